@@ -1,0 +1,41 @@
+//! Estimators of the chain, and what they believe.
+//!
+//! * [`Belief`]: the estimated chain and its covariance in minimal tangent coordinates.
+//! * [`Estimator`]: takes a movement and its observation, revises the belief.
+//! * [`Rls`]: recursive least squares, (2)–(5) of the paper: an extended Kalman filter with a constant state.
+//! * [`Gradient`]: the stochastic gradient, the paper's baseline.
+
+mod belief;
+mod gradient;
+mod rls;
+
+pub use belief::Belief;
+pub use gradient::Gradient;
+pub use rls::{Rls, StabilisingNoise};
+
+use crate::sensing::Observation;
+
+/// Revises a belief after each movement.
+pub trait Estimator: Send {
+    /// What is believed now.
+    fn belief(&self) -> &Belief;
+
+    /// Takes in what was observed after moving to `positions` (rad or m, one per joint).
+    fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError>;
+}
+
+/// What an update found before it changed the belief.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Update {
+    /// Normalised innovation squared, `(y − h)ᵀ S⁻¹ (y − h)` with `S = H P Hᵀ + R`, and its degrees of freedom; `None`
+    /// for a miss and for an estimator without a covariance.
+    pub nis: Option<(f64, usize)>,
+}
+
+/// Why an estimator could not take in an observation. Its belief stays as it was.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EstimationError {
+    /// The update left the range of numbers.
+    #[error("the estimate diverged: {0}")]
+    Diverged(&'static str),
+}

@@ -1,0 +1,204 @@
+//! Recursive least squares: an extended Kalman filter whose state does not move.
+//!
+//! The paper's equations, in minimal tangent coordinates (x becomes the chart's origin, + becomes a retraction):
+//!
+//! ```text
+//! S = H P Hᵀ + R,   K = P Hᵀ S⁻¹                    (4)
+//! x ← x ⊞ K (y − h(x, θ))                           (2)
+//! P ← J [(I − K H) P (I − K H)ᵀ + K R Kᵀ] Jᵀ        (3), J carries P to the chart at the new x
+//! P ← P + σn² I                                     (5), on the steps that the schedule names
+//! ```
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::{Belief, EstimationError, Estimator, Update};
+use crate::{
+    kinematics::jacobian::jacobian,
+    sensing::{Observation, isotropic},
+};
+
+/// The stabilising noise of (5) and when it is added.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StabilisingNoise {
+    /// σn², added to every tangent coordinate: m² for points, rad² for directions.
+    pub variance: f64,
+    /// The first movement after which it is added, counted from 1.
+    pub first_step: u64,
+    /// It is added again after every so many movements.
+    pub every: u64,
+}
+
+impl StabilisingNoise {
+    fn is_due(&self, step: u64) -> bool {
+        step >= self.first_step && (step - self.first_step).is_multiple_of(self.every.max(1))
+    }
+}
+
+/// Recursive least squares after Martinez-Cantin, Lopes and Montesano 2010.
+#[derive(Clone, Debug)]
+pub struct Rls {
+    belief: Belief,
+    covariance: DMatrix<f64>,
+    stabilising: Option<StabilisingNoise>,
+    step: u64,
+}
+
+impl Rls {
+    /// Starts from `belief`, with `covariance` as prior P₀.
+    pub fn new(belief: Belief, covariance: DMatrix<f64>, stabilising: Option<StabilisingNoise>) -> Self {
+        Self { belief: Belief { covariance: Some(covariance.clone()), ..belief }, covariance, stabilising, step: 0 }
+    }
+
+    /// The update (2)–(4) with what was seen; the covariance before (5).
+    fn corrected(
+        &self,
+        positions: &[f64],
+        measured: &Vector3<f64>,
+    ) -> Result<(crate::kinematics::Chain, DMatrix<f64>, f64), EstimationError> {
+        let (chain, layout, p) = (&self.belief.chain, &self.belief.layout, &self.covariance);
+        let noise = isotropic(self.belief.noise_m2);
+        let (predicted, h) = jacobian(chain, layout, positions);
+        let innovation = measured - predicted.coords;
+        let gain_numerator = p * h.transpose();
+        let s = (&h * &gain_numerator).fixed_view::<3, 3>(0, 0).into_owned() + noise;
+        let s_inverse =
+            s.cholesky().ok_or(EstimationError::Diverged("the innovation covariance is not positive"))?.inverse();
+        let k = gain_numerator * s_inverse;
+        let delta: DVector<f64> = &k * innovation;
+        let shrink = DMatrix::identity(p.nrows(), p.ncols()) - &k * &h;
+        let joseph = &shrink * p * shrink.transpose() + &k * noise * k.transpose();
+        let transport = chain.transport(layout, &delta);
+        let covariance = &transport * joseph * transport.transpose();
+        let nis = (innovation.transpose() * s_inverse * innovation).x;
+        if !(delta.iter().chain(covariance.iter()).all(|x| x.is_finite()) && nis.is_finite()) {
+            return Err(EstimationError::Diverged("an update was not a finite number"));
+        }
+        Ok((chain.retract(layout, &delta), covariance, nis))
+    }
+}
+
+impl Estimator for Rls {
+    fn belief(&self) -> &Belief {
+        &self.belief
+    }
+
+    fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
+        let mut update = Update::default();
+        if let Some(measured) = observation.position() {
+            let (chain, covariance, nis) = self.corrected(positions, &measured.coords)?;
+            self.belief.chain = chain;
+            self.covariance = covariance;
+            update.nis = Some((nis, 3));
+        }
+        self.step += 1;
+        if let Some(noise) = self.stabilising.filter(|noise| noise.is_due(self.step)) {
+            for k in 0..self.covariance.nrows() {
+                self.covariance[(k, k)] += noise.variance;
+            }
+        }
+        symmetrise(&mut self.covariance);
+        self.belief.covariance = Some(self.covariance.clone());
+        Ok(update)
+    }
+}
+
+/// Removes the rounding error that would let P drift from symmetry over thousands of updates.
+fn symmetrise(matrix: &mut DMatrix<f64>) {
+    for column in 0..matrix.ncols() {
+        for row in 0..column {
+            let mean = 0.5 * (matrix[(row, column)] + matrix[(column, row)]);
+            matrix[(row, column)] = mean;
+            matrix[(column, row)] = mean;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::Point3;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::kinematics::{TangentLayout, laws::random_chain};
+
+    fn random_filter(seed: u64, stabilising: Option<StabilisingNoise>) -> (Rls, ChaCha8Rng) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let chain = random_chain(&mut rng, 6);
+        let layout = Arc::new(TangentLayout::new(&chain.joints, &[], true));
+        let covariance = DMatrix::identity(layout.dimension(), layout.dimension()) * 0.2;
+        let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-4 };
+        (Rls::new(belief, covariance, stabilising), rng)
+    }
+
+    fn random_update(filter: &mut Rls, rng: &mut ChaCha8Rng) {
+        let theta: Vec<f64> = (0..6).map(|_| rng.random_range(-1.5..1.5)).collect();
+        // Half of the markers near the prediction, half anywhere: innovations small and absurd.
+        let near = filter.belief().chain.marker_at(&theta);
+        let spread = if rng.random_range(0..2) == 0 { 0.01 } else { 1.0 };
+        let measured = near + Vector3::from_fn(|_, _| rng.random_range(-spread..spread));
+        let observation = if rng.random_range(0..10) == 0 { Observation::Missed } else { Observation::Seen(measured) };
+        filter.update(&theta, &observation).expect("a finite update");
+    }
+
+    #[test]
+    fn covariance_stays_symmetric_and_positive_over_ten_thousand_updates() {
+        let noise = StabilisingNoise { variance: 1e-6, first_step: 1, every: 3 };
+        for (seed, stabilising) in [(1, None), (2, Some(noise))] {
+            let (mut filter, mut rng) = random_filter(seed, stabilising);
+            for step in 0..10_000 {
+                random_update(&mut filter, &mut rng);
+                if step % 100 == 99 {
+                    let p = filter.belief().covariance.as_ref().expect("a covariance");
+                    assert_eq!(p, &p.transpose(), "step {step}");
+                    let least = p.clone().symmetric_eigenvalues().min();
+                    assert!(least > 0.0, "step {step}: least eigenvalue {least}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn agrees_with_the_information_form_on_a_small_step() {
+        // One update with a measurement at the prediction moves nothing, and P⁻¹ grows by HᵀR⁻¹H.
+        let (mut filter, _) = random_filter(3, None);
+        let theta = [0.3, -0.5, 0.9, 0.1, -1.0, 0.4];
+        let before = filter.belief().clone();
+        let (predicted, h) = jacobian(&before.chain, &before.layout, &theta);
+        let update = filter.update(&theta, &Observation::Seen(predicted)).expect("an update");
+        let information = before.covariance.expect("a covariance").try_inverse().expect("positive")
+            + h.transpose() * &h / before.noise_m2;
+        let expected = information.try_inverse().expect("positive");
+        assert!((filter.belief().covariance.as_ref().expect("a covariance") - expected).amax() < 1e-9);
+        let moved = before.chain.local(&before.layout, &filter.belief().chain).expect("in the chart");
+        assert!(moved.amax() < 1e-12);
+        assert!(update.nis.is_some_and(|(nis, dof)| nis.abs() < 1e-12 && dof == 3));
+    }
+
+    #[test]
+    fn a_miss_changes_no_estimate_and_counts_as_a_step() {
+        let noise = StabilisingNoise { variance: 0.5, first_step: 2, every: 2 };
+        let (mut filter, _) = random_filter(4, Some(noise));
+        let before = filter.belief().clone();
+        let trace = |filter: &Rls| filter.belief().covariance.as_ref().map_or(0.0, DMatrix::trace);
+        let start = trace(&filter);
+        filter.update(&[0.0; 6], &Observation::Missed).expect("an update");
+        assert_eq!(filter.belief().chain, before.chain);
+        assert_eq!(trace(&filter), start);
+        filter.update(&[0.0; 6], &Observation::Missed).expect("an update");
+        let added = 0.5 * before.layout.dimension() as f64;
+        assert!((trace(&filter) - start - added).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_measurement_that_is_no_number_is_refused_and_leaves_the_belief() {
+        let (mut filter, _) = random_filter(5, None);
+        let before = filter.belief().clone();
+        let result = filter.update(&[0.1; 6], &Observation::Seen(Point3::new(f64::NAN, 0.0, 0.0)));
+        assert!(matches!(result, Err(EstimationError::Diverged(_))));
+        assert_eq!(filter.belief().chain, before.chain);
+        assert_eq!(filter.belief().covariance, before.covariance);
+    }
+}

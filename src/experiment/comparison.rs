@@ -1,0 +1,307 @@
+//! A comparison of learners over many seeds.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Experiment, StepReport, metrics::Metrics};
+
+/// Many runs of the same learners, one per seed: `compare --json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct Comparison {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Steps of every run.
+    pub steps: u64,
+    /// The learners.
+    pub learners: Vec<LearnerComparison>,
+}
+
+/// One learner over many seeds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct LearnerComparison {
+    /// Its name.
+    pub name: String,
+    /// Its runs, in the order of the seeds.
+    pub runs: Vec<SeedRun>,
+    /// When they converged.
+    pub summary: Summary,
+    /// The errors by number of movements, over the runs.
+    pub curve: Vec<Curve>,
+    /// How long choosing one movement took, milliseconds.
+    pub selection_ms: SelectionTime,
+}
+
+/// One run of one learner.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct SeedRun {
+    /// Its seed.
+    pub seed: u64,
+    /// First movement of the final stretch within the thresholds, confirmed by 20 more; null if there is none.
+    pub converged_at: Option<u64>,
+    /// Movements made.
+    pub movements: u64,
+    /// Movements after which the marker was not seen.
+    pub misses: u64,
+    /// The errors at the end.
+    #[serde(rename = "final")]
+    pub last: RunSummary,
+}
+
+/// The errors of one run at its end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct RunSummary {
+    /// See [`Metrics::orientation_deg`].
+    pub orientation_deg: Option<f64>,
+    /// See [`Metrics::axis_deg`].
+    pub axis_deg: Option<f64>,
+    /// See [`Metrics::location_m`].
+    pub location_m: Option<f64>,
+    /// See [`Metrics::prediction_m`].
+    pub prediction_m: Option<f64>,
+    /// See [`Metrics::prediction_mean_m`].
+    pub prediction_mean_m: Option<f64>,
+}
+
+impl From<&Metrics> for RunSummary {
+    fn from(metrics: &Metrics) -> Self {
+        Self {
+            orientation_deg: metrics.orientation_deg,
+            axis_deg: metrics.axis_deg,
+            location_m: metrics.location_m,
+            prediction_m: metrics.prediction_m,
+            prediction_mean_m: metrics.prediction_mean_m,
+        }
+    }
+}
+
+/// When the runs of a learner converged. A run that did not counts as infinitely late: a quantile that falls on one is
+/// null. Quantiles are nearest-rank, but the median of an even number is the mean of its two middle runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct Summary {
+    /// How many runs.
+    pub runs: usize,
+    /// How many converged.
+    pub converged: usize,
+    /// The median run.
+    pub median_converged_at: Option<f64>,
+    /// The run at the 90th percentile.
+    pub p90_converged_at: Option<f64>,
+    /// The last run; null unless all converged.
+    pub max_converged_at: Option<f64>,
+}
+
+/// The errors after so many movements, over the runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct Curve {
+    /// Movements made.
+    pub movements: u64,
+    /// See [`Metrics::orientation_deg`].
+    pub orientation_deg: Option<Quantiles>,
+    /// See [`Metrics::axis_deg`].
+    pub axis_deg: Option<Quantiles>,
+    /// See [`Metrics::location_m`].
+    pub location_m: Option<Quantiles>,
+    /// See [`Metrics::prediction_m`].
+    pub prediction_m: Option<Quantiles>,
+    /// See [`Metrics::prediction_mean_m`].
+    pub prediction_mean_m: Option<Quantiles>,
+}
+
+/// One error over the runs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct Quantiles {
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Median.
+    pub median: f64,
+    /// Lower quartile.
+    pub q25: f64,
+    /// Upper quartile.
+    pub q75: f64,
+}
+
+/// Wall time of choosing one movement.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct SelectionTime {
+    /// Median over all movements of all runs, milliseconds.
+    pub median: Option<f64>,
+    /// 95th percentile, milliseconds.
+    pub p95: Option<f64>,
+}
+
+/// What is kept of one run of all learners.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    seed: u64,
+    learners: Vec<LearnerTrace>,
+}
+
+#[derive(Clone, Debug)]
+struct LearnerTrace {
+    name: String,
+    converged_at: Option<u64>,
+    movements: u64,
+    misses: u64,
+    errors: Vec<RunSummary>,
+    selection_ms: Vec<f64>,
+}
+
+impl Trace {
+    /// Runs `experiment` for `steps` steps and calls `tick` after each.
+    pub fn run(mut experiment: Experiment, steps: u64, mut tick: impl FnMut()) -> Result<Self, super::ExperimentError> {
+        let mut learners: Vec<LearnerTrace> = experiment
+            .description()
+            .learners
+            .iter()
+            .map(|learner| LearnerTrace {
+                name: learner.name.clone(),
+                converged_at: None,
+                movements: 0,
+                misses: 0,
+                errors: Vec::with_capacity(steps as usize + 1),
+                selection_ms: Vec::with_capacity(steps as usize),
+            })
+            .collect();
+        let mut take = |report: &StepReport| {
+            for (trace, learner) in learners.iter_mut().zip(&report.learners) {
+                trace.errors.push(RunSummary::from(&learner.metrics));
+                trace.selection_ms.extend(learner.movement.as_ref().map(|movement| movement.selection_ms));
+                (trace.movements, trace.misses) = (learner.metrics.movements, learner.metrics.misses);
+            }
+        };
+        take(experiment.latest());
+        for _ in 0..steps {
+            take(experiment.step()?);
+            tick();
+        }
+        for (trace, verdict) in learners.iter_mut().zip(&experiment.verdicts) {
+            trace.converged_at = verdict.convergence.converged_at();
+        }
+        Ok(Self { seed: experiment.description().seed, learners })
+    }
+}
+
+impl Comparison {
+    /// Puts together the runs of one scenario, in the order given.
+    pub fn of(scenario: &str, steps: u64, traces: &[Trace]) -> Self {
+        let count = traces.first().map_or(0, |trace| trace.learners.len());
+        let learners = (0..count).map(|index| LearnerComparison::of(index, steps, traces)).collect();
+        Self { scenario: scenario.to_owned(), steps, learners }
+    }
+}
+
+impl LearnerComparison {
+    fn of(index: usize, steps: u64, traces: &[Trace]) -> Self {
+        let of_learner = || traces.iter().map(|trace| (trace.seed, &trace.learners[index]));
+        let runs: Vec<SeedRun> = of_learner()
+            .map(|(seed, trace)| SeedRun {
+                seed,
+                converged_at: trace.converged_at,
+                movements: trace.movements,
+                misses: trace.misses,
+                last: trace.errors.last().copied().unwrap_or_default(),
+            })
+            .collect();
+        let curve = (0..=steps)
+            .map(|movements| {
+                let over_runs = |error: fn(&RunSummary) -> Option<f64>| {
+                    let values = of_learner().filter_map(|(_, trace)| error(trace.errors.get(movements as usize)?));
+                    Quantiles::of(values.collect())
+                };
+                Curve {
+                    movements,
+                    orientation_deg: over_runs(|errors| errors.orientation_deg),
+                    axis_deg: over_runs(|errors| errors.axis_deg),
+                    location_m: over_runs(|errors| errors.location_m),
+                    prediction_m: over_runs(|errors| errors.prediction_m),
+                    prediction_mean_m: over_runs(|errors| errors.prediction_mean_m),
+                }
+            })
+            .collect();
+        let mut times: Vec<f64> = of_learner().flat_map(|(_, trace)| trace.selection_ms.iter().copied()).collect();
+        times.sort_by(f64::total_cmp);
+        Self {
+            name: of_learner().next().map(|(_, trace)| trace.name.clone()).unwrap_or_default(),
+            summary: Summary::of(runs.iter().map(|run| run.converged_at)),
+            runs,
+            curve,
+            selection_ms: SelectionTime { median: median(&times), p95: nearest_rank(&times, 0.95) },
+        }
+    }
+}
+
+impl Summary {
+    /// The summary of runs by when they converged.
+    pub fn of(converged_at: impl Iterator<Item = Option<u64>>) -> Self {
+        let mut late: Vec<f64> = converged_at.map(|at| at.map_or(f64::INFINITY, |at| at as f64)).collect();
+        late.sort_by(f64::total_cmp);
+        let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
+        Self {
+            runs: late.len(),
+            converged: late.iter().filter(|at| at.is_finite()).count(),
+            median_converged_at: finite(median(&late)),
+            p90_converged_at: finite(nearest_rank(&late, 0.9)),
+            max_converged_at: finite(late.last().copied()),
+        }
+    }
+}
+
+impl Quantiles {
+    fn of(mut values: Vec<f64>) -> Option<Self> {
+        values.sort_by(f64::total_cmp);
+        Some(Self {
+            mean: values.iter().sum::<f64>() / values.len() as f64,
+            median: median(&values)?,
+            q25: nearest_rank(&values, 0.25)?,
+            q75: nearest_rank(&values, 0.75)?,
+        })
+    }
+}
+
+/// The median of sorted values.
+fn median(sorted: &[f64]) -> Option<f64> {
+    let count = sorted.len();
+    match count {
+        0 => None,
+        _ if count % 2 == 1 => Some(sorted[count / 2]),
+        _ => Some(0.5 * (sorted[count / 2 - 1] + sorted[count / 2])),
+    }
+}
+
+/// The smallest of sorted values that a fraction `q` of them does not exceed.
+fn nearest_rank(sorted: &[f64], q: f64) -> Option<f64> {
+    let rank = (q * sorted.len() as f64).ceil().max(1.0) as usize;
+    sorted.get(rank - 1).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_did_not_converge_is_infinitely_late() {
+        let summary = Summary::of([Some(10), None, Some(30), Some(20)].into_iter());
+        assert_eq!((summary.runs, summary.converged), (4, 3));
+        assert_eq!(summary.median_converged_at, Some(25.0));
+        assert_eq!(summary.p90_converged_at, None);
+        assert_eq!(summary.max_converged_at, None);
+        assert_eq!(Summary::of([Some(1), None].into_iter()).median_converged_at, None);
+        assert_eq!(Summary::of([].into_iter()).median_converged_at, None);
+    }
+
+    #[test]
+    fn quantiles_are_nearest_rank() {
+        let values: Vec<f64> = (1..=20).map(f64::from).collect();
+        assert_eq!(nearest_rank(&values, 0.9), Some(18.0));
+        assert_eq!(nearest_rank(&values, 0.25), Some(5.0));
+        assert_eq!(median(&values), Some(10.5));
+        assert_eq!(Quantiles::of(vec![]), None);
+    }
+}

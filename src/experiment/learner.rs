@@ -1,0 +1,142 @@
+//! One learner of a comparison: an estimator, a policy, and what was seen so far.
+
+use rand_chacha::ChaCha8Rng;
+use web_time::Instant;
+
+use super::{
+    metrics::{self, Evaluation, Metrics},
+    report::{LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays},
+};
+use crate::{
+    estimation::{Estimator, Update},
+    kinematics::Chain,
+    selection::{Actions, Policy, Selection, SelectionError, Weights},
+    sensing::Observation,
+};
+
+/// Steps in a row for which the expected error must stay below the target before a learner calls itself settled.
+const SETTLING_STEPS: u32 = 5;
+
+/// What a learner is told: nothing here comes from the truth.
+pub struct Learner {
+    /// Its name, estimator and policy.
+    pub description: LearnerDescription,
+    /// Revises its belief.
+    pub estimator: Box<dyn Estimator>,
+    /// Chooses its movements.
+    pub policy: Box<dyn Policy>,
+    /// What it may do.
+    pub actions: Actions,
+    /// The weights of its criterion and of its trace.
+    pub weights: Weights,
+    /// Configurations over which it judges itself.
+    pub workspace: Vec<Vec<f64>>,
+    /// It calls itself settled when its expected prediction error stays below this, metres.
+    pub settled_below_m: f64,
+    /// Random numbers of its policy.
+    pub rng: ChaCha8Rng,
+    /// How it has fared.
+    pub record: Record,
+}
+
+/// Counters of one learner.
+#[derive(Clone, Debug, Default)]
+pub struct Record {
+    movements: u64,
+    misses: u64,
+    steps_below_target: u32,
+    failure: Option<String>,
+}
+
+impl Learner {
+    /// Chooses the next movement and says how long that took, in milliseconds. `None` once the learner has failed.
+    pub(super) fn choose(&mut self) -> Result<Option<(Selection, f64)>, SelectionError> {
+        if self.record.failure.is_some() {
+            return Ok(None);
+        }
+        let start = Instant::now();
+        match self.policy.select(self.estimator.belief(), &self.actions, &mut self.rng) {
+            Ok(selection) => Ok(Some((selection, start.elapsed().as_secs_f64() * 1e3))),
+            Err(error @ SelectionError::NoFiniteCriterion) => {
+                self.record.failure = Some(error.to_string());
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Takes in what was seen after `selection`.
+    pub(super) fn learn(
+        &mut self,
+        (selection, selection_ms): (Selection, f64),
+        observation: &Observation,
+        truth: Option<&Chain>,
+    ) -> (MovementReport, Update) {
+        let configuration = selection.movement.configuration.clone();
+        let predicted = self.estimator.belief().chain.marker_at(&configuration);
+        self.actions.use_up(&selection.movement);
+        self.record.movements += 1;
+        self.record.misses += u64::from(*observation == Observation::Missed);
+        let update = self.estimator.update(&configuration, observation).unwrap_or_else(|error| {
+            self.record.failure = Some(error.to_string());
+            Update::default()
+        });
+        let report = MovementReport {
+            predicted_marker_m: array(&predicted.coords),
+            measured_marker_m: observation.position().map(|position| array(&position.coords)),
+            estimated_skeleton_m: arrays(&self.estimator.belief().chain.skeleton(&configuration)),
+            true_skeleton_m: truth.map(|truth| arrays(&truth.skeleton(&configuration))),
+            row: selection.movement.row,
+            configuration,
+            criterion: selection.criterion,
+            gain: selection.gain,
+            evaluations: selection.evaluations,
+            selection_ms,
+            partition: selection.partition,
+        };
+        (report, update)
+    }
+
+    /// The learner as it stands, judged against the truth where one is known.
+    pub(super) fn report(
+        &mut self,
+        movement: Option<MovementReport>,
+        update: Update,
+        evaluation: &Evaluation,
+        truth: Option<&Chain>,
+    ) -> LearnerReport {
+        let belief = self.estimator.belief();
+        let (estimate, layout) = (&belief.chain, &*belief.layout);
+        let expected = belief.expected_error_m(&self.workspace);
+        if expected.is_some_and(|error| error < self.settled_below_m) {
+            self.record.steps_below_target += 1;
+        } else {
+            self.record.steps_below_target = 0;
+        }
+        let prediction = evaluation.prediction_m(estimate);
+        let nees = truth.and_then(|truth| metrics::nees(belief, truth));
+        let metrics = Metrics {
+            orientation_deg: truth.and_then(|truth| metrics::orientation_deg(estimate, truth, layout)),
+            axis_deg: truth.and_then(|truth| metrics::axis_deg(estimate, truth, layout)),
+            location_m: truth.and_then(|truth| metrics::location_m(estimate, truth, layout)),
+            prediction_m: prediction.map(|(rms, _)| rms),
+            prediction_mean_m: prediction.map(|(_, mean)| mean),
+            expected_prediction_m: expected,
+            trace: belief.covariance.as_ref().map(|covariance| self.weights.trace(covariance)),
+            nis: update.nis.map(|(nis, _)| nis),
+            nis_dof: update.nis.map(|(_, dof)| dof),
+            nees,
+            nees_dof: nees.map(|_| layout.dimension()),
+            movements: self.record.movements,
+            misses: self.record.misses,
+            settled: self.record.steps_below_target >= SETTLING_STEPS,
+        };
+        LearnerReport {
+            name: self.description.name.clone(),
+            movement,
+            estimate: ModelReport::of_belief(belief),
+            metrics,
+            failure: self.record.failure.clone(),
+        }
+    }
+}

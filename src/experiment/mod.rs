@@ -1,0 +1,146 @@
+//! Several learners in one world, step by step.
+//!
+//! At every step each learner chooses a movement, the world shows it the marker there, and it revises its belief. All
+//! learners start from the same estimate and see the same noise. One [`StepReport`] per step is all that the outside
+//! reads.
+
+mod comparison;
+mod convergence;
+mod learner;
+mod metrics;
+mod report;
+mod result;
+mod streams;
+mod world;
+
+pub use comparison::{
+    Comparison, Curve, LearnerComparison, Quantiles, RunSummary, SeedRun, SelectionTime, Summary, Trace,
+};
+pub use convergence::{CONFIRMATION, Convergence, Thresholds};
+pub use learner::{Learner, Record};
+pub use metrics::{Evaluation, Metrics, axis_deg, location_m, nees, orientation_deg};
+pub use report::{
+    Description, JointDescription, JointReport, LearnerDescription, LearnerReport, ModelReport, MovementReport,
+    StepReport,
+};
+pub use result::{JointModel, LearnerResult, MarkerModel, Model, RunResult};
+pub use streams::Stream;
+pub use world::{NoiseSequence, World};
+
+use crate::{estimation::Update, selection::SelectionError};
+
+/// A running comparison of learners.
+pub struct Experiment {
+    description: Description,
+    world: World,
+    noise: NoiseSequence,
+    learners: Vec<Learner>,
+    evaluation: Evaluation,
+    verdicts: Vec<Verdict>,
+    latest: StepReport,
+}
+
+/// What is known of one learner's run so far.
+struct Verdict {
+    convergence: Convergence,
+    settled_at: Option<u64>,
+}
+
+/// Why a step could not be made. The experiment stays as it was.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ExperimentError {
+    /// A learner could not choose.
+    #[error("learner `{learner}` cannot choose its next movement: {source}")]
+    Selection {
+        /// Its name.
+        learner: String,
+        /// Why.
+        source: SelectionError,
+    },
+}
+
+impl Experiment {
+    /// A comparison of `learners` in `world`, judged over `evaluation`; step 0 is reported at once.
+    pub fn new(description: Description, world: World, learners: Vec<Learner>, evaluation: Evaluation) -> Self {
+        let verdicts = learners
+            .iter()
+            .map(|_| Verdict { convergence: Convergence::new(description.thresholds), settled_at: None })
+            .collect();
+        let noise = NoiseSequence::new(description.seed);
+        let latest = StepReport { step: 0, learners: Vec::new() };
+        let mut experiment = Self { description, world, noise, learners, evaluation, verdicts, latest };
+        let truth = experiment.world.truth();
+        let reports = experiment
+            .learners
+            .iter_mut()
+            .map(|learner| learner.report(None, Update::default(), &experiment.evaluation, truth))
+            .collect();
+        experiment.conclude(StepReport { step: 0, learners: reports });
+        experiment
+    }
+
+    /// What stays the same from step to step.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// The report of the latest step.
+    pub fn latest(&self) -> &StepReport {
+        &self.latest
+    }
+
+    /// How many steps can still be made; `None` without an end.
+    pub fn remaining(&self) -> Option<usize> {
+        self.learners.iter().filter_map(|learner| learner.actions.remaining()).min()
+    }
+
+    /// The truth, for those who judge: reports, recordings, bounds.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// One movement of every learner.
+    pub fn step(&mut self) -> Result<&StepReport, ExperimentError> {
+        // All choose before any moves, so that a failed choice leaves the experiment as it was.
+        let choices = self
+            .learners
+            .iter_mut()
+            .map(|learner| {
+                learner
+                    .choose()
+                    .map_err(|source| ExperimentError::Selection { learner: learner.description.name.clone(), source })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let noise = self.noise.draw();
+        let truth = self.world.truth();
+        let reports = self
+            .learners
+            .iter_mut()
+            .zip(choices)
+            .map(|(learner, choice)| {
+                let (movement, update) = match choice {
+                    Some(choice) => {
+                        let observation = self.world.observe(&choice.0.movement, &noise);
+                        let (movement, update) = learner.learn(choice, &observation, truth);
+                        (Some(movement), update)
+                    }
+                    None => (None, Update::default()),
+                };
+                learner.report(movement, update, &self.evaluation, truth)
+            })
+            .collect();
+        self.conclude(StepReport { step: self.latest.step + 1, learners: reports });
+        Ok(&self.latest)
+    }
+
+    fn conclude(&mut self, report: StepReport) {
+        for (verdict, learner) in self.verdicts.iter_mut().zip(&report.learners) {
+            let metrics = &learner.metrics;
+            verdict.convergence.observe(report.step, metrics.orientation_deg, metrics.location_m);
+            if metrics.settled && verdict.settled_at.is_none() {
+                verdict.settled_at = Some(metrics.movements);
+            }
+        }
+        self.latest = report;
+    }
+}

@@ -1,0 +1,192 @@
+//! What an experiment tells the outside: one [`Description`] at the start, one [`StepReport`] after each step.
+//!
+//! Everything that shows or stores (recordings, tables, HTTP, the page) reads these and nothing else. Lengths are in
+//! metres, angles in radians unless a name says otherwise, all positions in the frame of the measurements.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::{convergence::Thresholds, metrics::Metrics};
+use crate::{
+    estimation::Belief,
+    kinematics::{Chain, JointKind},
+    selection::Partition,
+};
+
+/// What stays the same from step to step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct Description {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// One line about the scenario.
+    pub title: String,
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Version of body-schema.
+    pub version: String,
+    /// The joints, base first.
+    pub joints: Vec<JointDescription>,
+    /// Number of learned parameters in tangent coordinates.
+    pub parameters: usize,
+    /// The learners, in the order of every report.
+    pub learners: Vec<LearnerDescription>,
+    /// The thresholds of `converged_at`.
+    pub thresholds: Thresholds,
+    /// How many movements there are at most (a recorded data set ends); null without an end.
+    pub movements_available: Option<usize>,
+    /// The true arm at θ = 0; null where no truth is known.
+    pub truth: Option<ModelReport>,
+}
+
+/// A joint as the scenario describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct JointDescription {
+    /// Its name.
+    pub name: String,
+    /// Revolute or prismatic.
+    pub kind: JointKind,
+    /// Whether its axis is learned, or known and held fixed.
+    pub learned: bool,
+    /// Its limits, rad (revolute) or m (prismatic).
+    pub limits: [f64; 2],
+}
+
+/// A learner of the comparison.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct LearnerDescription {
+    /// Its name in the scenario.
+    pub name: String,
+    /// Its estimator: `rls` or `gradient`.
+    pub estimator: String,
+    /// Its policy: `active` or `random`.
+    pub policy: String,
+}
+
+/// All learners after one step. Step 0 is the start: no movement yet, the initial estimate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct StepReport {
+    /// The step, counted from 0.
+    pub step: u64,
+    /// The learners, in the order of the description.
+    pub learners: Vec<LearnerReport>,
+}
+
+/// One learner after one step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct LearnerReport {
+    /// Its name.
+    pub name: String,
+    /// The movement of this step, chosen and predicted before the update; null at step 0 and after a failure.
+    pub movement: Option<MovementReport>,
+    /// The estimate after the update.
+    pub estimate: ModelReport,
+    /// The metrics after the update.
+    pub metrics: Metrics,
+    /// Why the learner stopped learning, if it did (a diverged estimate); null otherwise.
+    pub failure: Option<String>,
+}
+
+/// A movement: how it was chosen, what was expected, what was seen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct MovementReport {
+    /// The configuration θ, rad or m per joint.
+    pub configuration: Vec<f64>,
+    /// The row of the recorded data set; null in a simulated world.
+    pub row: Option<usize>,
+    /// The marker as predicted before the measurement, metres.
+    pub predicted_marker_m: [f64; 3],
+    /// The measured marker, metres; null for a miss.
+    pub measured_marker_m: Option<[f64; 3]>,
+    /// The arm in this configuration as estimated after the update: axis points in order, then the marker, metres.
+    pub estimated_skeleton_m: Vec<[f64; 3]>,
+    /// The true arm in this configuration; null where no truth is known.
+    pub true_skeleton_m: Option<Vec<[f64; 3]>>,
+    /// The criterion C(θ) of the choice; null for a policy without one.
+    pub criterion: Option<f64>,
+    /// tr(W P) − C(θ), the fall of the trace that was expected.
+    pub gain: Option<f64>,
+    /// How many configurations were evaluated to choose this one.
+    pub evaluations: usize,
+    /// How long the choice took, milliseconds of wall time.
+    pub selection_ms: f64,
+    /// The minimiser's partition of the joint box. Too large for every report: recordings hold it, JSON does not.
+    #[serde(skip)]
+    pub partition: Option<Partition>,
+}
+
+/// A chain at θ = 0, with its uncertainty if it is an estimate that keeps one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct ModelReport {
+    /// The joints, base first.
+    pub joints: Vec<JointReport>,
+    /// The marker at θ = 0, metres.
+    pub marker_m: [f64; 3],
+    /// Covariance of the marker, m², row by row; null if it is known or no covariance is kept.
+    pub marker_covariance_m2: Option<[[f64; 3]; 3]>,
+}
+
+/// The axis of one joint at θ = 0.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct JointReport {
+    /// Unit direction of the axis.
+    pub axis: [f64; 3],
+    /// A point on the axis (the pivot of its chart), metres; null for a prismatic joint.
+    pub point_m: Option<[f64; 3]>,
+    /// Covariance of the point, m², row by row: rank 2, flat along the axis.
+    pub point_covariance_m2: Option<[[f64; 3]; 3]>,
+    /// Covariance of the direction, rad², row by row: rank 2, flat along the axis.
+    pub direction_covariance_rad2: Option<[[f64; 3]; 3]>,
+}
+
+impl ModelReport {
+    /// A chain without uncertainty.
+    pub fn of_chain(chain: &Chain) -> Self {
+        let joints = chain
+            .joints
+            .iter()
+            .map(|joint| JointReport {
+                axis: array(&joint.direction()),
+                point_m: joint.line().map(|line| array(&line.point.coords)),
+                point_covariance_m2: None,
+                direction_covariance_rad2: None,
+            })
+            .collect();
+        Self { joints, marker_m: array(&chain.marker.coords), marker_covariance_m2: None }
+    }
+
+    /// A belief with what it holds of uncertainty.
+    pub fn of_belief(belief: &Belief) -> Self {
+        let mut model = Self::of_chain(&belief.chain);
+        for (index, joint) in model.joints.iter_mut().enumerate() {
+            joint.point_covariance_m2 = belief.point_covariance(index).map(|p| rows(&p));
+            joint.direction_covariance_rad2 = belief.direction_covariance(index).map(|p| rows(&p));
+        }
+        model.marker_covariance_m2 = belief.hand_marker_covariance().map(|p| rows(&p));
+        model
+    }
+
+    /// The arm at θ = 0: axis points in order, then the marker, metres.
+    pub fn skeleton_m(&self) -> Vec<[f64; 3]> {
+        self.joints.iter().filter_map(|joint| joint.point_m).chain([self.marker_m]).collect()
+    }
+}
+
+pub(super) fn array(v: &Vector3<f64>) -> [f64; 3] {
+    [v.x, v.y, v.z]
+}
+
+pub(super) fn arrays(points: &[Point3<f64>]) -> Vec<[f64; 3]> {
+    points.iter().map(|point| array(&point.coords)).collect()
+}
+
+fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    matrix.transpose().into()
+}

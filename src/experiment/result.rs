@@ -1,0 +1,159 @@
+//! The outcome of a run: the metrics at its end and the learned models, to take away and use.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Experiment, convergence::Thresholds, metrics::Metrics, report::array};
+use crate::{
+    estimation::Belief,
+    kinematics::{JointKind, chart},
+};
+
+/// The outcome of one run: `result.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct RunResult {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Version of body-schema that computed this.
+    pub version: String,
+    /// Steps made.
+    pub steps: u64,
+    /// The thresholds of `converged_at`.
+    pub thresholds: Thresholds,
+    /// The learners.
+    pub learners: Vec<LearnerResult>,
+}
+
+/// The outcome of one learner.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct LearnerResult {
+    /// Its name.
+    pub name: String,
+    /// Its estimator.
+    pub estimator: String,
+    /// Its policy.
+    pub policy: String,
+    /// First movement of the final stretch within the thresholds, confirmed by 20 more; null if there is none.
+    pub converged_at: Option<u64>,
+    /// First movement at which the learner called itself settled; null if it did not.
+    pub settled_at: Option<u64>,
+    /// Why the learner stopped learning, if it did.
+    pub failure: Option<String>,
+    /// The metrics at the end.
+    pub metrics: Metrics,
+    /// The learned model.
+    pub model: Model,
+}
+
+/// A learned chain with its covariance, at θ = 0, in the frame of the measurements.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct Model {
+    /// The joints, base first.
+    pub joints: Vec<JointModel>,
+    /// The marker on the hand.
+    pub marker: MarkerModel,
+    /// Covariance of all learned parameters in tangent coordinates, row by row; null if the estimator keeps none.
+    /// Coordinates are joint by joint those listed in `coordinates`, then those of the marker.
+    pub covariance: Option<Vec<Vec<f64>>>,
+}
+
+/// A learned joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct JointModel {
+    /// Its name.
+    pub name: String,
+    /// Revolute or prismatic.
+    pub kind: JointKind,
+    /// Whether it was learned, or known and held fixed.
+    pub learned: bool,
+    /// Unit direction of the axis.
+    pub axis: [f64; 3],
+    /// A point on the axis, metres; null for a prismatic joint.
+    pub point_m: Option<[f64; 3]>,
+    /// The chart's basis: two unit vectors ⟂ axis along which point (m) and direction (rad) move.
+    pub basis: [[f64; 3]; 2],
+    /// Indices of this joint's coordinates in the covariance: two of the point (revolute only), two of the direction.
+    pub coordinates: Vec<usize>,
+}
+
+/// The marker on the hand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct MarkerModel {
+    /// Its position at θ = 0, metres.
+    pub position_m: [f64; 3],
+    /// Whether it was learned.
+    pub learned: bool,
+    /// Indices of its coordinates in the covariance: x, y, z (m).
+    pub coordinates: Vec<usize>,
+}
+
+impl Model {
+    fn new(belief: &Belief, names: &[String]) -> Self {
+        let layout = &belief.layout;
+        let joints = belief
+            .chain
+            .joints
+            .iter()
+            .enumerate()
+            .map(|(index, joint)| {
+                let basis = chart::basis(&joint.direction());
+                let coordinates = [layout.point(index), layout.direction(index)];
+                JointModel {
+                    name: names.get(index).cloned().unwrap_or_default(),
+                    kind: joint.kind(),
+                    learned: layout.is_learned(index),
+                    axis: array(&joint.direction()),
+                    point_m: joint.line().map(|line| array(&line.point.coords)),
+                    basis: [array(&basis.column(0).into_owned()), array(&basis.column(1).into_owned())],
+                    coordinates: coordinates.into_iter().flatten().flatten().collect(),
+                }
+            })
+            .collect();
+        let marker = MarkerModel {
+            position_m: array(&belief.chain.marker.coords),
+            learned: layout.marker().is_some(),
+            coordinates: layout.marker().into_iter().flatten().collect(),
+        };
+        let covariance =
+            belief.covariance.as_ref().map(|p| p.row_iter().map(|row| row.iter().copied().collect()).collect());
+        Self { joints, marker, covariance }
+    }
+}
+
+impl Experiment {
+    /// The outcome so far.
+    pub fn result(&self) -> RunResult {
+        let description = self.description();
+        let names: Vec<String> = description.joints.iter().map(|joint| joint.name.clone()).collect();
+        let learners = self
+            .learners
+            .iter()
+            .zip(&self.latest.learners)
+            .zip(&self.verdicts)
+            .map(|((learner, report), verdict)| LearnerResult {
+                name: report.name.clone(),
+                estimator: learner.description.estimator.clone(),
+                policy: learner.description.policy.clone(),
+                converged_at: verdict.convergence.converged_at(),
+                settled_at: verdict.settled_at,
+                failure: report.failure.clone(),
+                metrics: report.metrics.clone(),
+                model: Model::new(learner.estimator.belief(), &names),
+            })
+            .collect();
+        RunResult {
+            scenario: description.scenario.clone(),
+            seed: description.seed,
+            version: description.version.clone(),
+            steps: self.latest.step,
+            thresholds: description.thresholds,
+            learners,
+        }
+    }
+}

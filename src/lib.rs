@@ -1,0 +1,8 @@
+//! Learn a robot's kinematic body schema from a few well-chosen movements.
+pub mod estimation;
+pub mod experiment;
+pub mod kinematics;
+pub mod optimize;
+pub mod scenario;
+pub mod selection;
+pub mod sensing;

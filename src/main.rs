@@ -1,0 +1,2 @@
+//! Learn a robot's kinematic body schema from a few well-chosen movements.
+fn main() {}

@@ -1,0 +1,17 @@
+//! DIRECT and DIRECT-l; the parent module documents the algorithms.
+
+mod classes;
+mod hull;
+mod lineage;
+mod minimize;
+mod partition;
+mod search;
+mod settings;
+mod ternary;
+
+pub use hull::HullPoint;
+pub use minimize::{Batch, Minimum, minimize};
+pub use partition::{Partition, Rectangle};
+pub use search::Direct;
+pub use settings::{DirectError, Settings, Variant};
+pub use ternary::MAX_LEVEL;

@@ -1,0 +1,42 @@
+//! The scenarios that are embedded in the program.
+
+use super::{Scenario, ScenarioError, error::similar};
+
+/// A scenario file that is part of the program.
+#[derive(Clone, Copy, Debug)]
+pub struct Builtin {
+    /// Its name.
+    pub name: &'static str,
+    /// Its text.
+    pub text: &'static str,
+}
+
+macro_rules! builtins {
+    ($($name:literal),* $(,)?) => {
+        &[$(Builtin { name: $name, text: include_str!(concat!("../../scenarios/", $name, ".toml")) }),*]
+    };
+}
+
+/// All of them, simplest first.
+pub const BUILTIN: &[Builtin] = builtins!["arm-6dof", "arm-12dof", "tiago-mocap"];
+
+/// The data files that they name.
+const DATA: &[(&str, &str)] = &[("tiago-mocap.csv", include_str!("../../scenarios/tiago-mocap.csv"))];
+
+/// The built-in scenario of that name.
+pub fn builtin(name: &str) -> Result<Scenario, ScenarioError> {
+    let names = || BUILTIN.iter().map(|builtin| builtin.name);
+    let Some(found) = BUILTIN.iter().find(|builtin| builtin.name == name) else {
+        return Err(ScenarioError::UnknownScenario {
+            name: name.to_owned(),
+            suggested: similar(name, names()).map(str::to_owned),
+            known: names().map(str::to_owned).collect(),
+        });
+    };
+    Scenario::parse(&format!("scenarios/{name}.toml"), found.text, &|file| {
+        DATA.iter()
+            .find(|(name, _)| *name == file)
+            .map(|(_, text)| (*text).to_owned())
+            .ok_or_else(|| "is not among the built-in data".to_owned())
+    })
+}

@@ -1,0 +1,246 @@
+//! From a scenario and a seed to an experiment: everything that is drawn is drawn here.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, Rotation3, UnitVector3, Vector3};
+use rand::{RngExt, seq::SliceRandom};
+use rand_chacha::ChaCha8Rng;
+
+use super::{
+    ErrorDraw, EstimatorKind, InitialError, LearnerSpec, PolicyKind, Recording, Scenario, ScenarioError, WorldSpec,
+};
+use crate::{
+    estimation::{Belief, Estimator, Gradient, Rls},
+    experiment::{Description, Evaluation, Experiment, Learner, ModelReport, Record, Stream, World},
+    kinematics::{Chain, Joint, registration::register},
+    selection::{Actions, Active, Movement, Policy, Random, Weights, draw_configuration},
+    sensing::MarkerTracker,
+};
+
+/// Configurations over which the prediction error is judged in a simulated world.
+const EVALUATION_SIZE: usize = 200;
+/// Configurations over which a learner judges itself.
+const WORKSPACE_SIZE: usize = 32;
+
+/// What learners are told at the start. Nothing in it comes from the truth but through the drawn initial estimate.
+struct Briefing {
+    initial: Chain,
+    actions: Actions,
+    workspace: Vec<Vec<f64>>,
+}
+
+impl Scenario {
+    /// The experiment of a seed with the named learners; with all of the scenario's if none are named.
+    pub fn experiment(&self, seed: u64, learners: Option<&[String]>) -> Result<Experiment, ScenarioError> {
+        let (world, evaluation, briefing) = self.draw(seed)?;
+        self.assemble(seed, &self.chosen(learners)?, world, evaluation, &briefing)
+    }
+
+    /// The learners of these names, in this order.
+    pub fn chosen(&self, names: Option<&[String]>) -> Result<Vec<LearnerSpec>, ScenarioError> {
+        let Some(names) = names else { return Ok(self.learners.clone()) };
+        if names.is_empty() {
+            return Err(ScenarioError::NoLearner);
+        }
+        let mut chosen: Vec<LearnerSpec> = Vec::new();
+        for name in names {
+            let spec = self.learners.iter().find(|spec| spec.name == *name);
+            let spec = spec.ok_or_else(|| ScenarioError::UnknownLearner {
+                scenario: self.name.clone(),
+                name: name.clone(),
+                known: self.learners.iter().map(|spec| spec.name.clone()).collect(),
+            })?;
+            if chosen.contains(spec) {
+                return Err(ScenarioError::RepeatedLearner(name.clone()));
+            }
+            chosen.push(spec.clone());
+        }
+        Ok(chosen)
+    }
+
+    fn draw(&self, seed: u64) -> Result<(World, Evaluation, Briefing), ScenarioError> {
+        match &self.world {
+            WorldSpec::Simulated { sigma_m, initial_error } => {
+                let truth = self.robot.chain.clone();
+                let limits = &self.robot.limits;
+                let draw = |stream: Stream, count: usize| -> Vec<Vec<f64>> {
+                    let mut rng = stream.rng(seed);
+                    (0..count).map(|_| draw_configuration(limits, &mut rng)).collect()
+                };
+                let targets = draw(Stream::Evaluation, EVALUATION_SIZE)
+                    .into_iter()
+                    .map(|theta| (theta.clone(), truth.marker_at(&theta)))
+                    .collect();
+                let briefing = Briefing {
+                    initial: self.perturbed(initial_error, &mut Stream::InitialEstimate.rng(seed)),
+                    actions: Actions::Box(limits.clone()),
+                    workspace: draw(Stream::Workspace, WORKSPACE_SIZE),
+                };
+                let world = World::Simulated { truth, tracker: MarkerTracker { sigma_m: *sigma_m } };
+                Ok((world, Evaluation { targets }, briefing))
+            }
+            WorldSpec::Measured { recording, held_out } => self.draw_measured(seed, recording, *held_out),
+        }
+    }
+
+    /// Holds rows out, and registers the nominal chain to the others.
+    fn draw_measured(
+        &self,
+        seed: u64,
+        recording: &Recording,
+        held_out: usize,
+    ) -> Result<(World, Evaluation, Briefing), ScenarioError> {
+        let mut rows: Vec<usize> = (0..recording.markers_m.len()).collect();
+        rows.shuffle(&mut Stream::HeldOut.rng(seed));
+        let (test, training) = rows.split_at_mut(held_out);
+        training.sort_unstable();
+        let pair = |row: &usize| (recording.configurations[*row].clone(), recording.markers_m[*row]);
+        let data: Vec<_> = training.iter().map(pair).collect();
+        let registration = register(&self.robot.chain, &data).map_err(|source| ScenarioError::Registration {
+            scenario: self.name.clone(),
+            seed,
+            source,
+        })?;
+        let movement =
+            |row: &usize| Movement { configuration: recording.configurations[*row].clone(), row: Some(*row) };
+        let briefing = Briefing {
+            initial: registration.chain,
+            actions: Actions::Pool(training.iter().map(movement).collect()),
+            workspace: data.into_iter().map(|(theta, _)| theta).collect(),
+        };
+        let evaluation = Evaluation { targets: test.iter().map(pair).collect() };
+        Ok((World::Measured { markers_m: recording.markers_m.clone() }, evaluation, briefing))
+    }
+
+    /// The true chain with the error of the initial estimate: for each learned joint three Euler angles, then for a
+    /// revolute one three coordinates; at last the marker.
+    fn perturbed(&self, error: &InitialError, rng: &mut ChaCha8Rng) -> Chain {
+        let mut chain = self.robot.chain.clone();
+        let layout = &self.robot.layout;
+        for (index, joint) in chain.joints.iter_mut().enumerate().filter(|(index, _)| layout.is_learned(*index)) {
+            debug_assert!(layout.direction(index).is_some());
+            let angles = error.draw(error.angle_rad, rng);
+            let turn = Rotation3::from_euler_angles(angles.x, angles.y, angles.z);
+            let turned = |w: &UnitVector3<f64>| UnitVector3::new_normalize(turn * w.into_inner());
+            match joint {
+                Joint::Revolute(line) => {
+                    line.direction = turned(&line.direction);
+                    line.point += error.draw(error.point_m, rng);
+                }
+                Joint::Prismatic(direction) => *direction = turned(direction),
+            }
+        }
+        if layout.marker().is_some() {
+            chain.marker += error.draw(error.marker_m, rng);
+        }
+        chain
+    }
+
+    fn assemble(
+        &self,
+        seed: u64,
+        specs: &[LearnerSpec],
+        world: World,
+        evaluation: Evaluation,
+        briefing: &Briefing,
+    ) -> Result<Experiment, ScenarioError> {
+        let layout = Arc::new(self.robot.layout.clone());
+        let prior_sd = self.prior.standard_deviations(&layout);
+        let weights = Weights::new(self.selection.units, &layout, &prior_sd);
+        let learners = specs
+            .iter()
+            .map(|spec| {
+                let belief = Belief {
+                    chain: briefing.initial.clone(),
+                    layout: layout.clone(),
+                    covariance: None,
+                    noise_m2: self.filter.noise_m2,
+                };
+                let estimator: Box<dyn Estimator> = match spec.estimator {
+                    EstimatorKind::Rls => {
+                        let prior = DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd));
+                        Box::new(Rls::new(belief, prior, self.filter.stabilising))
+                    }
+                    EstimatorKind::Gradient => Box::new(Gradient::new(belief, self.gradient_rate)),
+                };
+                let policy: Box<dyn Policy> = match spec.policy {
+                    PolicyKind::Active => Box::new(Active::new(weights.clone(), self.selection.search)),
+                    PolicyKind::Random => Box::new(Random),
+                };
+                Learner {
+                    description: spec.description(),
+                    estimator,
+                    policy,
+                    actions: briefing.actions.clone(),
+                    weights: weights.clone(),
+                    workspace: briefing.workspace.clone(),
+                    settled_below_m: self.settled_below_m,
+                    rng: Stream::Policy.rng(seed),
+                    record: Record::default(),
+                }
+            })
+            .collect();
+        let description = Description {
+            scenario: self.name.clone(),
+            title: self.title.clone(),
+            seed,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            joints: self.robot.joint_descriptions(),
+            parameters: layout.dimension(),
+            learners: specs.iter().map(LearnerSpec::description).collect(),
+            thresholds: self.thresholds,
+            movements_available: briefing.actions.remaining(),
+            truth: world.truth().map(ModelReport::of_chain),
+        };
+        Ok(Experiment::new(description, world, learners, evaluation))
+    }
+}
+
+impl InitialError {
+    fn draw(&self, size: f64, rng: &mut ChaCha8Rng) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| match self.draw {
+            ErrorDraw::UpTo => size * rng.random_range(-1.0..=1.0),
+            ErrorDraw::Exactly => size * if rng.random::<bool>() { 1.0 } else { -1.0 },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::builtin;
+
+    /// No truth leaks: with the truth swapped behind the learners' backs, their first choices stay as they were, and
+    /// the choices after the first measurement do not.
+    #[test]
+    fn swapping_the_truth_changes_no_first_selection() {
+        for name in ["arm-6dof", "arm-12dof"] {
+            let scenario = builtin(name).expect("a built-in scenario");
+            let selections = |swap: bool| {
+                let (mut world, mut evaluation, briefing) = scenario.draw(11).expect("a world");
+                if let (true, World::Simulated { truth, .. }) = (swap, &mut world) {
+                    *truth = scenario.perturbed(
+                        &InitialError { draw: ErrorDraw::Exactly, angle_rad: 0.7, point_m: 0.3, marker_m: 0.1 },
+                        &mut Stream::InitialEstimate.rng(99),
+                    );
+                    for (theta, target) in &mut evaluation.targets {
+                        *target = truth.marker_at(theta);
+                    }
+                }
+                let specs = scenario.chosen(None).expect("learners");
+                let mut experiment =
+                    scenario.assemble(11, &specs, world, evaluation, &briefing).expect("an experiment");
+                [(); 2].map(|()| {
+                    let report = experiment.step().expect("a step");
+                    let chosen = |learner: &crate::experiment::LearnerReport| {
+                        learner.movement.as_ref().expect("a movement").configuration.clone()
+                    };
+                    report.learners.iter().map(chosen).collect::<Vec<_>>()
+                })
+            };
+            let ([first, second], [first_swapped, second_swapped]) = (selections(false), selections(true));
+            assert_eq!(first, first_swapped, "{name}");
+            assert_ne!(second[0], second_swapped[0], "{name}: the active learner must have seen another marker");
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! Scenario files: what robot, what world, what learners.
+//!
+//! A scenario is TOML, read in two stages: [`raw`] says which keys there are, and [`validate`] turns them into a
+//! [`Scenario`] whose values can be relied on. Every problem names the file, the line, the key and the mend. From a
+//! scenario and a seed, [`Scenario::experiment`] draws an experiment.
+
+mod builtin;
+mod data;
+mod error;
+mod experiment;
+mod raw;
+mod summary;
+mod validate;
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+
+pub use builtin::{BUILTIN, Builtin, builtin};
+pub use data::Recording;
+pub use error::{Problem, ScenarioError};
+pub use summary::{ScenarioSummary, WorldKind};
+
+use crate::{
+    estimation::StabilisingNoise,
+    experiment::{LearnerDescription, Thresholds},
+    kinematics::{Chain, Quantity, TangentLayout},
+    optimize::Settings,
+    selection::CriterionUnits,
+};
+
+/// A validated scenario.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// Its name.
+    pub name: String,
+    /// One line about it.
+    pub title: String,
+    /// Steps of a run unless told otherwise.
+    pub steps: u64,
+    /// The robot.
+    pub robot: Robot,
+    /// Where it moves.
+    pub world: WorldSpec,
+    /// Prior standard deviations.
+    pub prior: Prior,
+    /// Values of the recursive least squares.
+    pub filter: Filter,
+    /// Rate η of the stochastic gradient.
+    pub gradient_rate: f64,
+    /// How movements are chosen actively.
+    pub selection: SelectionSpec,
+    /// Thresholds of `converged_at`.
+    pub thresholds: Thresholds,
+    /// Expected prediction error below which a learner calls itself settled, metres.
+    pub settled_below_m: f64,
+    /// The learners it offers.
+    pub learners: Vec<LearnerSpec>,
+    /// The number of movements within which a learner promises to converge; what the convergence tests hold it to.
+    pub promises: BTreeMap<String, u64>,
+    /// The text it was read from.
+    pub source: String,
+}
+
+/// The robot of a scenario. In a simulated world this is the truth; in a measured one the nominal description.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    /// Joint names, base first.
+    pub names: Vec<String>,
+    /// The chain at θ = 0.
+    pub chain: Chain,
+    /// Which parameters are learned.
+    pub layout: TangentLayout,
+    /// Joint limits, rad or m.
+    pub limits: Vec<(f64, f64)>,
+}
+
+/// The world of a scenario.
+#[derive(Clone, Debug)]
+pub enum WorldSpec {
+    /// The robot's chain is the truth; the initial estimate is drawn around it.
+    Simulated {
+        /// Standard deviation of the tracker per coordinate, metres.
+        sigma_m: f64,
+        /// How wrong the initial estimate is.
+        initial_error: InitialError,
+    },
+    /// A recorded data set is replayed; the initial estimate is the nominal chain, registered to the training rows.
+    Measured {
+        /// The rows.
+        recording: Recording,
+        /// How many rows, drawn by seed, are held out for the prediction error.
+        held_out: usize,
+    },
+}
+
+/// How the error of the initial estimate is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InitialError {
+    /// Uniform up to the size, or exactly the size with random signs.
+    pub draw: ErrorDraw,
+    /// Size of each of the three Euler angles that turn an axis, radians.
+    pub angle_rad: f64,
+    /// Size of the shift of a point along each coordinate, metres.
+    pub point_m: f64,
+    /// Size of the shift of the marker along each coordinate, metres; 0 if it is known.
+    pub marker_m: f64,
+}
+
+/// The distribution of the initial error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ErrorDraw {
+    /// Uniform between minus and plus the size.
+    UpTo,
+    /// Minus or plus the size, with equal chance.
+    Exactly,
+}
+
+/// Prior standard deviations in tangent coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    /// Of a direction, radians.
+    pub direction_rad: f64,
+    /// Of a point, metres.
+    pub point_m: f64,
+    /// Of the marker, metres.
+    pub marker_m: f64,
+}
+
+impl Prior {
+    /// The standard deviation of every tangent coordinate.
+    pub fn standard_deviations(&self, layout: &TangentLayout) -> DVector<f64> {
+        let quantities = layout.quantities();
+        DVector::from_iterator(
+            quantities.len(),
+            quantities.iter().map(|quantity| match quantity {
+                Quantity::Direction => self.direction_rad,
+                Quantity::Point => self.point_m,
+                Quantity::Marker => self.marker_m,
+            }),
+        )
+    }
+}
+
+/// Values of the recursive least squares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Filter {
+    /// R = r I as the filter assumes it: r in m².
+    pub noise_m2: f64,
+    /// The stabilising noise of (5), if any.
+    pub stabilising: Option<StabilisingNoise>,
+}
+
+/// How movements are chosen actively.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SelectionSpec {
+    /// DIRECT's variant, ε and budget.
+    pub search: Settings,
+    /// The units of the criterion.
+    pub units: CriterionUnits,
+}
+
+/// A learner that a scenario offers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LearnerSpec {
+    /// Its name.
+    pub name: String,
+    /// Its estimator.
+    pub estimator: EstimatorKind,
+    /// Its policy.
+    pub policy: PolicyKind,
+}
+
+impl LearnerSpec {
+    fn description(&self) -> LearnerDescription {
+        LearnerDescription {
+            name: self.name.clone(),
+            estimator: self.estimator.name().to_owned(),
+            policy: self.policy.name().to_owned(),
+        }
+    }
+}
+
+/// The estimators that a scenario can name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EstimatorKind {
+    /// Recursive least squares.
+    Rls,
+    /// Stochastic gradient.
+    Gradient,
+}
+
+impl EstimatorKind {
+    /// Its name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rls => "rls",
+            Self::Gradient => "gradient",
+        }
+    }
+
+    fn keeps_covariance(self) -> bool {
+        self == Self::Rls
+    }
+}
+
+/// The policies that a scenario can name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PolicyKind {
+    /// Minimises the A-criterion.
+    Active,
+    /// Draws uniformly.
+    Random,
+}
+
+impl PolicyKind {
+    /// Its name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Active => "active",
+            Self::Random => "random",
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! What a scenario tells of itself to those who choose among scenarios.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Scenario, WorldSpec};
+use crate::experiment::{JointDescription, LearnerDescription, Thresholds};
+
+/// A scenario in brief.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct ScenarioSummary {
+    /// Its name.
+    pub name: String,
+    /// One line about it.
+    pub title: String,
+    /// Simulated or measured.
+    pub world: WorldKind,
+    /// The joints, base first.
+    pub joints: Vec<JointDescription>,
+    /// Number of learned parameters in tangent coordinates.
+    pub parameters: usize,
+    /// Steps of a run unless told otherwise.
+    pub steps: u64,
+    /// The learners it offers.
+    pub learners: Vec<LearnerDescription>,
+    /// The thresholds of `converged_at`.
+    pub thresholds: Thresholds,
+}
+
+/// Where movements are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub enum WorldKind {
+    /// A simulated arm whose truth is known to the judges.
+    Simulated,
+    /// A recorded data set without a known truth.
+    Measured,
+}
+
+impl Scenario {
+    /// The scenario in brief.
+    pub fn summary(&self) -> ScenarioSummary {
+        ScenarioSummary {
+            name: self.name.clone(),
+            title: self.title.clone(),
+            world: match self.world {
+                WorldSpec::Simulated { .. } => WorldKind::Simulated,
+                WorldSpec::Measured { .. } => WorldKind::Measured,
+            },
+            joints: self.robot.joint_descriptions(),
+            parameters: self.robot.layout.dimension(),
+            steps: self.steps,
+            learners: self.learners.iter().map(super::LearnerSpec::description).collect(),
+            thresholds: self.thresholds,
+        }
+    }
+}
+
+impl super::Robot {
+    pub(super) fn joint_descriptions(&self) -> Vec<JointDescription> {
+        (self.names.iter().zip(&self.chain.joints).zip(&self.limits).enumerate())
+            .map(|(index, ((name, joint), &(lower, upper)))| JointDescription {
+                name: name.clone(),
+                kind: joint.kind(),
+                learned: self.layout.is_learned(index),
+                limits: [lower, upper],
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,186 @@
+//! The A-criterion: the expected posterior error after one more observation.
+//!
+//! With the future observation simulated at the current estimate, (7) becomes
+//!
+//! ```text
+//! C(θ) = tr(W P_T) = tr(W P) − tr(S⁻¹ G W Gᵀ),    G = H P,   S = G Hᵀ + R
+//! ```
+//!
+//! W weighs the parameters (see [`Weights`]). The right side needs no posterior: for B candidates the Jacobians stack
+//! into one m × 3B matrix, and one product with P serves them all.
+//!
+//! The criterion adds square metres and square radians. W decides what a radian is worth.
+
+use nalgebra::{DMatrix, DVector, Dyn, Matrix3, U3};
+
+use super::SelectionError;
+use crate::{
+    estimation::Belief,
+    kinematics::{Quantity, TangentLayout, jacobian},
+    sensing::isotropic,
+};
+
+/// How the criterion compares metres with radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CriterionUnits {
+    /// One radian counts as this many metres: w = 1 for a direction, 1/L² for a point. The paper's implicit L is 1 m.
+    CharacteristicLength(f64),
+    /// Every parameter in units of its prior standard deviation σ₀: w = 1/σ₀².
+    Prior,
+}
+
+/// The diagonal of W, one weight per tangent coordinate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weights(DVector<f64>);
+
+impl Weights {
+    /// The weights of `layout` in the given units; `prior_sd` holds the prior standard deviation of every coordinate.
+    pub fn new(units: CriterionUnits, layout: &TangentLayout, prior_sd: &DVector<f64>) -> Self {
+        let weight = |(index, quantity): (usize, &Quantity)| match (units, quantity) {
+            (CriterionUnits::Prior, _) => prior_sd[index].powi(-2),
+            (CriterionUnits::CharacteristicLength(_), Quantity::Direction) => 1.0,
+            (CriterionUnits::CharacteristicLength(length), _) => length.powi(-2),
+        };
+        let quantities = layout.quantities();
+        Self(DVector::from_iterator(quantities.len(), quantities.iter().enumerate().map(weight)))
+    }
+
+    /// tr(W P).
+    pub fn trace(&self, covariance: &DMatrix<f64>) -> f64 {
+        self.0.iter().zip(covariance.diagonal().iter()).map(|(w, p)| w * p).sum()
+    }
+}
+
+/// The A-criterion under one belief.
+pub struct ACriterion<'a> {
+    belief: &'a Belief,
+    covariance: &'a DMatrix<f64>,
+    weights: &'a Weights,
+    trace: f64,
+}
+
+/// Candidates per batch product: enough to fill the matrix kernel, few enough to share among cores.
+const CHUNK: usize = 32;
+
+impl<'a> ACriterion<'a> {
+    /// The criterion at `belief`, which must hold a covariance.
+    pub fn new(belief: &'a Belief, weights: &'a Weights) -> Result<Self, SelectionError> {
+        let covariance = belief.covariance.as_ref().ok_or(SelectionError::NoCovariance)?;
+        Ok(Self { belief, covariance, weights, trace: weights.trace(covariance) })
+    }
+
+    /// tr(W P), the criterion before any further observation.
+    pub fn trace(&self) -> f64 {
+        self.trace
+    }
+
+    /// C(θ) of every candidate, in order. Chunks run on several cores with the feature `parallel`; the values do not
+    /// depend on how many.
+    pub fn evaluate<C: AsRef<[f64]> + Sync>(&self, candidates: &[C]) -> Vec<f64> {
+        #[cfg(feature = "parallel")]
+        if candidates.len() > CHUNK {
+            use rayon::prelude::*;
+            return candidates.par_chunks(CHUNK).flat_map_iter(|chunk| self.evaluate_chunk(chunk)).collect();
+        }
+        candidates.chunks(CHUNK).flat_map(|chunk| self.evaluate_chunk(chunk)).collect()
+    }
+
+    fn evaluate_chunk<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {
+        let m = self.belief.layout.dimension();
+        let mut stacked = DMatrix::zeros(m, 3 * candidates.len());
+        for (index, candidate) in candidates.iter().enumerate() {
+            let columns = stacked.generic_view_mut((0, 3 * index), (Dyn(m), U3));
+            jacobian::jacobian_transposed_into(&self.belief.chain, &self.belief.layout, candidate.as_ref(), columns);
+        }
+        let gains = self.covariance * &stacked;
+        let noise = isotropic(self.belief.noise_m2);
+        (0..candidates.len())
+            .map(|index| {
+                let h_t = stacked.fixed_columns::<3>(3 * index);
+                let g_t = gains.fixed_columns::<3>(3 * index);
+                let (mut s, mut g_w_g) = (noise, Matrix3::zeros());
+                for k in 0..m {
+                    let (h, g) = (h_t.row(k), g_t.row(k));
+                    s += h.transpose() * g;
+                    g_w_g += g.transpose() * g * self.weights.0[k];
+                }
+                let s = (s + s.transpose()) * 0.5;
+                s.cholesky().map_or(f64::INFINITY, |cholesky| self.trace - cholesky.solve(&g_w_g).trace())
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::kinematics::laws::random_chain;
+
+    fn random_belief(seed: u64) -> (Belief, Weights, ChaCha8Rng) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let chain = random_chain(&mut rng, 6);
+        let layout = Arc::new(TangentLayout::new(&chain.joints, &[], true));
+        let m = layout.dimension();
+        let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-0.5..0.5));
+        let covariance = &root * root.transpose() + DMatrix::identity(m, m) * 1e-3;
+        let prior_sd = DVector::from_fn(m, |_, _| rng.random_range(0.1..2.0));
+        let units =
+            if seed.is_multiple_of(2) { CriterionUnits::Prior } else { CriterionUnits::CharacteristicLength(0.3) };
+        let weights = Weights::new(units, &layout, &prior_sd);
+        (Belief { chain, layout, covariance: Some(covariance), noise_m2: 1e-2 }, weights, rng)
+    }
+
+    /// The posterior that the criterion abbreviates, built the long way.
+    fn trace_of_posterior(belief: &Belief, weights: &Weights, theta: &[f64]) -> f64 {
+        let p = belief.covariance.as_ref().expect("a covariance");
+        let (_, h) = jacobian::jacobian(&belief.chain, &belief.layout, theta);
+        let information = p.clone().try_inverse().expect("positive") + h.transpose() * &h / belief.noise_m2;
+        weights.trace(&information.try_inverse().expect("positive"))
+    }
+
+    #[test]
+    fn equals_the_weighted_trace_of_the_posterior() {
+        for seed in 0..40 {
+            let (belief, weights, mut rng) = random_belief(seed);
+            let criterion = ACriterion::new(&belief, &weights).expect("a covariance");
+            let candidates: Vec<Vec<f64>> =
+                (0..7).map(|_| (0..6).map(|_| rng.random_range(-2.0..2.0)).collect()).collect();
+            for (value, theta) in criterion.evaluate(&candidates).iter().zip(&candidates) {
+                let expected = trace_of_posterior(&belief, &weights, theta);
+                assert!((value - expected).abs() < 1e-8 * criterion.trace(), "seed {seed}: {value} {expected}");
+                assert!(*value <= criterion.trace());
+            }
+        }
+    }
+
+    #[test]
+    fn batches_equal_single_evaluations_to_the_last_bit_of_the_sum() {
+        let (belief, weights, mut rng) = random_belief(7);
+        let criterion = ACriterion::new(&belief, &weights).expect("a covariance");
+        let candidates: Vec<Vec<f64>> =
+            (0..150).map(|_| (0..6).map(|_| rng.random_range(-2.0..2.0)).collect()).collect();
+        let batch = criterion.evaluate(&candidates);
+        for (value, theta) in batch.iter().zip(&candidates) {
+            let single = criterion.evaluate(std::slice::from_ref(theta))[0];
+            assert!((value - single).abs() <= 1e-12 * criterion.trace());
+        }
+        assert_eq!(batch, criterion.evaluate(&candidates));
+    }
+
+    #[test]
+    fn weights_follow_the_units() {
+        let chain = random_chain(&mut ChaCha8Rng::seed_from_u64(9), 5);
+        let layout = TangentLayout::new(&chain.joints, &[], true);
+        let sd = DVector::from_element(layout.dimension(), 0.5);
+        assert!(Weights::new(CriterionUnits::Prior, &layout, &sd).0.iter().all(|w| *w == 4.0));
+        let weights = Weights::new(CriterionUnits::CharacteristicLength(0.1), &layout, &sd);
+        let marker = layout.marker().expect("learned");
+        assert!((weights.0[marker.start] - 100.0).abs() < 1e-9);
+        assert_eq!(weights.0[layout.direction(0).expect("learned").start], 1.0);
+    }
+}

@@ -1,0 +1,94 @@
+//! Which movement to make next.
+//!
+//! * [`ACriterion`]: the expected posterior error of (7), in the form that never builds a posterior.
+//! * [`Policy`]: chooses among [`Actions`], the whole joint box or a list of recorded movements.
+//! * [`Active`]: minimises the criterion, by DIRECT over a box or by trying all of a list.
+//! * [`Random`]: draws uniformly, the paper's comparison.
+
+mod active;
+mod criterion;
+mod random;
+
+pub(crate) use random::draw_configuration;
+
+use rand_chacha::ChaCha8Rng;
+
+pub use active::{Active, Leaf, Partition};
+pub use criterion::{ACriterion, CriterionUnits, Weights};
+pub use random::Random;
+
+use crate::{estimation::Belief, optimize::DirectError};
+
+/// The movements that may be chosen now.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Actions {
+    /// Any configuration inside the joint limits, `(lower, upper)` per joint, rad or m.
+    Box(Vec<(f64, f64)>),
+    /// One of a list, each at most once: a recorded data set.
+    Pool(Vec<Movement>),
+}
+
+impl Actions {
+    /// Takes a movement of the pool out of it; a box stays as it is.
+    pub fn use_up(&mut self, movement: &Movement) {
+        if let Self::Pool(pool) = self {
+            pool.retain(|candidate| candidate.row != movement.row);
+        }
+    }
+
+    /// How many movements are left; `None` for a box, which has no end.
+    pub fn remaining(&self) -> Option<usize> {
+        match self {
+            Self::Box(_) => None,
+            Self::Pool(pool) => Some(pool.len()),
+        }
+    }
+}
+
+/// A movement to make: where to, and which row of a recorded data set that is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Movement {
+    /// Joint positions, rad or m, one per joint.
+    pub configuration: Vec<f64>,
+    /// The row of the data set, counted from 0; `None` in a simulated world.
+    pub row: Option<usize>,
+}
+
+/// A chosen movement and what the choice rested on.
+#[derive(Clone, Debug)]
+pub struct Selection {
+    /// What to do.
+    pub movement: Movement,
+    /// C(θ) of the chosen movement; `None` for a policy without a criterion.
+    pub criterion: Option<f64>,
+    /// tr(W P) − C(θ): by how much the trace is expected to fall.
+    pub gain: Option<f64>,
+    /// How many configurations were evaluated.
+    pub evaluations: usize,
+    /// The minimiser's partition of the box, if it was searched by DIRECT.
+    pub partition: Option<Partition>,
+}
+
+/// Why no movement could be chosen.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SelectionError {
+    /// Every recorded movement has been used.
+    #[error("no movement is left: every row of the recorded data has been used")]
+    Exhausted,
+    /// The criterion needs a covariance.
+    #[error("active selection needs an estimator with a covariance; pair this one with the random policy")]
+    NoCovariance,
+    /// The minimiser refused its settings.
+    #[error("DIRECT: {0}")]
+    Search(DirectError),
+    /// No configuration has a finite criterion.
+    #[error("no configuration has a finite criterion: the belief has diverged")]
+    NoFiniteCriterion,
+}
+
+/// Chooses the next movement from what is believed.
+pub trait Policy: Send {
+    /// Chooses among `actions` under `belief`; `rng` is the policy's own stream.
+    fn select(&mut self, belief: &Belief, actions: &Actions, rng: &mut ChaCha8Rng)
+    -> Result<Selection, SelectionError>;
+}
