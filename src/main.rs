@@ -1,2 +1,20 @@
-//! Learn a robot's kinematic body schema from a few well-chosen movements.
-fn main() {}
+//! The command line of body-schema.
+
+use std::{io::Write, process::ExitCode};
+
+use clap::Parser;
+
+mod cli;
+
+fn main() -> ExitCode {
+    let arguments = cli::Arguments::parse();
+    match cli::run(arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if cli::is_closed_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            // Standard error may be closed; there is nobody left to tell then.
+            let _ = writeln!(std::io::stderr(), "error: {error:#}");
+            ExitCode::from(if cli::is_bad_input(&error) { 2 } else { 1 })
+        }
+    }
+}

@@ -6,6 +6,7 @@
 
 mod builtin;
 mod data;
+mod edit;
 mod error;
 mod experiment;
 mod raw;
@@ -18,6 +19,7 @@ use nalgebra::DVector;
 
 pub use builtin::{BUILTIN, Builtin, builtin};
 pub use data::Recording;
+pub use edit::edited;
 pub use error::{Problem, ScenarioError};
 pub use summary::{ScenarioSummary, WorldKind};
 
@@ -60,6 +62,18 @@ pub struct Scenario {
     pub promises: BTreeMap<String, u64>,
     /// The text it was read from.
     pub source: String,
+    /// The data file that it names, and its text.
+    pub data: Option<(String, String)>,
+}
+
+impl Scenario {
+    /// The text of a data file that this scenario has already read.
+    pub fn data_file(&self, file: &str) -> Result<String, String> {
+        match &self.data {
+            Some((name, text)) if name == file => Ok(text.clone()),
+            _ => Err("is not a data file of this scenario".to_owned()),
+        }
+    }
 }
 
 /// The robot of a scenario. In a simulated world this is the truth; in a measured one the nominal description.

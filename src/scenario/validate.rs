@@ -27,7 +27,7 @@ impl Scenario {
     pub fn parse(file: &str, text: &str, open: &dyn Fn(&str) -> Result<String, String>) -> Result<Self, ScenarioError> {
         let invalid = |problems| ScenarioError::Invalid { file: file.to_owned(), problems };
         let raw = raw::read(text).map_err(|problem| invalid(vec![problem]))?;
-        let mut check = Check { text, problems: Vec::new() };
+        let mut check = Check { text, data: None, problems: Vec::new() };
         let scenario = check.scenario(&raw, open);
         match scenario {
             Some(scenario) if check.problems.is_empty() => Ok(scenario),
@@ -39,6 +39,7 @@ impl Scenario {
 /// Collects problems while it converts. A value that cannot be converted is `None` and has left a problem behind.
 struct Check<'a> {
     text: &'a str,
+    data: Option<(String, String)>,
     problems: Vec<Problem>,
 }
 
@@ -112,6 +113,7 @@ impl Check<'_> {
             robot,
             world: world?,
             source: self.text.to_owned(),
+            data: self.data.take(),
         })
     }
 
@@ -298,6 +300,7 @@ impl Check<'_> {
             self.problem(measurements.held_out.span(), "measurements.held_out", what, mend);
             return None;
         }
+        self.data = Some((file.clone(), text));
         Some(WorldSpec::Measured { recording, held_out })
     }
 
@@ -316,7 +319,7 @@ impl Check<'_> {
 
     fn filter(&mut self, raw: &raw::Filter) -> Filter {
         let stabilising = raw.stabilising_noise.as_ref().map(|noise| StabilisingNoise {
-            variance: self.positive("filter.stabilising_noise.variance", &noise.variance),
+            variance: self.not_negative("filter.stabilising_noise.variance", &noise.variance),
             first_step: self.at_least_one("filter.stabilising_noise.first_step", &noise.first_step),
             every: self.at_least_one("filter.stabilising_noise.every", &noise.every),
         });

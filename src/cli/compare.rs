@@ -1,0 +1,132 @@
+//! `compare`: many seeds, in parallel.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use body_schema::{
+    experiment::{Comparison, LearnerComparison, Trace},
+    recording::comparison_csv,
+    scenario::{Scenario, ScenarioError},
+};
+use comfy_table::Table;
+use rayon::prelude::*;
+
+use super::{ScenarioArguments, Seeds, output, progress, steps_of};
+
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    scenario: ScenarioArguments,
+    /// Seeds: `20` for 1 to 20, or a range with both ends such as `101..120`
+    #[arg(long, default_value = "20", value_name = "SEEDS")]
+    seeds: Seeds,
+    /// Movements of every run [default: the scenario's]
+    #[arg(long, value_name = "N")]
+    steps: Option<u64>,
+    /// Write everything as JSON to FILE, or to standard output for `-`
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the curves as CSV to FILE
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Run on so many threads [default: one per core]; the outcome does not depend on it
+    #[arg(long, value_name = "N")]
+    threads: Option<std::num::NonZeroUsize>,
+}
+
+pub fn compare(arguments: &Arguments) -> Result<()> {
+    let (scenario, learners) = arguments.scenario.load()?;
+    let steps = steps_of(&scenario, arguments.steps)?;
+    let bar = progress::bar(
+        arguments.seeds.count() * steps,
+        &format!("{} × {} seeds", scenario.name, arguments.seeds.count()),
+    );
+    let comparison = super::on_threads(arguments.threads, || {
+        over_seeds(&scenario, learners, &arguments.seeds, steps, &|| bar.inc(1))
+    })?;
+    bar.finish_and_clear();
+    if let Some(path) = &arguments.csv {
+        comparison_csv(&comparison, output::create(path)?)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    if let Some(path) = &arguments.json {
+        output::write_json(path, &comparison)?;
+    }
+    if !arguments.json.as_deref().is_some_and(output::is_stdout) {
+        let Comparison { scenario, steps, .. } = &comparison;
+        let seeds = arguments.seeds.count();
+        output::say(format!("{scenario}: {seeds} seeds, {steps} movements each"))?;
+        output::say(table(&comparison))?;
+    }
+    Ok(())
+}
+
+/// Runs the learners over the seeds, on all cores; the outcome does not depend on how many there are.
+pub fn over_seeds(
+    scenario: &Scenario,
+    learners: Option<&[String]>,
+    seeds: &Seeds,
+    steps: u64,
+    tick: &(dyn Fn() + Sync),
+) -> Result<Comparison> {
+    let seeds: Vec<u64> = seeds.iter().collect();
+    let traces = seeds
+        .into_par_iter()
+        .map(|seed| Ok(Trace::run(scenario.experiment(seed, learners)?, steps, tick)?))
+        .collect::<Result<Vec<_>, ScenarioError>>()?;
+    Ok(Comparison::of(&scenario.name, steps, &traces))
+}
+
+fn table(comparison: &Comparison) -> Table {
+    let has_truth = comparison.learners.iter().any(|learner| {
+        learner.curve.last().is_some_and(|curve| curve.orientation_deg.is_some() || curve.location_m.is_some())
+    });
+    let end = |learner: &LearnerComparison| learner.curve.last().cloned();
+    let time = |learner: &LearnerComparison| output::number(learner.selection_ms.median, 3);
+    if !has_truth {
+        let rows = comparison.learners.iter().map(|learner| {
+            let mean_mm = |movements: usize| {
+                let error = learner.curve.get(movements).and_then(|curve| curve.prediction_mean_m);
+                output::number(error.map(|error| error.mean * 1e3), 2)
+            };
+            let last = comparison.steps as usize;
+            [learner.name.clone(), mean_mm(0), mean_mm(last / 4), mean_mm(last / 2), mean_mm(last), time(learner)]
+        });
+        let last = comparison.steps;
+        let at = |movements: u64| format!("after {movements} (mm)");
+        let header = [&at(0), &at(last / 4), &at(last / 2), &at(last)].map(String::as_str);
+        let mut table = output::table(["learner", header[0], header[1], header[2], header[3], "choice (ms)"], rows);
+        table.set_header(["prediction", header[0], header[1], header[2], header[3], "choice (ms)"]);
+        return table;
+    }
+    let rows = comparison.learners.iter().map(|learner| {
+        let (summary, end) = (&learner.summary, end(learner));
+        let misses: u64 = learner.runs.iter().map(|run| run.misses).sum();
+        let at_end = |value: Option<f64>, decimals| output::number(value, decimals);
+        [
+            learner.name.clone(),
+            format!("{}/{}", summary.converged, summary.runs),
+            output::number(summary.median_converged_at, 1),
+            output::number(summary.p90_converged_at, 0),
+            output::number(summary.max_converged_at, 0),
+            at_end(end.as_ref().and_then(|end| end.orientation_deg).map(|error| error.median), 2),
+            at_end(end.as_ref().and_then(|end| end.location_m).map(|error| error.median * 1e3), 1),
+            at_end(end.as_ref().and_then(|end| end.prediction_mean_m).map(|error| error.median * 1e3), 1),
+            misses.to_string(),
+            time(learner),
+        ]
+    });
+    let header = [
+        "learner",
+        "converged",
+        "median",
+        "90 %",
+        "worst",
+        "orient. (deg)",
+        "location (mm)",
+        "predict. (mm)",
+        "misses",
+        "choice (ms)",
+    ];
+    output::table(header, rows)
+}

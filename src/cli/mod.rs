@@ -1,0 +1,141 @@
+//! Commands, their arguments, and what becomes of their errors.
+
+mod compare;
+mod output;
+mod progress;
+mod run;
+mod scenarios;
+mod seeds;
+mod serve;
+mod sweep;
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use body_schema::scenario::{BUILTIN, Scenario, ScenarioError, builtin};
+use clap::{Parser, Subcommand};
+
+use seeds::Seeds;
+
+/// Learn a robot's kinematic body schema from a few well-chosen movements, and watch it happen.
+///
+/// Without a command: `serve`.
+#[derive(Debug, Parser)]
+#[command(version, about, max_term_width = 100, subcommand_negates_reqs = true)]
+pub struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Open the explorer: a web page and its HTTP interface
+    Serve(serve::Arguments),
+    /// Run the learners of a scenario once, and keep what you want of it
+    Run(run::Arguments),
+    /// Run the learners of a scenario over many seeds, and compare them
+    Compare(compare::Arguments),
+    /// Try a grid of values in a scenario, and rank them by a learner's own median
+    Sweep(sweep::Arguments),
+    /// List the built-in scenarios
+    Scenarios(scenarios::ListArguments),
+    /// Say whether a scenario file is valid, and if not, what to mend
+    Check(scenarios::CheckArguments),
+}
+
+/// Which scenario, and which of its learners.
+#[derive(Debug, clap::Args)]
+struct ScenarioArguments {
+    /// A built-in scenario (see `body-schema scenarios`) or the path of a scenario file
+    #[arg(value_name = "SCENARIO")]
+    scenario: String,
+    /// A learner of the scenario; repeat for several [default: all of them]
+    #[arg(long = "learner", value_name = "NAME")]
+    learners: Vec<String>,
+}
+
+impl ScenarioArguments {
+    /// The scenario and the names of the learners, checked against each other.
+    fn load(&self) -> Result<(Scenario, Option<&[String]>)> {
+        let scenario = load_scenario(&self.scenario)?;
+        let learners = (!self.learners.is_empty()).then_some(self.learners.as_slice());
+        scenario.chosen(learners)?;
+        Ok((scenario, learners))
+    }
+}
+
+/// Carries out a command.
+pub fn run(arguments: Arguments) -> Result<()> {
+    match arguments.command {
+        None => serve::serve(&serve::Arguments::default()),
+        Some(Command::Serve(arguments)) => serve::serve(&arguments),
+        Some(Command::Run(arguments)) => run::run(&arguments),
+        Some(Command::Compare(arguments)) => compare::compare(&arguments),
+        Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
+        Some(Command::Scenarios(arguments)) => scenarios::list(&arguments),
+        Some(Command::Check(arguments)) => scenarios::check(&arguments),
+    }
+}
+
+/// Runs `work` on so many threads, or on the common pool.
+fn on_threads<T: Send>(threads: Option<std::num::NonZeroUsize>, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+    match threads {
+        None => work(),
+        Some(count) => rayon::ThreadPoolBuilder::new()
+            .num_threads(count.get())
+            .build()
+            .with_context(|| format!("cannot start {count} threads"))?
+            .install(work),
+    }
+}
+
+/// Something that the user gave and can mend.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct BadInput(String);
+
+/// Whether the error lies in what was asked, and not in carrying it out.
+pub fn is_bad_input(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause.is::<BadInput>()
+            || cause.downcast_ref::<ScenarioError>().is_some_and(|error| !matches!(error, ScenarioError::Experiment(_)))
+    })
+}
+
+/// Whether the reader of our output went away, as `head` does: no failure.
+pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
+    })
+}
+
+/// A built-in scenario by name, or else a file by path.
+fn load_scenario(name: &str) -> Result<Scenario> {
+    let path = PathBuf::from(name);
+    if BUILTIN.iter().any(|builtin| builtin.name == name) {
+        return Ok(builtin(name)?);
+    }
+    let looks_like_a_path = path.extension().is_some() || name.contains(std::path::MAIN_SEPARATOR) || path.exists();
+    if !looks_like_a_path {
+        return Ok(builtin(name)?);
+    }
+    let text = std::fs::read_to_string(&path)
+        .map_err(|error| BadInput(format!("cannot read the scenario {}: {error}", path.display())))?;
+    let folder = path.parent().map(PathBuf::from).unwrap_or_default();
+    let open = |file: &str| std::fs::read_to_string(folder.join(file)).map_err(|error| error.to_string());
+    Ok(Scenario::parse(name, &text, &open)?)
+}
+
+/// How many steps to run: what was asked, else the scenario's own; no more than there are recorded movements.
+fn steps_of(scenario: &Scenario, asked: Option<u64>) -> Result<u64> {
+    let steps = asked.unwrap_or(scenario.steps);
+    let available = scenario.experiment(1, None).context("the scenario cannot start")?.remaining();
+    match available {
+        Some(available) if steps > available as u64 => Err(BadInput(format!(
+            "scenario `{}` replays recorded data with {available} movements, {steps} were asked; use --steps {available} or fewer",
+            scenario.name
+        ))
+        .into()),
+        _ => Ok(steps),
+    }
+}

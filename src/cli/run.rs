@@ -1,0 +1,112 @@
+//! `run`: one seed, with everything that can be kept of it.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use body_schema::{
+    experiment::{Experiment, RunResult},
+    recording::{Recorder, StepsCsv},
+};
+
+use super::{ScenarioArguments, output, progress, steps_of};
+
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    scenario: ScenarioArguments,
+    /// Seed of everything random: initial estimate, noise, random movements
+    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    seed: u64,
+    /// Movements to make [default: the scenario's]
+    #[arg(long, value_name = "N")]
+    steps: Option<u64>,
+    /// Write a Rerun recording to FILE (open it with Rerun 0.36)
+    #[arg(long, value_name = "FILE")]
+    rrd: Option<PathBuf>,
+    /// Write every step of every learner as CSV to FILE
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write the outcome and the learned models as JSON to FILE, or to standard output for `-`
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let (scenario, learners) = arguments.scenario.load()?;
+    let steps = steps_of(&scenario, arguments.steps)?;
+    let mut experiment = scenario.experiment(arguments.seed, learners)?;
+    let mut recorder = arguments.rrd.as_deref().map(|path| recorder(&experiment, path)).transpose()?;
+    let mut csv = arguments.csv.as_deref().map(|path| steps_csv(&experiment, path)).transpose()?;
+
+    let bar = progress::bar(steps, &scenario.name);
+    observe(&experiment, recorder.as_mut(), csv.as_mut())?;
+    for _ in 0..steps {
+        experiment.step()?;
+        observe(&experiment, recorder.as_mut(), csv.as_mut())?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+
+    if let Some(recorder) = recorder {
+        recorder.finish()?;
+    }
+    if let Some(csv) = csv {
+        csv.finish().context("cannot finish the CSV file")?;
+    }
+    let result = experiment.result();
+    if let Some(path) = &arguments.json {
+        output::write_json(path, &result)?;
+    }
+    if !arguments.json.as_deref().is_some_and(output::is_stdout) {
+        summarise(&result)?;
+        for path in [&arguments.rrd, &arguments.csv, &arguments.json].into_iter().flatten() {
+            output::say(format!("wrote {}", path.display()))?;
+        }
+    }
+    Ok(())
+}
+
+type CsvFile = StepsCsv<std::io::BufWriter<std::fs::File>>;
+
+fn recorder(experiment: &Experiment, path: &Path) -> Result<Recorder> {
+    Ok(Recorder::to_file(experiment.description(), path)?)
+}
+
+fn steps_csv(experiment: &Experiment, path: &Path) -> Result<CsvFile> {
+    StepsCsv::new(output::create(path)?, experiment.description())
+        .with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn observe(experiment: &Experiment, recorder: Option<&mut Recorder>, csv: Option<&mut CsvFile>) -> Result<()> {
+    if let Some(recorder) = recorder {
+        recorder.log(experiment.latest())?;
+    }
+    if let Some(csv) = csv {
+        csv.write(experiment.latest()).context("cannot write the CSV file")?;
+    }
+    Ok(())
+}
+
+fn summarise(result: &RunResult) -> Result<()> {
+    output::say(format!("{}, seed {}: {} movements each", result.scenario, result.seed, result.steps))?;
+    let rows = result.learners.iter().map(|learner| {
+        let metrics = &learner.metrics;
+        let verdict = match (&learner.failure, learner.converged_at) {
+            (Some(failure), _) => failure.clone(),
+            (None, Some(at)) => format!("converged at {at}"),
+            (None, None) if metrics.orientation_deg.is_none() && metrics.location_m.is_none() => "truth unknown".into(),
+            (None, None) => "not converged".into(),
+        };
+        [
+            learner.name.clone(),
+            output::number(metrics.orientation_deg, 2),
+            output::number(metrics.axis_deg, 2),
+            output::number(metrics.location_m.map(|error| error * 1e3), 1),
+            output::number(metrics.prediction_mean_m.map(|error| error * 1e3), 2),
+            metrics.misses.to_string(),
+            verdict,
+        ]
+    });
+    let header = ["learner", "orient. (deg)", "axis (deg)", "location (mm)", "predict. (mm)", "misses", "verdict"];
+    output::say(output::table(header, rows))
+}

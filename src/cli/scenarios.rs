@@ -1,0 +1,63 @@
+//! `scenarios` and `check`.
+
+use std::{io::Write, path::PathBuf};
+
+use anyhow::Result;
+use body_schema::scenario::{BUILTIN, ScenarioSummary, builtin};
+
+use super::{load_scenario, output};
+
+#[derive(Debug, clap::Args)]
+pub struct ListArguments {
+    /// Write the list as JSON to FILE, or to standard output for `-`
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+#[derive(Debug, clap::Args)]
+pub struct CheckArguments {
+    /// The path of a scenario file, or a built-in name
+    #[arg(value_name = "FILE")]
+    file: String,
+}
+
+pub fn list(arguments: &ListArguments) -> Result<()> {
+    let scenarios: Vec<ScenarioSummary> =
+        BUILTIN.iter().map(|found| Ok(builtin(found.name)?.summary())).collect::<Result<_>>()?;
+    if let Some(path) = &arguments.json {
+        return output::write_json(path, &scenarios);
+    }
+    let rows = scenarios.into_iter().map(|scenario| {
+        let learners: Vec<String> = scenario.learners.into_iter().map(|learner| learner.name).collect();
+        [
+            scenario.name,
+            scenario.joints.len().to_string(),
+            scenario.parameters.to_string(),
+            learners.join(" "),
+            scenario.title,
+        ]
+    });
+    let mut table = output::table(["scenario", "joints", "parameters", "learners", "about"], rows);
+    for column in table.column_iter_mut().skip(3) {
+        column.set_cell_alignment(comfy_table::CellAlignment::Left);
+    }
+    writeln!(std::io::stdout(), "{table}")?;
+    Ok(())
+}
+
+pub fn check(arguments: &CheckArguments) -> Result<()> {
+    let scenario = load_scenario(&arguments.file)?;
+    // What only a seed brings to light: a rigid fit that fails, say.
+    scenario.experiment(1, None)?;
+    let summary = scenario.summary();
+    writeln!(
+        std::io::stdout(),
+        "{}: valid scenario `{}`: {} joints, {} parameters to learn, learners {}",
+        arguments.file,
+        summary.name,
+        summary.joints.len(),
+        summary.parameters,
+        summary.learners.iter().map(|learner| learner.name.as_str()).collect::<Vec<_>>().join(", ")
+    )?;
+    Ok(())
+}
