@@ -15,6 +15,9 @@ use nalgebra::DVector;
 use super::{Belief, EstimationError, Estimator, Update};
 use crate::{kinematics::jacobian::jacobian, sensing::Observation};
 
+/// A step beyond this many metres or radians has nothing to do with a robot any more. (A NaN is not below it.)
+const LARGEST_STEP: f64 = 1e6;
+
 /// Steepest descent on one observation at a time, with a constant rate.
 #[derive(Clone, Debug)]
 pub struct Gradient {
@@ -39,8 +42,8 @@ impl Estimator for Gradient {
             let Belief { chain, layout, .. } = &self.belief;
             let (predicted, h) = jacobian(chain, layout, positions);
             let delta: DVector<f64> = h.transpose() * (measured - predicted) * self.rate;
-            if !delta.iter().all(|x| x.is_finite()) {
-                return Err(EstimationError::Diverged("the gradient was not a finite number"));
+            if !delta.iter().all(|x| x.abs() < LARGEST_STEP) {
+                return Err(EstimationError::Diverged("a gradient step left all bounds; the rate is too large"));
             }
             self.belief.chain = chain.retract(layout, &delta);
         }

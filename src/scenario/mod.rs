@@ -1,6 +1,6 @@
 //! Scenario files: what robot, what world, what learners.
 //!
-//! A scenario is TOML, read in two stages: [`raw`] says which keys there are, and [`validate`] turns them into a
+//! A scenario is TOML, read in two stages: `raw` says which keys there are, and `validate` turns them into a
 //! [`Scenario`] whose values can be relied on. Every problem names the file, the line, the key and the mend. From a
 //! scenario and a seed, [`Scenario::experiment`] draws an experiment.
 

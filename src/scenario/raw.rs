@@ -168,11 +168,20 @@ pub fn line_of(text: &str, offset: usize) -> usize {
     text.as_bytes().iter().take(offset).filter(|&&byte| byte == b'\n').count() + 1
 }
 
-/// Drops what `Spanned` adds to paths.
+/// Drops what `Spanned` adds to paths, but for the index of a sequence.
 fn readable_path(path: &str) -> String {
-    let parts: Vec<&str> =
-        path.split('.').filter(|part| !part.starts_with("$__") && *part != "?" && !part.is_empty()).collect();
-    parts.join(".")
+    let mut readable = String::new();
+    for part in path.split('.') {
+        let (name, index) = part.find('[').map_or((part, ""), |bracket| part.split_at(bracket));
+        if !(name.starts_with("$__") || name == "?" || name.is_empty()) {
+            if !readable.is_empty() {
+                readable.push('.');
+            }
+            readable.push_str(name);
+        }
+        readable.push_str(index);
+    }
+    readable
 }
 
 fn problem(text: &str, path: &str, error: &toml::de::Error) -> Problem {

@@ -1,0 +1,219 @@
+//! Scenario files as users write them: what is wrong is said with file, line, key and mend.
+
+use body_schema::scenario::{BUILTIN, Problem, Scenario, ScenarioError, builtin};
+
+const ARM: &str = include_str!("../scenarios/arm-6dof.toml");
+const TIAGO: &str = include_str!("../scenarios/tiago-mocap.toml");
+const TIAGO_CSV: &str = include_str!("../scenarios/tiago-mocap.csv");
+
+fn problems(text: &str, data: Result<&str, &str>) -> Vec<Problem> {
+    let open = |_: &str| data.map(str::to_owned).map_err(str::to_owned);
+    match Scenario::parse("my.toml", text, &open) {
+        Err(error @ ScenarioError::Invalid { .. }) => {
+            let message = error.to_string();
+            let ScenarioError::Invalid { file, problems } = error else { unreachable!("matched above") };
+            assert_eq!(file, "my.toml");
+            for problem in &problems {
+                assert!(message.contains(&format!("my.toml:{}", problem.line)), "{message}");
+                assert!(message.contains(&problem.key) && message.contains(&problem.mend), "{message}");
+                assert!(!problem.mend.is_empty() && !problem.what.is_empty(), "{message}");
+            }
+            problems
+        }
+        other => panic!("must be refused: {other:?}"),
+    }
+}
+
+/// Replaces `from` in the arm's file and returns the one problem, with the line on which the replacement stands.
+fn one(text: &str, from: &str, to: &str) -> (Problem, usize) {
+    assert!(text.contains(from), "the test's own premise: {from}");
+    let line = text[..text.find(from).expect("contained")].matches('\n').count() + 1;
+    let mut found = problems(&text.replacen(from, to, 1), Ok(TIAGO_CSV));
+    assert_eq!(found.len(), 1, "{found:?}");
+    (found.remove(0), line)
+}
+
+#[test]
+fn builtin_scenarios_are_valid_and_start() {
+    for found in BUILTIN {
+        let scenario = builtin(found.name).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(scenario.name, found.name);
+        let mut experiment = scenario.experiment(1, None).expect("starts");
+        experiment.step().expect("steps");
+    }
+}
+
+#[test]
+fn an_unknown_key_is_named_with_a_suggestion() {
+    let (problem, line) = one(ARM, "learn_marker = false", "learn_marker = false\ncolour = 3");
+    assert_eq!((problem.key.as_str(), problem.line), ("robot.colour", line + 1));
+    let (problem, line) = one(ARM, "evaluations = 300", "evaluation = 300");
+    assert_eq!((problem.key.as_str(), problem.line), ("selection.evaluation", line));
+    assert!(problem.mend.contains("`evaluations`"), "{problem}");
+}
+
+#[test]
+fn a_missing_unit_is_recognised() {
+    let (problem, line) = one(ARM, "sigma_m = 0.01", "sigma = 0.01");
+    assert_eq!((problem.key.as_str(), problem.line), ("sensor.sigma", line));
+    assert!(problem.mend.contains("`sigma_m`") && problem.mend.contains("unit"), "{problem}");
+    let (problem, line) = one(ARM, "limits_deg = [-90.0, 60.0]", "limits = [-90.0, 60.0]");
+    assert_eq!(problem.line, line);
+    assert!(problem.key.contains("limits") && problem.mend.contains("limits_deg"), "{problem}");
+}
+
+#[test]
+fn a_missing_key_is_named() {
+    let (problem, _) = one(ARM, "sigma_m = 0.01", "");
+    assert_eq!(problem.key, "sensor.sigma_m");
+    let (problem, _) = one(ARM, "limits_deg = [-90.0, 60.0]", "");
+    assert_eq!(problem.key, "robot.joint[1].limits_deg");
+}
+
+#[test]
+fn reversed_limits_are_refused_and_turned_round() {
+    let (problem, line) = one(ARM, "limits_deg = [-90.0, 60.0]", "limits_deg = [60.0, -90.0]");
+    assert_eq!((problem.key.as_str(), problem.line), ("robot.joint[1].limits_deg", line));
+    assert!(problem.mend.contains("[-90.0, 60.0]"), "{problem}");
+}
+
+#[test]
+fn an_axis_that_is_no_unit_vector_is_refused_and_normalised() {
+    let (problem, line) = one(ARM, "axis = [0.0, 1.0, 0.0]", "axis = [0.0, 3.0, 4.0]");
+    assert_eq!((problem.key.as_str(), problem.line), ("robot.joint[1].axis", line));
+    assert!(problem.mend.contains("[0.000000, 0.600000, 0.800000]"), "{problem}");
+    assert_eq!(one(ARM, "axis = [0.0, 1.0, 0.0]", "axis = [0.0, 0.0, 0.0]").0.key, "robot.joint[1].axis");
+}
+
+#[test]
+fn numbers_that_are_no_numbers_or_out_of_range_are_refused() {
+    for (from, to, key) in [
+        ("sigma_m = 0.01", "sigma_m = nan", "sensor.sigma_m"),
+        ("sigma_m = 0.01", "sigma_m = -0.01", "sensor.sigma_m"),
+        ("sigma_m = 0.01", "sigma_m = inf", "sensor.sigma_m"),
+        ("point_m = [0.291, 0.0, 0.0]", "point_m = [0.291, nan, 0.0]", "robot.joint[3].point_m"),
+        ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, nan, 0.0]", "robot.joint[1].axis"),
+        ("limits_deg = [-90.0, 60.0]", "limits_deg = [-90.0, nan]", "robot.joint[1].limits_deg"),
+        ("marker_m = [0.66, 0.02, 0.05]", "marker_m = [0.66, inf, 0.05]", "robot.marker_m"),
+        ("evaluations = 300", "evaluations = 0", "selection.evaluations"),
+        ("every = 1 ", "every = 0 ", "filter.stabilising_noise.every"),
+        ("steps = 1000", "steps = 0", "steps"),
+        ("direction_rad = 0.6", "direction_rad = 0.0", "prior.direction_rad"),
+    ] {
+        let (problem, line) = one(ARM, from, to);
+        assert_eq!((problem.key.as_str(), problem.line), (key, line), "{problem}");
+    }
+}
+
+#[test]
+fn wrong_types_and_broken_toml_are_located() {
+    let (problem, line) = one(ARM, "sigma_m = 0.01", "sigma_m = \"small\"");
+    assert_eq!((problem.key.as_str(), problem.line), ("sensor.sigma_m", line));
+    let (problem, line) = one(ARM, "sigma_m = 0.01", "sigma_m = 0.01 0.02");
+    assert_eq!(problem.line, line, "{problem}");
+    let (problem, line) = one(ARM, "axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0]");
+    assert_eq!((problem.key.as_str(), problem.line), ("robot.joint[1].axis", line));
+    let (problem, _) = one(ARM, "variant = \"direct-l\"", "variant = \"simplex\"");
+    assert!(problem.mend.contains("direct-l"), "{problem}");
+}
+
+#[test]
+fn several_problems_are_told_at_once() {
+    let text = ARM.replace("sigma_m = 0.01", "sigma_m = -1.0").replace("evaluations = 300", "evaluations = 0");
+    assert_eq!(problems(&text, Err("none")).len(), 2);
+}
+
+#[test]
+fn contradictions_are_refused() {
+    let (problem, _) =
+        one(ARM, "estimator = \"gradient\"\npolicy = \"random\"", "estimator = \"gradient\"\npolicy = \"active\"");
+    assert_eq!(problem.key, "learner[2].policy");
+    let (problem, _) = one(ARM, "name = \"gradient\"", "name = \"world\"");
+    assert_eq!(problem.key, "learner[2].name");
+    let found = problems(&ARM.replace("learn_marker = false", "learn_marker = true"), Err("none"));
+    let keys: Vec<&str> = found.iter().map(|problem| problem.key.as_str()).collect();
+    assert_eq!(keys, ["initial_error.marker_m", "prior.marker_m"]);
+    let both =
+        format!("{ARM}\n[measurements]\nfile = \"a.csv\"\nmarker_columns_m = [\"x\", \"y\", \"z\"]\nheld_out = 3\n");
+    assert_eq!(problems(&both, Ok("")).len(), 1);
+}
+
+#[test]
+fn measured_data_are_checked() {
+    let (problem, line) = one(TIAGO, "held_out = 7", "held_out = 31");
+    assert_eq!((problem.key.as_str(), problem.line), ("measurements.held_out", line));
+    let (problem, _) = one(TIAGO, "[\"x1\", ", "[\"x9\", ");
+    assert!(problem.what.contains("no column `x9`"), "{problem}");
+    let (problem, _) = one(TIAGO, "column = \"arm_3_joint\"\n", "");
+    assert_eq!(problem.key, "robot.joint[3].column");
+    let found = problems(TIAGO, Err("no such file"));
+    assert!(found[0].what.contains("no such file"), "{found:?}");
+}
+
+#[test]
+fn a_misspelt_builtin_name_gets_a_suggestion() {
+    let message = builtin("arm-6dofs").expect_err("unknown").to_string();
+    assert!(message.contains("did you mean `arm-6dof`") && message.contains("tiago-mocap"), "{message}");
+}
+
+#[test]
+fn held_out_rows_differ_by_seed_and_are_never_chosen() {
+    let scenario = builtin("tiago-mocap").expect("built in");
+    let mut sets = Vec::new();
+    for seed in 1..=5 {
+        let mut experiment = scenario.experiment(seed, None).expect("starts");
+        assert_eq!(experiment.remaining(), Some(27));
+        let mut rows: Vec<Vec<usize>> = vec![Vec::new(); 3];
+        for _ in 0..27 {
+            let report = experiment.step().expect("27 rows");
+            for (rows, learner) in rows.iter_mut().zip(&report.learners) {
+                rows.push(learner.movement.as_ref().and_then(|movement| movement.row).expect("a row"));
+                assert_eq!(learner.metrics.orientation_deg, None);
+                assert_eq!(learner.metrics.nees, None);
+                assert!(learner.metrics.prediction_mean_m.is_some());
+            }
+        }
+        assert!(experiment.step().is_err(), "the data end");
+        rows.iter_mut().for_each(|rows| rows.sort_unstable());
+        rows[0].dedup();
+        assert_eq!(rows[0].len(), 27, "each row once");
+        assert!(rows.iter().all(|learner| *learner == rows[0]), "all learners end with the same rows");
+        sets.push(rows.remove(0));
+    }
+    sets.dedup();
+    assert!(sets.len() > 1, "the split depends on the seed");
+}
+
+#[test]
+fn what_is_held_out_touches_nothing_but_the_prediction_error() {
+    let movements = |csv: &str| {
+        let open = |_: &str| Ok(csv.to_owned());
+        let scenario = Scenario::parse("tiago", TIAGO, &open).expect("valid");
+        let mut experiment = scenario.experiment(3, None).expect("starts");
+        (0..27)
+            .map(|_| {
+                let report = experiment.step().expect("27 rows").clone();
+                let prediction = report.learners[0].metrics.prediction_mean_m;
+                let models: Vec<_> = report.learners.iter().map(|learner| learner.estimate.clone()).collect();
+                let rows: Vec<_> =
+                    report.learners.iter().map(|learner| learner.movement.as_ref().and_then(|m| m.row)).collect();
+                (rows, models, prediction)
+            })
+            .collect::<Vec<_>>()
+    };
+    let honest = movements(TIAGO_CSV);
+    let used: Vec<usize> = honest.iter().filter_map(|(rows, ..)| rows[0]).collect();
+    let tampered: Vec<String> = TIAGO_CSV
+        .lines()
+        .enumerate()
+        .map(|(line, text)| match line.checked_sub(1) {
+            Some(row) if !used.contains(&row) => format!("9.0{}", &text[text.find(',').expect("a row")..]),
+            _ => text.to_owned(),
+        })
+        .collect();
+    let other = movements(&tampered.join("\n"));
+    for ((rows, models, prediction), (other_rows, other_models, other_prediction)) in honest.iter().zip(&other) {
+        assert_eq!((rows, models), (other_rows, other_models));
+        assert_ne!(prediction, other_prediction);
+    }
+}
