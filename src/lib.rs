@@ -54,6 +54,8 @@ pub mod estimation;
 pub mod experiment;
 pub mod kinematics;
 pub mod optimize;
+#[cfg(feature = "app")]
+pub mod recording;
 pub mod scenario;
 pub mod selection;
 pub mod sensing;

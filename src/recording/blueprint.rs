@@ -1,0 +1,128 @@
+//! How a viewer arranges a recording when it opens it.
+
+use rerun::{
+    AsComponents, RecordingStreamBuilder, Timeline,
+    blueprint::{
+        Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Grid, Horizontal, SelectionPanel, Spatial2DView,
+        Spatial3DView, Tabs, TextDocumentView, TimePanel, TimeSeriesView, Vertical,
+        components::{Corner2D, PanelState, PlayState, VisualBounds2D},
+    },
+    datatypes::Range2D,
+    external::{
+        re_log_types::{ApplicationId, BlueprintActivationCommand, EntityPath, LogMsg},
+        re_sdk_types::blueprint::archetypes::{EyeControls3D, PlotLegend, VisualBounds2D as Bounds},
+    },
+    log::{Chunk, RowId},
+};
+
+use super::{RecordingError, model::single, recorder::Scene};
+use crate::experiment::Description;
+
+/// Where the camera stands, as seen from the middle of the arm, in sizes of the arm: aside, a little ahead and above.
+const CAMERA: [f64; 3] = [0.35, -1.35, 0.75];
+
+/// The arrangement as messages: the learners side by side above; below, the curves, DIRECT's partition and the note.
+pub(super) fn messages(
+    description: &Description,
+    learners: &[&EntityPath],
+    scene: &Scene,
+    application: ApplicationId,
+) -> Result<Vec<LogMsg>, RecordingError> {
+    let mut properties = Properties::default();
+    let names = || learners.iter().zip(&description.learners);
+    let arms = names().map(|(root, learner)| {
+        let name = format!("{} ({} × {})", learner.name, learner.estimator, learner.policy);
+        let view = Spatial3DView::new(name).with_origin("/").with_contents([
+            "+ /world/truth/**".to_owned(),
+            format!("+ {root}/**"),
+            format!("- {root}/direct/**"),
+            format!("- {root}/metrics/**"),
+        ]);
+        let eye = EyeControls3D::new()
+            .with_position(single(std::array::from_fn(|i| scene.centre_m[i] + CAMERA[i] * scene.size_m)))
+            .with_look_target(single(scene.centre_m));
+        properties.of(view.into(), "EyeControls3D", &eye)
+    });
+    let arms = Grid::new(arms.collect::<Vec<_>>()).with_grid_columns(learners.len().clamp(1, 3) as u32);
+
+    let charts: &[(&str, &str)] = if description.truth.is_some() {
+        &[
+            ("Orientation error (deg)", "orientation_deg"),
+            ("Location error (m)", "location_m"),
+            ("Prediction error, mean (m)", "prediction_mean_m"),
+        ]
+    } else {
+        &[("Prediction error, mean (m)", "prediction_mean_m"), ("Trace of the covariance, tr(W P)", "trace")]
+    };
+    let mut below: Vec<ContainerLike> = Vec::new();
+    for (title, metric) in charts {
+        let contents = learners.iter().map(|root| format!("+ {root}/metrics/{metric}"));
+        let view = TimeSeriesView::new(*title).with_origin("/").with_contents(contents);
+        below.push(properties.of(view.into(), "PlotLegend", &PlotLegend::new().with_corner(Corner2D::RightTop)));
+    }
+    let mut tabs: Vec<ContainerLike> = Vec::new();
+    // A box is divided by DIRECT; recorded movements are tried one by one.
+    for (root, _) in names().filter(|(_, l)| l.policy == "active" && description.movements_available.is_none()) {
+        let name = root.last().map(|part| part.ui_string()).unwrap_or_default();
+        let view = Spatial2DView::new(format!("DIRECT, {name}")).with_origin(root.join(&EntityPath::from("direct")));
+        let bounds = Range2D { x_range: [-0.08, 1.08].into(), y_range: [-0.12, 1.12].into() };
+        tabs.push(properties.of(view.into(), "VisualBounds2D", &Bounds::new(VisualBounds2D(bounds))));
+    }
+    tabs.push(TextDocumentView::new("Note").with_origin("/note").into());
+    below.push(Tabs::new(tabs).into());
+
+    let root = Vertical::new([arms.into(), Horizontal::new(below).into()]).with_row_shares(vec![3.0, 2.0]);
+    let blueprint = Blueprint::new(root)
+        .with_auto_views(false)
+        .with_auto_layout(false)
+        .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Hidden))
+        .with_selection_panel(SelectionPanel::from_state(PanelState::Hidden))
+        .with_time_panel(
+            TimePanel::new()
+                .with_state(PanelState::Collapsed)
+                .with_timeline(super::TIMELINE)
+                .with_play_state(PlayState::Following),
+        );
+    encode(&blueprint, properties, application)
+}
+
+/// Properties of views for which Rerun's Rust builders have no method; they are logged beside what the builders log.
+#[derive(Default)]
+struct Properties(Vec<(EntityPath, Vec<rerun::SerializedComponentBatch>)>);
+
+impl Properties {
+    /// Gives `view` a property and returns it.
+    fn of(&mut self, view: ContainerLike, name: &str, property: &dyn AsComponents) -> ContainerLike {
+        if let ContainerLike::View(view) = &view {
+            let path = view.blueprint_path().join(&EntityPath::from(name));
+            self.0.push((path, property.as_serialized_batches()));
+        }
+        view
+    }
+}
+
+fn encode(
+    blueprint: &Blueprint,
+    properties: Properties,
+    application: ApplicationId,
+) -> Result<Vec<LogMsg>, RecordingError> {
+    let failed = |error: rerun::RecordingStreamError| RecordingError::Encode(error.to_string());
+    // The builders write to a stream of Rerun's: one in memory, whose own recording is left out.
+    let (stream, storage) = RecordingStreamBuilder::new(application).memory().map_err(failed)?;
+    blueprint.send(&stream, BlueprintActivation::default()).map_err(failed)?;
+    let mut messages: Vec<LogMsg> =
+        storage.take().into_iter().filter(|message| message.store_id().is_blueprint()).collect();
+    let Some(store) = messages.first().map(|message| message.store_id().clone()) else {
+        return Err(RecordingError::Encode("Rerun gave no blueprint".to_owned()));
+    };
+    // The activation comes last.
+    messages.retain(|message| !matches!(message, LogMsg::BlueprintActivationCommand(_)));
+    for (path, components) in properties.0 {
+        let chunk = Chunk::builder(path)
+            .with_serialized_batches(RowId::new(), [(Timeline::new_sequence("blueprint"), 0)], components)
+            .build()?;
+        messages.push(LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?));
+    }
+    messages.push(BlueprintActivationCommand { blueprint_id: store, make_active: true, make_default: true }.into());
+    Ok(messages)
+}

@@ -1,0 +1,137 @@
+//! Covariances as ellipsoids.
+
+use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion};
+
+/// The size of every ellipsoid in a recording, in standard deviations along each of its axes.
+pub const SIGMAS: f64 = 2.0;
+
+/// A direction without variance is drawn with this part of the largest half-size: a disc that can be seen edge-on.
+const FLATNESS: f64 = 0.02;
+
+/// Eigenvalues below this part of the largest count as none: what rounding leaves of a rank-2 covariance.
+const NO_VARIANCE: f64 = 1e-9;
+
+/// What is drawn for a covariance.
+#[derive(Clone, Debug)]
+pub(super) struct Ellipsoid {
+    /// [`SIGMAS`] times the standard deviations along the axes, largest first at the first step.
+    pub(super) half_sizes: [f64; 3],
+    /// Turns x, y, z into the axes.
+    pub(super) rotation: UnitQuaternion<f64>,
+}
+
+/// The axes that an ellipsoid had at the last step. Eigenvalues change their order, and eigenvectors their signs; taken
+/// as they come, an ellipsoid would flip between steps that hardly differ.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Axes(Option<Matrix3<f64>>);
+
+impl Axes {
+    /// The ellipsoid of a covariance whose half-sizes are multiplied by `scale`; `None` if it is not finite.
+    pub(super) fn ellipsoid(&mut self, covariance: &[[f64; 3]; 3], scale: f64) -> Option<Ellipsoid> {
+        let matrix = Matrix3::from_fn(|row, column| 0.5 * (covariance[row][column] + covariance[column][row]));
+        if !matrix.iter().all(|entry| entry.is_finite()) {
+            return None;
+        }
+        let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, 100)?;
+        let (order, axes) = self.in_order(&eigen);
+        self.0 = Some(axes);
+        let variances = order.map(|index| eigen.eigenvalues[index].max(0.0));
+        let largest = variances.iter().copied().fold(0.0, f64::max);
+        let half_sizes = variances.map(|variance| {
+            let shown = if variance > NO_VARIANCE * largest { variance.sqrt() } else { FLATNESS * largest.sqrt() };
+            SIGMAS * scale * shown
+        });
+        Some(Ellipsoid {
+            half_sizes,
+            rotation: UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes)),
+        })
+    }
+
+    /// The order of the eigenvectors, and the right-handed frame of them, that is closest to the last one.
+    fn in_order(&self, eigen: &SymmetricEigen<f64, nalgebra::Const<3>>) -> ([usize; 3], Matrix3<f64>) {
+        const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+        let vectors = &eigen.eigenvectors;
+        let order = match &self.0 {
+            Some(last) => {
+                let closeness = |order: &[usize; 3]| -> f64 {
+                    (0..3).map(|i| last.column(i).dot(&vectors.column(order[i])).abs()).sum()
+                };
+                ORDERS.into_iter().max_by(|a, b| closeness(a).total_cmp(&closeness(b))).unwrap_or(ORDERS[0])
+            }
+            None => {
+                let mut order = ORDERS[0];
+                order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+                order
+            }
+        };
+        let mut axes = Matrix3::from_fn(|row, column| vectors[(row, order[column])]);
+        let last = self.0.unwrap_or(axes);
+        let closeness = |axes: &Matrix3<f64>, i: usize| last.column(i).dot(&axes.column(i));
+        for i in 0..3 {
+            if closeness(&axes, i) < 0.0 {
+                axes.column_mut(i).neg_mut();
+            }
+        }
+        if axes.determinant() < 0.0 {
+            // An ellipsoid does not mind; turn the axis that says least about the last frame.
+            let least = (0..3).min_by(|&i, &j| closeness(&axes, i).total_cmp(&closeness(&axes, j))).unwrap_or(2);
+            axes.column_mut(least).neg_mut();
+        }
+        (order, axes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Rotation3, Vector3};
+
+    use super::*;
+
+    fn rows(matrix: Matrix3<f64>) -> [[f64; 3]; 3] {
+        matrix.transpose().into()
+    }
+
+    fn turned(variances: [f64; 3], angle: f64) -> [[f64; 3]; 3] {
+        let turn = Rotation3::new(Vector3::new(0.3, -0.5, 0.7) * angle).into_inner();
+        rows(turn * Matrix3::from_diagonal(&variances.into()) * turn.transpose())
+    }
+
+    #[test]
+    fn is_the_covariance_again() {
+        let covariance = turned([0.04, 0.01, 0.0025], 1.0);
+        let ellipsoid = Axes::default().ellipsoid(&covariance, 1.0).unwrap();
+        let axes = ellipsoid.rotation.to_rotation_matrix().into_inner();
+        let variances = Vector3::from(ellipsoid.half_sizes).map(|half| (half / SIGMAS).powi(2));
+        let again = axes * Matrix3::from_diagonal(&variances) * axes.transpose();
+        assert!((again - Matrix3::from_fn(|i, j| covariance[i][j])).amax() < 1e-12);
+        assert!((ellipsoid.half_sizes[0] - 0.4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn rank_two_is_a_disc() {
+        let ellipsoid = Axes::default().ellipsoid(&turned([0.04, 0.01, 0.0], 2.0), 0.5).unwrap();
+        let [a, b, c] = ellipsoid.half_sizes;
+        assert!((a - 0.2).abs() < 1e-9 && (b - 0.1).abs() < 1e-9 && (c - 0.004).abs() < 1e-9);
+    }
+
+    #[test]
+    fn does_not_flip_when_eigenvalues_cross() {
+        let mut axes = Axes::default();
+        let mut last: Option<UnitQuaternion<f64>> = None;
+        for step in 0..200 {
+            let t = f64::from(step) / 200.0;
+            let ellipsoid = axes.ellipsoid(&turned([0.04, 0.01 + 0.06 * t, 0.03 - 0.02 * t], 2.0 * t), 1.0).unwrap();
+            if let Some(last) = last {
+                assert!(ellipsoid.rotation.angle_to(&last) < 0.05, "step {step}");
+            }
+            assert!((ellipsoid.rotation.norm() - 1.0).abs() < 1e-9);
+            last = Some(ellipsoid.rotation);
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_not_drawn() {
+        assert!(Axes::default().ellipsoid(&[[f64::NAN; 3]; 3], 1.0).is_none());
+        assert_eq!(Axes::default().ellipsoid(&[[0.0; 3]; 3], 1.0).unwrap().half_sizes, [0.0; 3]);
+    }
+}

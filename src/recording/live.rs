@@ -1,0 +1,212 @@
+//! A recording that is followed while it grows.
+
+use std::{
+    collections::BTreeMap,
+    io::Cursor,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
+
+use bytes::Bytes;
+use re_log_encoding::{CrateVersion, DecoderApp, Encodable, Encoder, EncodingOptions, StreamHeader, ToTransport};
+use rerun::{
+    external::{
+        re_log,
+        re_log_types::{EntityPath, StoreId},
+    },
+    log::{Chunk, LogMsg},
+    sink::{LogSink, SinkFlushError},
+};
+use tokio::sync::watch;
+
+use super::RecordingError;
+
+/// A growing log of encoded parts, in memory, for any number of readers at any speed. Clones share one log.
+///
+/// Part 0 is the 12-byte header of an .rrd stream; every further part is one message. The parts in order are a valid
+/// stream at every moment, without a footer; a reader that takes single messages puts the header before each. Reader
+/// loops hold the index of their next part:
+///
+/// ```
+/// # use body_schema::recording::LiveLog;
+/// # async fn follow(log: LiveLog) {
+/// let mut length = log.subscribe();
+/// let mut next = 0;
+/// loop {
+///     let parts = log.parts_from(next);
+///     next += parts.len();
+///     // … send the parts …
+///     if parts.is_empty() && (log.is_closed() || length.changed().await.is_err()) {
+///         break;
+///     }
+/// }
+/// # }
+/// ```
+#[derive(Clone)]
+pub struct LiveLog {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    state: Mutex<State>,
+    /// The number of parts; touched at each append and when the log closes.
+    length: watch::Sender<usize>,
+}
+
+#[derive(Default)]
+struct State {
+    parts: Vec<Bytes>,
+    bytes: usize,
+    closed: bool,
+}
+
+impl LiveLog {
+    /// An empty log: the header alone.
+    pub fn new() -> Self {
+        let header = StreamHeader {
+            fourcc: re_log_encoding::RRD_FOURCC,
+            version: CrateVersion::LOCAL.to_bytes(),
+            options: EncodingOptions::PROTOBUF_COMPRESSED,
+        };
+        let mut bytes = Vec::new();
+        // Writing twelve bytes to memory does not fail; were the header missing, every reader would say so.
+        if let Err(error) = header.to_rrd_bytes(&mut bytes) {
+            re_log::error!("no header for the live recording: {error}");
+        }
+        let state = State { bytes: bytes.len(), parts: vec![Bytes::from(bytes)], closed: false };
+        Self { shared: Arc::new(Shared { state: Mutex::new(state), length: watch::Sender::new(1) }) }
+    }
+
+    /// The header and the message with which a part can be sent alone.
+    pub fn header(&self) -> Bytes {
+        self.state().parts[0].clone()
+    }
+
+    /// The parts from `index` on; cheap, the bytes are shared.
+    pub fn parts_from(&self, index: usize) -> Vec<Bytes> {
+        self.state().parts.get(index..).map(<[Bytes]>::to_vec).unwrap_or_default()
+    }
+
+    /// The number of parts; at least 1, the header.
+    #[expect(clippy::len_without_is_empty, reason = "the header is always there")]
+    pub fn len(&self) -> usize {
+        self.state().parts.len()
+    }
+
+    /// The size of all parts together, bytes.
+    pub fn bytes(&self) -> usize {
+        self.state().bytes
+    }
+
+    /// Is woken when parts are appended and when the log is closed; its value is the number of parts.
+    pub fn subscribe(&self) -> watch::Receiver<usize> {
+        self.shared.length.subscribe()
+    }
+
+    /// Says that nothing more will come, so that readers end. What is there stays readable.
+    pub fn close(&self) {
+        self.state().closed = true;
+        self.shared.length.send_modify(|_| ());
+    }
+
+    /// Whether the log is closed.
+    pub fn is_closed(&self) -> bool {
+        self.state().closed
+    }
+
+    /// Encodes messages and appends them, one part each; on an error none. A closed log ignores them.
+    pub fn append(&self, messages: &[LogMsg]) -> Result<(), RecordingError> {
+        let parts = messages.iter().map(encode).collect::<Result<Vec<_>, _>>()?;
+        let mut state = self.state();
+        if state.closed {
+            return Ok(());
+        }
+        state.bytes += parts.iter().map(Bytes::len).sum::<usize>();
+        state.parts.extend(parts);
+        // Under the lock, so that the lengths are sent in order.
+        self.shared.length.send_replace(state.parts.len());
+        Ok(())
+    }
+
+    /// Everything so far as a finished .rrd file: the many small chunks of a live session put together, with a footer.
+    ///
+    /// Takes about as long as it took to encode the session: run it where it may block.
+    pub fn complete(&self) -> Result<Vec<u8>, RecordingError> {
+        let stream = self.parts_from(0).concat();
+        let decoded = |source: re_log_encoding::DecodeError| RecordingError::Encode(source.to_string());
+        let mut rest = Vec::new();
+        let mut chunks: BTreeMap<(EntityPath, bool), (StoreId, Vec<Chunk>)> = BTreeMap::new();
+        for message in DecoderApp::decode_eager(Cursor::new(stream)).map_err(decoded)? {
+            match message.map_err(decoded)? {
+                LogMsg::ArrowMsg(store, message) if store.is_recording() => {
+                    let chunk = Chunk::from_arrow_msg(&message)?;
+                    let key = (chunk.entity_path().clone(), chunk.is_static());
+                    chunks.entry(key).or_insert_with(|| (store, Vec::new())).1.push(chunk);
+                }
+                other => rest.push(other),
+            }
+        }
+        for (store, chunks) in chunks.into_values() {
+            for chunk in merged(chunks)? {
+                rest.push(LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?));
+            }
+        }
+        Ok(Encoder::encode(rest.into_iter().map(Ok))?)
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Nothing panics while it holds the lock.
+        self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Default for LiveLog {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Lets a Rerun stream of one's own write to the log as well.
+impl LogSink for LiveLog {
+    fn send(&self, message: LogMsg) {
+        self.send_all(vec![message]);
+    }
+
+    fn send_all(&self, messages: Vec<LogMsg>) {
+        // The trait has no way to return an error.
+        if let Err(error) = self.append(&messages) {
+            re_log::error!("{error}");
+        }
+    }
+
+    fn flush_blocking(&self, _timeout: Duration) -> Result<(), SinkFlushError> {
+        Ok(())
+    }
+}
+
+fn encode(message: &LogMsg) -> Result<Bytes, RecordingError> {
+    let mut bytes = Vec::new();
+    message.to_transport(EncodingOptions::PROTOBUF_COMPRESSED.compression)?.to_rrd_bytes(&mut bytes)?;
+    Ok(Bytes::from(bytes))
+}
+
+/// Beyond this many rows chunks are no longer put together: viewers load by chunk.
+const ROWS: usize = 1024;
+
+/// Puts neighbouring chunks of one entity together, by halves: each row is copied only log₂ n times.
+fn merged(mut chunks: Vec<Chunk>) -> Result<Vec<Chunk>, RecordingError> {
+    if chunks.len() < 2 {
+        return Ok(chunks);
+    }
+    let mut right = merged(chunks.split_off(chunks.len() / 2))?.into_iter();
+    let mut left = merged(chunks)?;
+    if let (Some(last), Some(first)) = (left.pop(), right.next()) {
+        if last.num_rows() + first.num_rows() <= ROWS && last.concatenable(&first) {
+            left.push(Chunk::concat_and_sort(&last, &first)?);
+        } else {
+            left.extend([last, first]);
+        }
+    }
+    left.extend(right);
+    Ok(left)
+}

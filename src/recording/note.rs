@@ -1,0 +1,67 @@
+//! The note that goes with a recording: what it shows, and how to make it again.
+
+use std::fmt::Write as _;
+
+use rerun::{MediaType, TextDocument};
+
+use super::{SIGMAS, TRUTH_COLOR, colours::hex, colours::learner_color};
+use crate::{experiment::Description, kinematics::JointKind};
+
+/// The note, in markdown.
+pub(super) fn note(description: &Description) -> TextDocument {
+    TextDocument::new(markdown(description)).with_media_type(MediaType::markdown())
+}
+
+fn markdown(description: &Description) -> String {
+    let Description { scenario, title, seed, version, parameters, thresholds, .. } = description;
+    let mut text = format!(
+        "# {title}\n\nScenario `{scenario}`, seed {seed}, {parameters} learned parameters, recorded by body-schema \
+         {version}.\n\n"
+    );
+    // Writing to a String does not fail.
+    let _ = write!(
+        text,
+        "```\nbody-schema run {scenario} --seed {seed} --steps M --rrd FILE\n```\nmakes this recording again, but for \
+         the times in `selection_ms`.\n\n## Learners\n\n| learner | estimator | policy | colour |\n|---|---|---|---|\n"
+    );
+    for (index, learner) in description.learners.iter().enumerate() {
+        let colour = hex(learner_color(index));
+        let _ = writeln!(text, "| {} | {} | {} | `{colour}` |", learner.name, learner.estimator, learner.policy);
+    }
+    text.push_str("\n## What you see\n\n");
+    if description.truth.is_some() {
+        let _ = writeln!(text, "- **Truth** in grey (`{}`): the arm at θ = 0 and its axes.", hex(TRUTH_COLOR));
+    } else {
+        text.push_str("- The truth is not known: errors that need it are absent; prediction is judged over held-out measurements.\n");
+    }
+    let _ = write!(
+        text,
+        "- **Estimate** in the learner's colour: thick the arm at θ = 0, with one arrow per joint axis (a sliding \
+         joint's stands at the next joint); thin and pale the arm in the configuration of the step's movement, beside \
+         the true one.\n\
+         - **Ellipsoids** are {SIGMAS}σ along each principal axis: of the points on the axes (flat along the axis, \
+         where a point means nothing), and at the tips of the arrows of the directions, drawn as the tip would move. \
+         The coordinates alone: 2σ in three dimensions holds 74 % and in two 86 %.\n\
+         - **Marker**: pale as predicted before the measurement, yellow as measured; no yellow point after a miss.\n\
+         - **Partition**: how DIRECT divided the joint box to choose the movement, as the slice through the chosen \
+         configuration (vermillion) along two joints, each from limit to limit. Brighter is a lower criterion, so \
+         better; thick outlines are what would be divided next; dots are centres outside the slice.\n\n\
+         Lengths in metres, in the frame of the measurements; `_deg` in degrees; joint values in radians or metres.\n\n\
+         `converged_at` asks for an orientation error up to {}° and a location error up to {} m.\n\n",
+        thresholds.orientation_deg, thresholds.location_m
+    );
+    text.push_str("## Joints\n\n| joint | kind | limits | learned |\n|---|---|---|---|\n");
+    for joint in &description.joints {
+        let learned = if joint.learned { "yes" } else { "no" };
+        let _ = match (joint.kind, joint.limits) {
+            (JointKind::Revolute, [lower, upper]) => {
+                let (lower, upper) = (lower.to_degrees(), upper.to_degrees());
+                writeln!(text, "| {} | revolute | {lower:.1}° … {upper:.1}° | {learned} |", joint.name)
+            }
+            (JointKind::Prismatic, [lower, upper]) => {
+                writeln!(text, "| {} | prismatic | {lower:.3} m … {upper:.3} m | {learned} |", joint.name)
+            }
+        };
+    }
+    text
+}

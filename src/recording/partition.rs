@@ -1,0 +1,171 @@
+//! DIRECT's partition of the joint box: a slice to look at, and all of it as data.
+
+use std::sync::Arc;
+
+use rerun::{
+    AsComponents, Boxes2D, Color, DynamicArchetype, LineStrips2D, Points2D, Radius,
+    external::arrow::array::{BooleanArray, Float64Array, UInt8Array, UInt32Array},
+};
+
+use super::colours::viridis;
+use crate::{
+    experiment::JointDescription,
+    kinematics::JointKind,
+    selection::{Leaf, Partition},
+};
+
+const NO_VALUE: [u8; 3] = [0x60, 0x60, 0x60];
+const FRAME: [u8; 3] = [0x90, 0x90, 0x90];
+const CHOSEN: [u8; 3] = [0xD5, 0x5E, 0x00];
+
+/// The two joints that slices show: `x` to the right, `y` upwards, each from its lower limit to its upper. They are
+/// chosen at the first partition and kept, so that the picture does not jump from step to step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Plane {
+    x: usize,
+    /// `None` for an arm of one joint.
+    y: Option<usize>,
+}
+
+impl Plane {
+    /// The two joints whose sides are divided most over all leaves, in the order of the arm; the first ones of a tie.
+    /// `None` for an empty partition.
+    pub(super) fn of(partition: &Partition) -> Option<Self> {
+        let dimension = partition.leaves.first()?.levels.len();
+        let divisions =
+            |joint: usize| -> u64 { partition.leaves.iter().map(|leaf| u64::from(leaf.levels[joint])).sum() };
+        let mut joints: Vec<usize> = (0..dimension).collect();
+        joints.sort_by_key(|&joint| std::cmp::Reverse(divisions(joint)));
+        joints.truncate(2);
+        joints.sort_unstable();
+        Some(Self { x: *joints.first()?, y: joints.get(1).copied() })
+    }
+
+    /// Centre and half-sizes of a leaf in the unit square. Rerun's 2-D views have y downwards: upper limits are at 0.
+    fn rectangle(self, leaf: &Leaf) -> ([f32; 2], [f32; 2]) {
+        let (y, half_y) = self.y.map_or((0.5, 0.5), |y| (leaf.centre[y], leaf.half_side(y)));
+        ([leaf.centre[self.x] as f32, (1.0 - y) as f32], [leaf.half_side(self.x) as f32, half_y as f32])
+    }
+
+    /// Whether a leaf cuts the slice through `chosen`: it contains it in all joints but the two.
+    fn cuts(self, leaf: &Leaf, chosen: &Leaf) -> bool {
+        (0..leaf.levels.len())
+            .filter(|&joint| joint != self.x && Some(joint) != self.y)
+            .all(|joint| leaf.spans(joint, chosen.centre[joint]))
+    }
+
+    /// The frame of the slice and the names and limits of its joints.
+    pub(super) fn frame(self, joints: &[JointDescription]) -> [Box<dyn AsComponents>; 2] {
+        let square = [[0.0_f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
+        let label = |joint: usize, directions: [&str; 2]| {
+            joints.get(joint).map_or_else(String::new, |joint| {
+                let [lower, upper] = joint.limits.map(|limit| match joint.kind {
+                    JointKind::Revolute => format!("{:.0}°", limit.to_degrees()),
+                    JointKind::Prismatic => format!("{limit:.2} m"),
+                });
+                format!("{}: {lower} {}, {upper} {}", joint.name, directions[0], directions[1])
+            })
+        };
+        let mut labels = vec![([0.5_f32, 1.06], label(self.x, ["left", "right"]))];
+        labels.extend(self.y.map(|y| ([0.5, -0.06], label(y, ["bottom", "top"]))));
+        [
+            Box::new(
+                LineStrips2D::new([square])
+                    .with_colors([Color::from(FRAME)])
+                    .with_radii([Radius::new_ui_points(0.75)])
+                    .with_draw_order(1.0),
+            ),
+            Box::new(
+                Points2D::new(labels.iter().map(|(place, _)| *place))
+                    .with_colors([Color::from_unmultiplied_rgba(0, 0, 0, 0)])
+                    .with_radii([Radius::new_ui_points(0.0)])
+                    .with_labels(labels.iter().map(|(_, label)| label.clone()))
+                    .with_show_labels(true),
+            ),
+        ]
+    }
+}
+
+/// What is drawn of a slice.
+pub(super) struct Slice {
+    pub(super) boxes: Boxes2D,
+    pub(super) centres: Points2D,
+    pub(super) chosen: Points2D,
+}
+
+impl Slice {
+    /// The slice of a partition through its chosen leaf; `None` if it has none.
+    pub(super) fn of(partition: &Partition, plane: Plane) -> Option<Self> {
+        let chosen = partition.leaves.get(partition.chosen)?;
+        let colour = scale(partition);
+        let (mut cut, other): (Vec<&Leaf>, Vec<&Leaf>) =
+            partition.leaves.iter().partition(|leaf| plane.cuts(leaf, chosen));
+        // Potentially optimal ones last, on top of their neighbours.
+        cut.sort_by_key(|leaf| leaf.potentially_optimal);
+        let rectangles = || cut.iter().map(|leaf| plane.rectangle(leaf));
+        Some(Self {
+            boxes: Boxes2D::from_centers_and_half_sizes(rectangles().map(|(c, _)| c), rectangles().map(|(_, h)| h))
+                .with_colors(cut.iter().map(|leaf| Color::from(colour(leaf))))
+                .with_radii(
+                    cut.iter().map(|leaf| Radius::new_ui_points(if leaf.potentially_optimal { 2.5 } else { 1.0 })),
+                )
+                .with_draw_order(10.0),
+            centres: Points2D::new(other.iter().map(|leaf| plane.rectangle(leaf).0))
+                .with_colors(other.iter().map(|leaf| Color::from(colour(leaf))))
+                .with_radii([Radius::new_ui_points(1.5)])
+                .with_draw_order(20.0),
+            chosen: Points2D::new([plane.rectangle(chosen).0])
+                .with_colors([Color::from(CHOSEN)])
+                .with_radii([Radius::new_ui_points(5.0)])
+                .with_labels(["chosen"])
+                .with_show_labels(false)
+                .with_draw_order(30.0),
+        })
+    }
+}
+
+/// The colour of a leaf: viridis over the values of the partition, the lowest, which DIRECT looks for, brightest.
+fn scale(partition: &Partition) -> impl Fn(&Leaf) -> [u8; 3] {
+    let (lowest, highest) = partition
+        .leaves
+        .iter()
+        .filter_map(|leaf| leaf.value)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let range = highest - lowest;
+    move |leaf| match leaf.value {
+        Some(value) if range > 0.0 => viridis((highest - value) / range),
+        Some(_) => viridis(1.0),
+        None => NO_VALUE,
+    }
+}
+
+/// All leaves as plain data.
+pub(super) fn leaves(partition: &Partition) -> DynamicArchetype {
+    let leaves = &partition.leaves;
+    let dimension = leaves.first().map_or(0, |leaf| leaf.levels.len());
+    DynamicArchetype::new_without_archetype()
+        .with_component_from_data(
+            "centres",
+            Arc::new(Float64Array::from_iter_values(leaves.iter().flat_map(|leaf| leaf.centre.iter().copied()))),
+        )
+        .with_component_from_data(
+            "levels",
+            Arc::new(UInt8Array::from_iter_values(leaves.iter().flat_map(|leaf| leaf.levels.iter().copied()))),
+        )
+        .with_component_from_data(
+            "values",
+            Arc::new(Float64Array::from_iter_values(leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)))),
+        )
+        .with_component_from_data(
+            "generations",
+            Arc::new(UInt32Array::from_iter_values(
+                leaves.iter().map(|leaf| u32::try_from(leaf.generation).unwrap_or(u32::MAX)),
+            )),
+        )
+        .with_component_from_data(
+            "potentially_optimal",
+            Arc::new(leaves.iter().map(|leaf| Some(leaf.potentially_optimal)).collect::<BooleanArray>()),
+        )
+        .with_component_from_data("dimension", Arc::new(UInt32Array::from_iter_values([dimension as u32])))
+        .with_component_from_data("chosen", Arc::new(UInt32Array::from_iter_values([partition.chosen as u32])))
+}

@@ -1,0 +1,353 @@
+//! The observer that records.
+
+use std::path::PathBuf;
+
+use rerun::{
+    RecordingInfo, Scalars, SeriesLines, TextLog, ViewCoordinates,
+    external::re_log_types::{
+        ApplicationId, EntityPath, EntityPathPart, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource,
+    },
+    log::RowId,
+};
+
+use super::{
+    LiveLog, RecordingError, TRUTH_COLOR, blueprint,
+    colours::learner_color,
+    file::RrdFile,
+    metrics, model,
+    model::Uncertainty,
+    movement::Movement,
+    note::note,
+    partition::{self, Plane, Slice},
+    rows::Rows,
+};
+use crate::experiment::{Description, JointDescription, LearnerReport, StepReport};
+
+/// So many steps are written at once unless somebody flushes earlier …
+const BATCH_STEPS: usize = 64;
+
+/// … or so many leaves of partitions, some tens of megabytes.
+const BATCH_LEAVES: usize = 200_000;
+
+/// Length of the arrows, as a part of the size of the arm.
+const ARROW: f64 = 0.22;
+
+/// Where a recording goes.
+#[derive(Clone, Default)]
+pub struct Target {
+    file: Option<PathBuf>,
+    live: Option<LiveLog>,
+    recording_id: Option<String>,
+}
+
+impl Target {
+    /// A file, by convention `.rrd`. It is replaced if it exists.
+    pub fn file(path: impl Into<PathBuf>) -> Self {
+        Self::default().and_file(path)
+    }
+
+    /// A log that viewers follow.
+    pub fn live(log: LiveLog) -> Self {
+        Self { live: Some(log), ..Self::default() }
+    }
+
+    /// Also a file.
+    pub fn and_file(mut self, path: impl Into<PathBuf>) -> Self {
+        self.file = Some(path.into());
+        self
+    }
+
+    /// Sets the recording's id. Viewers take two recordings of one id for one: a server that runs a scenario and seed
+    /// twice gives each run an id of its own. Otherwise it is made of scenario and seed.
+    pub fn with_recording_id(mut self, id: impl Into<String>) -> Self {
+        self.recording_id = Some(id.into());
+        self
+    }
+}
+
+/// Records an experiment, as the module's documentation lists it.
+///
+/// Steps are gathered and written 64 at a time, or when [`flush`](Self::flush) is called: a live view flushes when it
+/// wants to be up to date. [`finish`](Self::finish) writes what is left and the file's footer (its index); dropping the
+/// recorder does the same, but has nobody to tell of errors.
+///
+/// If the process is killed, the file holds everything up to the last batch. Viewers open it; `rerun rrd verify`
+/// complains of the missing footer, which `rerun rrd optimize` adds.
+///
+/// # The leaves
+///
+/// `/{learner}/direct/leaves` holds the whole partition of a step as components of plain numbers: `dimension` n, then
+/// for each leaf `centres` (n f64 in the unit cube), `levels` (n u8, side i is 3^−levelᵢ long), `values` (f64, NaN if
+/// the criterion was not finite), `generations` (u32), `potentially_optimal` (bool); `chosen` is the index of the leaf
+/// whose centre is the chosen configuration.
+///
+/// The slice in `direct/boxes` is the plane through the chosen configuration along two joints, in units of their
+/// limits: x = centre of the one, y = 1 − centre of the other, because Rerun draws y downwards and upper limits belong
+/// on top. The two are the joints that the first partition divides most, and stay the same over the recording.
+pub struct Recorder {
+    description: Description,
+    store: StoreId,
+    rows: Rows,
+    file: Option<RrdFile>,
+    live: Option<LiveLog>,
+    learners: Vec<LearnerEntities>,
+    /// Known from the first report on.
+    arrow_m: Option<f64>,
+    waiting_steps: usize,
+    waiting_leaves: usize,
+    finished: bool,
+}
+
+impl Recorder {
+    /// Opens the target and records what stays the same.
+    pub fn new(description: &Description, target: Target) -> Result<Self, RecordingError> {
+        let Target { file, live, recording_id } = target;
+        let names: Vec<&str> = description.learners.iter().map(|learner| learner.name.as_str()).collect();
+        // Viewers keep one arrangement per application: those of different learners must not meet.
+        let application = format!("body-schema-{}-{}", description.scenario, names.join("-"));
+        let recording = recording_id.unwrap_or_else(|| format!("{}-seed-{}", description.scenario, description.seed));
+        let mut recorder = Self {
+            description: description.clone(),
+            store: StoreId::recording(ApplicationId::new_or_unknown(application), recording),
+            rows: Rows::default(),
+            file: file.as_deref().map(RrdFile::create).transpose()?,
+            live,
+            learners: (names.iter().enumerate())
+                .map(|(index, name)| LearnerEntities::new(index, name, description.joints.len()))
+                .collect(),
+            arrow_m: None,
+            waiting_steps: 0,
+            waiting_leaves: 0,
+            finished: false,
+        };
+        recorder.begin()?;
+        Ok(recorder)
+    }
+
+    /// The id of the recording.
+    pub fn recording_id(&self) -> &str {
+        self.store.recording_id().as_str()
+    }
+
+    /// The id of the application, by which viewers keep arrangements of views.
+    pub fn application_id(&self) -> &str {
+        self.store.application_id().as_str()
+    }
+
+    /// Records a step. Steps come in order; the first one is step 0.
+    pub fn log(&mut self, report: &StepReport) -> Result<(), RecordingError> {
+        let arrow_m = match self.arrow_m {
+            Some(arrow_m) => arrow_m,
+            None => self.arrange(report)?,
+        };
+        let Self { description, learners, rows, .. } = self;
+        for (entities, learner) in learners.iter_mut().zip(&report.learners) {
+            entities.log(rows, report.step, learner, description, arrow_m);
+            let partition = learner.movement.as_ref().and_then(|movement| movement.partition.as_ref());
+            self.waiting_leaves += partition.map_or(0, |partition| partition.leaves.len());
+        }
+        self.waiting_steps += 1;
+        if self.waiting_steps >= BATCH_STEPS || self.waiting_leaves >= BATCH_LEAVES { self.flush() } else { Ok(()) }
+    }
+
+    /// Writes the steps that wait. When this returns they are in the log, and with the operating system.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        (self.waiting_steps, self.waiting_leaves) = (0, 0);
+        let messages = (self.rows.drain()?.into_iter())
+            .map(|chunk| Ok(LogMsg::ArrowMsg(self.store.clone(), chunk.to_arrow_msg()?)))
+            .collect::<Result<Vec<_>, RecordingError>>()?;
+        self.send(&messages)
+    }
+
+    /// Writes what is left, ends the file with its footer, and closes the log.
+    pub fn finish(mut self) -> Result<(), RecordingError> {
+        self.end()
+    }
+
+    fn end(&mut self) -> Result<(), RecordingError> {
+        if std::mem::replace(&mut self.finished, true) {
+            return Ok(());
+        }
+        let flushed = self.flush();
+        if let Some(live) = &self.live {
+            live.close();
+        }
+        flushed?;
+        self.file.as_mut().map_or(Ok(()), RrdFile::finish)
+    }
+
+    /// To both targets, whatever happens to the other.
+    fn send(&mut self, messages: &[LogMsg]) -> Result<(), RecordingError> {
+        let live = self.live.as_ref().map_or(Ok(()), |live| live.append(messages));
+        self.file.as_mut().map_or(Ok(()), |file| file.append(messages)).and(live)
+    }
+
+    fn begin(&mut self) -> Result<(), RecordingError> {
+        let info = StoreInfo::new(self.store.clone(), StoreSource::Other("body-schema".to_owned()));
+        self.send(&[SetStoreInfo { row_id: *RowId::new(), info }.into()])?;
+        let Self { description, rows, .. } = self;
+        let name = format!("{}, seed {}", description.scenario, description.seed);
+        rows.always(&EntityPath::properties(), &[&RecordingInfo::new().with_name(name)]);
+        rows.always(&EntityPath::root(), &[&ViewCoordinates::RIGHT_HAND_Z_UP()]);
+        rows.always(&EntityPath::from("note"), &[&note(description)]);
+        for (index, learner) in self.learners.iter().enumerate() {
+            let colour = learner_color(index);
+            let name = &description.learners[index].name;
+            for series in &learner.metrics {
+                let line = SeriesLines::new()
+                    .with_colors([rerun::Color::from(colour)])
+                    .with_names([name.clone()])
+                    .with_widths([2.0]);
+                rows.always(series, &[&line]);
+            }
+        }
+        Ok(())
+    }
+
+    /// What needs the size of the arm: the truth's arrows and the cameras. Returns the length of all arrows.
+    fn arrange(&mut self, first: &StepReport) -> Result<f64, RecordingError> {
+        let model = self.description.truth.as_ref().or_else(|| first.learners.first().map(|learner| &learner.estimate));
+        let scene = model.map(|model| Scene::around(&model.skeleton_m())).unwrap_or_default();
+        let arrow_m = ARROW * scene.size_m;
+        self.arrow_m = Some(arrow_m);
+        if let Some(truth) = &self.description.truth {
+            let links = model::links(&truth.skeleton_m(), TRUTH_COLOR, 2.5);
+            self.rows.always(&EntityPath::from("world/truth/links"), &[&links]);
+            let axes = model::axes(truth, &self.description.joints, arrow_m, TRUTH_COLOR);
+            self.rows.always(&EntityPath::from("world/truth/axes"), &[&axes]);
+        }
+        let learners: Vec<&EntityPath> = self.learners.iter().map(|learner| &learner.root).collect();
+        let blueprint = blueprint::messages(&self.description, &learners, &scene, self.store.application_id().clone())?;
+        self.send(&blueprint)?;
+        Ok(arrow_m)
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        if let Err(error) = self.end() {
+            rerun::external::re_log::error!("{error}");
+        }
+    }
+}
+
+/// The place and size of an arm, for cameras and arrows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scene {
+    pub(super) centre_m: [f64; 3],
+    /// Diagonal of the box around the arm.
+    pub(super) size_m: f64,
+}
+
+impl Default for Scene {
+    fn default() -> Self {
+        Self { centre_m: [0.0; 3], size_m: 1.0 }
+    }
+}
+
+impl Scene {
+    fn around(points_m: &[[f64; 3]]) -> Self {
+        let finite = || points_m.iter().filter(|point| point.iter().all(|x| x.is_finite()));
+        let bound = |axis: usize, start: f64, pick: fn(f64, f64) -> f64| finite().map(|p| p[axis]).fold(start, pick);
+        if finite().next().is_none() {
+            return Self::default();
+        }
+        let lower: [f64; 3] = std::array::from_fn(|axis| bound(axis, f64::INFINITY, f64::min));
+        let upper: [f64; 3] = std::array::from_fn(|axis| bound(axis, f64::NEG_INFINITY, f64::max));
+        let size_m = (0..3).map(|axis| (upper[axis] - lower[axis]).powi(2)).sum::<f64>().sqrt();
+        let centre_m = std::array::from_fn(|axis| 0.5 * (lower[axis] + upper[axis]));
+        // An arm of one joint may be a single point.
+        Self { centre_m, size_m: if size_m > 1e-3 { size_m } else { 1.0 } }
+    }
+}
+
+/// The entities of one learner, and what they carry from step to step.
+struct LearnerEntities {
+    colour: [u8; 3],
+    root: EntityPath,
+    metrics: Vec<EntityPath>,
+    uncertainty: Uncertainty,
+    plane: Option<Plane>,
+    moved: bool,
+    failed: bool,
+}
+
+impl LearnerEntities {
+    fn new(index: usize, name: &str, joints: usize) -> Self {
+        let root = EntityPath::new(vec![EntityPathPart::new(name)]);
+        let metrics = root.join(&EntityPath::from("metrics"));
+        Self {
+            colour: learner_color(index),
+            metrics: metrics::NAMES.iter().map(|name| metrics.join(&EntityPath::from(*name))).collect(),
+            root,
+            uncertainty: Uncertainty::new(joints),
+            plane: None,
+            moved: false,
+            failed: false,
+        }
+    }
+
+    fn entity(&self, path: &str) -> EntityPath {
+        self.root.join(&EntityPath::from(path))
+    }
+
+    fn log(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, description: &Description, arrow_m: f64) {
+        let (colour, joints) = (self.colour, description.joints.as_slice());
+        let model = &report.estimate;
+        rows.at(step, &self.entity("links"), &[&model::links(&model.skeleton_m(), colour, 2.5)]);
+        rows.at(step, &self.entity("axes"), &[&model::axes(model, joints, arrow_m, colour)]);
+        if let Some(points) = self.uncertainty.of_points(model, joints, colour) {
+            rows.at(step, &self.entity("point_ellipsoids"), &points.parts());
+        }
+        if let Some(directions) = self.uncertainty.of_directions(model, joints, arrow_m, colour) {
+            rows.at(step, &self.entity("direction_uncertainty"), &directions.parts());
+        }
+        self.log_movement(rows, step, report, description.truth.is_some(), joints);
+        for (series, value) in self.metrics.iter().zip(metrics::values(report)) {
+            if let Some(value) = value {
+                rows.at(step, series, &[&Scalars::new([value])]);
+            }
+        }
+        if let (Some(failure), false) = (&report.failure, self.failed) {
+            self.failed = true;
+            rows.at(step, &self.entity("failure"), &[&TextLog::new(failure.as_str()).with_level("ERROR")]);
+        }
+    }
+
+    fn log_movement(
+        &mut self,
+        rows: &mut Rows,
+        step: u64,
+        report: &LearnerReport,
+        has_truth: bool,
+        joints: &[JointDescription],
+    ) {
+        let report = report.movement.as_ref();
+        if report.is_none() && !self.moved {
+            return;
+        }
+        // Once more after the last movement of a learner that has stopped, to clear it.
+        self.moved = report.is_some();
+        let movement = Movement::of(report, has_truth, self.colour);
+        rows.at(step, &self.entity("movement/links"), &[&movement.links]);
+        if let Some(truth) = &movement.truth {
+            rows.at(step, &self.entity("movement/truth"), &[truth]);
+        }
+        rows.at(step, &self.entity("marker/predicted"), &[&movement.predicted]);
+        rows.at(step, &self.entity("marker/measured"), &[&movement.measured]);
+        let Some(partition) = report.and_then(|report| report.partition.as_ref()) else { return };
+        if self.plane.is_none()
+            && let Some(plane) = Plane::of(partition)
+        {
+            self.plane = Some(plane);
+            let [square, labels] = plane.frame(joints);
+            rows.always(&self.entity("direct/axes"), &[square.as_ref(), labels.as_ref()]);
+        }
+        if let Some(slice) = self.plane.and_then(|plane| Slice::of(partition, plane)) {
+            rows.at(step, &self.entity("direct/boxes"), &[&slice.boxes]);
+            rows.at(step, &self.entity("direct/centres"), &[&slice.centres]);
+            rows.at(step, &self.entity("direct/chosen"), &[&slice.chosen]);
+        }
+        rows.at(step, &self.entity("direct/leaves"), &[&partition::leaves(partition)]);
+    }
+}

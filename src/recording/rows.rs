@@ -1,0 +1,66 @@
+//! Rows that wait to be written, one batch per entity.
+//!
+//! Rerun's own stream batches in a thread and writes in another, where errors go to a log. Here rows are gathered and
+//! handed over when the recorder says so: many steps make one chunk per entity, and every error has a caller.
+
+use std::collections::BTreeMap;
+
+use rerun::{
+    AsComponents, SerializedComponentBatch, Timeline,
+    external::re_log_types::EntityPath,
+    log::{Chunk, ChunkError, RowId},
+    time::TimePoint,
+};
+
+use super::TIMELINE;
+
+/// Rows by entity, in the order of their logging.
+#[derive(Default)]
+pub(super) struct Rows {
+    // An entity's static rows and those in time cannot share a chunk.
+    rows: BTreeMap<(EntityPath, When), Vec<Row>>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum When {
+    Always,
+    InTime,
+}
+
+struct Row {
+    id: RowId,
+    time: TimePoint,
+    components: Vec<SerializedComponentBatch>,
+}
+
+impl Rows {
+    /// What holds at all times.
+    pub(super) fn always(&mut self, entity: &EntityPath, what: &[&dyn AsComponents]) {
+        self.push(entity, When::Always, TimePoint::default(), what);
+    }
+
+    /// What holds from a step on, until the entity's next row.
+    pub(super) fn at(&mut self, step: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
+        let step = i64::try_from(step).unwrap_or(i64::MAX);
+        self.push(entity, When::InTime, TimePoint::from([(Timeline::new_sequence(TIMELINE), step)]), what);
+    }
+
+    fn push(&mut self, entity: &EntityPath, when: When, time: TimePoint, what: &[&dyn AsComponents]) {
+        let components = what.iter().flat_map(|archetype| archetype.as_serialized_batches()).collect();
+        self.rows.entry((entity.clone(), when)).or_default().push(Row { id: RowId::new(), time, components });
+    }
+
+    /// Takes everything out, one chunk per entity, and another for its static rows.
+    pub(super) fn drain(&mut self) -> Result<Vec<Chunk>, ChunkError> {
+        std::mem::take(&mut self.rows)
+            .into_iter()
+            .map(|((entity, _), rows)| {
+                rows.into_iter()
+                    .fold(Chunk::builder(entity), |chunk, row| {
+                        chunk.with_serialized_batches(row.id, row.time, row.components)
+                    })
+                    .build()
+            })
+            .collect()
+    }
+}
