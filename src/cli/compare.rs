@@ -92,12 +92,10 @@ fn table(comparison: &Comparison) -> Table {
             let last = comparison.steps as usize;
             [learner.name.clone(), mean_mm(0), mean_mm(last / 4), mean_mm(last / 2), mean_mm(last), time(learner)]
         });
-        let last = comparison.steps;
         let at = |movements: u64| format!("after {movements} (mm)");
-        let header = [&at(0), &at(last / 4), &at(last / 2), &at(last)].map(String::as_str);
-        let mut table = output::table(["learner", header[0], header[1], header[2], header[3], "choice (ms)"], rows);
-        table.set_header(["prediction", header[0], header[1], header[2], header[3], "choice (ms)"]);
-        return table;
+        let last = comparison.steps;
+        let header = ["prediction".into(), at(0), at(last / 4), at(last / 2), at(last), "choice (ms)".into()];
+        return output::table(header, rows);
     }
     let rows = comparison.learners.iter().map(|learner| {
         let (summary, end) = (&learner.summary, end(learner));

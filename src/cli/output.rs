@@ -31,10 +31,10 @@ pub fn create(path: &Path) -> Result<BufWriter<File>> {
 }
 
 /// A plain table: first column to the left, the others to the right.
-pub fn table<const N: usize>(header: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> Table {
+pub fn table<const N: usize>(header: [impl ToString; N], rows: impl IntoIterator<Item = [String; N]>) -> Table {
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Disabled);
-    table.set_header(header);
+    table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Disabled);
+    table.set_header(header.map(|title| title.to_string()));
     for row in rows {
         table.add_row(row);
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use body_schema::{
     experiment::{Experiment, RunResult},
-    recording::{Recorder, StepsCsv},
+    recording::{Recorder, StepsCsv, Target},
 };
 
 use super::{ScenarioArguments, output, progress, steps_of};
@@ -50,8 +50,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(recorder) = recorder {
         recorder.finish()?;
     }
-    if let Some(csv) = csv {
-        csv.finish().context("cannot finish the CSV file")?;
+    if let Some(csv) = &mut csv {
+        csv.flush().context("cannot finish the CSV file")?;
     }
     let result = experiment.result();
     if let Some(path) = &arguments.json {
@@ -69,11 +69,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 type CsvFile = StepsCsv<std::io::BufWriter<std::fs::File>>;
 
 fn recorder(experiment: &Experiment, path: &Path) -> Result<Recorder> {
-    Ok(Recorder::to_file(experiment.description(), path)?)
+    Ok(Recorder::new(experiment.description(), Target::file(path))?)
 }
 
 fn steps_csv(experiment: &Experiment, path: &Path) -> Result<CsvFile> {
-    StepsCsv::new(output::create(path)?, experiment.description())
+    StepsCsv::new(experiment.description(), output::create(path)?)
         .with_context(|| format!("cannot write {}", path.display()))
 }
 

@@ -1,0 +1,183 @@
+//! The command line as a user meets it.
+#![cfg(feature = "app")]
+
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn body_schema(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_body-schema")).args(arguments).output().expect("the program starts")
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = body_schema(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("standard output holds JSON only")
+}
+
+/// Exit code and standard error.
+fn failure(arguments: &[&str]) -> (i32, String) {
+    let output = body_schema(arguments);
+    (output.status.code().expect("an exit code"), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn compare_writes_the_documented_json() {
+    let value = json(&["compare", "arm-6dof", "--seeds", "2", "--steps", "30", "--json", "-"]);
+    assert_eq!((value["scenario"].as_str(), value["steps"].as_u64()), (Some("arm-6dof"), Some(30)));
+    let learners = value["learners"].as_array().expect("learners");
+    let names: Vec<_> = learners.iter().map(|learner| learner["name"].as_str().expect("a name")).collect();
+    assert_eq!(names, ["active", "random", "gradient"]);
+    for learner in learners {
+        let runs = learner["runs"].as_array().expect("runs");
+        assert_eq!(runs.iter().map(|run| run["seed"].as_u64()).collect::<Vec<_>>(), [Some(1), Some(2)]);
+        for run in runs {
+            assert!(run["converged_at"].is_null() || run["converged_at"].is_u64());
+            assert_eq!((run["movements"].as_u64(), run["misses"].as_u64()), (Some(30), Some(0)));
+            for error in ["orientation_deg", "axis_deg", "location_m", "prediction_m", "prediction_mean_m"] {
+                assert!(run["final"][error].is_f64(), "{error}");
+            }
+        }
+        for key in ["runs", "converged", "median_converged_at", "p90_converged_at", "max_converged_at"] {
+            assert!(learner["summary"].get(key).is_some(), "{key}");
+        }
+        let curve = learner["curve"].as_array().expect("a curve");
+        assert_eq!(curve.len(), 31);
+        for (movements, point) in curve.iter().enumerate() {
+            assert_eq!(point["movements"].as_u64(), Some(movements as u64));
+            for quantile in ["mean", "median", "q25", "q75"] {
+                assert!(point["orientation_deg"][quantile].is_f64() && point["prediction_mean_m"][quantile].is_f64());
+            }
+        }
+        assert!(learner["selection_ms"]["median"].is_f64() && learner["selection_ms"]["p95"].is_f64());
+    }
+}
+
+#[test]
+fn the_same_command_gives_the_same_outcome_with_one_and_with_two_threads() {
+    let outcome = |threads: &str| {
+        let command = ["compare", "arm-6dof", "--seeds", "5..8", "--steps", "60", "--threads", threads, "--json", "-"];
+        let mut value = json(&command);
+        for learner in value["learners"].as_array_mut().expect("learners") {
+            learner.as_object_mut().expect("an object").remove("selection_ms");
+        }
+        value
+    };
+    let one = outcome("1");
+    assert_eq!(one, outcome("2"));
+    assert_eq!(one, outcome("2"));
+}
+
+#[test]
+fn run_writes_all_that_it_is_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
+    let (rrd, csv) = (path("a.rrd"), path("a.csv"));
+    let result = json(&[
+        "run",
+        "tiago-mocap",
+        "--learner",
+        "active",
+        "--learner",
+        "random",
+        "--seed",
+        "4",
+        "--steps",
+        "9",
+        "--rrd",
+        &rrd,
+        "--csv",
+        &csv,
+        "--json",
+        "-",
+    ]);
+    assert_eq!((result["scenario"].as_str(), result["seed"].as_u64()), (Some("tiago-mocap"), Some(4)));
+    let learners = result["learners"].as_array().expect("learners");
+    assert_eq!(learners.len(), 2);
+    for learner in learners {
+        assert_eq!((learner["estimator"].as_str(), learner["metrics"]["movements"].as_u64()), (Some("rls"), Some(9)));
+        assert!(learner["converged_at"].is_null() && learner["metrics"]["orientation_deg"].is_null());
+        let covariance = learner["model"]["covariance"].as_array().expect("a covariance");
+        assert_eq!(covariance.len(), 33);
+        let coordinates = |part: &Value| part["coordinates"].as_array().expect("indices").len();
+        let joints = learner["model"]["joints"].as_array().expect("joints");
+        assert_eq!(joints.iter().map(coordinates).sum::<usize>() + coordinates(&learner["model"]["marker"]), 33);
+    }
+    let rows = std::fs::read_to_string(&csv).expect("a table").lines().count();
+    assert_eq!(rows, 1 + 2 * 10, "a header, and steps 0 to 9 of two learners");
+    assert!(std::fs::metadata(&rrd).expect("a recording").len() > 10_000);
+}
+
+#[test]
+fn bad_input_exits_with_two_and_says_what_to_do() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("bad.toml");
+    let text = include_str!("../scenarios/arm-6dof.toml").replace("sigma_m = 0.01", "sigma = 0.01");
+    std::fs::write(&file, text).expect("written");
+    let file = file.to_str().expect("a plain path");
+    let cases: [(&[&str], &[&str]); 10] = [
+        (&["check", file], &["bad.toml:", "`sensor.sigma`", "`sigma_m`"]),
+        (&["run", "arm-6dofx"], &["did you mean `arm-6dof`"]),
+        (&["run", "no/such.toml"], &["no/such.toml"]),
+        (&["run", "arm-6dof", "--learner", "clever"], &["`clever`", "active, random, gradient"]),
+        (&["run", "arm-6dof", "--learner", "active", "--learner", "active"], &["named twice"]),
+        (&["run", "tiago-mocap", "--steps", "28"], &["27 movements", "--steps 27"]),
+        (&["compare", "arm-6dof", "--seeds", "9..3"], &["3..9"]),
+        (&["compare", "arm-6dof", "--seeds", "0"], &["at least one seed"]),
+        (&["sweep", "arm-6dof", "--set", "filter.x=1"], &["--learner"]),
+        (&["fly"], &["fly"]),
+    ];
+    for (arguments, expected) in cases {
+        let (code, message) = failure(arguments);
+        assert_eq!(code, 2, "{arguments:?}: {message}");
+        for part in expected {
+            assert!(message.contains(part), "{arguments:?}: {message}");
+        }
+        assert!(!message.contains("panicked"), "{message}");
+    }
+}
+
+#[test]
+fn what_cannot_be_written_exits_with_one_and_names_the_file() {
+    for option in ["--rrd", "--csv", "--json"] {
+        let (code, message) = failure(&["run", "arm-6dof", "--steps", "1", option, "/no/such/folder/x"]);
+        assert_eq!(code, 1, "{option}: {message}");
+        assert!(message.contains("/no/such/folder/x"), "{option}: {message}");
+    }
+}
+
+#[test]
+fn a_scenario_can_be_a_path_with_data_beside_it() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/tiago-mocap.toml");
+    let output = body_schema(&["check", path]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("33 parameters"));
+    let list = body_schema(&["scenarios"]);
+    let text = String::from_utf8_lossy(&list.stdout).into_owned();
+    assert!(["arm-6dof", "arm-12dof", "tiago-mocap"].iter().all(|name| text.contains(name)), "{text}");
+}
+
+#[test]
+fn a_sweep_ranks_by_the_learners_own_median() {
+    let trials = json(&[
+        "sweep",
+        "arm-6dof",
+        "--learner",
+        "random",
+        "--set",
+        "filter.measurement_variance_m2=0.003,0.00001",
+        "--set",
+        "filter.stabilising_noise.variance=0.003",
+        "--seeds",
+        "1001..1004",
+        "--steps",
+        "500",
+        "--json",
+        "-",
+    ]);
+    let trials = trials.as_array().expect("trials");
+    assert_eq!(trials.len(), 2);
+    let late = |trial: &Value| trial["summary"]["median_converged_at"].as_f64().unwrap_or(f64::INFINITY);
+    assert!(late(&trials[0]) <= late(&trials[1]), "{trials:?}");
+    assert_eq!(trials[0]["values"][0][1], "0.003");
+}
