@@ -211,7 +211,7 @@ impl Recorder {
         let arrow_m = ARROW * scene.size_m;
         self.arrow_m = Some(arrow_m);
         if let Some(truth) = &self.description.truth {
-            let links = model::links(&truth.skeleton_m(), TRUTH_COLOR, 2.5);
+            let links = model::links(&truth.skeleton_m(), TRUTH_COLOR, 2.0);
             self.rows.always(&EntityPath::from("world/truth/links"), &[&links]);
             let axes = model::axes(truth, &self.description.joints, arrow_m, TRUTH_COLOR);
             self.rows.always(&EntityPath::from("world/truth/axes"), &[&axes]);
@@ -234,6 +234,7 @@ impl Drop for Recorder {
 /// The place and size of an arm, for cameras and arrows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scene {
+    /// Between the base of the arm and its middle.
     pub(super) centre_m: [f64; 3],
     /// Diagonal of the box around the arm.
     pub(super) size_m: f64,
@@ -255,7 +256,9 @@ impl Scene {
         let lower: [f64; 3] = std::array::from_fn(|axis| bound(axis, f64::INFINITY, f64::min));
         let upper: [f64; 3] = std::array::from_fn(|axis| bound(axis, f64::NEG_INFINITY, f64::max));
         let size_m = (0..3).map(|axis| (upper[axis] - lower[axis]).powi(2)).sum::<f64>().sqrt();
-        let centre_m = std::array::from_fn(|axis| 0.5 * (lower[axis] + upper[axis]));
+        // It swings about its base, which comes first.
+        let base = finite().next().copied().unwrap_or_default();
+        let centre_m = std::array::from_fn(|axis| 0.5 * base[axis] + 0.25 * (lower[axis] + upper[axis]));
         // An arm of one joint may be a single point.
         Self { centre_m, size_m: if size_m > 1e-3 { size_m } else { 1.0 } }
     }
@@ -294,7 +297,7 @@ impl LearnerEntities {
     fn log(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, description: &Description, arrow_m: f64) {
         let (colour, joints) = (self.colour, description.joints.as_slice());
         let model = &report.estimate;
-        rows.at(step, &self.entity("links"), &[&model::links(&model.skeleton_m(), colour, 2.5)]);
+        rows.at(step, &self.entity("links"), &[&model::links(&model.skeleton_m(), colour, 2.0)]);
         rows.at(step, &self.entity("axes"), &[&model::axes(model, joints, arrow_m, colour)]);
         if let Some(points) = self.uncertainty.of_points(model, joints, colour) {
             rows.at(step, &self.entity("point_ellipsoids"), &points.parts());
@@ -342,8 +345,10 @@ impl LearnerEntities {
             self.plane = Some(plane);
             let [square, labels] = plane.frame(joints);
             rows.always(&self.entity("direct/axes"), &[square.as_ref(), labels.as_ref()]);
+            rows.always(&self.entity("direct/criterion"), &[&partition::fill_transform()]);
         }
         if let Some(slice) = self.plane.and_then(|plane| Slice::of(partition, plane)) {
+            rows.at(step, &self.entity("direct/criterion"), &[&slice.fill]);
             rows.at(step, &self.entity("direct/boxes"), &[&slice.boxes]);
             rows.at(step, &self.entity("direct/centres"), &[&slice.centres]);
             rows.at(step, &self.entity("direct/chosen"), &[&slice.chosen]);
