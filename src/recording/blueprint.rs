@@ -17,14 +17,30 @@ use rerun::{
     log::{Chunk, RowId},
 };
 
-use super::{RecordingError, model::single, recorder::Scene};
+use super::{RecordingError, model::single, scene::Scene};
 use crate::experiment::Description;
 
 /// Where the camera stands, as seen from the scene's centre, in sizes of the arm: aside, a little ahead and above.
-const CAMERA: [f64; 3] = [0.55, -1.8, 0.95];
+const CAMERA: [f64; 3] = [0.6, -2.0, 1.05];
 
 /// The ground of the arms, the same in light and dark viewers: colours must stand out from it.
 const BACKGROUND: [u8; 3] = [0x14, 0x16, 0x1A];
+
+/// Titles and metrics of the curves.
+const CHARTS: [(&str, &str); 3] = [
+    ("Orientation error (deg)", "orientation_deg"),
+    ("Location error (m)", "location_m"),
+    ("Prediction error, mean (m)", "prediction_mean_m"),
+];
+
+/// The same where no truth is known.
+const CHARTS_WITHOUT_TRUTH: [(&str, &str); 2] =
+    [("Prediction error, mean (m)", "prediction_mean_m"), ("Trace of the covariance, tr(W P)", "trace")];
+
+/// Whether a metric has its curve in some arrangement.
+pub(super) fn shows(metric: &str) -> bool {
+    CHARTS.iter().chain(&CHARTS_WITHOUT_TRUTH).any(|(_, shown)| *shown == metric)
+}
 
 /// The arrangement as messages: the learners side by side above; below, the curves, DIRECT's partition and the note.
 pub(super) fn messages(
@@ -53,15 +69,7 @@ pub(super) fn messages(
     });
     let arms = Grid::new(arms.collect::<Vec<_>>()).with_grid_columns(learners.len().clamp(1, 3) as u32);
 
-    let charts: &[(&str, &str)] = if description.truth.is_some() {
-        &[
-            ("Orientation error (deg)", "orientation_deg"),
-            ("Location error (m)", "location_m"),
-            ("Prediction error, mean (m)", "prediction_mean_m"),
-        ]
-    } else {
-        &[("Prediction error, mean (m)", "prediction_mean_m"), ("Trace of the covariance, tr(W P)", "trace")]
-    };
+    let charts: &[(&str, &str)] = if description.truth.is_some() { &CHARTS } else { &CHARTS_WITHOUT_TRUTH };
     let mut below: Vec<ContainerLike> = Vec::new();
     for (title, metric) in charts {
         let contents = learners.iter().map(|root| format!("+ {root}/metrics/{metric}"));

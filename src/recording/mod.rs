@@ -40,6 +40,7 @@ mod csv;
 mod ellipsoid;
 mod error;
 mod file;
+mod learner;
 mod live;
 mod metrics;
 mod model;
@@ -48,6 +49,7 @@ mod note;
 mod partition;
 mod recorder;
 mod rows;
+mod scene;
 
 pub use self::{
     colours::{TRUTH_COLOR, hex, learner_color},
