@@ -50,10 +50,10 @@ impl Rows {
         self.rows.entry((entity.clone(), when)).or_default().push(Row { id: RowId::new(), time, components });
     }
 
-    /// Takes everything out, one chunk per entity, and another for its static rows.
-    pub(super) fn drain(&mut self) -> Result<Vec<Chunk>, ChunkError> {
-        std::mem::take(&mut self.rows)
-            .into_iter()
+    /// Takes out what `wanted` says, one chunk per entity, and another for its static rows.
+    pub(super) fn drain(&mut self, wanted: impl Fn(&EntityPath) -> bool) -> Result<Vec<Chunk>, ChunkError> {
+        self.rows
+            .extract_if(.., |(entity, _), _| wanted(entity))
             .map(|((entity, _), rows)| {
                 rows.into_iter()
                     .fold(Chunk::builder(entity), |chunk, row| {
