@@ -149,7 +149,7 @@ impl Recorder {
 
     /// Writes only what the arrangement of views shows; the rest waits for the next [`flush`](Self::flush), at most 64
     /// steps. Every message costs about a kilobyte, and most entities are series that no view shows: a live view that
-    /// is up to date at every step is a third of the size this way.
+    /// is up to date at every step needs half the messages this way.
     pub fn flush_shown(&mut self) -> Result<(), RecordingError> {
         let hidden: BTreeSet<EntityPath> = self.learners.iter().flat_map(LearnerEntities::hidden).collect();
         self.write(|entity| !hidden.contains(entity))
