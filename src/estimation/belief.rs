@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Matrix3, Matrix3x2};
+use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix3x2};
 
 use crate::kinematics::{Chain, TangentLayout, chart, jacobian::jacobian};
 
@@ -40,14 +40,23 @@ impl Belief {
         Some(sum / configurations.len() as f64)
     }
 
-    /// The covariance of a joint's axis point (m², measurement frame): rank 2, flat along the axis.
-    pub fn point_covariance(&self, joint: usize) -> Option<Matrix3<f64>> {
-        self.embedded(joint, self.layout.point(joint)?.start)
+    /// The covariance (m², measurement frame) of the point of a joint's axis that lies `along` metres from the pivot:
+    /// rank 2, flat along the axis. To first order that point moves by B (a + along · d).
+    pub fn point_covariance(&self, joint: usize, along: f64) -> Option<Matrix3<f64>> {
+        let (point, direction) = (self.layout.point(joint)?.start, self.layout.direction(joint)?.start);
+        let covariance = self.covariance.as_ref()?;
+        let block = |row, column| covariance.fixed_view::<2, 2>(row, column).into_owned();
+        let cross: Matrix2<f64> = block(point, direction);
+        self.embedded(
+            joint,
+            block(point, point) + (cross + cross.transpose()) * along + block(direction, direction) * (along * along),
+        )
     }
 
     /// The covariance of a joint's axis direction (rad², measurement frame): rank 2, flat along the axis.
     pub fn direction_covariance(&self, joint: usize) -> Option<Matrix3<f64>> {
-        self.embedded(joint, self.layout.direction(joint)?.start)
+        let start = self.layout.direction(joint)?.start;
+        self.embedded(joint, self.covariance.as_ref()?.fixed_view::<2, 2>(start, start).into_owned())
     }
 
     /// The covariance of the marker p₀ (m²), if it is learned.
@@ -56,9 +65,50 @@ impl Belief {
         Some(self.covariance.as_ref()?.fixed_view::<3, 3>(start, start).into_owned())
     }
 
-    fn embedded(&self, joint: usize, start: usize) -> Option<Matrix3<f64>> {
-        let block = self.covariance.as_ref()?.fixed_view::<2, 2>(start, start).into_owned();
+    fn embedded(&self, joint: usize, block: Matrix2<f64>) -> Option<Matrix3<f64>> {
         let basis: Matrix3x2<f64> = chart::basis(&self.chain.joints.get(joint)?.direction());
         Some(basis * block * basis.transpose())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::kinematics::{Joint, laws::random_chain};
+
+    /// The covariance of a point away from the pivot, against the derivative of that point of the retracted line.
+    #[test]
+    fn the_covariance_of_a_slid_point_follows_the_line() {
+        for seed in 0..20 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let chain = random_chain(&mut rng, 5);
+            let layout = Arc::new(TangentLayout::new(&chain.joints, &[], false));
+            let m = layout.dimension();
+            let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-0.5..0.5));
+            let covariance = &root * root.transpose();
+            let along = rng.random_range(-0.8..0.8);
+            let belief = Belief { chain, layout, covariance: Some(covariance.clone()), noise_m2: 1.0 };
+            for (index, joint) in belief.chain.joints.iter().enumerate() {
+                let Joint::Revolute(line) = joint else {
+                    assert!(belief.point_covariance(index, along).is_none());
+                    continue;
+                };
+                let moved = |k: usize, step: f64| {
+                    let mut delta = nalgebra::DVector::zeros(m);
+                    delta[k] = step;
+                    let retracted = belief.chain.retract(&belief.layout, &delta).joints[index];
+                    let retracted = retracted.line().map(|line| line.slid(along).point);
+                    retracted.unwrap_or(line.point).coords
+                };
+                let columns: Vec<_> = (0..m).map(|k| (moved(k, 1e-6) - moved(k, -1e-6)) / 2e-6).collect();
+                let derivative = nalgebra::Matrix3xX::from_columns(&columns);
+                let expected = &derivative * &covariance * derivative.transpose();
+                let found = belief.point_covariance(index, along).expect("a revolute joint");
+                assert!((expected - found).amax() < 1e-6, "seed {seed}, joint {index}");
+            }
+        }
     }
 }

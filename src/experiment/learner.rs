@@ -5,7 +5,7 @@ use web_time::Instant;
 
 use super::{
     metrics::{self, Evaluation, Metrics},
-    report::{LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays},
+    report::{LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
 };
 use crate::{
     estimation::{Estimator, Update},
@@ -84,7 +84,7 @@ impl Learner {
         let report = MovementReport {
             predicted_marker_m: array(&predicted.coords),
             measured_marker_m: observation.position().map(|position| array(&position.coords)),
-            estimated_skeleton_m: arrays(&self.estimator.belief().chain.skeleton(&configuration)),
+            estimated_skeleton_m: arrays(&shown(&self.estimator.belief().chain, truth).skeleton(&configuration)),
             true_skeleton_m: truth.map(|truth| arrays(&truth.skeleton(&configuration))),
             row: selection.movement.row,
             configuration,
@@ -134,7 +134,7 @@ impl Learner {
         LearnerReport {
             name: self.description.name.clone(),
             movement,
-            estimate: ModelReport::of_belief(belief),
+            estimate: ModelReport::of_belief(belief, truth),
             metrics,
             failure: self.record.failure.clone(),
         }

@@ -138,9 +138,10 @@ pub struct ModelReport {
 pub struct JointReport {
     /// Unit direction of the axis.
     pub axis: [f64; 3],
-    /// A point on the axis (the pivot of its chart), metres; null for a prismatic joint.
+    /// A point on the axis, metres: of an estimate the one nearest to the true axis point, so that drawings compare
+    /// like with like, or the pivot of its chart where no truth is known; null for a prismatic joint.
     pub point_m: Option<[f64; 3]>,
-    /// Covariance of the point, m², row by row: rank 2, flat along the axis.
+    /// Covariance of that point, m², row by row: rank 2, flat along the axis.
     pub point_covariance_m2: Option<[[f64; 3]; 3]>,
     /// Covariance of the direction, rad², row by row: rank 2, flat along the axis.
     pub direction_covariance_rad2: Option<[[f64; 3]; 3]>,
@@ -162,11 +163,16 @@ impl ModelReport {
         Self { joints, marker_m: array(&chain.marker.coords), marker_covariance_m2: None }
     }
 
-    /// A belief with what it holds of uncertainty.
-    pub fn of_belief(belief: &Belief) -> Self {
-        let mut model = Self::of_chain(&belief.chain);
+    /// A belief with what it holds of uncertainty; points on axes are those nearest to the truth's, where it is known.
+    pub fn of_belief(belief: &Belief, truth: Option<&Chain>) -> Self {
+        let shown = shown(&belief.chain, truth);
+        let mut model = Self::of_chain(&shown);
         for (index, joint) in model.joints.iter_mut().enumerate() {
-            joint.point_covariance_m2 = belief.point_covariance(index).map(|p| rows(&p));
+            let along = match (shown.joints[index].line(), belief.chain.joints[index].line()) {
+                (Some(shown), Some(line)) => line.direction.dot(&(shown.point - line.point)),
+                _ => 0.0,
+            };
+            joint.point_covariance_m2 = belief.point_covariance(index, along).map(|p| rows(&p));
             joint.direction_covariance_rad2 = belief.direction_covariance(index).map(|p| rows(&p));
         }
         model.marker_covariance_m2 = belief.hand_marker_covariance().map(|p| rows(&p));
@@ -177,6 +183,11 @@ impl ModelReport {
     pub fn skeleton_m(&self) -> Vec<[f64; 3]> {
         self.joints.iter().filter_map(|joint| joint.point_m).chain([self.marker_m]).collect()
     }
+}
+
+/// An estimate as it is drawn beside the truth.
+pub(super) fn shown(estimate: &Chain, truth: Option<&Chain>) -> Chain {
+    truth.map_or_else(|| estimate.clone(), |truth| estimate.slid_towards(truth))
 }
 
 pub(super) fn array(v: &Vector3<f64>) -> [f64; 3] {

@@ -48,6 +48,18 @@ impl Chain {
         points
     }
 
+    /// The same chain with the point of every axis slid to where it is nearest to the axis point of `reference`: the
+    /// same kinematics, drawn comparably.
+    pub fn slid_towards(&self, reference: &Self) -> Self {
+        let mut chain = self.clone();
+        for (joint, reference) in chain.joints.iter_mut().zip(&reference.joints) {
+            if let (Joint::Revolute(line), Some(other)) = (joint, reference.line()) {
+                *line = line.slid(line.direction.dot(&(other.point - line.point)));
+            }
+        }
+        chain
+    }
+
     /// The chain at tangent coordinates δ (see [`TangentLayout`]) in the chart at `self`; what is not learned stays.
     pub fn retract(&self, layout: &TangentLayout, delta: &DVector<f64>) -> Self {
         let mut chain = self.clone();

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion};
 
 /// The size of every ellipsoid in a recording, in standard deviations along each of its axes.
-pub const SIGMAS: f64 = 2.0;
+pub const SIGMAS: f64 = 1.0;
 
 /// A direction without variance is drawn with this part of the largest half-size: a disc that can be seen edge-on.
 const FLATNESS: f64 = 0.02;

@@ -41,7 +41,7 @@ fn markdown(description: &Description) -> String {
          the true one.\n\
          - **Ellipsoids** are {SIGMAS}σ along each principal axis: of the points on the axes (flat along the axis, \
          where a point means nothing), and, paler, at the tips of the arrows those of the directions, as the tips would move. \
-         In two dimensions 2σ hold 86 % of a normal distribution, in three 74 %.\n\
+         In two dimensions 1σ holds 39 % of a normal distribution, in three 20 %.\n\
          - **Marker**: pale as predicted before the measurement, yellow as measured; no yellow point after a miss.\n\
          - **Partition**: how DIRECT divided the joint box to choose the movement, as the slice through the chosen \
          configuration (vermillion) along two joints, each from limit to limit. Brighter is a lower criterion, so \
