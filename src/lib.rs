@@ -59,3 +59,8 @@ pub mod recording;
 pub mod scenario;
 pub mod selection;
 pub mod sensing;
+
+/// The code in the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

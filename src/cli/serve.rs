@@ -7,6 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
+use body_schema::server::{self, Options};
 use tokio_util::sync::CancellationToken;
 
 #[derive(Debug, clap::Args)]
@@ -45,7 +46,7 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
             writeln!(out, "recordings are kept in {}", folder.display())?;
         }
         out.flush()?;
-        let _ = (listener, shutdown);
+        server::serve(listener, Options { data_dir: arguments.data_dir.clone() }, shutdown).await?;
         writeln!(out, "ended; every recording is complete")?;
         Ok(())
     })
