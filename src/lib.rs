@@ -8,3 +8,5 @@ pub mod recording;
 pub mod scenario;
 pub mod selection;
 pub mod sensing;
+#[cfg(feature = "app")]
+pub mod server;
