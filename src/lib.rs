@@ -59,6 +59,8 @@ pub mod recording;
 pub mod scenario;
 pub mod selection;
 pub mod sensing;
+#[cfg(feature = "app")]
+pub mod server;
 
 /// The code in the README, compiled and run.
 #[cfg(doctest)]

@@ -1,0 +1,136 @@
+//! The routes under `/v1`, and what OpenAPI says of them.
+
+mod downloads;
+mod scenarios;
+mod sessions;
+mod streams;
+
+use std::sync::Arc;
+
+use axum::{
+    Json, Router,
+    body::{Body, Bytes},
+    extract::State,
+    http::header,
+    response::{IntoResponse, Response},
+};
+use serde::Serialize;
+use utoipa::{OpenApi, ToSchema, openapi::RefOr};
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+pub use scenarios::{ScenarioList, ScenarioResource};
+pub use sessions::{MadeSteps, SessionList, StepRequest};
+
+use super::{
+    App,
+    problem::{Kind, PROBLEM_JSON, Problem},
+};
+use crate::experiment::StepReport;
+
+const JSON: &str = "application/json";
+
+/// Whether the server works.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct Health {
+    /// `ok`, or there is no answer.
+    pub status: Liveness,
+    /// Version of body-schema.
+    #[schema(value_type = String)]
+    pub version: &'static str,
+}
+
+/// The health of a server that answers.
+#[derive(Clone, Copy, Debug, Serialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Liveness {
+    /// It answers.
+    Ok,
+}
+
+#[derive(OpenApi)]
+#[openapi(
+    info(
+        title = "body-schema",
+        description = "Learn a robot's kinematic body schema from a few well-chosen movements, and watch it happen.\n\n\
+            A session is an experiment: a scenario with a seed, in which several learners each make one movement per \
+            step. Step it, follow its reports as they are made, take its recording away.\n\nEvery error is a problem \
+            document (RFC 9457). Lengths are in metres and angles in radians unless a name says otherwise."
+    ),
+    tags(
+        (name = "scenarios", description = "What experiments there are"),
+        (name = "sessions", description = "Running experiments"),
+        (name = "results", description = "What came out of a session"),
+        (name = "server", description = "The server itself")
+    ),
+    // What streams carry, and so no route returns.
+    components(schemas(StepReport, streams::LiveEvent))
+)]
+struct Document;
+
+/// All routes, and the document that describes them.
+pub(super) fn routes() -> (Router<Arc<App>>, Bytes) {
+    let (router, mut document) = OpenApiRouter::with_openapi(Document::openapi())
+        .routes(routes!(scenarios::list))
+        .routes(routes!(scenarios::get))
+        .routes(routes!(sessions::list, sessions::create))
+        .routes(routes!(sessions::get, sessions::delete))
+        .routes(routes!(sessions::step))
+        .routes(routes!(streams::events))
+        .routes(routes!(streams::live))
+        .routes(routes!(streams::live_recording))
+        .routes(routes!(downloads::recording))
+        .routes(routes!(downloads::steps_csv))
+        .routes(routes!(downloads::result))
+        .routes(routes!(openapi))
+        .routes(routes!(health))
+        .split_for_parts();
+    describe_problems(&mut document);
+    // The document consists of strings, so that it can always be written.
+    (router, document.to_pretty_json().unwrap_or_default().into())
+}
+
+/// Says once for all routes that problems have their own media type.
+fn describe_problems(document: &mut utoipa::openapi::OpenApi) {
+    for item in document.paths.paths.values_mut() {
+        let operations = [&mut item.get, &mut item.post, &mut item.delete].into_iter().flatten();
+        let responses = operations.flat_map(|operation| &mut operation.responses.responses);
+        let errors = responses.filter(|(status, _)| status.starts_with(['4', '5']));
+        for response in errors.filter_map(|(_, response)| match response {
+            RefOr::T(response) => Some(response),
+            RefOr::Ref(_) => None,
+        }) {
+            let content = response.content.swap_remove(JSON);
+            response.content.extend(content.map(|content| (PROBLEM_JSON.to_owned(), content)));
+        }
+    }
+}
+
+/// This document.
+#[utoipa::path(get, path = "/v1/openapi.json", tag = "server", responses(
+    (status = 200, description = "The OpenAPI 3.1 description of this server", body = serde_json::Value)
+))]
+async fn openapi(State(app): State<Arc<App>>) -> Response {
+    ([(header::CONTENT_TYPE, JSON)], app.openapi.clone()).into_response()
+}
+
+/// Whether the server works.
+#[utoipa::path(get, path = "/healthz", tag = "server", responses(
+    (status = 200, description = "The server works", body = Health)
+))]
+async fn health() -> Json<Health> {
+    Json(Health { status: Liveness::Ok, version: env!("CARGO_PKG_VERSION") })
+}
+
+/// Does what takes long where it holds up no other request.
+async fn aside<T: Send + 'static>(work: impl FnOnce() -> Result<T, Problem> + Send + 'static) -> Result<T, Problem> {
+    let done = tokio::task::spawn_blocking(work).await;
+    done.unwrap_or_else(|error| Err(Problem::new(Kind::Internal, format!("a part of the server failed: {error}"))))
+}
+
+/// A JSON response, written aside.
+async fn json<T: Serialize + Send + 'static>(value: T) -> Result<Response, Problem> {
+    let bytes = aside(move || {
+        serde_json::to_vec(&value).map_err(|error| Problem::new(Kind::Internal, format!("no JSON: {error}")))
+    });
+    Ok(([(header::CONTENT_TYPE, JSON)], Body::from(bytes.await?)).into_response())
+}

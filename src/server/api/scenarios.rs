@@ -1,0 +1,57 @@
+//! What experiments there are.
+
+use axum::{Json, extract::Path};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::aside;
+use crate::{
+    scenario::{BUILTIN, Scenario, ScenarioError, ScenarioSummary, builtin},
+    server::problem::{Kind, Problem},
+};
+
+/// The built-in scenarios.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct ScenarioList {
+    /// All of them, simplest first.
+    pub scenarios: Vec<ScenarioSummary>,
+}
+
+/// A scenario with its source.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct ScenarioResource {
+    /// The scenario in brief.
+    #[serde(flatten)]
+    pub summary: ScenarioSummary,
+    /// The scenario file, TOML.
+    pub source: String,
+}
+
+/// All built-in scenarios.
+#[utoipa::path(get, path = "/v1/scenarios", tag = "scenarios", operation_id = "listScenarios", responses(
+    (status = 200, description = "All built-in scenarios, simplest first", body = ScenarioList)
+))]
+pub(super) async fn list() -> Result<Json<ScenarioList>, Problem> {
+    let summaries = || BUILTIN.iter().map(|known| find(known.name).map(|scenario| scenario.summary())).collect();
+    Ok(Json(ScenarioList { scenarios: aside(summaries).await? }))
+}
+
+/// One scenario with its source.
+#[utoipa::path(get, path = "/v1/scenarios/{name}", tag = "scenarios", operation_id = "getScenario",
+    params(("name" = String, Path, description = "The scenario's name", example = "arm-6dof")),
+    responses(
+        (status = 200, description = "The scenario", body = ScenarioResource),
+        (status = 404, description = "There is no such scenario", body = Problem),
+    )
+)]
+pub(super) async fn get(Path(name): Path<String>) -> Result<Json<ScenarioResource>, Problem> {
+    let scenario = aside(move || find(&name)).await?;
+    Ok(Json(ScenarioResource { summary: scenario.summary(), source: scenario.source }))
+}
+
+fn find(name: &str) -> Result<Scenario, Problem> {
+    builtin(name).map_err(|error| match error {
+        ScenarioError::UnknownScenario { .. } => Problem::new(Kind::UnknownScenario, error.to_string()).field("name"),
+        error => error.into(),
+    })
+}

@@ -1,0 +1,281 @@
+//! Following a session as it goes. Every reader holds an index and goes at its own pace: nothing is sent to it before it
+//! has taken what came before, and a slow one holds up nobody.
+
+use std::{convert::Infallible, sync::Arc, time::Duration};
+
+use axum::{
+    body::{Body, Bytes},
+    extract::{
+        Path, RawQuery, State, WebSocketUpgrade,
+        ws::{CloseFrame, Message, WebSocket, rejection::WebSocketUpgradeRejection},
+    },
+    http::{HeaderMap, header},
+    response::{
+        IntoResponse, Response,
+        sse::{Event, KeepAlive, Sse},
+    },
+};
+use futures_util::{Stream, stream::unfold};
+use serde::Serialize;
+use tokio::sync::watch;
+use utoipa::ToSchema;
+
+use crate::{
+    experiment::{Description, StepReport},
+    server::{
+        App, extract,
+        problem::Problem,
+        session::{Session, Watching},
+    },
+};
+
+/// How many reports are taken from the history at a time.
+const BATCH: usize = 64;
+/// Silence after which a comment or a ping shows that the connection still stands.
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
+/// Why the WebSocket was closed: the session is no more, or its engine has failed.
+const CLOSE_ENDED: u16 = 4404;
+
+/// A text message of the WebSocket.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+#[serde(tag = "type", content = "data", rename_all = "lowercase")]
+pub(super) enum LiveEvent {
+    /// The first message.
+    #[schema(value_type = Description)]
+    Description(Box<Description>),
+    /// One for each step, from the one asked for on.
+    #[schema(value_type = StepReport)]
+    Step(#[serde(serialize_with = "report")] Arc<StepReport>),
+}
+
+fn report<S: serde::Serializer>(report: &Arc<StepReport>, serializer: S) -> Result<S::Ok, S::Error> {
+    report.as_ref().serialize(serializer)
+}
+
+/// The reports as server-sent events: all from step 0, or all after `Last-Event-ID`, then each as it is made.
+#[utoipa::path(get, path = "/v1/sessions/{id}/events", tag = "sessions", operation_id = "followReports",
+    params(
+        ("id" = String, Path, description = "The session's id", format = "uuid"),
+        ("Last-Event-ID" = Option<u64>, Header, description = "The last step seen; browsers send it when they reconnect"),
+    ),
+    responses(
+        (status = 200, description = "Events whose id is the step and whose data is a StepReport. The stream ends with the session.",
+            body = String, content_type = "text/event-stream"),
+        (status = 400, description = "Last-Event-ID is not a step", body = Problem),
+        (status = 404, description = "There is no such session", body = Problem),
+    )
+)]
+pub(super) async fn events(
+    State(app): State<Arc<App>>,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let session = app.sessions.get(&id)?;
+    let first = extract::last_event_id(&headers)?.map_or(0, |last| last.saturating_add(1));
+    let events = unfold((Reports::new(&session, first), Vec::new().into_iter()), |(mut reports, mut batch)| async {
+        let report: Arc<StepReport> = match batch.next() {
+            Some(report) => report,
+            None => {
+                batch = reports.next().await?.into_iter();
+                batch.next()?
+            }
+        };
+        // A report is plain data: writing it cannot fail.
+        let event = Event::default().id(report.step.to_string()).json_data(report.as_ref()).unwrap_or_default();
+        Some((Ok::<_, Infallible>(event), (reports, batch)))
+    });
+    Ok(Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
+}
+
+/// The recording as it grows: an .rrd without footer, which `rerun http://…/live.rrd` follows.
+#[utoipa::path(get, path = "/v1/sessions/{id}/live.rrd", tag = "sessions", operation_id = "followRecording",
+    params(("id" = String, Path, description = "The session's id", format = "uuid")),
+    responses(
+        (status = 200, description = "The recording so far, then all that is added to it. The stream ends with the session.",
+            body = Vec<u8>, content_type = "application/octet-stream"),
+        (status = 404, description = "There is no such session", body = Problem),
+    )
+)]
+pub(super) async fn live_recording(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let session = app.sessions.get(&id)?;
+    let body = Body::from_stream(parts(Parts::new(&session, 0)));
+    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], body).into_response())
+}
+
+fn parts(parts: Parts) -> impl Stream<Item = Result<Bytes, Infallible>> {
+    unfold((parts, Vec::new().into_iter()), |(mut parts, mut batch)| async {
+        let part: Bytes = match batch.next() {
+            Some(part) => part,
+            None => {
+                batch = parts.next().await?.into_iter();
+                batch.next()?
+            }
+        };
+        Some((Ok(part), (parts, batch)))
+    })
+}
+
+/// Everything over one WebSocket, for a page: reports as text (LiveEvent), the recording as binary messages.
+///
+/// A binary message is one part of the recording: part 0 is the 12-byte header of an .rrd stream, each further part is
+/// one message, and any part after the header makes a valid stream with the header in front. A report comes after the
+/// part that records it.
+#[utoipa::path(get, path = "/v1/sessions/{id}/live", tag = "sessions", operation_id = "followSession",
+    params(
+        ("id" = String, Path, description = "The session's id", format = "uuid"),
+        ("from" = Option<u64>, Query, description = "The first part of the recording to send; 0 if absent"),
+        ("step" = Option<u64>, Query, description = "The first step to report; 0 if absent"),
+    ),
+    responses(
+        (status = 101, description = "The WebSocket. It closes with code 4404 when the session ends."),
+        (status = 400, description = "Not a WebSocket handshake, or a parameter is not a number", body = Problem),
+        (status = 403, description = "The request comes from a foreign page", body = Problem),
+        (status = 404, description = "There is no such session", body = Problem),
+        (status = 426, description = "The connection cannot be upgraded", body = Problem),
+    )
+)]
+pub(super) async fn live(
+    State(app): State<Arc<App>>,
+    Path(id): Path<String>,
+    RawQuery(query): RawQuery,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> Result<Response, Problem> {
+    let session = app.sessions.get(&id)?;
+    let [from, step] = extract::whole_numbers(query.as_deref(), ["from", "step"])?;
+    let upgrade = match upgrade {
+        Ok(upgrade) => upgrade,
+        Err(rejection) => return Ok(rejection.into_response()),
+    };
+    let readers = (Reports::new(&session, step.unwrap_or(0)), Parts::new(&session, from.unwrap_or(0)));
+    let description = session.description().clone();
+    // Clients have nothing to say; what they say must not fill the memory.
+    let upgrade = upgrade.max_message_size(1 << 10);
+    Ok(upgrade.on_upgrade(|socket| async {
+        // A client that goes away needs no answer.
+        drop(follow(socket, description, readers).await);
+    }))
+}
+
+async fn follow(
+    mut socket: WebSocket,
+    description: Description,
+    (mut reports, mut parts): (Reports, Parts),
+) -> Result<(), axum::Error> {
+    socket.send(text(&LiveEvent::Description(Box::new(description)))?).await?;
+    let mut ping = tokio::time::interval_at(tokio::time::Instant::now() + KEEP_ALIVE, KEEP_ALIVE);
+    loop {
+        // Parts first: they are published before the reports of their steps.
+        tokio::select! {
+            biased;
+            message = socket.recv() => if message.transpose()?.is_none() { return Ok(()) },
+            batch = parts.next() => match batch {
+                Some(batch) => for part in batch { socket.send(Message::Binary(part)).await? },
+                None => break,
+            },
+            batch = reports.next() => {
+                // Both may have come since the parts were asked for.
+                for part in parts.ready() {
+                    socket.send(Message::Binary(part)).await?;
+                }
+                for report in batch.into_iter().flatten() {
+                    socket.send(text(&LiveEvent::Step(report))?).await?;
+                }
+            }
+            _ = ping.tick() => socket.send(Message::Ping(Bytes::new())).await?,
+        }
+    }
+    while let Some(batch) = reports.next().await {
+        for report in batch {
+            socket.send(text(&LiveEvent::Step(report))?).await?;
+        }
+    }
+    let frame = CloseFrame { code: CLOSE_ENDED, reason: "the session has ended".into() };
+    socket.send(Message::Close(Some(frame))).await
+}
+
+fn text(event: &LiveEvent) -> Result<Message, axum::Error> {
+    serde_json::to_string(event).map(|text| Message::Text(text.into())).map_err(axum::Error::new)
+}
+
+/// Reads reports from an index on.
+struct Reports {
+    session: Watching,
+    next: usize,
+    more: watch::Receiver<usize>,
+}
+
+impl Reports {
+    fn new(session: &Arc<Session>, first: u64) -> Self {
+        Self {
+            next: usize::try_from(first).unwrap_or(usize::MAX),
+            more: session.new_reports(),
+            session: session.watch(),
+        }
+    }
+
+    /// The next reports, as soon as there are any; `None` when none are coming. Cancelling loses nothing.
+    async fn next(&mut self) -> Option<Vec<Arc<StepReport>>> {
+        loop {
+            // Asked first: what an ended engine has left is still read.
+            let ended = self.session.ended().is_cancelled();
+            self.more.borrow_and_update();
+            let batch = self.session.reports(self.next, BATCH);
+            if !batch.is_empty() {
+                self.next += batch.len();
+                return Some(batch);
+            }
+            if ended {
+                return None;
+            }
+            changed(&mut self.more, &self.session).await;
+        }
+    }
+}
+
+/// Reads parts of the recording from an index on.
+struct Parts {
+    session: Watching,
+    next: usize,
+    more: watch::Receiver<usize>,
+}
+
+impl Parts {
+    fn new(session: &Arc<Session>, first: u64) -> Self {
+        let more = session.live().subscribe();
+        Self { next: usize::try_from(first).unwrap_or(usize::MAX), more, session: session.watch() }
+    }
+
+    /// The next parts, as soon as there are any; `None` when none are coming. Cancelling loses nothing.
+    async fn next(&mut self) -> Option<Vec<Bytes>> {
+        loop {
+            let ended = self.session.ended().is_cancelled();
+            self.more.borrow_and_update();
+            let batch = self.ready();
+            if !batch.is_empty() {
+                return Some(batch);
+            }
+            if ended {
+                return None;
+            }
+            changed(&mut self.more, &self.session).await;
+        }
+    }
+
+    fn ready(&mut self) -> Vec<Bytes> {
+        let batch = self.session.live().parts_from(self.next);
+        self.next += batch.len();
+        batch
+    }
+}
+
+async fn changed(more: &mut watch::Receiver<usize>, session: &Session) {
+    let ended = session.ended().cancelled();
+    tokio::select! {
+        biased;
+        changed = more.changed() => if changed.is_err() {
+            // Nothing more can be published, so only the end is left to wait for.
+            session.ended().cancelled().await;
+        },
+        () = ended => {}
+    }
+}

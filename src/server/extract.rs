@@ -1,0 +1,145 @@
+//! Reads requests, and says what is wrong with them in terms of the request.
+
+use axum::{
+    body::Bytes,
+    extract::{FromRequest, Request},
+    http::{HeaderMap, StatusCode, header},
+    response::IntoResponse,
+};
+use serde::de::DeserializeOwned;
+
+use super::{
+    MAX_BODY_BYTES,
+    problem::{Kind, Problem},
+};
+
+/// A JSON body. An absent body counts as `{}`, so that defaults need no body.
+pub(super) struct JsonBody<T>(pub(super) T);
+
+impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        let is_json = is_json(request.headers());
+        let bytes = Bytes::from_request(request, state).await.map_err(|rejection| {
+            let response = rejection.into_response();
+            match response.status() {
+                StatusCode::PAYLOAD_TOO_LARGE => {
+                    Problem::new(Kind::BodyTooLarge, format!("a body may have at most {MAX_BODY_BYTES} bytes"))
+                }
+                _ => Problem::new(Kind::Malformed, "the body broke off before its end"),
+            }
+        })?;
+        if !is_json && !bytes.is_empty() {
+            let detail = "send the body as JSON, with the header `Content-Type: application/json`";
+            return Err(Problem::new(Kind::UnsupportedMediaType, detail).field("Content-Type"));
+        }
+        parse(if bytes.is_empty() { b"{}" } else { &bytes }).map(Self)
+    }
+}
+
+fn is_json(headers: &HeaderMap) -> bool {
+    let value = headers.get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok());
+    value.is_some_and(|value| {
+        value.split(';').next().is_some_and(|essence| essence.trim().eq_ignore_ascii_case("application/json"))
+    })
+}
+
+fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+    // Syntax first: a body that breaks off is not blamed on the field where it does.
+    let value: serde_json::Value = serde_json::from_slice(bytes)
+        .map_err(|error| Problem::new(Kind::Malformed, format!("the body is not JSON: {error}")))?;
+    if !value.is_object() {
+        return Err(Problem::new(Kind::InvalidValue, "the body must be a JSON object"));
+    }
+    // Then from the text again, which also finds repeated fields.
+    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
+    serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
+        let message = error.inner().to_string();
+        let path = error.path().to_string();
+        // Missing, unknown and repeated fields are named in the message only.
+        let named = message.split_once("field `").and_then(|(_, rest)| rest.split_once('`')).map(|(name, _)| name);
+        let field = match named {
+            Some(name) => Some(name.to_owned()),
+            None => (path != ".").then_some(path),
+        };
+        let what = message.split(" at line ").next().unwrap_or(&message);
+        let detail = match &field {
+            Some(field) => format!("`{field}`: {what}"),
+            None => what.to_owned(),
+        };
+        Problem { field, ..Problem::new(Kind::InvalidValue, detail) }
+    })
+}
+
+/// The parameters of a query, each of which must be among `known` and a whole number; absent ones are `None`.
+pub(super) fn whole_numbers<const N: usize>(
+    query: Option<&str>,
+    known: [&'static str; N],
+) -> Result<[Option<u64>; N], Problem> {
+    let mut values = [None; N];
+    for pair in query.unwrap_or_default().split('&').filter(|pair| !pair.is_empty()) {
+        let (name, value) = pair.split_once('=').unwrap_or((pair, ""));
+        let Some(index) = known.iter().position(|known| *known == name) else {
+            let detail = format!("there is no parameter `{name}`; there is: {}", known.join(", "));
+            return Err(Problem::new(Kind::Malformed, detail).field(name));
+        };
+        values[index] = Some(whole_number(name, value)?);
+    }
+    Ok(values)
+}
+
+/// The header `Last-Event-ID`: the last step that was seen.
+pub(super) fn last_event_id(headers: &HeaderMap) -> Result<Option<u64>, Problem> {
+    let Some(value) = headers.get("last-event-id") else { return Ok(None) };
+    whole_number("Last-Event-ID", value.to_str().unwrap_or_default()).map(Some)
+}
+
+fn whole_number(name: &str, value: &str) -> Result<u64, Problem> {
+    value.parse().map_err(|_| {
+        Problem::new(Kind::Malformed, format!("`{name}` must be a whole number from 0, not `{value}`")).field(name)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Body {
+        #[allow(dead_code)]
+        scenario: String,
+        #[serde(default)]
+        #[allow(dead_code)]
+        learners: Vec<String>,
+    }
+
+    #[test]
+    fn every_fault_of_a_body_names_its_field() {
+        for (body, status, field) in [
+            ("{", 400, None),
+            ("[]", 422, None),
+            ("{}", 422, Some("scenario")),
+            (r#"{"scenario":1}"#, 422, Some("scenario")),
+            (r#"{"scenario":"a","seeds":1}"#, 422, Some("seeds")),
+            (r#"{"scenario":"a","scenario":"b"}"#, 422, Some("scenario")),
+            (r#"{"scenario":"a","learners":["b",2]}"#, 422, Some("learners[1]")),
+            (r#"{"scenario":"a","learners":"b"}"#, 422, Some("learners")),
+        ] {
+            let problem = parse::<Body>(body.as_bytes()).expect_err(body);
+            assert_eq!((problem.status, problem.field.as_deref()), (status, field), "{body}: {}", problem.detail);
+        }
+    }
+
+    #[test]
+    fn query_parameters_are_whole_numbers() {
+        assert_eq!(whole_numbers(Some("after=3"), ["from", "after"]).expect("valid"), [None, Some(3)]);
+        assert_eq!(whole_numbers(None, ["from"]).expect("valid"), [None]);
+        for query in ["from=", "from=x", "from=-1", "from=1.5"] {
+            let problem = whole_numbers(Some(query), ["from"]).expect_err(query);
+            assert_eq!((problem.status, problem.field.as_deref()), (400, Some("from")));
+        }
+        assert_eq!(whole_numbers(Some("form=1"), ["from"]).expect_err("unknown").field.as_deref(), Some("form"));
+    }
+}

@@ -1,0 +1,141 @@
+//! What holds for every request and every response.
+
+use std::sync::Arc;
+
+use axum::{
+    Router,
+    body::to_bytes,
+    extract::{DefaultBodyLimit, Request, State},
+    http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header},
+    middleware::{Next, from_fn_with_state, map_response},
+    response::{IntoResponse, Response},
+};
+
+use super::{
+    App, MAX_BODY_BYTES,
+    problem::{Kind, PROBLEM_JSON, Problem},
+};
+
+/// Scripts, styles, images and connections from here and from nowhere else; the viewer is WebAssembly. It also keeps
+/// the viewer from calling its makers' telemetry and from loading fonts.
+const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; \
+     img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// The routes with all that holds for every one of them.
+pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>) -> Router<Arc<App>> {
+    router
+        .fallback(async |uri: Uri| {
+            Problem::new(Kind::UnknownRoute, format!("there is nothing at `{}`; see /v1/openapi.json", uri.path()))
+        })
+        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
+        .layer(from_fn_with_state(app.clone(), refuse_strangers))
+        .layer(map_response(as_problem))
+        .layer(map_response(with_headers))
+}
+
+/// A page of another origin must neither change anything nor open a WebSocket, and on a loopback address a foreign host
+/// name is a page that had its name point here.
+async fn refuse_strangers(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let host = request.headers().get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
+    if app.loopback && !is_local(host) {
+        let detail = format!("this server answers to localhost only, not to `{host}`");
+        return Problem::new(Kind::ForeignOrigin, detail).field("Host").into_response();
+    }
+    let harmless = matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS)
+        && !request.headers().contains_key(header::UPGRADE);
+    if !harmless && !is_own_origin(request.headers(), host) {
+        let detail = "a page of another origin may not do this";
+        return Problem::new(Kind::ForeignOrigin, detail).field("Origin").into_response();
+    }
+    next.run(request).await
+}
+
+fn is_local(host: &str) -> bool {
+    let name = match host.rsplit_once(':') {
+        Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
+        _ => host,
+    };
+    let name = name.trim_matches(['[', ']']).to_ascii_lowercase();
+    name == "localhost"
+        || name.ends_with(".localhost")
+        || name.parse::<std::net::IpAddr>().is_ok_and(|address| address.is_loopback())
+}
+
+/// Scripts send no origin; browsers always do where it matters.
+fn is_own_origin(headers: &HeaderMap, host: &str) -> bool {
+    let Some(origin) = headers.get(header::ORIGIN) else { return true };
+    let authority = origin.to_str().ok().and_then(|origin| origin.split_once("://")).map(|(_, authority)| authority);
+    authority.is_some_and(|authority| authority.eq_ignore_ascii_case(host))
+}
+
+/// Turns errors that no handler made (wrong methods, bad paths, failed upgrades) into problems.
+async fn as_problem(response: Response) -> Response {
+    let status = response.status();
+    let is_problem = response.headers().get(header::CONTENT_TYPE).is_some_and(|value| value == PROBLEM_JSON);
+    if is_problem || !(status.is_client_error() || status.is_server_error()) {
+        return response;
+    }
+    let (mut parts, body) = response.into_parts();
+    let said = to_bytes(body, MAX_BODY_BYTES).await.unwrap_or_default();
+    let said = String::from_utf8_lossy(&said).into_owned();
+    let problem = match status {
+        StatusCode::METHOD_NOT_ALLOWED => {
+            let allowed = parts.headers.get(header::ALLOW).and_then(|value| value.to_str().ok()).unwrap_or("no method");
+            Problem::new(Kind::MethodNotAllowed, format!("allowed here: {}", allowed.replace(',', ", ")))
+        }
+        StatusCode::NOT_FOUND => Problem::new(Kind::UnknownRoute, said),
+        StatusCode::BAD_REQUEST => Problem::new(Kind::Malformed, said),
+        _ => Problem::new(Kind::Other(status), said),
+    };
+    parts.headers.remove(header::CONTENT_TYPE);
+    parts.headers.remove(header::CONTENT_LENGTH);
+    let (made, body) = problem.into_response().into_parts();
+    parts.headers.extend(made.headers);
+    Response::from_parts(parts, body)
+}
+
+async fn with_headers(mut response: Response) -> Response {
+    let headers = response.headers_mut();
+    for (name, value) in [
+        (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+        (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    // What sessions say changes from step to step; assets have said themselves how long they hold.
+    headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
+    response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_names_of_this_machine_are_local() {
+        for host in ["localhost", "localhost:8080", "LOCALHOST:1", "127.0.0.1:80", "127.1.2.3", "[::1]:8080", "[::1]"] {
+            assert!(is_local(host), "{host}");
+        }
+        for host in
+            ["", "example.org", "example.org:8080", "127.0.0.1.example.org", "localhost.example.org", "10.0.0.1"]
+        {
+            assert!(!is_local(host), "{host}");
+        }
+    }
+
+    #[test]
+    fn an_origin_must_be_the_host() {
+        let check = |origin: Option<&'static str>| {
+            let mut headers = HeaderMap::new();
+            headers.extend(origin.map(|origin| (header::ORIGIN, HeaderValue::from_static(origin))));
+            is_own_origin(&headers, "localhost:8080")
+        };
+        assert!(check(None) && check(Some("http://localhost:8080")));
+        for origin in ["http://localhost:8081", "http://localhost", "https://example.org", "null"] {
+            assert!(!check(Some(origin)), "{origin}");
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Everything that can go wrong, as RFC 9457 problem details.
+
+use axum::{
+    http::{HeaderValue, StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::scenario::ScenarioError;
+
+/// Media type of every error.
+pub const PROBLEM_JSON: &str = "application/problem+json";
+
+/// What went wrong (RFC 9457). Optional members are left out where they say nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct Problem {
+    /// Names the kind of problem; stable, to be compared by programs.
+    #[serde(rename = "type")]
+    #[schema(format = "uri", example = "urn:body-schema:problem:step-mismatch")]
+    pub kind: &'static str,
+    /// The kind in words; the same for every problem of this kind.
+    pub title: &'static str,
+    /// The HTTP status code.
+    pub status: u16,
+    /// What went wrong this time, and how to mend it.
+    pub detail: String,
+    /// The body field, parameter or header that is to blame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub field: Option<String>,
+    /// The session's actual step, where it matters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<u64>,
+    /// How many steps can still be made, where that is too few.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remaining: Option<u64>,
+}
+
+/// The kinds of problems.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Malformed,
+    ForeignOrigin,
+    UnknownRoute,
+    UnknownScenario,
+    UnknownSession,
+    MethodNotAllowed,
+    StepMismatch,
+    BodyTooLarge,
+    UnsupportedMediaType,
+    InvalidValue,
+    TooFewStepsLeft,
+    EngineFailed,
+    Internal,
+    ServerFull,
+    ShuttingDown,
+    Other(StatusCode),
+}
+
+impl Kind {
+    fn parts(self) -> (u16, &'static str, &'static str) {
+        macro_rules! urn {
+            ($slug:literal) => {
+                concat!("urn:body-schema:problem:", $slug)
+            };
+        }
+        match self {
+            Self::Malformed => (400, urn!("malformed"), "The request cannot be read"),
+            Self::ForeignOrigin => (403, urn!("foreign-origin"), "The request comes from a foreign page"),
+            Self::UnknownRoute => (404, urn!("unknown-route"), "There is nothing here"),
+            Self::UnknownScenario => (404, urn!("unknown-scenario"), "There is no such scenario"),
+            Self::UnknownSession => (404, urn!("unknown-session"), "There is no such session"),
+            Self::MethodNotAllowed => (405, urn!("method-not-allowed"), "This method is not allowed here"),
+            Self::StepMismatch => (409, urn!("step-mismatch"), "The session is at another step"),
+            Self::BodyTooLarge => (413, urn!("body-too-large"), "The body is too large"),
+            Self::UnsupportedMediaType => (415, urn!("unsupported-media-type"), "The body is not JSON"),
+            Self::InvalidValue => (422, urn!("invalid-value"), "A value is not valid"),
+            Self::TooFewStepsLeft => (422, urn!("too-few-steps-left"), "The session cannot make so many more steps"),
+            Self::EngineFailed => (500, urn!("engine-failed"), "The session's engine has failed"),
+            Self::Internal => (500, urn!("internal"), "The server has failed"),
+            Self::ServerFull => (503, urn!("server-full"), "The server holds as much as it can"),
+            Self::ShuttingDown => (503, urn!("shutting-down"), "The server is shutting down"),
+            Self::Other(status) => (status.as_u16(), "about:blank", status.canonical_reason().unwrap_or("Error")),
+        }
+    }
+}
+
+impl Problem {
+    pub(super) fn new(kind: Kind, detail: impl Into<String>) -> Self {
+        let (status, urn, title) = kind.parts();
+        Self { kind: urn, title, status, detail: detail.into(), field: None, step: None, remaining: None }
+    }
+
+    pub(super) fn field(self, field: impl Into<String>) -> Self {
+        Self { field: Some(field.into()), ..self }
+    }
+
+    pub(super) fn step(self, step: u64) -> Self {
+        Self { step: Some(step), ..self }
+    }
+
+    pub(super) fn remaining(self, remaining: u64) -> Self {
+        Self { remaining: Some(remaining), ..self }
+    }
+
+    pub(super) fn unknown_session(id: impl std::fmt::Display) -> Self {
+        Self::new(Kind::UnknownSession, format!("there is no session `{id}`; it may have been deleted")).field("id")
+    }
+}
+
+/// A scenario that cannot become a session, blamed on the body field that asked for it.
+impl From<ScenarioError> for Problem {
+    fn from(error: ScenarioError) -> Self {
+        let field = match &error {
+            ScenarioError::UnknownScenario { .. } => "scenario",
+            ScenarioError::UnknownLearner { .. } | ScenarioError::RepeatedLearner(_) | ScenarioError::NoLearner => {
+                "learners"
+            }
+            ScenarioError::Registration { .. } => "seed",
+            ScenarioError::Invalid { .. } | ScenarioError::Experiment(_) => {
+                return Self::new(Kind::EngineFailed, error.to_string());
+            }
+        };
+        Self::new(Kind::InvalidValue, error.to_string()).field(field)
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        let body = serde_json::to_vec(&self).unwrap_or_default();
+        let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
+        if matches!(status, StatusCode::SERVICE_UNAVAILABLE) {
+            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("10"));
+        }
+        response
+    }
+}

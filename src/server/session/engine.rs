@@ -1,0 +1,208 @@
+//! A session's engine: one thread that owns the experiment and its recording, and takes one command at a time.
+//!
+//! Steps take milliseconds of computing each, so they have no place on the runtime's workers. What the thread makes
+//! goes to [`Shared`], in the order recording, then reports: whoever sees a report finds its recording already there.
+
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::PathBuf,
+    sync::{Arc, mpsc},
+    time::{Duration, Instant},
+};
+
+use tokio::sync::{OwnedSemaphorePermit, oneshot};
+use uuid::Uuid;
+
+use super::Shared;
+use crate::{
+    experiment::{Description, Experiment, RunResult, StepReport},
+    recording::{Recorder, Target},
+    scenario::builtin,
+    server::{
+        MAX_STEPS_PER_SESSION,
+        problem::{Kind, Problem},
+    },
+};
+
+/// Within a long command, what was made is published this often.
+const PUBLISH_EVERY: Duration = Duration::from_millis(200);
+
+/// What a session is made from.
+pub(super) struct Setup {
+    /// Also the recording's id, so that viewers tell two sessions of one seed apart.
+    pub(super) id: Uuid,
+    pub(super) scenario: String,
+    pub(super) seed: u64,
+    pub(super) learners: Option<Vec<String>>,
+    /// The recording's file, if one is kept.
+    pub(super) file: Option<PathBuf>,
+    pub(super) shared: Arc<Shared>,
+    /// Held until the thread ends, so that ending sessions still count.
+    pub(super) permit: OwnedSemaphorePermit,
+}
+
+/// What a session can be asked. A dropped `reply` means that the engine is no more; a dropped receiver, that nobody
+/// waits for the answer any longer.
+pub(super) enum Command {
+    Step {
+        count: u64,
+        expected: Option<u64>,
+        reply: Reply<Vec<Arc<StepReport>>>,
+    },
+    Result {
+        reply: Reply<RunResult>,
+    },
+    Stop,
+    #[cfg(test)]
+    Panic,
+}
+
+pub(super) type Reply<T> = oneshot::Sender<Result<T, Problem>>;
+
+/// The body of the thread. `opened` hears of the description once the session stands.
+pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply<Description>) {
+    let Setup { id, scenario, seed, learners, file, shared, permit } = setup;
+    let open = || -> Result<(Experiment, Recorder), Problem> {
+        let experiment = builtin(&scenario)?.experiment(seed, learners.as_deref())?;
+        let target = Target::live(shared.live.clone()).with_recording_id(id.to_string());
+        let target = file.iter().fold(target, |target, file| target.and_file(file));
+        let mut recorder = Recorder::new(experiment.description(), target)
+            .and_then(|mut recorder| recorder.log(experiment.latest()).map(|()| recorder))
+            .map_err(|error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}")))?;
+        recorder.flush().map_err(recording_failed)?;
+        Ok((experiment, recorder))
+    };
+    match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
+        Ok((experiment, mut recorder)) => {
+            shared.publish(vec![kept(experiment.latest())], experiment.remaining());
+            if opened.send(Ok(experiment.description().clone())).is_ok() {
+                let mut engine = Engine { experiment, shared: &shared };
+                let outcome = catch_unwind(AssertUnwindSafe(|| engine.serve(&commands, &mut recorder)));
+                if let Err(panic) = outcome {
+                    shared.fail(panicked(&*panic).detail);
+                }
+            }
+            if let Ok(Err(error)) = catch_unwind(AssertUnwindSafe(|| recorder.finish())) {
+                shared.fail(format!("the recording could not be finished: {error}"));
+            }
+        }
+        Err(problem) => drop(opened.send(Err(problem))),
+    }
+    shared.live.close();
+    shared.ended.cancel();
+    drop(permit);
+}
+
+struct Engine<'a> {
+    experiment: Experiment,
+    shared: &'a Shared,
+}
+
+impl Engine<'_> {
+    /// Takes commands until told to stop or until nobody can send any more.
+    fn serve(&mut self, commands: &mpsc::Receiver<Command>, recorder: &mut Recorder) {
+        while let Ok(command) = commands.recv() {
+            if self.shared.stop.is_cancelled() {
+                return;
+            }
+            match command {
+                Command::Step { count, expected, mut reply } => {
+                    let outcome = self.steps(count, expected, recorder, &mut reply);
+                    // Nobody waits any longer: the steps stand all the same.
+                    drop(reply.send(outcome));
+                }
+                Command::Result { reply } => drop(reply.send(Ok(self.experiment.result()))),
+                Command::Stop => return,
+                #[cfg(test)]
+                Command::Panic => panic!("as the test asked"),
+            }
+        }
+    }
+
+    fn steps(
+        &mut self,
+        count: u64,
+        expected: Option<u64>,
+        recorder: &mut Recorder,
+        reply: &mut Reply<Vec<Arc<StepReport>>>,
+    ) -> Result<Vec<Arc<StepReport>>, Problem> {
+        let step = self.experiment.latest().step;
+        if let Some(expected) = expected.filter(|expected| *expected != step) {
+            let detail = format!("the session is at step {step}, not {expected}; nothing was stepped");
+            return Err(Problem::new(Kind::StepMismatch, detail).field("expected_step").step(step));
+        }
+        if let Some(problem) = self.too_many(count, step) {
+            return Err(problem.field("count").step(step));
+        }
+        let mut batch = Batch { made: Vec::new(), published: 0, last: Instant::now() };
+        let mut outcome = Ok(());
+        while outcome.is_ok() && (batch.made.len() as u64) < count {
+            // A request that its client has given up, or a session that is to end, stops between two steps.
+            if self.shared.stop.is_cancelled() || reply.is_closed() {
+                let detail = format!("the session is ending; {} of {count} steps were made", batch.made.len());
+                outcome = Err(Problem::new(Kind::ShuttingDown, detail));
+                break;
+            }
+            outcome = self.step(&mut batch, recorder);
+            if outcome.is_ok() && batch.last.elapsed() >= PUBLISH_EVERY {
+                outcome = self.publish(&mut batch, recorder);
+            }
+        }
+        let published = self.publish(&mut batch, recorder);
+        outcome.and(published).map(|()| batch.made).map_err(|problem| problem.step(self.experiment.latest().step))
+    }
+
+    fn step(&mut self, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
+        let report = self.experiment.step().map_err(|error| Problem::new(Kind::EngineFailed, error.to_string()))?;
+        // The step stands even if it cannot be recorded.
+        batch.made.push(kept(report));
+        recorder.log(report).map_err(recording_failed)
+    }
+
+    fn publish(&self, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
+        let flushed = recorder.flush().map_err(recording_failed);
+        self.shared.publish(batch.made[batch.published..].to_vec(), self.experiment.remaining());
+        (batch.published, batch.last) = (batch.made.len(), Instant::now());
+        flushed
+    }
+
+    fn too_many(&self, count: u64, step: u64) -> Option<Problem> {
+        let few = |left: u64, detail: String| Problem::new(Kind::TooFewStepsLeft, detail).remaining(left);
+        if let Some(left) = self.experiment.remaining().map(|left| left as u64).filter(|left| count > *left) {
+            return Some(few(left, format!("the recorded data have {left} steps left, {count} were asked for")));
+        }
+        let left = MAX_STEPS_PER_SESSION.saturating_sub(step);
+        if count > left {
+            let detail = format!("a session makes at most {MAX_STEPS_PER_SESSION} steps: {left} are left, not {count}");
+            return Some(few(left, detail));
+        }
+        (!self.shared.budget.has_room()).then(|| {
+            Problem::new(Kind::ServerFull, "the sessions together fill the server's memory; delete some and go on")
+        })
+    }
+}
+
+/// The steps of one command.
+struct Batch {
+    made: Vec<Arc<StepReport>>,
+    published: usize,
+    last: Instant,
+}
+
+/// What is kept of a report for late visitors: all but the minimiser's partition, which only recordings hold.
+fn kept(report: &StepReport) -> Arc<StepReport> {
+    let mut report = report.clone();
+    for movement in report.learners.iter_mut().filter_map(|learner| learner.movement.as_mut()) {
+        movement.partition = None;
+    }
+    Arc::new(report)
+}
+
+fn recording_failed(error: impl std::fmt::Display) -> Problem {
+    Problem::new(Kind::Internal, format!("the recording cannot be written: {error}"))
+}
+
+fn panicked(panic: &(dyn std::any::Any + Send)) -> Problem {
+    let said = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    Problem::new(Kind::EngineFailed, format!("the engine panicked: {}", said.unwrap_or("no message")))
+}

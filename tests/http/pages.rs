@@ -1,0 +1,66 @@
+//! The page's files.
+
+use std::io::Read;
+
+use reqwest::{Method, StatusCode};
+
+use crate::support::Server;
+
+#[tokio::test]
+async fn the_page_and_all_that_it_names_are_served() {
+    let server = Server::start().await;
+    let page = server.get("/").await;
+    assert_eq!(page.headers()["content-type"], "text/html; charset=utf-8");
+    assert_eq!(page.headers()["x-content-type-options"], "nosniff");
+    assert!(page.headers().contains_key("referrer-policy"));
+    let policy = page.headers()["content-security-policy"].to_str().expect("text").to_owned();
+    assert!(policy.starts_with("default-src 'none'") && !policy.contains("unsafe-inline") && !policy.contains("http"));
+    let page = page.text().await.expect("text");
+    let addresses: Vec<&str> = page.split('"').filter(|text| text.starts_with('/') && text.contains("?v=")).collect();
+    assert_eq!(addresses.len(), 5, "style, script, icon, the viewer's script and wasm: {addresses:?}");
+    assert!(page.contains("#0072b2"), "the learners' colours");
+    for address in addresses {
+        let file = server.get(address).await;
+        assert_eq!(file.status(), StatusCode::OK, "{address}");
+        assert_eq!(file.headers()["cache-control"], "public, max-age=31536000, immutable");
+        let tag = file.headers()["etag"].clone();
+        let again = server.request(Method::GET, address).header("if-none-match", &tag).send().await.expect("an answer");
+        assert_eq!(again.status(), StatusCode::NOT_MODIFIED);
+        assert_eq!(again.headers()["etag"], tag);
+        assert!(again.bytes().await.expect("nothing").is_empty());
+        let plain = server.get(address.split('?').next().expect("a path")).await;
+        assert_eq!(plain.headers()["cache-control"], "no-cache", "an address without a version may change");
+    }
+    for script in ["/session.js", "/table.js", "/viewer.js"] {
+        assert_eq!(server.get(script).await.headers()["content-type"], "text/javascript; charset=utf-8");
+    }
+    let wasm = server.request(Method::HEAD, "/viewer/re_viewer_bg.wasm").send().await.expect("an answer");
+    assert_eq!(wasm.headers()["content-type"], "application/wasm");
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn files_are_compressed_for_those_who_ask() {
+    let server = Server::start().await;
+    let path = "/viewer/re_viewer.js";
+    let plain = server.get(path).await;
+    assert!(!plain.headers().contains_key("content-encoding"));
+    let plain = plain.bytes().await.expect("a file");
+    let small =
+        server.request(Method::GET, path).header("accept-encoding", "br, gzip").send().await.expect("an answer");
+    assert_eq!(small.headers()["content-encoding"], "gzip");
+    assert_eq!(small.headers()["vary"], "Accept-Encoding");
+    let small = small.bytes().await.expect("a file");
+    let mut unpacked = Vec::new();
+    flate2::read::GzDecoder::new(small.as_ref()).read_to_end(&mut unpacked).expect("gzip");
+    assert!(unpacked == plain && small.len() * 2 < plain.len());
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn health() {
+    let server = Server::start().await;
+    let health = server.get_json("/healthz").await;
+    assert_eq!((health["status"].as_str(), health["version"].as_str()), (Some("ok"), Some(env!("CARGO_PKG_VERSION"))));
+    server.stop().await;
+}

@@ -1,0 +1,188 @@
+//! Following sessions: events, recordings and the WebSocket.
+
+use std::{collections::BTreeSet, io::Cursor};
+
+use futures_util::{SinkExt, StreamExt};
+use re_log_encoding::DecoderApp;
+use reqwest::Method;
+use rerun::log::{Chunk, LogMsg};
+use serde_json::Value;
+use tokio::{net::TcpStream, time::timeout};
+use tokio_tungstenite::{
+    client_async,
+    tungstenite::{Message, protocol::frame::coding::CloseCode},
+};
+
+use crate::support::{SOON, Server, timeless};
+
+/// All steps for which a recording holds data.
+pub fn steps_of_recording(bytes: &[u8]) -> BTreeSet<i64> {
+    let messages = DecoderApp::decode_eager(Cursor::new(bytes.to_vec())).expect("a recording");
+    let mut steps = BTreeSet::new();
+    for message in messages {
+        let LogMsg::ArrowMsg(store, message) = message.expect("a message") else { continue };
+        let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
+        if store.is_recording() {
+            steps.extend(chunk.timelines().values().flat_map(|times| times.times_raw().iter().copied()));
+        }
+    }
+    steps
+}
+
+/// The events of a stream, as they come.
+struct Events {
+    response: reqwest::Response,
+    text: String,
+}
+
+impl Events {
+    async fn open(server: &Server, session: &str, last: Option<u64>) -> Self {
+        let request = server.request(Method::GET, &format!("{session}/events"));
+        let request = last.into_iter().fold(request, |request, last| request.header("last-event-id", last));
+        let response = request.send().await.expect("an answer");
+        assert_eq!(response.status(), 200);
+        assert!(response.headers()["content-type"].to_str().expect("text").starts_with("text/event-stream"));
+        Self { response, text: String::new() }
+    }
+
+    /// The next event: its id and its data; `None` at the end.
+    async fn next(&mut self) -> Option<(u64, Value)> {
+        loop {
+            if let Some((event, rest)) = self.text.split_once("\n\n") {
+                let line = |name: &str| event.lines().find_map(|line| line.strip_prefix(name)).map(str::trim);
+                let event = line("id:")
+                    .zip(line("data:"))
+                    .map(|(id, data)| (id.parse().expect("a step"), serde_json::from_str(data).expect("JSON")));
+                self.text = rest.to_owned();
+                if event.is_some() {
+                    return event;
+                }
+                continue;
+            }
+            let more = timeout(SOON, self.response.chunk()).await.expect("an event soon").expect("a connection")?;
+            self.text.push_str(std::str::from_utf8(&more).expect("text"));
+        }
+    }
+}
+
+#[tokio::test]
+async fn events_tell_late_visitors_everything_and_resume() {
+    let server = Server::start().await;
+    let session = server.open_quick(1).await;
+    let mut early = Events::open(&server, &session, None).await;
+    assert_eq!(early.next().await.expect("step 0").0, 0);
+    let made = server.step(&session, 4).await;
+    let mut late = Events::open(&server, &session, None).await;
+    assert_eq!(late.next().await.expect("step 0").0, 0);
+    let mut resumed = Events::open(&server, &session, Some(2)).await;
+    for step in 1..=4 {
+        let report = &made["reports"][step - 1];
+        for (events, first) in [(&mut early, 1), (&mut late, 1), (&mut resumed, 3)] {
+            if step >= first {
+                assert_eq!(&events.next().await.expect("an event"), &(step as u64, report.clone()));
+            }
+        }
+    }
+    assert!(early.next_is_later(&server, &session).await);
+    server.delete(&session).await;
+    for events in [&mut late, &mut resumed] {
+        assert_eq!(events.next().await.expect("the fifth").0, 5);
+        assert!(events.next().await.is_none(), "the stream ends with the session");
+    }
+    server.stop().await;
+}
+
+impl Events {
+    /// Whether an event comes when, and only when, a step is made.
+    async fn next_is_later(&mut self, server: &Server, session: &str) -> bool {
+        assert!(timeout(std::time::Duration::from_millis(100), self.response.chunk()).await.is_err(), "nothing yet");
+        let made = server.step(session, 1).await;
+        let (step, report) = self.next().await.expect("an event");
+        step == 5 && timeless(&report) == timeless(&made["reports"][0])
+    }
+}
+
+#[tokio::test]
+async fn the_live_recording_grows_and_ends_with_the_session() {
+    let server = Server::start().await;
+    let session = server.open_quick(1).await;
+    server.step(&session, 2).await;
+    let mut live = server.get(&format!("{session}/live.rrd")).await;
+    let mut bytes = Vec::new();
+    let until = async |live: &mut reqwest::Response, bytes: &mut Vec<u8>, last: i64| {
+        while !steps_of_recording(bytes).contains(&last) {
+            bytes.extend(timeout(SOON, live.chunk()).await.expect("soon").expect("a connection").expect("more"));
+        }
+    };
+    bytes.extend(live.chunk().await.expect("a connection").expect("the header"));
+    until(&mut live, &mut bytes, 2).await;
+    server.step(&session, 3).await;
+    until(&mut live, &mut bytes, 5).await;
+    assert_eq!(steps_of_recording(&bytes), (0..=5).collect());
+    server.delete(&session).await;
+    while let Some(more) = timeout(SOON, live.chunk()).await.expect("the end, soon").expect("a connection") {
+        bytes.extend(more);
+    }
+    assert_eq!(steps_of_recording(&bytes), (0..=5).collect());
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn the_websocket_carries_reports_and_recording_and_resumes() {
+    let server = Server::start().await;
+    let session = server.open_quick(1).await;
+    server.step(&session, 3).await;
+    let connect = async |query: &str| {
+        let stream = TcpStream::connect(server.address).await.expect("a connection");
+        let url = format!("ws://{}{session}/live{query}", server.address);
+        client_async(url, stream).await.expect("a WebSocket").0
+    };
+    let mut whole = connect("").await;
+    let (mut parts, mut steps) = (Vec::new(), Vec::new());
+    let first = timeout(SOON, whole.next()).await.expect("soon").expect("a message").expect("no error");
+    let first: Value = serde_json::from_str(first.to_text().expect("text")).expect("JSON");
+    assert_eq!((first["type"].as_str(), first["data"]["seed"].as_u64()), (Some("description"), Some(1)));
+    while steps.last() != Some(&3) {
+        match timeout(SOON, whole.next()).await.expect("soon").expect("a message").expect("no error") {
+            Message::Binary(part) => parts.push(part),
+            Message::Text(text) => {
+                let event: Value = serde_json::from_str(&text).expect("JSON");
+                assert_eq!(event["type"], "step");
+                let step = event["data"]["step"].as_u64().expect("a step");
+                assert!(steps_of_recording(&parts.concat()).contains(&(step as i64)), "its recording came before");
+                steps.push(step);
+            }
+            other => panic!("unexpected: {other:?}"),
+        }
+    }
+    assert_eq!(steps, [0, 1, 2, 3]);
+    assert_eq!(parts[0].len(), 12);
+
+    let mut resumed = connect(&format!("?from={}&step=4", parts.len())).await;
+    resumed.next().await.expect("a message").expect("the description");
+    server.step(&session, 1).await;
+    let mut bytes = parts[0].to_vec();
+    loop {
+        match timeout(SOON, resumed.next()).await.expect("soon").expect("a message").expect("no error") {
+            Message::Binary(part) => bytes.extend_from_slice(&part),
+            Message::Text(text) => {
+                let event: Value = serde_json::from_str(&text).expect("JSON");
+                assert_eq!(event["data"]["step"], 4, "only what is new");
+                break;
+            }
+            other => panic!("unexpected: {other:?}"),
+        }
+    }
+    assert_eq!(steps_of_recording(&bytes), BTreeSet::from([4]), "only what is new");
+    resumed.close(None).await.expect("closed");
+
+    server.delete(&session).await;
+    let mut last = None;
+    while let Some(Ok(message)) = timeout(SOON, whole.next()).await.expect("the end, soon") {
+        last = Some(message);
+    }
+    let Some(Message::Close(Some(frame))) = last else { panic!("no reason: {last:?}") };
+    assert_eq!(frame.code, CloseCode::from(4404));
+    drop(whole.flush().await);
+    server.stop().await;
+}

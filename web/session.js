@@ -1,0 +1,104 @@
+// The server's API, and the one WebSocket that a page holds.
+
+/** How long to wait before each attempt to reconnect, ms; the last holds for all further ones. */
+const BACK_OFF_MS = [500, 1000, 2000, 4000, 8000];
+/** The close code that says that the session has ended. */
+const CLOSE_ENDED = 4404;
+
+/** An error that the server explained (RFC 9457). */
+export class ProblemError extends Error {
+  /** @param {object} problem */
+  constructor(problem) {
+    super(problem.detail || problem.title);
+    this.problem = problem;
+    this.status = problem.status;
+  }
+}
+
+/**
+ * Asks the server.
+ * @param {string} method
+ * @param {string} path
+ * @param {object} [body]
+ * @returns {Promise<any>} throws a ProblemError, or a TypeError where there is no answer
+ */
+export async function request(method, path, body) {
+  const headers = body === undefined ? {} : { "Content-Type": "application/json" };
+  const response = await fetch(path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
+  if (response.ok) return response.status === 204 ? null : response.json();
+  const problem = await response.json().catch(() => ({ title: response.statusText }));
+  throw new ProblemError({ ...problem, status: response.status });
+}
+
+/**
+ * Follows a session until told otherwise, over broken connections too.
+ *
+ * Nothing is received twice: after a break it goes on with the next part and the next step.
+ */
+export class Follower {
+  #id;
+  #on;
+  #part = 0;
+  #step = 0;
+  #attempt = 0;
+  #socket = null;
+  #timer = 0;
+  #stopped = false;
+
+  /**
+   * @param {string} id
+   * @param {{description: Function, step: Function, part: Function, connected: Function, lost: Function,
+   *   ended: Function}} on lost(seconds) says when it is tried again
+   */
+  constructor(id, on) {
+    this.#id = id;
+    this.#on = on;
+    this.#connect();
+  }
+
+  stop() {
+    this.#stopped = true;
+    clearTimeout(this.#timer);
+    this.#socket?.close();
+  }
+
+  #connect() {
+    const address = new URL(`/v1/sessions/${this.#id}/live`, location.href);
+    address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    address.search = new URLSearchParams({ from: String(this.#part), step: String(this.#step) }).toString();
+    const socket = new WebSocket(address);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
+      this.#attempt = 0;
+      if (!this.#stopped) this.#on.connected();
+    };
+    socket.onmessage = (message) => this.#stopped || this.#receive(message.data);
+    socket.onclose = (event) => this.#stopped || this.#closed(event.code);
+    this.#socket = socket;
+  }
+
+  #receive(data) {
+    if (data instanceof ArrayBuffer) {
+      this.#part += 1;
+      this.#on.part(data);
+      return;
+    }
+    const event = JSON.parse(data);
+    if (event.type === "step") this.#step = event.data.step + 1;
+    this.#on[event.type]?.(event.data);
+  }
+
+  async #closed(code) {
+    if (code === CLOSE_ENDED) return this.#on.ended();
+    // A refused connection does not say why: a session that is gone is asked for in vain.
+    const gone = await request("GET", `/v1/sessions/${this.#id}`).then(
+      () => false,
+      (error) => error.status === 404,
+    );
+    if (this.#stopped) return;
+    if (gone) return this.#on.ended();
+    const wait = BACK_OFF_MS[Math.min(this.#attempt++, BACK_OFF_MS.length - 1)];
+    this.#on.lost(wait / 1000);
+    this.#timer = setTimeout(() => this.#connect(), wait);
+  }
+}

@@ -1,0 +1,171 @@
+// Rerun's viewer: its loading, and what it is fed.
+
+/** The timeline of every recording. */
+const TIMELINE = "step";
+/** Length of the header that must stand before every message, bytes. */
+const HEADER_BYTES = 12;
+/** How long parts are gathered, ms. */
+const GATHER_MS = 10;
+
+/**
+ * Loads the viewer's WebAssembly and starts it on a canvas.
+ * @param {HTMLCanvasElement} canvas
+ * @param {{script: string, wasm: string}} addresses
+ * @param {(fraction: number | null) => void} progress null where the size is not known
+ * @returns {Promise<Viewer>}
+ */
+export async function startViewer(canvas, addresses, progress) {
+  keepToThisHost();
+  const [, response] = await Promise.all([loadScript(addresses.script), fetch(addresses.wasm)]);
+  if (!response.ok) throw new Error(`the viewer could not be loaded (${response.status})`);
+  // `wasm_bindgen` is what the script defines.
+  await wasm_bindgen({ module_or_path: withProgress(response, progress) });
+  const handle = new wasm_bindgen.WebHandle({
+    url: [],
+    hide_welcome_screen: true,
+    enable_history: false,
+    notebook: false,
+    persist: false,
+  });
+  await handle.start(canvas);
+  for (const panel of ["top", "blueprint", "selection"]) handle.override_panel_state(panel, "hidden");
+  handle.override_panel_state("time", "collapsed");
+  return new Viewer(handle);
+}
+
+/**
+ * Answers the viewer's calls to its makers' telemetry with nothing. The content security policy would refuse them too,
+ * with an error in the console each time.
+ */
+function keepToThisHost() {
+  const fetchAnything = window.fetch.bind(window);
+  window.fetch = (resource, options) => {
+    const address = new URL(resource instanceof Request ? resource.url : resource, location.href);
+    if (address.origin === location.origin) return fetchAnything(resource, options);
+    return Promise.resolve(new Response("", { status: 200 }));
+  };
+}
+
+/** @param {string} address */
+function loadScript(address) {
+  return new Promise((resolve, reject) => {
+    const script = document.createElement("script");
+    script.src = address;
+    script.onload = resolve;
+    script.onerror = () => reject(new Error("the viewer's script could not be loaded"));
+    document.head.append(script);
+  });
+}
+
+/**
+ * The same response, whose reading is reported.
+ * @param {Response} response
+ * @param {(fraction: number | null) => void} progress
+ */
+function withProgress(response, progress) {
+  const total = Number(response.headers.get("uncompressed-length"));
+  let loaded = 0;
+  const counted = response.body.pipeThrough(
+    new TransformStream({
+      transform(chunk, controller) {
+        loaded += chunk.byteLength;
+        progress(total ? Math.min(loaded / total, 1) : null);
+        controller.enqueue(chunk);
+      },
+    }),
+  );
+  return new Response(counted, { headers: { "Content-Type": "application/wasm" } });
+}
+
+/** A running viewer that shows one recording at a time. */
+export class Viewer {
+  #handle;
+  #channel = null;
+  #header = null;
+  /** Parts that wait to be sent together. */
+  #parts = [];
+  #timer = 0;
+  /** The step to be at, and those who wait for it. */
+  #step = 0;
+  #waiting = [];
+  #seeking = false;
+
+  constructor(handle) {
+    this.#handle = handle;
+  }
+
+  /** Begins a recording. @param {string} id its recording id */
+  open(id) {
+    this.close();
+    this.#channel = id;
+    this.#handle.open_channel(id, id);
+  }
+
+  /** Ends the recording; what was shown stays. */
+  close() {
+    clearTimeout(this.#timer);
+    if (this.#channel !== null) this.#handle.close_channel(this.#channel);
+    this.#channel = this.#header = null;
+    [this.#parts, this.#timer, this.#step] = [[], 0, 0];
+    this.#wake();
+  }
+
+  /** Shows one part of the recording; part 0 is the header. @param {ArrayBuffer} part */
+  feed(part) {
+    if (this.#header === null) {
+      this.#header = part.slice(0, HEADER_BYTES);
+      return;
+    }
+    this.#parts.push(part);
+    // Parts come in dozens: one header for all that are there.
+    this.#timer ||= setTimeout(() => this.#send(), GATHER_MS);
+  }
+
+  #send() {
+    this.#timer = 0;
+    const parts = [this.#header, ...this.#parts.splice(0)];
+    const message = new Uint8Array(parts.reduce((length, part) => length + part.byteLength, 0));
+    let length = 0;
+    for (const part of parts) {
+      message.set(new Uint8Array(part), length);
+      length += part.byteLength;
+    }
+    this.#handle.send_rrd_to_channel(this.#channel, message);
+  }
+
+  /**
+   * Goes to a step as soon as the viewer has taken it in, which may be some frames later.
+   * @param {number} step
+   * @returns {Promise<void>} resolves when the viewer is there, or when it shows another recording
+   */
+  seek(step) {
+    this.#step = Math.max(this.#step, step);
+    if (!this.#seeking) {
+      this.#seeking = true;
+      requestAnimationFrame(() => this.#follow());
+    }
+    return new Promise((resolve) => this.#waiting.push(resolve));
+  }
+
+  #follow() {
+    const id = this.#channel;
+    const newest = id === null ? undefined : this.#handle.get_timeline_time_range(id, TIMELINE)?.max;
+    if (newest !== undefined) {
+      this.#handle.set_active_recording_id(id);
+      this.#handle.set_playing(id, false);
+      this.#handle.set_time_for_timeline(id, TIMELINE, Math.min(this.#step, newest));
+    }
+    this.#seeking = id !== null && !(newest >= this.#step);
+    if (this.#seeking) requestAnimationFrame(() => this.#follow());
+    else this.#wake();
+  }
+
+  #wake() {
+    this.#waiting.splice(0).forEach((resolve) => resolve());
+  }
+
+  /** Why the viewer has crashed, or null. */
+  failure() {
+    return this.#handle.has_panicked() ? (this.#handle.panic_message() ?? "no message") : null;
+  }
+}
