@@ -16,7 +16,7 @@ use crate::{
 
 const NO_VALUE: [u8; 3] = [0x60, 0x60, 0x60];
 const FRAME: [u8; 3] = [0x90, 0x90, 0x90];
-const LABEL: [u8; 3] = [0xC8, 0xC8, 0xC8];
+const LABEL: [u8; 3] = [0x80, 0x80, 0x80];
 const CHOSEN: [u8; 3] = [0xD5, 0x5E, 0x00];
 
 /// Pixels along each side of the picture of a slice: sides trisected up to four times fit exactly.
