@@ -11,7 +11,7 @@ use std::{fs, path::PathBuf};
 
 use body_schema::{
     experiment::{Comparison, Description, StepReport, Trace},
-    recording::{LiveLog, Recorder, RecordingError, StepsCsv, Target, comparison_csv, learner_color},
+    recording::{LiveLog, Recorder, RecordingError, SIGMAS, StepsCsv, Target, comparison_csv, learner_color},
     scenario::builtin,
 };
 use checks::check;
@@ -64,7 +64,9 @@ fn a_recording_holds_what_the_reports_said() {
         assert_eq!(reading.timelines(), ["step"]);
         assert_eq!(reading.steps("/gradient/failure"), [4]);
         let note = reading.note();
-        for word in ["arm-6dof", "seed 3", "active", "gradient", "2σ", "metres", "body-schema run arm-6dof --seed 3"] {
+        let sigma = format!("{SIGMAS}σ");
+        for word in ["arm-6dof", "seed 3", "active", "gradient", &sigma, "metres", "body-schema run arm-6dof --seed 3"]
+        {
             assert!(note.contains(word), "the note says {word}: {note}");
         }
     }
