@@ -132,7 +132,7 @@ impl Engine<'_> {
             return Err(Problem::new(Kind::StepMismatch, detail).field("expected_step").step(step));
         }
         if let Some(problem) = self.too_many(count, step) {
-            return Err(problem.field("count").step(step));
+            return Err(problem.step(step));
         }
         let mut batch = Batch { made: Vec::new(), published: 0, last: Instant::now() };
         let mut outcome = Ok(());
@@ -167,7 +167,8 @@ impl Engine<'_> {
     }
 
     fn too_many(&self, count: u64, step: u64) -> Option<Problem> {
-        let few = |left: u64, detail: String| Problem::new(Kind::TooFewStepsLeft, detail).remaining(left);
+        let few =
+            |left: u64, detail: String| Problem::new(Kind::TooFewStepsLeft, detail).field("count").remaining(left);
         if let Some(left) = self.experiment.remaining().map(|left| left as u64).filter(|left| count > *left) {
             return Some(few(left, format!("the recorded data have {left} steps left, {count} were asked for")));
         }

@@ -145,8 +145,13 @@ impl Session {
             step: self.step(),
             remaining: Some(self.shared.remaining.load(Ordering::Relaxed)).filter(|left| *left != u64::MAX),
             file: self.file.clone(),
-            failure: lock(&self.shared.failure).clone(),
+            failure: self.failure(),
         }
+    }
+
+    /// Why the engine has failed, if it has.
+    pub(super) fn failure(&self) -> Option<String> {
+        lock(&self.shared.failure).clone()
     }
 
     /// The latest published step.
@@ -187,18 +192,20 @@ impl Session {
 
     async fn ask<T>(&self, command: impl FnOnce(engine::Reply<T>) -> Command) -> Result<T, Problem> {
         let (reply, answer) = oneshot::channel();
-        // Both an engine that takes no commands and one that dropped this one have ended.
-        let sent = self.commands.send(command(reply));
-        match (sent, answer.await) {
-            (Ok(()), Ok(outcome)) => outcome,
-            _ => Err(self.why_ended().await),
+        // Both an engine that takes no commands and one that dropped this one have ended. A command that was not sent
+        // must go at once: it holds the other end of `answer`.
+        if self.commands.send(command(reply)).is_ok()
+            && let Ok(outcome) = answer.await
+        {
+            return outcome;
         }
+        Err(self.why_ended().await)
     }
 
     async fn why_ended(&self) -> Problem {
         // The reason may come an instant after the dropped reply.
         self.shared.ended.cancelled().await;
-        match lock(&self.shared.failure).clone() {
+        match self.failure() {
             Some(failure) => Problem::new(Kind::EngineFailed, failure).step(self.step()),
             None => Problem::unknown_session(self.id),
         }
