@@ -5,21 +5,42 @@ use rerun::{
     blueprint::{
         Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Grid, Horizontal, SelectionPanel, Spatial2DView,
         Spatial3DView, Tabs, TextDocumentView, TimePanel, TimeSeriesView, Vertical,
-        components::{Corner2D, PanelState, PlayState, VisualBounds2D},
+        components::{BackgroundKind, Corner2D, PanelState, PlayState, VisualBounds2D},
     },
     datatypes::Range2D,
     external::{
         re_log_types::{ApplicationId, BlueprintActivationCommand, EntityPath, LogMsg},
-        re_sdk_types::blueprint::archetypes::{EyeControls3D, PlotLegend, VisualBounds2D as Bounds},
+        re_sdk_types::blueprint::archetypes::{
+            Background, EyeControls3D, LineGrid3D, PlotLegend, VisualBounds2D as Bounds,
+        },
     },
     log::{Chunk, RowId},
 };
 
-use super::{RecordingError, model::single, recorder::Scene};
+use super::{RecordingError, model::single, scene::Scene};
 use crate::experiment::Description;
 
-/// Where the camera stands, as seen from the middle of the arm, in sizes of the arm: aside, a little ahead and above.
-const CAMERA: [f64; 3] = [0.35, -1.35, 0.75];
+/// Where the camera stands, as seen from the scene's centre, in sizes of the arm: aside, a little ahead and above.
+const CAMERA: [f64; 3] = [0.6, -2.0, 1.05];
+
+/// The ground of the arms, the same in light and dark viewers: colours must stand out from it.
+const BACKGROUND: [u8; 3] = [0x14, 0x16, 0x1A];
+
+/// Titles and metrics of the curves.
+const CHARTS: [(&str, &str); 3] = [
+    ("Orientation error (deg)", "orientation_deg"),
+    ("Location error (m)", "location_m"),
+    ("Prediction error, mean (m)", "prediction_mean_m"),
+];
+
+/// The same where no truth is known.
+const CHARTS_WITHOUT_TRUTH: [(&str, &str); 2] =
+    [("Prediction error, mean (m)", "prediction_mean_m"), ("Trace of the covariance, tr(W P)", "trace")];
+
+/// Whether a metric has its curve in some arrangement.
+pub(super) fn shows(metric: &str) -> bool {
+    CHARTS.iter().chain(&CHARTS_WITHOUT_TRUTH).any(|(_, shown)| *shown == metric)
+}
 
 /// The arrangement as messages: the learners side by side above; below, the curves, DIRECT's partition and the note.
 pub(super) fn messages(
@@ -41,19 +62,14 @@ pub(super) fn messages(
         let eye = EyeControls3D::new()
             .with_position(single(std::array::from_fn(|i| scene.centre_m[i] + CAMERA[i] * scene.size_m)))
             .with_look_target(single(scene.centre_m));
-        properties.of(view.into(), "EyeControls3D", &eye)
+        let view = properties.of(view.into(), "EyeControls3D", &eye);
+        let view =
+            properties.of(view, "Background", &Background::new(BackgroundKind::SolidColor).with_color(BACKGROUND));
+        properties.of(view, "LineGrid3D", &LineGrid3D::new().with_visible(false))
     });
     let arms = Grid::new(arms.collect::<Vec<_>>()).with_grid_columns(learners.len().clamp(1, 3) as u32);
 
-    let charts: &[(&str, &str)] = if description.truth.is_some() {
-        &[
-            ("Orientation error (deg)", "orientation_deg"),
-            ("Location error (m)", "location_m"),
-            ("Prediction error, mean (m)", "prediction_mean_m"),
-        ]
-    } else {
-        &[("Prediction error, mean (m)", "prediction_mean_m"), ("Trace of the covariance, tr(W P)", "trace")]
-    };
+    let charts: &[(&str, &str)] = if description.truth.is_some() { &CHARTS } else { &CHARTS_WITHOUT_TRUTH };
     let mut below: Vec<ContainerLike> = Vec::new();
     for (title, metric) in charts {
         let contents = learners.iter().map(|root| format!("+ {root}/metrics/{metric}"));
@@ -65,7 +81,7 @@ pub(super) fn messages(
     for (root, _) in names().filter(|(_, l)| l.policy == "active" && description.movements_available.is_none()) {
         let name = root.last().map(|part| part.ui_string()).unwrap_or_default();
         let view = Spatial2DView::new(format!("DIRECT, {name}")).with_origin(root.join(&EntityPath::from("direct")));
-        let bounds = Range2D { x_range: [-0.08, 1.08].into(), y_range: [-0.12, 1.12].into() };
+        let bounds = Range2D { x_range: [-0.08, 1.08].into(), y_range: [-0.16, 1.16].into() };
         tabs.push(properties.of(view.into(), "VisualBounds2D", &Bounds::new(VisualBounds2D(bounds))));
     }
     tabs.push(TextDocumentView::new("Note").with_origin("/note").into());

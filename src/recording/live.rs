@@ -77,7 +77,7 @@ impl LiveLog {
         Self { shared: Arc::new(Shared { state: Mutex::new(state), length: watch::Sender::new(1) }) }
     }
 
-    /// The header and the message with which a part can be sent alone.
+    /// Part 0, the header: it goes before a part that is sent alone.
     pub fn header(&self) -> Bytes {
         self.state().parts[0].clone()
     }
@@ -135,12 +135,13 @@ impl LiveLog {
         let stream = self.parts_from(0).concat();
         let decoded = |source: re_log_encoding::DecodeError| RecordingError::Encode(source.to_string());
         let mut rest = Vec::new();
-        let mut chunks: BTreeMap<(EntityPath, bool), (StoreId, Vec<Chunk>)> = BTreeMap::new();
+        // What is static comes first.
+        let mut chunks: BTreeMap<(bool, EntityPath), (StoreId, Vec<Chunk>)> = BTreeMap::new();
         for message in DecoderApp::decode_eager(Cursor::new(stream)).map_err(decoded)? {
             match message.map_err(decoded)? {
                 LogMsg::ArrowMsg(store, message) if store.is_recording() => {
                     let chunk = Chunk::from_arrow_msg(&message)?;
-                    let key = (chunk.entity_path().clone(), chunk.is_static());
+                    let key = (!chunk.is_static(), chunk.entity_path().clone());
                     chunks.entry(key).or_insert_with(|| (store, Vec::new())).1.push(chunk);
                 }
                 other => rest.push(other),

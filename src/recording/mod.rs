@@ -18,7 +18,8 @@
 //! | `/{learner}/direction_uncertainty` | Ellipsoids3D | covariances of the directions, at the tips of the arrows |
 //! | `/{learner}/movement/links`, `…/truth` | LineStrips3D | estimated and true arm in the step's configuration |
 //! | `/{learner}/marker/predicted`, `…/measured` | Points3D | the marker before the update; measured is empty after a miss |
-//! | `/{learner}/direct/boxes`, `…/centres`, `…/chosen` | Boxes2D, Points2D | the slice, the other leaves, the choice |
+//! | `/{learner}/direct/criterion` | Image, Transform3D | the criterion over a slice of DIRECT's partition |
+//! | `/{learner}/direct/boxes`, `…/centres`, `…/chosen` | Boxes2D, Points2D | the leaves of the slice, the centres of the others, the choice |
 //! | `/{learner}/direct/axes` | LineStrips2D, Points2D, static | frame and labels of the slice: joints and limits |
 //! | `/{learner}/direct/leaves` | plain data | the whole partition, see [`Recorder`] |
 //! | `/{learner}/metrics/{name}` | Scalars, SeriesLines | every metric, and what is known of the choice |
@@ -39,6 +40,7 @@ mod csv;
 mod ellipsoid;
 mod error;
 mod file;
+mod learner;
 mod live;
 mod metrics;
 mod model;
@@ -47,6 +49,7 @@ mod note;
 mod partition;
 mod recorder;
 mod rows;
+mod scene;
 
 pub use self::{
     colours::{TRUTH_COLOR, hex, learner_color},

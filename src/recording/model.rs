@@ -7,8 +7,14 @@ use rerun::{
     external::arrow::array::Float64Array,
 };
 
-use super::ellipsoid::{Axes, Ellipsoid, SIGMAS};
+use super::{
+    colours::tint,
+    ellipsoid::{Axes, Ellipsoid, SIGMAS},
+};
 use crate::experiment::{JointDescription, ModelReport};
+
+/// Opacity of ellipsoids, of 255: what they surround stays visible.
+const ALPHA: u8 = 90;
 
 /// A point as Rerun takes it.
 pub(super) fn single([x, y, z]: [f64; 3]) -> [f32; 3] {
@@ -28,7 +34,7 @@ pub(super) fn axes(model: &ModelReport, joints: &[JointDescription], length_m: f
     Arrows3D::from_vectors(vectors)
         .with_origins(origins(model).into_iter().map(single))
         .with_colors([Color::from(colour)])
-        .with_radii([Radius::new_ui_points(1.5)])
+        .with_radii([Radius::new_ui_points(2.0)])
         .with_labels(joints.iter().map(|joint| joint.name.clone()))
         .with_show_labels(false)
 }
@@ -99,7 +105,7 @@ impl Uncertainty {
                 Some((tip, joint.direction_covariance_rad2?, axes, description.name.as_str()))
             },
         );
-        Instances::new(tips, length_m, colour)
+        Instances::new(tips, length_m, tint(colour, 0.5))
     }
 }
 
@@ -132,7 +138,7 @@ impl Instances {
                 let [x, y, z, w]: [f64; 4] = instance.ellipsoid.rotation.coords.into();
                 Quaternion::from_xyzw([x as f32, y as f32, z as f32, w as f32])
             }))
-            .with_colors([Color::from(colour)])
+            .with_colors([Color::from_unmultiplied_rgba(colour[0], colour[1], colour[2], ALPHA)])
             .with_line_radii([Radius::new_ui_points(0.5)])
             .with_fill_mode(FillMode::TransparentFillMajorWireframe)
             .with_labels(instances.iter().map(|instance| instance.label.clone()))

@@ -40,8 +40,8 @@ fn markdown(description: &Description) -> String {
          joint's stands at the next joint); thin and pale the arm in the configuration of the step's movement, beside \
          the true one.\n\
          - **Ellipsoids** are {SIGMAS}σ along each principal axis: of the points on the axes (flat along the axis, \
-         where a point means nothing), and at the tips of the arrows of the directions, drawn as the tip would move. \
-         The coordinates alone: 2σ in three dimensions holds 74 % and in two 86 %.\n\
+         where a point means nothing), and, paler, at the tips of the arrows those of the directions, as the tips would move. \
+         In two dimensions 2σ hold 86 % of a normal distribution, in three 74 %.\n\
          - **Marker**: pale as predicted before the measurement, yellow as measured; no yellow point after a miss.\n\
          - **Partition**: how DIRECT divided the joint box to choose the movement, as the slice through the chosen \
          configuration (vermillion) along two joints, each from limit to limit. Brighter is a lower criterion, so \

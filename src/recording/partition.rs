@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use rerun::{
-    AsComponents, Boxes2D, Color, DynamicArchetype, LineStrips2D, Points2D, Radius,
+    AsComponents, Boxes2D, Color, DynamicArchetype, Image, LineStrips2D, Points2D, Radius, Transform3D,
     external::arrow::array::{BooleanArray, Float64Array, UInt8Array, UInt32Array},
 };
 
@@ -16,7 +16,14 @@ use crate::{
 
 const NO_VALUE: [u8; 3] = [0x60, 0x60, 0x60];
 const FRAME: [u8; 3] = [0x90, 0x90, 0x90];
+const LABEL: [u8; 3] = [0xC8, 0xC8, 0xC8];
 const CHOSEN: [u8; 3] = [0xD5, 0x5E, 0x00];
+
+/// Pixels along each side of the picture of a slice: sides trisected up to four times fit exactly.
+const PIXELS: usize = 81;
+
+/// How bright the fill of a rectangle is beside its outline.
+const FILL: f64 = 0.5;
 
 /// The two joints that slices show: `x` to the right, `y` upwards, each from its lower limit to its upper. They are
 /// chosen at the first partition and kept, so that the picture does not jump from step to step.
@@ -66,8 +73,8 @@ impl Plane {
                 format!("{}: {lower} {}, {upper} {}", joint.name, directions[0], directions[1])
             })
         };
-        let mut labels = vec![([0.5_f32, 1.06], label(self.x, ["left", "right"]))];
-        labels.extend(self.y.map(|y| ([0.5, -0.06], label(y, ["bottom", "top"]))));
+        let mut labels = vec![([0.5_f32, 1.02], label(self.x, ["left", "right"]))];
+        labels.extend(self.y.map(|y| ([0.5, -0.09], label(y, ["bottom", "top"]))));
         [
             Box::new(
                 LineStrips2D::new([square])
@@ -77,7 +84,7 @@ impl Plane {
             ),
             Box::new(
                 Points2D::new(labels.iter().map(|(place, _)| *place))
-                    .with_colors([Color::from_unmultiplied_rgba(0, 0, 0, 0)])
+                    .with_colors([Color::from(LABEL)])
                     .with_radii([Radius::new_ui_points(0.0)])
                     .with_labels(labels.iter().map(|(_, label)| label.clone()))
                     .with_show_labels(true),
@@ -88,6 +95,7 @@ impl Plane {
 
 /// What is drawn of a slice.
 pub(super) struct Slice {
+    pub(super) fill: Image,
     pub(super) boxes: Boxes2D,
     pub(super) centres: Points2D,
     pub(super) chosen: Points2D,
@@ -104,6 +112,7 @@ impl Slice {
         cut.sort_by_key(|leaf| leaf.potentially_optimal);
         let rectangles = || cut.iter().map(|leaf| plane.rectangle(leaf));
         Some(Self {
+            fill: fill(cut.iter().map(|leaf| (plane.rectangle(leaf), colour(leaf)))),
             boxes: Boxes2D::from_centers_and_half_sizes(rectangles().map(|(c, _)| c), rectangles().map(|(_, h)| h))
                 .with_colors(cut.iter().map(|leaf| Color::from(colour(leaf))))
                 .with_radii(
@@ -122,6 +131,34 @@ impl Slice {
                 .with_draw_order(30.0),
         })
     }
+}
+
+/// The rectangles as a picture; Rerun's boxes are outlines.
+fn fill(rectangles: impl Iterator<Item = (([f32; 2], [f32; 2]), [u8; 3])>) -> Image {
+    let mut pixels = vec![0; PIXELS * PIXELS * 3];
+    for ((centre, half), colour) in rectangles {
+        // Of rectangles smaller than a pixel the last one gets it.
+        let range = |side: usize| {
+            let pixel = |place: f32| (place * PIXELS as f32).clamp(0.0, PIXELS as f32);
+            let first = (pixel(centre[side] - half[side]) + 1e-3) as usize;
+            let last = (pixel(centre[side] + half[side]) - 1e-3).ceil() as usize;
+            first.min(PIXELS - 1)..last.clamp(first + 1, PIXELS)
+        };
+        let dark = colour.map(|channel| (FILL * f64::from(channel)) as u8);
+        for row in range(1) {
+            for column in range(0) {
+                let start = 3 * (row * PIXELS + column);
+                pixels[start..start + 3].copy_from_slice(&dark);
+            }
+        }
+    }
+    Image::from_rgb24(pixels, [PIXELS as u32; 2]).with_draw_order(-10.0)
+}
+
+/// Puts the picture of a slice on the unit square.
+pub(super) fn fill_transform() -> Transform3D {
+    let pixel = 1.0 / PIXELS as f32;
+    Transform3D::from_scale([pixel, pixel, 1.0])
 }
 
 /// The colour of a leaf: viridis over the values of the partition, the lowest, which DIRECT looks for, brightest.

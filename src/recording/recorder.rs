@@ -1,27 +1,18 @@
 //! The observer that records.
 
-use std::path::PathBuf;
+use std::{collections::BTreeSet, path::PathBuf};
 
 use rerun::{
-    RecordingInfo, Scalars, SeriesLines, TextLog, ViewCoordinates,
-    external::re_log_types::{
-        ApplicationId, EntityPath, EntityPathPart, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource,
-    },
+    RecordingInfo, SeriesLines, ViewCoordinates,
+    external::re_log_types::{ApplicationId, EntityPath, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource},
     log::RowId,
 };
 
 use super::{
-    LiveLog, RecordingError, TRUTH_COLOR, blueprint,
-    colours::learner_color,
-    file::RrdFile,
-    metrics, model,
-    model::Uncertainty,
-    movement::Movement,
-    note::note,
-    partition::{self, Plane, Slice},
-    rows::Rows,
+    LiveLog, RecordingError, TRUTH_COLOR, blueprint, colours::learner_color, file::RrdFile, learner::LearnerEntities,
+    model, note::note, rows::Rows, scene::Scene,
 };
-use crate::experiment::{Description, JointDescription, LearnerReport, StepReport};
+use crate::experiment::{Description, StepReport};
 
 /// So many steps are written at once unless somebody flushes earlier …
 const BATCH_STEPS: usize = 64;
@@ -67,8 +58,8 @@ impl Target {
 
 /// Records an experiment, as the module's documentation lists it.
 ///
-/// Steps are gathered and written 64 at a time, or when [`flush`](Self::flush) is called: a live view flushes when it
-/// wants to be up to date. [`finish`](Self::finish) writes what is left and the file's footer (its index); dropping the
+/// Steps are gathered and written 64 at a time, or when [`flush`](Self::flush) or [`flush_shown`](Self::flush_shown) is
+/// called: a live view flushes when it wants to be up to date. [`finish`](Self::finish) writes what is left and the file's footer (its index); dropping the
 /// recorder does the same, but has nobody to tell of errors.
 ///
 /// If the process is killed, the file holds everything up to the last batch. Viewers open it; `rerun rrd verify`
@@ -153,7 +144,19 @@ impl Recorder {
     /// Writes the steps that wait. When this returns they are in the log, and with the operating system.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         (self.waiting_steps, self.waiting_leaves) = (0, 0);
-        let messages = (self.rows.drain()?.into_iter())
+        self.write(|_| true)
+    }
+
+    /// Writes only what the arrangement of views shows; the rest waits for the next [`flush`](Self::flush), at most 64
+    /// steps. Every message costs about a kilobyte, and most entities are series that no view shows: a live view that
+    /// is up to date at every step needs half the messages this way.
+    pub fn flush_shown(&mut self) -> Result<(), RecordingError> {
+        let hidden: BTreeSet<EntityPath> = self.learners.iter().flat_map(LearnerEntities::hidden).collect();
+        self.write(|entity| !hidden.contains(entity))
+    }
+
+    fn write(&mut self, wanted: impl Fn(&EntityPath) -> bool) -> Result<(), RecordingError> {
+        let messages = (self.rows.drain(wanted)?.into_iter())
             .map(|chunk| Ok(LogMsg::ArrowMsg(self.store.clone(), chunk.to_arrow_msg()?)))
             .collect::<Result<Vec<_>, RecordingError>>()?;
         self.send(&messages)
@@ -211,7 +214,7 @@ impl Recorder {
         let arrow_m = ARROW * scene.size_m;
         self.arrow_m = Some(arrow_m);
         if let Some(truth) = &self.description.truth {
-            let links = model::links(&truth.skeleton_m(), TRUTH_COLOR, 2.5);
+            let links = model::links(&truth.skeleton_m(), TRUTH_COLOR, 2.0);
             self.rows.always(&EntityPath::from("world/truth/links"), &[&links]);
             let axes = model::axes(truth, &self.description.joints, arrow_m, TRUTH_COLOR);
             self.rows.always(&EntityPath::from("world/truth/axes"), &[&axes]);
@@ -228,126 +231,5 @@ impl Drop for Recorder {
         if let Err(error) = self.end() {
             rerun::external::re_log::error!("{error}");
         }
-    }
-}
-
-/// The place and size of an arm, for cameras and arrows.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Scene {
-    pub(super) centre_m: [f64; 3],
-    /// Diagonal of the box around the arm.
-    pub(super) size_m: f64,
-}
-
-impl Default for Scene {
-    fn default() -> Self {
-        Self { centre_m: [0.0; 3], size_m: 1.0 }
-    }
-}
-
-impl Scene {
-    fn around(points_m: &[[f64; 3]]) -> Self {
-        let finite = || points_m.iter().filter(|point| point.iter().all(|x| x.is_finite()));
-        let bound = |axis: usize, start: f64, pick: fn(f64, f64) -> f64| finite().map(|p| p[axis]).fold(start, pick);
-        if finite().next().is_none() {
-            return Self::default();
-        }
-        let lower: [f64; 3] = std::array::from_fn(|axis| bound(axis, f64::INFINITY, f64::min));
-        let upper: [f64; 3] = std::array::from_fn(|axis| bound(axis, f64::NEG_INFINITY, f64::max));
-        let size_m = (0..3).map(|axis| (upper[axis] - lower[axis]).powi(2)).sum::<f64>().sqrt();
-        let centre_m = std::array::from_fn(|axis| 0.5 * (lower[axis] + upper[axis]));
-        // An arm of one joint may be a single point.
-        Self { centre_m, size_m: if size_m > 1e-3 { size_m } else { 1.0 } }
-    }
-}
-
-/// The entities of one learner, and what they carry from step to step.
-struct LearnerEntities {
-    colour: [u8; 3],
-    root: EntityPath,
-    metrics: Vec<EntityPath>,
-    uncertainty: Uncertainty,
-    plane: Option<Plane>,
-    moved: bool,
-    failed: bool,
-}
-
-impl LearnerEntities {
-    fn new(index: usize, name: &str, joints: usize) -> Self {
-        let root = EntityPath::new(vec![EntityPathPart::new(name)]);
-        let metrics = root.join(&EntityPath::from("metrics"));
-        Self {
-            colour: learner_color(index),
-            metrics: metrics::NAMES.iter().map(|name| metrics.join(&EntityPath::from(*name))).collect(),
-            root,
-            uncertainty: Uncertainty::new(joints),
-            plane: None,
-            moved: false,
-            failed: false,
-        }
-    }
-
-    fn entity(&self, path: &str) -> EntityPath {
-        self.root.join(&EntityPath::from(path))
-    }
-
-    fn log(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, description: &Description, arrow_m: f64) {
-        let (colour, joints) = (self.colour, description.joints.as_slice());
-        let model = &report.estimate;
-        rows.at(step, &self.entity("links"), &[&model::links(&model.skeleton_m(), colour, 2.5)]);
-        rows.at(step, &self.entity("axes"), &[&model::axes(model, joints, arrow_m, colour)]);
-        if let Some(points) = self.uncertainty.of_points(model, joints, colour) {
-            rows.at(step, &self.entity("point_ellipsoids"), &points.parts());
-        }
-        if let Some(directions) = self.uncertainty.of_directions(model, joints, arrow_m, colour) {
-            rows.at(step, &self.entity("direction_uncertainty"), &directions.parts());
-        }
-        self.log_movement(rows, step, report, description.truth.is_some(), joints);
-        for (series, value) in self.metrics.iter().zip(metrics::values(report)) {
-            if let Some(value) = value {
-                rows.at(step, series, &[&Scalars::new([value])]);
-            }
-        }
-        if let (Some(failure), false) = (&report.failure, self.failed) {
-            self.failed = true;
-            rows.at(step, &self.entity("failure"), &[&TextLog::new(failure.as_str()).with_level("ERROR")]);
-        }
-    }
-
-    fn log_movement(
-        &mut self,
-        rows: &mut Rows,
-        step: u64,
-        report: &LearnerReport,
-        has_truth: bool,
-        joints: &[JointDescription],
-    ) {
-        let report = report.movement.as_ref();
-        if report.is_none() && !self.moved {
-            return;
-        }
-        // Once more after the last movement of a learner that has stopped, to clear it.
-        self.moved = report.is_some();
-        let movement = Movement::of(report, has_truth, self.colour);
-        rows.at(step, &self.entity("movement/links"), &[&movement.links]);
-        if let Some(truth) = &movement.truth {
-            rows.at(step, &self.entity("movement/truth"), &[truth]);
-        }
-        rows.at(step, &self.entity("marker/predicted"), &[&movement.predicted]);
-        rows.at(step, &self.entity("marker/measured"), &[&movement.measured]);
-        let Some(partition) = report.and_then(|report| report.partition.as_ref()) else { return };
-        if self.plane.is_none()
-            && let Some(plane) = Plane::of(partition)
-        {
-            self.plane = Some(plane);
-            let [square, labels] = plane.frame(joints);
-            rows.always(&self.entity("direct/axes"), &[square.as_ref(), labels.as_ref()]);
-        }
-        if let Some(slice) = self.plane.and_then(|plane| Slice::of(partition, plane)) {
-            rows.at(step, &self.entity("direct/boxes"), &[&slice.boxes]);
-            rows.at(step, &self.entity("direct/centres"), &[&slice.centres]);
-            rows.at(step, &self.entity("direct/chosen"), &[&slice.chosen]);
-        }
-        rows.at(step, &self.entity("direct/leaves"), &[&partition::leaves(partition)]);
     }
 }

@@ -6,8 +6,8 @@
 use std::collections::BTreeMap;
 
 use rerun::{
-    AsComponents, SerializedComponentBatch, Timeline,
-    external::re_log_types::EntityPath,
+    AsComponents, ComponentIdentifier, SerializedComponentBatch, Timeline,
+    external::{arrow::array::ArrayRef, re_log_types::EntityPath},
     log::{Chunk, ChunkError, RowId},
     time::TimePoint,
 };
@@ -19,7 +19,13 @@ use super::TIMELINE;
 pub(super) struct Rows {
     // An entity's static rows and those in time cannot share a chunk.
     rows: BTreeMap<(EntityPath, When), Vec<Row>>,
+    /// How entities look since their last row that said so.
+    looks: BTreeMap<(EntityPath, ComponentIdentifier), ArrayRef>,
 }
+
+/// Components that say how something looks. They hold until they are logged again, and each costs some 300 bytes in
+/// every message: rows repeat them only when they change.
+const LOOKS: [&str; 7] = ["colors", "draw_order", "fill_mode", "labels", "line_radii", "radii", "show_labels"];
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum When {
@@ -36,24 +42,30 @@ struct Row {
 impl Rows {
     /// What holds at all times.
     pub(super) fn always(&mut self, entity: &EntityPath, what: &[&dyn AsComponents]) {
-        self.push(entity, When::Always, TimePoint::default(), what);
+        self.push(entity, When::Always, TimePoint::default(), batches(what));
     }
 
     /// What holds from a step on, until the entity's next row.
     pub(super) fn at(&mut self, step: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
         let step = i64::try_from(step).unwrap_or(i64::MAX);
-        self.push(entity, When::InTime, TimePoint::from([(Timeline::new_sequence(TIMELINE), step)]), what);
+        let time = TimePoint::from([(Timeline::new_sequence(TIMELINE), step)]);
+        let mut components = batches(what);
+        components.retain(|batch| {
+            let component = batch.descriptor.component;
+            let is_look = component.as_str().split_once(':').is_some_and(|(_, field)| LOOKS.contains(&field));
+            !is_look || self.looks.insert((entity.clone(), component), batch.array.clone()) != Some(batch.array.clone())
+        });
+        self.push(entity, When::InTime, time, components);
     }
 
-    fn push(&mut self, entity: &EntityPath, when: When, time: TimePoint, what: &[&dyn AsComponents]) {
-        let components = what.iter().flat_map(|archetype| archetype.as_serialized_batches()).collect();
+    fn push(&mut self, entity: &EntityPath, when: When, time: TimePoint, components: Vec<SerializedComponentBatch>) {
         self.rows.entry((entity.clone(), when)).or_default().push(Row { id: RowId::new(), time, components });
     }
 
-    /// Takes everything out, one chunk per entity, and another for its static rows.
-    pub(super) fn drain(&mut self) -> Result<Vec<Chunk>, ChunkError> {
-        std::mem::take(&mut self.rows)
-            .into_iter()
+    /// Takes out what `wanted` says, one chunk per entity, and another for its static rows.
+    pub(super) fn drain(&mut self, wanted: impl Fn(&EntityPath) -> bool) -> Result<Vec<Chunk>, ChunkError> {
+        self.rows
+            .extract_if(.., |(entity, _), _| wanted(entity))
             .map(|((entity, _), rows)| {
                 rows.into_iter()
                     .fold(Chunk::builder(entity), |chunk, row| {
@@ -63,4 +75,8 @@ impl Rows {
             })
             .collect()
     }
+}
+
+fn batches(what: &[&dyn AsComponents]) -> Vec<SerializedComponentBatch> {
+    what.iter().flat_map(|archetype| archetype.as_serialized_batches()).collect()
 }

@@ -1,0 +1,125 @@
+//! What one learner's reports become.
+
+use rerun::{
+    Scalars, TextLog,
+    external::re_log_types::{EntityPath, EntityPathPart},
+};
+
+use super::{
+    blueprint,
+    colours::learner_color,
+    metrics,
+    model::{self, Uncertainty},
+    movement::Movement,
+    partition::{self, Plane, Slice},
+    rows::Rows,
+};
+use crate::experiment::{Description, JointDescription, LearnerReport};
+
+/// The entities of one learner, and what they carry from step to step.
+pub(super) struct LearnerEntities {
+    colour: [u8; 3],
+    pub(super) root: EntityPath,
+    pub(super) metrics: Vec<EntityPath>,
+    uncertainty: Uncertainty,
+    plane: Option<Plane>,
+    moved: bool,
+    failed: bool,
+}
+
+impl LearnerEntities {
+    /// Those of the learner at this place in the description.
+    pub(super) fn new(index: usize, name: &str, joints: usize) -> Self {
+        let root = EntityPath::new(vec![EntityPathPart::new(name)]);
+        let metrics = root.join(&EntityPath::from("metrics"));
+        Self {
+            colour: learner_color(index),
+            metrics: metrics::NAMES.iter().map(|name| metrics.join(&EntityPath::from(*name))).collect(),
+            root,
+            uncertainty: Uncertainty::new(joints),
+            plane: None,
+            moved: false,
+            failed: false,
+        }
+    }
+
+    /// What no view of the arrangement shows.
+    pub(super) fn hidden(&self) -> impl Iterator<Item = EntityPath> {
+        let series = self.metrics.iter().zip(metrics::NAMES).filter(|(_, name)| !blueprint::shows(name));
+        series.map(|(series, _)| series.clone()).chain([self.entity("direct/leaves")])
+    }
+
+    fn entity(&self, path: &str) -> EntityPath {
+        self.root.join(&EntityPath::from(path))
+    }
+
+    /// Logs what a report says of the learner; the arrows are `arrow_m` long.
+    pub(super) fn log(
+        &mut self,
+        rows: &mut Rows,
+        step: u64,
+        report: &LearnerReport,
+        description: &Description,
+        arrow_m: f64,
+    ) {
+        let (colour, joints) = (self.colour, description.joints.as_slice());
+        let model = &report.estimate;
+        rows.at(step, &self.entity("links"), &[&model::links(&model.skeleton_m(), colour, 2.0)]);
+        rows.at(step, &self.entity("axes"), &[&model::axes(model, joints, arrow_m, colour)]);
+        if let Some(points) = self.uncertainty.of_points(model, joints, colour) {
+            rows.at(step, &self.entity("point_ellipsoids"), &points.parts());
+        }
+        if let Some(directions) = self.uncertainty.of_directions(model, joints, arrow_m, colour) {
+            rows.at(step, &self.entity("direction_uncertainty"), &directions.parts());
+        }
+        self.log_movement(rows, step, report, description.truth.is_some(), joints);
+        for (series, value) in self.metrics.iter().zip(metrics::values(report)) {
+            if let Some(value) = value {
+                rows.at(step, series, &[&Scalars::new([value])]);
+            }
+        }
+        if let (Some(failure), false) = (&report.failure, self.failed) {
+            self.failed = true;
+            rows.at(step, &self.entity("failure"), &[&TextLog::new(failure.as_str()).with_level("ERROR")]);
+        }
+    }
+
+    fn log_movement(
+        &mut self,
+        rows: &mut Rows,
+        step: u64,
+        report: &LearnerReport,
+        has_truth: bool,
+        joints: &[JointDescription],
+    ) {
+        let report = report.movement.as_ref();
+        if report.is_none() && !self.moved {
+            return;
+        }
+        // Once more after the last movement of a learner that has stopped, to clear it.
+        self.moved = report.is_some();
+        let movement = Movement::of(report, has_truth, self.colour);
+        rows.at(step, &self.entity("movement/links"), &[&movement.links]);
+        if let Some(truth) = &movement.truth {
+            rows.at(step, &self.entity("movement/truth"), &[truth]);
+        }
+        rows.at(step, &self.entity("marker/predicted"), &[&movement.predicted]);
+        rows.at(step, &self.entity("marker/measured"), &[&movement.measured]);
+        let Some(partition) = report.and_then(|report| report.partition.as_ref()) else { return };
+        if self.plane.is_none()
+            && let Some(plane) = Plane::of(partition)
+        {
+            self.plane = Some(plane);
+            let [square, labels] = plane.frame(joints);
+            rows.always(&self.entity("direct/axes"), &[square.as_ref(), labels.as_ref()]);
+            rows.always(&self.entity("direct/criterion"), &[&partition::fill_transform()]);
+        }
+        if let Some(slice) = self.plane.and_then(|plane| Slice::of(partition, plane)) {
+            rows.at(step, &self.entity("direct/criterion"), &[&slice.fill]);
+            rows.at(step, &self.entity("direct/boxes"), &[&slice.boxes]);
+            rows.at(step, &self.entity("direct/centres"), &[&slice.centres]);
+            rows.at(step, &self.entity("direct/chosen"), &[&slice.chosen]);
+        }
+        rows.at(step, &self.entity("direct/leaves"), &[&partition::leaves(partition)]);
+    }
+}

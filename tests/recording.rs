@@ -1,0 +1,300 @@
+//! Recordings, read back with Rerun's own decoder, hold what the reports said.
+
+#![cfg(feature = "app")]
+
+#[path = "recording/checks.rs"]
+mod checks;
+#[path = "recording/reading.rs"]
+mod reading;
+
+use std::{fs, path::PathBuf};
+
+use body_schema::{
+    experiment::{Comparison, Description, StepReport, Trace},
+    recording::{LiveLog, Recorder, RecordingError, StepsCsv, Target, comparison_csv, learner_color},
+    scenario::builtin,
+};
+use checks::check;
+use reading::Reading;
+
+fn run(scenario: &str, steps: usize) -> (Description, Vec<StepReport>) {
+    let mut experiment = builtin(scenario).unwrap().experiment(3, None).unwrap();
+    let mut reports = vec![experiment.latest().clone()];
+    for _ in 0..steps {
+        reports.push(experiment.step().unwrap().clone());
+    }
+    (experiment.description().clone(), reports)
+}
+
+fn path(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
+
+fn record(description: &Description, reports: &[StepReport], target: Target) {
+    let mut recorder = Recorder::new(description, target).unwrap();
+    reports.iter().for_each(|report| recorder.log(report).unwrap());
+    recorder.finish().unwrap();
+}
+
+#[test]
+fn a_recording_holds_what_the_reports_said() {
+    let (description, mut reports) = run("arm-6dof", 5);
+    // A miss, and a learner that stops.
+    reports[3].learners[0].movement.as_mut().unwrap().measured_marker_m = None;
+    reports[3].learners[0].metrics.nis = None;
+    for report in &mut reports[4..] {
+        report.learners[2].movement = None;
+        report.learners[2].failure = Some("the estimate has diverged".to_owned());
+        report.learners[2].metrics.prediction_m = None;
+    }
+    let (file, live) = (path("arm-6dof.rrd"), LiveLog::new());
+    let mut recorder = Recorder::new(&description, Target::live(live.clone()).and_file(&file)).unwrap();
+    for report in &reports {
+        recorder.log(report).unwrap();
+        recorder.flush().unwrap();
+    }
+    let so_far = Reading::of(&live.complete().unwrap());
+    recorder.finish().unwrap();
+    let bytes = fs::read(&file).unwrap();
+    for reading in
+        [Reading::of(&bytes), so_far, Reading::of(&live.complete().unwrap()), Reading::of(&live.parts_from(0).concat())]
+    {
+        check(&reading, &description, &reports);
+        assert_eq!(reading.recording_id, "arm-6dof-seed-3");
+        assert_eq!(reading.timelines(), ["step"]);
+        assert_eq!(reading.steps("/gradient/failure"), [4]);
+        let note = reading.note();
+        for word in ["arm-6dof", "seed 3", "active", "gradient", "2σ", "metres", "body-schema run arm-6dof --seed 3"] {
+            assert!(note.contains(word), "the note says {word}: {note}");
+        }
+    }
+}
+
+#[test]
+fn the_entities_are_the_documented_ones() {
+    let (description, reports) = run("arm-6dof", 2);
+    let live = LiveLog::new();
+    record(&description, &reports, Target::live(live.clone()));
+    let reading = Reading::of(&live.complete().unwrap());
+    let mut expected: Vec<String> =
+        ["/", "/__properties", "/note", "/world/truth/axes", "/world/truth/links"].map(str::to_owned).into();
+    for (learner, estimator, policy) in [("active", "rls", "active"), ("random", "rls", "r"), ("gradient", "g", "r")] {
+        let mut entities =
+            vec!["links", "axes", "movement/links", "movement/truth", "marker/predicted", "marker/measured"];
+        if estimator == "rls" {
+            entities.extend(["point_ellipsoids", "direction_uncertainty"]);
+        }
+        if policy == "active" {
+            entities.extend(["axes", "boxes", "centres", "chosen", "criterion", "leaves"].map(|name| match name {
+                "axes" => "direct/axes",
+                "boxes" => "direct/boxes",
+                "centres" => "direct/centres",
+                "chosen" => "direct/chosen",
+                "criterion" => "direct/criterion",
+                _ => "direct/leaves",
+            }));
+        }
+        expected.extend(entities.iter().map(|entity| format!("/{learner}/{entity}")));
+        for metric in
+            "orientation_deg axis_deg location_m prediction_m prediction_mean_m expected_prediction_m trace nis \
+                       nis_dof nees nees_dof movements misses settled selection_ms criterion gain evaluations"
+                .split_whitespace()
+        {
+            expected.push(format!("/{learner}/metrics/{metric}"));
+        }
+    }
+    expected.sort();
+    assert_eq!(reading.entities(), expected);
+}
+
+#[test]
+fn a_real_robot_has_no_truth() {
+    let (description, reports) = run("tiago-mocap", 3);
+    let live = LiveLog::new();
+    record(&description, &reports, Target::live(live.clone()).with_recording_id("a session of its own"));
+    let reading = Reading::of(&live.complete().unwrap());
+    check(&reading, &description, &reports);
+    assert_eq!(reading.recording_id, "a session of its own");
+    let entities = reading.entities();
+    assert!(!entities.iter().any(|entity| entity.contains("truth") || entity.contains("direct/")));
+    // Eight joints, the marker among the ellipsoids.
+    assert_eq!(reading.ellipsoids("/active/point_ellipsoids", 3).len(), 8);
+}
+
+#[test]
+fn learners_keep_their_colours() {
+    let (description, reports) = run("arm-6dof", 1);
+    let live = LiveLog::new();
+    record(&description, &reports, Target::live(live.clone()));
+    let reading = Reading::of(&live.complete().unwrap());
+    for (index, learner) in description.learners.iter().enumerate() {
+        let series = reading.colour(&format!("/{}/metrics/nees", learner.name), "SeriesLines:colors");
+        assert_eq!(series, learner_color(index));
+        assert_eq!(reading.colour(&format!("/{}/links", learner.name), "LineStrips3D:colors"), learner_color(index));
+    }
+}
+
+#[test]
+fn the_arrangement_comes_with_the_recording() {
+    let (description, reports) = run("arm-6dof", 1);
+    let live = LiveLog::new();
+    record(&description, &reports, Target::live(live.clone()));
+    let reading = Reading::of(&live.complete().unwrap());
+    assert!(reading.activated, "a blueprint is there and activated");
+    let views = reading.views.iter().map(String::as_str).collect::<Vec<_>>();
+    for view in ["active (rls × active)", "Orientation error (deg)", "Location error (m)", "DIRECT, active", "Note"] {
+        assert!(views.contains(&view), "{view} in {views:?}");
+    }
+    let (description, reports) = run("tiago-mocap", 1);
+    let live = LiveLog::new();
+    record(&description, &reports, Target::live(live.clone()));
+    let views = Reading::of(&live.complete().unwrap()).views;
+    assert!(!views.iter().any(|view| view.contains("Orientation") || view.contains("DIRECT")), "{views:?}");
+}
+
+#[test]
+fn a_live_log_is_followed_part_by_part() {
+    let (description, reports) = run("arm-6dof", 2);
+    let live = LiveLog::new();
+    let woken = live.subscribe();
+    assert_eq!((live.len(), live.header().len(), *woken.borrow()), (1, 12, 1));
+    let mut recorder = Recorder::new(&description, Target::live(live.clone())).unwrap();
+    recorder.log(&reports[0]).unwrap();
+    recorder.flush().unwrap();
+    assert!(woken.has_changed().unwrap());
+    let seen = live.len();
+    recorder.log(&reports[1]).unwrap();
+    assert_eq!(live.len(), seen, "steps wait for the flush");
+    recorder.flush().unwrap();
+    let new = live.parts_from(seen);
+    assert_eq!(new.len(), live.len() - seen);
+    // Each part can be sent alone, behind the header.
+    for part in &new {
+        assert_eq!(reading::messages(&[live.header(), part.clone()].concat()).len(), 1);
+    }
+    assert!(live.parts_from(live.len()).is_empty() && live.parts_from(usize::MAX).is_empty());
+    assert_eq!(live.bytes(), live.parts_from(0).concat().len());
+    assert!(!live.is_closed());
+    drop(recorder);
+    assert!(live.is_closed());
+    let length = live.len();
+    live.append(&reading::messages(&live.parts_from(0).concat())).unwrap();
+    assert_eq!(live.len(), length, "nothing is appended to a closed log");
+}
+
+#[test]
+fn what_no_view_shows_can_wait() {
+    let (description, reports) = run("arm-6dof", 2);
+    let live = LiveLog::new();
+    let mut recorder = Recorder::new(&description, Target::live(live.clone())).unwrap();
+    for report in &reports {
+        recorder.log(report).unwrap();
+        recorder.flush_shown().unwrap();
+    }
+    let shown = Reading::of(&live.complete().unwrap());
+    let leaves = "/active/direct/leaves";
+    assert_eq!(shown.steps("/random/metrics/location_m"), [i64::MIN, 0, 1, 2], "static, then every step");
+    assert!(shown.steps(leaves).is_empty() && shown.steps("/random/metrics/nis").is_empty());
+    recorder.flush().unwrap();
+    check(&Reading::of(&live.complete().unwrap()), &description, &reports);
+}
+
+#[test]
+fn a_recorder_moves_between_threads() {
+    fn sends<T: Send + 'static>() {}
+    fn shares<T: Send + Sync + Clone + 'static>() {}
+    sends::<Recorder>();
+    shares::<LiveLog>();
+}
+
+#[test]
+fn what_was_flushed_survives_a_kill() {
+    let (description, reports) = run("arm-6dof", 2);
+    let file = path("killed.rrd");
+    let mut recorder = Recorder::new(&description, Target::file(&file)).unwrap();
+    reports.iter().for_each(|report| recorder.log(report).unwrap());
+    recorder.flush().unwrap();
+    // As if the process ended here: no footer, no drop.
+    std::mem::forget(recorder);
+    check(&Reading::of(&fs::read(&file).unwrap()), &description, &reports);
+}
+
+#[test]
+fn a_long_recording_is_small() {
+    let steps = 40;
+    let (description, reports) = run("arm-6dof", steps);
+    let file = path("long.rrd");
+    record(&description, &reports, Target::file(&file));
+    let bytes = fs::metadata(&file).unwrap().len();
+    // 200 steps stay well under 10 MB.
+    assert!(bytes < 35_000 * steps as u64, "{bytes} bytes in {steps} steps");
+}
+
+#[test]
+fn errors_name_the_file() {
+    let (description, reports) = run("tiago-mocap", 1);
+    let missing = path("no/such/folder/a.rrd");
+    let error = Recorder::new(&description, Target::file(&missing)).err().unwrap();
+    assert!(matches!(error, RecordingError::Create { .. }));
+    assert!(error.to_string().contains("no/such/folder/a.rrd"), "{error}");
+    if cfg!(target_os = "linux") {
+        // A disk that is always full. The live log is not affected.
+        let live = LiveLog::new();
+        let result = Recorder::new(&description, Target::live(live.clone()).and_file("/dev/full"))
+            .and_then(|mut recorder| recorder.log(&reports[0]).and_then(|()| recorder.finish()));
+        let error = result.unwrap_err();
+        assert!(matches!(error, RecordingError::Write { .. }), "{error}");
+        assert!(error.to_string().contains("/dev/full"), "{error}");
+    }
+}
+
+#[test]
+fn steps_as_csv() {
+    let (description, mut reports) = run("tiago-mocap", 2);
+    reports[2].learners[1].movement.as_mut().unwrap().measured_marker_m = None;
+    let mut bytes = Vec::new();
+    let mut table = StepsCsv::new(&description, &mut bytes).unwrap();
+    reports.iter().for_each(|report| table.write(report).unwrap());
+    table.flush().unwrap();
+    drop(table);
+    let mut reader = csv::Reader::from_reader(bytes.as_slice());
+    let header = reader.headers().unwrap().clone();
+    let column = |name: &str| header.iter().position(|h| h == name).unwrap_or_else(|| panic!("{name} in {header:?}"));
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 9);
+    let of = |step: usize, learner: usize, name: &str| rows[3 * step + learner].get(column(name)).unwrap();
+    assert_eq!((of(0, 0, "step"), of(0, 0, "learner"), of(2, 2, "step")), ("0", "active", "2"));
+    for name in ["orientation_deg", "location_m", "nees"] {
+        assert_eq!(of(2, 0, name), "", "{name} is not known");
+    }
+    for name in ["selection_ms", "q_torso_lift_joint_m", "q_arm_1_joint_rad", "measured_x_m", "predicted_z_m"] {
+        assert_eq!(of(0, 0, name), "", "no movement at step 0");
+    }
+    let movement = reports[1].learners[0].movement.as_ref().unwrap();
+    assert_eq!(of(1, 0, "q_arm_7_joint_rad").parse(), Ok(movement.configuration[7]));
+    assert_eq!(of(1, 0, "predicted_z_m").parse(), Ok(movement.predicted_marker_m[2]));
+    assert_eq!(of(1, 0, "measured_y_m").parse(), Ok(movement.measured_marker_m.unwrap()[1]));
+    assert_eq!(of(1, 0, "criterion").parse().ok(), movement.criterion);
+    assert_eq!((of(2, 1, "measured_x_m"), of(1, 0, "movements"), of(1, 0, "settled")), ("", "1", "0"));
+}
+
+#[test]
+fn comparisons_as_csv() {
+    let scenario = builtin("arm-6dof").unwrap();
+    let traces: Vec<Trace> =
+        (1..=2).map(|seed| Trace::run(scenario.experiment(seed, None).unwrap(), 2, || ()).unwrap()).collect();
+    let comparison = Comparison::of("arm-6dof", 2, &traces);
+    let mut bytes = Vec::new();
+    comparison_csv(&comparison, &mut bytes).unwrap();
+    let mut reader = csv::Reader::from_reader(bytes.as_slice());
+    assert_eq!(
+        reader.headers().unwrap(),
+        ["learner", "movements", "metric", "mean", "median", "q25", "q75"].as_slice()
+    );
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 3 * 3 * 5);
+    let expected = comparison.learners[1].curve[2].location_m.unwrap();
+    let row = rows.iter().find(|row| [&row[0], &row[1], &row[2]] == ["random", "2", "location_m"]).unwrap();
+    assert_eq!(row[4].parse(), Ok(expected.median));
+    assert_eq!(row[6].parse(), Ok(expected.q75));
+}

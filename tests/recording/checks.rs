@@ -1,0 +1,183 @@
+//! What a recording must hold of the reports.
+
+use body_schema::{
+    experiment::{Description, LearnerReport, ModelReport, StepReport},
+    recording::SIGMAS,
+    selection::Partition,
+};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+
+use super::reading::Reading;
+
+const TOLERANCE: f64 = 1e-6;
+
+fn close(found: &[f64], expected: &[f64], what: &str) {
+    assert_eq!(found.len(), expected.len(), "{what}");
+    for (found, expected) in found.iter().zip(expected) {
+        assert!((found - expected).abs() <= TOLERANCE, "{what}: {found} instead of {expected}");
+    }
+}
+
+/// Every value of the reports, entity by entity and step by step.
+pub fn check(reading: &Reading, description: &Description, reports: &[StepReport]) {
+    for report in reports {
+        for learner in &report.learners {
+            check_estimate(reading, report.step, learner);
+            check_metrics(reading, report.step, learner);
+            check_movement(reading, report.step, learner, description);
+        }
+    }
+    if let Some(truth) = &description.truth {
+        close(&reading.strip("/world/truth/links", None), &truth.skeleton_m().concat(), "true links");
+        check_axes(reading, "/world/truth/axes", None, truth);
+    }
+}
+
+fn check_estimate(reading: &Reading, step: u64, learner: &LearnerReport) {
+    let (name, model) = (&learner.name, &learner.estimate);
+    close(&reading.strip(&format!("/{name}/links"), Some(step)), &model.skeleton_m().concat(), "links");
+    check_axes(reading, &format!("/{name}/axes"), Some(step), model);
+    let points = model.joints.iter().filter_map(|joint| Some((joint.point_m?, joint.point_covariance_m2?)));
+    let marker = model.marker_covariance_m2.map(|covariance| (model.marker_m, covariance));
+    let points: Vec<_> = points.chain(marker).collect();
+    check_ellipsoids(reading, &format!("/{name}/point_ellipsoids"), step, &points, 1.0);
+
+    let (origins, vectors) = reading.arrows(&format!("/{name}/axes"), Some(step));
+    let length = Vector3::from(vectors[0]).norm();
+    let tip = |i: usize| std::array::from_fn(|k| origins[i][k] + vectors[i][k]);
+    let directions: Vec<_> = (model.joints.iter().enumerate())
+        .filter_map(|(i, joint)| Some((tip(i), joint.direction_covariance_rad2?)))
+        .collect();
+    check_ellipsoids(reading, &format!("/{name}/direction_uncertainty"), step, &directions, length);
+}
+
+fn check_axes(reading: &Reading, entity: &str, step: Option<u64>, model: &ModelReport) {
+    let (origins, vectors) = reading.arrows(entity, step);
+    assert_eq!(vectors.len(), model.joints.len());
+    for (index, joint) in model.joints.iter().enumerate() {
+        let direction = Vector3::from(vectors[index]).normalize();
+        close(direction.as_slice(), &joint.axis, "axis");
+        let next = model.joints[index..].iter().find_map(|joint| joint.point_m);
+        close(&origins[index], &next.unwrap_or(model.marker_m), "origin of an arrow");
+    }
+}
+
+fn check_ellipsoids(reading: &Reading, entity: &str, step: u64, expected: &[([f64; 3], [[f64; 3]; 3])], scale: f64) {
+    let found = reading.ellipsoids(entity, step);
+    assert_eq!(found.len(), expected.len(), "{entity}");
+    close(
+        &reading.numbers(entity, "covariances", Some(step)).unwrap_or_default(),
+        &expected.iter().flat_map(|(_, covariance)| covariance.concat()).collect::<Vec<_>>(),
+        "covariances",
+    );
+    for ((centre, half_sizes, [x, y, z, w]), (expected_centre, covariance)) in found.into_iter().zip(expected) {
+        close(&centre, expected_centre, "centre of an ellipsoid");
+        let quaternion = Quaternion::new(w, x, y, z);
+        assert!((quaternion.norm() - 1.0).abs() < TOLERANCE);
+        let axes = UnitQuaternion::from_quaternion(quaternion).to_rotation_matrix().into_inner();
+        // The variance along each axis is the one that is drawn, but for the axis without any, drawn as a thin disc.
+        let covariance = Matrix3::from_fn(|row, column| covariance[row][column]);
+        let largest = half_sizes.iter().copied().fold(0.0, f64::max);
+        for (axis, half) in half_sizes.into_iter().enumerate() {
+            let axis: Vector3<f64> = axes.column(axis).into();
+            let standard_deviation = axis.dot(&(covariance * axis)).max(0.0).sqrt();
+            let expected = SIGMAS * scale * standard_deviation;
+            if expected > 1e-3 * largest {
+                close(&[half], &[expected], "half-size");
+            } else {
+                assert!((half / largest - 0.02).abs() < 1e-3, "the flat axis is thin, and to be seen");
+            }
+        }
+    }
+}
+
+fn check_metrics(reading: &Reading, step: u64, learner: &LearnerReport) {
+    let metrics = &learner.metrics;
+    let movement = learner.movement.as_ref();
+    let expected = [
+        ("orientation_deg", metrics.orientation_deg),
+        ("axis_deg", metrics.axis_deg),
+        ("location_m", metrics.location_m),
+        ("prediction_m", metrics.prediction_m),
+        ("prediction_mean_m", metrics.prediction_mean_m),
+        ("expected_prediction_m", metrics.expected_prediction_m),
+        ("trace", metrics.trace),
+        ("nis", metrics.nis),
+        ("nis_dof", metrics.nis_dof.map(|dof| dof as f64)),
+        ("nees", metrics.nees),
+        ("nees_dof", metrics.nees_dof.map(|dof| dof as f64)),
+        ("movements", Some(metrics.movements as f64)),
+        ("misses", Some(metrics.misses as f64)),
+        ("settled", Some(if metrics.settled { 1.0 } else { 0.0 })),
+        ("selection_ms", movement.map(|movement| movement.selection_ms)),
+        ("criterion", movement.and_then(|movement| movement.criterion)),
+        ("gain", movement.and_then(|movement| movement.gain)),
+        ("evaluations", movement.map(|movement| movement.evaluations as f64)),
+    ];
+    for (name, expected) in expected {
+        let found = reading.numbers(&format!("/{}/metrics/{name}", learner.name), "Scalars:scalars", Some(step));
+        assert_eq!(found, expected.map(|value| vec![value]), "{name} of {} at step {step}", learner.name);
+    }
+}
+
+fn check_movement(reading: &Reading, step: u64, learner: &LearnerReport, description: &Description) {
+    let entity = |path: &str| format!("/{}/{path}", learner.name);
+    let Some(movement) = &learner.movement else {
+        for path in ["marker/predicted", "marker/measured"] {
+            assert!(reading.points(&entity(path), step).is_none_or(|points| points.is_empty()));
+        }
+        return;
+    };
+    close(&reading.strip(&entity("movement/links"), Some(step)), &movement.estimated_skeleton_m.concat(), "movement");
+    assert_eq!(movement.true_skeleton_m.is_some(), description.truth.is_some());
+    if let Some(truth) = &movement.true_skeleton_m {
+        close(&reading.strip(&entity("movement/truth"), Some(step)), &truth.concat(), "true movement");
+    }
+    close(&reading.points(&entity("marker/predicted"), step).unwrap(), &movement.predicted_marker_m, "predicted");
+    let measured = movement.measured_marker_m.map(Vec::from).unwrap_or_default();
+    close(&reading.points(&entity("marker/measured"), step).unwrap(), &measured, "measured");
+    let leaves = reading.numbers(&entity("direct/leaves"), "centres", Some(step));
+    assert_eq!(leaves.is_some(), movement.partition.is_some());
+    if let Some(partition) = &movement.partition {
+        check_partition(reading, &entity("direct"), step, partition);
+    }
+}
+
+fn check_partition(reading: &Reading, direct: &str, step: u64, partition: &Partition) {
+    let leaves = format!("{direct}/leaves");
+    let dimension = partition.leaves[0].centre.len();
+    let centres = reading.numbers(&leaves, "centres", Some(step)).unwrap();
+    let values = reading.numbers(&leaves, "values", Some(step)).unwrap();
+    let levels = reading.levels(&leaves, step);
+    assert_eq!(reading.counts(&leaves, "dimension", step), [dimension as u32]);
+    assert_eq!(reading.counts(&leaves, "chosen", step), [partition.chosen as u32]);
+    assert_eq!(values.len(), partition.leaves.len());
+    for (index, leaf) in partition.leaves.iter().enumerate() {
+        let range = index * dimension..(index + 1) * dimension;
+        assert_eq!(centres[range.clone()], leaf.centre);
+        assert_eq!(levels[range], leaf.levels);
+        assert_eq!(Some(values[index]).filter(|value| !value.is_nan()), leaf.value);
+    }
+    fills_the_cube(&centres, &levels, dimension);
+    // The slice fills the unit square.
+    let area: f64 = reading.half_sizes_2d(&format!("{direct}/boxes"), step).iter().map(|[x, y]| 4.0 * x * y).sum();
+    close(&[area], &[1.0], "area of the slice");
+    let cut = reading.half_sizes_2d(&format!("{direct}/boxes"), step).len();
+    let other = reading.points_2d(&format!("{direct}/centres"), step).len();
+    assert_eq!(cut + other, partition.leaves.len());
+    assert_eq!(reading.points_2d(&format!("{direct}/chosen"), step).len(), 1);
+}
+
+/// The rectangles' volumes sum to 1 and no two overlap.
+fn fills_the_cube(centres: &[f64], levels: &[u8], dimension: usize) {
+    let half: Vec<f64> = levels.iter().map(|&level| 0.5 * 3_f64.powi(-i32::from(level))).collect();
+    let volume: f64 = half.chunks(dimension).map(|half| half.iter().map(|half| 2.0 * half).product::<f64>()).sum();
+    assert!((volume - 1.0).abs() < 1e-9, "volume {volume}");
+    let leaves: Vec<_> = centres.chunks(dimension).zip(half.chunks(dimension)).collect();
+    for (index, (a, half_a)) in leaves.iter().enumerate() {
+        for (b, half_b) in &leaves[..index] {
+            let apart = (0..dimension).any(|i| (a[i] - b[i]).abs() > half_a[i] + half_b[i] - 1e-12);
+            assert!(apart, "leaves at {a:?} and {b:?} overlap");
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! A recording as plain numbers.
+
+use std::{collections::BTreeMap, io::Cursor};
+
+use re_log_encoding::DecoderApp;
+use rerun::{
+    Component,
+    components::{
+        Color, HalfSize2D, HalfSize3D, LineStrip3D, Name, Position2D, Position3D, RotationQuat, Text, Vector3D,
+    },
+    log::{Chunk, LogMsg},
+};
+
+/// All messages of a stream.
+pub fn messages(bytes: &[u8]) -> Vec<LogMsg> {
+    DecoderApp::decode_eager(Cursor::new(bytes)).unwrap().map(Result::unwrap).collect()
+}
+
+/// The chunks of a recording by entity, and what its blueprint says.
+pub struct Reading {
+    pub recording_id: String,
+    /// Display names of the blueprint's views.
+    pub views: Vec<String>,
+    /// Whether the blueprint is activated.
+    pub activated: bool,
+    chunks: BTreeMap<String, Vec<Chunk>>,
+}
+
+impl Reading {
+    pub fn of(bytes: &[u8]) -> Self {
+        let mut reading =
+            Self { recording_id: String::new(), views: Vec::new(), activated: false, chunks: BTreeMap::new() };
+        for message in messages(bytes) {
+            match message {
+                LogMsg::SetStoreInfo(info) if info.info.store_id.is_recording() => {
+                    reading.recording_id = info.info.store_id.recording_id().as_str().to_owned();
+                }
+                LogMsg::ArrowMsg(store, message) => {
+                    let chunk = Chunk::from_arrow_msg(&message).unwrap();
+                    if store.is_recording() {
+                        reading.chunks.entry(chunk.entity_path().to_string()).or_default().push(chunk);
+                    } else {
+                        let names = chunk.iter_component::<Name>("ViewBlueprint:display_name".into());
+                        reading
+                            .views
+                            .extend(names.flat_map(|n| n.as_slice().iter().map(|n| n.to_string()).collect::<Vec<_>>()));
+                    }
+                }
+                LogMsg::BlueprintActivationCommand(command) => reading.activated = command.make_active,
+                LogMsg::SetStoreInfo(_) => {}
+            }
+        }
+        reading
+    }
+
+    pub fn entities(&self) -> Vec<String> {
+        self.chunks.keys().cloned().collect()
+    }
+
+    pub fn timelines(&self) -> Vec<String> {
+        let mut names: Vec<String> = self
+            .chunks
+            .values()
+            .flatten()
+            .flat_map(|chunk| chunk.timelines().keys().map(|name| name.to_string()))
+            .collect();
+        names.sort();
+        names.dedup();
+        names
+    }
+
+    /// The steps at which an entity has a row.
+    pub fn steps(&self, entity: &str) -> Vec<i64> {
+        let chunks = self.chunks.get(entity).into_iter().flatten();
+        chunks.flat_map(|chunk| chunk.iter_indices(&"step".into()).map(|(time, _)| time.as_i64())).collect()
+    }
+
+    /// What `read` finds in the row of a step; of the static row without a step.
+    fn row<T>(
+        &self,
+        entity: &str,
+        component: &'static str,
+        step: Option<u64>,
+        read: impl Fn(&Chunk, usize) -> T,
+    ) -> Option<T> {
+        let mut found: Vec<T> = Vec::new();
+        for chunk in self.chunks.get(entity).into_iter().flatten() {
+            let indices = chunk.iter_component_indices("step".into(), component.into());
+            for (row, (time, _)) in indices.enumerate() {
+                let wanted = step.map_or(chunk.is_static(), |step| !chunk.is_static() && time.as_i64() == step as i64);
+                found.extend(wanted.then(|| read(chunk, row)));
+            }
+        }
+        assert!(found.len() <= 1, "{entity} has one row per step");
+        found.pop()
+    }
+
+    fn components<C: Component>(&self, entity: &str, component: &'static str, step: Option<u64>) -> Option<Vec<C>> {
+        self.row(entity, component, step, |chunk, row| {
+            chunk.iter_component::<C>(component.into()).nth(row).unwrap().as_slice().to_vec()
+        })
+    }
+
+    pub fn numbers(&self, entity: &str, component: &'static str, step: Option<u64>) -> Option<Vec<f64>> {
+        self.row(entity, component, step, |chunk, row| {
+            chunk.iter_slices::<f64>(component.into()).nth(row).unwrap().to_vec()
+        })
+    }
+
+    pub fn levels(&self, entity: &str, step: u64) -> Vec<u8> {
+        let read = |chunk: &Chunk, row: usize| chunk.iter_slices::<u8>("levels".into()).nth(row).unwrap().to_vec();
+        self.row(entity, "levels", Some(step), read).unwrap()
+    }
+
+    pub fn counts(&self, entity: &str, component: &'static str, step: u64) -> Vec<u32> {
+        let read = |chunk: &Chunk, row: usize| chunk.iter_slices::<u32>(component.into()).nth(row).unwrap().to_vec();
+        self.row(entity, component, Some(step), read).unwrap()
+    }
+
+    /// The coordinates of a line, point after point.
+    pub fn strip(&self, entity: &str, step: Option<u64>) -> Vec<f64> {
+        let strips: Vec<LineStrip3D> = self.components(entity, "LineStrips3D:strips", step).unwrap();
+        assert_eq!(strips.len(), 1);
+        strips[0].0.iter().flat_map(|point| point.0).map(f64::from).collect()
+    }
+
+    pub fn arrows(&self, entity: &str, step: Option<u64>) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
+        let origins: Vec<Position3D> = self.components(entity, "Arrows3D:origins", step).unwrap();
+        let vectors: Vec<Vector3D> = self.components(entity, "Arrows3D:vectors", step).unwrap();
+        (origins.iter().map(|o| o.0.0.map(f64::from)).collect(), vectors.iter().map(|v| v.0.0.map(f64::from)).collect())
+    }
+
+    /// Centres, half-sizes and quaternions (x, y, z, w); none if nothing is logged.
+    pub fn ellipsoids(&self, entity: &str, step: u64) -> Vec<([f64; 3], [f64; 3], [f64; 4])> {
+        let step = Some(step);
+        let Some(half_sizes) = self.components::<HalfSize3D>(entity, "Ellipsoids3D:half_sizes", step) else {
+            return Vec::new();
+        };
+        let centres: Vec<Position3D> = self.components(entity, "Ellipsoids3D:centers", step).unwrap();
+        let turns: Vec<RotationQuat> = self.components(entity, "Ellipsoids3D:quaternions", step).unwrap();
+        (centres.iter().zip(&half_sizes).zip(&turns))
+            .map(|((c, h), q)| (c.0.0.map(f64::from), h.0.0.map(f64::from), q.0.0.map(f64::from)))
+            .collect()
+    }
+
+    pub fn points(&self, entity: &str, step: u64) -> Option<Vec<f64>> {
+        let points: Vec<Position3D> = self.components(entity, "Points3D:positions", Some(step))?;
+        Some(points.iter().flat_map(|point| point.0.0).map(f64::from).collect())
+    }
+
+    pub fn points_2d(&self, entity: &str, step: u64) -> Vec<[f64; 2]> {
+        let points: Vec<Position2D> = self.components(entity, "Points2D:positions", Some(step)).unwrap();
+        points.iter().map(|point| point.0.0.map(f64::from)).collect()
+    }
+
+    pub fn half_sizes_2d(&self, entity: &str, step: u64) -> Vec<[f64; 2]> {
+        let sizes: Vec<HalfSize2D> = self.components(entity, "Boxes2D:half_sizes", Some(step)).unwrap();
+        sizes.iter().map(|size| size.0.0.map(f64::from)).collect()
+    }
+
+    /// The first colour: the static one, or that of step 0.
+    pub fn colour(&self, entity: &str, component: &'static str) -> [u8; 3] {
+        let colours = self.components::<Color>(entity, component, None);
+        let colours = colours.or_else(|| self.components(entity, component, Some(0))).unwrap();
+        let [red, green, blue, _] = colours[0].0.to_array();
+        [red, green, blue]
+    }
+
+    pub fn note(&self) -> String {
+        let text: Vec<Text> = self.components("/note", "TextDocument:text", None).unwrap();
+        text[0].as_str().to_owned()
+    }
+}
