@@ -190,6 +190,12 @@ impl Session {
         self.ask(|reply| Command::Result { reply }).await
     }
 
+    /// Completes the recording so far, after whatever the session is busy with. That of a failed engine is complete.
+    pub(super) async fn flush(&self) -> Result<(), Problem> {
+        let flushed = self.ask(|reply| Command::Flush { reply }).await;
+        if self.failure().is_some() { Ok(()) } else { flushed }
+    }
+
     async fn ask<T>(&self, command: impl FnOnce(engine::Reply<T>) -> Command) -> Result<T, Problem> {
         let (reply, answer) = oneshot::channel();
         // Both an engine that takes no commands and one that dropped this one have ended. A command that was not sent
@@ -215,7 +221,7 @@ impl Session {
     pub(super) fn stop(&self) {
         self.shared.stop.cancel();
         // An engine that waits for commands must wake; one that has ended needs nothing.
-        drop(self.commands.send(Command::Stop));
+        drop(self.commands.send(Command::Wake));
     }
 
     /// Counts the caller among those who watch, as long as it keeps the answer.
