@@ -15,7 +15,7 @@ const table = new Table(element("learners"), document.body.dataset.learnerColors
 
 /**
  * The state of the page: `latest` is the newest report, `shown` the newest step on the screen, `remaining` null without
- * an end.
+ * an end, `busy` the session that makes a step, `passing` whether the status is outdated once there is a connection.
  */
 const state = {
   session: null,
@@ -24,7 +24,8 @@ const state = {
   connected: false,
   ended: false,
   running: false,
-  busy: false,
+  passing: false,
+  busy: null,
   latest: null,
   shown: -1,
   remaining: null,
@@ -35,7 +36,9 @@ let viewer = null;
 /** Wakes a run that waits for a step to be shown. */
 let shown = () => {};
 
-function say(text, alarm = false) {
+/** @param {boolean} [passing] whether it is outdated once there is a connection */
+function say(text, alarm = false, passing = false) {
+  state.passing = passing;
   status.textContent = text;
   status.classList.toggle("alarm", alarm);
 }
@@ -43,7 +46,7 @@ function say(text, alarm = false) {
 function refresh() {
   const atEnd = state.remaining === 0;
   const ready = state.session !== null && state.connected && !state.ended && !atEnd;
-  element("step").disabled = !ready || state.busy || state.running;
+  element("step").disabled = !ready || state.busy !== null || state.running;
   element("run").disabled = !ready && !state.running;
   element("run").textContent = state.running ? "Pause" : "Run";
   element("run").setAttribute("aria-pressed", String(state.running));
@@ -65,7 +68,7 @@ async function reset(remark = "") {
   if (!element("choice").reportValidity()) return;
   state.running = false;
   const { session, own } = state;
-  say("Opening a session…");
+  say("Opening a session…", false, true);
   try {
     const next = await request("POST", "/v1/sessions", { scenario: scenario.value, seed: Number(seed.value) });
     // The old one goes only after the new one has come.
@@ -91,6 +94,7 @@ function follow(resource, own) {
   seed.value = String(description.seed);
   describe(id, description);
   waiting = [];
+  shown();
   viewer?.open(id);
   let scheduled = false;
   state.follower = new Follower(id, {
@@ -107,18 +111,19 @@ function follow(resource, own) {
     },
     connected: () => {
       state.connected = true;
-      say("");
+      if (state.passing) say("");
       refresh();
     },
     lost: (seconds) => {
       state.connected = state.running = false;
-      say(`The connection is lost; trying again in ${seconds} s.`, true);
+      say(`The connection is lost; trying again in ${seconds} s.`, true, true);
       refresh();
     },
-    ended: () => {
+    ended: (failure) => {
       state.ended = true;
       state.running = state.connected = false;
-      say("This session is gone. Press Reset to begin it anew.", true);
+      const why = failure === null ? "This session is gone." : `The engine has failed: ${failure}.`;
+      say(`${why} Press Reset to begin anew.`, true);
       refresh();
     },
   });
@@ -146,8 +151,7 @@ function show() {
   const { step } = state.latest;
   const { session } = state;
   const reached = () => {
-    if (session !== state.session) return;
-    state.shown = Math.max(state.shown, step);
+    if (session === state.session) state.shown = Math.max(state.shown, step);
     shown();
   };
   if (viewer === null) reached();
@@ -163,30 +167,30 @@ function show() {
 
 /** Makes one step; requests never overlap. */
 async function step() {
-  if (state.busy) return;
-  state.busy = true;
+  const { session } = state;
+  if (state.busy === session) return;
+  state.busy = session;
   refresh();
-  const session = state.session;
   try {
     const expected = state.latest?.step;
     const made = await request("POST", `/v1/sessions/${session}/steps`, { count: 1, expected_step: expected ?? null });
-    if (session === state.session) await untilShown(made.step);
+    await untilShown(session, made.step);
   } catch (error) {
     // Somebody else has stepped this session: their steps are on their way.
-    if (error.status === 409) await untilShown(error.problem.step);
+    if (error.status === 409) await untilShown(session, error.problem.step);
     else if (session === state.session) explain(error);
   } finally {
-    state.busy = false;
+    if (state.busy === session) state.busy = null;
     refresh();
   }
 }
 
 /** Waits for a step to be on the screen, so that a run goes no faster than it can be drawn. */
-function untilShown(step) {
+function untilShown(session, step) {
   return new Promise((resolve) => {
     const timer = setTimeout(resolve, SHOWN_WITHIN_MS);
     shown = () => {
-      if (state.shown < step) return;
+      if (state.session === session && state.shown < step) return;
       clearTimeout(timer);
       resolve();
     };

@@ -2,8 +2,8 @@
 
 /** How long to wait before each attempt to reconnect, ms; the last holds for all further ones. */
 const BACK_OFF_MS = [500, 1000, 2000, 4000, 8000];
-/** The close code that says that the session has ended. */
-const CLOSE_ENDED = 4404;
+/** The close codes that say that the session was deleted, and that its engine has failed. */
+const [CLOSE_DELETED, CLOSE_FAILED] = [4404, 4500];
 
 /** An error that the server explained (RFC 9457). */
 export class ProblemError extends Error {
@@ -48,7 +48,7 @@ export class Follower {
   /**
    * @param {string} id
    * @param {{description: Function, step: Function, part: Function, connected: Function, lost: Function,
-   *   ended: Function}} on lost(seconds) says when it is tried again
+   *   ended: Function}} on lost(seconds) says when it is tried again, ended(failure) why there is nothing more
    */
   constructor(id, on) {
     this.#id = id;
@@ -88,15 +88,22 @@ export class Follower {
     this.#on[event.type]?.(event.data);
   }
 
+  /** The session; null if it is gone, undefined if there is no answer. */
+  #resource() {
+    return request("GET", `/v1/sessions/${this.#id}`).catch((error) => (error.status === 404 ? null : undefined));
+  }
+
+  async #end() {
+    const resource = await this.#resource();
+    if (!this.#stopped) this.#on.ended(resource?.failure ?? null);
+  }
+
   async #closed(code) {
-    if (code === CLOSE_ENDED) return this.#on.ended();
+    if (code === CLOSE_DELETED || code === CLOSE_FAILED) return this.#end();
     // A refused connection does not say why: a session that is gone is asked for in vain.
-    const gone = await request("GET", `/v1/sessions/${this.#id}`).then(
-      () => false,
-      (error) => error.status === 404,
-    );
+    const resource = await this.#resource();
     if (this.#stopped) return;
-    if (gone) return this.#on.ended();
+    if (resource === null) return this.#on.ended(null);
     const wait = BACK_OFF_MS[Math.min(this.#attempt++, BACK_OFF_MS.length - 1)];
     this.#on.lost(wait / 1000);
     this.#timer = setTimeout(() => this.#connect(), wait);

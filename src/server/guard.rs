@@ -22,12 +22,15 @@ const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self' 'wa
      img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// The routes with all that holds for every one of them.
-pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>) -> Router<Arc<App>> {
-    router
+pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>) -> Router {
+    let router = router
         .fallback(async |uri: Uri| {
             Problem::new(Kind::UnknownRoute, format!("there is nothing at `{}`; see /v1/openapi.json", uri.path()))
         })
-        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
+        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES));
+    // Around the router as a whole: what is wrong with a method is known only there.
+    Router::new()
+        .fallback_service(router.with_state(app.clone()))
         .layer(from_fn_with_state(app.clone(), refuse_strangers))
         .layer(map_response(as_problem))
         .layer(map_response(with_headers))

@@ -97,7 +97,7 @@ pub async fn serve(listener: TcpListener, options: Options, shutdown: Cancellati
         loopback,
     });
     let router = Router::new().merge(routes).merge(assets::routes());
-    let router = guard::layered(router, &app).with_state(app.clone());
+    let router = guard::layered(router, &app);
     let serving = axum::serve(listener, router).with_graceful_shutdown(shutdown.clone().cancelled_owned());
     let ending = async {
         shutdown.cancelled().await;

@@ -29,7 +29,8 @@ use crate::{
     )
 )]
 pub(super) async fn recording(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let session = app.sessions.get(&id)?;
+    let session = app.sessions.get(&id)?.watch();
+    session.flush().await?;
     let live = session.live().clone();
     let complete = move || {
         live.complete().map_err(|error| Problem::new(Kind::Internal, format!("no complete recording: {error}")))

@@ -33,8 +33,14 @@ use crate::{
 const BATCH: usize = 64;
 /// Silence after which a comment or a ping shows that the connection still stands.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
-/// Why the WebSocket was closed: the session is no more, or its engine has failed.
-const CLOSE_ENDED: u16 = 4404;
+/// Why the WebSocket was closed: the session was deleted …
+const CLOSE_DELETED: u16 = 4404;
+/// … or its engine has failed …
+const CLOSE_FAILED: u16 = 4500;
+/// … or the server is going away.
+const CLOSE_GOING_AWAY: u16 = 1001;
+/// A reason holds 123 bytes at most, and a character takes up to four.
+const CLOSE_REASON_CHARS: usize = 30;
 
 /// A text message of the WebSocket.
 #[derive(Clone, Debug, Serialize, ToSchema)]
@@ -127,7 +133,8 @@ fn parts(parts: Parts) -> impl Stream<Item = Result<Bytes, Infallible>> {
         ("step" = Option<u64>, Query, description = "The first step to report; 0 if absent"),
     ),
     responses(
-        (status = 101, description = "The WebSocket. It closes with code 4404 when the session ends."),
+        (status = 101, description = "The WebSocket. Its close code says why it ended: 4404 the session was deleted, \
+            4500 its engine has failed, 1001 the server is shutting down."),
         (status = 400, description = "Not a WebSocket handshake, or a parameter is not a number", body = Problem),
         (status = 403, description = "The request comes from a foreign page", body = Problem),
         (status = 404, description = "There is no such session", body = Problem),
@@ -150,14 +157,15 @@ pub(super) async fn live(
     let description = session.description().clone();
     // Clients have nothing to say; what they say must not fill the memory.
     let upgrade = upgrade.max_message_size(1 << 10);
-    Ok(upgrade.on_upgrade(|socket| async {
+    Ok(upgrade.on_upgrade(|socket| async move {
         // A client that goes away needs no answer.
-        drop(follow(socket, description, readers).await);
+        drop(follow(socket, &app, description, readers).await);
     }))
 }
 
 async fn follow(
     mut socket: WebSocket,
+    app: &App,
     description: Description,
     (mut reports, mut parts): (Reports, Parts),
 ) -> Result<(), axum::Error> {
@@ -189,8 +197,12 @@ async fn follow(
             socket.send(text(&LiveEvent::Step(report))?).await?;
         }
     }
-    let frame = CloseFrame { code: CLOSE_ENDED, reason: "the session has ended".into() };
-    socket.send(Message::Close(Some(frame))).await
+    let (code, reason) = match reports.session.failure() {
+        _ if app.sessions.is_shutting_down() => (CLOSE_GOING_AWAY, "the server is shutting down".to_owned()),
+        Some(failure) => (CLOSE_FAILED, failure.chars().take(CLOSE_REASON_CHARS).collect()),
+        None => (CLOSE_DELETED, "the session was deleted".to_owned()),
+    };
+    socket.send(Message::Close(Some(CloseFrame { code, reason: reason.into() }))).await
 }
 
 fn text(event: &LiveEvent) -> Result<Message, axum::Error> {

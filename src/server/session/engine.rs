@@ -26,6 +26,9 @@ use crate::{
 
 /// Within a long command, what was made is published this often.
 const PUBLISH_EVERY: Duration = Duration::from_millis(200);
+/// What the arrangement of views does not show is written when nothing was asked for so long: while steps are made one
+/// by one, every message counts.
+const COMPLETE_AFTER: Duration = Duration::from_millis(500);
 
 /// What a session is made from.
 pub(super) struct Setup {
@@ -52,7 +55,12 @@ pub(super) enum Command {
     Result {
         reply: Reply<RunResult>,
     },
-    Stop,
+    /// Completes the recording so far.
+    Flush {
+        reply: Reply<()>,
+    },
+    /// Makes the engine look whether it is to end.
+    Wake,
     #[cfg(test)]
     Panic,
 }
@@ -101,22 +109,41 @@ struct Engine<'a> {
 impl Engine<'_> {
     /// Takes commands until told to stop or until nobody can send any more.
     fn serve(&mut self, commands: &mpsc::Receiver<Command>, recorder: &mut Recorder) {
-        while let Ok(command) = commands.recv() {
+        loop {
+            let command = commands.recv_timeout(COMPLETE_AFTER).or_else(|_| {
+                // Whoever asks for the recording is told if it cannot be written.
+                drop(self.flush(recorder));
+                commands.recv()
+            });
             if self.shared.stop.is_cancelled() {
                 return;
             }
             match command {
-                Command::Step { count, expected, mut reply } => {
-                    let outcome = self.steps(count, expected, recorder, &mut reply);
-                    // Nobody waits any longer: the steps stand all the same.
-                    drop(reply.send(outcome));
-                }
-                Command::Result { reply } => drop(reply.send(Ok(self.experiment.result()))),
-                Command::Stop => return,
-                #[cfg(test)]
-                Command::Panic => panic!("as the test asked"),
+                Err(mpsc::RecvError) => return,
+                Ok(command) => self.obey(command, recorder),
             }
         }
+    }
+
+    fn obey(&mut self, command: Command, recorder: &mut Recorder) {
+        // Nobody may wait for an answer any longer; what was done stands all the same.
+        match command {
+            Command::Step { count, expected, mut reply } => {
+                let outcome = self.steps(count, expected, recorder, &mut reply);
+                drop(reply.send(outcome));
+            }
+            Command::Result { reply } => drop(reply.send(Ok(self.experiment.result()))),
+            Command::Flush { reply } => drop(reply.send(self.flush(recorder))),
+            Command::Wake => {}
+            #[cfg(test)]
+            Command::Panic => panic!("as the test asked"),
+        }
+    }
+
+    fn flush(&self, recorder: &mut Recorder) -> Result<(), Problem> {
+        let flushed = recorder.flush().map_err(recording_failed);
+        self.shared.publish(Vec::new(), self.experiment.remaining());
+        flushed
     }
 
     fn steps(
@@ -132,7 +159,7 @@ impl Engine<'_> {
             return Err(Problem::new(Kind::StepMismatch, detail).field("expected_step").step(step));
         }
         if let Some(problem) = self.too_many(count, step) {
-            return Err(problem.field("count").step(step));
+            return Err(problem.step(step));
         }
         let mut batch = Batch { made: Vec::new(), published: 0, last: Instant::now() };
         let mut outcome = Ok(());
@@ -160,14 +187,15 @@ impl Engine<'_> {
     }
 
     fn publish(&self, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
-        let flushed = recorder.flush().map_err(recording_failed);
+        let flushed = recorder.flush_shown().map_err(recording_failed);
         self.shared.publish(batch.made[batch.published..].to_vec(), self.experiment.remaining());
         (batch.published, batch.last) = (batch.made.len(), Instant::now());
         flushed
     }
 
     fn too_many(&self, count: u64, step: u64) -> Option<Problem> {
-        let few = |left: u64, detail: String| Problem::new(Kind::TooFewStepsLeft, detail).remaining(left);
+        let few =
+            |left: u64, detail: String| Problem::new(Kind::TooFewStepsLeft, detail).field("count").remaining(left);
         if let Some(left) = self.experiment.remaining().map(|left| left as u64).filter(|left| count > *left) {
             return Some(few(left, format!("the recorded data have {left} steps left, {count} were asked for")));
         }

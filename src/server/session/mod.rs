@@ -145,8 +145,13 @@ impl Session {
             step: self.step(),
             remaining: Some(self.shared.remaining.load(Ordering::Relaxed)).filter(|left| *left != u64::MAX),
             file: self.file.clone(),
-            failure: lock(&self.shared.failure).clone(),
+            failure: self.failure(),
         }
+    }
+
+    /// Why the engine has failed, if it has.
+    pub(super) fn failure(&self) -> Option<String> {
+        lock(&self.shared.failure).clone()
     }
 
     /// The latest published step.
@@ -185,20 +190,28 @@ impl Session {
         self.ask(|reply| Command::Result { reply }).await
     }
 
+    /// Completes the recording so far, after whatever the session is busy with. That of a failed engine is complete.
+    pub(super) async fn flush(&self) -> Result<(), Problem> {
+        let flushed = self.ask(|reply| Command::Flush { reply }).await;
+        if self.failure().is_some() { Ok(()) } else { flushed }
+    }
+
     async fn ask<T>(&self, command: impl FnOnce(engine::Reply<T>) -> Command) -> Result<T, Problem> {
         let (reply, answer) = oneshot::channel();
-        // Both an engine that takes no commands and one that dropped this one have ended.
-        let sent = self.commands.send(command(reply));
-        match (sent, answer.await) {
-            (Ok(()), Ok(outcome)) => outcome,
-            _ => Err(self.why_ended().await),
+        // Both an engine that takes no commands and one that dropped this one have ended. A command that was not sent
+        // must go at once: it holds the other end of `answer`.
+        if self.commands.send(command(reply)).is_ok()
+            && let Ok(outcome) = answer.await
+        {
+            return outcome;
         }
+        Err(self.why_ended().await)
     }
 
     async fn why_ended(&self) -> Problem {
         // The reason may come an instant after the dropped reply.
         self.shared.ended.cancelled().await;
-        match lock(&self.shared.failure).clone() {
+        match self.failure() {
             Some(failure) => Problem::new(Kind::EngineFailed, failure).step(self.step()),
             None => Problem::unknown_session(self.id),
         }
@@ -208,7 +221,7 @@ impl Session {
     pub(super) fn stop(&self) {
         self.shared.stop.cancel();
         // An engine that waits for commands must wake; one that has ended needs nothing.
-        drop(self.commands.send(Command::Stop));
+        drop(self.commands.send(Command::Wake));
     }
 
     /// Counts the caller among those who watch, as long as it keeps the answer.

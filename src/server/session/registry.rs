@@ -134,6 +134,10 @@ impl Sessions {
         })
     }
 
+    pub(in crate::server) fn is_shutting_down(&self) -> bool {
+        self.shutdown.is_cancelled()
+    }
+
     /// All sessions, oldest first.
     pub(in crate::server) fn all(&self) -> Vec<Arc<Session>> {
         lock(&self.all).clone()
@@ -195,15 +199,15 @@ mod tests {
         assert_eq!(session.reports(0, usize::MAX).len(), 3, "what was made can still be read");
         assert!(session.resource().failure.is_some());
         sessions.close(session.id).await.expect("it can be deleted");
-        assert_eq!(sessions.get(&session.id.to_string()).expect_err("deleted").status, 404);
+        assert_eq!(sessions.get(&session.id.to_string()).err().map(|problem| problem.status), Some(404));
     }
 
     #[tokio::test]
     async fn full_memory_refuses_steps_until_a_session_goes() {
-        let sessions = Sessions::new(Budget::new(100_000), None, CancellationToken::new());
+        let sessions = Sessions::new(Budget::new(300_000), None, CancellationToken::new());
         let new = NewSession { scenario: "arm-6dof".to_owned(), seed: 1, learners: Some(vec!["random".to_owned()]) };
         let (first, second) = (sessions.open(new.clone()).await.expect("one"), sessions.open(new).await.expect("two"));
-        first.make_steps(200, None).await.expect("the last command may overshoot");
+        first.make_steps(300, None).await.expect("the last command may overshoot");
         assert_eq!(second.make_steps(1, None).await.expect_err("full").status, 503);
         sessions.close(first.id).await.expect("deleted");
         drop(first);

@@ -1,0 +1,175 @@
+//! Chromium and chromedriver.
+
+use std::{
+    collections::BTreeSet,
+    io::{BufRead, BufReader, Read},
+    path::{Path, PathBuf},
+    process::{Child, ChildStdout, Command, Stdio},
+    sync::Arc,
+    time::Duration,
+};
+
+use fantoccini::{Client, ClientBuilder, Locator, wd::WebDriverCompatibleCommand};
+use hyper_util::client::legacy::connect::HttpConnector;
+use reqwest::{Method, Url};
+use serde_json::{Value, json};
+use tokio::time::Instant;
+
+const WAIT: Duration = Duration::from_secs(120);
+
+/// A headless browser that draws without a graphics card and calls nobody by itself.
+const FLAGS: &str = "--headless=new --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader \
+    --ignore-gpu-blocklist --disable-quic --no-first-run --disable-background-networking --disable-component-update \
+    --disable-sync --window-size=1280,900";
+
+/// A browser with one page.
+#[derive(Clone)]
+pub struct Browser {
+    client: Client,
+    _driver: Arc<Driver>,
+    _profile: Arc<tempfile::TempDir>,
+}
+
+impl Browser {
+    /// Starts a browser; without one the test is skipped, unless it must not be.
+    pub async fn start() -> Option<Self> {
+        let driver = find("CHROMEDRIVER", &["chromedriver"]);
+        let chromium = find("CHROMIUM", &["chromium", "chromium-browser", "google-chrome"]);
+        let (Some(driver), Some(chromium)) = (&driver, &chromium) else {
+            let missing = if driver.is_none() { "chromedriver" } else { "chromium" };
+            let set = |name: &str| std::env::var(name).is_ok_and(|value| !value.is_empty() && value != "0");
+            let required = set("CI") || set("BODY_SCHEMA_REQUIRE_BROWSER");
+            assert!(!required, "{missing} is not installed, and this test must not be skipped here");
+            eprintln!("skipped: {missing} is not installed");
+            return None;
+        };
+        let (driver, port) = Driver::start(driver);
+        let profile = tempfile::tempdir().expect("a directory");
+        let mut flags: Vec<String> = FLAGS.split(' ').map(str::to_owned).collect();
+        flags.push(format!("--user-data-dir={}", profile.path().display()));
+        let capabilities = json!({
+            "goog:chromeOptions": { "args": flags, "binary": chromium },
+            "goog:loggingPrefs": { "browser": "ALL", "performance": "ALL" },
+        });
+        let client = ClientBuilder::new(HttpConnector::new())
+            .capabilities(capabilities.as_object().expect("an object").clone())
+            .connect(&format!("http://127.0.0.1:{port}"))
+            .await
+            .expect("Chromium starts");
+        Some(Self { client, _driver: Arc::new(driver), _profile: Arc::new(profile) })
+    }
+
+    pub async fn stop(self) {
+        drop(self.client.close().await);
+    }
+
+    pub async fn open(&self, address: &str) {
+        self.client.goto(address).await.expect("the page");
+    }
+
+    /// The value of a JavaScript expression.
+    pub async fn evaluate(&self, expression: &str) -> Value {
+        self.client.execute(&format!("return {expression};"), Vec::new()).await.expect("a value")
+    }
+
+    pub async fn wait_for(&self, what: &str, condition: &str) {
+        let deadline = Instant::now() + WAIT;
+        while self.evaluate(condition).await != true {
+            if Instant::now() > deadline {
+                panic!("no {what}; the page says: {}", self.evaluate("document.body.innerText").await);
+            }
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+    }
+
+    /// Presses a button by keyboard: it must be reachable and ready.
+    pub async fn press(&self, id: &str) {
+        self.wait_for(&format!("ready button {id}"), &format!("!document.getElementById('{id}').disabled")).await;
+        let button = self.client.find(Locator::Id(id)).await.expect("a button");
+        button.send_keys("\u{e007}").await.expect("a key press");
+    }
+
+    pub async fn screenshot(&self) -> Vec<u8> {
+        self.client.screenshot().await.expect("a picture")
+    }
+
+    /// The errors in the console.
+    pub async fn errors(&self) -> Vec<String> {
+        let entries = self.log("browser").await;
+        let severe = entries.iter().filter(|entry| entry["level"] == "SEVERE");
+        severe.map(|entry| entry["message"].to_string()).collect()
+    }
+
+    /// The hosts that the page has asked for anything.
+    pub async fn hosts(&self) -> Vec<String> {
+        let entries = self.log("performance").await;
+        let addresses = entries.iter().filter_map(|entry| {
+            let message: Value = serde_json::from_str(entry["message"].as_str()?).ok()?;
+            let params = &message["message"]["params"];
+            let address = match message["message"]["method"].as_str()? {
+                "Network.requestWillBeSent" => &params["request"]["url"],
+                "Network.webSocketCreated" => &params["url"],
+                _ => return None,
+            };
+            Url::parse(address.as_str()?).ok()
+        });
+        let to_hosts = addresses.filter(|address| matches!(address.scheme(), "http" | "https" | "ws" | "wss"));
+        let hosts: BTreeSet<String> = to_hosts.map(|address| address.authority().to_owned()).collect();
+        hosts.into_iter().collect()
+    }
+
+    async fn log(&self, kind: &'static str) -> Vec<Value> {
+        let entries = self.client.issue_cmd(Log(kind)).await.expect("a log");
+        entries.as_array().expect("entries").clone()
+    }
+}
+
+/// Chromedriver, as long as it is needed.
+struct Driver {
+    child: Child,
+    /// Kept open: a driver that cannot write ends.
+    _output: BufReader<ChildStdout>,
+}
+
+impl Driver {
+    /// Starts it on a port of its choice.
+    fn start(program: &Path) -> (Self, u16) {
+        let command = Command::new(program).arg("--port=0").stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
+        let mut child = command.expect("chromedriver starts");
+        let mut output = BufReader::new(child.stdout.take().expect("an output"));
+        let mut lines = output.by_ref().lines().map_while(Result::ok);
+        let port =
+            lines.find_map(|line| Some(line.split_once("successfully on port ")?.1.trim_end_matches('.').parse()));
+        drop(lines);
+        (Self { child, _output: output }, port.and_then(Result::ok).expect("chromedriver names its port"))
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        drop(self.child.kill());
+        drop(self.child.wait());
+    }
+}
+
+/// Chromedriver's own command for logs.
+#[derive(Debug)]
+struct Log(&'static str);
+
+impl WebDriverCompatibleCommand for Log {
+    fn endpoint(&self, base: &Url, session: Option<&str>) -> Result<Url, <Url as std::str::FromStr>::Err> {
+        base.join(&format!("session/{}/se/log", session.unwrap_or_default()))
+    }
+
+    fn method_and_body(&self, _: &Url) -> (Method, Option<String>) {
+        (Method::POST, Some(json!({ "type": self.0 }).to_string()))
+    }
+}
+
+fn find(variable: &str, names: &[&str]) -> Option<PathBuf> {
+    if let Some(path) = std::env::var_os(variable) {
+        return Some(path.into());
+    }
+    let paths: Vec<PathBuf> = std::env::var_os("PATH").iter().flat_map(std::env::split_paths).collect();
+    names.iter().find_map(|name| paths.iter().map(|path| path.join(name)).find(|file| file.is_file()))
+}
