@@ -6,6 +6,9 @@ import { startViewer } from "./viewer.js";
 
 /** The shortest time between two steps of a run, ms: it is to be watched. */
 const RUN_EVERY_MS = 60;
+/** Where drawing is slow, a run makes several steps between two pictures, to keep up this many a second. */
+const RUN_STEPS_PER_SECOND = 10;
+const RUN_MOST_AT_ONCE = 25;
 /** How long a run waits for a step that was made to be shown, ms. */
 const SHOWN_WITHIN_MS = 3000;
 
@@ -76,7 +79,7 @@ async function reset(remark = "") {
     sessionStorage.setItem("own", next.id);
     follow(next, true);
     // The first movement shows what it is all about.
-    await step();
+    await step(1);
     if (remark) say(remark);
   } catch (error) {
     explain(error);
@@ -165,15 +168,15 @@ function show() {
 
 // ---- steps
 
-/** Makes one step; requests never overlap. */
-async function step() {
+/** Makes so many steps; requests never overlap. */
+async function step(count) {
   const { session } = state;
   if (state.busy === session) return;
   state.busy = session;
   refresh();
   try {
     const expected = state.latest?.step;
-    const made = await request("POST", `/v1/sessions/${session}/steps`, { count: 1, expected_step: expected ?? null });
+    const made = await request("POST", `/v1/sessions/${session}/steps`, { count, expected_step: expected ?? null });
     await untilShown(session, made.step);
   } catch (error) {
     // Somebody else has stepped this session: their steps are on their way.
@@ -203,10 +206,14 @@ async function run() {
   say("");
   refresh();
   const session = state.session;
+  let count = 1;
   while (state.running && state.session === session) {
+    const begun = performance.now();
     const pause = new Promise((resolve) => setTimeout(resolve, RUN_EVERY_MS));
-    await step();
+    await step(Math.min(count, state.remaining ?? count));
     await pause;
+    const due = Math.round(((performance.now() - begun) / 1000) * RUN_STEPS_PER_SECOND);
+    count = Math.min(Math.max(due, 1), RUN_MOST_AT_ONCE);
   }
   refresh();
 }
@@ -266,7 +273,7 @@ async function begin() {
   }
 }
 
-element("step").addEventListener("click", step);
+element("step").addEventListener("click", () => step(1));
 element("run").addEventListener("click", () => {
   if (state.running) state.running = false;
   else run();
