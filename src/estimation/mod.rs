@@ -3,15 +3,18 @@
 //! * [`Belief`]: the estimated chain and its covariance in minimal tangent coordinates.
 //! * [`Estimator`]: takes a movement and its observation, revises the belief.
 //! * [`Rls`]: recursive least squares, (2)–(5) of the paper: an extended Kalman filter with a constant state.
+//! * [`SixNumbers`]: the same in the paper's over-parameterised coordinates, for comparison.
 //! * [`Gradient`]: the stochastic gradient, the paper's baseline.
 
 mod belief;
 mod gradient;
 mod rls;
+mod six_numbers;
 
 pub use belief::Belief;
 pub use gradient::Gradient;
 pub use rls::{Rls, StabilisingNoise};
+pub use six_numbers::SixNumbers;
 
 use crate::sensing::Observation;
 

@@ -29,7 +29,7 @@ pub struct StabilisingNoise {
 }
 
 impl StabilisingNoise {
-    fn is_due(&self, step: u64) -> bool {
+    pub(super) fn is_due(&self, step: u64) -> bool {
         step >= self.first_step && (step - self.first_step).is_multiple_of(self.every.max(1))
     }
 }

@@ -38,49 +38,82 @@ fn columns(
     positions: &[f64],
     mut column: impl FnMut(usize, Vector3<f64>),
 ) -> Point3<f64> {
+    let (marker, turn) = walk(chain, positions, |index, derivative| {
+        let Some(directions) = layout.direction(index) else { return };
+        let frame = chart::basis(&derivative.joint.direction());
+        for k in 0..2 {
+            let b: Vector3<f64> = frame.column(k).into_owned();
+            if let Some(points) = layout.point(index) {
+                column(points.start + k, derivative.point(&b));
+            }
+            column(directions.start + k, derivative.direction(&b));
+        }
+    });
+    for (k, index) in layout.marker().unwrap_or(0..0).enumerate() {
+        column(index, turn.column(k).into_owned());
+    }
+    marker
+}
+
+/// How the marker moves with one joint's axis, all else held.
+pub(crate) struct JointDerivative<'a> {
+    /// The joint.
+    pub joint: &'a Joint,
+    /// Aᵢ₋₁.
+    before: &'a Matrix3<f64>,
+    /// e^{wθ}.
+    rotation: &'a Matrix3<f64>,
+    /// r, the marker as moved by the joints behind, from the axis point.
+    arm: Vector3<f64>,
+    position: f64,
+}
+
+impl JointDerivative<'_> {
+    /// The derivative along a shift `b` of the axis point; zero for a prismatic joint.
+    pub fn point(&self, b: &Vector3<f64>) -> Vector3<f64> {
+        self.before * (b - self.rotation * b)
+    }
+
+    /// The derivative along a change `b` of the direction.
+    pub fn direction(&self, b: &Vector3<f64>) -> Vector3<f64> {
+        let (w, r) = (self.joint.direction().into_inner(), &self.arm);
+        match self.joint {
+            Joint::Revolute(_) => {
+                let (sin, cos) = self.position.sin_cos();
+                self.before * (b.cross(r) * sin + (w * b.dot(r) + b * w.dot(r)) * (1.0 - cos))
+            }
+            Joint::Prismatic(_) => self.before * b * self.position,
+        }
+    }
+}
+
+/// Walks the chain once each way and shows every joint's derivative to `visit`; returns the marker position and A_n.
+pub(crate) fn walk(
+    chain: &Chain,
+    positions: &[f64],
+    mut visit: impl FnMut(usize, &JointDerivative<'_>),
+) -> (Point3<f64>, Matrix3<f64>) {
     debug_assert_eq!(positions.len(), chain.joints.len());
     // Backwards: the marker as moved by the joints behind each joint.
     let rotations: Vec<Matrix3<f64>> =
         chain.joints.iter().zip(positions).map(|(joint, &theta)| joint.rotation(theta)).collect();
-    let mut behind = vec![Vector3::zeros(); chain.joints.len()];
+    let mut arms = vec![Vector3::zeros(); chain.joints.len()];
     let mut x = chain.marker.coords;
     for (index, joint) in chain.joints.iter().enumerate().rev() {
-        behind[index] = x;
-        x = match joint {
-            Joint::Revolute(line) => rotations[index] * (x - line.point.coords) + line.point.coords,
-            Joint::Prismatic(w) => x + w.into_inner() * positions[index],
-        };
+        match joint {
+            Joint::Revolute(line) => {
+                arms[index] = x - line.point.coords;
+                x = rotations[index] * arms[index] + line.point.coords;
+            }
+            Joint::Prismatic(w) => x += w.into_inner() * positions[index],
+        }
     }
-    let marker = Point3::from(x);
-
     // Forwards: the rotation of the joints before each joint.
     let mut before = Matrix3::identity();
     for (index, joint) in chain.joints.iter().enumerate() {
-        let rotation = &rotations[index];
-        if let Some(directions) = layout.direction(index) {
-            let frame = chart::basis(&joint.direction());
-            match joint {
-                Joint::Revolute(line) => {
-                    let (w, r) = (line.direction.into_inner(), behind[index] - line.point.coords);
-                    let (sin, cos) = positions[index].sin_cos();
-                    for k in 0..2 {
-                        let b: Vector3<f64> = frame.column(k).into_owned();
-                        column(directions.start - 2 + k, before * (b - rotation * b));
-                        let turned = b.cross(&r) * sin + (w * b.dot(&r) + b * w.dot(&r)) * (1.0 - cos);
-                        column(directions.start + k, before * turned);
-                    }
-                }
-                Joint::Prismatic(_) => {
-                    for k in 0..2 {
-                        column(directions.start + k, before * frame.column(k) * positions[index]);
-                    }
-                }
-            }
-        }
+        let (rotation, arm, position) = (&rotations[index], arms[index], positions[index]);
+        visit(index, &JointDerivative { joint, before: &before, rotation, arm, position });
         before *= rotation;
     }
-    for (k, index) in layout.marker().unwrap_or(0..0).enumerate() {
-        column(index, before.column(k).into_owned());
-    }
-    marker
+    (Point3::from(x), before)
 }

@@ -1,7 +1,8 @@
 //! Derivative-free minimisation over the unit cube: DIRECT and its locally biased form DIRECT-l.
 //!
-//! [`Direct`] is the ask-and-tell minimiser and [`minimize`] the loop around it. Nothing in this module knows what is
-//! being minimised, and nothing in it is random.
+//! [`Direct`] is the ask-and-tell minimiser and [`minimize`] the loop around it; nothing in them is random. For
+//! comparison there is [`bayesian()`], Bayesian optimisation with a Gaussian process. Nothing in this module knows what
+//! is being minimised.
 //!
 //! # Algorithm
 //!
@@ -94,7 +95,10 @@
 //! * J. M. Gablonsky. DIRECT version 2.0 user guide. Technical report CRSC-TR01-08, North Carolina State University,
 //!   2001. His code, in the C translation that NLopt distributes, served as the reference for order and ties.
 
+mod bayesian;
 mod direct;
+
+pub use bayesian::bayesian;
 
 pub use direct::{
     Batch, Direct, DirectError, HullPoint, MAX_LEVEL, Minimum, Partition, Rectangle, Settings, Variant, minimize,
