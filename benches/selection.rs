@@ -10,7 +10,7 @@ use body_schema::{
     kinematics::jacobian::jacobian,
     optimize::{Direct, Settings, Variant},
     scenario::{Scenario, builtin},
-    selection::{ACriterion, Actions, Active, Policy, Weights},
+    selection::{ACriterion, Actions, Active, Policy, Search, Weights},
 };
 use divan::Bencher;
 use nalgebra::DMatrix;
@@ -86,7 +86,7 @@ fn c_posterior_of_every_candidate(bencher: Bencher<'_, '_>, name: &str) {
 #[divan::bench(args = SCENARIOS)]
 fn d_one_active_selection(bencher: Bencher<'_, '_>, name: &str) {
     let case = case(name);
-    let mut active = Active::new(case.weights.clone(), case.scenario.selection.search);
+    let mut active = Active::new(case.weights.clone(), Search::Direct(case.scenario.selection.search));
     let actions = Actions::Box(case.scenario.robot.limits.clone());
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     bencher.bench_local(|| active.select(&case.belief, &actions, &mut rng).expect("a selection"));

@@ -7,15 +7,17 @@ use rand::{RngExt, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    ErrorDraw, EstimatorKind, InitialError, LearnerSpec, PolicyKind, Recording, Scenario, ScenarioError, WorldSpec,
+    ErrorDraw, EstimatorKind, InitialError, LearnerSpec, PolicyKind, Prior, Recording, Scenario, ScenarioError,
+    WorldSpec,
 };
 use crate::{
-    estimation::{Belief, Estimator, Gradient, Rls},
+    estimation::{Belief, Estimator, Gradient, Rls, SixNumbers},
     experiment::{
         Change, Description, Evaluation, Experiment, HeadDescription, Learner, ModelReport, Record, Stream, World,
     },
     kinematics::{Chain, Joint, registration::register},
-    selection::{Actions, Active, Movement, Policy, Random, Watch, Weights, draw_configuration},
+    optimize::{Settings, Variant},
+    selection::{Actions, Active, Movement, Policy, Random, Search, Watch, Weights, draw_configuration},
     sensing::MarkerTracker,
 };
 
@@ -171,15 +173,14 @@ impl Scenario {
                         let prior = DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd));
                         Box::new(Rls::new(belief, prior, self.filter.stabilising.filter(|_| spec.stabilising)))
                     }
+                    EstimatorKind::RlsSixNumbers => {
+                        let Prior { direction_rad, point_m, .. } = self.prior;
+                        let stabilising = self.filter.stabilising.filter(|_| spec.stabilising);
+                        Box::new(SixNumbers::new(belief, direction_rad, point_m, stabilising))
+                    }
                     EstimatorKind::Gradient => Box::new(Gradient::new(belief, self.gradient_rate)),
                 };
-                let active = Active::new(weights.clone(), self.selection.search);
-                let policy: Box<dyn Policy> = match (spec.policy, briefing.watch.clone()) {
-                    (PolicyKind::Active, Some(watch)) => Box::new(active.watched(watch)),
-                    (PolicyKind::ActiveNaive, Some(watch)) => Box::new(active.watched_naively(watch)),
-                    (PolicyKind::Active | PolicyKind::ActiveNaive, None) => Box::new(active),
-                    (PolicyKind::Random, _) => Box::new(Random),
-                };
+                let policy = self.policy(spec.policy, &weights, briefing.watch.clone());
                 Learner {
                     description: spec.description(),
                     estimator,
@@ -208,6 +209,30 @@ impl Scenario {
             head: briefing.watch.as_ref().map(|watch| HeadDescription::of(&watch.head)),
         };
         Ok(Experiment::new(description, world, learners, evaluation))
+    }
+}
+
+/// Chains drawn from the posterior for one Monte Carlo evaluation of (7).
+const MONTE_CARLO_SAMPLES: usize = 16;
+
+impl Scenario {
+    fn policy(&self, kind: PolicyKind, weights: &Weights, watch: Option<Watch>) -> Box<dyn Policy> {
+        let settings = self.selection.search;
+        let evaluations = settings.max_evaluations;
+        let search = match kind {
+            PolicyKind::Random => return Box::new(Random),
+            PolicyKind::Active | PolicyKind::ActiveNaive | PolicyKind::ActiveMonteCarlo => Search::Direct(settings),
+            PolicyKind::ActiveDirect => Search::Direct(Settings { variant: Variant::Original, ..settings }),
+            PolicyKind::ActiveRandomSearch => Search::Random { evaluations },
+            PolicyKind::ActiveBayesian => Search::Bayesian { evaluations },
+        };
+        let samples = if kind == PolicyKind::ActiveMonteCarlo { MONTE_CARLO_SAMPLES } else { 0 };
+        let active = Active::new(weights.clone(), search).sampled(samples);
+        Box::new(match watch {
+            Some(watch) if kind == PolicyKind::ActiveNaive => active.watched_naively(watch),
+            Some(watch) => active.watched(watch),
+            None => active,
+        })
     }
 }
 

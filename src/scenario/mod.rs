@@ -213,10 +213,12 @@ impl LearnerSpec {
 
 /// The estimators that a scenario can name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum EstimatorKind {
     /// Recursive least squares.
     Rls,
+    /// Recursive least squares in the paper's six numbers per joint: a comparison, which shows no covariance.
+    RlsSixNumbers,
     /// Stochastic gradient.
     Gradient,
 }
@@ -226,6 +228,7 @@ impl EstimatorKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Rls => "rls",
+            Self::RlsSixNumbers => "rls-six-numbers",
             Self::Gradient => "gradient",
         }
     }
@@ -243,6 +246,14 @@ pub enum PolicyKind {
     Active,
     /// The same, but where a head watches with blind faith in the predicted marker: a comparison.
     ActiveNaive,
+    /// As `active`, but by original DIRECT, whatever the scenario's variant.
+    ActiveDirect,
+    /// As `active`, but the best of as many random configurations: the floor of every search.
+    ActiveRandomSearch,
+    /// As `active`, but by Bayesian optimisation with as many evaluations.
+    ActiveBayesian,
+    /// As `active`, but with the expectation of (7) by Monte Carlo over the posterior.
+    ActiveMonteCarlo,
     /// Draws uniformly.
     Random,
 }
@@ -253,6 +264,10 @@ impl PolicyKind {
         match self {
             Self::Active => "active",
             Self::ActiveNaive => "active-naive",
+            Self::ActiveDirect => "active-direct",
+            Self::ActiveRandomSearch => "active-random-search",
+            Self::ActiveBayesian => "active-bayesian",
+            Self::ActiveMonteCarlo => "active-monte-carlo",
             Self::Random => "random",
         }
     }

@@ -1,14 +1,18 @@
 //! Active selection: the movement that is expected to teach most.
 
+use nalgebra::DVector;
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ACriterion, Actions, Movement, Policy, Selection, SelectionError, Sight, Visibility, Watch, Weights, criterion::scaled,
+    ACriterion, Actions, Movement, Policy, Selection, SelectionError, Sight, Visibility, Watch, Weights,
+    criterion::scaled, draw_configuration,
 };
 use crate::{
     estimation::Belief,
-    optimize::{Direct, Settings},
+    optimize::{Direct, Settings, bayesian},
     sensing::Observation,
 };
 
@@ -20,8 +24,26 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct Active {
     weights: Weights,
-    search: Settings,
+    search: Search,
+    samples: usize,
     watch: Option<Watched>,
+}
+
+/// How the criterion is minimised over a box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Search {
+    /// DIRECT, original or locally biased.
+    Direct(Settings),
+    /// The best of so many random configurations: the floor that every search must beat.
+    Random {
+        /// How many.
+        evaluations: usize,
+    },
+    /// Bayesian optimisation with a Gaussian process, which the paper found not worth its cost.
+    Bayesian {
+        /// How many configurations are evaluated.
+        evaluations: usize,
+    },
 }
 
 #[derive(Clone, Debug)]
@@ -58,6 +80,25 @@ pub struct Leaf {
     pub potentially_optimal: bool,
 }
 
+impl Partition {
+    fn of(direct: &Direct) -> Self {
+        let leaves: Vec<Leaf> = direct
+            .partition()
+            .iter()
+            .map(|rectangle| Leaf {
+                centre: rectangle.centre.to_vec(),
+                levels: rectangle.levels.to_vec(),
+                value: rectangle.value,
+                generation: rectangle.generation,
+                potentially_optimal: rectangle.potentially_optimal,
+            })
+            .collect();
+        let best = direct.best().map(|(centre, _)| centre);
+        let chosen = leaves.iter().position(|leaf| Some(leaf.centre.as_slice()) == best).unwrap_or(0);
+        Self { leaves, chosen }
+    }
+}
+
 impl Leaf {
     /// Half the length of side `index`, in the unit cube.
     pub fn half_side(&self, index: usize) -> f64 {
@@ -71,9 +112,15 @@ impl Leaf {
 }
 
 impl Active {
-    /// Selection by the A-criterion with `weights`; `search` says how DIRECT goes about it.
-    pub fn new(weights: Weights, search: Settings) -> Self {
-        Self { weights, search, watch: None }
+    /// Selection by the A-criterion with `weights`, minimised by `search`.
+    pub fn new(weights: Weights, search: Search) -> Self {
+        Self { weights, search, samples: 0, watch: None }
+    }
+
+    /// The expectation in (7) by Monte Carlo: the mean of the criterion over so many chains drawn from the posterior,
+    /// instead of the criterion at the estimate.
+    pub fn sampled(self, samples: usize) -> Self {
+        Self { samples, ..self }
     }
 
     /// The same where a head watches.
@@ -91,40 +138,72 @@ impl Active {
         active
     }
 
-    fn search_box(&self, criterion: &ACriterion<'_>, limits: &[(f64, f64)]) -> Result<Selection, SelectionError> {
+    /// The beliefs over which the criterion is averaged: the estimate's, or chains drawn from it by N(0, P) in its
+    /// chart, each with the same P.
+    fn outlooks(&self, belief: &Belief, rng: &mut ChaCha8Rng) -> Result<Vec<Belief>, SelectionError> {
+        if self.samples == 0 {
+            return Ok(vec![belief.clone()]);
+        }
+        let covariance = belief.covariance.clone().ok_or(SelectionError::NoCovariance)?;
+        let root = covariance.cholesky().ok_or(SelectionError::NoFiniteCriterion)?.l();
+        let draw = |_| {
+            let standard = DVector::from_fn(root.nrows(), |_, _| rng.sample(StandardNormal));
+            Belief { chain: belief.chain.retract(&belief.layout, &(&root * standard)), ..belief.clone() }
+        };
+        Ok((0..self.samples).map(draw).collect())
+    }
+
+    fn search_box(
+        &self,
+        criteria: &[ACriterion<'_>],
+        limits: &[(f64, f64)],
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Selection, SelectionError> {
         let scale = |centre: &[f64]| -> Vec<f64> {
             centre.iter().zip(limits).map(|(c, (lower, upper))| lower + c * (upper - lower)).collect()
         };
-        let mut direct = Direct::new(limits.len(), self.search).map_err(SelectionError::Search)?;
-        while let Some(batch) = direct.ask() {
-            let candidates: Vec<Vec<f64>> = batch.iter().map(scale).collect();
-            direct.tell(&criterion.evaluate(&candidates)).map_err(SelectionError::Search)?;
-        }
-        let Some((centre, value)) = direct.best() else {
+        let evaluate = |candidates: &[Vec<f64>]| {
+            let mut sums = vec![0.0; candidates.len()];
+            for criterion in criteria {
+                sums.iter_mut().zip(criterion.evaluate(candidates)).for_each(|(sum, value)| *sum += value);
+            }
+            sums.iter().map(|sum| sum / criteria.len() as f64).collect::<Vec<f64>>()
+        };
+        let (best, evaluations, partition) = match self.search {
+            Search::Direct(settings) => {
+                let mut direct = Direct::new(limits.len(), settings).map_err(SelectionError::Search)?;
+                while let Some(batch) = direct.ask() {
+                    let candidates: Vec<Vec<f64>> = batch.iter().map(scale).collect();
+                    direct.tell(&evaluate(&candidates)).map_err(SelectionError::Search)?;
+                }
+                let best = direct.best().map(|(centre, value)| (scale(centre), value));
+                (best, direct.evaluations(), Some(Partition::of(&direct)))
+            }
+            Search::Random { evaluations } => {
+                let candidates: Vec<_> = (0..evaluations).map(|_| draw_configuration(limits, rng)).collect();
+                let values = evaluate(&candidates).into_iter();
+                let finite = candidates.into_iter().zip(values).filter(|(_, value)| value.is_finite());
+                (finite.min_by(|a, b| a.1.total_cmp(&b.1)), evaluations, None)
+            }
+            Search::Bayesian { evaluations } => {
+                let found = bayesian(limits.len(), evaluations, rng.random(), |x| evaluate(&[scale(x)])[0]);
+                (found.map(|found| (scale(&found.point), found.value)), evaluations, None)
+            }
+        };
+        let trace = criteria.iter().map(ACriterion::trace).sum::<f64>() / criteria.len() as f64;
+        let Some((configuration, value)) = best else {
             return match &self.watch {
                 // Nothing in view was found: back to where the marker is known to be seen.
-                Some(watch) if criterion.trace().is_finite() => Ok(Selection::plain(watch.visible_pose.clone())),
+                Some(watch) if trace.is_finite() => Ok(Selection::plain(watch.visible_pose.clone())),
                 _ => Err(SelectionError::NoFiniteCriterion),
             };
         };
-        let leaves: Vec<Leaf> = direct
-            .partition()
-            .iter()
-            .map(|rectangle| Leaf {
-                centre: rectangle.centre.to_vec(),
-                levels: rectangle.levels.to_vec(),
-                value: rectangle.value,
-                generation: rectangle.generation,
-                potentially_optimal: rectangle.potentially_optimal,
-            })
-            .collect();
-        let chosen = leaves.iter().position(|leaf| leaf.centre == centre).unwrap_or(0);
         Ok(Selection {
-            movement: Movement { configuration: scale(centre), row: None },
+            movement: Movement { configuration, row: None },
             criterion: Some(value),
-            gain: Some(criterion.trace() - value),
-            evaluations: direct.evaluations(),
-            partition: Some(Partition { leaves, chosen }),
+            gain: Some(trace - value),
+            evaluations,
+            partition,
         })
     }
 }
@@ -134,19 +213,27 @@ impl Policy for Active {
         &mut self,
         belief: &Belief,
         actions: &Actions,
-        _rng: &mut ChaCha8Rng,
+        rng: &mut ChaCha8Rng,
     ) -> Result<Selection, SelectionError> {
-        let criterion = ACriterion::new(belief, &self.weights)?;
         match actions {
-            Actions::Box(limits) => match &self.watch {
-                Some(watch) if !watch.has_moved => Ok(Selection::plain(watch.visible_pose.clone())),
-                Some(watch) if watch.naive => {
-                    self.search_box(&criterion.watched(Sight::Predicted(&watch.visibility)), limits)
+            Actions::Box(limits) => {
+                if let Some(watch) = self.watch.as_ref().filter(|watch| !watch.has_moved) {
+                    return Ok(Selection::plain(watch.visible_pose.clone()));
                 }
-                Some(watch) => self.search_box(&criterion.watched(Sight::Chance(&watch.visibility, limits)), limits),
-                None => self.search_box(&criterion, limits),
-            },
+                let outlooks = self.outlooks(belief, rng)?;
+                let criterion = |belief| {
+                    let criterion = ACriterion::new(belief, &self.weights)?;
+                    Ok(match &self.watch {
+                        Some(watch) if watch.naive => criterion.watched(Sight::Predicted(&watch.visibility)),
+                        Some(watch) => criterion.watched(Sight::Chance(&watch.visibility, limits)),
+                        None => criterion,
+                    })
+                };
+                let criteria = outlooks.iter().map(criterion).collect::<Result<Vec<_>, SelectionError>>()?;
+                self.search_box(&criteria, limits, rng)
+            }
             Actions::Pool(pool) => {
+                let criterion = ACriterion::new(belief, &self.weights)?;
                 let candidates: Vec<&[f64]> = pool.iter().map(|movement| movement.configuration.as_slice()).collect();
                 let values = criterion.evaluate(&candidates);
                 let (movement, value) =
@@ -164,6 +251,7 @@ impl Policy for Active {
             }
         }
     }
+
     fn observe(&mut self, movement: &Movement, actions: &Actions, observation: &Observation) {
         let Some(watch) = &mut self.watch else { return };
         watch.has_moved = true;

@@ -15,7 +15,7 @@ pub(crate) use random::draw_configuration;
 
 use rand_chacha::ChaCha8Rng;
 
-pub use active::{Active, Leaf, Partition};
+pub use active::{Active, Leaf, Partition, Search};
 pub use criterion::{ACriterion, CriterionUnits, Sight, Weights};
 pub use random::Random;
 pub use visibility::{Visibility, Watch};

@@ -116,7 +116,7 @@ impl Check<'_> {
         }
         let robot = self.robot(&raw.robot)?;
         let world = self.world(raw, &robot, open);
-        let learners = self.learners(&raw.learners);
+        let learners = self.learners(&raw.learners, raw.robot.learn_marker);
         Some(Scenario {
             name: name.clone(),
             title: raw.title.clone(),
@@ -191,7 +191,7 @@ impl Check<'_> {
         SelectionSpec { search, units }
     }
 
-    fn learners(&mut self, raw: &Spanned<Vec<raw::Learner>>) -> Vec<LearnerSpec> {
+    fn learners(&mut self, raw: &Spanned<Vec<raw::Learner>>, learns_marker: bool) -> Vec<LearnerSpec> {
         let mut learners: Vec<LearnerSpec> = Vec::new();
         for (index, learner) in raw.get_ref().iter().enumerate() {
             let (name, policy) = (learner.name.get_ref(), *learner.policy.get_ref());
@@ -206,6 +206,11 @@ impl Check<'_> {
                 let what = format!("`{}` keeps no covariance to choose by", learner.estimator.name());
                 let mend = "write `policy = \"random\"`, or another estimator";
                 self.problem(learner.policy.span(), format!("{key}.policy"), what, mend);
+            }
+            if learner.estimator == EstimatorKind::RlsSixNumbers && learns_marker {
+                let mend = "write `estimator = \"rls\"`, or set `learn_marker = false`";
+                let what = "six numbers per joint leave no place for a learned marker";
+                self.problem(learner.name.span(), format!("{key}.estimator"), what, mend);
             }
             if let (Some(key_span), EstimatorKind::Gradient) = (&learner.stabilising_noise, learner.estimator) {
                 let mend = "remove it; only `rls` adds this noise";
