@@ -104,14 +104,14 @@ mod tests {
         let variances = Vector3::from(ellipsoid.half_sizes).map(|half| (half / SIGMAS).powi(2));
         let again = axes * Matrix3::from_diagonal(&variances) * axes.transpose();
         assert!((again - Matrix3::from_fn(|i, j| covariance[i][j])).amax() < 1e-12);
-        assert!((ellipsoid.half_sizes[0] - 0.4).abs() < 1e-12);
+        assert!((ellipsoid.half_sizes[0] - SIGMAS * 0.2).abs() < 1e-12);
     }
 
     #[test]
     fn rank_two_is_a_disc() {
         let ellipsoid = Axes::default().ellipsoid(&turned([0.04, 0.01, 0.0], 2.0), 0.5).unwrap();
-        let [a, b, c] = ellipsoid.half_sizes;
-        assert!((a - 0.2).abs() < 1e-9 && (b - 0.1).abs() < 1e-9 && (c - 0.004).abs() < 1e-9);
+        let [a, b, c] = ellipsoid.half_sizes.map(|half| half / SIGMAS);
+        assert!((a - 0.1).abs() < 1e-9 && (b - 0.05).abs() < 1e-9 && (c - 0.002).abs() < 1e-9);
     }
 
     #[test]
