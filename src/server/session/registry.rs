@@ -214,7 +214,7 @@ mod tests {
         // The engine's thread lets go of the session a moment after its end.
         let room = async {
             while second.make_steps(1, None).await.is_err() {
-                tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+                tokio::time::sleep(Duration::from_millis(10)).await;
             }
         };
         timeout(END_WITHIN, room).await.expect("room again");
