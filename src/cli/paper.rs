@@ -70,11 +70,11 @@ pub fn paper(arguments: &Arguments) -> Result<()> {
     if arguments.json.as_deref().is_some_and(output::is_stdout) {
         return Ok(());
     }
-    let rows = report.rows.iter().map(|row| {
+    for row in &report.rows {
         let verdict = row.agrees.map_or("–", Agreement::name);
-        [format!("{}, {}", row.figure, row.what), row.paper.clone(), row.ours_text.clone(), verdict.to_owned()]
-    });
-    output::say(output::table(["what", "the paper said", "we measured", "agrees"], rows))?;
+        output::say(format!("{verdict:7} {}: {}", row.figure, row.what))?;
+        output::say(format!("        paper: {}\n        ours:  {}", row.paper, row.ours_text))?;
+    }
     for name in ["paper.md", "paper.json"] {
         output::say(format!("wrote {}", plan.out.join(name).display()))?;
     }

@@ -18,6 +18,8 @@ pub struct Axis {
     pub scale: Scale,
     /// Its ends.
     pub range: [f64; 2],
+    /// Where a logarithmic axis shows zero, which it has no place for, if anywhere.
+    pub zero: Option<f64>,
 }
 
 impl Axis {
@@ -31,19 +33,25 @@ impl Axis {
         let lower = steps(low).into_iter().rfind(|step| *step <= low).unwrap_or(low);
         let upper = steps(high).into_iter().find(|step| *step >= high).unwrap_or(high);
         let upper = if upper > lower { upper } else { lower * 10.0 };
-        Self { label: label.to_owned(), scale: Scale::Log, range: [lower, upper] }
+        Self { label: label.to_owned(), scale: Scale::Log, range: [lower, upper], zero: None }
     }
 
     /// An even axis over all `values` with a little room at both ends.
     pub fn linear(label: &str, values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extent(values).unwrap_or((0.0, 1.0));
         let room = if high > low { 0.04 * (high - low) } else { 0.5 };
-        Self { label: label.to_owned(), scale: Scale::Linear, range: [low - room, high + room] }
+        Self { label: label.to_owned(), scale: Scale::Linear, range: [low - room, high + room], zero: None }
     }
 
     /// The same axis with these ends.
     pub fn over(mut self, lower: f64, upper: f64) -> Self {
         self.range = [lower, upper];
+        self
+    }
+
+    /// The same axis, a logarithmic one, with zero shown in the place of a small value.
+    pub fn with_zero_at(mut self, value: f64) -> Self {
+        self.zero = Some(value);
         self
     }
 
@@ -60,6 +68,8 @@ impl Axis {
     /// The values to mark, and the names of those to name.
     pub fn ticks(&self) -> Vec<(f64, Option<String>)> {
         let [lower, upper] = self.range;
+        let is_zero = |value: f64| self.zero.is_some_and(|zero| (value / zero - 1.0).abs() < 1e-9);
+        let names = |value: f64| if is_zero(value) { "0".to_owned() } else { self.name(value) };
         let inside = |value: &f64| *value >= lower * (1.0 - 1e-9) - 1e-300 && *value <= upper * (1.0 + 1e-9);
         match self.scale {
             Scale::Log => {
@@ -72,8 +82,9 @@ impl Axis {
                     .filter(|(_, value)| inside(value))
                     .map(|(digit, value)| {
                         let named = digit == 1 || (narrow && matches!(digit, 2 | 5));
-                        (value, named.then(|| name(value)))
+                        (value, named.then(|| names(value)))
                     })
+                    .filter(|(value, _)| self.zero.is_none_or(|zero| *value > 9.0 * zero || is_zero(*value)))
                     .collect()
             }
             Scale::Linear => {
@@ -85,12 +96,27 @@ impl Axis {
                         let value = tick as f64 * step;
                         // Away with the last digits of 3 · 0.1.
                         let value = format!("{value:.9}").parse().unwrap_or(value);
-                        (value, Some(name(value)))
+                        (value, Some(names(value)))
                     })
                     .collect()
             }
         }
     }
+
+    /// Powers of ten as such on an axis that goes far, plain numbers on others.
+    fn name(&self, value: f64) -> String {
+        let [lower, upper] = self.range;
+        if self.scale == Scale::Log && (lower < 1e-3 || upper > 1e5) {
+            return format!("10{}", superscript(&format!("{:.0}", value.log10())));
+        }
+        format!("{value}")
+    }
+}
+
+fn superscript(number: &str) -> String {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let raised = |digit: char| digit.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
+    number.chars().map(raised).collect()
 }
 
 fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
@@ -103,13 +129,6 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 fn nice_step(rough: f64) -> f64 {
     let decade = 10_f64.powf(rough.log10().floor());
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|step| step * decade).find(|step| *step >= rough).unwrap_or(10.0 * decade)
-}
-
-fn name(value: f64) -> String {
-    match value.abs() {
-        size if size != 0.0 && !(1e-4..1e6).contains(&size) => format!("{value:e}"),
-        _ => format!("{value}"),
-    }
 }
 
 #[cfg(test)]
@@ -125,6 +144,13 @@ mod tests {
         assert_eq!(named, ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5"]);
         assert!(Axis::log("", [3.0].into_iter()).range[1] > 3.0);
         assert_eq!(Axis::log("", [].into_iter()).range, [1.0, 10.0]);
+    }
+
+    #[test]
+    fn a_log_axis_that_goes_far_names_powers_and_can_show_zero() {
+        let axis = Axis::log("ε", [1e-8, 1e-6, 1e-1].into_iter()).with_zero_at(1e-8);
+        let named: Vec<String> = axis.ticks().into_iter().filter_map(|(_, name)| name).collect();
+        assert_eq!(named, ["0", "10⁻⁷", "10⁻⁶", "10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹"]);
     }
 
     #[test]

@@ -39,6 +39,9 @@ pub enum Marker {
     Dot,
 }
 
+/// The dashes of what is no line, but points only.
+const NO_LINE: &str = "none";
+
 const DASHES: [&str; 4] = ["", "7 3", "2 2.5", "9 3 2 3"];
 const MARKERS: [Marker; 4] = [Marker::Circle, Marker::Square, Marker::Triangle, Marker::Diamond];
 
@@ -46,6 +49,15 @@ impl Style {
     /// The style of the curve at this place among others.
     pub fn at(index: usize, colour: Colour) -> Self {
         Self { colour, dashes: DASHES[index % DASHES.len()], marker: Some(MARKERS[index % MARKERS.len()]) }
+    }
+
+    /// The style of points that are not joined.
+    pub fn points(marker: Marker, colour: Colour) -> Self {
+        Self { colour, dashes: NO_LINE, marker: Some(marker) }
+    }
+
+    pub(super) fn is_line(&self) -> bool {
+        self.dashes != NO_LINE
     }
 
     pub(super) fn stroke(&self) -> Stroke {

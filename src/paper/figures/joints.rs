@@ -7,7 +7,6 @@ use crate::{
         chart::{Axis, Chart, Layer, Panel, Style},
         outcome::JointCurve,
     },
-    recording::learner_color,
 };
 
 /// More joints than this cannot be told apart in one panel.
@@ -66,8 +65,8 @@ fn row(
         let last = movements.last().copied().unwrap_or(2.0).max(2.0);
         let mut layers = vec![Layer::Level { y: threshold, label: String::new() }];
         layers.extend(joints.iter().enumerate().map(|(index, joint)| {
-            let points = movements.iter().zip(medians(joint)).filter(|(x, _)| **x > 0.0).map(|(x, y)| [*x, y]);
-            Layer::Curve { points: points.collect(), style: joint_style(index, joints.len()) }
+            let points = smoothed(movements.iter().zip(medians(joint)).map(|(x, y)| [*x, y]));
+            Layer::Curve { points, style: joint_style(index, joints.len()) }
         }));
         Panel {
             title: learner.name.clone(),
@@ -79,11 +78,29 @@ fn row(
     Some(panels.collect())
 }
 
-/// Joints from the base, dark, to the hand, bright: colours of learners would mean something else here.
+/// Joints from the base, dark, to the hand, bright, so that they can be told apart in grey; colours of learners would
+/// mean something else here.
 fn joint_style(index: usize, joints: usize) -> Style {
-    let place = if joints > 1 { index as f64 / (joints - 1) as f64 } else { 0.0 };
-    const DARK: [f64; 3] = [0x1B as f64, 0x1B as f64, 0x3A as f64];
-    let hand = learner_color(1).map(f64::from);
-    let colour = std::array::from_fn(|channel| (DARK[channel] + place * (hand[channel] - DARK[channel])).round() as u8);
+    const STOPS: [[f64; 3]; 3] = [[20.0, 20.0, 60.0], [175.0, 45.0, 95.0], [240.0, 165.0, 20.0]];
+    let place = if joints > 1 { 2.0 * index as f64 / (joints - 1) as f64 } else { 0.0 };
+    let lower = (place as usize).min(1);
+    let [from, to] = [STOPS[lower], STOPS[lower + 1]];
+    let colour = std::array::from_fn(|channel| {
+        (from[channel] + (place - lower as f64) * (to[channel] - from[channel])).round() as u8
+    });
     Style::at(index, colour)
+}
+
+/// Points in bins of a ninth of the way each, at the geometric means of their places and values: many noisy curves in one
+/// panel hide one another otherwise.
+fn smoothed(points: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+    let mut bins: Vec<(f64, Vec<[f64; 2]>)> = Vec::new();
+    for [x, y] in points.filter(|[x, y]| *x > 0.0 && *y > 0.0) {
+        match bins.last_mut() {
+            Some((first, bin)) if x <= *first * 1.12 => bin.push([x.ln(), y.ln()]),
+            _ => bins.push((x, vec![[x.ln(), y.ln()]])),
+        }
+    }
+    let mean = |bin: &[[f64; 2]], side: usize| (bin.iter().map(|p| p[side]).sum::<f64>() / bin.len() as f64).exp();
+    bins.iter().map(|(_, bin)| [mean(bin, 0), mean(bin, 1)]).collect()
 }

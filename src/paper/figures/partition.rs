@@ -21,12 +21,17 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
     let chart = Chart {
         title: source.title(),
         subtitle: source.provenance(),
-        legend: vec![("convex hull".into(), hull)],
+        legend: vec![
+            ("rectangles".into(), Style::points(Marker::Dot, RECTANGLES)),
+            ("lower right convex hull".into(), hull),
+            ("potentially optimal; left: the choice".into(), Style::points(Marker::Diamond, learner_color(1))),
+        ],
         rows,
         notes: vec![
-            format!("The A-criterion of a real selection, {evaluations} evaluations. Left: the slice of the joint box"),
-            "through the choice (◆); brighter is better. Right: every rectangle of the box; ◆ potentially optimal."
-                .into(),
+            format!(
+                "The A-criterion C(θ) of a real selection, {evaluations} evaluations. Left: the slice of the joint box through the choice;"
+            ),
+            "the lighter, the lower C; thick outlines: potentially optimal. Right: every rectangle of the box.".into(),
         ],
     };
     let caption = format!(

@@ -27,10 +27,10 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
     let style = Style::at(index, learner_color(index));
     let learners: Vec<_> =
         trials.iter().filter_map(|trial| Some((place(trial.value?), trial.comparison.learners.first()?))).collect();
-    let label = if zero { format!("{key} (leftmost: 0)") } else { key.to_owned() };
-    let x = Axis::log(&label, learners.iter().map(|(x, _)| *x));
+    let x = Axis::log(key, learners.iter().map(|(x, _)| *x));
     let [lower, upper] = x.range;
     let x = x.over(lower / 1.6, upper * 1.6);
+    let x = if zero { x.with_zero_at(least / 10.0) } else { x };
     let runs = learners.first()?.1.summary.runs as f64;
     let converged = learners.iter().map(|(x, learner)| [*x, learner.summary.converged as f64]).collect();
     let medians: Vec<[f64; 2]> =
@@ -49,13 +49,18 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
     let movements = Panel {
         title: "(a) movements until it converges".into(),
         x: x.clone(),
-        y: Axis { label: "movements".into(), scale: Scale::Linear, range: [0.0, top(&late).max(top(&medians)) * 1.1] },
+        y: Axis {
+            label: "movements".into(),
+            scale: Scale::Linear,
+            range: [0.0, top(&late).max(top(&medians)) * 1.1],
+            zero: None,
+        },
         layers: vec![Layer::Curve { points: late, style: late_style }, Layer::Curve { points: medians, style }],
     };
     let counts = Panel {
         title: format!("(b) runs of {runs} that converge"),
         x: x.clone(),
-        y: Axis { label: "runs".into(), scale: Scale::Linear, range: [0.0, runs * 1.05] },
+        y: Axis { label: "runs".into(), scale: Scale::Linear, range: [0.0, runs * 1.05], zero: None },
         layers: vec![Layer::Curve { points: converged, style }],
     };
     let ends = locations.iter().flat_map(|point| point[1..].to_vec()).chain([threshold]);
