@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Experiment, StepReport, metrics::Metrics};
+use super::{
+    Experiment, StepReport,
+    metrics::{JointMetrics, Metrics},
+};
 
 /// Many runs of the same learners, one per seed: `compare --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,6 +43,8 @@ pub struct SeedRun {
     pub seed: u64,
     /// First movement of the final stretch within the thresholds, confirmed by 20 more; null if there is none.
     pub converged_at: Option<u64>,
+    /// The same after a change of the body, counted from it; null if there is none or no change.
+    pub recovered_at: Option<u64>,
     /// Movements made.
     pub movements: u64,
     /// Movements after which the marker was not seen.
@@ -110,6 +115,8 @@ pub struct Curve {
     pub prediction_m: Option<Quantiles>,
     /// See [`Metrics::prediction_mean_m`].
     pub prediction_mean_m: Option<Quantiles>,
+    /// Every joint by itself, base first: medians over the runs.
+    pub joints: Vec<JointMetrics>,
 }
 
 /// One error over the runs.
@@ -147,9 +154,11 @@ pub struct Trace {
 struct LearnerTrace {
     name: String,
     converged_at: Option<u64>,
+    recovered_at: Option<u64>,
     movements: u64,
     misses: u64,
     errors: Vec<RunSummary>,
+    joints: Vec<Vec<JointMetrics>>,
     selection_ms: Vec<f64>,
 }
 
@@ -176,9 +185,11 @@ impl Trace {
             .map(|learner| LearnerTrace {
                 name: learner.name.clone(),
                 converged_at: None,
+                recovered_at: None,
                 movements: 0,
                 misses: 0,
                 errors: Vec::with_capacity(steps as usize + 1),
+                joints: Vec::with_capacity(steps as usize + 1),
                 selection_ms: Vec::with_capacity(steps as usize),
             })
             .collect();
@@ -186,6 +197,7 @@ impl Trace {
             observe(report);
             for (trace, learner) in learners.iter_mut().zip(&report.learners) {
                 trace.errors.push(RunSummary::from(&learner.metrics));
+                trace.joints.push(learner.metrics.joints.clone());
                 trace.selection_ms.extend(learner.movement.as_ref().map(|movement| movement.selection_ms));
                 (trace.movements, trace.misses) = (learner.metrics.movements, learner.metrics.misses);
             }
@@ -196,6 +208,7 @@ impl Trace {
         }
         for (trace, verdict) in learners.iter_mut().zip(&experiment.verdicts) {
             trace.converged_at = verdict.convergence.converged_at();
+            trace.recovered_at = verdict.recovery.converged_at();
         }
         Ok(Self { seed: experiment.description().seed, learners })
     }
@@ -217,11 +230,26 @@ impl LearnerComparison {
             .map(|(seed, trace)| SeedRun {
                 seed,
                 converged_at: trace.converged_at,
+                recovered_at: trace.recovered_at,
                 movements: trace.movements,
                 misses: trace.misses,
                 last: trace.errors.last().copied().unwrap_or_default(),
             })
             .collect();
+        let joints = of_learner().filter_map(|(_, trace)| trace.joints.first()).map(Vec::len).min().unwrap_or(0);
+        let of_joint = |movements: usize, joint: usize| {
+            let metrics = || of_learner().filter_map(|(_, trace)| trace.joints.get(movements)?.get(joint));
+            let over_runs = |metric: fn(&JointMetrics) -> Option<f64>| {
+                let mut values: Vec<f64> = metrics().filter_map(metric).collect();
+                values.sort_by(f64::total_cmp);
+                median(&values)
+            };
+            JointMetrics {
+                axis_deg: over_runs(|joint| joint.axis_deg),
+                location_m: over_runs(|joint| joint.location_m),
+                signal_to_noise: over_runs(|joint| joint.signal_to_noise),
+            }
+        };
         let curve = (0..=steps)
             .map(|movements| {
                 let over_runs = |error: fn(&RunSummary) -> Option<f64>| {
@@ -235,6 +263,7 @@ impl LearnerComparison {
                     location_m: over_runs(|errors| errors.location_m),
                     prediction_m: over_runs(|errors| errors.prediction_m),
                     prediction_mean_m: over_runs(|errors| errors.prediction_mean_m),
+                    joints: (0..joints).map(|joint| of_joint(movements as usize, joint)).collect(),
                 }
             })
             .collect();

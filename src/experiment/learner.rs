@@ -5,7 +5,8 @@ use web_time::Instant;
 
 use super::{
     metrics::{self, Evaluation, Metrics},
-    report::{LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
+    report::{GazeReport, LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
+    world::World,
 };
 use crate::{
     estimation::{Estimator, Update},
@@ -70,10 +71,12 @@ impl Learner {
         &mut self,
         (selection, selection_ms): (Selection, f64),
         observation: &Observation,
-        truth: Option<&Chain>,
+        world: &World,
     ) -> (MovementReport, Update) {
+        let truth = world.truth();
         let configuration = selection.movement.configuration.clone();
         let predicted = self.estimator.belief().chain.marker_at(&configuration);
+        self.policy.observe(&selection.movement, &self.actions, observation);
         self.actions.use_up(&selection.movement);
         self.record.movements += 1;
         self.record.misses += u64::from(*observation == Observation::Missed);
@@ -86,6 +89,7 @@ impl Learner {
             measured_marker_m: observation.position().map(|position| array(&position.coords)),
             estimated_skeleton_m: arrays(&shown(&self.estimator.belief().chain, truth).skeleton(&configuration)),
             true_skeleton_m: truth.map(|truth| arrays(&truth.skeleton(&configuration))),
+            gaze: gaze(world, &configuration),
             row: selection.movement.row,
             configuration,
             criterion: selection.criterion,
@@ -130,6 +134,7 @@ impl Learner {
             movements: self.record.movements,
             misses: self.record.misses,
             settled: self.record.steps_below_target >= SETTLING_STEPS,
+            joints: evaluation.joints(estimate, truth, layout),
         };
         LearnerReport {
             name: self.description.name.clone(),
@@ -139,4 +144,10 @@ impl Learner {
             failure: self.record.failure.clone(),
         }
     }
+}
+
+/// Where the head that watches looks after the movement: at the true marker, as far as it can turn.
+fn gaze(world: &World, configuration: &[f64]) -> Option<GazeReport> {
+    let (head, truth) = (world.head()?, world.truth()?);
+    Some(GazeReport::of(head, &head.gaze_at(&truth.marker_at(configuration))))
 }

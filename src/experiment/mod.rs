@@ -18,14 +18,14 @@ pub use comparison::{
 };
 pub use convergence::{CONFIRMATION, Convergence, Thresholds};
 pub use learner::{Learner, Record};
-pub use metrics::{Evaluation, Metrics, axis_deg, location_m, nees, orientation_deg};
+pub use metrics::{Evaluation, JointMetrics, Metrics, axis_deg, location_m, nees, orientation_deg};
 pub use report::{
-    Description, JointDescription, JointReport, LearnerDescription, LearnerReport, ModelReport, MovementReport,
-    StepReport,
+    Description, GazeReport, HeadDescription, JointDescription, JointReport, LearnerDescription, LearnerReport,
+    ModelReport, MovementReport, StepReport,
 };
 pub use result::{JointModel, LearnerResult, MarkerModel, Model, RunResult};
 pub use streams::Stream;
-pub use world::{NoiseSequence, World};
+pub use world::{Change, NoiseSequence, World};
 
 use crate::{estimation::Update, selection::SelectionError};
 
@@ -42,7 +42,10 @@ pub struct Experiment {
 
 /// What is known of one learner's run so far.
 struct Verdict {
+    /// Up to the change of the body, if there is one.
     convergence: Convergence,
+    /// From the change on.
+    recovery: Convergence,
     settled_at: Option<u64>,
 }
 
@@ -64,10 +67,13 @@ impl Experiment {
     pub fn new(description: Description, world: World, learners: Vec<Learner>, evaluation: Evaluation) -> Self {
         let verdicts = learners
             .iter()
-            .map(|_| Verdict { convergence: Convergence::new(description.thresholds), settled_at: None })
+            .map(|_| {
+                let unjudged = Convergence::new(description.thresholds);
+                Verdict { convergence: unjudged.clone(), recovery: unjudged, settled_at: None }
+            })
             .collect();
         let noise = NoiseSequence::new(description.seed);
-        let latest = StepReport { step: 0, learners: Vec::new() };
+        let latest = StepReport { step: 0, learners: Vec::new(), truth: None };
         let mut experiment = Self { description, world, noise, learners, evaluation, verdicts, latest };
         let truth = experiment.world.truth();
         let reports = experiment
@@ -75,7 +81,7 @@ impl Experiment {
             .iter_mut()
             .map(|learner| learner.report(None, Update::default(), &experiment.evaluation, truth))
             .collect();
-        experiment.conclude(StepReport { step: 0, learners: reports });
+        experiment.conclude(StepReport { step: 0, learners: reports, truth: None });
         experiment
     }
 
@@ -112,7 +118,11 @@ impl Experiment {
             })
             .collect::<Result<Vec<_>, _>>()?;
         let noise = self.noise.draw();
+        let has_changed = self.world.advance(self.latest.step);
         let truth = self.world.truth();
+        if let (Some(truth), true) = (truth, has_changed) {
+            self.evaluation.follow(truth);
+        }
         let reports = self
             .learners
             .iter_mut()
@@ -121,7 +131,7 @@ impl Experiment {
                 let (movement, update) = match choice {
                     Some(choice) => {
                         let observation = self.world.observe(&choice.0.movement, &noise);
-                        let (movement, update) = learner.learn(choice, &observation, truth);
+                        let (movement, update) = learner.learn(choice, &observation, &self.world);
                         (Some(movement), update)
                     }
                     None => (None, Update::default()),
@@ -129,14 +139,21 @@ impl Experiment {
                 learner.report(movement, update, &self.evaluation, truth)
             })
             .collect();
-        self.conclude(StepReport { step: self.latest.step + 1, learners: reports });
+        let truth = truth.filter(|_| has_changed).map(ModelReport::of_chain);
+        self.conclude(StepReport { step: self.latest.step + 1, learners: reports, truth });
         Ok(&self.latest)
     }
 
     fn conclude(&mut self, report: StepReport) {
         for (verdict, learner) in self.verdicts.iter_mut().zip(&report.learners) {
             let metrics = &learner.metrics;
-            verdict.convergence.observe(report.step, metrics.orientation_deg, metrics.location_m);
+            let since_change = self.description.change_at.and_then(|change| report.step.checked_sub(change));
+            match since_change {
+                Some(movements @ 1..) => {
+                    verdict.recovery.observe(movements, metrics.orientation_deg, metrics.location_m);
+                }
+                _ => verdict.convergence.observe(report.step, metrics.orientation_deg, metrics.location_m),
+            }
             if metrics.settled && verdict.settled_at.is_none() {
                 verdict.settled_at = Some(metrics.movements);
             }

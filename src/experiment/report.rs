@@ -11,6 +11,7 @@ use crate::{
     estimation::Belief,
     kinematics::{Chain, JointKind},
     selection::Partition,
+    sensing::{Gaze, Head},
 };
 
 /// What stays the same from step to step.
@@ -37,6 +38,68 @@ pub struct Description {
     pub movements_available: Option<usize>,
     /// The true arm at θ = 0; null where no truth is known.
     pub truth: Option<ModelReport>,
+    /// The number of movements after which the body changes; null if it does not. `truth` is the one before.
+    pub change_at: Option<u64>,
+    /// The head that watches; null if the marker is always seen.
+    pub head: Option<HeadDescription>,
+}
+
+/// A camera head with pan and tilt.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct HeadDescription {
+    /// Where it is, metres.
+    pub position_m: [f64; 3],
+    /// Unit look direction at rest.
+    pub look: [f64; 3],
+    /// Unit direction that is upright for the head at rest.
+    pub up: [f64; 3],
+    /// Limit of pan to either side, radians.
+    pub pan_limit_rad: f64,
+    /// Limit of tilt up and down, radians.
+    pub tilt_limit_rad: f64,
+    /// Half-angle of the cone that an eye sees, radians.
+    pub lens_half_angle_rad: f64,
+    /// Distance between two eyes, metres; null for one eye.
+    pub eye_baseline_m: Option<f64>,
+}
+
+/// Where a head looks, after it has followed the marker.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct GazeReport {
+    /// Pan, positive to the left, radians.
+    pub pan_rad: f64,
+    /// Tilt, positive upwards, radians.
+    pub tilt_rad: f64,
+    /// Unit look direction.
+    pub direction: [f64; 3],
+    /// The eyes, metres: one, or the left one and the right one.
+    pub eyes_m: Vec<[f64; 3]>,
+}
+
+impl HeadDescription {
+    /// Of a head.
+    pub fn of(head: &Head) -> Self {
+        Self {
+            position_m: array(&head.position.coords),
+            look: array(&head.look),
+            up: array(&head.axes().0),
+            pan_limit_rad: head.pan_limit,
+            tilt_limit_rad: head.tilt_limit,
+            lens_half_angle_rad: head.lens_half_angle,
+            eye_baseline_m: head.baseline,
+        }
+    }
+}
+
+impl GazeReport {
+    /// Of a head and where it looks.
+    pub fn of(head: &Head, gaze: &Gaze) -> Self {
+        let eyes: Vec<_> = head.eyes(gaze).collect();
+        let direction = array(&gaze.direction);
+        Self { pan_rad: gaze.pan, tilt_rad: gaze.tilt, direction, eyes_m: arrays(&eyes) }
+    }
 }
 
 /// A joint as the scenario describes it.
@@ -61,7 +124,7 @@ pub struct LearnerDescription {
     pub name: String,
     /// Its estimator: `rls` or `gradient`.
     pub estimator: String,
-    /// Its policy: `active` or `random`.
+    /// Its policy: `active`, `active-naive` or `random`.
     pub policy: String,
 }
 
@@ -73,6 +136,8 @@ pub struct StepReport {
     pub step: u64,
     /// The learners, in the order of the description.
     pub learners: Vec<LearnerReport>,
+    /// The true arm at θ = 0, at the one step at which it is another than before; null at all others.
+    pub truth: Option<ModelReport>,
 }
 
 /// One learner after one step.
@@ -99,6 +164,8 @@ pub struct MovementReport {
     pub configuration: Vec<f64>,
     /// The row of the recorded data set; null in a simulated world.
     pub row: Option<usize>,
+    /// Where the head that watches looks then; null without a head.
+    pub gaze: Option<GazeReport>,
     /// The marker as predicted before the measurement, metres.
     pub predicted_marker_m: [f64; 3],
     /// The measured marker, metres; null for a miss.

@@ -38,6 +38,12 @@ pub struct LearnerResult {
     pub policy: String,
     /// First movement of the final stretch within the thresholds, confirmed by 20 more; null if there is none.
     pub converged_at: Option<u64>,
+    /// After a change of the body: the first movement, counted from the change, of the final stretch within the
+    /// thresholds, confirmed by 20 more; null if there is none or no change. `converged_at` is judged up to the change.
+    pub recovered_at: Option<u64>,
+    /// The movement, counted from the change, at which the learner itself noticed it; null for a learner that does not
+    /// look for changes.
+    pub change_detected_at: Option<u64>,
     /// First movement at which the learner called itself settled; null if it did not.
     pub settled_at: Option<u64>,
     /// Why the learner stopped learning, if it did.
@@ -141,6 +147,8 @@ impl Experiment {
                 estimator: learner.description.estimator.clone(),
                 policy: learner.description.policy.clone(),
                 converged_at: verdict.convergence.converged_at(),
+                recovered_at: verdict.recovery.converged_at(),
+                change_detected_at: None,
                 settled_at: verdict.settled_at,
                 failure: report.failure.clone(),
                 metrics: report.metrics.clone(),

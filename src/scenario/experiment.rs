@@ -11,9 +11,11 @@ use super::{
 };
 use crate::{
     estimation::{Belief, Estimator, Gradient, Rls},
-    experiment::{Description, Evaluation, Experiment, Learner, ModelReport, Record, Stream, World},
+    experiment::{
+        Change, Description, Evaluation, Experiment, HeadDescription, Learner, ModelReport, Record, Stream, World,
+    },
     kinematics::{Chain, Joint, registration::register},
-    selection::{Actions, Active, Movement, Policy, Random, Weights, draw_configuration},
+    selection::{Actions, Active, Movement, Policy, Random, Watch, Weights, draw_configuration},
     sensing::MarkerTracker,
 };
 
@@ -27,6 +29,7 @@ struct Briefing {
     initial: Chain,
     actions: Actions,
     workspace: Vec<Vec<f64>>,
+    watch: Option<Watch>,
 }
 
 impl Scenario {
@@ -60,24 +63,30 @@ impl Scenario {
 
     fn draw(&self, seed: u64) -> Result<(World, Evaluation, Briefing), ScenarioError> {
         match &self.world {
-            WorldSpec::Simulated { sigma_m, initial_error } => {
+            WorldSpec::Simulated { sigma_m, initial_error, watch, change } => {
                 let truth = self.robot.chain.clone();
                 let limits = &self.robot.limits;
-                let draw = |stream: Stream, count: usize| -> Vec<Vec<f64>> {
-                    let mut rng = stream.rng(seed);
-                    (0..count).map(|_| draw_configuration(limits, &mut rng)).collect()
-                };
-                let targets = draw(Stream::Evaluation, EVALUATION_SIZE)
-                    .into_iter()
-                    .map(|theta| (theta.clone(), truth.marker_at(&theta)))
-                    .collect();
                 let briefing = Briefing {
                     initial: self.perturbed(initial_error, &mut Stream::InitialEstimate.rng(seed)),
                     actions: Actions::Box(limits.clone()),
-                    workspace: draw(Stream::Workspace, WORKSPACE_SIZE),
+                    // Uniform in the joint box, seen or not: what a head can see depends on the truth.
+                    workspace: drawn(limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true),
+                    watch: watch.clone(),
                 };
-                let world = World::Simulated { truth, tracker: MarkerTracker { sigma_m: *sigma_m } };
-                Ok((world, Evaluation { targets }, briefing))
+                let head = watch.as_ref().map(|watch| watch.head);
+                let seen = |theta: &[f64]| head.is_none_or(|head| head.sees(&truth.marker_at(theta)));
+                let mut configurations = drawn(limits, EVALUATION_SIZE, Stream::Evaluation, seed, seen);
+                if configurations.is_empty() {
+                    configurations.extend(watch.as_ref().map(|watch| watch.visible_pose.clone()));
+                }
+                let evaluation = Evaluation::of_truth(configurations, &truth, *sigma_m);
+                let world = World::Simulated {
+                    truth,
+                    tracker: MarkerTracker { sigma_m: *sigma_m },
+                    head,
+                    change: change.as_ref().map(|change| Change { step: change.step, truth: change.truth.clone() }),
+                };
+                Ok((world, evaluation, briefing))
             }
             WorldSpec::Measured { recording, held_out } => self.draw_measured(seed, recording, *held_out),
         }
@@ -107,8 +116,9 @@ impl Scenario {
             initial: registration.chain,
             actions: Actions::Pool(training.iter().map(movement).collect()),
             workspace: data.into_iter().map(|(theta, _)| theta).collect(),
+            watch: None,
         };
-        let evaluation = Evaluation { targets: test.iter().map(pair).collect() };
+        let evaluation = Evaluation::of_measurements(test.iter().map(pair).collect());
         Ok((World::Measured { markers_m: recording.markers_m.clone() }, evaluation, briefing))
     }
 
@@ -159,13 +169,16 @@ impl Scenario {
                 let estimator: Box<dyn Estimator> = match spec.estimator {
                     EstimatorKind::Rls => {
                         let prior = DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd));
-                        Box::new(Rls::new(belief, prior, self.filter.stabilising))
+                        Box::new(Rls::new(belief, prior, self.filter.stabilising.filter(|_| spec.stabilising)))
                     }
                     EstimatorKind::Gradient => Box::new(Gradient::new(belief, self.gradient_rate)),
                 };
-                let policy: Box<dyn Policy> = match spec.policy {
-                    PolicyKind::Active => Box::new(Active::new(weights.clone(), self.selection.search)),
-                    PolicyKind::Random => Box::new(Random),
+                let active = Active::new(weights.clone(), self.selection.search);
+                let policy: Box<dyn Policy> = match (spec.policy, briefing.watch.clone()) {
+                    (PolicyKind::Active, Some(watch)) => Box::new(active.watched(watch)),
+                    (PolicyKind::ActiveNaive, Some(watch)) => Box::new(active.watched_naively(watch)),
+                    (PolicyKind::Active | PolicyKind::ActiveNaive, None) => Box::new(active),
+                    (PolicyKind::Random, _) => Box::new(Random),
                 };
                 Learner {
                     description: spec.description(),
@@ -191,9 +204,27 @@ impl Scenario {
             thresholds: self.thresholds,
             movements_available: briefing.actions.remaining(),
             truth: world.truth().map(ModelReport::of_chain),
+            change_at: world.change().map(|change| change.step),
+            head: briefing.watch.as_ref().map(|watch| HeadDescription::of(&watch.head)),
         };
         Ok(Experiment::new(description, world, learners, evaluation))
     }
+}
+
+/// Draws before giving up on finding more configurations that are wanted.
+const PATIENCE: usize = 100_000;
+
+/// Up to `count` configurations, uniform among those in the box that are `wanted`.
+fn drawn(
+    limits: &[(f64, f64)],
+    count: usize,
+    stream: Stream,
+    seed: u64,
+    wanted: impl Fn(&[f64]) -> bool,
+) -> Vec<Vec<f64>> {
+    let mut rng = stream.rng(seed);
+    let draws = std::iter::repeat_with(|| draw_configuration(limits, &mut rng)).take(PATIENCE);
+    draws.filter(|theta| wanted(theta)).take(count).collect()
 }
 
 impl InitialError {
@@ -223,9 +254,7 @@ mod tests {
                         &InitialError { draw: ErrorDraw::Exactly, angle_rad: 0.7, point_m: 0.3, marker_m: 0.1 },
                         &mut Stream::InitialEstimate.rng(99),
                     );
-                    for (theta, target) in &mut evaluation.targets {
-                        *target = truth.marker_at(theta);
-                    }
+                    evaluation.follow(truth);
                 }
                 let specs = scenario.chosen(None).expect("learners");
                 let mut experiment =

@@ -28,7 +28,7 @@ use crate::{
     experiment::{LearnerDescription, Thresholds},
     kinematics::{Chain, Quantity, TangentLayout},
     optimize::Settings,
-    selection::CriterionUnits,
+    selection::{CriterionUnits, Watch},
 };
 
 /// A validated scenario.
@@ -98,6 +98,10 @@ pub enum WorldSpec {
         sigma_m: f64,
         /// How wrong the initial estimate is.
         initial_error: InitialError,
+        /// The head that watches, if the marker is not always seen.
+        watch: Option<Watch>,
+        /// How the body changes during a run, if it does.
+        change: Option<ChangeSpec>,
     },
     /// A recorded data set is replayed; the initial estimate is the nominal chain, registered to the training rows.
     Measured {
@@ -106,6 +110,15 @@ pub enum WorldSpec {
         /// How many rows, drawn by seed, are held out for the prediction error.
         held_out: usize,
     },
+}
+
+/// A change of the body.
+#[derive(Clone, Debug)]
+pub struct ChangeSpec {
+    /// The number of movements after which it happens.
+    pub step: u64,
+    /// The true chain from then on.
+    pub truth: Chain,
 }
 
 /// How the error of the initial estimate is drawn.
@@ -184,6 +197,8 @@ pub struct LearnerSpec {
     pub estimator: EstimatorKind,
     /// Its policy.
     pub policy: PolicyKind,
+    /// Whether its filter adds the scenario's stabilising noise.
+    pub stabilising: bool,
 }
 
 impl LearnerSpec {
@@ -222,10 +237,12 @@ impl EstimatorKind {
 
 /// The policies that a scenario can name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum PolicyKind {
-    /// Minimises the A-criterion.
+    /// Minimises the A-criterion; where a head watches, weighed by the chance of being seen.
     Active,
+    /// The same, but where a head watches with blind faith in the predicted marker: a comparison.
+    ActiveNaive,
     /// Draws uniformly.
     Random,
 }
@@ -235,6 +252,7 @@ impl PolicyKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Active => "active",
+            Self::ActiveNaive => "active-naive",
             Self::Random => "random",
         }
     }

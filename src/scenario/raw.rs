@@ -18,6 +18,8 @@ pub struct Scenario {
     pub sensor: Option<Spanned<Sensor>>,
     pub initial_error: Option<Spanned<InitialError>>,
     pub measurements: Option<Spanned<Measurements>>,
+    pub head: Option<Spanned<Head>>,
+    pub change: Option<Spanned<Change>>,
     pub prior: Spanned<Prior>,
     pub filter: Filter,
     pub gradient: Gradient,
@@ -78,6 +80,41 @@ pub struct Measurements {
     pub file: Spanned<String>,
     pub marker_columns_m: Spanned<[String; 3]>,
     pub held_out: Spanned<usize>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Head {
+    pub position_m: Spanned<[f64; 3]>,
+    pub look: Spanned<[f64; 3]>,
+    pub pan_limit_deg: Option<Spanned<f64>>,
+    pub tilt_limit_deg: Option<Spanned<f64>>,
+    pub lens_half_angle_deg: Option<Spanned<f64>>,
+    pub eye_baseline_m: Option<Spanned<f64>>,
+    pub visible_pose_deg: Spanned<Vec<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    pub step: Spanned<u64>,
+    pub tilt: Option<Tilt>,
+    pub shift: Option<Shift>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tilt {
+    pub joint: Spanned<String>,
+    pub angle_deg: Spanned<f64>,
+    pub towards: Spanned<[f64; 3]>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shift {
+    pub joint: Spanned<String>,
+    pub by_m: Spanned<[f64; 3]>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -152,6 +189,7 @@ pub struct Learner {
     pub name: Spanned<String>,
     pub estimator: EstimatorKind,
     pub policy: Spanned<PolicyKind>,
+    pub stabilising_noise: Option<Spanned<bool>>,
 }
 
 /// Reads the keys of `text`.

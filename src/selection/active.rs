@@ -3,18 +3,33 @@
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{ACriterion, Actions, Movement, Policy, Selection, SelectionError, Weights};
+use super::{
+    ACriterion, Actions, Movement, Policy, Selection, SelectionError, Sight, Visibility, Watch, Weights, criterion::scaled,
+};
 use crate::{
     estimation::Belief,
     optimize::{Direct, Settings},
+    sensing::Observation,
 };
 
 /// Minimises the A-criterion: over a box of joint limits by DIRECT, normalised to the unit cube; over a pool of
 /// recorded movements by trying every one.
+///
+/// Where a head watches ([`watched`](Self::watched)), the first movement goes to the pose that is known to be visible,
+/// the gain is weighed by the chance of being seen, and misses are remembered.
 #[derive(Clone, Debug)]
 pub struct Active {
     weights: Weights,
     search: Settings,
+    watch: Option<Watched>,
+}
+
+#[derive(Clone, Debug)]
+struct Watched {
+    visible_pose: Vec<f64>,
+    visibility: Visibility,
+    naive: bool,
+    has_moved: bool,
 }
 
 /// The rectangles into which DIRECT had divided the joint box when its budget ended.
@@ -58,7 +73,22 @@ impl Leaf {
 impl Active {
     /// Selection by the A-criterion with `weights`; `search` says how DIRECT goes about it.
     pub fn new(weights: Weights, search: Settings) -> Self {
-        Self { weights, search }
+        Self { weights, search, watch: None }
+    }
+
+    /// The same where a head watches.
+    pub fn watched(self, watch: Watch) -> Self {
+        let Watch { head, visible_pose } = watch;
+        let visibility = Visibility::new(head);
+        Self { watch: Some(Watched { visible_pose, visibility, naive: false, has_moved: false }), ..self }
+    }
+
+    /// The naive form, for comparison: the plain criterion wherever the *predicted* marker is in view. It believes its
+    /// own prediction, and a miss teaches it nothing.
+    pub fn watched_naively(self, watch: Watch) -> Self {
+        let mut active = self.watched(watch);
+        active.watch.iter_mut().for_each(|watch| watch.naive = true);
+        active
     }
 
     fn search_box(&self, criterion: &ACriterion<'_>, limits: &[(f64, f64)]) -> Result<Selection, SelectionError> {
@@ -70,7 +100,13 @@ impl Active {
             let candidates: Vec<Vec<f64>> = batch.iter().map(scale).collect();
             direct.tell(&criterion.evaluate(&candidates)).map_err(SelectionError::Search)?;
         }
-        let (centre, value) = direct.best().ok_or(SelectionError::NoFiniteCriterion)?;
+        let Some((centre, value)) = direct.best() else {
+            return match &self.watch {
+                // Nothing in view was found: back to where the marker is known to be seen.
+                Some(watch) if criterion.trace().is_finite() => Ok(Selection::plain(watch.visible_pose.clone())),
+                _ => Err(SelectionError::NoFiniteCriterion),
+            };
+        };
         let leaves: Vec<Leaf> = direct
             .partition()
             .iter()
@@ -102,7 +138,14 @@ impl Policy for Active {
     ) -> Result<Selection, SelectionError> {
         let criterion = ACriterion::new(belief, &self.weights)?;
         match actions {
-            Actions::Box(limits) => self.search_box(&criterion, limits),
+            Actions::Box(limits) => match &self.watch {
+                Some(watch) if !watch.has_moved => Ok(Selection::plain(watch.visible_pose.clone())),
+                Some(watch) if watch.naive => {
+                    self.search_box(&criterion.watched(Sight::Predicted(&watch.visibility)), limits)
+                }
+                Some(watch) => self.search_box(&criterion.watched(Sight::Chance(&watch.visibility, limits)), limits),
+                None => self.search_box(&criterion, limits),
+            },
             Actions::Pool(pool) => {
                 let candidates: Vec<&[f64]> = pool.iter().map(|movement| movement.configuration.as_slice()).collect();
                 let values = criterion.evaluate(&candidates);
@@ -119,6 +162,13 @@ impl Policy for Active {
                     partition: None,
                 })
             }
+        }
+    }
+    fn observe(&mut self, movement: &Movement, actions: &Actions, observation: &Observation) {
+        let Some(watch) = &mut self.watch else { return };
+        watch.has_moved = true;
+        if let (Actions::Box(limits), Observation::Missed) = (actions, observation) {
+            watch.visibility.missed(scaled(&movement.configuration, limits));
         }
     }
 }

@@ -9,11 +9,14 @@
 //! W weighs the parameters (see [`Weights`]). The right side needs no posterior: for B candidates the Jacobians stack
 //! into one m × 3B matrix, and one product with P serves them all.
 //!
+//! Where a head watches, the gain is weighed by the chance p(θ) that the marker is seen (see [`Visibility`]):
+//! `C = tr(W P) − p(θ) tr(S⁻¹ G W Gᵀ)`, which is the expectation over both outcomes, as a miss leaves P as it is.
+//!
 //! The criterion adds square metres and square radians. W decides what a radian is worth.
 
-use nalgebra::{DMatrix, DVector, Dyn, Matrix3, U3};
+use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Point3, U3};
 
-use super::SelectionError;
+use super::{SelectionError, Visibility};
 use crate::{
     estimation::Belief,
     kinematics::{Quantity, TangentLayout, jacobian},
@@ -51,12 +54,23 @@ impl Weights {
     }
 }
 
+/// How a head that watches enters the criterion.
+#[derive(Clone, Copy, Debug)]
+pub enum Sight<'a> {
+    /// The gain times the chance of being seen; not finite where that is certainly 0. The second field holds the
+    /// limits of the joint box.
+    Chance(&'a Visibility, &'a [(f64, f64)]),
+    /// The naive form, for comparison: the plain criterion, not finite unless the *predicted* marker is in view.
+    Predicted(&'a Visibility),
+}
+
 /// The A-criterion under one belief.
 pub struct ACriterion<'a> {
     belief: &'a Belief,
     covariance: &'a DMatrix<f64>,
     weights: &'a Weights,
     trace: f64,
+    sight: Option<Sight<'a>>,
 }
 
 /// Candidates per batch product: enough to fill the matrix kernel, few enough to share among cores.
@@ -66,7 +80,12 @@ impl<'a> ACriterion<'a> {
     /// The criterion at `belief`, which must hold a covariance.
     pub fn new(belief: &'a Belief, weights: &'a Weights) -> Result<Self, SelectionError> {
         let covariance = belief.covariance.as_ref().ok_or(SelectionError::NoCovariance)?;
-        Ok(Self { belief, covariance, weights, trace: weights.trace(covariance) })
+        Ok(Self { belief, covariance, weights, trace: weights.trace(covariance), sight: None })
+    }
+
+    /// The same where a head watches.
+    pub fn watched(self, sight: Sight<'a>) -> Self {
+        Self { sight: Some(sight), ..self }
     }
 
     /// tr(W P), the criterion before any further observation.
@@ -88,27 +107,49 @@ impl<'a> ACriterion<'a> {
     fn evaluate_chunk<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {
         let m = self.belief.layout.dimension();
         let mut stacked = DMatrix::zeros(m, 3 * candidates.len());
-        for (index, candidate) in candidates.iter().enumerate() {
-            let columns = stacked.generic_view_mut((0, 3 * index), (Dyn(m), U3));
-            jacobian::jacobian_transposed_into(&self.belief.chain, &self.belief.layout, candidate.as_ref(), columns);
-        }
+        let markers: Vec<Point3<f64>> = (candidates.iter().enumerate())
+            .map(|(index, candidate)| {
+                let columns = stacked.generic_view_mut((0, 3 * index), (Dyn(m), U3));
+                let (chain, layout) = (&self.belief.chain, &self.belief.layout);
+                jacobian::jacobian_transposed_into(chain, layout, candidate.as_ref(), columns)
+            })
+            .collect();
         let gains = self.covariance * &stacked;
         let noise = isotropic(self.belief.noise_m2);
         (0..candidates.len())
             .map(|index| {
                 let h_t = stacked.fixed_columns::<3>(3 * index);
                 let g_t = gains.fixed_columns::<3>(3 * index);
-                let (mut s, mut g_w_g) = (noise, Matrix3::zeros());
+                let (mut spread, mut g_w_g) = (Matrix3::zeros(), Matrix3::zeros());
                 for k in 0..m {
                     let (h, g) = (h_t.row(k), g_t.row(k));
-                    s += h.transpose() * g;
+                    spread += h.transpose() * g;
                     g_w_g += g.transpose() * g * self.weights.0[k];
                 }
-                let s = (s + s.transpose()) * 0.5;
-                s.cholesky().map_or(f64::INFINITY, |cholesky| self.trace - cholesky.solve(&g_w_g).trace())
+                let spread = (spread + spread.transpose()) * 0.5;
+                let chance = self.chance(candidates[index].as_ref(), &markers[index], &spread);
+                if chance == 0.0 {
+                    return f64::INFINITY;
+                }
+                let gain = |s: nalgebra::Cholesky<f64, U3>| s.solve(&g_w_g).trace();
+                (spread + noise).cholesky().map_or(f64::INFINITY, |s| self.trace - chance * gain(s))
             })
             .collect()
     }
+
+    /// p(θ), given the distribution of the predicted marker; 1 where no head watches.
+    fn chance(&self, candidate: &[f64], marker: &Point3<f64>, spread: &Matrix3<f64>) -> f64 {
+        match self.sight {
+            None => 1.0,
+            Some(Sight::Predicted(visibility)) => f64::from(visibility.head().sees(marker)),
+            Some(Sight::Chance(visibility, limits)) => visibility.chance(&scaled(candidate, limits), marker, spread),
+        }
+    }
+}
+
+/// A configuration as its place in the joint box, scaled to the unit cube.
+pub(super) fn scaled(configuration: &[f64], limits: &[(f64, f64)]) -> Vec<f64> {
+    configuration.iter().zip(limits).map(|(q, (lower, upper))| (q - lower) / (upper - lower)).collect()
 }
 
 #[cfg(test)]

@@ -3,21 +3,24 @@
 //! * [`ACriterion`]: the expected posterior error of (7), in the form that never builds a posterior.
 //! * [`Policy`]: chooses among [`Actions`], the whole joint box or a list of recorded movements.
 //! * [`Active`]: minimises the criterion, by DIRECT over a box or by trying all of a list.
+//! * [`Visibility`]: where a head watches, the chance that the marker is seen, which weighs the gain.
 //! * [`Random`]: draws uniformly, the paper's comparison.
 
 mod active;
 mod criterion;
 mod random;
+mod visibility;
 
 pub(crate) use random::draw_configuration;
 
 use rand_chacha::ChaCha8Rng;
 
 pub use active::{Active, Leaf, Partition};
-pub use criterion::{ACriterion, CriterionUnits, Weights};
+pub use criterion::{ACriterion, CriterionUnits, Sight, Weights};
 pub use random::Random;
+pub use visibility::{Visibility, Watch};
 
-use crate::{estimation::Belief, optimize::DirectError};
+use crate::{estimation::Belief, optimize::DirectError, sensing::Observation};
 
 /// The movements that may be chosen now.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +72,14 @@ pub struct Selection {
     pub partition: Option<Partition>,
 }
 
+impl Selection {
+    /// A configuration chosen without a criterion.
+    pub(crate) fn plain(configuration: Vec<f64>) -> Self {
+        let movement = Movement { configuration, row: None };
+        Self { movement, criterion: None, gain: None, evaluations: 0, partition: None }
+    }
+}
+
 /// Why no movement could be chosen.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SelectionError {
@@ -91,4 +102,8 @@ pub trait Policy: Send {
     /// Chooses among `actions` under `belief`; `rng` is the policy's own stream.
     fn select(&mut self, belief: &Belief, actions: &Actions, rng: &mut ChaCha8Rng)
     -> Result<Selection, SelectionError>;
+
+    /// Learns what came of a movement that it chose among `actions`. An estimator learns nothing from a miss; a policy
+    /// may.
+    fn observe(&mut self, _movement: &Movement, _actions: &Actions, _observation: &Observation) {}
 }

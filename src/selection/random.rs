@@ -7,6 +7,8 @@ use super::{Actions, Movement, Policy, Selection, SelectionError};
 use crate::estimation::Belief;
 
 /// Draws uniformly inside the limits, or from what is left of a pool (which shuffles it).
+///
+/// Where a head watches, it is told as much as every learner, and ignores it: the paper's random movements.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Random;
 

@@ -1,4 +1,11 @@
 //! What is measured after a movement, and with what noise.
+//!
+//! * [`MarkerTracker`]: the position of the marker in space.
+//! * [`Head`]: a camera head that follows the marker; where it cannot, the movement is a miss.
+
+mod head;
+
+pub use head::{Gaze, Head};
 
 use nalgebra::{Matrix3, Point3, Vector3};
 

@@ -5,7 +5,7 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
-use crate::experiment::{JointReport, LearnerReport, MovementReport, StepReport};
+use crate::experiment::{JointMetrics, JointReport, LearnerReport, MovementReport, StepReport};
 
 /// The memory that all sessions share for their reports and recordings.
 #[derive(Debug)]
@@ -42,7 +42,8 @@ pub(super) fn of(report: &StepReport) -> usize {
                 + size_of_val(&movement.estimated_skeleton_m[..])
                 + movement.true_skeleton_m.as_ref().map_or(0, |skeleton| size_of_val(&skeleton[..]))
         });
-        size_of::<LearnerReport>() + learner.estimate.joints.len() * size_of::<JointReport>() + movement
+        let joints = learner.estimate.joints.len() * (size_of::<JointReport>() + size_of::<JointMetrics>());
+        size_of::<LearnerReport>() + joints + movement
     };
     size_of::<StepReport>() + report.learners.iter().map(learner).sum::<usize>()
 }

@@ -1,0 +1,78 @@
+//! The head that watches.
+
+use toml::Spanned;
+
+use super::{Check, raw};
+use crate::{kinematics::JointKind, scenario::Robot, selection::Watch, sensing::Head};
+
+/// The limits of pan and tilt unless told otherwise, degrees.
+const SERVO_DEG: f64 = 15.0;
+/// The half-angle of the lens unless told otherwise, degrees.
+const LENS_DEG: f64 = 20.0;
+
+impl Check<'_> {
+    pub(super) fn head(&mut self, spanned: &Spanned<raw::Head>, robot: &Robot) -> Option<Watch> {
+        let raw = spanned.get_ref();
+        let position = self.point("head.position_m", &raw.position_m);
+        let mut angle = |key: &str, value: &Option<Spanned<f64>>, default: f64, lowest: f64| {
+            let mend = format!("an angle from {lowest} up to 89 degrees");
+            let given = value.as_ref().map(|angle| {
+                self.number(&format!("head.{key}"), angle, |angle| (lowest..=89.0).contains(&angle), &mend)
+            });
+            given.unwrap_or(default).to_radians()
+        };
+        let pan_limit = angle("pan_limit_deg", &raw.pan_limit_deg, SERVO_DEG, 0.0);
+        let tilt_limit = angle("tilt_limit_deg", &raw.tilt_limit_deg, SERVO_DEG, 0.0);
+        let lens_half_angle = angle("lens_half_angle_deg", &raw.lens_half_angle_deg, LENS_DEG, 1.0);
+        let baseline = raw.eye_baseline_m.as_ref().map(|length| self.positive("head.eye_baseline_m", length));
+        let look = self.unit("head.look", &raw.look)?;
+        if look.z.abs() > 0.999 {
+            let mend = "look aside a little: z tells the head what upright is";
+            self.problem(raw.look.span(), "head.look", "it is along z", mend);
+            return None;
+        }
+        let head = Head { position, look, pan_limit, tilt_limit, lens_half_angle, baseline };
+        let visible_pose = self.visible_pose(&raw.visible_pose_deg, robot)?;
+        let marker = robot.chain.marker_at(&visible_pose);
+        if !head.sees(&marker) {
+            let beyond = -head.clearance(&marker).to_degrees();
+            let what = format!("the marker is not in view there: it is {beyond:.1} degrees outside");
+            let mend = format!(
+                "name a pose in view, or look towards this one with `look = [{:.6}, {:.6}, {:.6}]`",
+                (marker - position).normalize().x,
+                (marker - position).normalize().y,
+                (marker - position).normalize().z
+            );
+            self.problem(raw.visible_pose_deg.span(), "head.visible_pose_deg", what, mend);
+            return None;
+        }
+        Some(Watch { head, visible_pose })
+    }
+
+    /// The positions of a pose (degrees or metres as the kind of each joint says), within the limits.
+    fn visible_pose(&mut self, raw: &Spanned<Vec<f64>>, robot: &Robot) -> Option<Vec<f64>> {
+        let key = "head.visible_pose_deg";
+        let (given, wanted) = (raw.get_ref(), robot.chain.joints.len());
+        if given.len() != wanted {
+            let what = format!("it has {} positions, the robot {wanted} joints", given.len());
+            self.problem(raw.span(), key, what, "write one position per joint, base first");
+            return None;
+        }
+        let mut pose = Vec::new();
+        for ((&value, name), (joint, &(lower, upper))) in
+            given.iter().zip(&robot.names).zip(robot.chain.joints.iter().zip(&robot.limits))
+        {
+            let revolute = joint.kind() == JointKind::Revolute;
+            let position = if revolute { value.to_radians() } else { value };
+            // A NaN is not within; a pose on a limit may miss it by a rounding error.
+            if !(position >= lower - 1e-9 && position <= upper + 1e-9) {
+                let shown = |limit: f64| if revolute { limit.to_degrees() } else { limit };
+                let mend = format!("write a number from {:.4} to {:.4} for this joint", shown(lower), shown(upper));
+                self.problem(raw.span(), key, format!("{value} is outside the limits of `{name}`"), mend);
+                return None;
+            }
+            pose.push(position.clamp(lower, upper));
+        }
+        Some(pose)
+    }
+}

@@ -1,0 +1,251 @@
+//! From the keys of a file to values that can be relied on.
+
+mod body;
+mod change;
+mod head;
+mod world;
+
+use std::{collections::BTreeMap, ops::Range};
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use toml::Spanned;
+
+use super::{
+    EstimatorKind, Filter, LearnerSpec, PolicyKind, Prior, Scenario, SelectionSpec,
+    error::{Problem, ScenarioError, similar},
+    raw,
+};
+use crate::{
+    estimation::StabilisingNoise,
+    experiment::Thresholds,
+    optimize::{Settings, Variant},
+    selection::CriterionUnits,
+};
+
+/// How far from 1 the length of an axis may be: what is lost by writing six digits.
+const UNIT_TOLERANCE: f64 = 1e-5;
+
+impl Scenario {
+    /// Reads a scenario from `text`. `file` is how errors name it; `open` returns the text of a data file that the
+    /// scenario names, or says why it cannot.
+    pub fn parse(file: &str, text: &str, open: &dyn Fn(&str) -> Result<String, String>) -> Result<Self, ScenarioError> {
+        let invalid = |problems| ScenarioError::Invalid { file: file.to_owned(), problems };
+        let raw = raw::read(text).map_err(|problem| invalid(vec![problem]))?;
+        let mut check = Check { text, data: None, problems: Vec::new() };
+        let scenario = check.scenario(&raw, open);
+        match scenario {
+            Some(scenario) if check.problems.is_empty() => Ok(scenario),
+            _ => Err(invalid(check.problems)),
+        }
+    }
+}
+
+/// Collects problems while it converts. A value that cannot be converted is `None` and has left a problem behind.
+struct Check<'a> {
+    text: &'a str,
+    data: Option<(String, String)>,
+    problems: Vec<Problem>,
+}
+
+impl Check<'_> {
+    fn problem(
+        &mut self,
+        span: Range<usize>,
+        key: impl Into<String>,
+        what: impl Into<String>,
+        mend: impl Into<String>,
+    ) {
+        let line = raw::line_of(self.text, span.start);
+        self.problems.push(Problem { line, key: key.into(), what: what.into(), mend: mend.into() });
+    }
+
+    /// A number that satisfies `holds`; NaN satisfies nothing.
+    fn number(&mut self, key: &str, value: &Spanned<f64>, holds: impl Fn(f64) -> bool, mend: &str) -> f64 {
+        let number = *value.get_ref();
+        if !number.is_finite() || !holds(number) {
+            self.problem(value.span(), key, format!("{number} is out of range"), format!("write {mend}"));
+        }
+        number
+    }
+
+    fn positive(&mut self, key: &str, value: &Spanned<f64>) -> f64 {
+        self.number(key, value, |number| number > 0.0, "a number above 0")
+    }
+
+    fn not_negative(&mut self, key: &str, value: &Spanned<f64>) -> f64 {
+        self.number(key, value, |number| number >= 0.0, "a number that is 0 or more")
+    }
+
+    fn at_least_one(&mut self, key: &str, value: &Spanned<u64>) -> u64 {
+        if *value.get_ref() == 0 {
+            self.problem(value.span(), key, "0 is out of range", "write a whole number of at least 1");
+        }
+        *value.get_ref()
+    }
+
+    fn point(&mut self, key: &str, value: &Spanned<[f64; 3]>) -> Point3<f64> {
+        if !value.get_ref().iter().all(|x| x.is_finite()) {
+            self.problem(value.span(), key, "a coordinate is not finite", "write three finite numbers, in metres");
+        }
+        Point3::from(*value.get_ref())
+    }
+
+    /// A direction; refused unless its length is 1.
+    fn unit(&mut self, key: &str, value: &Spanned<[f64; 3]>) -> Option<UnitVector3<f64>> {
+        let direction = Vector3::from(*value.get_ref());
+        let length = direction.norm();
+        // A NaN fails this comparison as well.
+        if (length - 1.0).abs() <= UNIT_TOLERANCE {
+            return Some(UnitVector3::new_normalize(direction));
+        }
+        let mend = if length.is_finite() && length > 0.0 {
+            let unit = direction / length;
+            format!("write the unit vector [{:.6}, {:.6}, {:.6}]", unit.x, unit.y, unit.z)
+        } else {
+            "write a unit vector, such as [0.0, 0.0, 1.0]".to_owned()
+        };
+        self.problem(value.span(), key, format!("its length is {length}, not 1"), mend);
+        None
+    }
+
+    fn scenario(&mut self, raw: &raw::Scenario, open: &dyn Fn(&str) -> Result<String, String>) -> Option<Scenario> {
+        let name = raw.name.get_ref();
+        if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
+            let mend = "use letters, digits, '-', '_' and '.'; the name becomes part of file names and addresses";
+            self.problem(raw.name.span(), "name", format!("{name:?} cannot be a name"), mend);
+        }
+        let robot = self.robot(&raw.robot)?;
+        let world = self.world(raw, &robot, open);
+        let learners = self.learners(&raw.learners);
+        Some(Scenario {
+            name: name.clone(),
+            title: raw.title.clone(),
+            steps: self.at_least_one("steps", &raw.steps),
+            prior: self.prior(raw),
+            filter: self.filter(&raw.filter),
+            gradient_rate: self.positive("gradient.rate", &raw.gradient.rate),
+            selection: self.selection(&raw.selection),
+            thresholds: Thresholds {
+                orientation_deg: self.positive("thresholds.orientation_deg", &raw.thresholds.orientation_deg),
+                location_m: self.positive("thresholds.location_m", &raw.thresholds.location_m),
+            },
+            settled_below_m: self.positive("settled.expected_prediction_m", &raw.settled.expected_prediction_m),
+            promises: self.promises(&raw.promises, &learners),
+            learners,
+            robot,
+            world: world?,
+            source: self.text.to_owned(),
+            data: self.data.take(),
+        })
+    }
+
+    fn prior(&mut self, raw: &raw::Scenario) -> Prior {
+        let prior = raw.prior.get_ref();
+        if raw.robot.learn_marker && prior.marker_m.is_none() {
+            let mend = "add `marker_m = …`, its standard deviation in metres";
+            self.problem(raw.prior.span(), "prior.marker_m", "the marker is learned", mend);
+        }
+        Prior {
+            direction_rad: self.positive("prior.direction_rad", &prior.direction_rad),
+            point_m: self.positive("prior.point_m", &prior.point_m),
+            marker_m: prior.marker_m.as_ref().map_or(1.0, |sd| self.positive("prior.marker_m", sd)),
+        }
+    }
+
+    fn filter(&mut self, raw: &raw::Filter) -> Filter {
+        let stabilising = raw.stabilising_noise.as_ref().map(|noise| StabilisingNoise {
+            variance: self.not_negative("filter.stabilising_noise.variance", &noise.variance),
+            first_step: self.at_least_one("filter.stabilising_noise.first_step", &noise.first_step),
+            every: self.at_least_one("filter.stabilising_noise.every", &noise.every),
+        });
+        let noise_m2 = self.positive("filter.measurement_variance_m2", &raw.measurement_variance_m2);
+        Filter { noise_m2, stabilising }
+    }
+
+    fn selection(&mut self, raw: &raw::Selection) -> SelectionSpec {
+        let units = match (raw.units, &raw.characteristic_length_m) {
+            (raw::Units::CharacteristicLength, None) => CriterionUnits::CharacteristicLength(1.0),
+            (raw::Units::CharacteristicLength, Some(length)) => {
+                CriterionUnits::CharacteristicLength(self.positive("selection.characteristic_length_m", length))
+            }
+            (raw::Units::Prior, None) => CriterionUnits::Prior,
+            (raw::Units::Prior, Some(length)) => {
+                let mend = "remove it, or set `units = \"characteristic_length\"`";
+                self.problem(length.span(), "selection.characteristic_length_m", "units are the prior's", mend);
+                CriterionUnits::Prior
+            }
+        };
+        let evaluations = &raw.evaluations;
+        if !(1..=100_000).contains(evaluations.get_ref()) {
+            let what = format!("{} is out of range", evaluations.get_ref());
+            self.problem(evaluations.span(), "selection.evaluations", what, "write a number from 1 to 100000");
+        }
+        let search = Settings {
+            variant: match raw.variant {
+                raw::DirectVariant::Direct => Variant::Original,
+                raw::DirectVariant::DirectL => Variant::LocallyBiased,
+            },
+            epsilon: self.not_negative("selection.epsilon", &raw.epsilon),
+            max_evaluations: *evaluations.get_ref(),
+        };
+        SelectionSpec { search, units }
+    }
+
+    fn learners(&mut self, raw: &Spanned<Vec<raw::Learner>>) -> Vec<LearnerSpec> {
+        let mut learners: Vec<LearnerSpec> = Vec::new();
+        for (index, learner) in raw.get_ref().iter().enumerate() {
+            let (name, policy) = (learner.name.get_ref(), *learner.policy.get_ref());
+            let key = format!("learner[{index}]");
+            if learners.iter().any(|other| other.name == *name) || RESERVED.contains(&name.as_str()) || !is_plain(name)
+            {
+                let what = format!("{name:?} is taken, reserved or not a plain word");
+                let mend = "give each learner a name of its own, of letters, digits, '-' and '_'";
+                self.problem(learner.name.span(), format!("{key}.name"), what, mend);
+            }
+            if policy != PolicyKind::Random && !learner.estimator.keeps_covariance() {
+                let what = format!("`{}` keeps no covariance to choose by", learner.estimator.name());
+                let mend = "write `policy = \"random\"`, or another estimator";
+                self.problem(learner.policy.span(), format!("{key}.policy"), what, mend);
+            }
+            if let (Some(key_span), EstimatorKind::Gradient) = (&learner.stabilising_noise, learner.estimator) {
+                let mend = "remove it; only `rls` adds this noise";
+                let what = "a gradient has no covariance to add noise to";
+                self.problem(key_span.span(), format!("{key}.stabilising_noise"), what, mend);
+            }
+            let stabilising = learner.stabilising_noise.as_ref().is_none_or(|given| *given.get_ref());
+            learners.push(LearnerSpec { name: name.clone(), estimator: learner.estimator, policy, stabilising });
+        }
+        if learners.is_empty() {
+            self.problem(raw.span(), "learner", "there is no learner", "add a [[learner]]");
+        }
+        learners
+    }
+
+    fn promises(
+        &mut self,
+        raw: &BTreeMap<Spanned<String>, Spanned<u64>>,
+        learners: &[LearnerSpec],
+    ) -> BTreeMap<String, u64> {
+        let mut promises = BTreeMap::new();
+        for (name, promise) in raw {
+            let names = || learners.iter().map(|learner| learner.name.as_str());
+            if !names().any(|known| known == name.get_ref()) {
+                let mend = match similar(name.get_ref(), names()) {
+                    Some(known) => format!("did you mean `{known}`?"),
+                    None => format!("name one of {}", names().collect::<Vec<_>>().join(", ")),
+                };
+                let key = format!("promises.{}", name.get_ref());
+                self.problem(name.span(), key, "there is no such learner", mend);
+            }
+            promises.insert(name.get_ref().clone(), *promise.get_ref());
+        }
+        promises
+    }
+}
+
+/// Names that recordings use for something else.
+const RESERVED: [&str; 1] = ["world"];
+
+fn is_plain(name: &str) -> bool {
+    !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c))
+}

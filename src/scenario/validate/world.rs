@@ -1,0 +1,109 @@
+//! The world of a scenario: simulated or measured.
+
+use toml::Spanned;
+
+use super::{Check, raw};
+use crate::scenario::{InitialError, Recording, Robot, WorldSpec};
+
+impl Check<'_> {
+    pub(super) fn world(&mut self, raw: &raw::Scenario, robot: &Robot, open: &dyn Fn(&str) -> Result<String, String>) -> Option<WorldSpec> {
+        match (&raw.sensor, &raw.initial_error, &raw.measurements) {
+            (Some(sensor), Some(error), None) => {
+                let marker_m = error.get_ref().marker_m.as_ref();
+                if raw.robot.learn_marker && marker_m.is_none() {
+                    let mend = "add `marker_m = …`, or set `learn_marker = false`";
+                    self.problem(error.span(), "initial_error.marker_m", "the marker is learned", mend);
+                }
+                let error = error.get_ref();
+                let angle = self.number(
+                    "initial_error.angle_deg",
+                    &error.angle_deg,
+                    |angle| (0.0..=180.0).contains(&angle),
+                    "an angle from 0 to 180 degrees",
+                );
+                let watch = raw.head.as_ref().map(|head| self.head(head, robot));
+                let change = raw.change.as_ref().map(|change| self.change(change.get_ref(), robot));
+                Some(WorldSpec::Simulated {
+                    sigma_m: self.not_negative("sensor.sigma_m", &sensor.get_ref().sigma_m),
+                    initial_error: InitialError {
+                        draw: error.draw,
+                        angle_rad: angle.to_radians(),
+                        point_m: self.not_negative("initial_error.point_m", &error.point_m),
+                        marker_m: marker_m.map_or(0.0, |size| self.not_negative("initial_error.marker_m", size)),
+                    },
+                    watch: watch.flatten(),
+                    change: change.flatten(),
+                })
+            }
+            (None, None, Some(measurements)) => {
+                let head = raw.head.as_ref().map(|head| ("head", head.span()));
+                let change = raw.change.as_ref().map(|change| ("change", change.span()));
+                for (key, span) in head.into_iter().chain(change) {
+                    let mend = "remove it; it belongs to a simulated world";
+                    self.problem(span, key, "recorded measurements cannot be watched or changed", mend);
+                }
+                self.measured(raw, measurements.get_ref(), open)
+            }
+            (sensor, error, measurements) => {
+                let span = [sensor.as_ref().map(Spanned::span), error.as_ref().map(Spanned::span)]
+                    .into_iter()
+                    .chain([measurements.as_ref().map(Spanned::span)])
+                    .flatten()
+                    .next();
+                let what = "a scenario is either simulated or measured";
+                let mend = "write [sensor] and [initial_error] for a simulated world, or [measurements] alone for a \
+                            measured one";
+                self.problem(span.unwrap_or(0..0), "sensor, initial_error, measurements", what, mend);
+                None
+            }
+        }
+    }
+
+    fn measured(
+        &mut self,
+        raw: &raw::Scenario,
+        measurements: &raw::Measurements,
+        open: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Option<WorldSpec> {
+        let mut columns = Vec::new();
+        for (index, joint) in raw.robot.joints.get_ref().iter().enumerate() {
+            match &joint.get_ref().column {
+                Some(column) => columns.push(column.get_ref().as_str()),
+                None => {
+                    let mend = "add `column = \"…\"`, the column of the data file with this joint's position";
+                    self.problem(joint.span(), format!("robot.joint[{index}].column"), "missing", mend);
+                }
+            }
+        }
+        let file = measurements.file.get_ref();
+        let text = match open(file) {
+            Ok(text) => text,
+            Err(error) => {
+                let mend = "name a file beside the scenario that can be read";
+                self.problem(measurements.file.span(), "measurements.file", format!("{file}: {error}"), mend);
+                return None;
+            }
+        };
+        if columns.len() < raw.robot.joints.get_ref().len() {
+            return None;
+        }
+        let recording = match Recording::from_csv(&text, &columns, measurements.marker_columns_m.get_ref()) {
+            Ok(recording) => recording,
+            Err(error) => {
+                let mend = "correct the data file or the names of its columns";
+                self.problem(measurements.file.span(), "measurements.file", format!("{file} {error}"), mend);
+                return None;
+            }
+        };
+        let (rows, held_out) = (recording.markers_m.len(), *measurements.held_out.get_ref());
+        // The rigid fit needs four rows at least.
+        if held_out == 0 || held_out + 4 > rows {
+            let what = format!("{held_out} of {rows} rows cannot be held out");
+            let mend = format!("write a number from 1 to {}", rows.saturating_sub(4));
+            self.problem(measurements.held_out.span(), "measurements.held_out", what, mend);
+            return None;
+        }
+        self.data = Some((file.clone(), text));
+        Some(WorldSpec::Measured { recording, held_out })
+    }
+}

@@ -1,0 +1,100 @@
+//! Whether the marker will be seen: the weight of a movement's gain when a head watches.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Matrix3, Point3};
+
+use crate::sensing::Head;
+
+/// What is known of the head that watches; every learner of a scenario is told the same.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Watch {
+    /// The head.
+    pub head: Head,
+    /// A configuration at which the marker is known to be seen, rad or m.
+    pub visible_pose: Vec<f64>,
+}
+
+/// How much a miss says about its neighbourhood, in units of the joint box (each joint's range is 1): at this distance
+/// a movement's chance is discounted by a factor of 1 − e^{−1/2}.
+const RADIUS: f64 = 0.15;
+/// Misses that are remembered, the latest ones.
+const MEMORY: usize = 50;
+
+/// The chance that the marker is seen after a movement, as believed before it:
+///
+/// ```text
+/// p(θ) = P(marker in view),  marker ~ N(h(θ), H P Hᵀ)     × Πₖ (1 − exp(−‖u(θ) − u(θₖ)‖² / 2ρ²))
+/// ```
+///
+/// The first factor is [`Head::chance`]. The second discounts what lies near the latest misses θₖ, with u the position
+/// in the joint box scaled to the unit cube and ρ = 0.15: a miss changes no estimate, so without it a learner that
+/// wrongly believes the marker in view would choose the same movement again and again.
+#[derive(Clone, Debug)]
+pub struct Visibility {
+    head: Head,
+    misses: VecDeque<Vec<f64>>,
+}
+
+impl Visibility {
+    /// Nothing missed yet.
+    pub fn new(head: Head) -> Self {
+        Self { head, misses: VecDeque::new() }
+    }
+
+    /// The head that watches.
+    pub fn head(&self) -> &Head {
+        &self.head
+    }
+
+    /// Remembers a miss at a configuration, scaled to the unit cube.
+    pub fn missed(&mut self, scaled: Vec<f64>) {
+        self.misses.push_back(scaled);
+        if self.misses.len() > MEMORY {
+            self.misses.pop_front();
+        }
+    }
+
+    /// The chance of seeing the marker, predicted as N(`marker`, `covariance`), at a configuration scaled to the unit
+    /// cube.
+    pub fn chance(&self, scaled: &[f64], marker: &Point3<f64>, covariance: &Matrix3<f64>) -> f64 {
+        let believed = self.head.chance(marker, covariance);
+        if believed == 0.0 {
+            return 0.0;
+        }
+        self.misses.iter().fold(believed, |chance, miss| {
+            let squared: f64 = scaled.iter().zip(miss).map(|(a, b)| (a - b).powi(2)).sum();
+            chance * -(-0.5 * squared / (RADIUS * RADIUS)).exp_m1()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitVector3, Vector3};
+
+    use super::*;
+
+    #[test]
+    fn a_miss_discounts_its_neighbourhood_and_is_forgotten_in_time() {
+        let head = Head {
+            position: Point3::origin(),
+            look: UnitVector3::new_normalize(Vector3::x()),
+            pan_limit: 0.3,
+            tilt_limit: 0.3,
+            lens_half_angle: 0.3,
+            baseline: None,
+        };
+        let mut visibility = Visibility::new(head);
+        let chance = |visibility: &Visibility, at: f64| {
+            visibility.chance(&[at, 0.5], &Point3::new(1.0, 0.0, 0.0), &Matrix3::zeros())
+        };
+        assert_eq!(chance(&visibility, 0.5), 1.0);
+        visibility.missed(vec![0.5, 0.5]);
+        assert_eq!(chance(&visibility, 0.5), 0.0);
+        assert!((chance(&visibility, 0.5 + RADIUS) - (1.0 - (-0.5_f64).exp())).abs() < 1e-12);
+        assert!(chance(&visibility, 1.0) > 0.99);
+        (0..MEMORY).for_each(|_| visibility.missed(vec![9.0, 9.0]));
+        assert!(chance(&visibility, 0.5) > 0.99);
+    }
+}
