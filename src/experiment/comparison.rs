@@ -164,20 +164,7 @@ struct LearnerTrace {
 
 impl Trace {
     /// Runs `experiment` for `steps` steps and calls `tick` after each.
-    pub fn run(experiment: Experiment, steps: u64, mut tick: impl FnMut()) -> Result<Self, super::ExperimentError> {
-        Self::observed(experiment, steps, |report| {
-            if report.step > 0 {
-                tick();
-            }
-        })
-    }
-
-    /// Runs `experiment` for `steps` steps and shows every report, that of the start included, to `observe`.
-    pub fn observed(
-        mut experiment: Experiment,
-        steps: u64,
-        mut observe: impl FnMut(&StepReport),
-    ) -> Result<Self, super::ExperimentError> {
+    pub fn run(mut experiment: Experiment, steps: u64, mut tick: impl FnMut()) -> Result<Self, super::ExperimentError> {
         let mut learners: Vec<LearnerTrace> = experiment
             .description()
             .learners
@@ -194,7 +181,6 @@ impl Trace {
             })
             .collect();
         let mut take = |report: &StepReport| {
-            observe(report);
             for (trace, learner) in learners.iter_mut().zip(&report.learners) {
                 trace.errors.push(RunSummary::from(&learner.metrics));
                 trace.joints.push(learner.metrics.joints.clone());
@@ -205,6 +191,7 @@ impl Trace {
         take(experiment.latest());
         for _ in 0..steps {
             take(experiment.step()?);
+            tick();
         }
         for (trace, verdict) in learners.iter_mut().zip(&experiment.verdicts) {
             trace.converged_at = verdict.convergence.converged_at();
@@ -296,8 +283,7 @@ impl Summary {
 }
 
 impl Quantiles {
-    /// The quantiles of `values`; `None` if there are none.
-    pub fn of(mut values: Vec<f64>) -> Option<Self> {
+    fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
         Some(Self {
             mean: values.iter().sum::<f64>() / values.len() as f64,

@@ -5,10 +5,10 @@ use rayon::prelude::*;
 use super::{
     PaperError, Plan,
     experiments::{Kind, PaperExperiment},
-    outcome::{JointCurve, Outcome, Search, Timing, Trial, is_kept},
+    outcome::{LearnedJoint, Outcome, Search, Timing, Trial, is_kept},
 };
 use crate::{
-    experiment::{Comparison, Experiment, Quantiles, StepReport, Trace},
+    experiment::{Comparison, Experiment, ExperimentError, Trace},
     optimize::{Direct, DirectError, Settings},
     scenario::{Scenario, edited},
 };
@@ -23,12 +23,6 @@ pub struct Measurement<'a> {
     pub plan: &'a Plan,
     /// Called after every movement of every seed.
     pub tick: &'a (dyn Fn() + Sync),
-}
-
-/// Errors of every learned joint of every learner, movement by movement; thinned.
-struct JointTrace {
-    /// By learner, kept movement, joint: degrees and metres.
-    errors: Vec<Vec<Vec<(f64, f64)>>>,
 }
 
 impl Measurement<'_> {
@@ -67,6 +61,10 @@ impl Measurement<'_> {
         PaperError::Impossible { experiment: self.experiment.id, reason: reason.into() }
     }
 
+    fn broke_off(&self, seed: u64, source: ExperimentError) -> PaperError {
+        PaperError::Run { experiment: self.experiment.id, seed, source }
+    }
+
     fn start(&self, scenario: &Scenario, seed: u64) -> Result<Experiment, PaperError> {
         let learners: Vec<String> = self.experiment.learners.iter().map(|name| (*name).to_owned()).collect();
         scenario
@@ -76,43 +74,22 @@ impl Measurement<'_> {
 
     fn trial(&self, scenario: &Scenario, value: Option<f64>) -> Result<Trial, PaperError> {
         let steps = self.experiment.kind.steps(self.plan.quick);
-        let runs = self
+        let traces = self
             .plan
             .seeds_of(self.experiment)
             .into_par_iter()
             .map(|seed| {
-                let experiment = self.start(scenario, seed)?;
-                let mut joints = JointTrace::new(&experiment);
-                let truth = experiment.description().truth.clone();
-                let trace = Trace::observed(experiment, steps, |report| {
-                    if let Some(truth) = truth.as_ref().filter(|_| is_kept(report.step, steps)) {
-                        joints.observe(report, truth);
-                    }
-                    if report.step > 0 {
-                        (self.tick)();
-                    }
-                })
-                .map_err(|source| PaperError::Run { experiment: self.experiment.id, seed, source })?;
-                Ok((trace, joints))
+                Trace::run(self.start(scenario, seed)?, steps, self.tick).map_err(|source| self.broke_off(seed, source))
             })
             .collect::<Result<Vec<_>, PaperError>>()?;
-        let (traces, joints): (Vec<_>, Vec<_>) = runs.into_iter().unzip();
         let mut comparison = Comparison::of(&scenario.name, steps, &traces);
         for learner in &mut comparison.learners {
             learner.curve.retain(|point| is_kept(point.movements, steps));
         }
-        let learned: Vec<(usize, &String)> = scenario
-            .robot
-            .names
-            .iter()
-            .enumerate()
+        let names = scenario.robot.names.iter().enumerate();
+        let joints = names
             .filter(|(index, _)| scenario.robot.layout.is_learned(*index))
-            .collect();
-        let joints = (0..comparison.learners.len())
-            .map(|learner| {
-                let curve = |(index, name): &(usize, &String)| JointTrace::curve(&joints, learner, *index, name);
-                learned.iter().map(curve).collect()
-            })
+            .map(|(index, name)| LearnedJoint { name: name.clone(), index })
             .collect();
         Ok(Trial { value, comparison, joints })
     }
@@ -122,8 +99,7 @@ impl Measurement<'_> {
         let mut experiment = self.start(self.scenario, seed)?;
         let mut choices = Vec::new();
         for _ in 0..steps {
-            let report =
-                experiment.step().map_err(|source| PaperError::Run { experiment: self.experiment.id, seed, source })?;
+            let report = experiment.step().map_err(|source| self.broke_off(seed, source))?;
             let movements = report.learners.iter().filter_map(|learner| learner.movement.as_ref());
             choices.extend(movements.map(|movement| (movement.selection_ms, movement.evaluations)));
             (self.tick)();
@@ -143,7 +119,7 @@ impl Measurement<'_> {
         let seed = *self.plan.seeds_of(self.experiment).start();
         let mut experiment = self.start(&scenario, seed)?;
         for _ in 0..step {
-            experiment.step().map_err(|source| PaperError::Run { experiment: self.experiment.id, seed, source })?;
+            experiment.step().map_err(|source| self.broke_off(seed, source))?;
         }
         let movement = experiment.latest().learners.first().and_then(|learner| learner.movement.as_ref());
         let partition = movement
@@ -177,38 +153,4 @@ fn replay(dimension: usize, settings: Settings, values: &[f64]) -> Result<Direct
         direct.tell(batch)?;
     }
     Ok(direct)
-}
-
-impl JointTrace {
-    fn new(experiment: &Experiment) -> Self {
-        Self { errors: vec![Vec::new(); experiment.description().learners.len()] }
-    }
-
-    fn observe(&mut self, report: &StepReport, truth: &crate::experiment::ModelReport) {
-        for (errors, learner) in self.errors.iter_mut().zip(&report.learners) {
-            let joints = learner.estimate.joints.iter().zip(&truth.joints).map(|(estimate, truth)| {
-                let cosine: f64 = estimate.axis.iter().zip(truth.axis).map(|(a, b)| a * b).sum();
-                // Points of estimates are reported where they are nearest to the true one.
-                let shift = match (estimate.point_m, truth.point_m) {
-                    (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt(),
-                    _ => 0.0,
-                };
-                (cosine.clamp(-1.0, 1.0).acos().to_degrees(), shift)
-            });
-            errors.push(joints.collect());
-        }
-    }
-
-    fn curve(runs: &[Self], learner: usize, joint: usize, name: &str) -> JointCurve {
-        let points = runs.iter().map(|run| run.errors[learner].len()).min().unwrap_or(0);
-        let over_runs = |pick: fn(&(f64, f64)) -> f64| -> Vec<Quantiles> {
-            let at = |point: usize| runs.iter().map(|run| pick(&run.errors[learner][point][joint])).collect();
-            (0..points).filter_map(|point| Quantiles::of(at(point))).collect()
-        };
-        JointCurve {
-            name: name.to_owned(),
-            axis_deg: over_runs(|error| error.0),
-            location_m: over_runs(|error| error.1),
-        }
-    }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    experiment::{Comparison, LearnerComparison, Quantiles},
+    experiment::{Comparison, LearnerComparison},
     optimize::HullPoint,
     selection::Partition,
 };
@@ -27,19 +27,17 @@ pub struct Trial {
     pub value: Option<f64>,
     /// The learners, their curves thinned.
     pub comparison: Comparison,
-    /// The learned joints of each learner, in the same order.
-    pub joints: Vec<Vec<JointCurve>>,
+    /// The joints that are learned.
+    pub joints: Vec<LearnedJoint>,
 }
 
-/// One joint of one learner over the runs.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct JointCurve {
-    /// Name of the joint.
+/// A joint that is learned.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LearnedJoint {
+    /// Its name.
     pub name: String,
-    /// Angle between estimated and true direction, degrees.
-    pub axis_deg: Vec<Quantiles>,
-    /// Distance of the true axis point from the estimated line, metres.
-    pub location_m: Vec<Quantiles>,
+    /// Its place in the chain, and in [`Curve::joints`](crate::experiment::Curve::joints).
+    pub index: usize,
 }
 
 /// How long it takes to choose one movement.
@@ -84,11 +82,9 @@ impl Outcome {
         self.trials().first()?.comparison.learners.iter().find(|learner| learner.name == name)
     }
 
-    /// The joints of a learner of the first comparison.
-    pub fn joints(&self, learner: &str) -> Option<&[JointCurve]> {
-        let trial = self.trials().first()?;
-        let index = trial.comparison.learners.iter().position(|found| found.name == learner)?;
-        trial.joints.get(index).map(Vec::as_slice)
+    /// The learned joints; none for outcomes other than comparisons.
+    pub fn joints(&self) -> &[LearnedJoint] {
+        self.trials().first().map_or(&[], |trial| &trial.joints)
     }
 }
 

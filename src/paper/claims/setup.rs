@@ -110,7 +110,7 @@ fn simulated(evidence: &Evidence<'_>, joints: usize) -> Option<Finding> {
     let WorldSpec::Simulated { sigma_m, initial_error, .. } = &scenario.world else { return None };
     let trial = evidence.outcome.trials().first()?;
     let runs = trial.comparison.learners.first()?.runs.len();
-    let learned = trial.joints.first()?.len();
+    let learned = trial.joints.len();
     let text = format!(
         "{learned} joints; each angle wrong by up to {:.0} deg and each coordinate by up to {} m; {} movements; σ = {} cm; \
          the filter assumes R = {} m²; {runs} runs",
@@ -142,7 +142,7 @@ fn real_robot(evidence: &Evidence<'_>, angle_deg: f64, point_m: f64) -> Option<F
     let scenario = evidence.scenario;
     let WorldSpec::Simulated { sigma_m, initial_error, .. } = &scenario.world else { return None };
     let trial = evidence.outcome.trials().first()?;
-    let (joints, learned) = (scenario.robot.names.len(), trial.joints.first()?.len());
+    let (joints, learned) = (scenario.robot.names.len(), trial.joints.len());
     let stabilising = scenario.filter.stabilising.map(|noise| noise.variance);
     // 90 % of a normal distribution lie within 1.645 σ.
     let bound_cm = 1.645 * sigma_m * 100.0;

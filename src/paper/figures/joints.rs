@@ -2,10 +2,10 @@
 
 use super::{Figure, Source};
 use crate::{
-    experiment::Quantiles,
+    experiment::{Curve, JointMetrics, LearnerComparison},
     paper::{
         chart::{Axis, Chart, Layer, Panel, Style},
-        outcome::JointCurve,
+        outcome::LearnedJoint,
     },
 };
 
@@ -15,12 +15,12 @@ const MOST: usize = 12;
 pub fn figure(source: Source<'_>) -> Option<Figure> {
     let trial = source.outcome.trials().first()?;
     let learners = &trial.comparison.learners;
-    let joints = trial.joints.first().filter(|joints| (1..=MOST).contains(&joints.len()))?;
+    let joints = Some(&trial.joints).filter(|joints| (1..=MOST).contains(&joints.len()))?;
     let thresholds = source.scenario.thresholds;
     let styles: Vec<Style> = (0..joints.len()).map(|index| joint_style(index, joints.len())).collect();
     let rows = [
-        row(&source, "direction error (deg)", |joint| &joint.axis_deg, 1.0, thresholds.orientation_deg)?,
-        row(&source, "location error (cm)", |joint| &joint.location_m, 100.0, thresholds.location_m * 100.0)?,
+        row(&source, "direction error (deg)", |joint| joint.axis_deg, 1.0, thresholds.orientation_deg)?,
+        row(&source, "location error (cm)", |joint| joint.location_m, 100.0, thresholds.location_m * 100.0)?,
     ];
     let id = if source.experiment.id == "head-fov" {
         "fig-7".to_owned()
@@ -52,21 +52,24 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
 fn row(
     source: &Source<'_>,
     label: &str,
-    error: fn(&JointCurve) -> &Vec<Quantiles>,
+    error: fn(&JointMetrics) -> Option<f64>,
     scale: f64,
     threshold: f64,
 ) -> Option<Vec<Panel>> {
     let trial = source.outcome.trials().first()?;
-    let medians = |joint: &JointCurve| -> Vec<f64> { error(joint).iter().map(|error| error.median * scale).collect() };
-    let all = trial.joints.iter().flatten().flat_map(medians).chain([threshold]);
-    let y = Axis::log(label, all);
-    let panels = trial.comparison.learners.iter().zip(&trial.joints).map(|(learner, joints)| {
-        let movements: Vec<f64> = learner.curve.iter().map(|point| point.movements as f64).collect();
-        let last = movements.last().copied().unwrap_or(2.0).max(2.0);
+    let points = |learner: &LearnerComparison, joint: &LearnedJoint| -> Vec<[f64; 2]> {
+        let at = |point: &Curve| Some([point.movements as f64, error(point.joints.get(joint.index)?)? * scale]);
+        smoothed(learner.curve.iter().filter_map(at))
+    };
+    let learners = &trial.comparison.learners;
+    let all = learners.iter().flat_map(|learner| trial.joints.iter().flat_map(|joint| points(learner, joint)));
+    let y = Axis::log(label, all.map(|[_, y]| y).chain([threshold]));
+    let panels = learners.iter().map(|learner| {
+        let last = learner.curve.last().map_or(2.0, |point| point.movements as f64).max(2.0);
         let mut layers = vec![Layer::Level { y: threshold, label: String::new() }];
-        layers.extend(joints.iter().enumerate().map(|(index, joint)| {
-            let points = smoothed(movements.iter().zip(medians(joint)).map(|(x, y)| [*x, y]));
-            Layer::Curve { points, style: joint_style(index, joints.len()) }
+        layers.extend(trial.joints.iter().enumerate().map(|(index, joint)| Layer::Curve {
+            points: points(learner, joint),
+            style: joint_style(index, trial.joints.len()),
         }));
         Panel {
             title: learner.name.clone(),
