@@ -33,6 +33,8 @@ pub enum Kind {
     Sweep {
         /// The key, as `selection.epsilon`.
         key: &'static str,
+        /// Its name on an axis, with its unit.
+        label: &'static str,
         /// Its values.
         values: &'static [f64],
         /// Movements of every run.
@@ -162,6 +164,7 @@ pub const EXPERIMENTS: &[PaperExperiment] = &[
         learners: &["active"],
         kind: Kind::Sweep {
             key: "selection.epsilon",
+            label: "DIRECT's ε",
             values: &[0.0, 1e-7, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1],
             steps: 400,
             quick_steps: 250,
@@ -174,7 +177,13 @@ pub const EXPERIMENTS: &[PaperExperiment] = &[
         title: "the gradient's learning rate",
         scenario: "arm-6dof",
         learners: &["gradient"],
-        kind: Kind::Sweep { key: "gradient.rate", values: &[0.01, 0.03, 0.1, 0.3, 0.5], steps: 1000, quick_steps: 400 },
+        kind: Kind::Sweep {
+            key: "gradient.rate",
+            label: "learning rate η",
+            values: &[0.01, 0.03, 0.1, 0.3, 0.5],
+            steps: 1000,
+            quick_steps: 400,
+        },
         claim: "several learning rates were tried",
     },
     PaperExperiment {
@@ -185,6 +194,7 @@ pub const EXPERIMENTS: &[PaperExperiment] = &[
         learners: &["random"],
         kind: Kind::Sweep {
             key: "filter.stabilising_noise.variance",
+            label: "variance σn² (m² or rad² per movement)",
             values: &[3e-5, 3e-4, 3e-3, 3e-2, 3e-1],
             steps: 1000,
             quick_steps: 400,

@@ -141,10 +141,17 @@ fn gradient_corrects_the_ends(evidence: &Evidence<'_>) -> Option<Finding> {
         ours: Some((ends - middle_mean) * 100.0),
         text: format!("corrected after {} movements: {}", evidence.steps, list.join(", ")),
         agrees,
-        why: "agrees if the first and the last joint are corrected most, in part if they are corrected more than the \
-              others on average; corrected: the fall of the median error, orientation and location each in units of its \
-              threshold, added"
-            .to_owned(),
+        why: format!(
+            "agrees if the first and the last joint are corrected most, in part if they are corrected more than the others \
+             on average; corrected: the fall of the median error, orientation and location each in units of its \
+             threshold, added.{}",
+            if agrees != Agreement::Yes && first > last {
+                " Steepest descent moves each parameter as far as it moves the marker: joints at the base, with the \
+                 longest lever, are corrected first"
+            } else {
+                ""
+            }
+        ),
     })
 }
 

@@ -4,7 +4,8 @@ use super::{Figure, Source};
 use crate::{
     experiment::{Curve, LearnerComparison, Quantiles},
     paper::chart::{Axis, Chart, Layer, Panel, Style},
-    recording::learner_color,
+    recording::{TRUTH_COLOR, learner_color},
+    scenario::WorldSpec,
 };
 
 /// One error, in the unit of its axis.
@@ -50,7 +51,16 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
     ];
     let styles: Vec<Style> = (0..learners.len()).map(|index| Style::at(index, learner_color(index))).collect();
     let last = learners.first()?.curve.last()?.movements as f64;
-    let panels = quantities.iter().map(|quantity| panel(quantity, learners, &styles, last)).collect();
+    let change = match &source.scenario.world {
+        WorldSpec::Simulated { change, .. } => change.as_ref().map(|change| change.step as f64),
+        WorldSpec::Measured { .. } => None,
+    };
+    let x = match change {
+        // What happens after a change late in the run would be crowded on a log axis.
+        Some(_) => Axis::linear("movements", [].into_iter()).over(0.0, last),
+        None => Axis::log("movements", [1.0, last].into_iter()).over(1.0, last.max(2.0)),
+    };
+    let panels = quantities.iter().map(|quantity| panel(quantity, learners, &styles, &x, change)).collect();
     let chart = Chart {
         title: source.title(),
         subtitle: source.provenance(),
@@ -71,7 +81,13 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
     Some(Figure { id: source.experiment.id.to_owned(), caption, chart })
 }
 
-fn panel(quantity: &Quantity, learners: &[LearnerComparison], styles: &[Style], last: f64) -> Panel {
+fn panel(
+    quantity: &Quantity,
+    learners: &[LearnerComparison],
+    styles: &[Style],
+    x: &Axis,
+    change: Option<f64>,
+) -> Panel {
     // A log axis has no place for movement 0.
     let points = |learner: &LearnerComparison| -> Vec<(f64, Quantiles)> {
         let after_start = learner.curve.iter().filter(|point| point.movements > 0);
@@ -90,18 +106,16 @@ fn panel(quantity: &Quantity, learners: &[LearnerComparison], styles: &[Style], 
         seen.push(*y);
         layers.push(Layer::Level { y: *y, label: label.clone() });
     }
+    if let Some(x) = change {
+        layers.push(Layer::Event { x, label: "change".into(), colour: TRUTH_COLOR, dashes: "6 2" });
+    }
     for (learner, style) in learners.iter().zip(styles) {
         if let Some(median) = learner.summary.median_converged_at.filter(|_| quantity.events) {
-            let label = format!("{median:.0}");
+            let label = median.to_string();
             layers.push(Layer::Event { x: median, label, colour: style.colour, dashes: "1 3" });
         }
         let points = points(learner).iter().map(|(x, error)| [*x, error.median * scale]).collect();
         layers.push(Layer::Curve { points, style: *style });
     }
-    Panel {
-        title: quantity.title.to_owned(),
-        x: Axis::log("movements", [1.0, last].into_iter()).over(1.0, last.max(2.0)),
-        y: Axis::log(quantity.label, seen.into_iter()),
-        layers,
-    }
+    Panel { title: quantity.title.to_owned(), x: x.clone(), y: Axis::log(quantity.label, seen.into_iter()), layers }
 }

@@ -24,12 +24,12 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
         legend: vec![
             ("rectangles".into(), Style::points(Marker::Dot, RECTANGLES)),
             ("lower right convex hull".into(), hull),
-            ("potentially optimal; left: the choice".into(), Style::points(Marker::Diamond, learner_color(1))),
+            ("potentially optimal".into(), Style::points(Marker::Diamond, learner_color(1))),
         ],
         rows,
         notes: vec![
             format!(
-                "The A-criterion C(θ) of a real selection, {evaluations} evaluations. Left: the slice of the joint box through the choice;"
+                "The A-criterion C(θ) of a real selection, {evaluations} evaluations. Left: the slice of the joint box through the choice (◆);"
             ),
             "the lighter, the lower C; thick outlines: potentially optimal. Right: every rectangle of the box.".into(),
         ],

@@ -10,7 +10,7 @@ use crate::{
 };
 
 pub fn figure(source: Source<'_>) -> Option<Figure> {
-    let Kind::Sweep { key, steps, quick_steps, .. } = source.experiment.kind else { return None };
+    let Kind::Sweep { label, steps, quick_steps, .. } = source.experiment.kind else { return None };
     let steps = if source.plan.quick { quick_steps } else { steps };
     let trials = source.outcome.trials();
     // A value of 0 has no place on a log axis: it gets one a decade before the others.
@@ -24,10 +24,10 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
         .iter()
         .position(|learner| source.experiment.learners.contains(&learner.name.as_str()))
         .unwrap_or(0);
-    let style = Style::at(index, learner_color(index));
+    let style = Style { dashes: "", ..Style::at(index, learner_color(index)) };
     let learners: Vec<_> =
         trials.iter().filter_map(|trial| Some((place(trial.value?), trial.comparison.learners.first()?))).collect();
-    let x = Axis::log(key, learners.iter().map(|(x, _)| *x));
+    let x = Axis::log(label, learners.iter().map(|(x, _)| *x));
     let [lower, upper] = x.range;
     let x = x.over(lower / 1.6, upper * 1.6);
     let x = if zero { x.with_zero_at(least / 10.0) } else { x };
@@ -46,8 +46,9 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
         .collect();
     let threshold = source.scenario.thresholds.location_m * 100.0;
     let late_style = Style { dashes: "2 2.5", marker: None, ..style };
-    let movements = Panel {
-        title: "(a) movements until it converges".into(),
+    // Where nothing converges there is nothing to show.
+    let movements = (!medians.is_empty()).then(|| Panel {
+        title: "movements until it converges".into(),
         x: x.clone(),
         y: Axis {
             label: "movements".into(),
@@ -56,16 +57,16 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
             zero: None,
         },
         layers: vec![Layer::Curve { points: late, style: late_style }, Layer::Curve { points: medians, style }],
-    };
+    });
     let counts = Panel {
-        title: format!("(b) runs of {runs} that converge"),
+        title: format!("runs of {runs} that converge"),
         x: x.clone(),
         y: Axis { label: "runs".into(), scale: Scale::Linear, range: [0.0, runs * 1.05], zero: None },
         layers: vec![Layer::Curve { points: converged, style }],
     };
     let ends = locations.iter().flat_map(|point| point[1..].to_vec()).chain([threshold]);
     let errors = Panel {
-        title: format!("(c) after {steps} movements"),
+        title: format!("after {steps} movements"),
         x,
         y: Axis::log("location error (cm)", ends),
         layers: vec![
@@ -75,12 +76,19 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
         ],
     };
     let name = source.experiment.learners.join(", ");
+    let mut legend = vec![(format!("{name}, median"), style)];
+    legend.extend(movements.is_some().then(|| (format!("{name}, 90 % of the runs"), late_style)));
+    let notes = if movements.is_some() {
+        vec!["Left: no point where the median run, or the 90th percentile, does not converge. Right: median and quartiles.".into()]
+    } else {
+        vec!["The median run converges nowhere. Right: median and quartiles.".into()]
+    };
     let chart = Chart {
         title: source.title(),
         subtitle: source.provenance(),
-        legend: vec![(format!("{name}, median"), style), (format!("{name}, 90 % of the runs"), late_style)],
-        rows: vec![vec![movements, counts, errors]],
-        notes: vec!["(a) holds no point where the median run, or the 90th percentile, does not converge.".into()],
+        legend,
+        rows: vec![movements.into_iter().chain([counts, errors]).collect()],
+        notes,
     };
     let caption = format!(
         "{}: how soon `{name}` converges, in how many runs, and its location error at the end (median and quartiles), {}",
