@@ -159,7 +159,9 @@ impl Evaluation {
         let mut chain = truth.clone();
         *chain.joints.get_mut(index)? = *found;
         let displacements = self.targets.iter().take(SIGNAL_SIZE);
-        Some(mean(displacements.map(|(theta, marker)| (chain.marker_at(theta) - marker).norm_squared()))?.sqrt() / sigma)
+        Some(
+            mean(displacements.map(|(theta, marker)| (chain.marker_at(theta) - marker).norm_squared()))?.sqrt() / sigma,
+        )
     }
 }
 

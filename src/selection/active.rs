@@ -4,7 +4,8 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ACriterion, Actions, Movement, Policy, Selection, SelectionError, Sight, Visibility, Watch, Weights, criterion::scaled,
+    ACriterion, Actions, Movement, Policy, Selection, SelectionError, Sight, Visibility, Watch, Weights,
+    criterion::scaled,
 };
 use crate::{
     estimation::Belief,

@@ -277,7 +277,8 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         for case in 0..cases {
             let head = head((case % 2 == 0).then_some(0.06));
-            let mean = at(&head, rng.random_range(-60.0..60.0), rng.random_range(-60.0..60.0), rng.random_range(0.3..0.9));
+            let mean =
+                at(&head, rng.random_range(-60.0..60.0), rng.random_range(-60.0..60.0), rng.random_range(0.3..0.9));
             let size = 10_f64.powf(rng.random_range(-2.5..0.0));
             let root = Matrix3::from_fn(|_, _| rng.random_range(-size..size));
             let covariance = root * root.transpose();

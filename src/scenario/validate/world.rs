@@ -6,7 +6,12 @@ use super::{Check, raw};
 use crate::scenario::{InitialError, Recording, Robot, WorldSpec};
 
 impl Check<'_> {
-    pub(super) fn world(&mut self, raw: &raw::Scenario, robot: &Robot, open: &dyn Fn(&str) -> Result<String, String>) -> Option<WorldSpec> {
+    pub(super) fn world(
+        &mut self,
+        raw: &raw::Scenario,
+        robot: &Robot,
+        open: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Option<WorldSpec> {
         match (&raw.sensor, &raw.initial_error, &raw.measurements) {
             (Some(sensor), Some(error), None) => {
                 let marker_m = error.get_ref().marker_m.as_ref();
