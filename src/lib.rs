@@ -22,7 +22,7 @@
 //!
 //! These do no input or output, know no threads but those of the feature `parallel`, and build without default
 //! features for `wasm32-unknown-unknown`. With the feature `app` (on by default) come `recording` (Rerun and CSV
-//! files), `server` (HTTP and the page) and the command line.
+//! files), `paper` (the paper's experiments beside its numbers), `server` (HTTP and the page) and the command line.
 //!
 //! # Notation, frames and units
 //!
@@ -54,6 +54,8 @@ pub mod estimation;
 pub mod experiment;
 pub mod kinematics;
 pub mod optimize;
+#[cfg(feature = "app")]
+pub mod paper;
 #[cfg(feature = "app")]
 pub mod recording;
 pub mod scenario;

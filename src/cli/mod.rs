@@ -2,6 +2,7 @@
 
 mod compare;
 mod output;
+mod paper;
 mod progress;
 mod run;
 mod scenarios;
@@ -12,7 +13,10 @@ mod sweep;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use body_schema::scenario::{BUILTIN, Scenario, ScenarioError, builtin};
+use body_schema::{
+    paper::PaperError,
+    scenario::{BUILTIN, Scenario, ScenarioError, builtin},
+};
 use clap::{Parser, Subcommand};
 
 use seeds::Seeds;
@@ -37,6 +41,8 @@ enum Command {
     Compare(compare::Arguments),
     /// Try a grid of values in a scenario, and rank them by a learner's own median
     Sweep(sweep::Arguments),
+    /// Rerun the paper's experiments, and set the outcome beside its figures and numbers
+    Paper(paper::Arguments),
     /// List the built-in scenarios
     Scenarios(scenarios::ListArguments),
     /// Say whether a scenario file is valid, and if not, what to mend
@@ -72,6 +78,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Compare(arguments)) => compare::compare(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
+        Some(Command::Paper(arguments)) => paper::paper(&arguments),
         Some(Command::Scenarios(arguments)) => scenarios::list(&arguments),
         Some(Command::Check(arguments)) => scenarios::check(&arguments),
     }
@@ -98,6 +105,7 @@ struct BadInput(String);
 pub fn is_bad_input(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.is::<BadInput>()
+            || cause.downcast_ref::<PaperError>().is_some_and(PaperError::is_bad_input)
             || cause.downcast_ref::<ScenarioError>().is_some_and(|error| !matches!(error, ScenarioError::Experiment(_)))
     })
 }

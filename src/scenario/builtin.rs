@@ -18,7 +18,17 @@ macro_rules! builtins {
 }
 
 /// All of them, simplest first.
-pub const BUILTIN: &[Builtin] = builtins!["arm-6dof", "arm-12dof", "arm-6dof-selectors", "head-fov", "tiago-mocap"];
+pub const BUILTIN: &[Builtin] = builtins![
+    "arm-6dof",
+    "arm-6dof-doubled-error",
+    "arm-6dof-selectors",
+    "arm-12dof",
+    "head-fov",
+    "head-fov-excursion",
+    "head-fov-doubled-error",
+    "body-change",
+    "tiago-mocap",
+];
 
 /// The data files that they name.
 const DATA: &[(&str, &str)] = &[("tiago-mocap.csv", include_str!("../../scenarios/tiago-mocap.csv"))];

@@ -1,0 +1,82 @@
+//! `paper`: the paper's experiments beside its numbers.
+
+use std::{path::PathBuf, sync::Mutex};
+
+use anyhow::Result;
+use body_schema::paper::{self, Agreement, EXPERIMENTS, Ending, PaperExperiment, Plan, Progress};
+use indicatif::ProgressBar;
+
+use super::{output, progress};
+
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// 4 seeds and short runs, to see that everything works
+    #[arg(long)]
+    quick: bool,
+    /// Run only this experiment; repeat for several. Of the others, what DIR holds is shown [default: all]
+    #[arg(long, value_name = "ID")]
+    only: Vec<String>,
+    /// Keep outcomes, figures and tables in DIR; outcomes kept there are not measured again
+    /// [default: paper, with --quick paper/quick]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write the table as JSON to FILE as well, or to standard output for `-`
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Run on so many threads [default: one per core]; only times depend on it
+    #[arg(long, value_name = "N")]
+    threads: Option<std::num::NonZeroUsize>,
+}
+
+/// One bar per experiment.
+struct Bars(Mutex<Option<ProgressBar>>);
+
+impl Bars {
+    fn bar(&self) -> std::sync::MutexGuard<'_, Option<ProgressBar>> {
+        // A bar is only a bar: one left by a thread that panicked still is.
+        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+impl Progress for Bars {
+    fn start(&self, experiment: &PaperExperiment, ticks: u64) {
+        let place = EXPERIMENTS.iter().position(|other| other.id == experiment.id).map_or(0, |index| index + 1);
+        *self.bar() = Some(progress::bar(ticks, &format!("{place}/{} {}", EXPERIMENTS.len(), experiment.id)));
+    }
+
+    fn tick(&self) {
+        if let Some(bar) = &*self.bar() {
+            bar.inc(1);
+        }
+    }
+
+    fn finish(&self, _experiment: &PaperExperiment, _how: Ending) {
+        if let Some(bar) = self.bar().take() {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+pub fn paper(arguments: &Arguments) -> Result<()> {
+    let plan = Plan {
+        quick: arguments.quick,
+        only: arguments.only.clone(),
+        out: arguments.out.clone().unwrap_or_else(|| paper::default_folder(arguments.quick)),
+    };
+    let report = super::on_threads(arguments.threads, || Ok(paper::run(&plan, &Bars(Mutex::new(None)))?))?;
+    if let Some(path) = &arguments.json {
+        output::write_json(path, &report)?;
+    }
+    if arguments.json.as_deref().is_some_and(output::is_stdout) {
+        return Ok(());
+    }
+    for row in &report.rows {
+        let verdict = row.agrees.map_or("–", Agreement::name);
+        output::say(format!("{verdict:7} {}: {}", row.figure, row.what))?;
+        output::say(format!("        paper: {}\n        ours:  {}", row.paper, row.ours_text))?;
+    }
+    for name in ["paper.md", "paper.json"] {
+        output::say(format!("wrote {}", plan.out.join(name).display()))?;
+    }
+    output::say(format!("wrote {} figures beside them, as SVG and PNG", report.figures.len()))
+}
