@@ -12,7 +12,7 @@ use std::{fs, path::PathBuf};
 use body_schema::{
     experiment::{Comparison, Description, StepReport, Trace},
     recording::{LiveLog, Recorder, RecordingError, SIGMAS, StepsCsv, Target, comparison_csv, learner_color},
-    scenario::builtin,
+    scenario::{Scenario, builtin},
 };
 use checks::check;
 use reading::Reading;
@@ -121,6 +121,35 @@ fn a_real_robot_has_no_truth() {
     assert!(!entities.iter().any(|entity| entity.contains("truth") || entity.contains("direct/")));
     // Eight joints, the marker among the ellipsoids.
     assert_eq!(reading.ellipsoids("/active/point_ellipsoids", 3).len(), 8);
+}
+
+#[test]
+fn a_head_shows_what_it_sees_and_what_it_misses() {
+    let (description, reports) = run("head-fov", 12);
+    let live = LiveLog::new();
+    record(&description, &reports, Target::live(live.clone()));
+    let reading = Reading::of(&live.complete().unwrap());
+    check(&reading, &description, &reports);
+    let misses = reports[12].learners[1].metrics.misses;
+    assert!((1..12).contains(&misses), "random both sees and misses: {misses}");
+    assert!(reading.note().contains("**Head**"));
+}
+
+#[test]
+fn a_changed_body_is_drawn_anew() {
+    let scenario = builtin("body-change").unwrap();
+    let text = scenario.source.replace("\nstep = 300", "\nstep = 2");
+    let scenario = Scenario::parse("sooner", &text, &|_| Err("none".into())).unwrap();
+    let mut experiment = scenario.experiment(3, None).unwrap();
+    let mut reports = vec![experiment.latest().clone()];
+    (0..4).for_each(|_| reports.push(experiment.step().unwrap().clone()));
+    let changed: Vec<bool> = reports.iter().map(|report| report.truth.is_some()).collect();
+    assert_eq!(changed, [false, false, false, true, false]);
+    let live = LiveLog::new();
+    record(experiment.description(), &reports, Target::live(live.clone()));
+    let reading = Reading::of(&live.complete().unwrap());
+    check(&reading, experiment.description(), &reports);
+    assert_eq!(reading.steps("/world/truth/links"), [0, 3]);
 }
 
 #[test]

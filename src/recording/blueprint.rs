@@ -55,6 +55,7 @@ pub(super) fn messages(
         let name = format!("{} ({} × {})", learner.name, learner.estimator, learner.policy);
         let view = Spatial3DView::new(name).with_origin("/").with_contents([
             "+ /world/truth/**".to_owned(),
+            "+ /world/head/**".to_owned(),
             format!("+ {root}/**"),
             format!("- {root}/direct/**"),
             format!("- {root}/metrics/**"),
@@ -78,7 +79,9 @@ pub(super) fn messages(
     }
     let mut tabs: Vec<ContainerLike> = Vec::new();
     // A box is divided by DIRECT; recorded movements are tried one by one.
-    for (root, _) in names().filter(|(_, l)| l.policy == "active" && description.movements_available.is_none()) {
+    for (root, _) in
+        names().filter(|(_, l)| l.policy.starts_with("active") && description.movements_available.is_none())
+    {
         let name = root.last().map(|part| part.ui_string()).unwrap_or_default();
         let view = Spatial2DView::new(format!("DIRECT, {name}")).with_origin(root.join(&EntityPath::from("direct")));
         let bounds = Range2D { x_range: [-0.08, 1.08].into(), y_range: [-0.16, 1.16].into() };

@@ -8,13 +8,13 @@ use rerun::{
 use super::{
     blueprint,
     colours::learner_color,
-    metrics,
+    head, metrics,
     model::{self, Uncertainty},
     movement::Movement,
     partition::{self, Plane, Slice},
     rows::Rows,
 };
-use crate::experiment::{Description, JointDescription, LearnerReport};
+use crate::experiment::{Description, LearnerReport};
 
 /// The entities of one learner, and what they carry from step to step.
 pub(super) struct LearnerEntities {
@@ -72,7 +72,7 @@ impl LearnerEntities {
         if let Some(directions) = self.uncertainty.of_directions(model, joints, arrow_m, colour) {
             rows.at(step, &self.entity("direction_uncertainty"), &directions.parts());
         }
-        self.log_movement(rows, step, report, description.truth.is_some(), joints);
+        self.log_movement(rows, step, report, description);
         for (series, value) in self.metrics.iter().zip(metrics::values(report)) {
             if let Some(value) = value {
                 rows.at(step, series, &[&Scalars::new([value])]);
@@ -84,14 +84,8 @@ impl LearnerEntities {
         }
     }
 
-    fn log_movement(
-        &mut self,
-        rows: &mut Rows,
-        step: u64,
-        report: &LearnerReport,
-        has_truth: bool,
-        joints: &[JointDescription],
-    ) {
+    fn log_movement(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, description: &Description) {
+        let (has_truth, joints) = (description.truth.is_some(), description.joints.as_slice());
         let report = report.movement.as_ref();
         if report.is_none() && !self.moved {
             return;
@@ -105,6 +99,11 @@ impl LearnerEntities {
         }
         rows.at(step, &self.entity("marker/predicted"), &[&movement.predicted]);
         rows.at(step, &self.entity("marker/measured"), &[&movement.measured]);
+        if let Some(head) = &description.head {
+            let gaze = report.and_then(|report| report.gaze.as_ref());
+            rows.at(step, &self.entity("head/gaze"), &[&head::gaze(head, gaze, self.colour)]);
+            rows.at(step, &self.entity("marker/missed"), &[&movement.missed]);
+        }
         let Some(partition) = report.and_then(|report| report.partition.as_ref()) else { return };
         if self.plane.is_none()
             && let Some(plane) = Plane::of(partition)

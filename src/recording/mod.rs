@@ -12,12 +12,15 @@
 //! | entity | archetype | what |
 //! |---|---|---|
 //! | `/note` | TextDocument, static | scenario, seed, version, learners, units, how to read and reproduce it |
-//! | `/world/truth/links`, `…/axes` | LineStrips3D, Arrows3D, static | the true arm at θ = 0; absent without a truth |
+//! | `/world/truth/links`, `…/axes` | LineStrips3D, Arrows3D, static | the true arm at θ = 0; absent without a truth; in time if the body changes |
+//! | `/world/head/frustum` | LineStrips3D, static | the cone of the lens at rest, and the range over which it can turn; absent without a head |
+//! | `/{learner}/head/gaze` | LineStrips3D | the cones of the eyes after the head has followed the marker |
 //! | `/{learner}/links`, `…/axes` | LineStrips3D, Arrows3D | the estimate at θ = 0, after the update |
 //! | `/{learner}/point_ellipsoids` | Ellipsoids3D | covariances of the axis points, then of the marker if it is learned |
 //! | `/{learner}/direction_uncertainty` | Ellipsoids3D | covariances of the directions, at the tips of the arrows |
 //! | `/{learner}/movement/links`, `…/truth` | LineStrips3D | estimated and true arm in the step's configuration |
 //! | `/{learner}/marker/predicted`, `…/measured` | Points3D | the marker before the update; measured is empty after a miss |
+//! | `/{learner}/marker/missed` | Points3D | the true marker after a miss, otherwise empty; absent without a head |
 //! | `/{learner}/direct/criterion` | Image, Transform3D | the criterion over a slice of DIRECT's partition |
 //! | `/{learner}/direct/boxes`, `…/centres`, `…/chosen` | Boxes2D, Points2D | the leaves of the slice, the centres of the others, the choice |
 //! | `/{learner}/direct/axes` | LineStrips2D, Points2D, static | frame and labels of the slice: joints and limits |
@@ -40,6 +43,7 @@ mod csv;
 mod ellipsoid;
 mod error;
 mod file;
+mod head;
 mod learner;
 mod live;
 mod metrics;

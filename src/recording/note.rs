@@ -7,6 +7,10 @@ use rerun::{MediaType, TextDocument};
 use super::{SIGMAS, TRUTH_COLOR, colours::hex, colours::learner_color};
 use crate::{experiment::Description, kinematics::JointKind};
 
+const HEAD: &str = "- **Head** in pale grey: the cone of the lens at rest, and the square over which its axis can turn; in the \
+                    learner's pale colour the cone after the head has followed the marker. A marker outside it is missed: red, where \
+                    it truly was.\n";
+
 /// The note, in markdown.
 pub(super) fn note(description: &Description) -> TextDocument {
     TextDocument::new(markdown(description)).with_media_type(MediaType::markdown())
@@ -36,7 +40,7 @@ fn markdown(description: &Description) -> String {
     }
     let _ = write!(
         text,
-        "- **Estimate** in the learner's colour: thick the arm at θ = 0, with one arrow per joint axis (a sliding \
+        "{}- **Estimate** in the learner's colour: thick the arm at θ = 0, with one arrow per joint axis (a sliding \
          joint's stands at the next joint); thin and pale the arm in the configuration of the step's movement, beside \
          the true one.\n\
          - **Ellipsoids** are {SIGMAS}σ along each principal axis: of the points on the axes (flat along the axis, \
@@ -48,7 +52,9 @@ fn markdown(description: &Description) -> String {
          better; thick outlines are what would be divided next; dots are centres outside the slice.\n\n\
          Lengths in metres, in the frame of the measurements; `_deg` in degrees; joint values in radians or metres.\n\n\
          `converged_at` asks for an orientation error up to {}° and a location error up to {} m.\n\n",
-        thresholds.orientation_deg, thresholds.location_m
+        if description.head.is_some() { HEAD } else { "" },
+        thresholds.orientation_deg,
+        thresholds.location_m
     );
     text.push_str("## Joints\n\n| joint | kind | limits | learned |\n|---|---|---|---|\n");
     for joint in &description.joints {

@@ -9,10 +9,10 @@ use rerun::{
 };
 
 use super::{
-    LiveLog, RecordingError, TRUTH_COLOR, blueprint, colours::learner_color, file::RrdFile, learner::LearnerEntities,
-    model, note::note, rows::Rows, scene::Scene,
+    LiveLog, RecordingError, TRUTH_COLOR, blueprint, colours::learner_color, file::RrdFile, head,
+    learner::LearnerEntities, model, note::note, rows::Rows, scene::Scene,
 };
-use crate::experiment::{Description, StepReport};
+use crate::experiment::{Description, ModelReport, StepReport};
 
 /// So many steps are written at once unless somebody flushes earlier …
 const BATCH_STEPS: usize = 64;
@@ -131,6 +131,9 @@ impl Recorder {
             Some(arrow_m) => arrow_m,
             None => self.arrange(report)?,
         };
+        if let Some(truth) = &report.truth {
+            self.log_truth(Some(report.step), truth, arrow_m);
+        }
         let Self { description, learners, rows, .. } = self;
         for (entities, learner) in learners.iter_mut().zip(&report.learners) {
             entities.log(rows, report.step, learner, description, arrow_m);
@@ -207,17 +210,35 @@ impl Recorder {
         Ok(())
     }
 
+    /// The true arm from a step on; at all times without a step.
+    fn log_truth(&mut self, step: Option<u64>, truth: &ModelReport, arrow_m: f64) {
+        let links = model::links(&truth.skeleton_m(), TRUTH_COLOR, 2.0);
+        let axes = model::axes(truth, &self.description.joints, arrow_m, TRUTH_COLOR);
+        let (links_at, axes_at) = (EntityPath::from("world/truth/links"), EntityPath::from("world/truth/axes"));
+        match step {
+            Some(step) => {
+                self.rows.at(step, &links_at, &[&links]);
+                self.rows.at(step, &axes_at, &[&axes]);
+            }
+            None => {
+                self.rows.always(&links_at, &[&links]);
+                self.rows.always(&axes_at, &[&axes]);
+            }
+        }
+    }
+
     /// What needs the size of the arm: the truth's arrows and the cameras. Returns the length of all arrows.
     fn arrange(&mut self, first: &StepReport) -> Result<f64, RecordingError> {
         let model = self.description.truth.as_ref().or_else(|| first.learners.first().map(|learner| &learner.estimate));
         let scene = model.map(|model| Scene::around(&model.skeleton_m())).unwrap_or_default();
         let arrow_m = ARROW * scene.size_m;
         self.arrow_m = Some(arrow_m);
-        if let Some(truth) = &self.description.truth {
-            let links = model::links(&truth.skeleton_m(), TRUTH_COLOR, 2.0);
-            self.rows.always(&EntityPath::from("world/truth/links"), &[&links]);
-            let axes = model::axes(truth, &self.description.joints, arrow_m, TRUTH_COLOR);
-            self.rows.always(&EntityPath::from("world/truth/axes"), &[&axes]);
+        if let Some(truth) = self.description.truth.clone() {
+            // What is static cannot change later.
+            self.log_truth(self.description.change_at.map(|_| first.step), &truth, arrow_m);
+        }
+        if let Some(head) = &self.description.head {
+            self.rows.always(&EntityPath::from("world/head/frustum"), &[&head::frustum(head)]);
         }
         let learners: Vec<&EntityPath> = self.learners.iter().map(|learner| &learner.root).collect();
         let blueprint = blueprint::messages(&self.description, &learners, &scene, self.store.application_id().clone())?;

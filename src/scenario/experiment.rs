@@ -266,11 +266,23 @@ mod tests {
     use super::*;
     use crate::scenario::builtin;
 
+    /// Judges look only where the head can see, by the truth.
+    #[test]
+    fn the_evaluation_set_lies_in_view() {
+        let scenario = builtin("head-fov").expect("a built-in scenario");
+        let (world, evaluation, briefing) = scenario.draw(5).expect("a world");
+        let head = world.head().expect("a head");
+        assert_eq!(evaluation.targets().len(), EVALUATION_SIZE);
+        assert!(evaluation.targets().iter().all(|(_, marker)| head.sees(marker)));
+        let truth = world.truth().expect("simulated");
+        assert!(briefing.workspace.iter().any(|theta| !head.sees(&truth.marker_at(theta))), "without truth");
+    }
+
     /// No truth leaks: with the truth swapped behind the learners' backs, their first choices stay as they were, and
     /// the choices after the first measurement do not.
     #[test]
     fn swapping_the_truth_changes_no_first_selection() {
-        for name in ["arm-6dof", "arm-12dof"] {
+        for name in ["arm-6dof", "arm-12dof", "head-fov"] {
             let scenario = builtin(name).expect("a built-in scenario");
             let selections = |swap: bool| {
                 let (mut world, mut evaluation, briefing) = scenario.draw(11).expect("a world");
@@ -284,7 +296,7 @@ mod tests {
                 let specs = scenario.chosen(None).expect("learners");
                 let mut experiment =
                     scenario.assemble(11, &specs, world, evaluation, &briefing).expect("an experiment");
-                [(); 2].map(|()| {
+                [(); 3].map(|()| {
                     let report = experiment.step().expect("a step");
                     let chosen = |learner: &crate::experiment::LearnerReport| {
                         learner.movement.as_ref().expect("a movement").configuration.clone()
@@ -292,9 +304,9 @@ mod tests {
                     report.learners.iter().map(chosen).collect::<Vec<_>>()
                 })
             };
-            let ([first, second], [first_swapped, second_swapped]) = (selections(false), selections(true));
+            let ([first, .., last], [first_swapped, .., last_swapped]) = (selections(false), selections(true));
             assert_eq!(first, first_swapped, "{name}");
-            assert_ne!(second[0], second_swapped[0], "{name}: the active learner must have seen another marker");
+            assert_ne!(last[0], last_swapped[0], "{name}: the active learner must have seen another marker");
         }
     }
 }

@@ -61,7 +61,7 @@ impl Head {
     /// Where the head looks after it has followed the marker to `point`.
     pub fn gaze_at(&self, point: &Point3<f64>) -> Gaze {
         let [pan, tilt] = self.bearing(point);
-        self.gaze(pan.clamp(-self.pan_limit, self.pan_limit), tilt.clamp(-self.tilt_limit, self.tilt_limit))
+        self.gaze(within(pan, self.pan_limit), within(tilt, self.tilt_limit))
     }
 
     /// The gaze at these angles.
@@ -98,7 +98,7 @@ impl Head {
     /// ```
     pub fn clearance(&self, point: &Point3<f64>) -> f64 {
         let [pan, tilt] = self.bearing(point);
-        let gaze = self.gaze(pan.clamp(-self.pan_limit, self.pan_limit), tilt.clamp(-self.tilt_limit, self.tilt_limit));
+        let gaze = self.gaze(within(pan, self.pan_limit), within(tilt, self.tilt_limit));
         let widest = self.eyes(&gaze).map(|eye| angle(&(point - eye), &gaze.direction)).fold(0.0, f64::max);
         let view = self.lens_half_angle - widest;
         let margin = (self.pan_limit - pan.abs()).min(self.tilt_limit - tilt.abs()).max(0.0);
@@ -145,6 +145,11 @@ impl Head {
         let (ahead, aside) = (self.look.dot(&d), left.dot(&d));
         [aside.atan2(ahead), up.dot(&d).atan2(ahead.hypot(aside))]
     }
+}
+
+/// An angle brought within ±limit. (`clamp` would panic at a limit that is no number.)
+fn within(angle: f64, limit: f64) -> f64 {
+    angle.max(-limit).min(limit)
 }
 
 /// The angle between a vector and a direction, exact for small and for large angles.

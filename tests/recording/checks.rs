@@ -27,9 +27,21 @@ pub fn check(reading: &Reading, description: &Description, reports: &[StepReport
             check_movement(reading, report.step, learner, description);
         }
     }
-    if let Some(truth) = &description.truth {
-        close(&reading.strip("/world/truth/links", None), &truth.skeleton_m().concat(), "true links");
-        check_axes(reading, "/world/truth/axes", None, truth);
+    let changed = reports.iter().filter_map(|report| Some((Some(report.step), report.truth.as_ref()?)));
+    let start = description.truth.as_ref().map(|truth| (description.change_at.map(|_| reports[0].step), truth));
+    for (step, truth) in start.into_iter().chain(changed) {
+        close(&reading.strip("/world/truth/links", step), &truth.skeleton_m().concat(), "true links");
+        check_axes(reading, "/world/truth/axes", step, truth);
+    }
+    assert_eq!(reading.entities().iter().any(|e| e == "/world/head/frustum"), description.head.is_some());
+    if let Some(head) = &description.head {
+        let strips = reading.strips("/world/head/frustum", None);
+        for corner in strips.iter().flatten() {
+            let ray = Vector3::from(*corner) - Vector3::from(head.position_m);
+            let angle = ray.angle(&Vector3::from(head.look));
+            let reach = head.lens_half_angle_rad.max(head.pan_limit_rad.hypot(head.tilt_limit_rad));
+            assert!(ray.norm() < 1e-6 || angle < reach + 1e-3, "{angle}");
+        }
     }
 }
 
@@ -136,6 +148,19 @@ fn check_movement(reading: &Reading, step: u64, learner: &LearnerReport, descrip
     close(&reading.points(&entity("marker/predicted"), step).unwrap(), &movement.predicted_marker_m, "predicted");
     let measured = movement.measured_marker_m.map(Vec::from).unwrap_or_default();
     close(&reading.points(&entity("marker/measured"), step).unwrap(), &measured, "measured");
+    assert_eq!(movement.gaze.is_some(), description.head.is_some());
+    if let (Some(gaze), Some(head)) = (&movement.gaze, &description.head) {
+        let strips = reading.strips(&entity("head/gaze"), Some(step));
+        assert_eq!(strips.len() % gaze.eyes_m.len(), 0);
+        let rim = Vector3::from(strips[0][0]) - Vector3::from(gaze.eyes_m[0]);
+        close(&[rim.angle(&Vector3::from(gaze.direction))], &[head.lens_half_angle_rad], "the cone");
+        let missed = reading.points(&entity("marker/missed"), step).unwrap();
+        let marker = *movement.true_skeleton_m.as_ref().unwrap().last().unwrap();
+        close(&missed, if movement.measured_marker_m.is_none() { &marker } else { &[] }, "missed");
+        // Seen, if and only if in the cone.
+        let angle = (Vector3::from(marker) - Vector3::from(gaze.eyes_m[0])).angle(&Vector3::from(gaze.direction));
+        assert_eq!(angle <= head.lens_half_angle_rad, movement.measured_marker_m.is_some());
+    }
     let leaves = reading.numbers(&entity("direct/leaves"), "centres", Some(step));
     assert_eq!(leaves.is_some(), movement.partition.is_some());
     if let Some(partition) = &movement.partition {

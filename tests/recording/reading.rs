@@ -124,6 +124,12 @@ impl Reading {
         strips[0].0.iter().flat_map(|point| point.0).map(f64::from).collect()
     }
 
+    /// Lines, as points.
+    pub fn strips(&self, entity: &str, step: Option<u64>) -> Vec<Vec<[f64; 3]>> {
+        let strips: Vec<LineStrip3D> = self.components(entity, "LineStrips3D:strips", step).unwrap();
+        strips.iter().map(|strip| strip.0.iter().map(|point| point.0.map(f64::from)).collect()).collect()
+    }
+
     pub fn arrows(&self, entity: &str, step: Option<u64>) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
         let origins: Vec<Position3D> = self.components(entity, "Arrows3D:origins", step).unwrap();
         let vectors: Vec<Vector3D> = self.components(entity, "Arrows3D:vectors", step).unwrap();

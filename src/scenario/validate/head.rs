@@ -13,6 +13,7 @@ const LENS_DEG: f64 = 20.0;
 impl Check<'_> {
     pub(super) fn head(&mut self, spanned: &Spanned<raw::Head>, robot: &Robot) -> Option<Watch> {
         let raw = spanned.get_ref();
+        let problems = self.problems.len();
         let position = self.point("head.position_m", &raw.position_m);
         let mut angle = |key: &str, value: &Option<Spanned<f64>>, default: f64, lowest: f64| {
             let mend = format!("an angle from {lowest} up to 89 degrees");
@@ -34,6 +35,9 @@ impl Check<'_> {
         let head = Head { position, look, pan_limit, tilt_limit, lens_half_angle, baseline };
         let visible_pose = self.visible_pose(&raw.visible_pose_deg, robot)?;
         let marker = robot.chain.marker_at(&visible_pose);
+        if self.problems.len() > problems {
+            return None;
+        }
         if !head.sees(&marker) {
             let beyond = -head.clearance(&marker).to_degrees();
             let what = format!("the marker is not in view there: it is {beyond:.1} degrees outside");
