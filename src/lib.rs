@@ -13,7 +13,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`kinematics`] | joints as twists, chains as products of exponentials, minimal tangent coordinates, the Jacobian |
-//! | [`sensing`] | what is measured after a movement |
+//! | [`sensing`] | what is measured after a movement, and what a head can see |
 //! | [`estimation`] | estimators and their beliefs: recursive least squares, stochastic gradient |
 //! | [`optimize`] | DIRECT, a minimiser over the unit cube that knows nothing of robots |
 //! | [`selection`] | the A-criterion, and the policies that choose movements |
