@@ -81,7 +81,7 @@ impl<'a> Process<'a> {
             return None;
         }
         let kernel = DMatrix::from_fn(count, count, |i, j| {
-            matern((&points[i] - &points[j]).norm(), length) + if i == j { JITTER } else { 0.0 }
+            matern(distance(&points[i], &points[j]), length) + if i == j { JITTER } else { 0.0 }
         });
         let cholesky = kernel.cholesky()?;
         let standard = DVector::from_iterator(count, values.iter().map(|value| (value - mean) / variance.sqrt()));
@@ -105,7 +105,7 @@ impl<'a> Process<'a> {
     fn expected_improvement(&self, x: &DVector<f64>) -> f64 {
         let k = DVector::from_iterator(
             self.points.len(),
-            self.points.iter().map(|point| matern((x - point).norm(), self.length)),
+            self.points.iter().map(|point| matern(distance(x, point), self.length)),
         );
         let mean = self.mean + self.variance.sqrt() * k.dot(&self.weights);
         let explained = (&self.inverse_root * k).norm_squared();
@@ -135,6 +135,10 @@ impl<'a> Process<'a> {
         }
         most.1
     }
+}
+
+fn distance(a: &DVector<f64>, b: &DVector<f64>) -> f64 {
+    a.iter().zip(b.iter()).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
 fn likeliest_length(points: &[DVector<f64>], values: &[f64]) -> Option<f64> {

@@ -157,6 +157,15 @@ pub const EXPERIMENTS: &[PaperExperiment] = &[
         claim: "random is sometimes trapped in local minima",
     },
     PaperExperiment {
+        id: "selectors",
+        figure: "text",
+        title: "other selectors and six numbers per joint, 6 joints, 100 evaluations",
+        scenario: "arm-6dof-selectors",
+        learners: ALL,
+        kind: Kind::Comparison { steps: 300, quick_steps: 40 },
+        claim: "Bayesian optimisation and Monte Carlo are not worth their cost",
+    },
+    PaperExperiment {
         id: "epsilon",
         figure: "text",
         title: "DIRECT's ε",

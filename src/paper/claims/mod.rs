@@ -6,6 +6,7 @@
 mod evidence;
 mod joints;
 mod remarks;
+mod selectors;
 mod setup;
 mod speed;
 
@@ -50,7 +51,9 @@ type Judge = fn(&Evidence<'_>) -> Option<Finding>;
 
 /// All claims, in the order of the paper.
 pub fn claims() -> impl Iterator<Item = &'static Claim> {
-    [setup::CLAIMS, speed::SIMULATED, joints::CLAIMS, speed::HEAD, remarks::CLAIMS].into_iter().flatten()
+    [setup::CLAIMS, speed::SIMULATED, joints::CLAIMS, speed::HEAD, selectors::CLAIMS, remarks::CLAIMS]
+        .into_iter()
+        .flatten()
 }
 
 impl Claim {
