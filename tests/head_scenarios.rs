@@ -35,7 +35,7 @@ fn watched(scenario: &Scenario) -> (Head, Vec<f64>, Chain) {
 
 #[test]
 fn problems_of_a_head_name_line_key_and_mend() {
-    let pose = "visible_pose_deg = [20.0, 20.0, 0.0, -60.0]";
+    let pose = "visible_pose_deg = [0.0, 0.0, 0.0, -60.0]";
     for (from, to, key, mend) in [
         ("pan_limit_deg = 15.0", "pan_limit = 15.0", "head.pan_limit", "pan_limit_deg"),
         ("pan_limit_deg = 15.0", "pan_limit_deg = -1.0", "head.pan_limit_deg", "from 0"),

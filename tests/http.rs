@@ -4,6 +4,8 @@
 #[path = "http/support.rs"]
 mod support;
 
+#[path = "http/choices.rs"]
+mod choices;
 #[path = "http/errors.rs"]
 mod errors;
 #[path = "http/openapi.rs"]

@@ -3,15 +3,16 @@
 use rand_chacha::ChaCha8Rng;
 use web_time::Instant;
 
+use super::choice::{AppraisalReport, Choice, ChoiceError};
 use super::{
     metrics::{self, Evaluation, Metrics},
     report::{GazeReport, LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
     world::World,
 };
 use crate::{
-    estimation::{Estimator, Update},
+    estimation::{Belief, Estimator, Update},
     kinematics::Chain,
-    selection::{Actions, Policy, Selection, SelectionError, Weights},
+    selection::{ACriterion, Actions, Policy, Selection, SelectionError, Sight, Visibility, Weights},
     sensing::Observation,
 };
 
@@ -34,6 +35,8 @@ pub struct Learner {
     pub workspace: Vec<Vec<f64>>,
     /// It calls itself settled when its expected prediction error stays below this, metres.
     pub settled_below_m: f64,
+    /// What it believed before its last movement; at the start, what it believes.
+    pub before: Belief,
     /// Random numbers of its policy.
     pub rng: ChaCha8Rng,
     /// How it has fared.
@@ -75,7 +78,8 @@ impl Learner {
     ) -> (MovementReport, Update) {
         let truth = world.truth();
         let configuration = selection.movement.configuration.clone();
-        let predicted = self.estimator.belief().chain.marker_at(&configuration);
+        self.before = self.estimator.belief().clone();
+        let predicted = self.before.chain.marker_at(&configuration);
         self.policy.observe(&selection.movement, &self.actions, observation);
         self.actions.use_up(&selection.movement);
         self.record.movements += 1;
@@ -99,6 +103,35 @@ impl Learner {
             partition: selection.partition,
         };
         (report, update)
+    }
+
+    /// How its last movement was chosen, as far as DIRECT chose it.
+    pub(super) fn choice(&self, step: u64, report: &LearnerReport) -> Result<Choice, ChoiceError> {
+        let not_searched = || ChoiceError::NotSearched(self.description.name.clone());
+        let movement = report.movement.as_ref().ok_or_else(not_searched)?;
+        let partition = movement.partition.as_ref().ok_or_else(not_searched)?;
+        let settings = self.policy.direct().ok_or_else(not_searched)?;
+        let traces = [&self.before, self.estimator.belief()]
+            .map(|belief| belief.covariance.as_ref().map(|covariance| self.weights.trace(covariance)));
+        Choice::of(step, report, movement, partition, settings, traces)
+    }
+
+    /// What another movement would have taught instead of the last one, within the joints' `limits`.
+    pub(super) fn appraise(
+        &self,
+        configuration: &[f64],
+        limits: &[(f64, f64)],
+        world: &World,
+    ) -> Result<AppraisalReport, ChoiceError> {
+        let unseen = world.head().map(|head| Visibility::new(*head));
+        let visibility = self.policy.visibility().or(unseen.as_ref());
+        let criterion = ACriterion::new(&self.before, &self.weights)?;
+        let criterion = match visibility {
+            Some(visibility) => criterion.watched(Sight::Chance(visibility, limits)),
+            None => criterion,
+        };
+        let appraisal = criterion.appraise(configuration)?;
+        Ok(AppraisalReport::of(configuration, criterion.trace(), &appraisal))
     }
 
     /// The learner as it stands, judged against the truth where one is known.

@@ -4,6 +4,7 @@
 //! learners start from the same estimate and see the same noise. One [`StepReport`] per step is all that the outside
 //! reads.
 
+mod choice;
 mod comparison;
 mod convergence;
 mod learner;
@@ -13,6 +14,9 @@ mod result;
 mod streams;
 mod world;
 
+pub use choice::{
+    AppraisalReport, BoxReport, Choice, ChoiceError, ChosenReport, IterationReport, SearchedJoint, ShapeReport,
+};
 pub use comparison::{
     Comparison, Curve, LearnerComparison, Quantiles, RunSummary, SeedRun, SelectionTime, Summary, Trace,
 };

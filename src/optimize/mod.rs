@@ -101,5 +101,6 @@ mod direct;
 pub use bayesian::bayesian;
 
 pub use direct::{
-    Batch, Direct, DirectError, HullPoint, MAX_LEVEL, Minimum, Partition, Rectangle, Settings, Variant, minimize,
+    Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Minimum, Moment, Partition, Rectangle, Settings, Shape,
+    Variant, minimize,
 };

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     experiment::{Comparison, Experiment, ExperimentError, Trace},
-    optimize::{Direct, DirectError, Settings},
+    optimize::History,
     scenario::{Scenario, edited},
 };
 
@@ -126,7 +126,7 @@ impl Measurement<'_> {
             .and_then(|movement| movement.partition.clone())
             .ok_or_else(|| self.impossible("nothing was searched"))?;
         let values: Vec<f64> = partition.leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)).collect();
-        let direct = replay(scenario.robot.limits.len(), scenario.selection.search, &values)?;
+        let direct = History::replay(scenario.robot.limits.len(), scenario.selection.search, &values)?.search;
         (self.tick)();
         Ok(Search {
             variant: variant.to_owned(),
@@ -142,15 +142,4 @@ impl Measurement<'_> {
             partition,
         })
     }
-}
-
-/// A search that is told values recorded in the order in which they were asked.
-fn replay(dimension: usize, settings: Settings, values: &[f64]) -> Result<Direct, DirectError> {
-    let mut direct = Direct::new(dimension, settings)?;
-    while let Some(asked) = direct.ask().map(|batch| batch.len()) {
-        let told = direct.evaluations();
-        let Some(batch) = values.get(told..told + asked) else { break };
-        direct.tell(batch)?;
-    }
-    Ok(direct)
 }

@@ -180,6 +180,7 @@ impl Scenario {
                     }
                     EstimatorKind::Gradient => Box::new(Gradient::new(belief, self.gradient_rate)),
                 };
+                let before = estimator.belief().clone();
                 let policy = self.policy(spec.policy, &weights, briefing.watch.clone());
                 Learner {
                     description: spec.description(),
@@ -189,6 +190,7 @@ impl Scenario {
                     weights: weights.clone(),
                     workspace: briefing.workspace.clone(),
                     settled_below_m: self.settled_below_m,
+                    before,
                     rng: Stream::Policy.rng(seed),
                     record: Record::default(),
                 }

@@ -252,6 +252,14 @@ impl Policy for Active {
         }
     }
 
+    fn visibility(&self) -> Option<&Visibility> {
+        self.watch.as_ref().map(|watch| &watch.visibility)
+    }
+
+    fn direct(&self) -> Option<Settings> {
+        if let Search::Direct(settings) = self.search { Some(settings) } else { None }
+    }
+
     fn observe(&mut self, movement: &Movement, actions: &Actions, observation: &Observation) {
         let Some(watch) = &mut self.watch else { return };
         watch.has_moved = true;

@@ -73,6 +73,21 @@ pub struct ACriterion<'a> {
     sight: Option<Sight<'a>>,
 }
 
+/// What one movement would teach, under one belief.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Appraisal {
+    /// C(θ); tr(W P) itself where the marker is certainly out of view.
+    pub criterion: f64,
+    /// tr(W P) − C(θ).
+    pub gain: f64,
+    /// The predicted marker h(x̂, θ), metres.
+    pub marker: Point3<f64>,
+    /// Its covariance H P Hᵀ, m².
+    pub marker_covariance: Matrix3<f64>,
+    /// The believed chance that it is seen; 1 where no head watches.
+    pub chance: f64,
+}
+
 /// Candidates per batch product: enough to fill the matrix kernel, few enough to share among cores.
 const CHUNK: usize = 32;
 
@@ -102,6 +117,20 @@ impl<'a> ACriterion<'a> {
             return candidates.par_chunks(CHUNK).flat_map_iter(|chunk| self.evaluate_chunk(chunk)).collect();
         }
         candidates.chunks(CHUNK).flat_map(|chunk| self.evaluate_chunk(chunk)).collect()
+    }
+
+    /// The criterion of one candidate and what it rests on; an error if it is not a number.
+    pub fn appraise(&self, candidate: &[f64]) -> Result<Appraisal, SelectionError> {
+        let marker = self.belief.chain.marker_at(candidate);
+        let marker_covariance = self.belief.marker_covariance(candidate).ok_or(SelectionError::NoCovariance)?;
+        let chance = self.chance(candidate, &marker, &marker_covariance);
+        let value = self.evaluate(&[candidate]).first().copied().filter(|value| value.is_finite());
+        let criterion = match value {
+            Some(value) => value,
+            None if chance == 0.0 && self.trace.is_finite() => self.trace,
+            None => return Err(SelectionError::NoFiniteCriterion),
+        };
+        Ok(Appraisal { criterion, gain: self.trace - criterion, marker, marker_covariance, chance })
     }
 
     fn evaluate_chunk<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {

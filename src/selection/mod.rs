@@ -16,11 +16,15 @@ pub(crate) use random::draw_configuration;
 use rand_chacha::ChaCha8Rng;
 
 pub use active::{Active, Leaf, Partition, Search};
-pub use criterion::{ACriterion, CriterionUnits, Sight, Weights};
+pub use criterion::{ACriterion, Appraisal, CriterionUnits, Sight, Weights};
 pub use random::Random;
 pub use visibility::{Visibility, Watch};
 
-use crate::{estimation::Belief, optimize::DirectError, sensing::Observation};
+use crate::{
+    estimation::Belief,
+    optimize::{DirectError, Settings},
+    sensing::Observation,
+};
 
 /// The movements that may be chosen now.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,4 +110,14 @@ pub trait Policy: Send {
     /// Learns what came of a movement that it chose among `actions`. An estimator learns nothing from a miss; a policy
     /// may.
     fn observe(&mut self, _movement: &Movement, _actions: &Actions, _observation: &Observation) {}
+
+    /// What it believes to be in view, if a head watches it.
+    fn visibility(&self) -> Option<&Visibility> {
+        None
+    }
+
+    /// The settings of the DIRECT that searches for it, if one does.
+    fn direct(&self) -> Option<Settings> {
+        None
+    }
 }

@@ -20,8 +20,8 @@ pub struct Watch {
 const RADIUS: f64 = 0.15;
 /// Misses that are remembered, the latest ones.
 const MEMORY: usize = 50;
-/// κ², by which the believed covariance of the marker is widened. Linearised at a poor estimate it is too small: of
-/// κ² = 1, 2, 4, 9 and 16 four served best (`head-fov`, seeds 1001 to 1040).
+/// κ², by which the believed covariance of the marker is widened: linearised at a poor estimate it is too small. Of 4, 9
+/// and 16 four served best (`head-fov`, seeds 1001 to 1040); 1 and 2 did no better on a first look.
 const CAUTION: f64 = 4.0;
 
 /// The chance that the marker is seen after a movement, as believed before it:
@@ -30,9 +30,10 @@ const CAUTION: f64 = 4.0;
 /// p(θ) = P(marker in view | marker ~ N(h(θ), κ² H P Hᵀ)) × Πₖ (1 − exp(−‖u(θ) − u(θₖ)‖² / 2ρ²))
 /// ```
 ///
-/// The first factor is [`Head::chance`], with κ = 2, as a filter that linearises is surer than it should be. The second discounts what lies near the latest misses θₖ, with u the position
-/// in the joint box scaled to the unit cube and ρ = 0.15: a miss changes no estimate, so without it a learner that
-/// wrongly believes the marker in view would choose the same movement again and again.
+/// The first factor is [`Head::chance`], with κ = 2, as a filter that linearises is surer than it should be. The
+/// second discounts what lies near the latest misses θₖ, with u the position in the joint box scaled to the unit cube and
+/// ρ = 0.15: a miss changes no estimate, so without it a learner that wrongly believes the marker in view would choose
+/// the same movement again and again.
 #[derive(Clone, Debug)]
 pub struct Visibility {
     head: Head,

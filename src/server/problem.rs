@@ -7,7 +7,7 @@ use axum::{
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::scenario::ScenarioError;
+use crate::{experiment::ChoiceError, scenario::ScenarioError};
 
 /// Media type of every error.
 pub const PROBLEM_JSON: &str = "application/problem+json";
@@ -44,8 +44,10 @@ pub(super) enum Kind {
     UnknownRoute,
     UnknownScenario,
     UnknownSession,
+    UnknownLearner,
     MethodNotAllowed,
     StepMismatch,
+    NothingToShow,
     BodyTooLarge,
     UnsupportedMediaType,
     InvalidValue,
@@ -70,8 +72,10 @@ impl Kind {
             Self::UnknownRoute => (404, urn!("unknown-route"), "There is nothing here"),
             Self::UnknownScenario => (404, urn!("unknown-scenario"), "There is no such scenario"),
             Self::UnknownSession => (404, urn!("unknown-session"), "There is no such session"),
+            Self::UnknownLearner => (404, urn!("unknown-learner"), "There is no such learner"),
             Self::MethodNotAllowed => (405, urn!("method-not-allowed"), "This method is not allowed here"),
             Self::StepMismatch => (409, urn!("step-mismatch"), "The session is at another step"),
+            Self::NothingToShow => (409, urn!("nothing-to-show"), "There is nothing to show yet"),
             Self::BodyTooLarge => (413, urn!("body-too-large"), "The body is too large"),
             Self::UnsupportedMediaType => (415, urn!("unsupported-media-type"), "The body is not JSON"),
             Self::InvalidValue => (422, urn!("invalid-value"), "A value is not valid"),
@@ -122,6 +126,20 @@ impl From<ScenarioError> for Problem {
             }
         };
         Self::new(Kind::InvalidValue, error.to_string()).field(field)
+    }
+}
+
+/// A question about a choice that has no answer.
+impl From<ChoiceError> for Problem {
+    fn from(error: ChoiceError) -> Self {
+        let (kind, field) = match &error {
+            ChoiceError::UnknownLearner { .. } => (Kind::UnknownLearner, Some("name")),
+            ChoiceError::Configuration(_) => (Kind::InvalidValue, Some("configuration")),
+            ChoiceError::NotSearched(_) | ChoiceError::Selection(_) => (Kind::NothingToShow, None),
+            ChoiceError::Search(_) => (Kind::Internal, None),
+        };
+        let problem = Self::new(kind, error.to_string());
+        field.into_iter().fold(problem, Self::field)
     }
 }
 

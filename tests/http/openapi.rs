@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::support::{Server, timeless};
 
-const ROUTES: [(&str, &str); 15] = [
+const ROUTES: [(&str, &str); 17] = [
     ("get", "/v1/scenarios"),
     ("get", "/v1/scenarios/{name}"),
     ("get", "/v1/sessions"),
@@ -13,6 +13,8 @@ const ROUTES: [(&str, &str); 15] = [
     ("get", "/v1/sessions/{id}"),
     ("delete", "/v1/sessions/{id}"),
     ("post", "/v1/sessions/{id}/steps"),
+    ("get", "/v1/sessions/{id}/learners/{name}/selection"),
+    ("post", "/v1/sessions/{id}/learners/{name}/evaluations"),
     ("get", "/v1/sessions/{id}/events"),
     ("get", "/v1/sessions/{id}/live"),
     ("get", "/v1/sessions/{id}/live.rrd"),

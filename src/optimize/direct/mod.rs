@@ -1,6 +1,7 @@
 //! DIRECT and DIRECT-l; the parent module documents the algorithms.
 
 mod classes;
+mod history;
 mod hull;
 mod lineage;
 mod minimize;
@@ -9,6 +10,7 @@ mod search;
 mod settings;
 mod ternary;
 
+pub use history::{History, Moment, Shape};
 pub use hull::HullPoint;
 pub use minimize::{Batch, Minimum, minimize};
 pub use partition::{Partition, Rectangle};

@@ -141,6 +141,11 @@ impl Direct {
         self.best.map(|(rectangle, value)| (self.rectangles.centre(rectangle), value))
     }
 
+    /// The number of the best rectangle in the [partition](Self::partition).
+    pub fn best_rectangle(&self) -> Option<usize> {
+        self.best.map(|(rectangle, _)| rectangle)
+    }
+
     /// How many values have been told.
     pub fn evaluations(&self) -> usize {
         self.rectangles.len()

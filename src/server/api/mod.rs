@@ -1,5 +1,6 @@
 //! The routes under `/v1`, and what OpenAPI says of them.
 
+mod choices;
 mod downloads;
 mod scenarios;
 mod sessions;
@@ -75,6 +76,8 @@ pub(super) fn routes() -> (Router<Arc<App>>, Bytes) {
         .routes(routes!(sessions::list, sessions::create))
         .routes(routes!(sessions::get, sessions::delete))
         .routes(routes!(sessions::step))
+        .routes(routes!(choices::selection))
+        .routes(routes!(choices::evaluate))
         .routes(routes!(streams::events))
         .routes(routes!(streams::live))
         .routes(routes!(streams::live_recording))

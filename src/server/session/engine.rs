@@ -15,7 +15,7 @@ use uuid::Uuid;
 
 use super::Shared;
 use crate::{
-    experiment::{Description, Experiment, RunResult, StepReport},
+    experiment::{AppraisalReport, Choice, Description, Experiment, RunResult, StepReport},
     recording::{Recorder, Target},
     scenario::builtin,
     server::{
@@ -54,6 +54,17 @@ pub(super) enum Command {
     },
     Result {
         reply: Reply<RunResult>,
+    },
+    /// How a learner's last movement was chosen.
+    Choice {
+        learner: String,
+        reply: Reply<Choice>,
+    },
+    /// What another movement would have taught it.
+    Appraise {
+        learner: String,
+        configuration: Vec<f64>,
+        reply: Reply<AppraisalReport>,
     },
     /// Completes the recording so far.
     Flush {
@@ -133,6 +144,12 @@ impl Engine<'_> {
                 drop(reply.send(outcome));
             }
             Command::Result { reply } => drop(reply.send(Ok(self.experiment.result()))),
+            Command::Choice { learner, reply } => {
+                drop(reply.send(self.experiment.choice(&learner).map_err(Problem::from)));
+            }
+            Command::Appraise { learner, configuration, reply } => {
+                drop(reply.send(self.experiment.appraise(&learner, &configuration).map_err(Problem::from)));
+            }
             Command::Flush { reply } => drop(reply.send(self.flush(recorder))),
             Command::Wake => {}
             #[cfg(test)]

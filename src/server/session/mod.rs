@@ -29,7 +29,7 @@ pub(super) use registry::Sessions;
 
 use super::problem::{Kind, Problem};
 use crate::{
-    experiment::{Description, RunResult, StepReport},
+    experiment::{AppraisalReport, Choice, Description, RunResult, StepReport},
     recording::LiveLog,
 };
 
@@ -188,6 +188,16 @@ impl Session {
     /// The outcome so far, after whatever the session is busy with.
     pub(super) async fn result(&self) -> Result<RunResult, Problem> {
         self.ask(|reply| Command::Result { reply }).await
+    }
+
+    /// How a learner's last movement was chosen, after whatever the session is busy with.
+    pub(super) async fn choice(&self, learner: String) -> Result<Choice, Problem> {
+        self.ask(|reply| Command::Choice { learner, reply }).await
+    }
+
+    /// What another movement would have taught a learner, after whatever the session is busy with.
+    pub(super) async fn appraise(&self, learner: String, configuration: Vec<f64>) -> Result<AppraisalReport, Problem> {
+        self.ask(|reply| Command::Appraise { learner, configuration, reply }).await
     }
 
     /// Completes the recording so far, after whatever the session is busy with. That of a failed engine is complete.

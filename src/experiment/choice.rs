@@ -1,0 +1,306 @@
+//! How a movement was chosen, and what another one would have taught: the questions of whoever looks on.
+
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Experiment,
+    report::{LearnerReport, MovementReport, array},
+};
+use crate::{
+    optimize::{DirectError, History, Settings, Variant},
+    selection::{Appraisal, Partition, SelectionError},
+};
+
+/// Why there is no answer.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ChoiceError {
+    /// No such learner.
+    #[error("there is no learner `{name}`; there are {known}")]
+    UnknownLearner {
+        /// The name asked for.
+        name: String,
+        /// Those that there are.
+        known: String,
+    },
+    /// The last movement was not found by DIRECT.
+    #[error("the last movement of `{0}` was not chosen by DIRECT: it has not moved yet, or its policy is another")]
+    NotSearched(String),
+    /// A configuration that this robot does not have.
+    #[error("`configuration` {0}")]
+    Configuration(String),
+    /// The criterion cannot be computed.
+    #[error(transparent)]
+    Selection(#[from] SelectionError),
+    /// The search cannot be repeated.
+    #[error("DIRECT: {0}")]
+    Search(#[from] DirectError),
+}
+
+/// How DIRECT chose a learner's last movement, iteration by iteration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct Choice {
+    /// The step of the movement.
+    pub step: u64,
+    /// The learner.
+    pub learner: String,
+    /// `direct` or `direct-l`.
+    pub variant: String,
+    /// Its ε.
+    pub epsilon: f64,
+    /// The joints, which span the unit cube.
+    pub joints: Vec<SearchedJoint>,
+    /// tr(W P) before the movement.
+    pub trace: Option<f64>,
+    /// Evaluations of the criterion.
+    pub evaluations: usize,
+    /// What was chosen.
+    pub chosen: ChosenReport,
+    /// All rectangles, in the order of their evaluation, by which they are numbered.
+    pub boxes: Vec<BoxReport>,
+    /// The iterations; the first holds the undivided cube.
+    pub iterations: Vec<IterationReport>,
+}
+
+/// A joint as DIRECT sees it: from 0 at its lower limit to 1 at its upper.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct SearchedJoint {
+    /// Its name.
+    pub name: String,
+    /// Its limits, rad (revolute) or m (prismatic).
+    pub limits: [f64; 2],
+}
+
+/// The movement that was chosen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct ChosenReport {
+    /// The rectangle at whose centre it is.
+    #[serde(rename = "box")]
+    pub rectangle: usize,
+    /// The configuration, rad or m per joint.
+    pub configuration: Vec<f64>,
+    /// The same in the unit cube.
+    pub point: Vec<f64>,
+    /// C(θ).
+    pub criterion: Option<f64>,
+    /// tr(W P) − C(θ): by how much the trace was expected to fall.
+    pub predicted_gain: Option<f64>,
+    /// By how much it fell; the stabilising noise lets it rise again.
+    pub realised_gain: Option<f64>,
+}
+
+/// A rectangle of DIRECT.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct BoxReport {
+    /// Its centre in the unit cube.
+    pub centre: Vec<f64>,
+    /// The criterion there; null if it is not finite (certainly out of view).
+    pub value: Option<f64>,
+    /// How it shrank.
+    pub shapes: Vec<ShapeReport>,
+}
+
+/// The shape of a rectangle from the end of an iteration on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct ShapeReport {
+    /// The iteration; that of the first shape is the rectangle's birth.
+    pub iteration: usize,
+    /// Side i is 3^−levels\[i\] long.
+    pub levels: Vec<u8>,
+}
+
+/// DIRECT at the end of an iteration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct IterationReport {
+    /// Counted from 0, the undivided cube.
+    pub iteration: usize,
+    /// Evaluations so far.
+    pub evaluations: usize,
+    /// The best criterion so far.
+    pub best: Option<f64>,
+    /// Its rectangle.
+    pub best_box: Option<usize>,
+    /// The potentially optimal rectangles, which the next iteration divides.
+    pub hull: Vec<usize>,
+    /// All vertices of the lower right hull, from the largest size to the smallest, whether or not they passed the ε
+    /// test.
+    pub lower_right_hull: Vec<usize>,
+}
+
+/// What a movement would have taught instead of the last one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct AppraisalReport {
+    /// The configuration, rad or m per joint.
+    pub configuration: Vec<f64>,
+    /// C(θ) under the belief before the last movement.
+    pub criterion: f64,
+    /// tr(W P) − C(θ).
+    pub gain: f64,
+    /// tr(W P).
+    pub trace: f64,
+    /// The predicted marker, metres.
+    pub predicted_marker_m: [f64; 3],
+    /// Its covariance, m², row by row.
+    pub marker_covariance_m2: [[f64; 3]; 3],
+    /// The believed chance of seeing it; 1 where no head watches.
+    pub chance_of_being_seen: f64,
+}
+
+impl AppraisalReport {
+    pub(super) fn of(configuration: &[f64], trace: f64, appraisal: &Appraisal) -> Self {
+        let rows = |matrix: &Matrix3<f64>| [0, 1, 2].map(|row| [0, 1, 2].map(|column| matrix[(row, column)]));
+        Self {
+            configuration: configuration.to_vec(),
+            criterion: appraisal.criterion,
+            gain: appraisal.gain,
+            trace,
+            predicted_marker_m: array(&appraisal.marker.coords),
+            marker_covariance_m2: rows(&appraisal.marker_covariance),
+            chance_of_being_seen: appraisal.chance,
+        }
+    }
+}
+
+impl Choice {
+    /// `traces` are tr(W P) before and after the movement. The joints are left to the caller, who knows their names.
+    pub(super) fn of(
+        step: u64,
+        report: &LearnerReport,
+        movement: &MovementReport,
+        partition: &Partition,
+        settings: Settings,
+        traces: [Option<f64>; 2],
+    ) -> Result<Self, ChoiceError> {
+        let values: Vec<f64> = partition.leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)).collect();
+        let dimension = partition.leaves.first().map_or(0, |leaf| leaf.centre.len());
+        let history = History::replay(dimension, settings, &values)?;
+        let boxes: Vec<BoxReport> = partition
+            .leaves
+            .iter()
+            .zip(history.shapes)
+            .map(|(leaf, shapes)| BoxReport {
+                centre: leaf.centre.clone(),
+                value: leaf.value,
+                shapes: shapes
+                    .into_iter()
+                    .map(|shape| ShapeReport { iteration: shape.iteration, levels: shape.levels })
+                    .collect(),
+            })
+            .collect();
+        let iterations = history.moments.into_iter().enumerate().map(|(iteration, moment)| IterationReport {
+            iteration,
+            evaluations: moment.evaluations,
+            best: moment.best.and_then(|best| boxes.get(best)?.value),
+            best_box: moment.best,
+            hull: moment.potentially_optimal,
+            lower_right_hull: moment.hull.iter().map(|point| point.rectangle).collect(),
+        });
+        let [before, after] = traces;
+        Ok(Self {
+            step,
+            learner: report.name.clone(),
+            variant: match settings.variant {
+                Variant::Original => "direct",
+                Variant::LocallyBiased => "direct-l",
+            }
+            .to_owned(),
+            epsilon: settings.epsilon,
+            joints: Vec::new(),
+            trace: before,
+            evaluations: movement.evaluations,
+            chosen: ChosenReport {
+                rectangle: partition.chosen,
+                configuration: movement.configuration.clone(),
+                point: partition.leaves.get(partition.chosen).map(|leaf| leaf.centre.clone()).unwrap_or_default(),
+                criterion: movement.criterion,
+                predicted_gain: movement.gain,
+                realised_gain: before.zip(after).map(|(before, after)| before - after),
+            },
+            iterations: iterations.collect(),
+            boxes,
+        })
+    }
+}
+
+impl Experiment {
+    /// How DIRECT chose the last movement of a learner.
+    pub fn choice(&self, learner: &str) -> Result<Choice, ChoiceError> {
+        let index = self.index_of(learner)?;
+        let choice = self.learners[index].choice(self.latest.step, &self.latest.learners[index])?;
+        let joints = self.description.joints.iter();
+        let joints = joints.map(|joint| SearchedJoint { name: joint.name.clone(), limits: joint.limits }).collect();
+        Ok(Choice { joints, ..choice })
+    }
+
+    /// What a movement to `configuration` (rad or m per joint) would have taught a learner instead of its last one;
+    /// before the first movement, what it would teach now.
+    pub fn appraise(&self, learner: &str, configuration: &[f64]) -> Result<AppraisalReport, ChoiceError> {
+        let index = self.index_of(learner)?;
+        let joints = &self.description.joints;
+        if configuration.len() != joints.len() {
+            let (found, wanted) = (configuration.len(), joints.len());
+            return Err(ChoiceError::Configuration(format!("has {found} numbers; this robot has {wanted} joints")));
+        }
+        for (joint, q) in joints.iter().zip(configuration) {
+            let [lower, upper] = joint.limits;
+            // Half a thousandth of the range is forgiven to those who round.
+            let slack = 5e-4 * (upper - lower);
+            if !(*q >= lower - slack && *q <= upper + slack) {
+                let name = &joint.name;
+                let said = format!("has {q} for `{name}`, whose limits are {lower} and {upper} (rad or m)");
+                return Err(ChoiceError::Configuration(said));
+            }
+        }
+        let limits: Vec<(f64, f64)> = joints.iter().map(|joint| (joint.limits[0], joint.limits[1])).collect();
+        self.learners[index].appraise(configuration, &limits, &self.world)
+    }
+
+    fn index_of(&self, learner: &str) -> Result<usize, ChoiceError> {
+        self.description.learners.iter().position(|known| known.name == learner).ok_or_else(|| {
+            let known: Vec<&str> = self.description.learners.iter().map(|known| known.name.as_str()).collect();
+            ChoiceError::UnknownLearner { name: learner.to_owned(), known: known.join(", ") }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{experiment::ChoiceError, scenario::builtin};
+
+    #[test]
+    fn the_chosen_movement_is_the_best_of_its_search_and_of_its_appraisal() {
+        for (name, steps) in [("arm-6dof", 3), ("head-fov", 6)] {
+            let mut experiment = builtin(name).and_then(|s| s.experiment(4, None)).expect("starts");
+            assert!(matches!(experiment.choice("active"), Err(ChoiceError::NotSearched(_))));
+            for _ in 0..steps {
+                experiment.step().expect("a step");
+            }
+            let choice = experiment.choice("active").expect("searched by DIRECT");
+            let last = choice.iterations.last().expect("iterations");
+            assert_eq!((last.best_box, last.best), (Some(choice.chosen.rectangle), choice.chosen.criterion));
+            assert_eq!(choice.boxes.len(), choice.evaluations);
+            let same = experiment.appraise("active", &choice.chosen.configuration).expect("an appraisal");
+            let (found, chosen) = (same.criterion, choice.chosen.criterion.expect("a criterion"));
+            assert!((found - chosen).abs() < 0.02 * same.trace, "{name}: {found} {chosen}");
+            let other = experiment.appraise("active", &vec![0.0; choice.joints.len()]).expect("an appraisal");
+            assert!(other.gain <= same.gain * 1.02, "{name}: {} {}", other.gain, same.gain);
+            assert!(matches!(experiment.choice("random"), Err(ChoiceError::NotSearched(_))));
+            assert!(experiment.appraise("random", &choice.chosen.configuration).is_ok(), "it has a covariance too");
+            assert!(matches!(
+                experiment.appraise("gradient", &choice.chosen.configuration),
+                Err(ChoiceError::Selection(_))
+            ));
+            for wrong in [vec![0.0], vec![f64::NAN; choice.joints.len()], vec![9.0; choice.joints.len()]] {
+                assert!(matches!(experiment.appraise("active", &wrong), Err(ChoiceError::Configuration(_))));
+            }
+            assert!(matches!(experiment.choice("nobody"), Err(ChoiceError::UnknownLearner { .. })));
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Why this posture: how a movement was chosen, and what another would have taught.
+
+use std::sync::Arc;
+
+use axum::{
+    extract::{Path, State},
+    response::Response,
+};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::json;
+use crate::{
+    experiment::{AppraisalReport, Choice},
+    server::{App, extract::JsonBody, problem::Problem},
+};
+
+/// A posture to be appraised.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EvaluationRequest {
+    /// One position per joint, rad (revolute) or m (prismatic), within its limits.
+    pub configuration: Vec<f64>,
+}
+
+/// How DIRECT chose a learner's last movement: every rectangle and every iteration.
+#[utoipa::path(get, path = "/v1/sessions/{id}/learners/{name}/selection", tag = "sessions",
+    operation_id = "getSelection",
+    params(
+        ("id" = String, Path, description = "The session's id", format = "uuid"),
+        ("name" = String, Path, description = "The learner's name"),
+    ),
+    responses(
+        (status = 200, description = "The search that chose the last movement", body = Choice),
+        (status = 404, description = "There is no such session or learner", body = Problem),
+        (status = 409, description = "The last movement was not chosen by DIRECT, or there is none", body = Problem),
+        (status = 500, description = "The session's engine has failed", body = Problem),
+    )
+)]
+pub(super) async fn selection(
+    State(app): State<Arc<App>>,
+    Path((id, name)): Path<(String, String)>,
+) -> Result<Response, Problem> {
+    json(app.sessions.get(&id)?.choice(name).await?).await
+}
+
+/// What a posture of your own would have taught instead of the last movement.
+#[utoipa::path(post, path = "/v1/sessions/{id}/learners/{name}/evaluations", tag = "sessions",
+    operation_id = "evaluateConfiguration",
+    params(
+        ("id" = String, Path, description = "The session's id", format = "uuid"),
+        ("name" = String, Path, description = "The learner's name"),
+    ),
+    request_body = EvaluationRequest,
+    responses(
+        (status = 200, description = "The criterion there, the marker predicted there and the chance of seeing it, \
+            under the belief before the last movement", body = AppraisalReport),
+        (status = 400, description = "The body is not JSON", body = Problem),
+        (status = 403, description = "The request comes from a foreign page", body = Problem),
+        (status = 404, description = "There is no such session or learner", body = Problem),
+        (status = 409, description = "The learner keeps no covariance, so that nothing can be said", body = Problem),
+        (status = 413, description = "The body is too large", body = Problem),
+        (status = 415, description = "The body is not said to be JSON", body = Problem),
+        (status = 422, description = "A value is not valid; `field` names it", body = Problem),
+        (status = 500, description = "The session's engine has failed", body = Problem),
+    )
+)]
+pub(super) async fn evaluate(
+    State(app): State<Arc<App>>,
+    Path((id, name)): Path<(String, String)>,
+    JsonBody(request): JsonBody<EvaluationRequest>,
+) -> Result<Response, Problem> {
+    json(app.sessions.get(&id)?.appraise(name, request.configuration).await?).await
+}
