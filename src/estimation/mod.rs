@@ -5,16 +5,20 @@
 //! * [`Rls`]: recursive least squares, (2)–(5) of the paper: an extended Kalman filter with a constant state.
 //! * [`SixNumbers`]: the same in the paper's over-parameterised coordinates, for comparison.
 //! * [`Gradient`]: the stochastic gradient, the paper's baseline.
+//! * [`Smoother`]: maximum a posteriori over all measurements, with several hypotheses.
 
 mod belief;
 mod gradient;
 mod rls;
 mod six_numbers;
+mod smoother;
 
-pub use belief::Belief;
+pub use belief::{Alternative, Belief};
 pub use gradient::Gradient;
 pub use rls::{Rls, StabilisingNoise};
 pub use six_numbers::SixNumbers;
+pub(crate) use smoother::anywhere;
+pub use smoother::{HypothesisSettings, Prior, Smoother};
 
 use crate::sensing::Observation;
 

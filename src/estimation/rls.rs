@@ -129,7 +129,7 @@ mod tests {
         let chain = random_chain(&mut rng, 6);
         let layout = Arc::new(TangentLayout::new(&chain.joints, &[], true));
         let covariance = DMatrix::identity(layout.dimension(), layout.dimension()) * 0.2;
-        let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-4 };
+        let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-4, alternatives: Vec::new() };
         (Rls::new(belief, covariance, stabilising), rng)
     }
 

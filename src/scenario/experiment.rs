@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Rotation3, UnitVector3, Vector3};
+use nalgebra::{DMatrix, DVector, Rotation3, UnitVector3, Vector3};
 use rand::{RngExt, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
 use super::{
     ErrorDraw, EstimatorKind, InitialError, LearnerSpec, PolicyKind, Prior, Recording, Scenario, ScenarioError,
-    WorldSpec,
+    SmootherSpec, WorldSpec,
 };
 use crate::{
-    estimation::{Belief, Estimator, Gradient, Rls, SixNumbers},
+    estimation::{self, Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, anywhere},
     experiment::{
         Change, Description, Evaluation, Experiment, HeadDescription, Learner, ModelReport, Record, Stream, World,
     },
@@ -41,9 +41,11 @@ impl Scenario {
         self.assemble(seed, &self.chosen(learners)?, world, evaluation, &briefing)
     }
 
-    /// The learners of these names, in this order.
+    /// The learners of these names, in this order; without names those that run by default.
     pub fn chosen(&self, names: Option<&[String]>) -> Result<Vec<LearnerSpec>, ScenarioError> {
-        let Some(names) = names else { return Ok(self.learners.clone()) };
+        let Some(names) = names else { 
+            return Ok(self.learners.iter().filter(|spec| spec.by_default).cloned().collect());
+        };
         if names.is_empty() {
             return Err(ScenarioError::NoLearner);
         }
@@ -131,6 +133,10 @@ impl Scenario {
         let layout = &self.robot.layout;
         for (index, joint) in chain.joints.iter_mut().enumerate().filter(|(index, _)| layout.is_learned(*index)) {
             debug_assert!(layout.direction(index).is_some());
+            if error.draw == ErrorDraw::Anywhere {
+                *joint = anywhere(joint, error.point_m, rng);
+                continue;
+            }
             let angles = error.draw(error.angle_rad, rng);
             let turn = Rotation3::from_euler_angles(angles.x, angles.y, angles.z);
             let turned = |w: &UnitVector3<f64>| UnitVector3::new_normalize(turn * w.into_inner());
@@ -167,6 +173,7 @@ impl Scenario {
                     layout: layout.clone(),
                     covariance: None,
                     noise_m2: self.filter.noise_m2,
+                    alternatives: Vec::new(),
                 };
                 let estimator: Box<dyn Estimator> = match spec.estimator {
                     EstimatorKind::Rls => {
@@ -177,6 +184,12 @@ impl Scenario {
                         let Prior { direction_rad, point_m, .. } = self.prior;
                         let stabilising = self.filter.stabilising.filter(|_| spec.stabilising);
                         Box::new(SixNumbers::new(belief, direction_rad, point_m, stabilising))
+                    }
+                    EstimatorKind::Smoother => {
+                        let SmootherSpec { noise_m2, hypotheses } = self.smoother;
+                        let prior = self.smoother_prior(&briefing.initial, &prior_sd);
+                        let rng = Stream::Hypotheses.rng(seed);
+                        Box::new(Smoother::new(prior, layout.clone(), noise_m2, hypotheses, rng))
                     }
                     EstimatorKind::Gradient => Box::new(Gradient::new(belief, self.gradient_rate)),
                 };
@@ -209,6 +222,19 @@ impl Scenario {
             head: briefing.watch.as_ref().map(|watch| HeadDescription::of(&watch.head)),
         };
         Ok(Experiment::new(description, world, learners, evaluation))
+    }
+}
+
+impl Scenario {
+    /// What a smoother is told: the initial estimate and how wrong it may be, or bounds alone.
+    fn smoother_prior(&self, initial: &Chain, deviations: &DVector<f64>) -> estimation::Prior {
+        match &self.world {
+            WorldSpec::Simulated { initial_error: InitialError { draw: ErrorDraw::Anywhere, point_m, .. }, .. } => {
+                let (frame, bound_m) = (initial.clone(), *point_m);
+                estimation::Prior::Within { frame, bound_m, marker_m: self.prior.marker_m }
+            }
+            _ => estimation::Prior::Around { guess: initial.clone(), deviations: deviations.clone() },
+        }
     }
 }
 
@@ -255,7 +281,7 @@ fn drawn(
 impl InitialError {
     fn draw(&self, size: f64, rng: &mut ChaCha8Rng) -> Vector3<f64> {
         Vector3::from_fn(|_, _| match self.draw {
-            ErrorDraw::UpTo => size * rng.random_range(-1.0..=1.0),
+            ErrorDraw::UpTo | ErrorDraw::Anywhere => size * rng.random_range(-1.0..=1.0),
             ErrorDraw::Exactly => size * if rng.random::<bool>() { 1.0 } else { -1.0 },
         })
     }

@@ -24,7 +24,7 @@ pub use error::{Problem, ScenarioError};
 pub use summary::{ScenarioSummary, WorldKind};
 
 use crate::{
-    estimation::StabilisingNoise,
+    estimation::{HypothesisSettings, StabilisingNoise},
     experiment::{LearnerDescription, Thresholds},
     kinematics::{Chain, Quantity, TangentLayout},
     optimize::Settings,
@@ -48,6 +48,8 @@ pub struct Scenario {
     pub prior: Prior,
     /// Values of the recursive least squares.
     pub filter: Filter,
+    /// Values of the smoother.
+    pub smoother: SmootherSpec,
     /// Rate η of the stochastic gradient.
     pub gradient_rate: f64,
     /// How movements are chosen actively.
@@ -142,6 +144,9 @@ pub enum ErrorDraw {
     UpTo,
     /// Minus or plus the size, with equal chance.
     Exactly,
+    /// No guess at all: directions uniform on the sphere, points uniform within plus and minus the size around the
+    /// origin. Nothing in it comes from the truth.
+    Anywhere,
 }
 
 /// Prior standard deviations in tangent coordinates.
@@ -179,6 +184,15 @@ pub struct Filter {
     pub stabilising: Option<StabilisingNoise>,
 }
 
+/// Values of the smoother.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SmootherSpec {
+    /// The measurement variance per coordinate that it assumes, m²: the sensor's own unless the file says otherwise.
+    pub noise_m2: f64,
+    /// How many hypotheses it keeps and searches.
+    pub hypotheses: HypothesisSettings,
+}
+
 /// How movements are chosen actively.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SelectionSpec {
@@ -199,6 +213,8 @@ pub struct LearnerSpec {
     pub policy: PolicyKind,
     /// Whether its filter adds the scenario's stabilising noise.
     pub stabilising: bool,
+    /// Whether it runs when no learner is named.
+    pub by_default: bool,
 }
 
 impl LearnerSpec {
@@ -221,6 +237,8 @@ pub enum EstimatorKind {
     RlsSixNumbers,
     /// Stochastic gradient.
     Gradient,
+    /// Maximum a posteriori over all measurements, with several hypotheses.
+    Smoother,
 }
 
 impl EstimatorKind {
@@ -230,11 +248,12 @@ impl EstimatorKind {
             Self::Rls => "rls",
             Self::RlsSixNumbers => "rls-six-numbers",
             Self::Gradient => "gradient",
+            Self::Smoother => "smoother",
         }
     }
 
     fn keeps_covariance(self) -> bool {
-        self == Self::Rls
+        matches!(self, Self::Rls | Self::Smoother)
     }
 }
 

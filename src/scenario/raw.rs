@@ -22,6 +22,7 @@ pub struct Scenario {
     pub change: Option<Spanned<Change>>,
     pub prior: Spanned<Prior>,
     pub filter: Filter,
+    pub smoother: Option<Smoother>,
     pub gradient: Gradient,
     pub selection: Selection,
     pub thresholds: Thresholds,
@@ -134,6 +135,14 @@ pub struct Filter {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
+pub struct Smoother {
+    pub measurement_variance_m2: Option<Spanned<f64>>,
+    pub hypotheses: Option<Spanned<u64>>,
+    pub spawned: Option<Spanned<u64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StabilisingNoise {
     pub variance: Spanned<f64>,
     pub first_step: Spanned<u64>,
@@ -190,6 +199,8 @@ pub struct Learner {
     pub estimator: EstimatorKind,
     pub policy: Spanned<PolicyKind>,
     pub stabilising_noise: Option<Spanned<bool>>,
+    #[serde(default = "yes")]
+    pub by_default: bool,
 }
 
 /// Reads the keys of `text`.

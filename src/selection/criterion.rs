@@ -173,7 +173,7 @@ mod tests {
         let units =
             if seed.is_multiple_of(2) { CriterionUnits::Prior } else { CriterionUnits::CharacteristicLength(0.3) };
         let weights = Weights::new(units, &layout, &prior_sd);
-        (Belief { chain, layout, covariance: Some(covariance), noise_m2: 1e-2 }, weights, rng)
+        (Belief { chain, layout, covariance: Some(covariance), noise_m2: 1e-2, alternatives: Vec::new() }, weights, rng)
     }
 
     /// The posterior that the criterion abbreviates, built the long way.
