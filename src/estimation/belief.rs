@@ -108,7 +108,8 @@ mod tests {
             let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-0.5..0.5));
             let covariance = &root * root.transpose();
             let along = rng.random_range(-0.8..0.8);
-            let belief = Belief { chain, layout, covariance: Some(covariance.clone()), noise_m2: 1.0, alternatives: Vec::new() };
+            let belief =
+                Belief { chain, layout, covariance: Some(covariance.clone()), noise_m2: 1.0, alternatives: Vec::new() };
             for (index, joint) in belief.chain.joints.iter().enumerate() {
                 let Joint::Revolute(line) = joint else {
                     assert!(belief.point_covariance(index, along).is_none());

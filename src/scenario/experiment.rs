@@ -43,7 +43,7 @@ impl Scenario {
 
     /// The learners of these names, in this order; without names those that run by default.
     pub fn chosen(&self, names: Option<&[String]>) -> Result<Vec<LearnerSpec>, ScenarioError> {
-        let Some(names) = names else { 
+        let Some(names) = names else {
             return Ok(self.learners.iter().filter(|spec| spec.by_default).cloned().collect());
         };
         if names.is_empty() {
@@ -193,7 +193,7 @@ impl Scenario {
                     }
                     EstimatorKind::Gradient => Box::new(Gradient::new(belief, self.gradient_rate)),
                 };
-                let policy = self.policy(spec.policy, &weights, briefing.watch.clone());
+                let policy = self.policy(spec, &weights, briefing.watch.clone());
                 Learner {
                     description: spec.description(),
                     estimator,
@@ -242,7 +242,8 @@ impl Scenario {
 const MONTE_CARLO_SAMPLES: usize = 16;
 
 impl Scenario {
-    fn policy(&self, kind: PolicyKind, weights: &Weights, watch: Option<Watch>) -> Box<dyn Policy> {
+    fn policy(&self, spec: &LearnerSpec, weights: &Weights, watch: Option<Watch>) -> Box<dyn Policy> {
+        let kind = spec.policy;
         let settings = self.selection.search;
         let evaluations = settings.max_evaluations;
         let search = match kind {
@@ -253,7 +254,10 @@ impl Scenario {
             PolicyKind::ActiveBayesian => Search::Bayesian { evaluations },
         };
         let samples = if kind == PolicyKind::ActiveMonteCarlo { MONTE_CARLO_SAMPLES } else { 0 };
-        let active = Active::new(weights.clone(), search).sampled(samples);
+        let mut active = Active::new(weights.clone(), search).sampled(samples);
+        if spec.estimator == EstimatorKind::Smoother && kind == PolicyKind::Active {
+            active = active.global(self.selection.global);
+        }
         Box::new(match watch {
             Some(watch) if kind == PolicyKind::ActiveNaive => active.watched_naively(watch),
             Some(watch) => active.watched(watch),

@@ -28,7 +28,7 @@ use crate::{
     experiment::{LearnerDescription, Thresholds},
     kinematics::{Chain, Quantity, TangentLayout},
     optimize::Settings,
-    selection::{CriterionUnits, Watch},
+    selection::{CriterionUnits, Global, Watch},
 };
 
 /// A validated scenario.
@@ -200,6 +200,8 @@ pub struct SelectionSpec {
     pub search: Settings,
     /// The units of the criterion.
     pub units: CriterionUnits,
+    /// How movements are planned for a belief with several hypotheses.
+    pub global: Global,
 }
 
 /// A learner that a scenario offers.

@@ -2,12 +2,15 @@
 //!
 //! * [`ACriterion`]: the expected posterior error of (7), in the form that never builds a posterior.
 //! * [`Policy`]: chooses among [`Actions`], the whole joint box or a list of recorded movements.
+//! * [`Outlook`]: the same under several hypotheses.
 //! * [`Active`]: minimises the criterion, by DIRECT over a box or by trying all of a list.
 //! * [`Visibility`]: where a head watches, the chance that the marker is seen, which weighs the gain.
 //! * [`Random`]: draws uniformly, the paper's comparison.
 
 mod active;
 mod criterion;
+mod outlook;
+mod plan;
 mod random;
 mod visibility;
 
@@ -15,8 +18,9 @@ pub(crate) use random::draw_configuration;
 
 use rand_chacha::ChaCha8Rng;
 
-pub use active::{Active, Leaf, Partition, Search};
+pub use active::{Active, Global, Leaf, Partition, Search};
 pub use criterion::{ACriterion, CriterionUnits, Sight, Weights};
+pub use outlook::Outlook;
 pub use random::Random;
 pub use visibility::{Visibility, Watch};
 

@@ -74,9 +74,10 @@ impl Hypotheses {
                 break;
             }
             let is_new = distinct.iter().all(|other| {
-                other.chain.local(layout, &mode.chain).is_none_or(|delta| {
-                    delta.dot(&(&other.information * &delta)) > MERGED
-                })
+                other
+                    .chain
+                    .local(layout, &mode.chain)
+                    .is_none_or(|delta| delta.dot(&(&other.information * &delta)) > MERGED)
             });
             if is_new {
                 distinct.push(mode);

@@ -24,8 +24,8 @@ use std::sync::Arc;
 use rand_chacha::ChaCha8Rng;
 
 pub use hypotheses::HypothesisSettings;
-pub(crate) use prior::anywhere;
 pub use prior::Prior;
+pub(crate) use prior::anywhere;
 
 use hypotheses::Hypotheses;
 use posterior::{Measurement, Posterior};

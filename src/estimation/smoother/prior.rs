@@ -180,7 +180,8 @@ pub(crate) fn anywhere(joint: &Joint, bound_m: f64, rng: &mut impl Rng) -> Joint
         nalgebra::UnitVector3::new_normalize(nalgebra::Vector3::new(radius * turn.cos(), radius * turn.sin(), height));
     match joint {
         Joint::Revolute(_) => {
-            let point = nalgebra::Point3::from(nalgebra::Vector3::from_fn(|_, _| bound_m * rng.random_range(-1.0..=1.0)));
+            let point =
+                nalgebra::Point3::from(nalgebra::Vector3::from_fn(|_, _| bound_m * rng.random_range(-1.0..=1.0)));
             Joint::Revolute(crate::kinematics::Line { point, direction })
         }
         Joint::Prismatic(_) => Joint::Prismatic(direction),

@@ -19,7 +19,7 @@ use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
     experiment::Thresholds,
     optimize::{Settings, Variant},
-    selection::CriterionUnits,
+    selection::{CriterionUnits, Global},
 };
 
 /// How far from 1 the length of an axis may be: what is lost by writing six digits.
@@ -209,7 +209,7 @@ impl Check<'_> {
             epsilon: self.not_negative("selection.epsilon", &raw.epsilon),
             max_evaluations: *evaluations.get_ref(),
         };
-        SelectionSpec { search, units }
+        SelectionSpec { search, units, global: Global::default() }
     }
 
     fn learners(&mut self, raw: &Spanned<Vec<raw::Learner>>, learns_marker: bool) -> Vec<LearnerSpec> {

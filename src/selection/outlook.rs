@@ -1,0 +1,175 @@
+//! The criterion under several hypotheses: the expectation in (7) taken seriously.
+//!
+//! A belief with alternatives is a mixture of chains xⱼ with weights πⱼ and covariances Pⱼ. Its error has two parts,
+//! the spread within the hypotheses and that between them:
+//!
+//! ```text
+//! tr(W P) = Σⱼ πⱼ tr(W Pⱼ) + Σⱼ<ₖ πⱼ πₖ ‖xⱼ − xₖ‖²_W
+//! ```
+//!
+//! A movement shrinks the first as in [`ACriterion`], and the second as far as it tells the hypotheses apart. For two
+//! hypotheses that predict the marker as N(hⱼ, Sⱼ) and N(hₖ, Sₖ) the chance of confusing them falls with the
+//! Bhattacharyya distance,
+//!
+//! ```text
+//! C(θ) = Σⱼ πⱼ [tr(W Pⱼ) − pⱼ tr(Sⱼ⁻¹ Gⱼ W Gⱼᵀ)] + Σⱼ<ₖ πⱼ πₖ ‖xⱼ − xₖ‖²_W (1 − p̄ (1 − e^{−B}))
+//! B = ⅛ (hⱼ − hₖ)ᵀ S̄⁻¹ (hⱼ − hₖ),   S̄ = (Sⱼ + Sₖ)/2
+//! ```
+//!
+//! so both parts are in the same units, and nothing is left to tune between them. pⱼ is the chance of being seen.
+//!
+//! *Caution.* Where a hypothesis is so unsure that its prediction is no longer linear in its error, the gain is
+//! fiction. The bend of a rotation by δ about a lever of length ℓ displaces a marker by ℓδ²/2 = s²/2ℓ where
+//! linearisation says s = ℓδ. That is taken for noise: `Sⱼ = Hⱼ Pⱼ Hⱼᵀ + R + κ (tr Hⱼ Pⱼ Hⱼᵀ)² I`.
+
+use nalgebra::{Matrix3, Point3};
+
+use super::{
+    ACriterion, SelectionError, Sight, Weights,
+    criterion::{CHUNK, Prediction},
+};
+use crate::{
+    estimation::Belief,
+    kinematics::{Chain, Joint, TangentLayout},
+    sensing::isotropic,
+};
+
+/// The criterion under a belief and its alternatives.
+pub struct Outlook<'a> {
+    hypotheses: Vec<(f64, ACriterion<'a>)>,
+    /// Pairs of hypotheses, and πⱼ πₖ ‖xⱼ − xₖ‖²_W.
+    pairs: Vec<(usize, usize, f64)>,
+    noise_m2: f64,
+    caution: f64,
+    trace: f64,
+}
+
+/// Hypotheses that the criterion looks at, the heaviest ones.
+const CONSIDERED: usize = 8;
+
+impl<'a> Outlook<'a> {
+    /// The criterion at `belief`, which must hold a covariance. `caution` is κ (m⁻²), 0 for blind faith in linearity.
+    pub fn new(belief: &'a Belief, weights: &'a Weights, caution: f64) -> Result<Self, SelectionError> {
+        let best = ACriterion::new(belief, weights)?;
+        let mut hypotheses = vec![(belief.weight(), best)];
+        let mut chains = vec![&belief.chain];
+        for alternative in belief.alternatives.iter().take(CONSIDERED - 1) {
+            let criterion = ACriterion::over(belief, &alternative.chain, &alternative.covariance, weights);
+            hypotheses.push((alternative.weight, criterion));
+            chains.push(&alternative.chain);
+        }
+        let total: f64 = hypotheses.iter().map(|(weight, _)| weight).sum();
+        hypotheses.iter_mut().for_each(|(weight, _)| *weight /= total);
+        let mut pairs = Vec::new();
+        for k in 0..chains.len() {
+            for j in 0..k {
+                let distance = squared_distance(chains[j], chains[k], &belief.layout, weights);
+                pairs.push((j, k, hypotheses[j].0 * hypotheses[k].0 * distance));
+            }
+        }
+        let within: f64 = hypotheses.iter().map(|(weight, criterion)| weight * criterion.trace()).sum();
+        let trace = within + pairs.iter().map(|pair| pair.2).sum::<f64>();
+        Ok(Self { hypotheses, pairs, noise_m2: belief.noise_m2, caution, trace })
+    }
+
+    /// The same after movements that will have told the pairs of hypotheses apart by these B.
+    pub(super) fn told(mut self, told: &[f64]) -> Self {
+        for (pair, told) in self.pairs.iter_mut().zip(told) {
+            let still = pair.2 * (-told).exp();
+            self.trace -= pair.2 - still;
+            pair.2 = still;
+        }
+        self
+    }
+
+    /// The chance of being seen under every hypothesis, and B of every pair, at one candidate.
+    pub(super) fn expectations(&self, candidate: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let predicted: Vec<Prediction> =
+            self.hypotheses.iter().flat_map(|(_, criterion)| criterion.predictions(&[candidate])).collect();
+        let covariances: Vec<Matrix3<f64>> = predicted.iter().map(|prediction| self.covariance(prediction)).collect();
+        let told = self.pairs.iter().map(|&(j, k, _)| {
+            let chance = 0.5 * (predicted[j].chance + predicted[k].chance);
+            let told =
+                told_apart(&predicted[j].marker, &predicted[k].marker, &((covariances[j] + covariances[k]) * 0.5));
+            -(-(chance * told).min(1.0 - 1e-12)).ln_1p()
+        });
+        (predicted.iter().map(|prediction| prediction.chance).collect(), told.collect())
+    }
+
+    /// S of a hypothesis.
+    fn covariance(&self, prediction: &Prediction) -> Matrix3<f64> {
+        let bend = self.caution * prediction.spread.trace().powi(2);
+        prediction.spread + isotropic(self.noise_m2 + bend)
+    }
+
+    /// The same where a head watches.
+    pub fn watched(mut self, sight: Sight<'a>) -> Self {
+        self.hypotheses = self.hypotheses.into_iter().map(|(weight, c)| (weight, c.watched(sight))).collect();
+        self
+    }
+
+    /// tr(W P) of the mixture, the criterion before any further observation.
+    pub fn trace(&self) -> f64 {
+        self.trace
+    }
+
+    /// C(θ) of every candidate, in order. The values do not depend on the number of cores.
+    pub fn evaluate<C: AsRef<[f64]> + Sync>(&self, candidates: &[C]) -> Vec<f64> {
+        #[cfg(feature = "parallel")]
+        if candidates.len() > CHUNK {
+            use rayon::prelude::*;
+            return candidates.par_chunks(CHUNK).flat_map_iter(|chunk| self.evaluate_chunk(chunk)).collect();
+        }
+        candidates.chunks(CHUNK).flat_map(|chunk| self.evaluate_chunk(chunk)).collect()
+    }
+
+    fn evaluate_chunk<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {
+        let predictions: Vec<Vec<Prediction>> =
+            self.hypotheses.iter().map(|(_, criterion)| criterion.predictions(candidates)).collect();
+        (0..candidates.len())
+            .map(|index| {
+                let predicted: Vec<&Prediction> = predictions.iter().map(|of| &of[index]).collect();
+                self.value(&predicted)
+            })
+            .collect()
+    }
+
+    fn value(&self, predicted: &[&Prediction]) -> f64 {
+        if predicted.iter().all(|prediction| prediction.chance == 0.0) {
+            return f64::INFINITY;
+        }
+        let covariances: Vec<Matrix3<f64>> = predicted.iter().map(|prediction| self.covariance(prediction)).collect();
+        let mut gain = 0.0;
+        for (((weight, _), prediction), s) in self.hypotheses.iter().zip(predicted).zip(&covariances) {
+            let Some(s) = s.cholesky() else { return f64::INFINITY };
+            gain += weight * prediction.chance * s.solve(&prediction.leverage).trace();
+        }
+        for &(j, k, between) in &self.pairs {
+            let told =
+                told_apart(&predicted[j].marker, &predicted[k].marker, &((covariances[j] + covariances[k]) * 0.5));
+            gain += between * 0.5 * (predicted[j].chance + predicted[k].chance) * told;
+        }
+        self.trace - gain
+    }
+}
+
+/// 1 − e^{−B}.
+fn told_apart(a: &Point3<f64>, b: &Point3<f64>, covariance: &Matrix3<f64>) -> f64 {
+    let difference = a - b;
+    covariance.cholesky().map_or(0.0, |s| -(-0.125 * difference.dot(&s.solve(&difference))).exp_m1())
+}
+
+/// ‖x − x'‖²_W: squared angles between directions and squared distances between axis points and markers, weighted like
+/// tangent coordinates.
+fn squared_distance(a: &Chain, b: &Chain, layout: &TangentLayout, weights: &Weights) -> f64 {
+    let mut sum = 0.0;
+    for (index, (a, b)) in a.joints.iter().zip(&b.joints).enumerate() {
+        if let Some(directions) = layout.direction(index) {
+            sum += weights.of(directions.start) * a.direction().angle(&b.direction()).powi(2);
+        }
+        if let (Joint::Revolute(a), Joint::Revolute(b), Some(points)) = (a, b, layout.point(index)) {
+            sum += weights.of(points.start) * (a.point - b.point).norm_squared();
+        }
+    }
+    sum + layout.marker().map_or(0.0, |range| weights.of(range.start) * (a.marker - b.marker).norm_squared())
+}
