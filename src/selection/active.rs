@@ -64,8 +64,8 @@ impl Default for Global {
             polished: 3,
             polish: polish(12),
             exchange: polish(5),
-            sweeps: 1,
-            considered: 6,
+            sweeps: 2,
+            considered: 8,
             unknown: 0.1,
             spare: 1,
             horizon: 20,
@@ -219,7 +219,7 @@ impl Active {
         let needed = plan::needed(belief, &self.weights, global.unknown)? + global.spare;
         let horizon = needed.clamp(1, global.horizon.max(1));
         for pose in self.planned.iter().take(horizon) {
-            let (chances, told) = self.outlook(&plan, global, limits)?.expectations(pose);
+            let (chances, told) = self.outlook(&plan, &now, global, limits)?.expectations(pose);
             plan.add(pose.clone(), chances, told);
         }
         // The weakest pose is sought anew over the whole box, and what is missing from the plan.
@@ -229,7 +229,7 @@ impl Active {
             for index in 0..plan.poses.len() {
                 let mut without = plan.clone();
                 without.remove(index);
-                let trace = self.outlook(&without, global, limits)?.trace();
+                let trace = self.outlook(&without, &now, global, limits)?.trace();
                 if weakest.is_none_or(|(least, _)| trace < least) {
                     weakest = Some((trace, index));
                 }
@@ -240,7 +240,7 @@ impl Active {
         }
         while plan.poses.len() < horizon {
             let (found, chances, told) = {
-                let outlook = self.outlook(&plan, global, limits)?;
+                let outlook = self.outlook(&plan, &now, global, limits)?;
                 let mut evaluate = |points: &[Vec<f64>]| {
                     evaluations += points.len();
                     let candidates: Vec<Vec<f64>> = points.iter().map(|point| scale(point)).collect();
@@ -276,7 +276,7 @@ impl Active {
                     // Always the first; what replaces it goes to the end.
                     let pose = plan.remove(0);
                     let (found, chances, told) = {
-                        let outlook = self.outlook(&plan, global, limits)?;
+                        let outlook = self.outlook(&plan, &now, global, limits)?;
                         let evaluate = |points: &[Vec<f64>]| {
                             evaluations += points.len();
                             let candidates: Vec<Vec<f64>> = points.iter().map(|point| scale(point)).collect();
@@ -293,7 +293,7 @@ impl Active {
         }
         // Of the plan, what teaches most at once comes first.
         let (first, trace) = {
-            let outlook = self.outlook(&now, global, limits)?;
+            let outlook = self.outlook(&now, &now, global, limits)?;
             let values = outlook.evaluate(&plan.poses).into_iter().enumerate();
             (values.min_by(|a, b| a.1.total_cmp(&b.1)), outlook.trace())
         };
@@ -318,12 +318,13 @@ impl Active {
     fn outlook<'a>(
         &'a self,
         plan: &'a Plan,
+        now: &'a Plan,
         global: &Global,
         limits: &'a [(f64, f64)],
     ) -> Result<Outlook<'a>, SelectionError> {
         let outlook = plan::outlook(plan, &self.weights, global.caution)?;
         Ok(match &self.watch {
-            Some(watch) => outlook.watched(Sight::Chance(&watch.visibility, limits)),
+            Some(watch) => outlook.unsure(&now.after).watched(Sight::Chance(&watch.visibility, limits)),
             None => outlook,
         })
     }

@@ -79,6 +79,8 @@ pub struct ACriterion<'a> {
     weights: &'a Weights,
     trace: f64,
     sight: Option<Sight<'a>>,
+    /// The covariance that visibility is judged by, if it is another than that of the criterion.
+    unsure: Option<&'a DMatrix<f64>>,
 }
 
 /// What a belief predicts of the marker after a movement.
@@ -111,12 +113,26 @@ impl<'a> ACriterion<'a> {
         weights: &'a Weights,
     ) -> Self {
         let trace = weights.trace(covariance);
-        Self { chain, layout: &belief.layout, noise_m2: belief.noise_m2, covariance, weights, trace, sight: None }
+        Self {
+            chain,
+            layout: &belief.layout,
+            noise_m2: belief.noise_m2,
+            covariance,
+            weights,
+            trace,
+            sight: None,
+            unsure: None,
+        }
     }
 
     /// The same where a head watches.
     pub fn watched(self, sight: Sight<'a>) -> Self {
         Self { sight: Some(sight), ..self }
+    }
+
+    /// The same with visibility judged by another covariance: by today's, where the criterion is that of a plan.
+    pub(super) fn unsure(self, covariance: &'a DMatrix<f64>) -> Self {
+        Self { unsure: Some(covariance), ..self }
     }
 
     /// tr(W P), the criterion before any further observation.
@@ -158,6 +174,7 @@ impl<'a> ACriterion<'a> {
             })
             .collect();
         let gains = self.covariance * &stacked;
+        let unsure = self.unsure.filter(|_| self.sight.is_some()).map(|covariance| covariance * &stacked);
         (candidates.iter().zip(markers).enumerate())
             .map(|(index, (candidate, marker))| {
                 let h_t = stacked.fixed_columns::<3>(3 * index);
@@ -169,7 +186,11 @@ impl<'a> ACriterion<'a> {
                     leverage += g.transpose() * g * self.weights.0[k];
                 }
                 let spread = (spread + spread.transpose()) * 0.5;
-                let chance = self.chance(candidate.as_ref(), &marker, &spread);
+                let doubt = unsure.as_ref().map_or(spread, |gains| {
+                    let doubt = (h_t.transpose() * gains.fixed_columns::<3>(3 * index)).into_owned();
+                    (doubt + doubt.transpose()) * 0.5
+                });
+                let chance = self.chance(candidate.as_ref(), &marker, &doubt);
                 Prediction { marker, spread, leverage, chance }
             })
             .collect()

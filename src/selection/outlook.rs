@@ -72,6 +72,18 @@ impl<'a> Outlook<'a> {
         Ok(Self { hypotheses, pairs, noise_m2: belief.noise_m2, caution, trace })
     }
 
+    /// The same with visibility judged by what `today` believes.
+    pub(super) fn unsure(mut self, today: &'a Belief) -> Self {
+        let others = today.alternatives.iter().map(|alternative| Some(&alternative.covariance));
+        let covariances = std::iter::once(today.covariance.as_ref()).chain(others);
+        for ((_, criterion), covariance) in self.hypotheses.iter_mut().zip(covariances) {
+            if let Some(covariance) = covariance {
+                *criterion = criterion.clone().unsure(covariance);
+            }
+        }
+        self
+    }
+
     /// The same after movements that will have told the pairs of hypotheses apart by these B.
     pub(super) fn told(mut self, told: &[f64]) -> Self {
         for (pair, told) in self.pairs.iter_mut().zip(told) {
