@@ -7,6 +7,7 @@
 mod comparison;
 mod convergence;
 mod learner;
+mod limits;
 mod metrics;
 mod report;
 mod result;
@@ -18,6 +19,7 @@ pub use comparison::{
 };
 pub use convergence::{CONFIRMATION, Convergence, Thresholds};
 pub use learner::{Learner, Record};
+pub use limits::{Design, Limits, movements_by_counting};
 pub use metrics::{Evaluation, JointMetrics, Metrics, axis_deg, location_m, nees, orientation_deg};
 pub use report::{
     Description, GazeReport, HeadDescription, JointDescription, JointReport, LearnerDescription, LearnerReport,

@@ -13,7 +13,8 @@ use super::{
 use crate::{
     estimation::{self, Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, anywhere},
     experiment::{
-        Change, Description, Evaluation, Experiment, HeadDescription, Learner, ModelReport, Record, Stream, World,
+        Change, Description, Evaluation, Experiment, HeadDescription, Learner, Limits, ModelReport, Record, Stream,
+        World,
     },
     kinematics::{Chain, Joint, registration::register},
     optimize::{Settings, Variant},
@@ -63,6 +64,16 @@ impl Scenario {
             chosen.push(spec.clone());
         }
         Ok(chosen)
+    }
+
+    /// What the limits of this scenario are computed from; `None` where no truth is known or the sensor has no noise.
+    pub fn limits(&self) -> Option<Limits> {
+        let WorldSpec::Simulated { sigma_m, .. } = self.world else { return None };
+        let layout = self.robot.layout.clone();
+        let prior_sd = self.prior.standard_deviations(&layout);
+        let weights = Weights::new(self.selection.units, &layout, &prior_sd);
+        let (truth, limits) = (self.robot.chain.clone(), self.robot.limits.clone());
+        (sigma_m > 0.0).then_some(Limits { truth, layout, limits, prior_sd, sigma_m, weights })
     }
 
     fn draw(&self, seed: u64) -> Result<(World, Evaluation, Briefing), ScenarioError> {

@@ -49,7 +49,7 @@ impl Weights {
     }
 
     /// The weight of one tangent coordinate.
-    pub(super) fn of(&self, coordinate: usize) -> f64 {
+    pub(crate) fn of(&self, coordinate: usize) -> f64 {
         self.0[coordinate]
     }
 
