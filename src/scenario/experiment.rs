@@ -18,7 +18,7 @@ use crate::{
     },
     kinematics::{Chain, Joint, registration::register},
     optimize::{Settings, Variant},
-    selection::{Actions, Active, Movement, Policy, Random, Search, Watch, Weights, draw_configuration},
+    selection::{Actions, Active, Movement, Planner, Policy, Random, Search, Watch, Weights, draw_configuration},
     sensing::MarkerTracker,
 };
 
@@ -204,7 +204,7 @@ impl Scenario {
                     }
                     EstimatorKind::Gradient => Box::new(Gradient::new(belief, self.gradient_rate)),
                 };
-                let policy = self.policy(spec, &weights, briefing.watch.clone());
+                let policy = self.policy(spec, &weights, briefing);
                 Learner {
                     description: spec.description(),
                     estimator,
@@ -253,22 +253,31 @@ impl Scenario {
 const MONTE_CARLO_SAMPLES: usize = 16;
 
 impl Scenario {
-    fn policy(&self, spec: &LearnerSpec, weights: &Weights, watch: Option<Watch>) -> Box<dyn Policy> {
+    fn policy(&self, spec: &LearnerSpec, weights: &Weights, briefing: &Briefing) -> Box<dyn Policy> {
+        let watch = briefing.watch.clone();
         let kind = spec.policy;
         let settings = self.selection.search;
         let evaluations = settings.max_evaluations;
         let search = match kind {
             PolicyKind::Random => return Box::new(Random),
-            PolicyKind::Active | PolicyKind::ActiveNaive | PolicyKind::ActiveMonteCarlo => Search::Direct(settings),
+            PolicyKind::Active | PolicyKind::ActivePlanned | PolicyKind::ActiveNaive | PolicyKind::ActiveMonteCarlo => {
+                Search::Direct(settings)
+            }
             PolicyKind::ActiveDirect => Search::Direct(Settings { variant: Variant::Original, ..settings }),
             PolicyKind::ActiveRandomSearch => Search::Random { evaluations },
             PolicyKind::ActiveBayesian => Search::Bayesian { evaluations },
         };
         let samples = if kind == PolicyKind::ActiveMonteCarlo { MONTE_CARLO_SAMPLES } else { 0 };
-        let mut active = Active::new(weights.clone(), search).sampled(samples);
-        if spec.estimator == EstimatorKind::Smoother && kind == PolicyKind::Active {
-            active = active.global(self.selection.global);
+        let plans = kind == PolicyKind::ActivePlanned
+            || (kind == PolicyKind::Active && spec.estimator == EstimatorKind::Smoother);
+        if plans {
+            let planner = Planner::new(weights.clone(), settings, self.selection.planning, briefing.workspace.clone());
+            return Box::new(match watch {
+                Some(watch) => planner.watched(watch),
+                None => planner,
+            });
         }
+        let active = Active::new(weights.clone(), search).sampled(samples);
         Box::new(match watch {
             Some(watch) if kind == PolicyKind::ActiveNaive => active.watched_naively(watch),
             Some(watch) => active.watched(watch),

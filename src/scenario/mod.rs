@@ -28,7 +28,7 @@ use crate::{
     experiment::{LearnerDescription, Thresholds},
     kinematics::{Chain, Quantity, TangentLayout},
     optimize::Settings,
-    selection::{CriterionUnits, Global, Watch},
+    selection::{CriterionUnits, Planning, Watch},
 };
 
 /// A validated scenario.
@@ -200,8 +200,8 @@ pub struct SelectionSpec {
     pub search: Settings,
     /// The units of the criterion.
     pub units: CriterionUnits,
-    /// How movements are planned for a belief with several hypotheses.
-    pub global: Global,
+    /// How movements are planned ahead, by learners that plan.
+    pub planning: Planning,
 }
 
 /// A learner that a scenario offers.
@@ -267,6 +267,8 @@ pub enum PolicyKind {
     Active,
     /// The same, but where a head watches with blind faith in the predicted marker: a comparison.
     ActiveNaive,
+    /// Plans the movements that are still needed together; what `active` is for a smoother.
+    ActivePlanned,
     /// As `active`, but by original DIRECT, whatever the scenario's variant.
     ActiveDirect,
     /// As `active`, but the best of as many random configurations: the floor of every search.
@@ -285,6 +287,7 @@ impl PolicyKind {
         match self {
             Self::Active => "active",
             Self::ActiveNaive => "active-naive",
+            Self::ActivePlanned => "active-planned",
             Self::ActiveDirect => "active-direct",
             Self::ActiveRandomSearch => "active-random-search",
             Self::ActiveBayesian => "active-bayesian",

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{ErrorDraw, EstimatorKind, PolicyKind, error::Problem, error::similar};
-use crate::kinematics::JointKind;
+use crate::{kinematics::JointKind, selection::Optimality};
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -163,6 +163,10 @@ pub struct Selection {
     pub evaluations: Spanned<usize>,
     pub units: Units,
     pub characteristic_length_m: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub criterion: Optimality,
+    pub ahead: Option<Spanned<u64>>,
+    pub batch: Option<Spanned<u64>>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]

@@ -7,14 +7,12 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ACriterion, Actions, Movement, Outlook, Policy, Selection, SelectionError, Sight, Visibility, Watch, Weights,
-    criterion::scaled,
-    draw_configuration,
-    plan::{self, Plan},
+    ACriterion, Actions, Movement, Policy, Selection, SelectionError, Sight, Visibility, Watch, Weights,
+    criterion::scaled, draw_configuration,
 };
 use crate::{
     estimation::Belief,
-    optimize::{Direct, Polish, Settings, bayesian, polish},
+    optimize::{Direct, Settings, bayesian},
     sensing::Observation,
 };
 
@@ -29,48 +27,6 @@ pub struct Active {
     search: Search,
     samples: usize,
     watch: Option<Watched>,
-    global: Option<Global>,
-    planned: Vec<Vec<f64>>,
-}
-
-/// How the criterion is minimised under several hypotheses.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Global {
-    /// κ, see [`Outlook`]; m⁻².
-    pub caution: f64,
-    /// How many of DIRECT's best leaves are polished by a local search.
-    pub polished: usize,
-    /// How far each is polished.
-    pub polish: Polish,
-    /// How far a pose of a plan is polished at every exchange.
-    pub exchange: Polish,
-    /// How often every pose of a plan is exchanged.
-    pub sweeps: usize,
-    /// Hypotheses looked at, the heaviest ones.
-    pub considered: usize,
-    /// A direction of parameter space counts as unknown above this standard deviation, in the units of the criterion.
-    pub unknown: f64,
-    /// Movements planned beyond those needed to determine what is unknown.
-    pub spare: usize,
-    /// Movements planned at most.
-    pub horizon: usize,
-}
-
-impl Default for Global {
-    fn default() -> Self {
-        let polish = |steps| Polish { steps, tolerance: 1e-4 };
-        Self {
-            caution: 0.0,
-            polished: 3,
-            polish: polish(12),
-            exchange: polish(5),
-            sweeps: 2,
-            considered: 8,
-            unknown: 0.1,
-            spare: 1,
-            horizon: 20,
-        }
-    }
 }
 
 /// How the criterion is minimised over a box.
@@ -125,7 +81,7 @@ pub struct Leaf {
 }
 
 impl Partition {
-    fn of(direct: &Direct) -> Self {
+    pub(super) fn of(direct: &Direct) -> Self {
         let leaves: Vec<Leaf> = direct
             .partition()
             .iter()
@@ -158,18 +114,13 @@ impl Leaf {
 impl Active {
     /// Selection by the A-criterion with `weights`, minimised by `search`.
     pub fn new(weights: Weights, search: Search) -> Self {
-        Self { weights, search, samples: 0, watch: None, global: None, planned: Vec::new() }
+        Self { weights, search, samples: 0, watch: None }
     }
 
     /// The expectation in (7) by Monte Carlo: the mean of the criterion over so many chains drawn from the posterior,
     /// instead of the criterion at the estimate.
     pub fn sampled(self, samples: usize) -> Self {
         Self { samples, ..self }
-    }
-
-    /// The same for a belief with alternatives: the criterion of [`Outlook`], and DIRECT's winners polished.
-    pub fn global(self, global: Global) -> Self {
-        Self { global: Some(global), ..self }
     }
 
     /// The same where a head watches.
@@ -200,133 +151,6 @@ impl Active {
             Belief { chain: belief.chain.retract(&belief.layout, &(&root * standard)), ..belief.clone() }
         };
         Ok((0..self.samples).map(draw).collect())
-    }
-
-    /// Plans the movements that are still needed under all hypotheses, and takes the first of them.
-    fn search_globally(
-        &mut self,
-        global: &Global,
-        belief: &Belief,
-        limits: &[(f64, f64)],
-    ) -> Result<Selection, SelectionError> {
-        let scale = |centre: &[f64]| -> Vec<f64> {
-            centre.iter().zip(limits).map(|(c, (lower, upper))| lower + c * (upper - lower)).collect()
-        };
-        let Search::Direct(settings) = self.search else { return Err(SelectionError::NoFiniteCriterion) };
-        let mut evaluations = 0;
-        let now = Plan::new(belief, global.considered);
-        let mut plan = now.clone();
-        let needed = plan::needed(belief, &self.weights, global.unknown)? + global.spare;
-        let horizon = needed.clamp(1, global.horizon.max(1));
-        for pose in self.planned.iter().take(horizon) {
-            let (chances, told) = self.outlook(&plan, &now, global, limits)?.expectations(pose);
-            plan.add(pose.clone(), chances, told);
-        }
-        // The weakest pose is sought anew over the whole box, and what is missing from the plan.
-        let mut partition = None;
-        if plan.poses.len() >= horizon {
-            let mut weakest: Option<(f64, usize)> = None;
-            for index in 0..plan.poses.len() {
-                let mut without = plan.clone();
-                without.remove(index);
-                let trace = self.outlook(&without, &now, global, limits)?.trace();
-                if weakest.is_none_or(|(least, _)| trace < least) {
-                    weakest = Some((trace, index));
-                }
-            }
-            if let Some((_, index)) = weakest {
-                plan.remove(index);
-            }
-        }
-        while plan.poses.len() < horizon {
-            let (found, chances, told) = {
-                let outlook = self.outlook(&plan, &now, global, limits)?;
-                let mut evaluate = |points: &[Vec<f64>]| {
-                    evaluations += points.len();
-                    let candidates: Vec<Vec<f64>> = points.iter().map(|point| scale(point)).collect();
-                    outlook.evaluate(&candidates)
-                };
-                let mut direct = Direct::new(limits.len(), settings).map_err(SelectionError::Search)?;
-                while let Some(batch) = direct.ask() {
-                    let points: Vec<Vec<f64>> = batch.iter().map(<[f64]>::to_vec).collect();
-                    direct.tell(&evaluate(&points)).map_err(SelectionError::Search)?;
-                }
-                let leaves = Partition::of(&direct);
-                let mut starts: Vec<(f64, &[f64])> =
-                    leaves.leaves.iter().filter_map(|leaf| Some((leaf.value?, leaf.centre.as_slice()))).collect();
-                starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-                let mut best: Option<(Vec<f64>, f64)> = None;
-                for (_, start) in starts.into_iter().take(global.polished.max(1)) {
-                    let found = polish(start, global.polish, &mut evaluate);
-                    if best.as_ref().is_none_or(|best| found.1 < best.1) {
-                        best = Some(found);
-                    }
-                }
-                partition.get_or_insert(leaves);
-                let Some((point, _)) = best else { break };
-                let pose = scale(&point);
-                let (chances, told) = outlook.expectations(&pose);
-                (pose, chances, told)
-            };
-            plan.add(found, chances, told);
-        }
-        if plan.poses.len() > 1 {
-            for _ in 0..global.sweeps {
-                for _ in 0..plan.poses.len() {
-                    // Always the first; what replaces it goes to the end.
-                    let pose = plan.remove(0);
-                    let (found, chances, told) = {
-                        let outlook = self.outlook(&plan, &now, global, limits)?;
-                        let evaluate = |points: &[Vec<f64>]| {
-                            evaluations += points.len();
-                            let candidates: Vec<Vec<f64>> = points.iter().map(|point| scale(point)).collect();
-                            outlook.evaluate(&candidates)
-                        };
-                        let (point, _) = polish(&scaled(&pose, limits), global.exchange, evaluate);
-                        let pose = scale(&point);
-                        let (chances, told) = outlook.expectations(&pose);
-                        (pose, chances, told)
-                    };
-                    plan.add(found, chances, told);
-                }
-            }
-        }
-        // Of the plan, what teaches most at once comes first.
-        let (first, trace) = {
-            let outlook = self.outlook(&now, &now, global, limits)?;
-            let values = outlook.evaluate(&plan.poses).into_iter().enumerate();
-            (values.min_by(|a, b| a.1.total_cmp(&b.1)), outlook.trace())
-        };
-        self.planned = plan.poses;
-        let Some((index, value)) = first.filter(|(_, value)| value.is_finite()) else {
-            return match &self.watch {
-                // Nothing in view was found: back to where the marker is known to be seen.
-                Some(watch) if trace.is_finite() => Ok(Selection::plain(watch.visible_pose.clone())),
-                _ => Err(SelectionError::NoFiniteCriterion),
-            };
-        };
-        Ok(Selection {
-            movement: Movement { configuration: self.planned.remove(index), row: None },
-            criterion: Some(value),
-            gain: Some(trace - value),
-            evaluations,
-            partition,
-        })
-    }
-
-    /// The criterion once `plan` is carried out.
-    fn outlook<'a>(
-        &'a self,
-        plan: &'a Plan,
-        now: &'a Plan,
-        global: &Global,
-        limits: &'a [(f64, f64)],
-    ) -> Result<Outlook<'a>, SelectionError> {
-        let outlook = plan::outlook(plan, &self.weights, global.caution)?;
-        Ok(match &self.watch {
-            Some(watch) => outlook.unsure(&now.after).watched(Sight::Chance(&watch.visibility, limits)),
-            None => outlook,
-        })
     }
 
     fn search_box(
@@ -395,9 +219,6 @@ impl Policy for Active {
             Actions::Box(limits) => {
                 if let Some(watch) = self.watch.as_ref().filter(|watch| !watch.has_moved) {
                     return Ok(Selection::plain(watch.visible_pose.clone()));
-                }
-                if let Some(global) = self.global {
-                    return self.search_globally(&global, belief, limits);
                 }
                 let outlooks = self.outlooks(belief, rng)?;
                 let criterion = |belief| {

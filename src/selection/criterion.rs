@@ -16,7 +16,7 @@
 
 use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Point3, U3};
 
-use super::{SelectionError, Visibility};
+use super::{Optimality, SelectionError, Visibility, optimality};
 use crate::{
     estimation::Belief,
     kinematics::{Chain, Quantity, TangentLayout, jacobian},
@@ -81,6 +81,9 @@ pub struct ACriterion<'a> {
     sight: Option<Sight<'a>>,
     /// The covariance that visibility is judged by, if it is another than that of the criterion.
     unsure: Option<&'a DMatrix<f64>>,
+    optimality: Optimality,
+    /// Mean of HᵀH over the workspace, for criterion I.
+    metric: Option<DMatrix<f64>>,
 }
 
 /// What a belief predicts of the marker after a movement.
@@ -91,6 +94,8 @@ pub(super) struct Prediction {
     pub spread: Matrix3<f64>,
     /// G W Gᵀ.
     pub leverage: Matrix3<f64>,
+    /// Gᵀ (m × 3), for criterion E.
+    pub gain: Option<DMatrix<f64>>,
     /// p(θ), the chance that it is seen.
     pub chance: f64,
 }
@@ -122,6 +127,8 @@ impl<'a> ACriterion<'a> {
             trace,
             sight: None,
             unsure: None,
+            optimality: Optimality::A,
+            metric: None,
         }
     }
 
@@ -133,6 +140,34 @@ impl<'a> ACriterion<'a> {
     /// The same with visibility judged by another covariance: by today's, where the criterion is that of a plan.
     pub(super) fn unsure(self, covariance: &'a DMatrix<f64>) -> Self {
         Self { unsure: Some(covariance), ..self }
+    }
+
+    /// The same by another optimality.
+    pub(super) fn by(self, optimality: Optimality, workspace: &[Vec<f64>]) -> Self {
+        let (mut metric, covariance) = (None, self.covariance);
+        let trace = match optimality {
+            Optimality::A => self.weights.trace(covariance),
+            Optimality::D => optimality::half_log_determinant(covariance),
+            Optimality::E => optimality::greatest_eigenvalue(covariance, self.weights, None),
+            Optimality::I => {
+                let of_predictions = optimality::prediction_metric(self.chain, self.layout, workspace);
+                let trace = of_predictions.dot(covariance);
+                metric = Some(of_predictions);
+                trace
+            }
+        };
+        Self { optimality, trace, metric, ..self }
+    }
+
+    /// By how much a marker with innovation covariance `s` lowers the criterion; NaN if `s` is not positive.
+    pub(super) fn gain(&self, prediction: &Prediction, s: &Matrix3<f64>) -> f64 {
+        match self.optimality {
+            Optimality::A | Optimality::I => s.cholesky().map_or(f64::NAN, |s| s.solve(&prediction.leverage).trace()),
+            Optimality::D => optimality::information(&prediction.spread, self.noise_m2),
+            Optimality::E => prediction.gain.as_ref().map_or(f64::NAN, |gain| {
+                self.trace - optimality::greatest_eigenvalue(self.covariance, self.weights, Some((gain, *s)))
+            }),
+        }
     }
 
     /// tr(W P), the criterion before any further observation.
@@ -186,12 +221,17 @@ impl<'a> ACriterion<'a> {
                     leverage += g.transpose() * g * self.weights.0[k];
                 }
                 let spread = (spread + spread.transpose()) * 0.5;
+                if let Some(metric) = &self.metric {
+                    leverage = (g_t.transpose() * (metric * g_t)).fixed_view::<3, 3>(0, 0).into_owned();
+                }
+                let gain = (self.optimality == Optimality::E)
+                    .then(|| DMatrix::from_column_slice(m, 3, g_t.into_owned().as_slice()));
                 let doubt = unsure.as_ref().map_or(spread, |gains| {
                     let doubt = (h_t.transpose() * gains.fixed_columns::<3>(3 * index)).into_owned();
                     (doubt + doubt.transpose()) * 0.5
                 });
                 let chance = self.chance(candidate.as_ref(), &marker, &doubt);
-                Prediction { marker, spread, leverage, chance }
+                Prediction { marker, spread, leverage, gain, chance }
             })
             .collect()
     }

@@ -17,15 +17,11 @@
 //! ```
 //!
 //! so both parts are in the same units, and nothing is left to tune between them. pⱼ is the chance of being seen.
-//!
-//! *Caution.* Where a hypothesis is so unsure that its prediction is no longer linear in its error, the gain is
-//! fiction. The bend of a rotation by δ about a lever of length ℓ displaces a marker by ℓδ²/2 = s²/2ℓ where
-//! linearisation says s = ℓδ. That is taken for noise: `Sⱼ = Hⱼ Pⱼ Hⱼᵀ + R + κ (tr Hⱼ Pⱼ Hⱼᵀ)² I`.
 
 use nalgebra::{Matrix3, Point3};
 
 use super::{
-    ACriterion, SelectionError, Sight, Weights,
+    ACriterion, Optimality, SelectionError, Sight, Weights,
     criterion::{CHUNK, Prediction},
 };
 use crate::{
@@ -40,7 +36,7 @@ pub struct Outlook<'a> {
     /// Pairs of hypotheses, and πⱼ πₖ ‖xⱼ − xₖ‖²_W.
     pairs: Vec<(usize, usize, f64)>,
     noise_m2: f64,
-    caution: f64,
+    optimality: Optimality,
     trace: f64,
 }
 
@@ -48,28 +44,46 @@ pub struct Outlook<'a> {
 const CONSIDERED: usize = 8;
 
 impl<'a> Outlook<'a> {
-    /// The criterion at `belief`, which must hold a covariance. `caution` is κ (m⁻²), 0 for blind faith in linearity.
-    pub fn new(belief: &'a Belief, weights: &'a Weights, caution: f64) -> Result<Self, SelectionError> {
-        let best = ACriterion::new(belief, weights)?;
-        let mut hypotheses = vec![(belief.weight(), best)];
+    /// The criterion at `belief`, which must hold a covariance; `workspace` serves criterion I alone.
+    pub fn new(
+        belief: &'a Belief,
+        weights: &'a Weights,
+        optimality: Optimality,
+        workspace: &[Vec<f64>],
+    ) -> Result<Self, SelectionError> {
+        let mut hypotheses = vec![(belief.weight(), ACriterion::new(belief, weights)?)];
         let mut chains = vec![&belief.chain];
         for alternative in belief.alternatives.iter().take(CONSIDERED - 1) {
             let criterion = ACriterion::over(belief, &alternative.chain, &alternative.covariance, weights);
             hypotheses.push((alternative.weight, criterion));
             chains.push(&alternative.chain);
         }
+        if optimality != Optimality::A {
+            let by = |(weight, criterion): (f64, ACriterion<'a>)| (weight, criterion.by(optimality, workspace));
+            hypotheses = hypotheses.into_iter().map(by).collect();
+        }
         let total: f64 = hypotheses.iter().map(|(weight, _)| weight).sum();
         hypotheses.iter_mut().for_each(|(weight, _)| *weight /= total);
         let mut pairs = Vec::new();
         for k in 0..chains.len() {
             for j in 0..k {
-                let distance = squared_distance(chains[j], chains[k], &belief.layout, weights);
+                let distance = match optimality {
+                    Optimality::A | Optimality::E => squared_distance(chains[j], chains[k], &belief.layout, weights),
+                    Optimality::I => apart(chains[j], chains[k], workspace),
+                    Optimality::D => 1.0,
+                };
                 pairs.push((j, k, hypotheses[j].0 * hypotheses[k].0 * distance));
             }
         }
+        if optimality == Optimality::D {
+            // Which hypothesis holds is worth the entropy of the weights, in shares of the pairs.
+            let entropy: f64 = hypotheses.iter().map(|(weight, _)| -weight * weight.max(f64::MIN_POSITIVE).ln()).sum();
+            let sum: f64 = pairs.iter().map(|pair| pair.2).sum();
+            pairs.iter_mut().filter(|_| sum > 0.0).for_each(|pair| pair.2 *= entropy / sum);
+        }
         let within: f64 = hypotheses.iter().map(|(weight, criterion)| weight * criterion.trace()).sum();
         let trace = within + pairs.iter().map(|pair| pair.2).sum::<f64>();
-        Ok(Self { hypotheses, pairs, noise_m2: belief.noise_m2, caution, trace })
+        Ok(Self { hypotheses, pairs, noise_m2: belief.noise_m2, optimality, trace })
     }
 
     /// The same with visibility judged by what `today` believes.
@@ -110,8 +124,7 @@ impl<'a> Outlook<'a> {
 
     /// S of a hypothesis.
     fn covariance(&self, prediction: &Prediction) -> Matrix3<f64> {
-        let bend = self.caution * prediction.spread.trace().powi(2);
-        prediction.spread + isotropic(self.noise_m2 + bend)
+        prediction.spread + isotropic(self.noise_m2)
     }
 
     /// The same where a head watches.
@@ -152,9 +165,12 @@ impl<'a> Outlook<'a> {
         }
         let covariances: Vec<Matrix3<f64>> = predicted.iter().map(|prediction| self.covariance(prediction)).collect();
         let mut gain = 0.0;
-        for (((weight, _), prediction), s) in self.hypotheses.iter().zip(predicted).zip(&covariances) {
-            let Some(s) = s.cholesky() else { return f64::INFINITY };
-            gain += weight * prediction.chance * s.solve(&prediction.leverage).trace();
+        for (((weight, criterion), prediction), s) in self.hypotheses.iter().zip(predicted).zip(&covariances) {
+            let taught = criterion.gain(prediction, s);
+            if !taught.is_finite() {
+                return f64::INFINITY;
+            }
+            gain += weight * prediction.chance * taught;
         }
         for &(j, k, between) in &self.pairs {
             let told =
@@ -184,4 +200,10 @@ fn squared_distance(a: &Chain, b: &Chain, layout: &TangentLayout, weights: &Weig
         }
     }
     sum + layout.marker().map_or(0.0, |range| weights.of(range.start) * (a.marker - b.marker).norm_squared())
+}
+
+/// Mean squared distance of predicted markers over the workspace, m².
+fn apart(a: &Chain, b: &Chain, workspace: &[Vec<f64>]) -> f64 {
+    let sum: f64 = workspace.iter().map(|theta| (a.marker_at(theta) - b.marker_at(theta)).norm_squared()).sum();
+    sum / workspace.len().max(1) as f64
 }

@@ -9,13 +9,13 @@
 //! minimise tr(W P(θ₁ … θₕ)),    P⁻¹ = P₀⁻¹ + Σᵢ pᵢ HᵢᵀHᵢ / r
 //! ```
 //!
-//! in the mean over the hypotheses, as [`Outlook`] does for one movement, by exchange (Fedorov 1972): each pose in turn
+//! in the mean over the hypotheses, as [`Outlook`](super::Outlook) does for one movement, by exchange (Fedorov 1972): each pose in turn
 //! is taken out of the plan (a downdate of rank three) and replaced by a better one, if there is one. The plan is made
 //! for what is believed now, and made anew after every movement, from where it stood.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
-use super::{Outlook, SelectionError, Weights};
+use super::{SelectionError, Weights};
 use crate::{
     estimation::{Alternative, Belief},
     kinematics::jacobian::jacobian,
@@ -29,7 +29,7 @@ pub(super) struct Plan {
     pub after: Belief,
     /// The poses (rad or m), and by hypothesis how much of each is expected to be seen.
     pub poses: Vec<Vec<f64>>,
-    /// By pair of hypotheses (as [`Outlook`] orders them): by how much each pose tells them apart, B.
+    /// By pair of hypotheses (as [`Outlook`](super::Outlook) orders them): by how much each pose tells them apart, B.
     told: Vec<Vec<f64>>,
     chances: Vec<Vec<f64>>,
 }
@@ -40,6 +40,16 @@ impl Plan {
         let mut after = belief.clone();
         after.alternatives.truncate(considered.saturating_sub(1));
         Self { after, poses: Vec::new(), told: Vec::new(), chances: Vec::new() }
+    }
+
+    /// How many movements are still needed: a third of the number of directions in parameter space, weighted as the
+    /// criterion does, whose standard deviation exceeds `unknown`.
+    pub fn unknown(&self, weights: &Weights, unknown: f64) -> Result<usize, SelectionError> {
+        let covariance = self.after.covariance.as_ref().ok_or(SelectionError::NoCovariance)?;
+        let root = DVector::from_fn(covariance.nrows(), |k, _| weights.of(k).sqrt());
+        let weighted = covariance.component_mul(&(&root * root.transpose()));
+        let eigenvalues = SymmetricEigen::new(weighted).eigenvalues;
+        Ok(eigenvalues.iter().filter(|value| **value > unknown * unknown).count().div_ceil(3))
     }
 
     /// Adds a pose that each hypothesis expects to be seen with these chances, and that tells pairs apart by `told`.
@@ -91,25 +101,4 @@ fn update(covariance: &mut DMatrix<f64>, h: &nalgebra::Matrix3xX<f64>, noise_m2:
     let Some(inverse) = middle.cholesky().map(|s| s.inverse() * c.signum()) else { return };
     let change = &numerator * inverse * numerator.transpose();
     *covariance -= (&change + change.transpose()) * 0.5;
-}
-
-/// How many movements are still needed: a third of the number of directions in parameter space, weighted as the
-/// criterion does, whose standard deviation exceeds `unknown`.
-pub(super) fn needed(belief: &Belief, weights: &Weights, unknown: f64) -> Result<usize, SelectionError> {
-    let covariance = belief.covariance.as_ref().ok_or(SelectionError::NoCovariance)?;
-    let root = DVector::from_fn(covariance.nrows(), |k, _| weights.of(k).sqrt());
-    let weighted =
-        DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| root[i] * covariance[(i, j)] * root[j]);
-    let eigenvalues = SymmetricEigen::new(weighted).eigenvalues;
-    Ok(eigenvalues.iter().filter(|value| **value > unknown * unknown).count().div_ceil(3))
-}
-
-/// What the criterion is under a plan: over the belief after it, with hypotheses told apart as far as it does.
-pub(super) fn outlook<'a>(plan: &'a Plan, weights: &'a Weights, caution: f64) -> Result<Outlook<'a>, SelectionError> {
-    Ok(Outlook::new(&plan.after, weights, caution)?.told(&plan.told()))
-}
-
-#[allow(dead_code)]
-fn is_positive(covariance: &DMatrix<f64>) -> bool {
-    Cholesky::new(covariance.clone()).is_some()
 }

@@ -19,7 +19,7 @@ use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
     experiment::Thresholds,
     optimize::{Settings, Variant},
-    selection::{CriterionUnits, Global},
+    selection::{CriterionUnits, Planning},
 };
 
 /// How far from 1 the length of an axis may be: what is lost by writing six digits.
@@ -209,7 +209,17 @@ impl Check<'_> {
             epsilon: self.not_negative("selection.epsilon", &raw.epsilon),
             max_evaluations: *evaluations.get_ref(),
         };
-        SelectionSpec { search, units, global: Global::default() }
+        let default = Planning::default();
+        let mut count = |key: &str, value: &Option<Spanned<u64>>, default: usize| {
+            value.as_ref().map_or(default, |value| self.at_least_one(key, value).min(100) as usize)
+        };
+        let planning = Planning {
+            optimality: raw.criterion,
+            ahead: count("selection.ahead", &raw.ahead, default.ahead),
+            batch: count("selection.batch", &raw.batch, default.batch),
+            ..default
+        };
+        SelectionSpec { search, units, planning }
     }
 
     fn learners(&mut self, raw: &Spanned<Vec<raw::Learner>>, learns_marker: bool) -> Vec<LearnerSpec> {
