@@ -46,6 +46,7 @@ pub struct Record {
     movements: u64,
     misses: u64,
     steps_below_target: u32,
+    changes_noticed: u64,
     failure: Option<String>,
 }
 
@@ -109,6 +110,7 @@ impl Learner {
         evaluation: &Evaluation,
         truth: Option<&Chain>,
     ) -> LearnerReport {
+        self.record.changes_noticed += u64::from(update.change_noticed);
         let belief = self.estimator.belief();
         let (estimate, layout) = (&belief.chain, &*belief.layout);
         let expected = belief.expected_error_m(&self.workspace);
@@ -134,6 +136,8 @@ impl Learner {
             movements: self.record.movements,
             misses: self.record.misses,
             settled: self.record.steps_below_target >= SETTLING_STEPS,
+            bound_trace: None,
+            changes_noticed: self.record.changes_noticed,
             joints: evaluation.joints(estimate, truth, layout),
         };
         LearnerReport {

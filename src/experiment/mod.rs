@@ -49,6 +49,10 @@ struct Verdict {
     /// From the change on.
     recovery: Convergence,
     settled_at: Option<u64>,
+    /// Movements after the change at which the learner first noticed it.
+    noticed_at: Option<u64>,
+    /// Changes noticed before there was one.
+    false_alarms: u64,
 }
 
 /// Why a step could not be made. The experiment stays as it was.
@@ -71,7 +75,13 @@ impl Experiment {
             .iter()
             .map(|_| {
                 let unjudged = Convergence::new(description.thresholds);
-                Verdict { convergence: unjudged.clone(), recovery: unjudged, settled_at: None }
+                Verdict {
+                    convergence: unjudged.clone(),
+                    recovery: unjudged,
+                    settled_at: None,
+                    noticed_at: None,
+                    false_alarms: 0,
+                }
             })
             .collect();
         let noise = NoiseSequence::new(description.seed);
@@ -155,6 +165,13 @@ impl Experiment {
                     verdict.recovery.observe(movements, metrics.orientation_deg, metrics.location_m);
                 }
                 _ => verdict.convergence.observe(report.step, metrics.orientation_deg, metrics.location_m),
+            }
+            match since_change {
+                Some(movements @ 1..) if metrics.changes_noticed > verdict.false_alarms => {
+                    verdict.noticed_at.get_or_insert(movements);
+                }
+                Some(1..) => {}
+                _ => verdict.false_alarms = metrics.changes_noticed,
             }
             if metrics.settled && verdict.settled_at.is_none() {
                 verdict.settled_at = Some(metrics.movements);

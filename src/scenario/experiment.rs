@@ -11,7 +11,7 @@ use super::{
     SmootherSpec, WorldSpec,
 };
 use crate::{
-    estimation::{self, Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, anywhere},
+    estimation::{self, Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls, anywhere},
     experiment::{
         Change, Description, Evaluation, Experiment, HeadDescription, Learner, Limits, ModelReport, Record, Stream,
         World,
@@ -190,6 +190,11 @@ impl Scenario {
                     EstimatorKind::Rls => {
                         let prior = DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd));
                         Box::new(Rls::new(belief, prior, self.filter.stabilising.filter(|_| spec.stabilising)))
+                    }
+                    EstimatorKind::Unscented => {
+                        let prior = DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd));
+                        let stabilising = self.filter.stabilising.filter(|_| spec.stabilising);
+                        Box::new(UnscentedRls::new(belief, prior, stabilising))
                     }
                     EstimatorKind::RlsSixNumbers => {
                         let Prior { direction_rad, point_m, .. } = self.prior;

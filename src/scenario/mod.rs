@@ -235,6 +235,8 @@ impl LearnerSpec {
 pub enum EstimatorKind {
     /// Recursive least squares.
     Rls,
+    /// Recursive least squares by the unscented transform.
+    Unscented,
     /// Recursive least squares in the paper's six numbers per joint: a comparison, which shows no covariance.
     RlsSixNumbers,
     /// Stochastic gradient.
@@ -248,6 +250,7 @@ impl EstimatorKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Rls => "rls",
+            Self::Unscented => "unscented",
             Self::RlsSixNumbers => "rls-six-numbers",
             Self::Gradient => "gradient",
             Self::Smoother => "smoother",
@@ -255,7 +258,7 @@ impl EstimatorKind {
     }
 
     fn keeps_covariance(self) -> bool {
-        matches!(self, Self::Rls | Self::Smoother)
+        matches!(self, Self::Rls | Self::Unscented | Self::Smoother)
     }
 }
 

@@ -30,7 +30,7 @@ pub(crate) use prior::anywhere;
 use hypotheses::Hypotheses;
 use posterior::{Measurement, Posterior};
 
-use super::{Alternative, Belief, EstimationError, Estimator, Update};
+use super::{Alternative, Belief, ChangeDetector, EstimationError, Estimator, Update};
 use crate::{
     kinematics::{TangentLayout, jacobian::jacobian},
     sensing::{Observation, isotropic},
@@ -44,10 +44,13 @@ pub struct Smoother {
     hypotheses: Hypotheses,
     settings: HypothesisSettings,
     rng: ChaCha8Rng,
+    changes: ChangeDetector,
 }
 
 /// Steps without a new hypothesis after which none are searched for any more.
 const CALM: usize = 6;
+/// A normalised innovation squared that the old body hardly explains: χ²₃ at 99 %.
+const SURPRISING: f64 = 11.3;
 /// Measurements that are kept as they are; beyond these the older half is compressed.
 const KEPT: usize = 60;
 
@@ -68,7 +71,14 @@ impl Smoother {
             noise_m2,
             alternatives: Vec::new(),
         };
-        let mut smoother = Self { belief, posterior, hypotheses: Hypotheses::default(), settings, rng };
+        let mut smoother = Self {
+            belief,
+            posterior,
+            hypotheses: Hypotheses::default(),
+            settings,
+            rng,
+            changes: ChangeDetector::honest(),
+        };
         smoother.begin();
         smoother.publish();
         smoother
@@ -113,6 +123,27 @@ impl Smoother {
         Some(innovation.dot(&s.solve(&innovation))).filter(|nis| nis.is_finite())
     }
 
+    /// Whether one hypothesis has explained everything alone for some time.
+    fn is_settled(&self) -> bool {
+        self.hypotheses.calm >= CALM
+    }
+
+    /// Drops what was measured before the body changed. The estimate stays as a guess, with half the deviations that
+    /// the prior had; of the measurements the latest stay, those that the old body does not explain.
+    fn forget(&mut self) {
+        let surprising = (self.posterior.measurements.iter().rev())
+            .take_while(|seen| self.nis(&seen.positions, &seen.marker).is_some_and(|nis| nis > SURPRISING))
+            .count();
+        let recent = self.posterior.measurements.split_off(self.posterior.measurements.len() - surprising);
+        let layout = &self.belief.layout;
+        let deviations = self.posterior.prior.deviations(layout) * 0.5;
+        let prior = Prior::Around { guess: self.belief.chain.clone(), deviations };
+        self.posterior = Posterior::new(prior, self.belief.noise_m2);
+        self.posterior.measurements = recent;
+        self.hypotheses.calm = 0;
+        self.changes.reset();
+    }
+
     /// Whether the data cost of the heaviest hypothesis is what noise alone explains, 2E ~ χ² with 3n degrees of
     /// freedom at most: within five standard deviations.
     fn explains(&self) -> bool {
@@ -135,8 +166,13 @@ impl Estimator for Smoother {
         let nis = self.nis(positions, measured);
         let layout = self.belief.layout.clone();
         self.posterior.measurements.push(Measurement { positions: positions.to_vec(), marker: *measured });
+        // Before the belief is settled its innovations say little about the body.
+        let change_noticed = self.is_settled() && nis.is_some_and(|nis| self.changes.observe(nis));
+        if change_noticed {
+            self.forget();
+        }
         self.hypotheses.follow(&self.posterior, &layout);
-        if self.hypotheses.calm < CALM {
+        if !self.is_settled() {
             self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         }
         self.hypotheses.condense(self.settings.kept, &layout);
@@ -147,12 +183,12 @@ impl Estimator for Smoother {
         let determined = 3 * self.posterior.count() >= layout.dimension();
         if determined && self.belief.alternatives.is_empty() && self.explains() {
             self.hypotheses.calm += 1;
-            if self.hypotheses.calm >= CALM && self.posterior.measurements.len() > KEPT {
+            if self.is_settled() && self.posterior.measurements.len() > KEPT {
                 self.posterior.settle(KEPT / 2, &self.belief.chain, &layout);
             }
         } else {
             self.hypotheses.calm = 0;
         }
-        Ok(Update { nis: nis.map(|nis| (nis, 3)) })
+        Ok(Update { nis: nis.map(|nis| (nis, 3)), change_noticed })
     }
 }

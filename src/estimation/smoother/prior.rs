@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector, Vector2};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
-use crate::kinematics::{Chain, Joint, TangentLayout, chart};
+use crate::kinematics::{Chain, Joint, Quantity, TangentLayout, chart};
 
 /// What is known of the chain before any movement.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,6 +72,21 @@ impl Prior {
         match self {
             Self::Around { deviations, .. } => deviations[index],
             Self::Within { .. } => fallback,
+        }
+    }
+
+    /// The standard deviation of every tangent coordinate.
+    pub(super) fn deviations(&self, layout: &TangentLayout) -> DVector<f64> {
+        match self {
+            Self::Around { deviations, .. } => deviations.clone(),
+            Self::Within { bound_m, marker_m, .. } => {
+                let deviation = |quantity: &Quantity| match quantity {
+                    Quantity::Point => bound_m / 3_f64.sqrt(),
+                    Quantity::Direction => UNIFORM_VARIANCE.sqrt(),
+                    Quantity::Marker => *marker_m,
+                };
+                DVector::from_iterator(layout.dimension(), layout.quantities().iter().map(deviation))
+            }
         }
     }
 
