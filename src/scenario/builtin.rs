@@ -25,6 +25,7 @@ pub const BUILTIN: &[Builtin] = builtins![
     "arm-6dof-selectors",
     "arm-12dof",
     "arm-12dof-no-prior",
+    "arm-20dof",
     "head-fov",
     "head-fov-excursion",
     "head-fov-doubled-error",
