@@ -18,6 +18,9 @@ use crate::{
 /// Steps in a row for which the expected error must stay below the target before a learner calls itself settled.
 const SETTLING_STEPS: u32 = 5;
 
+/// The estimate's weight among all hypotheses below which a learner is not settled.
+const UNAMBIGUOUS: f64 = 0.99;
+
 /// What a learner is told: nothing here comes from the truth.
 pub struct Learner {
     /// Its name, estimator and policy.
@@ -114,7 +117,8 @@ impl Learner {
         let belief = self.estimator.belief();
         let (estimate, layout) = (&belief.chain, &*belief.layout);
         let expected = belief.expected_error_m(&self.workspace);
-        if expected.is_some_and(|error| error < self.settled_below_m) {
+        let is_certain = belief.weight() > UNAMBIGUOUS;
+        if is_certain && expected.is_some_and(|error| error < self.settled_below_m) {
             self.record.steps_below_target += 1;
         } else {
             self.record.steps_below_target = 0;

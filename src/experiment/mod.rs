@@ -29,6 +29,8 @@ pub use result::{JointModel, LearnerResult, MarkerModel, Model, RunResult};
 pub use streams::Stream;
 pub use world::{Change, NoiseSequence, World};
 
+use nalgebra::DMatrix;
+
 use crate::{estimation::Update, selection::SelectionError};
 
 /// A running comparison of learners.
@@ -39,7 +41,15 @@ pub struct Experiment {
     learners: Vec<Learner>,
     evaluation: Evaluation,
     verdicts: Vec<Verdict>,
+    bounds: Option<Bounds>,
     latest: StepReport,
+}
+
+/// What the data of every learner allow.
+struct Bounds {
+    limits: Limits,
+    /// Λ₀ + Σ HᵀH/σ² at the truth, one per learner.
+    information: Vec<DMatrix<f64>>,
 }
 
 /// What is known of one learner's run so far.
@@ -86,7 +96,7 @@ impl Experiment {
             .collect();
         let noise = NoiseSequence::new(description.seed);
         let latest = StepReport { step: 0, learners: Vec::new(), truth: None };
-        let mut experiment = Self { description, world, noise, learners, evaluation, verdicts, latest };
+        let mut experiment = Self { description, world, noise, learners, evaluation, verdicts, bounds: None, latest };
         let truth = experiment.world.truth();
         let reports = experiment
             .learners
@@ -95,6 +105,15 @@ impl Experiment {
             .collect();
         experiment.conclude(StepReport { step: 0, learners: reports, truth: None });
         experiment
+    }
+
+    /// The same with the bound of the data collected in every report (see [`Limits`]).
+    pub fn bounded(mut self, limits: Limits) -> Self {
+        let information = vec![limits.prior(); self.learners.len()];
+        let bound = limits.bound(&limits.prior());
+        self.latest.learners.iter_mut().for_each(|learner| learner.metrics.bound_trace = bound);
+        self.bounds = Some(Bounds { limits, information });
+        self
     }
 
     /// What stays the same from step to step.
@@ -135,7 +154,13 @@ impl Experiment {
         if let (Some(truth), true) = (truth, has_changed) {
             self.evaluation.follow(truth);
         }
-        let reports = self
+        if let (Some(bounds), Some(truth), true) = (&mut self.bounds, truth, has_changed) {
+            // What was measured before says nothing certain of the new body.
+            bounds.limits.truth = truth.clone();
+            let prior = bounds.limits.prior();
+            bounds.information.fill(prior);
+        }
+        let mut reports: Vec<LearnerReport> = self
             .learners
             .iter_mut()
             .zip(choices)
@@ -151,6 +176,14 @@ impl Experiment {
                 learner.report(movement, update, &self.evaluation, truth)
             })
             .collect();
+        if let Some(bounds) = &mut self.bounds {
+            for (report, information) in reports.iter_mut().zip(&mut bounds.information) {
+                if let Some(movement) = report.movement.as_ref().filter(|it| it.measured_marker_m.is_some()) {
+                    *information += bounds.limits.information(&movement.configuration);
+                }
+                report.metrics.bound_trace = bounds.limits.bound(information);
+            }
+        }
         let truth = truth.filter(|_| has_changed).map(ModelReport::of_chain);
         self.conclude(StepReport { step: self.latest.step + 1, learners: reports, truth });
         Ok(&self.latest)

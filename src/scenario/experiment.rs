@@ -237,7 +237,11 @@ impl Scenario {
             change_at: world.change().map(|change| change.step),
             head: briefing.watch.as_ref().map(|watch| HeadDescription::of(&watch.head)),
         };
-        Ok(Experiment::new(description, world, learners, evaluation))
+        let experiment = Experiment::new(description, world, learners, evaluation);
+        Ok(match self.limits() {
+            Some(limits) => experiment.bounded(limits),
+            None => experiment,
+        })
     }
 }
 
@@ -337,7 +341,14 @@ mod tests {
     /// the choices after the first measurement do not.
     #[test]
     fn swapping_the_truth_changes_no_first_selection() {
-        for name in ["arm-6dof", "arm-12dof", "head-fov"] {
+        for (name, learner) in [
+            ("arm-6dof", None),
+            ("arm-12dof", None),
+            ("head-fov", None),
+            ("arm-6dof", Some("global")),
+            ("arm-6dof-no-prior", Some("global")),
+            ("head-fov", Some("global")),
+        ] {
             let scenario = builtin(name).expect("a built-in scenario");
             let selections = |swap: bool| {
                 let (mut world, mut evaluation, briefing) = scenario.draw(11).expect("a world");
@@ -348,7 +359,8 @@ mod tests {
                     );
                     evaluation.follow(truth);
                 }
-                let specs = scenario.chosen(None).expect("learners");
+                let names = learner.map(|learner| [learner.to_owned()]);
+                let specs = scenario.chosen(names.as_ref().map(<[_; 1]>::as_slice)).expect("learners");
                 let mut experiment =
                     scenario.assemble(11, &specs, world, evaluation, &briefing).expect("an experiment");
                 [(); 3].map(|()| {

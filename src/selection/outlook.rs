@@ -207,3 +207,102 @@ fn apart(a: &Chain, b: &Chain, workspace: &[Vec<f64>]) -> f64 {
     let sum: f64 = workspace.iter().map(|theta| (a.marker_at(theta) - b.marker_at(theta)).norm_squared()).sum();
     sum / workspace.len().max(1) as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{DMatrix, DVector};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::{
+        estimation::Alternative,
+        kinematics::{jacobian::jacobian, laws::random_chain},
+        selection::{CriterionUnits, plan::Plan},
+    };
+
+    fn case(seed: u64) -> (Belief, Weights, Vec<Vec<f64>>) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let chain = random_chain(&mut rng, 4);
+        let layout = Arc::new(TangentLayout::new(&chain.joints, &[], false));
+        let m = layout.dimension();
+        let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-0.3..0.3));
+        let covariance = &root * root.transpose() + DMatrix::identity(m, m) * 1e-3;
+        let weights = Weights::new(CriterionUnits::CharacteristicLength(0.5), &layout, &DVector::from_element(m, 1.0));
+        let candidates = (0..40).map(|_| (0..4).map(|_| rng.random_range(-2.0..2.0)).collect()).collect();
+        let belief = Belief { chain, layout, covariance: Some(covariance), noise_m2: 1e-3, alternatives: Vec::new() };
+        (belief, weights, candidates)
+    }
+
+    /// Every criterion against the posterior, built the long way.
+    #[test]
+    fn one_hypothesis_is_judged_by_its_posterior() {
+        for seed in 0..10 {
+            let (belief, weights, candidates) = case(seed);
+            let p = belief.covariance.clone().expect("kept");
+            for optimality in [Optimality::A, Optimality::D, Optimality::E, Optimality::I] {
+                let outlook = Outlook::new(&belief, &weights, optimality, &candidates[30..]).expect("a covariance");
+                for (value, theta) in outlook.evaluate(&candidates[..10]).iter().zip(&candidates) {
+                    let (_, h) = jacobian(&belief.chain, &belief.layout, theta);
+                    let information = p.clone().try_inverse().expect("positive") + h.transpose() * &h / 1e-3;
+                    let posterior = information.try_inverse().expect("positive");
+                    let root = DMatrix::from_fn(p.nrows(), p.nrows(), |i, j| f64::from(i == j) * weights.of(i).sqrt());
+                    let expected = match optimality {
+                        Optimality::A => weights.trace(&posterior),
+                        Optimality::D => 0.5 * posterior.determinant().ln(),
+                        Optimality::E => (&root * &posterior * &root).symmetric_eigenvalues().max(),
+                        Optimality::I => {
+                            let after = Belief { covariance: Some(posterior), ..belief.clone() };
+                            let spread = |theta: &Vec<f64>| after.marker_covariance(theta).expect("kept").trace();
+                            candidates[30..].iter().map(spread).sum::<f64>() / 10.0
+                        }
+                    };
+                    // The power iteration of E comes near from below.
+                    let tolerance = if optimality == Optimality::E { 0.05 } else { 1e-6 };
+                    let scale = expected.abs().max(1e-3);
+                    assert!((value - expected).abs() < tolerance * scale, "{seed} {optimality:?}: {value} {expected}");
+                }
+            }
+        }
+    }
+
+    /// Between two exactly known rivals only telling them apart counts: where both predict the same marker a movement
+    /// is worth nothing, and where they differ by far it settles the matter.
+    #[test]
+    fn rivals_are_worth_telling_apart() {
+        let (mut belief, weights, candidates) = case(3);
+        let m = belief.layout.dimension();
+        let tiny = DMatrix::identity(m, m) * 1e-12;
+        let chain = belief.chain.retract(&belief.layout, &DVector::from_element(m, 0.3));
+        belief.covariance = Some(tiny.clone());
+        belief.alternatives = vec![Alternative { weight: 0.4, chain: chain.clone(), covariance: tiny }];
+        let outlook = Outlook::new(&belief, &weights, Optimality::A, &[]).expect("a covariance");
+        // θ = 0 shows the marker where it is known to be.
+        let nothing = outlook.evaluate(&[vec![0.0; 4]])[0];
+        assert!((nothing - outlook.trace()).abs() < 1e-6 * outlook.trace());
+        for (theta, value) in candidates.iter().zip(outlook.evaluate(&candidates)) {
+            let apart = (chain.marker_at(theta) - belief.chain.marker_at(theta)).norm();
+            assert!(value <= outlook.trace());
+            assert!(apart < 0.5 || value < 0.01 * outlook.trace(), "{apart} m apart: {value}");
+        }
+    }
+
+    /// A pose added to a plan and taken out again leaves the belief as it was.
+    #[test]
+    fn plans_are_updated_and_downdated_exactly() {
+        for seed in 0..10 {
+            let (belief, weights, candidates) = case(seed);
+            let now = Plan::new(&belief, 4);
+            let mut plan = now.clone();
+            for theta in &candidates[..5] {
+                plan.add(theta.clone(), vec![0.8], Vec::new());
+            }
+            let trace = |plan: &Plan| weights.trace(plan.after.covariance.as_ref().expect("kept"));
+            assert!(trace(&plan) < trace(&now));
+            (0..5).for_each(|_| drop(plan.remove(0)));
+            assert!((trace(&plan) - trace(&now)).abs() < 1e-7 * trace(&now), "seed {seed}");
+        }
+    }
+}

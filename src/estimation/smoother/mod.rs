@@ -16,6 +16,8 @@
 //! compressed into a quadratic, so that a step costs the same whatever the number of movements.
 
 mod hypotheses;
+#[cfg(test)]
+mod laws;
 mod posterior;
 mod prior;
 
