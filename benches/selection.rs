@@ -44,6 +44,7 @@ fn case(name: &str) -> Case {
         layout: layout.into(),
         covariance: Some(DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd))),
         noise_m2: scenario.filter.noise_m2,
+        alternatives: Vec::new(),
     };
     Case { scenario, belief, weights, candidates }
 }

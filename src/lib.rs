@@ -14,9 +14,9 @@
 //! |---|---|
 //! | [`kinematics`] | joints as twists, chains as products of exponentials, minimal tangent coordinates, the Jacobian |
 //! | [`sensing`] | what is measured after a movement, and what a head can see |
-//! | [`estimation`] | estimators and their beliefs: recursive least squares, stochastic gradient |
-//! | [`optimize`] | DIRECT, a minimiser over the unit cube that knows nothing of robots |
-//! | [`selection`] | the A-criterion, and the policies that choose movements |
+//! | [`estimation`] | estimators and their beliefs: recursive least squares, stochastic gradient, a smoother with several hypotheses |
+//! | [`optimize`] | DIRECT and a bounded local search: minimisers over the unit cube that know nothing of robots |
+//! | [`selection`] | the A-criterion, and the policies that choose movements or plan them |
 //! | [`experiment`] | several learners in one world; metrics; the reports that everything outside reads |
 //! | [`scenario`] | scenario files, strictly read, and the experiments drawn from them |
 //!
@@ -38,6 +38,7 @@
 //! | P | [`Belief::covariance`](estimation::Belief::covariance) | covariance of δ, m × m |
 //! | R = r I | [`Belief::noise_m2`](estimation::Belief::noise_m2) | measurement covariance as the filter assumes it |
 //! | σn² | [`StabilisingNoise`](estimation::StabilisingNoise) | noise added to P, (5) |
+//! | xⱼ, πⱼ, Pⱼ | [`Alternative`](estimation::Alternative) | other hypotheses, with weight and covariance |
 //! | C(θ) | [`ACriterion`](selection::ACriterion) | expected posterior error, (7) |
 //!
 //! *Frame.* All axes and points are expressed at θ = 0 in the frame in which markers are measured. There is no base

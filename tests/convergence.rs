@@ -123,3 +123,92 @@ fn all_learners_of_a_seed_start_alike_and_see_the_same_noise() {
         assert!((a - b).abs() < 1e-12, "{a} {b}");
     }
 }
+
+/// The learner global, against the bars that it was built for; seeds of their own, fewer than the bars' twenty.
+#[test]
+fn the_global_learner_needs_little_more_than_as_many_movements_as_there_are_equations() {
+    let seeds: Vec<u64> = (401..=408).collect();
+    for (name, steps, median, worst) in [
+        ("arm-6dof", 40, 10.5, 16.0),
+        ("arm-6dof-doubled-error", 40, 10.5, 17.0),
+        ("arm-6dof-no-prior", 45, 10.5, 20.0),
+        ("head-fov", 60, 15.0, 30.0),
+    ] {
+        let summary = compare(&builtin(name).expect("built in"), "global", &seeds, steps).summary;
+        assert!(summary.median_converged_at.is_some_and(|at| at <= median), "{name}: {summary:?}");
+        assert!(summary.max_converged_at.is_some_and(|at| at <= worst), "{name}: {summary:?}");
+    }
+    let seeds = [401, 402, 403];
+    for (name, steps, worst) in [("arm-12dof", 50, 25.0), ("arm-12dof-no-prior", 55, 28.0)] {
+        let summary = compare(&builtin(name).expect("built in"), "global", &seeds, steps).summary;
+        assert!(summary.max_converged_at.is_some_and(|at| at <= worst), "{name}: {summary:?}");
+    }
+}
+
+/// Honest: the mean of NEES/m over the seeds lies in its 99 % band. Close to the limit: the trace of the smoother is
+/// that of the bound at the truth. And it calls itself settled soon after it has converged, and not wrongly.
+#[test]
+fn the_global_learner_is_honest_and_knows_when_it_is_done() {
+    let scenario = builtin("arm-6dof").expect("built in");
+    let m = scenario.robot.layout.dimension() as f64;
+    let seeds = 421..=440;
+    let count = 20.0;
+    let (mut sums, mut ratios) = ([0.0; 2], Vec::new());
+    for seed in seeds {
+        let mut experiment = scenario.experiment(seed, Some(&["global".to_owned()])).expect("starts");
+        for step in 1..=40 {
+            let metrics = experiment.step().expect("a step").learners[0].metrics.clone();
+            if let Some(index) = [20, 40].iter().position(|at| *at == step) {
+                sums[index] += metrics.nees.expect("a covariance") / m;
+                let ratio = metrics.trace.expect("a covariance") / metrics.bound_trace.expect("a truth");
+                assert!((0.6..1.6).contains(&ratio), "seed {seed}, {step} movements: {ratio}");
+            }
+        }
+        let result = experiment.result().learners.remove(0);
+        let (converged, settled) = (result.converged_at.expect("converges"), result.settled_at.expect("settles"));
+        ratios.push(settled as f64 / converged as f64);
+    }
+    let band = 2.576 * (2.0 / (count * m)).sqrt();
+    for (sum, at) in sums.iter().zip([20, 40]) {
+        assert!((sum / count - 1.0).abs() < band, "NEES/m {} at {at} movements", sum / count);
+    }
+    ratios.sort_by(f64::total_cmp);
+    assert!(ratios[ratios.len() / 2] <= 1.6, "{ratios:?}");
+}
+
+#[test]
+fn the_global_learner_notices_a_changed_body_and_learns_it_anew() {
+    let scenario = builtin("body-change").expect("built in");
+    for seed in 451..=454 {
+        let mut experiment = scenario.experiment(seed, Some(&["global".to_owned()])).expect("starts");
+        (0..350).for_each(|_| assert!(experiment.step().is_ok()));
+        let result = experiment.result().learners.remove(0);
+        assert_eq!(result.false_alarms, 0, "seed {seed}");
+        assert!(result.change_detected_at.is_some_and(|at| at <= 10), "seed {seed}: {:?}", result.change_detected_at);
+        assert!(result.recovered_at.is_some_and(|at| at <= 25), "seed {seed}: {:?}", result.recovered_at);
+    }
+}
+
+/// The movements of the smoother against the best design of the same length, certified by the equivalence theorem.
+#[test]
+fn planned_movements_are_nearly_as_good_as_the_best_design() {
+    let scenario = builtin("arm-6dof").expect("built in");
+    let limits = scenario.limits().expect("simulated");
+    let best = limits.best_design(40, 0.01).expect("noise");
+    assert!(best.gap <= 0.01, "gap {}", best.gap);
+    assert!((best.shares.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+    let efficiency = |learner: &str| {
+        let mut efficiencies: Vec<f64> = (461..=465)
+            .map(|seed| {
+                let mut experiment = scenario.experiment(seed, Some(&[learner.to_owned()])).expect("starts");
+                (0..40).for_each(|_| assert!(experiment.step().is_ok()));
+                best.trace / experiment.latest().learners[0].metrics.bound_trace.expect("a truth")
+            })
+            .collect();
+        efficiencies.sort_by(f64::total_cmp);
+        assert!(efficiencies.iter().all(|it| *it <= 1.0 + 1e-9), "{learner} beats the bound: {efficiencies:?}");
+        efficiencies[2]
+    };
+    let (global, random) = (efficiency("global"), efficiency("random"));
+    assert!(global >= 0.85 && random < 0.4, "global {global}, random {random}");
+}

@@ -20,6 +20,9 @@ pub struct Arguments {
     /// Movements to make [default: the scenario's]
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
+    /// Stop as soon as every learner calls itself settled, at the latest after the movements to make
+    #[arg(long, value_name = "WHEN")]
+    until: Option<Until>,
     /// Write a Rerun recording to FILE (open it with Rerun 0.36)
     #[arg(long, value_name = "FILE")]
     rrd: Option<PathBuf>,
@@ -29,6 +32,13 @@ pub struct Arguments {
     /// Write the outcome and the learned models as JSON to FILE, or to standard output for `-`
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+}
+
+/// What may end a run early.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Until {
+    /// The learners' own verdict, without truth.
+    Settled,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -44,6 +54,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         experiment.step()?;
         observe(&experiment, recorder.as_mut(), csv.as_mut())?;
         bar.inc(1);
+        let is_settled = experiment.latest().learners.iter().all(|learner| learner.metrics.settled);
+        if arguments.until == Some(Until::Settled) && is_settled {
+            break;
+        }
     }
     bar.finish_and_clear();
 

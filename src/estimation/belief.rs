@@ -17,9 +17,27 @@ pub struct Belief {
     pub covariance: Option<DMatrix<f64>>,
     /// R = r I as the estimator assumes it: r in m². It may differ from the sensor's own.
     pub noise_m2: f64,
+    /// Other chains that explain what was seen, the likeliest first; empty if the estimator keeps one hypothesis.
+    pub alternatives: Vec<Alternative>,
+}
+
+/// A rival of the estimate: another mode of the posterior.
+#[derive(Clone, Debug)]
+pub struct Alternative {
+    /// Its probability. The estimate's own is what all alternatives leave of 1.
+    pub weight: f64,
+    /// The chain.
+    pub chain: Chain,
+    /// Its covariance, in the chart at it.
+    pub covariance: DMatrix<f64>,
 }
 
 impl Belief {
+    /// The probability of the estimate, as against its alternatives.
+    pub fn weight(&self) -> f64 {
+        1.0 - self.alternatives.iter().map(|alternative| alternative.weight).sum::<f64>()
+    }
+
     /// The covariance of the predicted marker, `H P Hᵀ` (m²), without the measurement noise.
     pub fn marker_covariance(&self, positions: &[f64]) -> Option<Matrix3<f64>> {
         let covariance = self.covariance.as_ref()?;
@@ -90,7 +108,8 @@ mod tests {
             let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-0.5..0.5));
             let covariance = &root * root.transpose();
             let along = rng.random_range(-0.8..0.8);
-            let belief = Belief { chain, layout, covariance: Some(covariance.clone()), noise_m2: 1.0 };
+            let belief =
+                Belief { chain, layout, covariance: Some(covariance.clone()), noise_m2: 1.0, alternatives: Vec::new() };
             for (index, joint) in belief.chain.joints.iter().enumerate() {
                 let Joint::Revolute(line) = joint else {
                     assert!(belief.point_covariance(index, along).is_none());

@@ -69,7 +69,7 @@ mod tests {
             let layout = Arc::new(TangentLayout::new(&chain.joints, &[], true));
             let theta: Vec<f64> = (0..5).map(|_| rng.random_range(-1.5..1.5)).collect();
             let target = chain.marker_at(&theta) + nalgebra::Vector3::new(0.05, -0.02, 0.03);
-            let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-4 };
+            let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-4, alternatives: Vec::new() };
             let mut gradient = Gradient::new(belief, 1e-3);
             let error = |gradient: &Gradient| (gradient.belief().chain.marker_at(&theta) - target).norm();
             let before = error(&gradient);

@@ -3,18 +3,28 @@
 //! * [`Belief`]: the estimated chain and its covariance in minimal tangent coordinates.
 //! * [`Estimator`]: takes a movement and its observation, revises the belief.
 //! * [`Rls`]: recursive least squares, (2)–(5) of the paper: an extended Kalman filter with a constant state.
+//! * [`UnscentedRls`]: the same by the unscented transform, without linearisation.
 //! * [`SixNumbers`]: the same in the paper's over-parameterised coordinates, for comparison.
 //! * [`Gradient`]: the stochastic gradient, the paper's baseline.
+//! * [`Smoother`]: maximum a posteriori over all measurements, with several hypotheses.
+//! * [`ChangeDetector`]: notices from the innovations that the body has changed.
 
 mod belief;
+mod change;
 mod gradient;
 mod rls;
 mod six_numbers;
+mod smoother;
+mod unscented;
 
-pub use belief::Belief;
+pub use belief::{Alternative, Belief};
+pub use change::ChangeDetector;
 pub use gradient::Gradient;
 pub use rls::{Rls, StabilisingNoise};
 pub use six_numbers::SixNumbers;
+pub(crate) use smoother::anywhere;
+pub use smoother::{HypothesisSettings, Prior, Smoother};
+pub use unscented::UnscentedRls;
 
 use crate::sensing::Observation;
 
@@ -33,6 +43,8 @@ pub struct Update {
     /// Normalised innovation squared, `(y − h)ᵀ S⁻¹ (y − h)` with `S = H P Hᵀ + R`, and its degrees of freedom; `None`
     /// for a miss and for an estimator without a covariance.
     pub nis: Option<(f64, usize)>,
+    /// Whether the estimator noticed at this movement that the body has changed.
+    pub change_noticed: bool,
 }
 
 /// Why an estimator could not take in an observation. Its belief stays as it was.

@@ -11,7 +11,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::{Belief, EstimationError, Estimator, Update};
+use super::{Belief, ChangeDetector, EstimationError, Estimator, Update};
 use crate::{
     kinematics::jacobian::jacobian,
     sensing::{Observation, isotropic},
@@ -41,12 +41,14 @@ pub struct Rls {
     covariance: DMatrix<f64>,
     stabilising: Option<StabilisingNoise>,
     step: u64,
+    changes: ChangeDetector,
 }
 
 impl Rls {
     /// Starts from `belief`, with `covariance` as prior P₀.
     pub fn new(belief: Belief, covariance: DMatrix<f64>, stabilising: Option<StabilisingNoise>) -> Self {
-        Self { belief: Belief { covariance: Some(covariance.clone()), ..belief }, covariance, stabilising, step: 0 }
+        let belief = Belief { covariance: Some(covariance.clone()), ..belief };
+        Self { belief, covariance, stabilising, step: 0, changes: ChangeDetector::relative() }
     }
 
     /// The update (2)–(4) with what was seen; the covariance before (5).
@@ -88,7 +90,7 @@ impl Estimator for Rls {
             let (chain, covariance, nis) = self.corrected(positions, &measured.coords)?;
             self.belief.chain = chain;
             self.covariance = covariance;
-            update.nis = Some((nis, 3));
+            update = Update { nis: Some((nis, 3)), change_noticed: self.changes.observe(nis) };
         }
         self.step += 1;
         if let Some(noise) = self.stabilising.filter(|noise| noise.is_due(self.step)) {
@@ -129,7 +131,7 @@ mod tests {
         let chain = random_chain(&mut rng, 6);
         let layout = Arc::new(TangentLayout::new(&chain.joints, &[], true));
         let covariance = DMatrix::identity(layout.dimension(), layout.dimension()) * 0.2;
-        let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-4 };
+        let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-4, alternatives: Vec::new() };
         (Rls::new(belief, covariance, stabilising), rng)
     }
 

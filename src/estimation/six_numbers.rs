@@ -144,7 +144,7 @@ mod tests {
             let m = layout.dimension();
             let theta: Vec<f64> = (0..5).map(|_| rng.random_range(-1.5..1.5)).collect();
             let y = chain.marker_at(&theta) + Vector3::new(1e-5, -2e-5, 1e-5);
-            let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-2 };
+            let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-2, alternatives: Vec::new() };
             let mut six = SixNumbers::new(belief.clone(), 0.5, 0.5, None);
             let mut minimal = super::super::Rls::new(belief, DMatrix::identity(m, m) * 0.25, None);
             six.update(&theta, &Observation::Seen(y)).expect("an update");

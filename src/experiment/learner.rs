@@ -19,6 +19,9 @@ use crate::{
 /// Steps in a row for which the expected error must stay below the target before a learner calls itself settled.
 const SETTLING_STEPS: u32 = 5;
 
+/// The estimate's weight among all hypotheses below which a learner is not settled.
+const UNAMBIGUOUS: f64 = 0.99;
+
 /// What a learner is told: nothing here comes from the truth.
 pub struct Learner {
     /// Its name, estimator and policy.
@@ -49,6 +52,7 @@ pub struct Record {
     movements: u64,
     misses: u64,
     steps_below_target: u32,
+    changes_noticed: u64,
     failure: Option<String>,
 }
 
@@ -142,10 +146,12 @@ impl Learner {
         evaluation: &Evaluation,
         truth: Option<&Chain>,
     ) -> LearnerReport {
+        self.record.changes_noticed += u64::from(update.change_noticed);
         let belief = self.estimator.belief();
         let (estimate, layout) = (&belief.chain, &*belief.layout);
         let expected = belief.expected_error_m(&self.workspace);
-        if expected.is_some_and(|error| error < self.settled_below_m) {
+        let is_certain = belief.weight() > UNAMBIGUOUS;
+        if is_certain && expected.is_some_and(|error| error < self.settled_below_m) {
             self.record.steps_below_target += 1;
         } else {
             self.record.steps_below_target = 0;
@@ -167,6 +173,8 @@ impl Learner {
             movements: self.record.movements,
             misses: self.record.misses,
             settled: self.record.steps_below_target >= SETTLING_STEPS,
+            bound_trace: None,
+            changes_noticed: self.record.changes_noticed,
             joints: evaluation.joints(estimate, truth, layout),
         };
         LearnerReport {

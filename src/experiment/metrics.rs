@@ -40,6 +40,13 @@ pub struct Metrics {
     pub misses: u64,
     /// The learner's own verdict: its expected prediction error has been below the scenario's target for 5 steps.
     pub settled: bool,
+    /// tr(W F⁻¹), the least error that the data collected so far allow, at the truth and with the prior (see
+    /// [`Limits`](super::Limits)); since the change of the body, if it changed.
+    #[serde(default)]
+    pub bound_trace: Option<f64>,
+    /// How often the learner noticed a change of the body.
+    #[serde(default)]
+    pub changes_noticed: u64,
     /// Every joint of the chain by itself, base first.
     pub joints: Vec<JointMetrics>,
 }

@@ -8,6 +8,7 @@ mod choice;
 mod comparison;
 mod convergence;
 mod learner;
+mod limits;
 mod metrics;
 mod report;
 mod result;
@@ -22,6 +23,7 @@ pub use comparison::{
 };
 pub use convergence::{CONFIRMATION, Convergence, Thresholds};
 pub use learner::{Learner, Record};
+pub use limits::{Design, Limits, movements_by_counting};
 pub use metrics::{Evaluation, JointMetrics, Metrics, axis_deg, location_m, nees, orientation_deg};
 pub use report::{
     Description, GazeReport, HeadDescription, JointDescription, JointReport, LearnerDescription, LearnerReport,
@@ -30,6 +32,8 @@ pub use report::{
 pub use result::{JointModel, LearnerResult, MarkerModel, Model, RunResult};
 pub use streams::Stream;
 pub use world::{Change, NoiseSequence, World};
+
+use nalgebra::DMatrix;
 
 use crate::{estimation::Update, selection::SelectionError};
 
@@ -41,7 +45,15 @@ pub struct Experiment {
     learners: Vec<Learner>,
     evaluation: Evaluation,
     verdicts: Vec<Verdict>,
+    bounds: Option<Bounds>,
     latest: StepReport,
+}
+
+/// What the data of every learner allow.
+struct Bounds {
+    limits: Limits,
+    /// Λ₀ + Σ HᵀH/σ² at the truth, one per learner.
+    information: Vec<DMatrix<f64>>,
 }
 
 /// What is known of one learner's run so far.
@@ -51,6 +63,10 @@ struct Verdict {
     /// From the change on.
     recovery: Convergence,
     settled_at: Option<u64>,
+    /// Movements after the change at which the learner first noticed it.
+    noticed_at: Option<u64>,
+    /// Changes noticed before there was one.
+    false_alarms: u64,
 }
 
 /// Why a step could not be made. The experiment stays as it was.
@@ -73,12 +89,18 @@ impl Experiment {
             .iter()
             .map(|_| {
                 let unjudged = Convergence::new(description.thresholds);
-                Verdict { convergence: unjudged.clone(), recovery: unjudged, settled_at: None }
+                Verdict {
+                    convergence: unjudged.clone(),
+                    recovery: unjudged,
+                    settled_at: None,
+                    noticed_at: None,
+                    false_alarms: 0,
+                }
             })
             .collect();
         let noise = NoiseSequence::new(description.seed);
         let latest = StepReport { step: 0, learners: Vec::new(), truth: None };
-        let mut experiment = Self { description, world, noise, learners, evaluation, verdicts, latest };
+        let mut experiment = Self { description, world, noise, learners, evaluation, verdicts, bounds: None, latest };
         let truth = experiment.world.truth();
         let reports = experiment
             .learners
@@ -87,6 +109,15 @@ impl Experiment {
             .collect();
         experiment.conclude(StepReport { step: 0, learners: reports, truth: None });
         experiment
+    }
+
+    /// The same with the bound of the data collected in every report (see [`Limits`]).
+    pub fn bounded(mut self, limits: Limits) -> Self {
+        let information = vec![limits.prior(); self.learners.len()];
+        let bound = limits.bound(&limits.prior());
+        self.latest.learners.iter_mut().for_each(|learner| learner.metrics.bound_trace = bound);
+        self.bounds = Some(Bounds { limits, information });
+        self
     }
 
     /// What stays the same from step to step.
@@ -127,7 +158,13 @@ impl Experiment {
         if let (Some(truth), true) = (truth, has_changed) {
             self.evaluation.follow(truth);
         }
-        let reports = self
+        if let (Some(bounds), Some(truth), true) = (&mut self.bounds, truth, has_changed) {
+            // What was measured before says nothing certain of the new body.
+            bounds.limits.truth = truth.clone();
+            let prior = bounds.limits.prior();
+            bounds.information.fill(prior);
+        }
+        let mut reports: Vec<LearnerReport> = self
             .learners
             .iter_mut()
             .zip(choices)
@@ -143,6 +180,14 @@ impl Experiment {
                 learner.report(movement, update, &self.evaluation, truth)
             })
             .collect();
+        if let Some(bounds) = &mut self.bounds {
+            for (report, information) in reports.iter_mut().zip(&mut bounds.information) {
+                if let Some(movement) = report.movement.as_ref().filter(|it| it.measured_marker_m.is_some()) {
+                    *information += bounds.limits.information(&movement.configuration);
+                }
+                report.metrics.bound_trace = bounds.limits.bound(information);
+            }
+        }
         let truth = truth.filter(|_| has_changed).map(ModelReport::of_chain);
         self.conclude(StepReport { step: self.latest.step + 1, learners: reports, truth });
         Ok(&self.latest)
@@ -157,6 +202,13 @@ impl Experiment {
                     verdict.recovery.observe(movements, metrics.orientation_deg, metrics.location_m);
                 }
                 _ => verdict.convergence.observe(report.step, metrics.orientation_deg, metrics.location_m),
+            }
+            match since_change {
+                Some(movements @ 1..) if metrics.changes_noticed > verdict.false_alarms => {
+                    verdict.noticed_at.get_or_insert(movements);
+                }
+                Some(1..) => {}
+                _ => verdict.false_alarms = metrics.changes_noticed,
             }
             if metrics.settled && verdict.settled_at.is_none() {
                 verdict.settled_at = Some(metrics.movements);

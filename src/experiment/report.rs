@@ -122,7 +122,7 @@ pub struct JointDescription {
 pub struct LearnerDescription {
     /// Its name in the scenario.
     pub name: String,
-    /// Its estimator: `rls` or `gradient`.
+    /// Its estimator: `rls`, `gradient`, `smoother`, …
     pub estimator: String,
     /// Its policy: `active`, `active-naive` or `random`.
     pub policy: String,

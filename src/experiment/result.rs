@@ -44,6 +44,9 @@ pub struct LearnerResult {
     /// The movement, counted from the change, at which the learner itself noticed it; null for a learner that does not
     /// look for changes.
     pub change_detected_at: Option<u64>,
+    /// How often the learner noticed a change of the body before there was one.
+    #[serde(default)]
+    pub false_alarms: u64,
     /// First movement at which the learner called itself settled; null if it did not.
     pub settled_at: Option<u64>,
     /// Why the learner stopped learning, if it did.
@@ -148,7 +151,8 @@ impl Experiment {
                 policy: learner.description.policy.clone(),
                 converged_at: verdict.convergence.converged_at(),
                 recovered_at: verdict.recovery.converged_at(),
-                change_detected_at: None,
+                change_detected_at: verdict.noticed_at,
+                false_alarms: verdict.false_alarms,
                 settled_at: verdict.settled_at,
                 failure: report.failure.clone(),
                 metrics: report.metrics.clone(),

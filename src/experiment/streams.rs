@@ -18,6 +18,8 @@ pub enum Stream {
     Workspace = 5,
     /// The rows of a data set that are held out.
     HeldOut = 6,
+    /// Where a smoother searches for hypotheses.
+    Hypotheses = 7,
 }
 
 impl Stream {

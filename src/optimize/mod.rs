@@ -97,8 +97,10 @@
 
 mod bayesian;
 mod direct;
+mod polish;
 
 pub use bayesian::bayesian;
+pub use polish::{Polish, polish};
 
 pub use direct::{
     Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Minimum, Moment, Partition, Rectangle, Settings, Shape,

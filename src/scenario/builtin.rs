@@ -21,8 +21,11 @@ macro_rules! builtins {
 pub const BUILTIN: &[Builtin] = builtins![
     "arm-6dof",
     "arm-6dof-doubled-error",
+    "arm-6dof-no-prior",
     "arm-6dof-selectors",
     "arm-12dof",
+    "arm-12dof-no-prior",
+    "arm-20dof",
     "head-fov",
     "head-fov-excursion",
     "head-fov-doubled-error",

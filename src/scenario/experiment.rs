@@ -2,22 +2,23 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Rotation3, UnitVector3, Vector3};
+use nalgebra::{DMatrix, DVector, Rotation3, UnitVector3, Vector3};
 use rand::{RngExt, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
 use super::{
     ErrorDraw, EstimatorKind, InitialError, LearnerSpec, PolicyKind, Prior, Recording, Scenario, ScenarioError,
-    WorldSpec,
+    SmootherSpec, WorldSpec,
 };
 use crate::{
-    estimation::{Belief, Estimator, Gradient, Rls, SixNumbers},
+    estimation::{self, Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls, anywhere},
     experiment::{
-        Change, Description, Evaluation, Experiment, HeadDescription, Learner, ModelReport, Record, Stream, World,
+        Change, Description, Evaluation, Experiment, HeadDescription, Learner, Limits, ModelReport, Record, Stream,
+        World,
     },
     kinematics::{Chain, Joint, registration::register},
     optimize::{Settings, Variant},
-    selection::{Actions, Active, Movement, Policy, Random, Search, Watch, Weights, draw_configuration},
+    selection::{Actions, Active, Movement, Planner, Policy, Random, Search, Watch, Weights, draw_configuration},
     sensing::MarkerTracker,
 };
 
@@ -41,9 +42,11 @@ impl Scenario {
         self.assemble(seed, &self.chosen(learners)?, world, evaluation, &briefing)
     }
 
-    /// The learners of these names, in this order.
+    /// The learners of these names, in this order; without names those that run by default.
     pub fn chosen(&self, names: Option<&[String]>) -> Result<Vec<LearnerSpec>, ScenarioError> {
-        let Some(names) = names else { return Ok(self.learners.clone()) };
+        let Some(names) = names else {
+            return Ok(self.learners.iter().filter(|spec| spec.by_default).cloned().collect());
+        };
         if names.is_empty() {
             return Err(ScenarioError::NoLearner);
         }
@@ -61,6 +64,16 @@ impl Scenario {
             chosen.push(spec.clone());
         }
         Ok(chosen)
+    }
+
+    /// What the limits of this scenario are computed from; `None` where no truth is known or the sensor has no noise.
+    pub fn limits(&self) -> Option<Limits> {
+        let WorldSpec::Simulated { sigma_m, .. } = self.world else { return None };
+        let layout = self.robot.layout.clone();
+        let prior_sd = self.prior.standard_deviations(&layout);
+        let weights = Weights::new(self.selection.units, &layout, &prior_sd);
+        let (truth, limits) = (self.robot.chain.clone(), self.robot.limits.clone());
+        (sigma_m > 0.0).then_some(Limits { truth, layout, limits, prior_sd, sigma_m, weights })
     }
 
     fn draw(&self, seed: u64) -> Result<(World, Evaluation, Briefing), ScenarioError> {
@@ -131,6 +144,10 @@ impl Scenario {
         let layout = &self.robot.layout;
         for (index, joint) in chain.joints.iter_mut().enumerate().filter(|(index, _)| layout.is_learned(*index)) {
             debug_assert!(layout.direction(index).is_some());
+            if error.draw == ErrorDraw::Anywhere {
+                *joint = anywhere(joint, error.point_m, rng);
+                continue;
+            }
             let angles = error.draw(error.angle_rad, rng);
             let turn = Rotation3::from_euler_angles(angles.x, angles.y, angles.z);
             let turned = |w: &UnitVector3<f64>| UnitVector3::new_normalize(turn * w.into_inner());
@@ -167,21 +184,33 @@ impl Scenario {
                     layout: layout.clone(),
                     covariance: None,
                     noise_m2: self.filter.noise_m2,
+                    alternatives: Vec::new(),
                 };
                 let estimator: Box<dyn Estimator> = match spec.estimator {
                     EstimatorKind::Rls => {
                         let prior = DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd));
                         Box::new(Rls::new(belief, prior, self.filter.stabilising.filter(|_| spec.stabilising)))
                     }
+                    EstimatorKind::Unscented => {
+                        let prior = DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd));
+                        let stabilising = self.filter.stabilising.filter(|_| spec.stabilising);
+                        Box::new(UnscentedRls::new(belief, prior, stabilising))
+                    }
                     EstimatorKind::RlsSixNumbers => {
                         let Prior { direction_rad, point_m, .. } = self.prior;
                         let stabilising = self.filter.stabilising.filter(|_| spec.stabilising);
                         Box::new(SixNumbers::new(belief, direction_rad, point_m, stabilising))
                     }
+                    EstimatorKind::Smoother => {
+                        let SmootherSpec { noise_m2, hypotheses } = self.smoother;
+                        let prior = self.smoother_prior(&briefing.initial, &prior_sd);
+                        let rng = Stream::Hypotheses.rng(seed);
+                        Box::new(Smoother::new(prior, layout.clone(), noise_m2, hypotheses, rng))
+                    }
                     EstimatorKind::Gradient => Box::new(Gradient::new(belief, self.gradient_rate)),
                 };
                 let before = estimator.belief().clone();
-                let policy = self.policy(spec.policy, &weights, briefing.watch.clone());
+                let policy = self.policy(spec, &weights, briefing);
                 Learner {
                     description: spec.description(),
                     estimator,
@@ -210,7 +239,24 @@ impl Scenario {
             change_at: world.change().map(|change| change.step),
             head: briefing.watch.as_ref().map(|watch| HeadDescription::of(&watch.head)),
         };
-        Ok(Experiment::new(description, world, learners, evaluation))
+        let experiment = Experiment::new(description, world, learners, evaluation);
+        Ok(match self.limits() {
+            Some(limits) => experiment.bounded(limits),
+            None => experiment,
+        })
+    }
+}
+
+impl Scenario {
+    /// What a smoother is told: the initial estimate and how wrong it may be, or bounds alone.
+    fn smoother_prior(&self, initial: &Chain, deviations: &DVector<f64>) -> estimation::Prior {
+        match &self.world {
+            WorldSpec::Simulated { initial_error: InitialError { draw: ErrorDraw::Anywhere, point_m, .. }, .. } => {
+                let (frame, bound_m) = (initial.clone(), *point_m);
+                estimation::Prior::Within { frame, bound_m, marker_m: self.prior.marker_m }
+            }
+            _ => estimation::Prior::Around { guess: initial.clone(), deviations: deviations.clone() },
+        }
     }
 }
 
@@ -218,17 +264,30 @@ impl Scenario {
 const MONTE_CARLO_SAMPLES: usize = 16;
 
 impl Scenario {
-    fn policy(&self, kind: PolicyKind, weights: &Weights, watch: Option<Watch>) -> Box<dyn Policy> {
+    fn policy(&self, spec: &LearnerSpec, weights: &Weights, briefing: &Briefing) -> Box<dyn Policy> {
+        let watch = briefing.watch.clone();
+        let kind = spec.policy;
         let settings = self.selection.search;
         let evaluations = settings.max_evaluations;
         let search = match kind {
             PolicyKind::Random => return Box::new(Random),
-            PolicyKind::Active | PolicyKind::ActiveNaive | PolicyKind::ActiveMonteCarlo => Search::Direct(settings),
+            PolicyKind::Active | PolicyKind::ActivePlanned | PolicyKind::ActiveNaive | PolicyKind::ActiveMonteCarlo => {
+                Search::Direct(settings)
+            }
             PolicyKind::ActiveDirect => Search::Direct(Settings { variant: Variant::Original, ..settings }),
             PolicyKind::ActiveRandomSearch => Search::Random { evaluations },
             PolicyKind::ActiveBayesian => Search::Bayesian { evaluations },
         };
         let samples = if kind == PolicyKind::ActiveMonteCarlo { MONTE_CARLO_SAMPLES } else { 0 };
+        let plans = kind == PolicyKind::ActivePlanned
+            || (kind == PolicyKind::Active && spec.estimator == EstimatorKind::Smoother);
+        if plans {
+            let planner = Planner::new(weights.clone(), settings, self.selection.planning, briefing.workspace.clone());
+            return Box::new(match watch {
+                Some(watch) => planner.watched(watch),
+                None => planner,
+            });
+        }
         let active = Active::new(weights.clone(), search).sampled(samples);
         Box::new(match watch {
             Some(watch) if kind == PolicyKind::ActiveNaive => active.watched_naively(watch),
@@ -257,7 +316,7 @@ fn drawn(
 impl InitialError {
     fn draw(&self, size: f64, rng: &mut ChaCha8Rng) -> Vector3<f64> {
         Vector3::from_fn(|_, _| match self.draw {
-            ErrorDraw::UpTo => size * rng.random_range(-1.0..=1.0),
+            ErrorDraw::UpTo | ErrorDraw::Anywhere => size * rng.random_range(-1.0..=1.0),
             ErrorDraw::Exactly => size * if rng.random::<bool>() { 1.0 } else { -1.0 },
         })
     }
@@ -284,7 +343,14 @@ mod tests {
     /// the choices after the first measurement do not.
     #[test]
     fn swapping_the_truth_changes_no_first_selection() {
-        for name in ["arm-6dof", "arm-12dof", "head-fov"] {
+        for (name, learner) in [
+            ("arm-6dof", None),
+            ("arm-12dof", None),
+            ("head-fov", None),
+            ("arm-6dof", Some("global")),
+            ("arm-6dof-no-prior", Some("global")),
+            ("head-fov", Some("global")),
+        ] {
             let scenario = builtin(name).expect("a built-in scenario");
             let selections = |swap: bool| {
                 let (mut world, mut evaluation, briefing) = scenario.draw(11).expect("a world");
@@ -295,7 +361,8 @@ mod tests {
                     );
                     evaluation.follow(truth);
                 }
-                let specs = scenario.chosen(None).expect("learners");
+                let names = learner.map(|learner| [learner.to_owned()]);
+                let specs = scenario.chosen(names.as_ref().map(<[_; 1]>::as_slice)).expect("learners");
                 let mut experiment =
                     scenario.assemble(11, &specs, world, evaluation, &briefing).expect("an experiment");
                 [(); 3].map(|()| {

@@ -24,11 +24,11 @@ pub use error::{Problem, ScenarioError};
 pub use summary::{ScenarioSummary, WorldKind};
 
 use crate::{
-    estimation::StabilisingNoise,
+    estimation::{HypothesisSettings, StabilisingNoise},
     experiment::{LearnerDescription, Thresholds},
     kinematics::{Chain, Quantity, TangentLayout},
     optimize::Settings,
-    selection::{CriterionUnits, Watch},
+    selection::{CriterionUnits, Planning, Watch},
 };
 
 /// A validated scenario.
@@ -48,6 +48,8 @@ pub struct Scenario {
     pub prior: Prior,
     /// Values of the recursive least squares.
     pub filter: Filter,
+    /// Values of the smoother.
+    pub smoother: SmootherSpec,
     /// Rate η of the stochastic gradient.
     pub gradient_rate: f64,
     /// How movements are chosen actively.
@@ -142,6 +144,9 @@ pub enum ErrorDraw {
     UpTo,
     /// Minus or plus the size, with equal chance.
     Exactly,
+    /// No guess at all: directions uniform on the sphere, points uniform within plus and minus the size around the
+    /// origin. Nothing in it comes from the truth.
+    Anywhere,
 }
 
 /// Prior standard deviations in tangent coordinates.
@@ -179,6 +184,15 @@ pub struct Filter {
     pub stabilising: Option<StabilisingNoise>,
 }
 
+/// Values of the smoother.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SmootherSpec {
+    /// The measurement variance per coordinate that it assumes, m²: the sensor's own unless the file says otherwise.
+    pub noise_m2: f64,
+    /// How many hypotheses it keeps and searches.
+    pub hypotheses: HypothesisSettings,
+}
+
 /// How movements are chosen actively.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SelectionSpec {
@@ -186,6 +200,8 @@ pub struct SelectionSpec {
     pub search: Settings,
     /// The units of the criterion.
     pub units: CriterionUnits,
+    /// How movements are planned ahead, by learners that plan.
+    pub planning: Planning,
 }
 
 /// A learner that a scenario offers.
@@ -199,6 +215,8 @@ pub struct LearnerSpec {
     pub policy: PolicyKind,
     /// Whether its filter adds the scenario's stabilising noise.
     pub stabilising: bool,
+    /// Whether it runs when no learner is named.
+    pub by_default: bool,
 }
 
 impl LearnerSpec {
@@ -217,10 +235,14 @@ impl LearnerSpec {
 pub enum EstimatorKind {
     /// Recursive least squares.
     Rls,
+    /// Recursive least squares by the unscented transform.
+    Unscented,
     /// Recursive least squares in the paper's six numbers per joint: a comparison, which shows no covariance.
     RlsSixNumbers,
     /// Stochastic gradient.
     Gradient,
+    /// Maximum a posteriori over all measurements, with several hypotheses.
+    Smoother,
 }
 
 impl EstimatorKind {
@@ -228,13 +250,15 @@ impl EstimatorKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Rls => "rls",
+            Self::Unscented => "unscented",
             Self::RlsSixNumbers => "rls-six-numbers",
             Self::Gradient => "gradient",
+            Self::Smoother => "smoother",
         }
     }
 
     fn keeps_covariance(self) -> bool {
-        self == Self::Rls
+        matches!(self, Self::Rls | Self::Unscented | Self::Smoother)
     }
 }
 
@@ -246,6 +270,8 @@ pub enum PolicyKind {
     Active,
     /// The same, but where a head watches with blind faith in the predicted marker: a comparison.
     ActiveNaive,
+    /// Plans the movements that are still needed together; what `active` is for a smoother.
+    ActivePlanned,
     /// As `active`, but by original DIRECT, whatever the scenario's variant.
     ActiveDirect,
     /// As `active`, but the best of as many random configurations: the floor of every search.
@@ -264,6 +290,7 @@ impl PolicyKind {
         match self {
             Self::Active => "active",
             Self::ActiveNaive => "active-naive",
+            Self::ActivePlanned => "active-planned",
             Self::ActiveDirect => "active-direct",
             Self::ActiveRandomSearch => "active-random-search",
             Self::ActiveBayesian => "active-bayesian",

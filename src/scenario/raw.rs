@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{ErrorDraw, EstimatorKind, PolicyKind, error::Problem, error::similar};
-use crate::kinematics::JointKind;
+use crate::{kinematics::JointKind, selection::Optimality};
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -22,6 +22,7 @@ pub struct Scenario {
     pub change: Option<Spanned<Change>>,
     pub prior: Spanned<Prior>,
     pub filter: Filter,
+    pub smoother: Option<Smoother>,
     pub gradient: Gradient,
     pub selection: Selection,
     pub thresholds: Thresholds,
@@ -134,6 +135,14 @@ pub struct Filter {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
+pub struct Smoother {
+    pub measurement_variance_m2: Option<Spanned<f64>>,
+    pub hypotheses: Option<Spanned<u64>>,
+    pub spawned: Option<Spanned<u64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StabilisingNoise {
     pub variance: Spanned<f64>,
     pub first_step: Spanned<u64>,
@@ -154,6 +163,10 @@ pub struct Selection {
     pub evaluations: Spanned<usize>,
     pub units: Units,
     pub characteristic_length_m: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub criterion: Optimality,
+    pub ahead: Option<Spanned<u64>>,
+    pub batch: Option<Spanned<u64>>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -190,6 +203,8 @@ pub struct Learner {
     pub estimator: EstimatorKind,
     pub policy: Spanned<PolicyKind>,
     pub stabilising_noise: Option<Spanned<bool>>,
+    #[serde(default = "yes")]
+    pub by_default: bool,
 }
 
 /// Reads the keys of `text`.

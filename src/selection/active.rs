@@ -81,7 +81,7 @@ pub struct Leaf {
 }
 
 impl Partition {
-    fn of(direct: &Direct) -> Self {
+    pub(super) fn of(direct: &Direct) -> Self {
         let leaves: Vec<Leaf> = direct
             .partition()
             .iter()

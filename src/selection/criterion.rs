@@ -16,10 +16,10 @@
 
 use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Point3, U3};
 
-use super::{SelectionError, Visibility};
+use super::{Optimality, SelectionError, Visibility, optimality};
 use crate::{
     estimation::Belief,
-    kinematics::{Quantity, TangentLayout, jacobian},
+    kinematics::{Chain, Quantity, TangentLayout, jacobian},
     sensing::isotropic,
 };
 
@@ -48,6 +48,11 @@ impl Weights {
         Self(DVector::from_iterator(quantities.len(), quantities.iter().enumerate().map(weight)))
     }
 
+    /// The weight of one tangent coordinate.
+    pub(crate) fn of(&self, coordinate: usize) -> f64 {
+        self.0[coordinate]
+    }
+
     /// tr(W P).
     pub fn trace(&self, covariance: &DMatrix<f64>) -> f64 {
         self.0.iter().zip(covariance.diagonal().iter()).map(|(w, p)| w * p).sum()
@@ -65,12 +70,34 @@ pub enum Sight<'a> {
 }
 
 /// The A-criterion under one belief.
+#[derive(Clone)]
 pub struct ACriterion<'a> {
-    belief: &'a Belief,
+    chain: &'a Chain,
+    layout: &'a TangentLayout,
+    noise_m2: f64,
     covariance: &'a DMatrix<f64>,
     weights: &'a Weights,
     trace: f64,
     sight: Option<Sight<'a>>,
+    /// The covariance that visibility is judged by, if it is another than that of the criterion.
+    unsure: Option<&'a DMatrix<f64>>,
+    optimality: Optimality,
+    /// Mean of HᵀH over the workspace, for criterion I.
+    metric: Option<DMatrix<f64>>,
+}
+
+/// What a belief predicts of the marker after a movement.
+pub(super) struct Prediction {
+    /// h(x, θ).
+    pub marker: Point3<f64>,
+    /// H P Hᵀ, m².
+    pub spread: Matrix3<f64>,
+    /// G W Gᵀ.
+    pub leverage: Matrix3<f64>,
+    /// Gᵀ (m × 3), for criterion E.
+    pub gain: Option<DMatrix<f64>>,
+    /// p(θ), the chance that it is seen.
+    pub chance: f64,
 }
 
 /// What one movement would teach, under one belief.
@@ -89,18 +116,73 @@ pub struct Appraisal {
 }
 
 /// Candidates per batch product: enough to fill the matrix kernel, few enough to share among cores.
-const CHUNK: usize = 32;
+pub(super) const CHUNK: usize = 32;
 
 impl<'a> ACriterion<'a> {
     /// The criterion at `belief`, which must hold a covariance.
     pub fn new(belief: &'a Belief, weights: &'a Weights) -> Result<Self, SelectionError> {
         let covariance = belief.covariance.as_ref().ok_or(SelectionError::NoCovariance)?;
-        Ok(Self { belief, covariance, weights, trace: weights.trace(covariance), sight: None })
+        Ok(Self::over(belief, &belief.chain, covariance, weights))
+    }
+
+    /// The criterion under another chain and covariance than the belief's own.
+    pub(super) fn over(
+        belief: &'a Belief,
+        chain: &'a Chain,
+        covariance: &'a DMatrix<f64>,
+        weights: &'a Weights,
+    ) -> Self {
+        let trace = weights.trace(covariance);
+        Self {
+            chain,
+            layout: &belief.layout,
+            noise_m2: belief.noise_m2,
+            covariance,
+            weights,
+            trace,
+            sight: None,
+            unsure: None,
+            optimality: Optimality::A,
+            metric: None,
+        }
     }
 
     /// The same where a head watches.
     pub fn watched(self, sight: Sight<'a>) -> Self {
         Self { sight: Some(sight), ..self }
+    }
+
+    /// The same with visibility judged by another covariance: by today's, where the criterion is that of a plan.
+    pub(super) fn unsure(self, covariance: &'a DMatrix<f64>) -> Self {
+        Self { unsure: Some(covariance), ..self }
+    }
+
+    /// The same by another optimality.
+    pub(super) fn by(self, optimality: Optimality, workspace: &[Vec<f64>]) -> Self {
+        let (mut metric, covariance) = (None, self.covariance);
+        let trace = match optimality {
+            Optimality::A => self.weights.trace(covariance),
+            Optimality::D => optimality::half_log_determinant(covariance),
+            Optimality::E => optimality::greatest_eigenvalue(covariance, self.weights, None),
+            Optimality::I => {
+                let of_predictions = optimality::prediction_metric(self.chain, self.layout, workspace);
+                let trace = of_predictions.dot(covariance);
+                metric = Some(of_predictions);
+                trace
+            }
+        };
+        Self { optimality, trace, metric, ..self }
+    }
+
+    /// By how much a marker with innovation covariance `s` lowers the criterion; NaN if `s` is not positive.
+    pub(super) fn gain(&self, prediction: &Prediction, s: &Matrix3<f64>) -> f64 {
+        match self.optimality {
+            Optimality::A | Optimality::I => s.cholesky().map_or(f64::NAN, |s| s.solve(&prediction.leverage).trace()),
+            Optimality::D => optimality::information(&prediction.spread, self.noise_m2),
+            Optimality::E => prediction.gain.as_ref().map_or(f64::NAN, |gain| {
+                self.trace - optimality::greatest_eigenvalue(self.covariance, self.weights, Some((gain, *s)))
+            }),
+        }
     }
 
     /// tr(W P), the criterion before any further observation.
@@ -134,34 +216,51 @@ impl<'a> ACriterion<'a> {
     }
 
     fn evaluate_chunk<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {
-        let m = self.belief.layout.dimension();
+        let noise = isotropic(self.noise_m2);
+        let value = |prediction: Prediction| {
+            if prediction.chance == 0.0 {
+                return f64::INFINITY;
+            }
+            let gain = |s: nalgebra::Cholesky<f64, U3>| s.solve(&prediction.leverage).trace();
+            (prediction.spread + noise).cholesky().map_or(f64::INFINITY, |s| self.trace - prediction.chance * gain(s))
+        };
+        self.predictions(candidates).into_iter().map(value).collect()
+    }
+
+    /// What the belief predicts of the marker at every candidate.
+    pub(super) fn predictions<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<Prediction> {
+        let m = self.layout.dimension();
         let mut stacked = DMatrix::zeros(m, 3 * candidates.len());
         let markers: Vec<Point3<f64>> = (candidates.iter().enumerate())
             .map(|(index, candidate)| {
                 let columns = stacked.generic_view_mut((0, 3 * index), (Dyn(m), U3));
-                let (chain, layout) = (&self.belief.chain, &self.belief.layout);
-                jacobian::jacobian_transposed_into(chain, layout, candidate.as_ref(), columns)
+                jacobian::jacobian_transposed_into(self.chain, self.layout, candidate.as_ref(), columns)
             })
             .collect();
         let gains = self.covariance * &stacked;
-        let noise = isotropic(self.belief.noise_m2);
-        (0..candidates.len())
-            .map(|index| {
+        let unsure = self.unsure.filter(|_| self.sight.is_some()).map(|covariance| covariance * &stacked);
+        (candidates.iter().zip(markers).enumerate())
+            .map(|(index, (candidate, marker))| {
                 let h_t = stacked.fixed_columns::<3>(3 * index);
                 let g_t = gains.fixed_columns::<3>(3 * index);
-                let (mut spread, mut g_w_g) = (Matrix3::zeros(), Matrix3::zeros());
+                let (mut spread, mut leverage) = (Matrix3::zeros(), Matrix3::zeros());
                 for k in 0..m {
                     let (h, g) = (h_t.row(k), g_t.row(k));
                     spread += h.transpose() * g;
-                    g_w_g += g.transpose() * g * self.weights.0[k];
+                    leverage += g.transpose() * g * self.weights.0[k];
                 }
                 let spread = (spread + spread.transpose()) * 0.5;
-                let chance = self.chance(candidates[index].as_ref(), &markers[index], &spread);
-                if chance == 0.0 {
-                    return f64::INFINITY;
+                if let Some(metric) = &self.metric {
+                    leverage = (g_t.transpose() * (metric * g_t)).fixed_view::<3, 3>(0, 0).into_owned();
                 }
-                let gain = |s: nalgebra::Cholesky<f64, U3>| s.solve(&g_w_g).trace();
-                (spread + noise).cholesky().map_or(f64::INFINITY, |s| self.trace - chance * gain(s))
+                let gain = (self.optimality == Optimality::E)
+                    .then(|| DMatrix::from_column_slice(m, 3, g_t.into_owned().as_slice()));
+                let doubt = unsure.as_ref().map_or(spread, |gains| {
+                    let doubt = (h_t.transpose() * gains.fixed_columns::<3>(3 * index)).into_owned();
+                    (doubt + doubt.transpose()) * 0.5
+                });
+                let chance = self.chance(candidate.as_ref(), &marker, &doubt);
+                Prediction { marker, spread, leverage, gain, chance }
             })
             .collect()
     }
@@ -202,7 +301,7 @@ mod tests {
         let units =
             if seed.is_multiple_of(2) { CriterionUnits::Prior } else { CriterionUnits::CharacteristicLength(0.3) };
         let weights = Weights::new(units, &layout, &prior_sd);
-        (Belief { chain, layout, covariance: Some(covariance), noise_m2: 1e-2 }, weights, rng)
+        (Belief { chain, layout, covariance: Some(covariance), noise_m2: 1e-2, alternatives: Vec::new() }, weights, rng)
     }
 
     /// The posterior that the criterion abbreviates, built the long way.

@@ -2,12 +2,18 @@
 //!
 //! * [`ACriterion`]: the expected posterior error of (7), in the form that never builds a posterior.
 //! * [`Policy`]: chooses among [`Actions`], the whole joint box or a list of recorded movements.
+//! * [`Outlook`]: the same under several hypotheses.
 //! * [`Active`]: minimises the criterion, by DIRECT over a box or by trying all of a list.
+//! * [`Planner`]: plans the movements that are still needed together, under all hypotheses.
 //! * [`Visibility`]: where a head watches, the chance that the marker is seen, which weighs the gain.
 //! * [`Random`]: draws uniformly, the paper's comparison.
 
 mod active;
 mod criterion;
+mod optimality;
+mod outlook;
+mod plan;
+mod planner;
 mod random;
 mod visibility;
 
@@ -17,6 +23,9 @@ use rand_chacha::ChaCha8Rng;
 
 pub use active::{Active, Leaf, Partition, Search};
 pub use criterion::{ACriterion, Appraisal, CriterionUnits, Sight, Weights};
+pub use optimality::Optimality;
+pub use outlook::Outlook;
+pub use planner::{Planner, Planning};
 pub use random::Random;
 pub use visibility::{Visibility, Watch};
 

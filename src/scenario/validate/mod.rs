@@ -11,15 +11,15 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use toml::Spanned;
 
 use super::{
-    EstimatorKind, Filter, LearnerSpec, PolicyKind, Prior, Scenario, SelectionSpec,
+    EstimatorKind, Filter, LearnerSpec, PolicyKind, Prior, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError, similar},
     raw,
 };
 use crate::{
-    estimation::StabilisingNoise,
+    estimation::{HypothesisSettings, StabilisingNoise},
     experiment::Thresholds,
     optimize::{Settings, Variant},
-    selection::CriterionUnits,
+    selection::{CriterionUnits, Planning},
 };
 
 /// How far from 1 the length of an axis may be: what is lost by writing six digits.
@@ -123,6 +123,7 @@ impl Check<'_> {
             steps: self.at_least_one("steps", &raw.steps),
             prior: self.prior(raw),
             filter: self.filter(&raw.filter),
+            smoother: self.smoother(raw),
             gradient_rate: self.positive("gradient.rate", &raw.gradient.rate),
             selection: self.selection(&raw.selection),
             thresholds: Thresholds {
@@ -162,6 +163,26 @@ impl Check<'_> {
         Filter { noise_m2, stabilising }
     }
 
+    fn smoother(&mut self, raw: &raw::Scenario) -> SmootherSpec {
+        let default = HypothesisSettings::default();
+        let given = raw.smoother.as_ref();
+        let variance = given.and_then(|given| given.measurement_variance_m2.as_ref());
+        let sensor = raw.sensor.as_ref().map(|sensor| sensor.get_ref().sigma_m.get_ref().powi(2));
+        let noise_m2 = match variance {
+            Some(variance) => self.positive("smoother.measurement_variance_m2", variance),
+            // A sensor without noise would make the posterior infinitely sharp.
+            None => sensor.map_or(*raw.filter.measurement_variance_m2.get_ref(), |variance| variance.max(1e-10)),
+        };
+        let mut count = |key: &str, value: Option<&Spanned<u64>>, default: usize| {
+            value.map_or(default, |value| self.at_least_one(key, value).min(1000) as usize)
+        };
+        let hypotheses = HypothesisSettings {
+            kept: count("smoother.hypotheses", given.and_then(|given| given.hypotheses.as_ref()), default.kept),
+            spawned: count("smoother.spawned", given.and_then(|given| given.spawned.as_ref()), default.spawned),
+        };
+        SmootherSpec { noise_m2, hypotheses }
+    }
+
     fn selection(&mut self, raw: &raw::Selection) -> SelectionSpec {
         let units = match (raw.units, &raw.characteristic_length_m) {
             (raw::Units::CharacteristicLength, None) => CriterionUnits::CharacteristicLength(1.0),
@@ -188,7 +209,17 @@ impl Check<'_> {
             epsilon: self.not_negative("selection.epsilon", &raw.epsilon),
             max_evaluations: *evaluations.get_ref(),
         };
-        SelectionSpec { search, units }
+        let default = Planning::default();
+        let mut count = |key: &str, value: &Option<Spanned<u64>>, default: usize| {
+            value.as_ref().map_or(default, |value| self.at_least_one(key, value).min(100) as usize)
+        };
+        let planning = Planning {
+            optimality: raw.criterion,
+            ahead: count("selection.ahead", &raw.ahead, default.ahead),
+            batch: count("selection.batch", &raw.batch, default.batch),
+            ..default
+        };
+        SelectionSpec { search, units, planning }
     }
 
     fn learners(&mut self, raw: &Spanned<Vec<raw::Learner>>, learns_marker: bool) -> Vec<LearnerSpec> {
@@ -218,7 +249,8 @@ impl Check<'_> {
                 self.problem(key_span.span(), format!("{key}.stabilising_noise"), what, mend);
             }
             let stabilising = learner.stabilising_noise.as_ref().is_none_or(|given| *given.get_ref());
-            learners.push(LearnerSpec { name: name.clone(), estimator: learner.estimator, policy, stabilising });
+            let (name, by_default) = (name.clone(), learner.by_default);
+            learners.push(LearnerSpec { name, estimator: learner.estimator, policy, stabilising, by_default });
         }
         if learners.is_empty() {
             self.problem(raw.span(), "learner", "there is no learner", "add a [[learner]]");

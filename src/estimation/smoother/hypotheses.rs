@@ -1,0 +1,108 @@
+//! A weighted set of modes of the posterior: a Gaussian mixture.
+//!
+//! Each mode's evidence is that of its Laplace approximation, `−E − ½ ln det Λ`. Modes are searched again from where
+//! they are after every measurement; new ones are searched from draws of the prior and from the modes there are, with
+//! some joints drawn anew. Modes that meet are merged, and those without a share of the evidence are dropped.
+
+use rand::{Rng, RngExt};
+
+use super::posterior::{Effort, Mode, Posterior};
+use crate::kinematics::{Chain, Joint, Line, TangentLayout};
+
+/// How many modes are kept, and how hard new ones are searched for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HypothesisSettings {
+    /// Modes kept at most.
+    pub kept: usize,
+    /// Searches begun after every measurement while the belief may be ambiguous.
+    pub spawned: usize,
+}
+
+impl Default for HypothesisSettings {
+    fn default() -> Self {
+        Self { kept: 16, spawned: 16 }
+    }
+}
+
+/// The modes, the heaviest first.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Hypotheses {
+    pub modes: Vec<Mode>,
+    /// Steps in a row in which no new mode counted for anything.
+    pub calm: usize,
+}
+
+/// Modes nearer than this (squared, in standard deviations) are one.
+const MERGED: f64 = 0.3;
+/// A mode of a smaller share of the evidence is dropped.
+const NEGLIGIBLE: f64 = 1e-5;
+/// Logarithm of the evidence ratio from which on another mode does not count.
+const HOPELESS: f64 = 40.0;
+
+const WARM: Effort = Effort { steps: 30, tolerance: 1e-6, hopeless: f64::INFINITY };
+const COLD: Effort = Effort { steps: 40, tolerance: 1e-4, hopeless: f64::INFINITY };
+
+impl Hypotheses {
+    /// Searches every mode again after the posterior has changed.
+    pub fn follow(&mut self, posterior: &Posterior, layout: &TangentLayout) {
+        self.modes = self.modes.iter().filter_map(|mode| posterior.mode(&mode.chain, layout, WARM)).collect();
+    }
+
+    /// Searches new modes, half of them from the prior, half of them from the modes there are.
+    pub fn spawn(&mut self, count: usize, posterior: &Posterior, layout: &TangentLayout, rng: &mut impl Rng) {
+        let best = self.modes.iter().map(|mode| mode.cost).fold(f64::INFINITY, f64::min);
+        let effort = Effort { hopeless: (best + HOPELESS) * 10.0 + 1e3, ..COLD };
+        let before = self.modes.len();
+        for index in 0..count {
+            let drawn = posterior.prior.draw(layout, rng);
+            let start = if index % 2 == 0 || before == 0 {
+                drawn
+            } else {
+                mutated(&self.modes[rng.random_range(0..before)].chain, &drawn, layout, rng)
+            };
+            self.modes.extend(posterior.mode(&start, layout, effort));
+        }
+    }
+
+    /// Merges, weighs, sorts and prunes; says whether the heaviest mode is another than before.
+    pub fn condense(&mut self, kept: usize, layout: &TangentLayout) {
+        self.modes.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        let best = self.modes.first().map_or(0.0, |mode| mode.log_evidence);
+        let mut distinct: Vec<Mode> = Vec::new();
+        for mode in self.modes.drain(..) {
+            if mode.log_evidence < best - HOPELESS || distinct.len() >= kept {
+                break;
+            }
+            let is_new = distinct.iter().all(|other| {
+                other
+                    .chain
+                    .local(layout, &mode.chain)
+                    .is_none_or(|delta| delta.dot(&(&other.information * &delta)) > MERGED)
+            });
+            if is_new {
+                distinct.push(mode);
+            }
+        }
+        let total: f64 = distinct.iter().map(|mode| (mode.log_evidence - best).exp()).sum();
+        distinct.iter_mut().for_each(|mode| mode.weight = (mode.log_evidence - best).exp() / total);
+        distinct.retain(|mode| mode.weight >= NEGLIGIBLE);
+        self.modes = distinct;
+    }
+}
+
+/// `chain` with one to three of its joints drawn anew, or with an axis turned round.
+fn mutated(chain: &Chain, drawn: &Chain, layout: &TangentLayout, rng: &mut impl Rng) -> Chain {
+    let mut mutated = chain.clone();
+    let learned: Vec<usize> = (0..layout.joints()).filter(|&index| layout.is_learned(index)).collect();
+    if learned.is_empty() {
+        return mutated;
+    }
+    for _ in 0..rng.random_range(1..=3) {
+        let index = learned[rng.random_range(0..learned.len())];
+        mutated.joints[index] = match (mutated.joints[index], rng.random_range(0..4)) {
+            (Joint::Revolute(line), 0) => Joint::Revolute(Line { direction: -line.direction, ..line }),
+            _ => drawn.joints[index],
+        };
+    }
+    mutated
+}
