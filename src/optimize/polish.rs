@@ -33,7 +33,7 @@ const LENGTHS: [f64; 7] = [1.0, 2.0, 0.5, 0.25, 0.1, 0.03, 0.01];
 /// a batch of points; one that is not finite marks an infeasible point. The result is never worse than `start`.
 pub fn polish(start: &[f64], settings: Polish, mut evaluate: impl FnMut(&[Vec<f64>]) -> Vec<f64>) -> (Vec<f64>, f64) {
     let n = start.len();
-    let mut x: Vec<f64> = start.iter().map(|x| x.max(0.0).min(1.0)).collect();
+    let mut x: Vec<f64> = start.iter().map(|x| x.clamp(0.0, 1.0)).collect();
     let mut value = evaluate(std::slice::from_ref(&x)).first().copied().unwrap_or(f64::INFINITY);
     if !value.is_finite() || n == 0 {
         return (x, value);
@@ -60,7 +60,7 @@ pub fn polish(start: &[f64], settings: Polish, mut evaluate: impl FnMut(&[Vec<f6
         let direction = newton.filter(is_descent).unwrap_or(steepest);
         let trials: Vec<Vec<f64>> = LENGTHS
             .iter()
-            .map(|t| x.iter().zip(&direction).map(|(x, d)| (x + t * d).max(0.0).min(1.0)).collect())
+            .map(|t| x.iter().zip(&direction).map(|(x, d)| (x + t * d).clamp(0.0, 1.0)).collect())
             .collect();
         let values = evaluate(&trials);
         let best = trials.into_iter().zip(values).filter(|(_, v)| v.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1));
@@ -89,7 +89,7 @@ fn gradient(x: &[f64], value: f64, evaluate: &mut impl FnMut(&[Vec<f64>]) -> Vec
         .flat_map(|k| {
             [DIFFERENCE, -DIFFERENCE].map(|step| {
                 let mut moved = x.to_vec();
-                moved[k] = (moved[k] + step).max(0.0).min(1.0);
+                moved[k] = (moved[k] + step).clamp(0.0, 1.0);
                 moved
             })
         })

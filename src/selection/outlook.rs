@@ -36,7 +36,6 @@ pub struct Outlook<'a> {
     /// Pairs of hypotheses, and πⱼ πₖ ‖xⱼ − xₖ‖²_W.
     pairs: Vec<(usize, usize, f64)>,
     noise_m2: f64,
-    optimality: Optimality,
     trace: f64,
 }
 
@@ -83,7 +82,7 @@ impl<'a> Outlook<'a> {
         }
         let within: f64 = hypotheses.iter().map(|(weight, criterion)| weight * criterion.trace()).sum();
         let trace = within + pairs.iter().map(|pair| pair.2).sum::<f64>();
-        Ok(Self { hypotheses, pairs, noise_m2: belief.noise_m2, optimality, trace })
+        Ok(Self { hypotheses, pairs, noise_m2: belief.noise_m2, trace })
     }
 
     /// The same with visibility judged by what `today` believes.
