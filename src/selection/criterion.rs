@@ -203,8 +203,9 @@ impl<'a> ACriterion<'a> {
 
     /// The criterion of one candidate and what it rests on; an error if it is not a number.
     pub fn appraise(&self, candidate: &[f64]) -> Result<Appraisal, SelectionError> {
-        let marker = self.belief.chain.marker_at(candidate);
-        let marker_covariance = self.belief.marker_covariance(candidate).ok_or(SelectionError::NoCovariance)?;
+        let (marker, h) = jacobian::jacobian(self.chain, self.layout, candidate);
+        let spread = &h * self.covariance * h.transpose();
+        let marker_covariance = spread.fixed_view::<3, 3>(0, 0).into_owned();
         let chance = self.chance(candidate, &marker, &marker_covariance);
         let value = self.evaluate(&[candidate]).first().copied().filter(|value| value.is_finite());
         let criterion = match value {

@@ -17,7 +17,9 @@ async fn a_choice_can_be_looked_into_and_questioned() {
     server.step(&session, 4).await;
 
     let mut experiment = builtin("head-fov").and_then(|s| s.experiment(2, None)).expect("starts");
-    (0..4).for_each(|_| drop(experiment.step().expect("a step").step));
+    for _ in 0..4 {
+        experiment.step().expect("a step");
+    }
     let choice: Choice = server.get(&of("active", "selection")).await.json().await.expect("a choice");
     assert_eq!(choice, experiment.choice("active").expect("searched"));
     assert_eq!((choice.step, choice.joints[3].name.as_str()), (4, "elbow"));
