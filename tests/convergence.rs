@@ -124,14 +124,15 @@ fn all_learners_of_a_seed_start_alike_and_see_the_same_noise() {
     }
 }
 
-/// The learner global, against the bars that it was built for; seeds of their own, fewer than the bars' twenty.
+/// The learner global, against the bars that it was built for. The seeds are fewer than the bars' twenty, so the medians
+/// leave room for the spread of eight; the worst run may not be worse than that of twenty.
 #[test]
 fn the_global_learner_needs_little_more_than_as_many_movements_as_there_are_equations() {
     let seeds: Vec<u64> = (401..=408).collect();
     for (name, steps, median, worst) in [
-        ("arm-6dof", 40, 10.5, 16.0),
-        ("arm-6dof-doubled-error", 40, 10.5, 17.0),
-        ("arm-6dof-no-prior", 45, 10.5, 20.0),
+        ("arm-6dof", 40, 12.0, 16.0),
+        ("arm-6dof-doubled-error", 40, 12.0, 17.0),
+        ("arm-6dof-no-prior", 45, 12.0, 20.0),
         ("head-fov", 60, 15.0, 30.0),
     ] {
         let summary = compare(&builtin(name).expect("built in"), "global", &seeds, steps).summary;

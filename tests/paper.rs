@@ -109,7 +109,9 @@ fn curves_of_all_learners_and_joints_are_drawn() {
     ["fig-4", "fig-4-joints"].iter().for_each(|id| assert_is_a_figure(folder.path(), id));
     let row = report.rows.iter().find(|row| row.id == "fig-4-faster").expect("a row");
     assert!(row.ours.is_some_and(|ratio| ratio > 0.0), "{row:?}");
-    assert_eq!(row.command.as_deref(), Some("body-schema compare arm-6dof --seeds 1..4 --steps 400"));
+    let learners = "--learner active --learner random --learner gradient";
+    let command = format!("body-schema compare arm-6dof {learners} --seeds 1..4 --steps 400");
+    assert_eq!(row.command, Some(command));
 }
 
 #[test]

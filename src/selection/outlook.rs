@@ -301,7 +301,9 @@ mod tests {
             let trace = |plan: &Plan| weights.trace(plan.after.covariance.as_ref().expect("kept"));
             assert!(trace(&plan) < trace(&now));
             (0..5).for_each(|_| drop(plan.remove(0)));
-            assert!((trace(&plan) - trace(&now)).abs() < 1e-7 * trace(&now), "seed {seed}");
+            let change = (trace(&plan) / trace(&now) - 1.0).abs();
+            // What cancels leaves its rounding, magnified by how far the updates had shrunk P.
+            assert!(change < 1e-5, "seed {seed}: {change:e}");
         }
     }
 }
