@@ -183,7 +183,7 @@ impl Panel {
         }
     }
 
-    /// Names of events above the panel, each where the one before it ends at the earliest.
+    /// Names of events above the panel, each where the one before it ends at the earliest, as long as there is room.
     fn draw_events(&self, svg: &mut Svg, [left, top, width, _]: [f64; 4]) {
         let mut events: Vec<_> = self
             .layers
@@ -201,7 +201,10 @@ impl Panel {
             free = middle + half + 5.0;
             let tip = [[x, top - 0.5], [x - 3.0, top - 5.0], [x + 3.0, top - 5.0]];
             svg.shape(&tip, colour, Stroke { colour, width: 0.5, dashes: "" });
-            svg.text([middle, top - 7.0], label, face(9.5, false, colour, Align::Middle), 0.0);
+            // In a crowd those that find no room keep their tip alone; tables have the number.
+            if middle + half <= left + width + 20.0 {
+                svg.text([middle, top - 7.0], label, face(9.5, false, colour, Align::Middle), 0.0);
+            }
         }
     }
 }
