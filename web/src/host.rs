@@ -1,0 +1,218 @@
+//! What passes between the panel and the page that holds it.
+//!
+//! The panel keeps no connection and reads no clock: the page tells it what happened ([`Event`]) and does what it asks
+//! ([`Command`]). So everything that it does can be tested without a browser.
+
+use serde::{Deserialize, Serialize};
+
+use crate::wire::{Evaluation, Problem, Report, Scenario, Selection, Session};
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "is", rename_all = "snake_case")]
+pub enum Event {
+    /// The page was opened at this address.
+    Begin {
+        /// The address's query.
+        query: String,
+        /// The visitor has been here before, so that the tour need not be offered.
+        known: bool,
+    },
+    /// The scenarios there are.
+    Scenarios {
+        /// All of them.
+        scenarios: Vec<Scenario>,
+    },
+    /// The session that was asked for is there; null if there is none of that id.
+    Session {
+        /// The session.
+        session: Option<Box<Session>>,
+    },
+    /// A request was refused.
+    Refused {
+        /// What was asked, a [`Command`]'s name.
+        asked: String,
+        /// Why.
+        problem: Problem,
+    },
+    /// The connection stands.
+    Connected,
+    /// A message of the session's WebSocket.
+    Live {
+        /// A description or a report.
+        message: Live,
+    },
+    /// The request for steps is over.
+    Stepped {
+        /// The session that was stepped.
+        session: String,
+    },
+    /// The connection broke; it is tried again.
+    Lost {
+        /// After so many seconds.
+        seconds: f64,
+    },
+    /// The session has ended.
+    Ended {
+        /// Why its engine failed, if it did.
+        failure: Option<String>,
+        /// It went while there was no connection: the server was started anew.
+        unseen: bool,
+    },
+    /// The scene shows this step.
+    Shown {
+        /// The step.
+        step: u64,
+    },
+    /// The visitor moved the scene's time to this step.
+    Scrubbed {
+        /// The step.
+        step: u64,
+    },
+    /// The scene cannot be drawn.
+    NoScene {
+        /// Why.
+        reason: String,
+    },
+    /// How a movement was chosen; null if it was not chosen by a search.
+    Selection {
+        /// The learner asked for.
+        learner: String,
+        /// The answer.
+        selection: Option<Box<Selection>>,
+    },
+    /// What another posture would have taught.
+    Evaluation {
+        /// The answer.
+        evaluation: Box<Evaluation>,
+    },
+    /// A part of a run in the background.
+    Seeds {
+        /// Its seed.
+        seed: u64,
+        /// Its reports, from step 0 on.
+        reports: Vec<Report>,
+        /// Whether this seed is done.
+        done: bool,
+    },
+    /// Something was copied, or could not be.
+    Copied {
+        /// Whether it was.
+        done: bool,
+    },
+}
+
+/// A message of the session's WebSocket.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "type", content = "data", rename_all = "lowercase")]
+pub enum Live {
+    /// The first; the session's resource has said it already.
+    Description(serde::de::IgnoredAny),
+    /// A step.
+    Step(Report),
+}
+
+/// What the page is to do.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "do", rename_all = "snake_case")]
+pub enum Command {
+    /// Ask for the scenarios.
+    Scenarios,
+    /// Look for a session.
+    Find {
+        /// Its id.
+        session: String,
+    },
+    /// Open a session, follow it, and end the one before.
+    Open {
+        /// The scenario's name.
+        scenario: String,
+        /// The seed.
+        seed: u64,
+        /// The learners; null for all.
+        learners: Option<Vec<String>>,
+        /// How large ellipsoids are drawn.
+        sigmas: String,
+    },
+    /// Make steps.
+    Step {
+        /// Where.
+        session: String,
+        /// How many.
+        count: u64,
+        /// The step that the session must be at.
+        expected_step: u64,
+    },
+    /// Show this step in the scene.
+    Seek {
+        /// The step.
+        step: u64,
+    },
+    /// Ask how a movement was chosen.
+    Select {
+        /// The session.
+        session: String,
+        /// The learner.
+        learner: String,
+    },
+    /// Ask what a posture would have taught.
+    Evaluate {
+        /// The session.
+        session: String,
+        /// The learner.
+        learner: String,
+        /// Rad or m per joint.
+        configuration: Vec<f64>,
+    },
+    /// Run other seeds in the background.
+    Seeds {
+        /// The scenario's name.
+        scenario: String,
+        /// The learners.
+        learners: Vec<String>,
+        /// The seeds.
+        seeds: Vec<u64>,
+        /// Steps of each.
+        steps: u64,
+    },
+    /// Stop running other seeds.
+    CancelSeeds,
+    /// Make this the address.
+    Address {
+        /// The query.
+        query: String,
+    },
+    /// Put the page's address, or a text, on the clipboard.
+    Copy {
+        /// The text; for the address, its query with the question mark.
+        text: String,
+    },
+    /// Offer a file.
+    Download {
+        /// Where it is.
+        path: String,
+        /// Its name.
+        name: String,
+    },
+    /// Remember that the visitor knows the tour.
+    Known,
+    /// Tell assistive technology; scripts read the rest.
+    Say(Box<Mirror>),
+}
+
+/// The panel's state in words and numbers, for those who do not see it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Mirror {
+    /// A sentence.
+    pub text: String,
+    /// What the panel is about: `loading`, `ready`, `playing`, `stopped`, `lost`, `expired`, `failed`.
+    pub phase: String,
+    /// The step that is shown.
+    pub step: u64,
+    /// The latest step made.
+    pub latest: u64,
+    /// The session.
+    pub session: String,
+    /// Whether the visitor is typing, so that keys are text.
+    pub typing: bool,
+}

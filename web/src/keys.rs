@@ -1,0 +1,72 @@
+//! The keyboard.
+
+use egui::{Context, Key};
+
+use crate::panel::Panel;
+
+/// Every shortcut: its keys as they are written, and what it does.
+pub const SHORTCUTS: [(&str, &str); 9] = [
+    ("Space", "play or pause"),
+    ("→", "next step; at the end, make one"),
+    ("←", "step back"),
+    ("S", "make a step"),
+    ("R", "reset: the same run from its start"),
+    ("N", "a new seed"),
+    ("+  −", "faster, slower"),
+    ("T", "the tour"),
+    ("?", "this help; Esc closes it"),
+];
+
+impl Panel {
+    /// Does what the pressed keys stand for, unless the visitor types, and tells the page whether that is so.
+    pub fn take_keys(&mut self, ctx: &Context) {
+        let typing = ctx.text_edit_focused();
+        self.set_typing(typing);
+        if ctx.input(|input| input.key_pressed(Key::Escape)) {
+            (self.help, self.tour) = (false, None);
+        }
+        if typing {
+            return;
+        }
+        let has_focus = ctx.memory(|memory| memory.focused().is_some());
+        let pressed = |key: Key| {
+            ctx.input(|input| {
+                let held = input.modifiers.command || input.modifiers.ctrl || input.modifiers.alt;
+                input.key_pressed(key) && !held
+            })
+        };
+        // A button with the focus is pressed by Space, a slider moved by arrows.
+        if !has_focus {
+            if pressed(Key::Space) {
+                self.toggle();
+            }
+            if pressed(Key::ArrowRight) {
+                self.forward();
+            }
+            if pressed(Key::ArrowLeft) {
+                self.back();
+            }
+        }
+        if pressed(Key::S) {
+            self.make_step();
+        }
+        if pressed(Key::R) {
+            self.reset();
+        }
+        if pressed(Key::N) {
+            self.reroll();
+        }
+        if pressed(Key::Plus) || pressed(Key::Equals) {
+            self.change_speed(true);
+        }
+        if pressed(Key::Minus) {
+            self.change_speed(false);
+        }
+        if pressed(Key::T) {
+            self.tour = if self.tour.is_some() { None } else { Some(0) };
+        }
+        if pressed(Key::Questionmark) || (pressed(Key::Slash) && ctx.input(|input| input.modifiers.shift)) {
+            self.help = !self.help;
+        }
+    }
+}

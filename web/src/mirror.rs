@@ -1,0 +1,115 @@
+//! The panel in words, for those who hear it and for scripts.
+
+use crate::{
+    history::Verdict,
+    host::{Command, Mirror},
+    panel::{Link, Panel},
+};
+
+/// How often words are renewed, s: a screen reader must be able to finish a sentence.
+const SAY_EVERY: f64 = 1.0;
+
+impl Panel {
+    /// What stands above the controls: what goes on, or what to do.
+    pub fn status(&self) -> String {
+        let latest = self.history.latest();
+        match &self.link {
+            Link::Unreachable(why) => format!("The server cannot be used: {why}. Reset tries again."),
+            Link::Lost(seconds) => format!("The connection is lost; trying again in {seconds} s. The run is kept."),
+            Link::Expired => "This session has expired. Restore computes it again; Reset begins anew.".to_owned(),
+            Link::Failed(why) => format!("The engine has failed: {why}. Reset begins anew."),
+            _ if self.opening => "Opening a session…".to_owned(),
+            Link::Loading => "Loading…".to_owned(),
+            Link::Connected if self.restoring.is_some_and(|target| target > 1) => {
+                format!("Computing the run up to step {}…", self.restoring.unwrap_or_default())
+            }
+            Link::Connected if self.playing => {
+                format!("Running, {} steps a second, to step {}.", self.settings.speed, self.run_to())
+            }
+            Link::Connected => match &self.stopped {
+                Some(reason) => reason.clone(),
+                None if self.cursor < latest => format!("Step {} of {latest}.", self.cursor),
+                None => "Press Space to play.".to_owned(),
+            },
+        }
+    }
+
+    /// What has become of a learner at the step that is shown.
+    pub fn verdict(&self, learner: usize) -> String {
+        match self.history.verdict(self.cursor, learner) {
+            Verdict::Waiting => "not moved yet".to_owned(),
+            Verdict::Diverged => "diverged".to_owned(),
+            Verdict::Learning => "learning".to_owned(),
+            Verdict::Settled => "settled".to_owned(),
+            Verdict::Outside => "not converged".to_owned(),
+            Verdict::Within(first, confirmed) => format!("within since {first} ({confirmed}/20)"),
+            Verdict::Converged(first) => format!("converged at {first}"),
+        }
+    }
+
+    fn phase(&self) -> &'static str {
+        match self.link {
+            Link::Lost(_) => "lost",
+            Link::Expired => "expired",
+            Link::Failed(_) | Link::Unreachable(_) => "failed",
+            _ if self.opening || self.link == Link::Loading || self.restoring.is_some() => "loading",
+            _ if self.playing => "playing",
+            _ if self.stopped.is_some() => "stopped",
+            _ => "ready",
+        }
+    }
+
+    fn words(&self) -> String {
+        let mut text = self.status();
+        let Some(description) = self.description() else { return text };
+        text += &format!(" {}, seed {}, step {}.", description.scenario, description.seed, self.cursor);
+        for (index, learner) in description.learners.iter().enumerate() {
+            let Some(row) = self.history.row(self.cursor, index) else { continue };
+            text += &format!(" {}: {}", learner.name, self.verdict(index));
+            if let Some(error) = row.orientation_deg {
+                text += &format!(", orientation {error:.1} degrees");
+            }
+            if let Some(error) = row.location_m {
+                text += &format!(", location {:.0} millimetres", error * 1e3);
+            }
+            if let Some(error) = row.prediction_m {
+                text += &format!(", prediction {:.0} millimetres", error * 1e3);
+            }
+            text.push('.');
+        }
+        for notice in &self.notices {
+            text += &format!(" {notice}");
+        }
+        text
+    }
+
+    /// Tells the page when something has changed: numbers at once, words once a second.
+    pub(crate) fn mirror(&mut self, now: f64) {
+        let (said_at, before) = &self.said;
+        let mut mirror = Mirror {
+            text: before.text.clone(),
+            phase: self.phase().to_owned(),
+            step: self.cursor,
+            latest: self.history.latest(),
+            session: self.session.as_ref().map(|session| session.id.clone()).unwrap_or_default(),
+            typing: before.typing,
+        };
+        let mut said_at = *said_at;
+        if now - said_at >= SAY_EVERY {
+            mirror.text = self.words();
+            said_at = now;
+        }
+        if mirror != self.said.1 {
+            self.ask(Command::Say(Box::new(mirror.clone())));
+        }
+        self.said = (said_at, mirror);
+    }
+
+    /// Notes whether keys are text at the moment.
+    pub(crate) fn set_typing(&mut self, typing: bool) {
+        if self.said.1.typing != typing {
+            self.said.1.typing = typing;
+            self.ask(Command::Say(Box::new(self.said.1.clone())));
+        }
+    }
+}

@@ -1,0 +1,337 @@
+//! The panel's state, and what events do to it.
+
+use crate::{
+    history::History,
+    host::{Command, Event, Live, Mirror},
+    seeds::SeedRuns,
+    settings::{MAX_RESTORED, Settings},
+    why::Why,
+    wire::{Description, Problem, Report, Scenario, Session},
+};
+
+/// What the panel can do at the moment.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Link {
+    /// Nothing has come yet.
+    Loading,
+    /// The server cannot be reached, or refused to begin.
+    Unreachable(String),
+    /// A session is there and followed.
+    Connected,
+    /// The connection broke; it is tried again after so many seconds.
+    Lost(f64),
+    /// The session was deleted or had to make room.
+    Expired,
+    /// The session's engine failed.
+    Failed(String),
+}
+
+/// The panel.
+pub struct Panel {
+    /// What the visitor chose.
+    pub settings: Settings,
+    /// What there is to choose from.
+    pub scenarios: Vec<Scenario>,
+    /// What the visitor should know, newest last.
+    pub notices: Vec<String>,
+    /// Whether there is a session, and how it stands with it.
+    pub link: Link,
+    /// The session.
+    pub session: Option<Session>,
+    /// Its steps.
+    pub history: History,
+    /// The step that is shown, here and in the scene.
+    pub cursor: u64,
+    /// Whether steps are being made.
+    pub playing: bool,
+    /// Why the run has stopped.
+    pub stopped: Option<String>,
+    /// Why there is no scene.
+    pub no_scene: Option<String>,
+    /// How the last movement was chosen.
+    pub why: Why,
+    /// Other seeds, in the background.
+    pub seeds: SeedRuns,
+    /// The card of the tour that is open.
+    pub tour: Option<usize>,
+    /// Whether the help is open.
+    pub help: bool,
+    /// The seed as it is being typed.
+    pub seed_text: String,
+    /// The answer to the last copying.
+    pub copied: Option<String>,
+    pub(crate) opening: bool,
+    /// A request for steps is under way.
+    pub(crate) busy: bool,
+    /// Steps up to this one are made at once, to restore a run.
+    pub(crate) restoring: Option<u64>,
+    /// The step to show once it is there.
+    pub(crate) wanted: Option<u64>,
+    pub(crate) shown: u64,
+    pub(crate) sought: Option<u64>,
+    pub(crate) pace: crate::play::Pace,
+    pub(crate) now: f64,
+    pub(crate) said: (f64, Mirror),
+    pub(crate) address: (f64, String),
+    commands: Vec<Command>,
+}
+
+impl Default for Panel {
+    fn default() -> Self {
+        Self {
+            settings: Settings::default(),
+            scenarios: Vec::new(),
+            notices: Vec::new(),
+            link: Link::Loading,
+            session: None,
+            history: History::default(),
+            cursor: 0,
+            playing: false,
+            stopped: None,
+            no_scene: None,
+            why: Why::default(),
+            seeds: SeedRuns::default(),
+            tour: None,
+            help: false,
+            seed_text: "1".to_owned(),
+            copied: None,
+            opening: false,
+            busy: false,
+            restoring: None,
+            wanted: None,
+            shown: 0,
+            sought: None,
+            pace: crate::play::Pace::default(),
+            now: 0.0,
+            said: (f64::NEG_INFINITY, Mirror::default()),
+            address: (f64::NEG_INFINITY, String::new()),
+            commands: Vec::new(),
+        }
+    }
+}
+
+impl Panel {
+    /// Asks the page to do something.
+    pub(crate) fn ask(&mut self, command: Command) {
+        self.commands.push(command);
+    }
+
+    /// What the page is to do, in order.
+    pub fn take_commands(&mut self) -> Vec<Command> {
+        std::mem::take(&mut self.commands)
+    }
+
+    /// Whether there is anything for the page to do.
+    pub(crate) fn has_commands(&self) -> bool {
+        !self.commands.is_empty()
+    }
+
+    /// Tells the visitor something, once.
+    pub(crate) fn notice(&mut self, text: String) {
+        const MOST: usize = 6;
+        if !self.notices.contains(&text) {
+            self.notices.push(text);
+        }
+        let surplus = self.notices.len().saturating_sub(MOST);
+        self.notices.drain(..surplus);
+    }
+
+    /// What the session runs.
+    pub fn description(&self) -> Option<&Description> {
+        self.session.as_ref().map(|session| &session.description)
+    }
+
+    /// The chosen scenario.
+    pub fn scenario(&self) -> Option<&Scenario> {
+        self.scenarios.iter().find(|scenario| scenario.name == self.settings.scenario)
+    }
+
+    /// Whether steps can be made.
+    pub fn is_ready(&self) -> bool {
+        self.link == Link::Connected && self.session.is_some() && !self.opening && !self.history.is_empty()
+    }
+
+    /// How far a run is being restored, 0 to 1.
+    pub fn restored(&self) -> Option<f32> {
+        let target = self.restoring?;
+        Some(self.history.latest() as f32 / target.max(1) as f32)
+    }
+
+    /// Takes in what happened.
+    pub fn receive(&mut self, event: Event) {
+        match event {
+            Event::Begin { query, known } => self.begin(&query, known),
+            Event::Scenarios { scenarios } => self.take_scenarios(scenarios),
+            Event::Session { session: Some(session) } => self.adopt(*session),
+            Event::Session { session: None } => {
+                self.notice("The session of this address is gone; its run is computed again.".to_owned());
+                self.open(self.settings.step);
+            }
+            Event::Refused { asked, problem } => self.refused(&asked, &problem),
+            Event::Connected => self.link = Link::Connected,
+            Event::Live { message: Live::Step(report) } => self.take(&report),
+            Event::Live { message: Live::Description(_) } => {}
+            Event::Stepped { session } => {
+                if self.session.as_ref().is_some_and(|current| current.id == session) {
+                    self.busy = false;
+                }
+            }
+            Event::Lost { seconds } => {
+                self.link = Link::Lost(seconds);
+                self.busy = false;
+            }
+            Event::Ended { failure, unseen } => self.ended(failure, unseen),
+            Event::Shown { step } => self.shown = step,
+            Event::Scrubbed { step } => self.scrub(step),
+            Event::NoScene { reason } => self.no_scene = Some(reason),
+            Event::Selection { learner, selection } => self.why.answered(&learner, selection.map(|answer| *answer)),
+            Event::Evaluation { evaluation } => self.why.evaluated(*evaluation),
+            Event::Seeds { seed, reports, done } => self.seeds.take(seed, &reports, done),
+            Event::Copied { done } => {
+                let text = if done { "Copied." } else { "The browser does not allow copying." };
+                self.copied = Some(text.to_owned());
+            }
+        }
+    }
+
+    fn begin(&mut self, query: &str, known: bool) {
+        let (settings, notices) = Settings::parse(query);
+        self.settings = settings;
+        self.seed_text = self.settings.seed.to_string();
+        notices.into_iter().for_each(|notice| self.notice(notice));
+        if !known {
+            self.tour = Some(0);
+        }
+        self.ask(Command::Scenarios);
+    }
+
+    fn take_scenarios(&mut self, scenarios: Vec<Scenario>) {
+        self.scenarios = scenarios;
+        let notices = self.settings.validate(&self.scenarios);
+        notices.into_iter().for_each(|notice| self.notice(notice));
+        match self.settings.session.clone() {
+            Some(session) => {
+                self.wanted = Some(self.settings.step);
+                self.opening = true;
+                self.ask(Command::Find { session });
+            }
+            None => self.open(self.settings.step),
+        }
+    }
+
+    /// Leaves the session and opens that of the settings, at this step.
+    pub(crate) fn open(&mut self, step: u64) {
+        self.pause();
+        self.opening = true;
+        self.restoring = (step > 0).then(|| step.min(MAX_RESTORED));
+        self.wanted = self.restoring;
+        let Settings { scenario, seed, learners, sigmas, .. } = self.settings.clone();
+        let learners = Some(learners).filter(|learners| !learners.is_empty());
+        self.ask(Command::Open { scenario, seed, learners, sigmas });
+    }
+
+    fn adopt(&mut self, session: Session) {
+        let description = &session.description;
+        self.settings.scenario.clone_from(&description.scenario);
+        self.settings.seed = description.seed;
+        self.seed_text = description.seed.to_string();
+        let all = self.scenario().map_or(0, |scenario| scenario.learners.len());
+        let names: Vec<String> = description.learners.iter().map(|learner| learner.name.clone()).collect();
+        self.settings.learners = if names.len() == all { Vec::new() } else { names };
+        self.settings.session = Some(session.id.clone());
+        self.history = History::new(description);
+        self.why = Why::default();
+        (self.cursor, self.shown, self.sought) = (0, 0, None);
+        (self.opening, self.busy, self.stopped) = (false, false, None);
+        self.link = Link::Loading;
+        self.session = Some(session);
+    }
+
+    fn refused(&mut self, asked: &str, problem: &Problem) {
+        let sentence = problem.sentence();
+        match asked {
+            "scenarios" => self.link = Link::Unreachable(sentence),
+            "open" => {
+                self.opening = false;
+                // The server has the last word on what an address may ask for.
+                match problem.field.as_deref() {
+                    Some(field) if self.session.is_none() => self.fall_back(field, &sentence),
+                    _ if self.session.is_none() => self.link = Link::Unreachable(sentence),
+                    _ => self.notice(format!("No new session: {sentence}.")),
+                }
+            }
+            "find" => {
+                self.opening = false;
+                self.link = Link::Unreachable(sentence);
+            }
+            "step" => {
+                self.busy = false;
+                // Somebody else has stepped this session: their steps are on their way.
+                if problem.status != 409 {
+                    self.pause();
+                    self.restoring = None;
+                    if problem.status != 0 {
+                        self.notice(format!("No step: {sentence}."));
+                    }
+                }
+            }
+            "select" => self.why.refused(problem),
+            "evaluate" => {
+                self.why.evaluating = false;
+                self.notice(format!("This posture cannot be judged: {sentence}."));
+            }
+            "seeds" => {
+                self.seeds.cancel();
+                self.notice(format!("The other seeds stopped: {sentence}."));
+            }
+            _ => self.notice(sentence),
+        }
+    }
+
+    fn fall_back(&mut self, field: &str, sentence: &str) {
+        let usual = Settings::default();
+        let (seed, scenario) = (self.settings.seed, self.settings.scenario.clone());
+        self.settings.learners.clear();
+        if field != "learners" {
+            self.settings.seed = usual.seed;
+        }
+        self.notice(format!("The server does not take this address: {sentence}. Defaults are used instead."));
+        let is_new = seed != self.settings.seed || field == "learners" || scenario != self.settings.scenario;
+        if is_new { self.open(1) } else { self.link = Link::Unreachable(sentence.to_owned()) }
+    }
+
+    fn take(&mut self, report: &Report) {
+        let following = self.cursor == self.history.latest();
+        if !self.history.take(report) {
+            return;
+        }
+        match self.wanted {
+            Some(wanted) if self.history.latest() >= wanted => {
+                self.wanted = None;
+                self.cursor = wanted;
+            }
+            _ if following => self.cursor = self.history.latest(),
+            _ => {}
+        }
+    }
+
+    fn ended(&mut self, failure: Option<String>, unseen: bool) {
+        self.busy = false;
+        match failure {
+            Some(failure) => {
+                self.pause();
+                self.link = Link::Failed(failure);
+            }
+            None if unseen => {
+                let (latest, cursor) = (self.history.latest(), self.cursor);
+                self.notice(format!("The server was started anew; the run is computed again up to step {latest}."));
+                self.open(latest);
+                self.wanted = self.wanted.map(|_| cursor);
+            }
+            None => {
+                self.pause();
+                self.link = Link::Expired;
+            }
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! Making steps and going through those that were made.
+
+use crate::{
+    history::Row,
+    host::Command,
+    panel::{Link, Panel},
+    settings::{MAX_SPEED, MIN_SPEED, StopWhen},
+};
+
+/// The speeds that keys go through, steps a second.
+pub const SPEEDS: [f64; 8] = [MIN_SPEED, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, MAX_SPEED];
+/// Where drawing is slow, so many steps are made at once at most.
+const MOST_AT_ONCE: u64 = 25;
+/// So many are made at once to restore a run.
+const RESTORED_AT_ONCE: u64 = 50;
+/// How long playing waits for a step to be shown, s.
+const SHOWN_WITHIN: f64 = 2.0;
+/// How often the address follows, s: browsers allow some hundred changes a minute.
+const ADDRESS_EVERY: f64 = 1.0;
+
+/// How fast steps are made.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pace {
+    /// When the last steps were asked for.
+    asked_at: f64,
+    /// Learners that had settled when playing began.
+    settled: usize,
+}
+
+impl Panel {
+    /// The last step of a run.
+    pub fn run_to(&self) -> u64 {
+        self.settings.run_to.or_else(|| self.scenario().map(|scenario| scenario.steps)).unwrap_or(1000)
+    }
+
+    /// How many steps can still be made; `None` without an end.
+    pub fn remaining(&self) -> Option<u64> {
+        let session = self.session.as_ref()?;
+        Some((session.remaining? + session.step).saturating_sub(self.history.latest()))
+    }
+
+    /// Plays or pauses.
+    pub fn toggle(&mut self) {
+        if self.playing { self.pause() } else { self.play() }
+    }
+
+    /// Stops making steps.
+    pub fn pause(&mut self) {
+        self.playing = false;
+    }
+
+    fn play(&mut self) {
+        if !self.is_ready() || self.restoring.is_some() {
+            return;
+        }
+        self.stopped = None;
+        self.cursor = self.history.latest();
+        self.pace = Pace { asked_at: self.now - 1.0 / self.settings.speed, settled: self.settled().0 };
+        self.playing = true;
+        self.stop_if_due();
+    }
+
+    /// How many of the learners that judge themselves have settled, and how many there are.
+    fn settled(&self) -> (usize, usize) {
+        let learners = self.description().map_or(0, |description| description.learners.len());
+        let rows = (0..learners).filter_map(|learner| self.history.row(self.history.latest(), learner));
+        let judging: Vec<&Row> = rows.filter(|row| row.trace.is_some() && !row.failed).collect();
+        (judging.iter().filter(|row| row.settled).count(), judging.len())
+    }
+
+    fn stop_if_due(&mut self) {
+        let latest = self.history.latest();
+        let (settled, judging) = self.settled();
+        let newly = settled > self.pace.settled;
+        let reason = if self.remaining() == Some(0) {
+            "The end of the recorded data: every movement has been used.".to_owned()
+        } else if latest >= self.run_to() {
+            format!("Stopped at step {latest}, the last of this run. Raise “Run to” to go on.")
+        } else if newly && settled == judging && self.settings.stop != StopWhen::Never {
+            format!("Stopped at step {latest}: every learner that judges itself has settled. Play goes on.")
+        } else if newly && self.settings.stop == StopWhen::First {
+            let name = self.newly_settled().unwrap_or_default();
+            format!("Stopped at step {latest}: {name} has settled, by its own judgement. Play goes on.")
+        } else {
+            return;
+        };
+        self.playing = false;
+        self.stopped = Some(reason);
+    }
+
+    fn newly_settled(&self) -> Option<String> {
+        let latest = self.history.latest();
+        let learners = &self.description()?.learners;
+        let settled = |step: u64, index| self.history.row(step, index).is_some_and(|row| row.settled);
+        let found = learners.iter().enumerate().filter(|(index, _)| settled(latest, *index));
+        found
+            .min_by_key(|(index, _)| (0..latest).rev().take_while(|step| settled(*step, *index)).count())
+            .map(|(_, learner)| learner.name.clone())
+    }
+
+    /// One step: the next that was made, or a new one.
+    pub fn forward(&mut self) {
+        self.pause();
+        if self.cursor < self.history.latest() { self.cursor += 1 } else { self.make_step() }
+    }
+
+    /// The step before, of those that were made.
+    pub fn back(&mut self) {
+        self.pause();
+        self.cursor = self.cursor.saturating_sub(1);
+    }
+
+    /// Shows a step that was made.
+    pub fn scrub(&mut self, step: u64) {
+        let step = step.min(self.history.latest());
+        if step != self.cursor {
+            self.pause();
+            self.cursor = step;
+        }
+        self.sought = Some(step);
+    }
+
+    /// Makes a new step.
+    pub fn make_step(&mut self) {
+        self.pause();
+        self.stopped = None;
+        if self.remaining() == Some(0) {
+            self.stop_if_due();
+        } else if self.is_ready() && !self.busy && self.restoring.is_none() {
+            self.cursor = self.history.latest();
+            self.request(1);
+        }
+    }
+
+    fn request(&mut self, count: u64) {
+        let Some(session) = &self.session else { return };
+        let command = Command::Step { session: session.id.clone(), count, expected_step: self.history.latest() };
+        self.busy = true;
+        self.pace.asked_at = self.now;
+        self.ask(command);
+    }
+
+    /// Opens the session anew.
+    pub fn reset(&mut self) {
+        if self.scenarios.is_empty() {
+            self.link = Link::Loading;
+            self.ask(Command::Scenarios);
+        } else if !self.opening {
+            self.open(1);
+        }
+    }
+
+    /// Plays faster or slower.
+    pub fn change_speed(&mut self, faster: bool) {
+        let speed = self.settings.speed;
+        let next = if faster {
+            SPEEDS.iter().find(|other| **other > speed)
+        } else {
+            SPEEDS.iter().rev().find(|other| **other < speed)
+        };
+        self.settings.speed = next.copied().unwrap_or(speed);
+    }
+
+    /// What time does. It returns after how many seconds it must be called again, if nothing happens before.
+    pub fn tick(&mut self, now: f64) -> Option<f64> {
+        self.now = now;
+        let mut again = None;
+        if self.is_ready() && !self.busy {
+            if let Some(target) = self.restoring {
+                let latest = self.history.latest();
+                if latest < target && self.remaining() != Some(0) {
+                    self.request((target - latest).min(RESTORED_AT_ONCE).min(self.remaining().unwrap_or(u64::MAX)));
+                } else {
+                    self.restoring = None;
+                    if let Some(wanted) = self.wanted.take() {
+                        self.cursor = wanted.min(latest);
+                    }
+                }
+            } else if self.playing {
+                self.stop_if_due();
+                again = self.keep_playing();
+            }
+        }
+        self.explain(now);
+        // The scene follows once, whatever moved the cursor how often.
+        if self.is_ready() && self.sought != Some(self.cursor) {
+            self.sought = Some(self.cursor);
+            self.ask(Command::Seek { step: self.cursor });
+        }
+        self.mirror(now);
+        let waits = self.follow_address(now);
+        [again, waits].into_iter().flatten().reduce(f64::min)
+    }
+
+    fn keep_playing(&mut self) -> Option<f64> {
+        if !self.playing {
+            return None;
+        }
+        let elapsed = self.now - self.pace.asked_at;
+        // A run goes no faster than it can be drawn; where there is no scene, or a slow one, it does not wait for ever.
+        let drawn = self.no_scene.is_some() || self.shown >= self.history.latest() || elapsed > SHOWN_WITHIN;
+        let due = (elapsed * self.settings.speed + 1e-6) as u64;
+        if !drawn {
+            return Some(SHOWN_WITHIN - elapsed);
+        }
+        if due == 0 {
+            return Some(1.0 / self.settings.speed - elapsed);
+        }
+        let left = self.run_to().saturating_sub(self.history.latest()).min(self.remaining().unwrap_or(u64::MAX));
+        self.request(due.clamp(1, MOST_AT_ONCE).min(left.max(1)));
+        None
+    }
+
+    fn follow_address(&mut self, now: f64) -> Option<f64> {
+        // Until there is a session, the address is what it is made from.
+        if self.session.is_none() || self.opening || self.wanted.is_some() || self.history.is_empty() {
+            return None;
+        }
+        self.settings.step = self.cursor;
+        let query = self.settings.query(true);
+        if self.address.1 == query {
+            return None;
+        }
+        let wait = self.address.0 + ADDRESS_EVERY - now;
+        if wait > 0.0 {
+            return Some(wait);
+        }
+        self.address = (now, query.clone());
+        self.ask(Command::Address { query });
+        None
+    }
+}

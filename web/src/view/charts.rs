@@ -1,0 +1,263 @@
+//! Curves over the steps, in step with the scene: what is pointed at can be clicked to go there.
+
+use egui::{Id, RichText, Ui, Vec2b, vec2};
+use egui_plot::{
+    FilledArea, GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, Plot, PlotPoints, Points, VLine,
+};
+
+use super::learners::swatch;
+use crate::{colours, history::Row, panel::Panel};
+
+/// From this width on there are two charts beside each other.
+const TWO_COLUMNS: f32 = 640.0;
+const HEIGHT: f32 = 150.0;
+
+/// What a chart shows.
+struct Chart {
+    title: &'static str,
+    unit: &'static str,
+    /// What the number means.
+    tip: &'static str,
+    logarithmic: bool,
+    /// Whether convergence is marked on it.
+    judged: bool,
+    value: fn(&Row) -> Option<f64>,
+}
+
+const CHARTS: [Chart; 6] = [
+    Chart {
+        title: "Orientation error",
+        unit: "°",
+        tip: "Mean error of the angles between the joints' axes; dashed: the threshold of convergence",
+        logarithmic: true,
+        judged: true,
+        value: |row| row.orientation_deg,
+    },
+    Chart {
+        title: "Location error",
+        unit: "mm",
+        tip: "Mean distance of the true axis points from the estimated axes; dashed: the threshold of convergence",
+        logarithmic: true,
+        judged: true,
+        value: |row| Some(row.location_m? * 1e3),
+    },
+    Chart {
+        title: "Prediction error",
+        unit: "mm",
+        tip: "Mean distance between the predicted and the true marker over postures never seen",
+        logarithmic: true,
+        judged: false,
+        value: |row| Some(row.prediction_m? * 1e3),
+    },
+    Chart {
+        title: "Uncertainty",
+        unit: "tr(W P)",
+        tip: "Trace of the weighted covariance: what the active learner makes as small as it can",
+        logarithmic: true,
+        judged: false,
+        value: |row| row.trace,
+    },
+    Chart {
+        title: "Misses",
+        unit: "movements",
+        tip: "Movements after which the marker was not seen",
+        logarithmic: false,
+        judged: false,
+        value: |row| Some(row.misses as f64),
+    },
+    Chart {
+        title: "Time of a choice",
+        unit: "ms",
+        tip: "How long it took to choose the movement",
+        logarithmic: true,
+        judged: false,
+        value: |row| row.selection_ms.filter(|ms| *ms > 0.0),
+    },
+];
+
+/// Numbers below this are drawn as this where the scale is logarithmic.
+const FLOOR: f64 = 1e-9;
+
+impl Chart {
+    fn y(&self, value: f64) -> f64 {
+        if self.logarithmic { value.max(FLOOR).log10() } else { value }
+    }
+
+    fn number(&self, y: f64) -> String {
+        let value = if self.logarithmic { 10f64.powf(y) } else { y };
+        // Three significant digits, without trailing zeros.
+        let digits = (2 - value.abs().max(1e-6).log10().floor() as i32).clamp(0, 6) as usize;
+        let text = format!("{value:.digits$}");
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    }
+
+    fn threshold(&self, panel: &Panel) -> Option<f64> {
+        let description = panel.description().filter(|description| description.truth.is_some() && self.judged)?;
+        let thresholds = description.thresholds;
+        Some(if self.unit == "°" { thresholds.orientation_deg } else { thresholds.location_m * 1e3 })
+    }
+}
+
+/// Marks at 1, 2 and 5 of every power of ten, y being its logarithm.
+fn decades(input: GridInput) -> Vec<GridMark> {
+    let (low, high) = input.bounds;
+    if !(low.is_finite() && high.is_finite()) || high - low > 40.0 {
+        return Vec::new();
+    }
+    let mut marks = Vec::new();
+    for decade in low.floor() as i32..=high.ceil() as i32 {
+        marks.push(GridMark { value: f64::from(decade), step_size: 1.0 });
+        if high - low < 2.5 {
+            marks.extend(
+                [2.0f64, 5.0].map(|digit| GridMark { value: f64::from(decade) + digit.log10(), step_size: 0.5 }),
+            );
+        }
+    }
+    marks
+}
+
+impl Panel {
+    pub(super) fn charts(&mut self, ui: &mut Ui) {
+        self.legend(ui);
+        let missed = self.description().is_some_and(|description| {
+            (0..description.learners.len())
+                .any(|learner| self.history.row(self.history.latest(), learner).is_some_and(|row| row.misses > 0))
+        });
+        let known = self.description().is_some_and(|description| description.truth.is_some());
+        let shown: Vec<&Chart> =
+            CHARTS.iter().filter(|chart| (known || !chart.judged) && (chart.title != "Misses" || missed)).collect();
+        let columns = if ui.available_width() >= TWO_COLUMNS { 2 } else { 1 };
+        let mut clicked = None;
+        for row in shown.chunks(columns) {
+            ui.columns(columns, |uis| {
+                for (ui, chart) in uis.iter_mut().zip(row) {
+                    clicked = self.chart(ui, chart).or(clicked);
+                }
+            });
+        }
+        if let Some(step) = clicked {
+            self.scrub(step);
+            self.sought = None;
+        }
+        self.seeds_row(ui);
+    }
+
+    fn legend(&self, ui: &mut Ui) {
+        let Some(description) = self.description() else { return };
+        ui.horizontal_wrapped(|ui| {
+            for (index, learner) in description.learners.iter().enumerate() {
+                swatch(ui, index);
+                ui.label(&learner.name);
+                ui.add_space(6.0);
+            }
+            let converged =
+                (0..description.learners.len()).any(|i| self.history.converged_at(self.cursor, i).is_some());
+            if converged {
+                ui.label(RichText::new("filled mark: converged").weak());
+            }
+        });
+    }
+
+    /// Draws one chart; the step that was clicked.
+    fn chart(&self, ui: &mut Ui, chart: &Chart) -> Option<u64> {
+        let description = self.description()?;
+        ui.horizontal(|ui| {
+            ui.label(RichText::new(format!("{}, {}", chart.title, chart.unit)).strong()).on_hover_text(chart.tip);
+        });
+        let mut plot = Plot::new(chart.title)
+            .height(HEIGHT)
+            .link_axis(Id::unique("steps"), Vec2b::new(true, false))
+            .allow_zoom(Vec2b::new(true, false))
+            .allow_drag(Vec2b::new(true, false))
+            .allow_scroll(false)
+            .allow_boxed_zoom(false)
+            .include_x(0.0)
+            .include_x(10.0)
+            .set_margin_fraction(vec2(0.02, 0.08))
+            .y_axis_min_width(34.0)
+            .show_crosshair(false)
+            .x_axis_formatter(|mark, _| if mark.value < 0.0 { String::new() } else { mark.value.to_string() })
+            .y_axis_formatter(|mark, _| chart.number(mark.value))
+            .label_formatter(|hover| match hover {
+                HoverPosition::NearDataPoint { plot_name, position, .. } if !plot_name.is_empty() => {
+                    let number = chart.number(position.y);
+                    Some(format!("{plot_name}\nstep {}: {number} {}", position.x.round(), chart.unit))
+                }
+                HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position } => {
+                    Some(format!("step {}", position.x.round().max(0.0)))
+                }
+            });
+        if chart.logarithmic {
+            plot = plot.y_grid_spacer(decades);
+        } else {
+            plot = plot.include_y(0.0);
+        }
+        let cursor_colour = ui.visuals().weak_text_color();
+        let threshold_colour = ui.visuals().text_color();
+        let response = plot.show(ui, |plot| {
+            for index in 0..description.learners.len() {
+                if let Some(band) = self.band(index, chart.value) {
+                    let map = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| chart.y(*value)).collect() };
+                    let colour = colours::learner(index);
+                    let area = FilledArea::new("", &band.steps, &map(&band.low), &map(&band.high));
+                    plot.add(area.fill_color(colour.gamma_multiply(0.18)).allow_hover(false));
+                    let middle: Vec<[f64; 2]> =
+                        band.steps.iter().zip(map(&band.middle)).map(|(x, y)| [*x, y]).collect();
+                    plot.line(Line::new("", middle).color(colour.gamma_multiply(0.5)).width(1.0).allow_hover(false));
+                }
+            }
+            if let Some(threshold) = chart.threshold(self) {
+                let line = HLine::new("threshold", chart.y(threshold)).color(threshold_colour).width(1.0);
+                plot.hline(line.style(LineStyle::Dashed { length: 3.0 }).allow_hover(false));
+            }
+            plot.vline(VLine::new("", self.cursor as f64).color(cursor_colour).width(1.0).allow_hover(false));
+            for (index, learner) in description.learners.iter().enumerate() {
+                let colour = colours::learner(index);
+                let curve: Vec<[f64; 2]> =
+                    self.history.curve(index, chart.value).into_iter().map(|[x, y]| [x, chart.y(y)]).collect();
+                let line = Line::new(&learner.name, PlotPoints::from(curve)).color(colour).width(1.8);
+                plot.line(line.style(colours::line_style(index)));
+                let at = |step: u64| Some([step as f64, chart.y((chart.value)(self.history.row(step, index)?)?)]);
+                if let Some(point) = at(self.cursor).filter(|point| point[1].is_finite()) {
+                    let here = Points::new(&learner.name, vec![point]).color(colour).radius(4.0);
+                    plot.points(here.shape(colours::marker(index)).filled(false).allow_hover(false));
+                }
+                let converged = self.history.converged_at(self.cursor, index).filter(|_| chart.judged);
+                if let Some(point) = converged.and_then(at) {
+                    let name = format!("{} converged", learner.name);
+                    let mark = Points::new(name, vec![point]).color(colour).radius(6.0);
+                    plot.points(mark.shape(colours::marker(index)).filled(true));
+                }
+            }
+            plot.pointer_coordinate()
+        });
+        let clicked = response.response.clicked().then_some(response.inner).flatten()?;
+        Some(clicked.x.round().max(0.0) as u64)
+    }
+
+    fn seeds_row(&mut self, ui: &mut Ui) {
+        ui.add_space(4.0);
+        ui.horizontal_wrapped(|ui| {
+            if self.seeds.running {
+                if ui.button("Cancel").on_hover_text("What has been computed stays").clicked() {
+                    self.cancel_seeds();
+                }
+                let text = format!("{} of {} seeds", self.seeds.done(), self.seeds.total());
+                ui.add(egui::ProgressBar::new(self.seeds.progress()).text(text).desired_width(180.0));
+            } else {
+                let tip = "Runs ten other seeds in the background: bands hold the middle 80 % of them";
+                let ready = self.is_ready();
+                if ui
+                    .add_enabled(ready, egui::Button::new("Is this luck? Run 10 more seeds"))
+                    .on_hover_text(tip)
+                    .clicked()
+                {
+                    self.run_seeds();
+                }
+                if self.seeds.done() > 0 {
+                    ui.label(RichText::new(format!("bands: the middle 80 % of {} seeds", self.seeds.done())).weak());
+                }
+            }
+        });
+    }
+}

@@ -1,0 +1,58 @@
+//! The boxes of DIRECT by size and value, and the hull from which it takes those to divide: Fig. 3c of the paper.
+
+use egui::{Color32, RichText, Ui, Vec2b, vec2};
+use egui_plot::{HoverPosition, Line, MarkerShape, Plot, PlotPoints, Points};
+
+use crate::{panel::Panel, wire::Selection};
+
+impl Panel {
+    pub(super) fn diagram(&self, ui: &mut Ui, selection: &Selection, iteration: usize) {
+        let tip = "Every box: its size, and the criterion at its centre. DIRECT divides those on the lower right hull: \
+                   large ones, where something may hide, and good ones.";
+        ui.label(RichText::new("Boxes by size and criterion").strong()).on_hover_text(tip);
+        let dots = selection.diagram(iteration);
+        let of = |optimal: bool| -> Vec<[f64; 2]> {
+            let some = dots.iter().filter(|dot| dot.optimal == optimal);
+            some.map(|dot| [dot.size.log(3.0), dot.value]).collect()
+        };
+        let mut hull = of(true);
+        hull.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let bold = Color32::from_rgb(0xD5, 0x5E, 0x00);
+        let quiet = ui.visuals().text_color().gamma_multiply(0.6);
+        let name = if selection.variant == "direct" { "half diagonal" } else { "longest side" };
+        Plot::new("hull")
+            .height(220.0)
+            .allow_zoom(false)
+            .allow_drag(false)
+            .allow_scroll(false)
+            .allow_boxed_zoom(false)
+            .auto_bounds(Vec2b::TRUE)
+            .set_margin_fraction(vec2(0.06, 0.08))
+            .show_crosshair(false)
+            .x_axis_label(format!("size of the box: {name}"))
+            .y_axis_label("criterion")
+            .y_axis_min_width(40.0)
+            .x_axis_formatter(|mark, _| {
+                let power = mark.value;
+                if power.fract() != 0.0 || power > 0.0 {
+                    String::new()
+                } else if power == 0.0 {
+                    "1".to_owned()
+                } else {
+                    format!("1/{}", 3f64.powf(-power).round())
+                }
+            })
+            .label_formatter(|hover| match hover {
+                HoverPosition::NearDataPoint { plot_name, position, .. } if !plot_name.is_empty() => {
+                    Some(format!("{plot_name}\nsize {:.3}\ncriterion {:.4}", 3f64.powf(position.x), position.y))
+                }
+                _ => None,
+            })
+            .show(ui, |plot| {
+                plot.points(Points::new("box", PlotPoints::from(of(false))).color(quiet).radius(2.5));
+                plot.line(Line::new("", PlotPoints::from(hull.clone())).color(bold).width(1.5).allow_hover(false));
+                let optimal = Points::new("divided next", PlotPoints::from(hull)).color(bold).radius(5.0);
+                plot.points(optimal.shape(MarkerShape::Diamond));
+            });
+    }
+}

@@ -1,0 +1,119 @@
+//! What is compared: scenario, seed, learners.
+
+use egui::{ComboBox, RichText, TextEdit, Ui};
+
+use crate::{panel::Panel, settings::MAX_SEED, wire::Scenario};
+
+/// A scenario in figures.
+fn figures(scenario: &Scenario) -> String {
+    let world = if scenario.world == "measured" { "measured data" } else { "simulated" };
+    let (joints, parameters) = (scenario.joints.len(), scenario.parameters);
+    let (learners, steps) = (scenario.learners.len(), scenario.steps);
+    format!("{joints} joints · {parameters} parameters · {learners} learners · {steps} movements · {world}")
+}
+
+impl Panel {
+    pub(super) fn setup(&mut self, ui: &mut Ui) {
+        ui.horizontal_wrapped(|ui| {
+            let label = ui.label("Scenario");
+            let mut chosen = self.settings.scenario.clone();
+            ComboBox::from_id_salt("scenario")
+                .selected_text(&chosen)
+                .width(170.0)
+                .height(420.0)
+                .show_ui(ui, |ui| {
+                    for scenario in &self.scenarios {
+                        let text = format!("{}\n{}\n{}", scenario.name, scenario.title, figures(scenario));
+                        ui.selectable_value(&mut chosen, scenario.name.clone(), text);
+                    }
+                })
+                .response
+                .labelled_by(label.id);
+            if chosen != self.settings.scenario {
+                self.choose_scenario(&chosen);
+            }
+            let label = ui.label("Seed");
+            let field = TextEdit::singleline(&mut self.seed_text).desired_width(70.0).char_limit(16);
+            let field = ui.add(field).labelled_by(label.id);
+            if field.lost_focus() {
+                self.choose_seed();
+            }
+            field.on_hover_text("Initial error, noise and random movements all come from it");
+            if ui.button("🎲 New seed").on_hover_text("A new seed (N)").clicked() {
+                self.reroll();
+            }
+        });
+        let Some(scenario) = self.scenario().cloned() else { return };
+        ui.label(&scenario.title);
+        ui.label(RichText::new(figures(&scenario)).weak().small());
+        ui.horizontal_wrapped(|ui| {
+            ui.label("Compare");
+            for learner in &scenario.learners {
+                let mut on = self.is_compared(&learner.name);
+                let last = on && self.compared(&scenario).len() == 1;
+                let tip = if last {
+                    "At least one learner is needed".to_owned()
+                } else {
+                    format!("Estimator {}, policy {}. A change begins the run anew.", learner.estimator, learner.policy)
+                };
+                let toggled = ui.add_enabled(!last, egui::Checkbox::new(&mut on, &learner.name));
+                if toggled.on_hover_text(&tip).on_disabled_hover_text(&tip).changed() {
+                    self.compare(&scenario, &learner.name, on);
+                }
+            }
+        });
+    }
+
+    fn is_compared(&self, name: &str) -> bool {
+        self.settings.learners.is_empty() || self.settings.learners.iter().any(|learner| learner == name)
+    }
+
+    fn compared(&self, scenario: &Scenario) -> Vec<String> {
+        let names = scenario.learners.iter().map(|learner| learner.name.clone());
+        names.filter(|name| self.is_compared(name)).collect()
+    }
+
+    fn compare(&mut self, scenario: &Scenario, name: &str, on: bool) {
+        let mut compared = self.compared(scenario);
+        compared.retain(|learner| learner != name);
+        if on {
+            compared.push(name.to_owned());
+        }
+        self.settings.learners = compared;
+        self.settings.validate(&self.scenarios);
+        self.open(1);
+    }
+
+    fn choose_scenario(&mut self, name: &str) {
+        name.clone_into(&mut self.settings.scenario);
+        self.settings.learners.clear();
+        (self.settings.joints, self.settings.learner, self.settings.run_to) = (None, None, None);
+        self.notices.clear();
+        self.open(1);
+    }
+
+    fn choose_seed(&mut self) {
+        match self.seed_text.trim().parse::<u64>() {
+            Ok(seed) if seed <= MAX_SEED => {
+                if seed != self.settings.seed {
+                    self.settings.seed = seed;
+                    self.open(1);
+                }
+            }
+            _ => self.notice(format!("A seed is a whole number from 0 to {MAX_SEED}.")),
+        }
+        self.seed_text = self.settings.seed.to_string();
+    }
+
+    /// Another seed, and its run.
+    pub fn reroll(&mut self) {
+        // A step through all numbers that looks like chance; the first few seeds come from people.
+        let mixed = self.settings.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let seed = (mixed >> 33) % 10_000;
+        self.settings.seed = if seed == self.settings.seed { (seed + 1) % 10_000 } else { seed };
+        self.seed_text = self.settings.seed.to_string();
+        if !self.scenarios.is_empty() {
+            self.open(1);
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! What can be taken away: the address, files, and the command that computes the same again.
+
+use egui::{RichText, Ui};
+
+use crate::{host::Command, panel::Panel, settings::SIGMAS};
+
+impl Panel {
+    /// The command that computes what is shown.
+    pub fn command_line(&self) -> String {
+        let settings = &self.settings;
+        let steps = self.cursor.max(1);
+        let learners: String = settings.learners.iter().map(|name| format!(" --learner {name}")).collect();
+        format!(
+            "body-schema run {} --seed {} --steps {steps}{learners} --rrd run.rrd",
+            settings.scenario, settings.seed
+        )
+    }
+
+    pub(super) fn share(&mut self, ui: &mut Ui) {
+        ui.label(RichText::new("This view as a link").strong());
+        ui.label("It holds scenario, seed, learners, step and view. Whoever opens it sees the same numbers.");
+        let link = format!("?{}", self.settings.query(false));
+        ui.add(egui::Label::new(RichText::new(&link).monospace().small()).wrap().selectable(true));
+        ui.horizontal(|ui| {
+            if ui.button("Copy link").clicked() {
+                self.ask(Command::Copy { text: link });
+            }
+            if let Some(copied) = &self.copied {
+                ui.label(copied);
+            }
+        });
+        ui.add_space(8.0);
+        ui.label(RichText::new("Files of this session").strong());
+        ui.horizontal_wrapped(|ui| {
+            let files = [
+                ("recording.rrd", "The recording, to open with Rerun 0.36"),
+                ("steps.csv", "Every metric of every learner at every step"),
+                ("result.json", "The outcome and the learned models"),
+            ];
+            for (file, tip) in files {
+                let session = self.session.as_ref().map(|session| session.id.clone());
+                if ui.button(file).on_hover_text(tip).clicked()
+                    && let Some(session) = session
+                {
+                    let path = format!("/v1/sessions/{session}/{file}");
+                    self.ask(Command::Download { path, name: self.file_name(file) });
+                }
+            }
+            if ui.button("scenario.toml").on_hover_text("The scenario, to change and run").clicked() {
+                let path = format!("/v1/scenarios/{}", self.settings.scenario);
+                self.ask(Command::Download { path, name: format!("{}.toml", self.settings.scenario) });
+            }
+        });
+        ui.add_space(8.0);
+        ui.label(RichText::new("The same run without this page").strong());
+        let command = self.command_line();
+        ui.add(egui::Label::new(RichText::new(&command).monospace()).wrap().selectable(true));
+        if ui.button("Copy command").clicked() {
+            self.ask(Command::Copy { text: command });
+        }
+        ui.add_space(8.0);
+        ui.label(RichText::new("The scene").strong());
+        ui.horizontal_wrapped(|ui| {
+            ui.label("Ellipsoids of uncertainty");
+            let mut sigmas = self.settings.sigmas.clone();
+            for (name, text) in SIGMAS {
+                ui.radio_value(&mut sigmas, name.to_owned(), text);
+            }
+            if sigmas != self.settings.sigmas {
+                self.settings.sigmas = sigmas;
+                self.open(self.history.latest());
+            }
+        });
+        ui.label(RichText::new("Another size draws the run anew, up to this step.").weak().small());
+        ui.add_space(8.0);
+        ui.hyperlink_to("The HTTP interface that this page uses", "/v1/openapi.json");
+    }
+
+    fn file_name(&self, file: &str) -> String {
+        let stem = format!("{}-seed{}-step{}", self.settings.scenario, self.settings.seed, self.history.latest());
+        format!("{stem}-{file}")
+    }
+}
