@@ -18,13 +18,16 @@ pub struct Arguments {
     /// Also keep every session's recording as a file in DIR [default: in memory only, to be downloaded]
     #[arg(long, value_name = "DIR")]
     data_dir: Option<PathBuf>,
+    /// Show the page with the panel in DIR, which `cargo run -p body-schema-bundle -- DIR` built
+    #[arg(long, value_name = "DIR", hide = true)]
+    panel_dir: Option<PathBuf>,
 }
 
 const DEFAULT_ADDRESS: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
 
 impl Default for Arguments {
     fn default() -> Self {
-        Self { bind: DEFAULT_ADDRESS, data_dir: None }
+        Self { bind: DEFAULT_ADDRESS, data_dir: None, panel_dir: None }
     }
 }
 
@@ -46,7 +49,8 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
             writeln!(out, "recordings are kept in {}", folder.display())?;
         }
         out.flush()?;
-        server::serve(listener, Options { data_dir: arguments.data_dir.clone() }, shutdown).await?;
+        let options = Options { data_dir: arguments.data_dir.clone(), panel_dir: arguments.panel_dir.clone() };
+        server::serve(listener, options, shutdown).await?;
         writeln!(out, "ended; every recording is complete")?;
         Ok(())
     })

@@ -3,7 +3,8 @@
 use std::{
     borrow::Cow,
     hash::{DefaultHasher, Hasher},
-    io::Write,
+    io::{Read, Write},
+    path::Path,
     sync::{
         Arc, OnceLock,
         atomic::{AtomicBool, Ordering},
@@ -18,25 +19,25 @@ use axum::{
     response::{IntoResponse, Response},
     routing::get,
 };
-use flate2::{Compression, write::GzEncoder};
-use re_web_viewer_server::{WebViewerData, WebViewerDataError};
+use flate2::{Compression, read::GzDecoder, write::GzEncoder};
+use re_web_viewer_server::WebViewerData;
 
 use super::{
     App,
+    ServerError,
     problem::{Kind, Problem},
 };
-use crate::recording::{hex, learner_color};
 
 /// Files larger than this are compressed in the background while they are first sent as they are.
 const COMPRESS_AT_ONCE_BYTES: usize = 1 << 20;
 
-/// After so many learners the colours repeat.
-const LEARNER_COLOURS: usize = 7;
+const PANEL_SCRIPT: &str = "/panel/panel.js";
+const PANEL_WASM: &str = "/panel/panel_bg.wasm";
 
 /// A file of the page.
 macro_rules! embedded {
     ($name:literal) => {
-        Bytes::from_static(include_bytes!(concat!("../../web/", $name)))
+        Bytes::from_static(include_bytes!(concat!("../../web/page/", $name)))
     };
 }
 
@@ -55,9 +56,10 @@ struct Asset {
 
 /// The routes of all files.
 pub(super) fn routes() -> Router<Arc<App>> {
-    let page = ["/", "/page.css", "/page.js", "/session.js", "/table.js", "/viewer.js", "/icon.svg"];
+    let page = ["/", "/page.css", "/page.js", "/session.js", "/seeds.js", "/viewer.js", "/icon.svg"];
+    let panel = [PANEL_SCRIPT, PANEL_WASM];
     let viewer = ["/viewer/re_viewer.js", "/viewer/re_viewer_bg.wasm"];
-    let paths = page.into_iter().chain(viewer);
+    let paths = page.into_iter().chain(panel).chain(viewer);
     paths.fold(Router::new(), |router, path| router.route(path, get(file)))
 }
 
@@ -69,22 +71,37 @@ async fn file(State(app): State<Arc<App>>, uri: Uri, headers: HeaderMap) -> Resp
 }
 
 impl Assets {
-    /// All files; the page's addresses of the others carry their versions.
-    pub(super) fn load() -> Result<Self, WebViewerDataError> {
+    /// All files; the page's addresses of the others carry their versions. The panel is that of a folder, if one is
+    /// named.
+    pub(super) fn load(panel: Option<&Path>) -> Result<Self, ServerError> {
         const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
         let viewer = WebViewerData::load(None)?;
+        let (panel_script, panel_wasm) = match panel {
+            Some(folder) => {
+                let read = |name: &str| {
+                    let file = folder.join(name);
+                    std::fs::read(&file).map(Bytes::from).map_err(|source| ServerError::Panel { file, source })
+                };
+                (read("panel.js")?, read("panel_bg.wasm.gz")?)
+            }
+            None => (
+                Bytes::from_static(include_bytes!("../../web/dist/panel.js")),
+                Bytes::from_static(include_bytes!("../../web/dist/panel_bg.wasm.gz")),
+            ),
+        };
         let mut assets = vec![
             Asset::new("/page.css", "text/css; charset=utf-8", embedded!("page.css")),
             Asset::new("/page.js", JAVASCRIPT, embedded!("page.js")),
             Asset::new("/session.js", JAVASCRIPT, embedded!("session.js")),
-            Asset::new("/table.js", JAVASCRIPT, embedded!("table.js")),
+            Asset::new("/seeds.js", JAVASCRIPT, embedded!("seeds.js")),
             Asset::new("/viewer.js", JAVASCRIPT, embedded!("viewer.js")),
             Asset::new("/icon.svg", "image/svg+xml", embedded!("icon.svg")),
+            Asset::new(PANEL_SCRIPT, JAVASCRIPT, panel_script),
+            Asset::compressed_already(PANEL_WASM, "application/wasm", panel_wasm),
             Asset::new("/viewer/re_viewer.js", JAVASCRIPT, Bytes::copy_from_slice(viewer.viewer_js())),
             Asset::new("/viewer/re_viewer_bg.wasm", "application/wasm", viewer_wasm(viewer)),
         ];
-        let colours: Vec<String> = (0..LEARNER_COLOURS).map(|index| hex(learner_color(index))).collect();
-        let mut page = include_str!("../../web/index.html").replace("{learner colours}", &colours.join(" "));
+        let mut page = include_str!("../../web/page/index.html").to_owned();
         for asset in &assets {
             let Asset { path, version, .. } = asset;
             page = page.replace(&format!("\"{path}\""), &format!("\"{path}?v={version}\""));
@@ -111,6 +128,16 @@ impl Asset {
         hasher.write(&bytes);
         let version = format!("{:016x}", hasher.finish());
         Self { path, content_type, bytes, version, compressed: Arc::default(), compressing: false.into() }
+    }
+
+    /// A file that was compressed when it was built; who does not take it so gets it unpacked.
+    fn compressed_already(path: &'static str, content_type: &'static str, compressed: Bytes) -> Self {
+        let mut plain = Vec::new();
+        // What does not unpack stays empty, and the browser says so.
+        drop(GzDecoder::new(compressed.as_ref()).read_to_end(&mut plain));
+        let asset = Self::new(path, content_type, plain.into());
+        drop(asset.compressed.set(Some(compressed)));
+        asset
     }
 
     fn response(&self, headers: &HeaderMap, query: Option<&str>) -> Response {

@@ -50,6 +50,9 @@ const DRAIN_WITHIN: Duration = Duration::from_secs(15);
 pub struct Options {
     /// Where recordings are kept as files, `{scenario}-seed{seed}-{session}.rrd`; made if it does not exist.
     pub data_dir: Option<PathBuf>,
+    /// A folder with another build of the page's panel than the one that is part of this program, for those who work
+    /// on it.
+    pub panel_dir: Option<PathBuf>,
 }
 
 /// Why a server could not run.
@@ -66,6 +69,14 @@ pub enum ServerError {
     /// Rerun's viewer is not part of this program.
     #[error("the viewer cannot be loaded: {0}")]
     Viewer(#[from] re_web_viewer_server::WebViewerDataError),
+    /// Another build of the panel was asked for and is not there.
+    #[error("the panel's file {} cannot be read: {source}", file.display())]
+    Panel {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
     /// The socket failed.
     #[error("the socket failed: {0}")]
     Socket(#[from] io::Error),
@@ -92,7 +103,7 @@ pub async fn serve(listener: TcpListener, options: Options, shutdown: Cancellati
     let (routes, document) = api::routes();
     let app = Arc::new(App {
         sessions: Sessions::new(Budget::new(MAX_MEMORY_BYTES), options.data_dir, shutdown.clone()),
-        assets: assets::Assets::load()?,
+        assets: assets::Assets::load(options.panel_dir.as_deref())?,
         openapi: document,
         loopback,
     });

@@ -27,7 +27,7 @@ impl Server {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("an address");
         let shutdown = CancellationToken::new();
-        let serving = tokio::spawn(serve(listener, Options { data_dir }, shutdown.clone()));
+        let serving = tokio::spawn(serve(listener, Options { data_dir, ..Options::default() }, shutdown.clone()));
         Self { address, client: Client::builder().no_proxy().build().expect("a client"), shutdown, serving }
     }
 

@@ -6,21 +6,26 @@ const TIMELINE = "step";
 const HEADER_BYTES = 12;
 /** How long parts are gathered, ms. */
 const GATHER_MS = 10;
+/** So long after a seek, its echo may still come, ms. */
+const ECHO_MS = 3000;
 
 /**
  * Loads the viewer's WebAssembly and starts it on a canvas.
  * @param {HTMLCanvasElement} canvas
  * @param {{script: string, wasm: string}} addresses
  * @param {(fraction: number | null) => void} progress null where the size is not known
+ * @param {(step: number) => void} scrubbed hears where the visitor moves the time to
  * @returns {Promise<Viewer>}
  */
-export async function startViewer(canvas, addresses, progress) {
+export async function startViewer(canvas, addresses, progress, scrubbed) {
   keepToThisHost();
   const [, response] = await Promise.all([loadScript(addresses.script), fetch(addresses.wasm)]);
   if (!response.ok) throw new Error(`the viewer could not be loaded (${response.status})`);
   // `wasm_bindgen` is what the script defines.
   await wasm_bindgen({ module_or_path: withProgress(response, progress) });
+  let viewer = null;
   const handle = new wasm_bindgen.WebHandle({
+    on_viewer_event: (json) => viewer?.hear(JSON.parse(json)),
     url: [],
     hide_welcome_screen: true,
     enable_history: false,
@@ -30,7 +35,8 @@ export async function startViewer(canvas, addresses, progress) {
   await handle.start(canvas);
   for (const panel of ["top", "blueprint", "selection"]) handle.override_panel_state(panel, "hidden");
   handle.override_panel_state("time", "collapsed");
-  return new Viewer(handle);
+  viewer = new Viewer(handle, scrubbed);
+  return viewer;
 }
 
 /**
@@ -89,9 +95,22 @@ export class Viewer {
   #step = 0;
   #waiting = [];
   #seeking = false;
+  #scrubbed;
+  /** When which step was sought: the viewer tells of these too. */
+  #sought = new Map();
 
-  constructor(handle) {
+  constructor(handle, scrubbed) {
     this.#handle = handle;
+    this.#scrubbed = scrubbed;
+  }
+
+  /** Takes in an event of the viewer's. @param {{type: string, time?: number}} event */
+  hear(event) {
+    if (event.type !== "time_update" || this.#channel === null || this.#seeking || this.#sought.size === 0) return;
+    const step = Math.round(event.time);
+    const now = performance.now();
+    const echo = step === this.#step || now - (this.#sought.get(step) ?? -Infinity) < ECHO_MS;
+    if (!echo && step >= 0) this.#scrubbed(step);
   }
 
   /** Begins a recording. @param {string} id its recording id */
@@ -107,6 +126,7 @@ export class Viewer {
     if (this.#channel !== null) this.#handle.close_channel(this.#channel);
     this.#channel = this.#header = null;
     [this.#parts, this.#timer, this.#step] = [[], 0, 0];
+    this.#sought.clear();
     this.#wake();
   }
 
@@ -139,7 +159,7 @@ export class Viewer {
    * @returns {Promise<void>} resolves when the viewer is there, or when it shows another recording
    */
   seek(step) {
-    this.#step = Math.max(this.#step, step);
+    this.#step = step;
     if (!this.#seeking) {
       this.#seeking = true;
       requestAnimationFrame(() => this.#follow());
@@ -153,7 +173,12 @@ export class Viewer {
     if (newest !== undefined) {
       this.#handle.set_active_recording_id(id);
       this.#handle.set_playing(id, false);
-      this.#handle.set_time_for_timeline(id, TIMELINE, Math.min(this.#step, newest));
+      const time = Math.min(this.#step, newest);
+      this.#sought.delete(time);
+      this.#sought.set(time, performance.now());
+      // The oldest have long been heard of.
+      if (this.#sought.size > 100) this.#sought.delete(this.#sought.keys().next().value);
+      this.#handle.set_time_for_timeline(id, TIMELINE, time);
     }
     this.#seeking = id !== null && !(newest >= this.#step);
     if (this.#seeking) requestAnimationFrame(() => this.#follow());

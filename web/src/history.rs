@@ -82,6 +82,8 @@ pub enum Verdict {
 pub struct History {
     thresholds: Thresholds,
     change_at: Option<u64>,
+    /// The step of the first row.
+    first: u64,
     /// Step by step, all learners.
     rows: Vec<Vec<Row>>,
     /// Per learner, the reason why it stopped.
@@ -94,15 +96,18 @@ impl History {
         Self {
             thresholds: description.thresholds,
             change_at: description.change_at,
+            first: 0,
             rows: Vec::new(),
             failures: vec![None; description.learners.len()],
         }
     }
 
-    /// Takes a report in; one that is known already or leaves a gap changes nothing.
+    /// Takes a report in, the first whatever its step; one that is known already or leaves a gap changes nothing.
     pub fn take(&mut self, report: &Report) -> bool {
-        let next = usize::try_from(report.step).is_ok_and(|step| step == self.rows.len());
-        if !next || report.learners.len() != self.failures.len() {
+        if self.rows.is_empty() {
+            self.first = report.step;
+        }
+        if report.step != self.first + self.rows.len() as u64 || report.learners.len() != self.failures.len() {
             return false;
         }
         for (failure, learner) in self.failures.iter_mut().zip(&report.learners) {
@@ -114,7 +119,7 @@ impl History {
 
     /// The latest step; 0 before any.
     pub fn latest(&self) -> u64 {
-        self.rows.len().saturating_sub(1) as u64
+        self.first + self.rows.len().saturating_sub(1) as u64
     }
 
     /// Whether there is nothing yet.
@@ -124,12 +129,12 @@ impl History {
 
     /// A learner's row at a step.
     pub fn row(&self, step: u64, learner: usize) -> Option<&Row> {
-        self.rows.get(usize::try_from(step).ok()?)?.get(learner)
+        self.rows.get(usize::try_from(step.checked_sub(self.first)?).ok()?)?.get(learner)
     }
 
     /// One number of a learner over all steps; those that are not finite are left out.
     pub fn curve(&self, learner: usize, value: impl Fn(&Row) -> Option<f64>) -> Vec<[f64; 2]> {
-        let steps = self.rows.iter().enumerate();
+        let steps = (self.first..).zip(&self.rows);
         steps
             .filter_map(|(step, rows)| Some([step as f64, value(rows.get(learner)?)?]))
             .filter(|[_, value]| value.is_finite())

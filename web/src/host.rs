@@ -46,6 +46,8 @@ pub enum Event {
     Stepped {
         /// The session that was stepped.
         session: String,
+        /// The step that it is at.
+        step: u64,
     },
     /// The connection broke; it is tried again.
     Lost {

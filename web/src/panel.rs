@@ -63,6 +63,8 @@ pub struct Panel {
     pub(crate) opening: bool,
     /// A request for steps is under way.
     pub(crate) busy: bool,
+    /// The step whose report is awaited.
+    awaited: Option<u64>,
     /// Steps up to this one are made at once, to restore a run.
     pub(crate) restoring: Option<u64>,
     /// The step to show once it is there.
@@ -97,6 +99,7 @@ impl Default for Panel {
             copied: None,
             opening: false,
             busy: false,
+            awaited: None,
             restoring: None,
             wanted: None,
             shown: 0,
@@ -171,9 +174,9 @@ impl Panel {
             Event::Connected => self.link = Link::Connected,
             Event::Live { message: Live::Step(report) } => self.take(&report),
             Event::Live { message: Live::Description(_) } => {}
-            Event::Stepped { session } => {
+            Event::Stepped { session, step } => {
                 if self.session.as_ref().is_some_and(|current| current.id == session) {
-                    self.busy = false;
+                    self.stepped(step);
                 }
             }
             Event::Lost { seconds } => {
@@ -241,7 +244,7 @@ impl Panel {
         self.settings.session = Some(session.id.clone());
         self.history = History::new(description);
         self.why = Why::default();
-        (self.cursor, self.shown, self.sought) = (0, 0, None);
+        (self.cursor, self.shown, self.sought, self.awaited) = (0, 0, None, None);
         (self.opening, self.busy, self.stopped) = (false, false, None);
         self.link = Link::Loading;
         self.session = Some(session);
@@ -265,9 +268,11 @@ impl Panel {
                 self.link = Link::Unreachable(sentence);
             }
             "step" => {
-                self.busy = false;
                 // Somebody else has stepped this session: their steps are on their way.
-                if problem.status != 409 {
+                if let (409, Some(step)) = (problem.status, problem.step) {
+                    self.stepped(step);
+                } else {
+                    self.busy = false;
                     self.pause();
                     self.restoring = None;
                     if problem.status != 0 {
@@ -300,10 +305,19 @@ impl Panel {
         if is_new { self.open(1) } else { self.link = Link::Unreachable(sentence.to_owned()) }
     }
 
+    /// The session is at this step; its reports may still be on their way, and until then nothing is asked for.
+    fn stepped(&mut self, step: u64) {
+        self.awaited = Some(step).filter(|step| *step > self.history.latest());
+        self.busy = self.awaited.is_some();
+    }
+
     fn take(&mut self, report: &Report) {
         let following = self.cursor == self.history.latest();
         if !self.history.take(report) {
             return;
+        }
+        if self.awaited.is_some_and(|step| step <= self.history.latest()) {
+            (self.awaited, self.busy) = (None, false);
         }
         match self.wanted {
             Some(wanted) if self.history.latest() >= wanted => {

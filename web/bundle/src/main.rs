@@ -1,0 +1,122 @@
+//! Builds the page's panel into `web/dist`, which the server embeds:
+//!
+//! ```sh
+//! rustup target add wasm32-unknown-unknown    # once
+//! cargo run -p body-schema-bundle             # --check only tells whether web/dist is of these sources
+//! ```
+//!
+//! Where rustup has no such target, Debian's `rustc-web cargo-web rust-web-src lld-19` do it: set
+//! `BODY_SCHEMA_DEBIAN_RUST=1`. Binaryen's `wasm-opt`, if it is there, makes the bundle smaller. A folder as argument
+//! takes the place of `web/dist`.
+
+mod stamp;
+
+use std::{
+    env,
+    error::Error,
+    fs,
+    io::Write,
+    path::{Path, PathBuf},
+    process::{Command, ExitCode},
+};
+
+use flate2::{Compression, write::GzEncoder};
+use wasm_bindgen_cli_support::Bindgen;
+
+const TARGET: &str = "wasm32-unknown-unknown";
+/// The most that the compressed bundle may weigh: it is what a first visitor waits for.
+const MOST_BYTES: usize = 2_000_000;
+
+fn main() -> ExitCode {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let folder = arguments.iter().find(|argument| !argument.starts_with("--"));
+    let folder = folder.map_or_else(|| workspace.join("web/dist"), PathBuf::from);
+    let outcome = if arguments.iter().any(|argument| argument == "--check") {
+        check(&workspace, &folder)
+    } else {
+        build(&workspace, &folder)
+    };
+    match outcome {
+        Ok(said) => {
+            println!("{said}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn check(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
+    let kept = fs::read_to_string(folder.join("stamp.txt")).unwrap_or_default();
+    if kept.trim() == stamp::of_sources(workspace)?.trim() {
+        Ok("the bundle is of these sources".to_owned())
+    } else {
+        Err("the bundle is older than its sources: run `cargo run -p body-schema-bundle`".into())
+    }
+}
+
+fn build(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
+    let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target/panel"), PathBuf::from);
+    compile(workspace, &target)?;
+    let module = target.join(TARGET).join("release/body_schema_panel.wasm");
+    let made = target.join("bindgen");
+    Bindgen::new().web(true)?.typescript(false).input_path(module).out_name("panel").generate(&made)?;
+    let wasm = optimised(&made.join("panel_bg.wasm"))?;
+
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(&wasm)?;
+    let compressed = encoder.finish()?;
+    let script = fs::read(made.join("panel.js"))?;
+    let size = compressed.len() + script.len();
+    if size > MOST_BYTES {
+        return Err(format!("the bundle weighs {size} bytes, more than {MOST_BYTES}").into());
+    }
+    fs::create_dir_all(folder)?;
+    fs::write(folder.join("panel_bg.wasm.gz"), &compressed)?;
+    fs::write(folder.join("panel.js"), script)?;
+    fs::write(folder.join("stamp.txt"), stamp::of_sources(workspace)?)?;
+    let (wasm, compressed) = (wasm.len(), compressed.len());
+    Ok(format!("{}: {wasm} bytes of WebAssembly, {compressed} compressed", folder.display()))
+}
+
+fn compile(workspace: &Path, target: &Path) -> Result<(), Box<dyn Error>> {
+    let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    if env::var_os("BODY_SCHEMA_DEBIAN_RUST").is_some() {
+        // Debian's compiler has the target's sources instead of its library.
+        cargo = Command::new("/usr/bin/cargo");
+        cargo
+            .env("RUSTC", "/usr/bin/rustc")
+            .env("RUSTC_BOOTSTRAP", "1")
+            .env("RUSTFLAGS", "-C linker-flavor=wasm-ld")
+            .env("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", "wasm-ld-19")
+            .env_remove("RUSTUP_TOOLCHAIN")
+            .env_remove("RUSTC_WRAPPER")
+            .args(["-Z", "build-std=std,panic_abort"]);
+    }
+    cargo
+        .current_dir(workspace)
+        .args(["build", "--locked", "--release", "--package", "body-schema-panel", "--target", TARGET])
+        .arg("--target-dir")
+        .arg(target);
+    let status = cargo.status().map_err(|error| format!("cargo does not start: {error}"))?;
+    if status.success() { Ok(()) } else { Err("the panel does not compile".into()) }
+}
+
+fn optimised(module: &Path) -> Result<Vec<u8>, Box<dyn Error>> {
+    let small = module.with_extension("opt.wasm");
+    let mut tool = Command::new("wasm-opt");
+    // What every browser of the last years can do, and Rust's compiler uses.
+    tool.args(["-O2", "--enable-bulk-memory", "--enable-nontrapping-float-to-int", "--enable-sign-ext"]);
+    tool.args(["--enable-mutable-globals", "--enable-reference-types", "--enable-multivalue"]);
+    match tool.arg(module).arg("-o").arg(&small).status() {
+        Ok(status) if status.success() => Ok(fs::read(small)?),
+        Ok(status) => Err(format!("wasm-opt failed: {status}").into()),
+        Err(_) => {
+            eprintln!("note: wasm-opt (binaryen) is not installed; the bundle is larger than it need be");
+            Ok(fs::read(module)?)
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! What a bundle was built from, as one number. The tests of the server's crate compare it too.
+
+use std::{
+    fmt::Write,
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+/// The crates whose version changes the bundle.
+const CRATES: [&str; 8] =
+    ["eframe", "egui", "egui_plot", "epaint", "serde", "serde_json", "wasm-bindgen", "web-sys"];
+
+/// The stamp of the panel's sources, given the folder of the workspace.
+pub fn of_sources(workspace: &Path) -> io::Result<String> {
+    let mut files = vec![workspace.join("web/Cargo.toml")];
+    collect(&workspace.join("web/src"), &mut files)?;
+    files.sort();
+    let mut hash = Fnv::new();
+    for file in files {
+        let name = file.strip_prefix(workspace).unwrap_or(&file).to_string_lossy().replace('\\', "/");
+        hash.add(name.as_bytes());
+        // A checkout may have other line ends; they change nothing.
+        hash.add(fs::read_to_string(&file)?.replace('\r', "").as_bytes());
+    }
+    let lock = fs::read_to_string(workspace.join("Cargo.lock"))?.replace('\r', "");
+    for package in lock.split("[[package]]") {
+        let field = |name: &str| {
+            let line = package.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(" = "));
+            line.unwrap_or_default().trim_matches('"')
+        };
+        if CRATES.contains(&field("name")) {
+            hash.add(field("name").as_bytes());
+            hash.add(field("version").as_bytes());
+        }
+    }
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    drop(writeln!(text, "{:016x}", hash.0));
+    Ok(text)
+}
+
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            collect(&path, files)?;
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// FNV-1a: short, and the same for ever, which the standard library's hashers do not promise.
+struct Fnv(u64);
+
+impl Fnv {
+    fn new() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+
+    fn add(&mut self, bytes: &[u8]) {
+        // The length keeps two texts from running into each other.
+        for byte in (bytes.len() as u64).to_le_bytes().iter().chain(bytes) {
+            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+}

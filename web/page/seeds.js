@@ -1,0 +1,43 @@
+// Other seeds of the same comparison, run in the background, one after the other.
+
+import { ask } from "./session.js";
+
+/** Steps of one request: few, so that cancelling is quick and the session that is watched does not wait. */
+const AT_ONCE = 25;
+
+export class SeedRuns {
+  #tell;
+  /** Counts jobs: one that is not the latest ends. */
+  #job = 0;
+
+  /** @param {(event: object) => void} tell */
+  constructor(tell) {
+    this.#tell = tell;
+  }
+
+  cancel() {
+    this.#job += 1;
+  }
+
+  /** @param {{scenario: string, learners: string[], seeds: number[], steps: number}} job */
+  async run({ scenario, learners, seeds, steps }) {
+    const job = ++this.#job;
+    for (const seed of seeds) {
+      let id = null;
+      try {
+        id = (await ask("POST", "/v1/sessions", { scenario, seed, learners })).id;
+        for (let made = 0; made < steps && job === this.#job; ) {
+          const answer = await ask("POST", `/v1/sessions/${id}/steps`, { count: Math.min(AT_ONCE, steps - made) });
+          made = answer.step;
+          if (job === this.#job) this.#tell({ is: "seeds", seed, reports: answer.reports, done: made >= steps });
+        }
+      } catch (error) {
+        if (job === this.#job) this.#tell({ is: "refused", asked: "seeds", problem: error.problem ?? {} });
+        this.#job += job === this.#job ? 1 : 0;
+      } finally {
+        if (id !== null) ask("DELETE", `/v1/sessions/${id}`).catch(() => {});
+      }
+      if (job !== this.#job) return;
+    }
+  }
+}

@@ -1,0 +1,270 @@
+//! The panel as its visitor meets it: by labels and keys, with a page that the test plays.
+
+mod support;
+
+use body_schema_panel::{Link, host::Command, settings::Tab};
+use egui::Key;
+use serde_json::json;
+use support::{Page, scenarios, selection, session};
+
+fn steps(commands: &[Command]) -> Vec<u64> {
+    let counts = commands.iter().filter_map(|command| match command {
+        Command::Step { count, .. } => Some(*count),
+        _ => None,
+    });
+    counts.collect()
+}
+
+#[test]
+fn an_opened_page_asks_for_a_session_and_its_first_step() {
+    let mut page = Page::open("?scenario=head-fov&seed=7&learners=random,active");
+    assert_eq!(page.commands(), [Command::Scenarios]);
+    page.tell(scenarios());
+    let learners = Some(vec!["active".to_owned(), "random".to_owned()]);
+    let open = Command::Open { scenario: "head-fov".to_owned(), seed: 7, learners, sigmas: "1".to_owned() };
+    assert_eq!(page.commands(), [open]);
+    assert!(page.has("Opening a session"));
+}
+
+#[test]
+fn what_an_address_gets_wrong_is_told_and_replaced() {
+    let mut page = Page::open("?v=1&scenario=no-such&seed=-3&learners=active,nobody&colour=blue");
+    page.tell(scenarios());
+    for text in ["seed=-3", "“no-such”", "“nobody”", "“colour”"] {
+        assert!(page.has(text), "a notice about {text}");
+    }
+    let commands = page.commands();
+    let Some(Command::Open { scenario, seed, .. }) = commands.last() else { panic!("{commands:?}") };
+    assert_eq!((scenario.as_str(), *seed), ("arm-6dof", 1));
+    // The server has the last word.
+    page.tell(json!({ "is": "refused", "asked": "open",
+        "problem": { "status": 422, "title": "Invalid", "detail": "no such learner", "field": "learners" } }));
+    assert!(page.has("no such learner"));
+    let commands = page.commands();
+    assert!(matches!(commands.last(), Some(Command::Open { learners: None, .. })), "{commands:?}");
+}
+
+#[test]
+fn keys_drive_the_server_but_not_while_typing() {
+    let mut page = Page::with_session("");
+    page.make_steps(1, |_, _, _| {});
+    assert_eq!(page.harness.state().cursor, 1, "the first step shows what it is about");
+    page.press(Key::S);
+    assert_eq!(page.make_steps(1, |_, _, _| {}), 1);
+    page.press(Key::ArrowLeft);
+    assert_eq!((page.harness.state().cursor, page.harness.state().history.latest()), (1, 2));
+    page.press(Key::ArrowRight);
+    assert_eq!(page.harness.state().cursor, 2, "recorded steps are gone through first");
+    assert!(steps(&page.commands()).is_empty());
+    page.press(Key::ArrowRight);
+    assert_eq!(page.make_steps(1, |_, _, _| {}), 1);
+    page.press(Key::Plus);
+    assert_eq!(page.harness.state().settings.speed, 20.0);
+    page.press(Key::Minus);
+    assert_eq!(page.harness.state().settings.speed, 10.0);
+    page.press(Key::Questionmark);
+    assert!(page.harness.state().help);
+    page.press(Key::Escape);
+    assert!(!page.harness.state().help);
+
+    page.click("Seed");
+    page.press(Key::S);
+    page.press(Key::Space);
+    page.press(Key::R);
+    assert!(steps(&page.commands()).is_empty() && !page.harness.state().playing, "keys are text now");
+}
+
+#[test]
+fn a_run_stops_at_its_last_step_and_says_why() {
+    let mut page = Page::with_session("to=12&speed=100");
+    page.make_steps(1, |_, _, _| {});
+    page.click("▶ Play");
+    assert!(page.harness.state().playing);
+    page.make_steps(100, |_, _, _| {});
+    assert_eq!(page.harness.state().history.latest(), 12);
+    assert!(!page.harness.state().playing && page.has("Stopped at step 12, the last of this run"));
+}
+
+#[test]
+fn a_run_stops_when_all_that_judge_themselves_have_settled_and_plays_on() {
+    let mut page = Page::with_session("speed=50");
+    page.make_steps(1, |_, _, _| {});
+    let settle = |step: u64, learner: usize, value: &mut serde_json::Value| {
+        // The gradient keeps no uncertainty, so it never judges itself.
+        value["metrics"]["settled"] = json!(learner == 0 && step >= 8 || learner == 1 && step >= 20);
+    };
+    page.press(Key::Space);
+    page.make_steps(200, settle);
+    let latest = page.harness.state().history.latest();
+    assert!((20..30).contains(&latest), "{latest}");
+    assert!(page.has("every learner that judges itself has settled"));
+    page.press(Key::Space);
+    page.make_steps(20, settle);
+    assert!(page.harness.state().history.latest() > latest, "play goes on");
+}
+
+#[test]
+fn convergence_and_divergence_are_shown() {
+    let mut page = Page::with_session("speed=100&to=80&stop=never");
+    page.make_steps(1, |_, _, _| {});
+    page.press(Key::Space);
+    page.make_steps(80, |step, learner, value| {
+        if learner == 2 && step > 30 {
+            value["failure"] = json!("the estimate left every bound");
+        }
+    });
+    assert!(page.has("converged at 23"), "active: 40 / (1 + 0.4 n) ≤ 4 mm·200 from 23 on");
+    assert!(page.has("diverged"));
+    // Going back undoes the verdict: it is that of the step that is shown.
+    page.tell(json!({ "is": "scrubbed", "step": 30 }));
+    assert!(page.has("within since 23 (7/20)") && !page.has("diverged"));
+}
+
+#[test]
+fn scene_and_panel_move_together() {
+    let mut page = Page::with_session("");
+    page.make_steps(1, |_, _, _| {});
+    page.press(Key::S);
+    page.make_steps(1, |_, _, _| {});
+    page.commands();
+    page.press(Key::ArrowLeft);
+    assert!(page.commands().contains(&Command::Seek { step: 1 }));
+    page.tell(json!({ "is": "scrubbed", "step": 0 }));
+    assert_eq!(page.harness.state().cursor, 0);
+    assert!(!page.commands().iter().any(|command| matches!(command, Command::Seek { .. })), "no echo");
+    page.tell(json!({ "is": "scrubbed", "step": 99 }));
+    assert_eq!(page.harness.state().cursor, 2, "not beyond the latest");
+}
+
+#[test]
+fn a_lost_server_loses_nothing() {
+    let mut page = Page::with_session("speed=100&to=40&stop=never");
+    page.make_steps(1, |_, _, _| {});
+    page.press(Key::Space);
+    page.make_steps(100, |_, _, _| {});
+    page.tell(json!({ "is": "lost", "seconds": 0.5 }));
+    assert!(page.has("The connection is lost") && page.harness.state().history.latest() == 40);
+    page.tell(json!({ "is": "connected" }));
+    assert_eq!(page.harness.state().link, Link::Connected);
+    // Started anew: the session is gone, and computed again.
+    page.tell(json!({ "is": "ended", "failure": null, "unseen": true }));
+    page.open_session();
+    page.make_steps(40, |_, _, _| {});
+    assert_eq!((page.harness.state().history.latest(), page.harness.state().cursor), (40, 40));
+    // Expired: it waits to be asked.
+    page.tell(json!({ "is": "ended", "failure": null, "unseen": false }));
+    assert!(page.has("This session has expired"));
+    page.click("Restore");
+    page.open_session();
+    page.make_steps(40, |_, _, _| {});
+    assert_eq!(page.harness.state().history.latest(), 40);
+}
+
+#[test]
+fn a_reload_finds_its_session_or_computes_it_again() {
+    let mut page = Page::open("?scenario=head-fov&seed=3&step=5&session=abc");
+    page.tell(scenarios());
+    assert!(page.commands().contains(&Command::Find { session: "abc".to_owned() }));
+    page.tell(json!({ "is": "session", "session": null }));
+    assert!(page.has("is gone"));
+    page.open_session();
+    page.make_steps(5, |_, _, _| {});
+    assert_eq!(page.harness.state().cursor, 5);
+    page.harness.run_steps(120);
+    let query = page.commands().into_iter().rev().find_map(|command| match command {
+        Command::Address { query } => Some(query),
+        _ => None,
+    });
+    assert_eq!(query.as_deref(), Some("v=1&scenario=head-fov&seed=3&step=5&session=head-fov-3"));
+}
+
+#[test]
+fn learners_and_seeds_are_chosen() {
+    let mut page = Page::with_session("");
+    page.make_steps(1, |_, _, _| {});
+    page.click("🎲 New seed");
+    let commands = page.commands();
+    assert!(matches!(commands[..], [Command::Open { seed, .. }] if seed != 1), "{commands:?}");
+    page.tell(json!({ "is": "session", "session": session("arm-6dof", 5, None) }));
+    page.tell(json!({ "is": "connected" }));
+    page.press(Key::R);
+    assert!(matches!(page.commands().last(), Some(Command::Open { seed: 5, .. })));
+}
+
+#[test]
+fn the_choice_is_explained_and_challenged() {
+    let mut page = Page::with_session("tab=why");
+    page.make_steps(1, |_, _, _| {});
+    let commands = page.commands();
+    let asked = |commands: &[Command]| commands.iter().any(|command| matches!(command, Command::Select { .. }));
+    assert!(asked(&commands) || page.has("Asking the server"), "{commands:?}");
+    page.tell(json!({ "is": "selection", "learner": "active", "selection": selection(1) }));
+    assert!(page.has("How active chose movement 1") && page.has("DIRECT-L tried 7 postures"));
+    assert!(page.has("expected to fall by 0.600") && page.has("fell by 0.500"));
+    let panel = page.harness.state_mut();
+    assert_eq!(panel.settings.tab, Tab::Why);
+    panel.propose(vec![0.5, 1.0]);
+    let commands = page.commands();
+    assert!(matches!(&commands[..], [Command::Evaluate { learner, .. }] if learner == "active"), "{commands:?}");
+    page.tell(json!({ "is": "evaluation", "evaluation": {
+        "configuration": [0.5, 1.0], "criterion": 1.7, "gain": 0.3, "trace": 2.0, "predicted_marker_m": [0.1, 0.2, 0.3],
+        "marker_covariance_m2": [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]], "chance_of_being_seen": 0.5 } }));
+    assert!(page.has("by 0.300, 50 % of what DIRECT found") && page.has("chance of being seen 50 %"));
+    page.tell(json!({ "is": "refused", "asked": "select",
+        "problem": { "status": 409, "title": "Not by DIRECT", "detail": "a random movement" } }));
+    assert!(page.has("a random movement"));
+}
+
+#[test]
+fn a_selection_that_does_not_hold_together_is_not_drawn() {
+    let mut page = Page::with_session("tab=why");
+    page.make_steps(1, |_, _, _| {});
+    for (path, wrong) in [("/chosen/box", json!(99)), ("/iterations", json!([])), ("/boxes/0/shapes", json!([]))] {
+        let mut broken = selection(1);
+        *broken.pointer_mut(path).expect("a member") = wrong;
+        page.tell(json!({ "is": "selection", "learner": "active", "selection": broken }));
+        assert!(page.has("was not chosen by DIRECT"), "{path}");
+    }
+}
+
+#[test]
+fn other_seeds_run_in_the_background_and_can_be_cancelled() {
+    let mut page = Page::with_session("");
+    page.make_steps(1, |_, _, _| {});
+    page.click("Is this luck? Run 10 more seeds");
+    let commands = page.commands();
+    assert!(matches!(&commands[..], [Command::Seeds { seeds, .. }] if seeds.len() == 10), "{commands:?}");
+    assert!(page.has("0 of 10 seeds"));
+    page.click("Cancel");
+    assert_eq!(page.commands(), [Command::CancelSeeds]);
+}
+
+#[test]
+fn a_newcomer_is_shown_around_once() {
+    let mut page = Page::with_session("");
+    page.make_steps(1, |_, _, _| {});
+    page.click("Tour");
+    for title in ["What is learned", "random is wasteful", "ellipsoids", "DIRECT chooses"] {
+        assert!(page.has(title), "{title}");
+        page.click("Next");
+    }
+    assert!(page.has("What to try next"));
+    page.click("Done");
+    assert!(page.commands().contains(&Command::Known) && page.harness.state().tour.is_none());
+}
+
+#[test]
+fn everything_can_be_taken_away() {
+    let mut page = Page::with_session("tab=share&learners=active,random");
+    page.make_steps(1, |_, _, _| {});
+    assert!(page.has("body-schema run arm-6dof --seed 1 --steps 1 --learner active --learner random"));
+    page.commands();
+    for file in ["recording.rrd", "steps.csv", "result.json", "scenario.toml"] {
+        page.click(file);
+        assert!(matches!(&page.commands()[..], [Command::Download { name, .. }] if name.ends_with(&file[4..])), "{file}");
+    }
+    page.click("Copy link");
+    let commands = page.commands();
+    let Some(Command::Copy { text }) = commands.last() else { panic!("{commands:?}") };
+    assert!(text.starts_with("?v=1") && !text.contains("session="), "{text}");
+}
