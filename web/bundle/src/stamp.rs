@@ -1,7 +1,6 @@
 //! What a bundle was built from, as one number. The tests of the server's crate compare it too.
 
 use std::{
-    fmt::Write,
     fs, io,
     path::{Path, PathBuf},
 };
@@ -33,10 +32,7 @@ pub fn of_sources(workspace: &Path) -> io::Result<String> {
             hash.add(field("version").as_bytes());
         }
     }
-    let mut text = String::new();
-    // Writing to a string cannot fail.
-    drop(writeln!(text, "{:016x}", hash.0));
-    Ok(text)
+    Ok(format!("{:016x}\n", hash.0))
 }
 
 fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
