@@ -23,8 +23,7 @@ use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 use re_web_viewer_server::WebViewerData;
 
 use super::{
-    App,
-    ServerError,
+    App, ServerError,
     problem::{Kind, Problem},
 };
 

@@ -261,7 +261,10 @@ fn everything_can_be_taken_away() {
     page.commands();
     for file in ["recording.rrd", "steps.csv", "result.json", "scenario.toml"] {
         page.click(file);
-        assert!(matches!(&page.commands()[..], [Command::Download { name, .. }] if name.ends_with(&file[4..])), "{file}");
+        assert!(
+            matches!(&page.commands()[..], [Command::Download { name, .. }] if name.ends_with(&file[4..])),
+            "{file}"
+        );
     }
     page.click("Copy link");
     let commands = page.commands();

@@ -1,6 +1,9 @@
 //! A panel with a page that is played by the test.
 
-use body_schema_panel::{Panel, host::{Command, Event}};
+use body_schema_panel::{
+    Panel,
+    host::{Command, Event},
+};
 use egui::{Vec2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 use serde_json::{Value, json};
@@ -187,7 +190,8 @@ fn report(step: u64, change: impl Fn(usize, &mut Value)) -> Value {
 
 /// A selection as the server sends it: two joints, three iterations of DIRECT-l.
 pub fn selection(step: u64) -> Value {
-    let one = |centre: [f64; 2], value: f64, shapes: Value| json!({ "centre": centre, "value": value, "shapes": shapes });
+    let one =
+        |centre: [f64; 2], value: f64, shapes: Value| json!({ "centre": centre, "value": value, "shapes": shapes });
     let (third, sixth) = (1.0 / 3.0, 1.0 / 6.0);
     json!({
         "step": step, "learner": "active", "variant": "direct-l", "epsilon": 1e-4, "trace": 2.0, "evaluations": 7,

@@ -6,8 +6,7 @@
 //! ```
 //!
 //! Where rustup has no such target, Debian's `rustc-web cargo-web rust-web-src lld-19` do it: set
-//! `BODY_SCHEMA_DEBIAN_RUST=1`. Binaryen's `wasm-opt`, if it is there, makes the bundle smaller. A folder as argument
-//! takes the place of `web/dist`.
+//! `BODY_SCHEMA_DEBIAN_RUST=1`. A folder as argument takes the place of `web/dist`.
 
 mod stamp;
 
@@ -63,8 +62,11 @@ fn build(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
     compile(workspace, &target)?;
     let module = target.join(TARGET).join("release/body_schema_panel.wasm");
     let made = target.join("bindgen");
-    Bindgen::new().web(true)?.typescript(false).input_path(module).out_name("panel").generate(&made)?;
-    let wasm = optimised(&made.join("panel_bg.wasm"))?;
+    // No wasm-opt: names removed, it saves nothing once compressed, and Debian's (108) exports the wrong table.
+    let mut bindgen = Bindgen::new();
+    bindgen.web(true)?.typescript(false).remove_name_section(true).remove_producers_section(true);
+    bindgen.input_path(module).out_name("panel").generate(&made)?;
+    let wasm = fs::read(made.join("panel_bg.wasm"))?;
 
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(&wasm)?;
@@ -103,20 +105,4 @@ fn compile(workspace: &Path, target: &Path) -> Result<(), Box<dyn Error>> {
         .arg(target);
     let status = cargo.status().map_err(|error| format!("cargo does not start: {error}"))?;
     if status.success() { Ok(()) } else { Err("the panel does not compile".into()) }
-}
-
-fn optimised(module: &Path) -> Result<Vec<u8>, Box<dyn Error>> {
-    let small = module.with_extension("opt.wasm");
-    let mut tool = Command::new("wasm-opt");
-    // What every browser of the last years can do, and Rust's compiler uses.
-    tool.args(["-O2", "--enable-bulk-memory", "--enable-nontrapping-float-to-int", "--enable-sign-ext"]);
-    tool.args(["--enable-mutable-globals", "--enable-reference-types", "--enable-multivalue"]);
-    match tool.arg(module).arg("-o").arg(&small).status() {
-        Ok(status) if status.success() => Ok(fs::read(small)?),
-        Ok(status) => Err(format!("wasm-opt failed: {status}").into()),
-        Err(_) => {
-            eprintln!("note: wasm-opt (binaryen) is not installed; the bundle is larger than it need be");
-            Ok(fs::read(module)?)
-        }
-    }
 }

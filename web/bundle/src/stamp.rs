@@ -6,8 +6,7 @@ use std::{
 };
 
 /// The crates whose version changes the bundle.
-const CRATES: [&str; 8] =
-    ["eframe", "egui", "egui_plot", "epaint", "serde", "serde_json", "wasm-bindgen", "web-sys"];
+const CRATES: [&str; 8] = ["eframe", "egui", "egui_plot", "epaint", "serde", "serde_json", "wasm-bindgen", "web-sys"];
 
 /// The stamp of the panel's sources, given the folder of the workspace.
 pub fn of_sources(workspace: &Path) -> io::Result<String> {
