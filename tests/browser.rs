@@ -14,7 +14,7 @@ use std::{net::SocketAddr, time::Duration};
 use body_schema::server::{Options, serve};
 use driver::Browser;
 use pixels::Picture;
-use serde_json::{Value, json};
+use serde_json::Value;
 use tokio::{net::TcpListener, task::JoinHandle};
 use tokio_util::sync::CancellationToken;
 
@@ -31,7 +31,9 @@ impl Server {
     async fn start(address: SocketAddr) -> Self {
         let listener = TcpListener::bind(address).await.expect("a port");
         let (address, shutdown) = (listener.local_addr().expect("an address"), CancellationToken::new());
-        let serving = serve(listener, Options::default(), shutdown.clone());
+        // Another build of the panel than the embedded one may be tested.
+        let panel_dir = std::env::var_os("BODY_SCHEMA_PANEL_DIR").map(Into::into);
+        let serving = serve(listener, Options { panel_dir, ..Options::default() }, shutdown.clone());
         let serving = tokio::spawn(async { serving.await.expect("no error") });
         Self { address, shutdown, serving }
     }
@@ -61,85 +63,66 @@ async fn the_page_steps_and_shows() {
     assert_eq!(hosts, [address.to_string()], "every request goes to this host");
 }
 
+const SPACE: char = ' ';
+const LEFT: char = '\u{e012}';
+const RIGHT: char = '\u{e014}';
+const ESCAPE: char = '\u{e00c}';
+
 async fn visit(page: &Browser, server: Server) {
     let address = server.address;
     page.open(&format!("http://{address}/")).await;
 
     // The first movement is shown without anybody's doing.
-    page.wait_for("the viewer", "document.getElementById('cover').hidden").await;
-    page.wait_for("step 1", "document.getElementById('counter').textContent === 'step 1'").await;
+    page.wait_for_state("step 1", "state.phase === 'ready' && state.step === '1'").await;
+    page.wait_for("the scene", "document.getElementById('cover').hidden").await;
+    page.press(ESCAPE).await;
     let first = drawn(page, |_| true).await;
 
-    // Stepping changes the scene, and counts.
-    page.press("step").await;
-    page.wait_for("step 2", "document.getElementById('counter').textContent === 'step 2'").await;
-    let second = drawn(page, |picture| picture.differs_from(&first)).await;
-    let rows = page.evaluate("[...document.querySelectorAll('#learners tr')].map((row) => row.innerText)").await;
-    assert_eq!(rows.as_array().expect("rows").len(), 3, "{rows}");
-    assert!(rows.to_string().contains("not converged yet"), "{rows}");
+    // Keys drive the server; going back makes nothing new.
+    page.press('s').await;
+    page.wait_for_state("step 2", "state.step === '2' && state.phase === 'ready'").await;
+    drawn(page, |picture| picture.differs_from(&first)).await;
+    page.press(LEFT).await;
+    page.wait_for_state("one step back", "state.step === '1' && state.latest === '2'").await;
+    page.press(RIGHT).await;
+    page.wait_for_state("one step on", "state.step === '2' && state.latest === '2'").await;
+    page.press(SPACE).await;
+    page.wait_for_state("some steps", "Number(state.latest) >= 6").await;
+    page.press(SPACE).await;
+    page.wait_for_state("the pause", "state.phase === 'ready'").await;
+    let words = page.evaluate("document.getElementById('mirror').textContent").await;
+    assert!(words.as_str().expect("text").contains("active: not converged"), "{words}");
 
-    // A run goes on until it is paused.
-    page.press("run").await;
-    page.wait_for("some steps", "Number(document.getElementById('counter').textContent.split(' ')[1]) >= 4").await;
-    assert_eq!(page.evaluate("document.getElementById('run').textContent").await, "Pause");
-    page.press("run").await;
-    page.wait_for("the pause", "!document.getElementById('step').disabled").await;
-    drawn(page, |picture| picture.differs_from(&second)).await;
+    // A reload keeps session and step.
+    page.wait_for("the address", "new URLSearchParams(location.search).get('step') === document.getElementById('mirror').dataset.step").await;
+    let before = page.evaluate("[location.search, document.getElementById('mirror').dataset.step]").await;
+    page.open(&format!("http://{address}/{}", before[0].as_str().expect("text"))).await;
+    page.wait_for_state("the same step", &format!("state.phase === 'ready' && state.step === {}", before[1])).await;
+    assert_eq!(page.evaluate("location.search").await, before[0]);
 
-    // Reset opens another session; a reload keeps it.
-    let session = page.evaluate("location.search").await;
-    page.press("reset").await;
-    page.wait_for("another session", &format!("location.search !== {session}")).await;
-    page.wait_for("step 1", "document.getElementById('counter').textContent === 'step 1'").await;
-    let session = page.evaluate("location.search").await;
-    page.open(&format!("http://{address}/{}", session.as_str().expect("text"))).await;
-    page.wait_for("step 1", "document.getElementById('counter').textContent === 'step 1'").await;
-    assert_eq!(page.evaluate("location.search").await, session);
-
-    recorded_data_end(page, address).await;
+    // What an address gets wrong is told.
+    page.open(&format!("http://{address}/?v=1&scenario=tiago-mocap&seed=-1&step=3")).await;
+    page.wait_for_state("step 3", "state.phase === 'ready' && state.step === '3'").await;
+    page.wait_for("the notice", "document.getElementById('mirror').textContent.includes('seed=-1')").await;
 
     assert_eq!(page.errors().await, Vec::<String>::new(), "errors in the console");
 
-    // A server that goes away and comes back without the session.
+    // A server that goes away and comes back without the session: the run is computed again.
     server.stop().await;
-    page.wait_for("the loss", "document.getElementById('status').textContent.includes('connection is lost')").await;
+    page.wait_for_state("the loss", "state.phase === 'lost'").await;
     let server = Server::start(address).await;
-    page.wait_for("the news", "document.getElementById('status').textContent.includes('session is gone')").await;
-    page.press("reset").await;
-    page.wait_for("a new session", "document.getElementById('counter').textContent.startsWith('step 1')").await;
+    page.wait_for_state("the run", "state.phase === 'ready' && state.step === '3'").await;
     server.stop().await;
-}
-
-/// A session of recorded data that is stepped from elsewhere until one movement is left.
-async fn recorded_data_end(page: &Browser, address: SocketAddr) {
-    page.evaluate(
-        "(() => { const choice = document.getElementById('scenario'); choice.value = 'tiago-mocap';
-            choice.dispatchEvent(new Event('change')); })()",
-    )
-    .await;
-    page.wait_for("26 left", "document.getElementById('counter').textContent === 'step 1, 26 left'").await;
-    let session = page.evaluate("new URLSearchParams(location.search).get('session')").await;
-    let steps = format!("http://{address}/v1/sessions/{}/steps", session.as_str().expect("an id"));
-    let client = reqwest::Client::builder().no_proxy().build().expect("a client");
-    client.post(steps).json(&json!({ "count": 25 })).send().await.expect("an answer").error_for_status().expect("done");
-    page.wait_for("1 left", "document.getElementById('counter').textContent === 'step 26, 1 left'").await;
-    page.press("run").await;
-    page.wait_for("the end", "document.getElementById('status').textContent.includes('end of the recorded data')")
-        .await;
-    let state = page.evaluate("['step', 'run'].map((id) => document.getElementById(id).disabled)").await;
-    assert_eq!(state, json!([true, true]), "there is nothing left to do");
-    let text = page.evaluate("document.querySelector('.learners').innerText").await;
-    let text = text.as_str().expect("text");
-    assert!(text.contains('–') && text.contains("no known truth"), "{text}");
 }
 
 /// A picture in which all learners are drawn and that is as asked.
 async fn drawn(page: &Browser, is_it: impl Fn(&Picture) -> bool) -> Picture {
-    let top: Value = page.evaluate("document.getElementById('viewer').getBoundingClientRect().top").await;
-    let top = top.as_f64().expect("a number") as usize;
+    let place: Value =
+        page.evaluate("(({ left, top }) => [left, top])(document.getElementById('viewer').getBoundingClientRect())").await;
+    let [left, top] = [0, 1].map(|index| place[index].as_f64().expect("a number") as usize);
     let deadline = tokio::time::Instant::now() + DRAWN_WITHIN;
     loop {
-        let picture = Picture::of_scene(&page.screenshot().await, top);
+        let picture = Picture::of_scene(&page.screenshot().await, left, top);
         if picture.shows_all_learners() && is_it(&picture) {
             return picture;
         }

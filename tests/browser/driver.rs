@@ -9,7 +9,11 @@ use std::{
     time::Duration,
 };
 
-use fantoccini::{Client, ClientBuilder, Locator, wd::WebDriverCompatibleCommand};
+use fantoccini::{
+    Client, ClientBuilder,
+    actions::{InputSource, KeyAction, KeyActions},
+    wd::WebDriverCompatibleCommand,
+};
 use hyper_util::client::legacy::connect::HttpConnector;
 use reqwest::{Method, Url};
 use serde_json::{Value, json};
@@ -82,11 +86,17 @@ impl Browser {
         }
     }
 
-    /// Presses a button by keyboard: it must be reachable and ready.
-    pub async fn press(&self, id: &str) {
-        self.wait_for(&format!("ready button {id}"), &format!("!document.getElementById('{id}').disabled")).await;
-        let button = self.client.find(Locator::Id(id)).await.expect("a button");
-        button.send_keys("\u{e007}").await.expect("a key press");
+    /// Presses a key, wherever the focus is.
+    pub async fn press(&self, key: char) {
+        let keys = KeyActions::new("keyboard".to_owned());
+        let keys = keys.then(KeyAction::Down { value: key }).then(KeyAction::Up { value: key });
+        self.client.perform_actions(keys).await.expect("a key press");
+    }
+
+    /// What the page tells assistive technology, and scripts.
+    pub async fn wait_for_state(&self, what: &str, condition: &str) {
+        let condition = format!("((state) => {condition})(document.getElementById('mirror').dataset)");
+        self.wait_for(what, &condition).await;
     }
 
     pub async fn screenshot(&self) -> Vec<u8> {

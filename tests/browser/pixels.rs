@@ -19,8 +19,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The scenes of a viewer that begins `top` pixels below the upper edge.
-    pub fn of_scene(png: &[u8], top: usize) -> Self {
+    /// The scenes of a viewer that begins so many pixels from the left and the upper edge.
+    pub fn of_scene(png: &[u8], left: usize, top: usize) -> Self {
         let mut decoder = png::Decoder::new(Cursor::new(png));
         decoder.set_transformations(png::Transformations::normalize_to_color8());
         let mut reader = decoder.read_info().expect("a picture");
@@ -32,8 +32,8 @@ impl Picture {
         let scenes = below..top + ((height - top) as f64 * SCENES) as usize;
         let rows = bytes.chunks(info.line_size).enumerate().filter(|(row, _)| scenes.contains(row));
         let pixels =
-            rows.flat_map(|(_, row)| row.chunks(samples).take(width)).map(|pixel| [pixel[0], pixel[1], pixel[2]]);
-        Self { width, pixels: pixels.collect() }
+            rows.flat_map(|(_, row)| row.chunks(samples).take(width).skip(left)).map(|pixel| [pixel[0], pixel[1], pixel[2]]);
+        Self { width: width - left, pixels: pixels.collect() }
     }
 
     /// How many pixels of its own colour each learner's view has.

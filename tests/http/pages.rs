@@ -17,8 +17,7 @@ async fn the_page_and_all_that_it_names_are_served() {
     assert!(policy.starts_with("default-src 'none'") && !policy.contains("unsafe-inline") && !policy.contains("http"));
     let page = page.text().await.expect("text");
     let addresses: Vec<&str> = page.split('"').filter(|text| text.starts_with('/') && text.contains("?v=")).collect();
-    assert_eq!(addresses.len(), 5, "style, script, icon, the viewer's script and wasm: {addresses:?}");
-    assert!(page.contains("#0072b2"), "the learners' colours");
+    assert_eq!(addresses.len(), 7, "style, script, icon, script and wasm of panel and viewer: {addresses:?}");
     for address in addresses {
         let file = server.get(address).await;
         assert_eq!(file.status(), StatusCode::OK, "{address}");
@@ -31,11 +30,13 @@ async fn the_page_and_all_that_it_names_are_served() {
         let plain = server.get(address.split('?').next().expect("a path")).await;
         assert_eq!(plain.headers()["cache-control"], "no-cache", "an address without a version may change");
     }
-    for script in ["/session.js", "/table.js", "/viewer.js"] {
+    for script in ["/session.js", "/seeds.js", "/viewer.js", "/panel/panel.js"] {
         assert_eq!(server.get(script).await.headers()["content-type"], "text/javascript; charset=utf-8");
     }
-    let wasm = server.request(Method::HEAD, "/viewer/re_viewer_bg.wasm").send().await.expect("an answer");
-    assert_eq!(wasm.headers()["content-type"], "application/wasm");
+    for wasm in ["/viewer/re_viewer_bg.wasm", "/panel/panel_bg.wasm"] {
+        let wasm = server.request(Method::HEAD, wasm).send().await.expect("an answer");
+        assert_eq!(wasm.headers()["content-type"], "application/wasm");
+    }
     server.stop().await;
 }
 
@@ -54,6 +55,19 @@ async fn files_are_compressed_for_those_who_ask() {
     let mut unpacked = Vec::new();
     flate2::read::GzDecoder::new(small.as_ref()).read_to_end(&mut unpacked).expect("gzip");
     assert!(unpacked == plain && small.len() * 2 < plain.len());
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn the_panel_is_sent_as_it_was_compressed_and_unpacked_for_those_who_do_not_ask() {
+    let server = Server::start().await;
+    let path = "/panel/panel_bg.wasm";
+    let small = server.request(Method::GET, path).header("accept-encoding", "gzip").send().await.expect("an answer");
+    assert_eq!(small.headers()["content-encoding"], "gzip");
+    let small = small.bytes().await.expect("a file");
+    assert!(small.len() < 2_000_000, "{} bytes", small.len());
+    let plain = server.get(path).await.bytes().await.expect("a file");
+    assert!(plain.starts_with(b"\0asm") && plain.len() > small.len());
     server.stop().await;
 }
 

@@ -182,7 +182,7 @@ fn a_reload_finds_its_session_or_computes_it_again() {
 fn learners_and_seeds_are_chosen() {
     let mut page = Page::with_session("");
     page.make_steps(1, |_, _, _| {});
-    page.click("🎲 New seed");
+    page.click("New seed");
     let commands = page.commands();
     assert!(matches!(commands[..], [Command::Open { seed, .. }] if seed != 1), "{commands:?}");
     page.tell(json!({ "is": "session", "session": session("arm-6dof", 5, None) }));

@@ -113,6 +113,8 @@ fn decades(input: GridInput) -> Vec<GridMark> {
             );
         }
     }
+    // Labels are drawn for every mark, wherever it lies.
+    marks.retain(|mark| (low..=high).contains(&mark.value));
     marks
 }
 

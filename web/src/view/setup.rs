@@ -39,7 +39,7 @@ impl Panel {
                 self.choose_seed();
             }
             field.on_hover_text("Initial error, noise and random movements all come from it");
-            if ui.button("🎲 New seed").on_hover_text("A new seed (N)").clicked() {
+            if ui.button("New seed").on_hover_text("A new seed (N)").clicked() {
                 self.reroll();
             }
         });
