@@ -7,12 +7,12 @@ use crate::panel::Panel;
 /// Every shortcut: its keys as they are written, and what it does.
 pub const SHORTCUTS: [(&str, &str); 9] = [
     ("Space", "play or pause"),
-    ("→", "next step; at the end, make one"),
-    ("←", "step back"),
+    ("Right", "next step; at the end, make one"),
+    ("Left", "step back"),
     ("S", "make a step"),
     ("R", "reset: the same run from its start"),
     ("N", "a new seed"),
-    ("+  −", "faster, slower"),
+    ("+  -", "faster, slower"),
     ("T", "the tour"),
     ("?", "this help; Esc closes it"),
 ];

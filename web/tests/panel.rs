@@ -78,7 +78,7 @@ fn keys_drive_the_server_but_not_while_typing() {
 fn a_run_stops_at_its_last_step_and_says_why() {
     let mut page = Page::with_session("to=12&speed=100");
     page.make_steps(1, |_, _, _| {});
-    page.click("▶ Play");
+    page.click("Play");
     assert!(page.harness.state().playing);
     page.make_steps(100, |_, _, _| {});
     assert_eq!(page.harness.state().history.latest(), 12);

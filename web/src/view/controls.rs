@@ -17,7 +17,7 @@ impl Panel {
         });
         ui.add_space(2.0);
         ui.horizontal_wrapped(|ui| {
-            let (name, tip) = if self.playing { ("⏸ Pause", "Pause (Space)") } else { ("▶ Play", "Play (Space)") };
+            let (name, tip) = if self.playing { ("Pause", "Pause (Space)") } else { ("Play", "Play (Space)") };
             let ready = self.is_ready() && self.restoring.is_none();
             let accent = ui.visuals().selection.bg_fill;
             let play =
@@ -26,15 +26,15 @@ impl Panel {
                 self.toggle();
             }
             let can_go_back = self.cursor > 0 && !self.history.is_empty();
-            if ui.add_enabled(can_go_back, Button::new("◀ Back")).on_hover_text("One step back (←)").clicked() {
+            if ui.add_enabled(can_go_back, Button::new("Back")).on_hover_text("One step back (left arrow)").clicked() {
                 self.back();
             }
             let can_step = self.cursor < self.history.latest() || (ready && self.remaining() != Some(0));
-            let tip = "One step on (→); a new one from the end (S)";
-            if ui.add_enabled(can_step, Button::new("Step ▶")).on_hover_text(tip).clicked() {
+            let tip = "One step on (right arrow); a new one from the end (S)";
+            if ui.add_enabled(can_step, Button::new("Step")).on_hover_text(tip).clicked() {
                 self.forward();
             }
-            if ui.button("⟲ Reset").on_hover_text("The same run from its start (R)").clicked() {
+            if ui.button("Reset").on_hover_text("The same run from its start (R)").clicked() {
                 self.reset();
             }
             if self.link == Link::Expired {
@@ -62,7 +62,7 @@ impl Panel {
                     }
                 })
                 .response
-                .on_hover_text("Speed of playing (+ and −)");
+                .on_hover_text("Speed of playing (+ and -)");
             self.settings.speed = speed;
             let usual = self.scenario().map_or(1000, |scenario| scenario.steps);
             let mut to = self.run_to();
@@ -101,7 +101,7 @@ impl Panel {
             ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(60.0);
             let slider = Slider::new(&mut cursor, 0..=latest.max(1)).show_value(false);
             let slider = ui.add_enabled(latest > 0, slider).labelled_by(label.id);
-            if slider.on_hover_text("Go through the steps made so far (← →)").changed() {
+            if slider.on_hover_text("Go through the steps made so far (arrow keys)").changed() {
                 self.scrub(cursor);
                 // The scene has yet to follow.
                 self.sought = None;

@@ -106,7 +106,7 @@ impl Panel {
             Frame::new().fill(ui.visuals().faint_bg_color).inner_margin(6).corner_radius(4).show(ui, |ui| {
                 ui.horizontal(|ui| {
                     let is_scene = index >= self.notices.len();
-                    if !is_scene && ui.small_button("✖").on_hover_text("Dismiss").clicked() {
+                    if !is_scene && ui.small_button("×").on_hover_text("Dismiss").clicked() {
                         closed = Some(index);
                     }
                     ui.add(egui::Label::new(RichText::new(notice).color(alarm(ui))).wrap());
