@@ -94,7 +94,11 @@ async fn visit(page: &Browser, server: Server) {
     assert!(words.as_str().expect("text").contains("active: not converged"), "{words}");
 
     // A reload keeps session and step.
-    page.wait_for("the address", "new URLSearchParams(location.search).get('step') === document.getElementById('mirror').dataset.step").await;
+    page.wait_for(
+        "the address",
+        "new URLSearchParams(location.search).get('step') === document.getElementById('mirror').dataset.step",
+    )
+    .await;
     let before = page.evaluate("[location.search, document.getElementById('mirror').dataset.step]").await;
     page.open(&format!("http://{address}/{}", before[0].as_str().expect("text"))).await;
     page.wait_for_state("the same step", &format!("state.phase === 'ready' && state.step === {}", before[1])).await;
@@ -117,8 +121,9 @@ async fn visit(page: &Browser, server: Server) {
 
 /// A picture in which all learners are drawn and that is as asked.
 async fn drawn(page: &Browser, is_it: impl Fn(&Picture) -> bool) -> Picture {
-    let place: Value =
-        page.evaluate("(({ left, top }) => [left, top])(document.getElementById('viewer').getBoundingClientRect())").await;
+    let place: Value = page
+        .evaluate("(({ left, top }) => [left, top])(document.getElementById('viewer').getBoundingClientRect())")
+        .await;
     let [left, top] = [0, 1].map(|index| place[index].as_f64().expect("a number") as usize);
     let deadline = tokio::time::Instant::now() + DRAWN_WITHIN;
     loop {

@@ -31,8 +31,9 @@ impl Picture {
         let below = top + 30;
         let scenes = below..top + ((height - top) as f64 * SCENES) as usize;
         let rows = bytes.chunks(info.line_size).enumerate().filter(|(row, _)| scenes.contains(row));
-        let pixels =
-            rows.flat_map(|(_, row)| row.chunks(samples).take(width).skip(left)).map(|pixel| [pixel[0], pixel[1], pixel[2]]);
+        let pixels = rows
+            .flat_map(|(_, row)| row.chunks(samples).take(width).skip(left))
+            .map(|pixel| [pixel[0], pixel[1], pixel[2]]);
         Self { width: width - left, pixels: pixels.collect() }
     }
 
