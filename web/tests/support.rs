@@ -137,6 +137,10 @@ fn learners() -> Value {
     ])
 }
 
+fn compositions() -> Value {
+    json!([{ "name": "smoother:random", "estimator": "smoother", "policy": "random" }])
+}
+
 fn joints() -> Value {
     json!([
         { "name": "shoulder", "kind": "revolute", "learned": true, "limits": [-1.5, 1.5] },
@@ -147,18 +151,16 @@ fn joints() -> Value {
 fn scenario(name: &str, steps: u64) -> Value {
     json!({
         "name": name, "title": format!("The arm of {name}"), "world": "simulated", "joints": joints(), "parameters": 8,
-        "steps": steps, "learners": learners(), "thresholds": { "orientation_deg": 5.0, "location_m": 0.02 },
+        "steps": steps, "learners": learners(), "compositions": compositions(), "thresholds": { "orientation_deg": 5.0, "location_m": 0.02 },
     })
 }
 
 pub fn session(scenario: &str, seed: u64, chosen: Option<Vec<String>>) -> Value {
-    let all = learners();
-    let chosen: Vec<&Value> = all
-        .as_array()
-        .expect("learners")
-        .iter()
-        .filter(|one| chosen.as_ref().is_none_or(|names| names.iter().any(|name| one["name"] == *name)))
-        .collect();
+    let all = [learners(), compositions()];
+    let own = chosen.is_none();
+    let all = all.iter().take(if own { 1 } else { 2 }).flat_map(|list| list.as_array().expect("learners"));
+    let chosen: Vec<&Value> =
+        all.filter(|one| chosen.as_ref().is_none_or(|names| names.iter().any(|name| one["name"] == *name))).collect();
     json!({
         "id": format!("{scenario}-{seed}"), "step": 0, "remaining": null,
         "description": {

@@ -22,6 +22,8 @@ struct Chart {
     /// Whether convergence is marked on it.
     judged: bool,
     value: fn(&Row) -> Option<f64>,
+    /// What it cannot fall below.
+    bound: fn(&Row) -> Option<f64>,
 }
 
 const CHARTS: [Chart; 6] = [
@@ -32,6 +34,7 @@ const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: true,
         value: |row| row.orientation_deg,
+        bound: |_| None,
     },
     Chart {
         title: "Location error",
@@ -40,6 +43,7 @@ const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: true,
         value: |row| Some(row.location_m? * 1e3),
+        bound: |_| None,
     },
     Chart {
         title: "Prediction error",
@@ -48,14 +52,17 @@ const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: false,
         value: |row| Some(row.prediction_m? * 1e3),
+        bound: |_| None,
     },
     Chart {
         title: "Uncertainty",
         unit: "tr(W P)",
-        tip: "Trace of the weighted covariance: what the active learner makes as small as it can",
+        tip: "Trace of the weighted covariance: what the active learner makes as small as it can. Thin: the Cramér–Rao \
+              bound, below which nobody's error can fall with the same data",
         logarithmic: true,
         judged: false,
         value: |row| row.trace,
+        bound: |row| row.bound,
     },
     Chart {
         title: "Misses",
@@ -64,6 +71,7 @@ const CHARTS: [Chart; 6] = [
         logarithmic: false,
         judged: false,
         value: |row| Some(row.misses as f64),
+        bound: |_| None,
     },
     Chart {
         title: "Time of a choice",
@@ -72,6 +80,7 @@ const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: false,
         value: |row| row.selection_ms.filter(|ms| *ms > 0.0),
+        bound: |_| None,
     },
 ];
 
@@ -154,6 +163,14 @@ impl Panel {
             }
             let converged =
                 (0..description.learners.len()).any(|i| self.history.converged_at(self.cursor, i).is_some());
+            if description.truth.is_some() && description.parameters > 0 {
+                let tip = format!(
+                    "{} unknowns, three equations a movement: nobody can know everything earlier without an initial guess",
+                    description.parameters
+                );
+                let text = format!("dotted: {} movements, as many equations as unknowns", description.movements_by_counting());
+                ui.label(RichText::new(text).weak()).on_hover_text(tip);
+            }
             if converged {
                 ui.label(RichText::new("filled mark: converged").weak());
             }
@@ -212,11 +229,21 @@ impl Panel {
                 let line = HLine::new("threshold", chart.y(threshold)).color(threshold_colour).width(1.0);
                 plot.hline(line.style(LineStyle::Dashed { length: 3.0 }).allow_hover(false));
             }
+            if chart.judged && description.parameters > 0 {
+                let counted = VLine::new("", description.movements_by_counting() as f64).color(cursor_colour);
+                plot.vline(counted.width(1.0).style(LineStyle::Dotted { spacing: 4.0 }).allow_hover(false));
+            }
             plot.vline(VLine::new("", self.cursor as f64).color(cursor_colour).width(1.0).allow_hover(false));
             for (index, learner) in description.learners.iter().enumerate() {
                 let colour = colours::learner(index);
                 let curve: Vec<[f64; 2]> =
                     self.history.curve(index, chart.value).into_iter().map(|[x, y]| [x, chart.y(y)]).collect();
+                let bound = self.history.curve(index, chart.bound).into_iter();
+                let bound: Vec<[f64; 2]> = bound.map(|[x, y]| [x, chart.y(y)]).collect();
+                if !bound.is_empty() {
+                    let name = format!("bound of {}'s data", learner.name);
+                    plot.line(Line::new(name, bound).color(colour.gamma_multiply(0.6)).width(1.0));
+                }
                 let line = Line::new(&learner.name, PlotPoints::from(curve)).color(colour).width(1.8);
                 plot.line(line.style(colours::line_style(index)));
                 let at = |step: u64| Some([step as f64, chart.y((chart.value)(self.history.row(step, index)?)?)]);
