@@ -47,7 +47,7 @@ pub(super) fn shows(metric: &str) -> bool {
 pub(super) enum Arrangement {
     /// The learners side by side above; below, the curves, DIRECT's partition and the note.
     Whole,
-    /// The learners alone, for a page that has curves of its own. DIRECT's partition fills a gap.
+    /// The learners alone, for a page that has curves of its own. DIRECT's partition and the note fill a gap.
     Scene,
 }
 
@@ -62,12 +62,12 @@ pub(super) fn messages(
     let mut properties = Properties::default();
     let arms = arms(description, learners, scene, &mut properties);
     let partitions = partitions(description, learners, &mut properties);
+    let note = || -> ContainerLike { TextDocumentView::new("Note").with_origin("/note").into() };
     let root: ContainerLike = match arrangement {
         Arrangement::Whole => {
             let columns = arms.len().clamp(1, 3) as u32;
             let mut below = charts(description, learners, &mut properties);
-            let note: ContainerLike = TextDocumentView::new("Note").with_origin("/note").into();
-            below.push(Tabs::new(partitions.into_iter().chain([note])).into());
+            below.push(Tabs::new(partitions.into_iter().chain([note()])).into());
             let above = Grid::new(arms).with_grid_columns(columns);
             Vertical::new([above.into(), Horizontal::new(below).into()]).with_row_shares(vec![3.0, 2.0]).into()
         }
@@ -75,8 +75,8 @@ pub(super) fn messages(
             // Two stand one above the other: an arm is rather wide than high, and so is a view of half the height.
             let columns = if arms.len() > 2 { 2 } else { 1 };
             let mut views = arms;
-            if !views.len().is_multiple_of(columns) && !partitions.is_empty() {
-                views.push(Tabs::new(partitions).into());
+            if !views.len().is_multiple_of(columns) {
+                views.push(Tabs::new(partitions.into_iter().chain([note()])).into());
             }
             Grid::new(views).with_grid_columns(columns as u32).into()
         }

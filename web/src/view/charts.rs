@@ -107,7 +107,7 @@ impl Chart {
     }
 }
 
-/// Marks at 1, 2 and 5 of every power of ten, y being its logarithm.
+/// Marks at powers of ten and, where they are few, between them, y being its logarithm.
 fn decades(input: GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     if !(low.is_finite() && high.is_finite()) || high - low > 40.0 {
@@ -116,11 +116,12 @@ fn decades(input: GridInput) -> Vec<GridMark> {
     let mut marks = Vec::new();
     for decade in low.floor() as i32..=high.ceil() as i32 {
         marks.push(GridMark { value: f64::from(decade), step_size: 1.0 });
-        if high - low < 2.5 {
-            marks.extend(
-                [2.0f64, 5.0].map(|digit| GridMark { value: f64::from(decade) + digit.log10(), step_size: 0.5 }),
-            );
-        }
+        let digits: &[f64] = match high - low {
+            range if range < 0.7 => &[1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0],
+            range if range < 2.5 => &[2.0, 5.0],
+            _ => &[],
+        };
+        marks.extend(digits.iter().map(|digit| GridMark { value: f64::from(decade) + digit.log10(), step_size: 0.5 }));
     }
     // Labels are drawn for every mark, wherever it lies.
     marks.retain(|mark| (low..=high).contains(&mark.value));

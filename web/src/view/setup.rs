@@ -89,11 +89,15 @@ impl Panel {
             return;
         }
         let mut chosen = None;
-        let menu = ComboBox::from_id_salt("add a learner").selected_text("Add…").width(60.0).height(420.0);
-        let menu = menu.show_ui(ui, |ui| {
-            for learner in others() {
-                ui.selectable_value(&mut chosen, Some(learner.name.clone()), &learner.name);
-            }
+        let menu = ui.menu_button("Add…", |ui| {
+            egui::ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
+                for learner in others() {
+                    if ui.button(&learner.name).clicked() {
+                        chosen = Some(learner.name.clone());
+                        ui.close();
+                    }
+                }
+            });
         });
         menu.response.on_hover_text("Any estimator with any policy; the run begins anew");
         if let Some(name) = chosen {
