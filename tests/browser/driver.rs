@@ -77,9 +77,9 @@ impl Browser {
         self.client.window().await.expect("a tab")
     }
 
-    /// Opens a tab and puts it in front.
+    /// Opens a tab and puts it in front: in a window of its own, since those in the background are not drawn.
     pub async fn new_tab(&self) -> WindowHandle {
-        let tab = self.client.new_window(true).await.expect("a tab").handle;
+        let tab = self.client.new_window(false).await.expect("a tab").handle;
         self.switch_to(&tab).await;
         tab
     }
