@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Experiment, StepReport,
+    BestDesign, Experiment, StepReport,
     metrics::{JointMetrics, Metrics},
 };
 
@@ -15,6 +15,13 @@ pub struct Comparison {
     pub scenario: String,
     /// Steps of every run.
     pub steps: u64,
+    /// See [`Description::movements_by_counting`](super::Description::movements_by_counting).
+    #[serde(default)]
+    pub movements_by_counting: usize,
+    /// The best designs of several lengths up to these runs', by step; empty unless they were asked for, and where no
+    /// truth is known.
+    #[serde(default)]
+    pub best_designs: Vec<BestDesign>,
     /// The learners.
     pub learners: Vec<LearnerComparison>,
 }
@@ -33,6 +40,10 @@ pub struct LearnerComparison {
     pub curve: Vec<Curve>,
     /// How long choosing one movement took, milliseconds.
     pub selection_ms: SelectionTime,
+    /// The A-efficiency of the data collected: the trace of the last of `best_designs` as a fraction of the median
+    /// `bound_trace` at the end; null without one of them.
+    #[serde(default)]
+    pub efficiency: Option<f64>,
 }
 
 /// One run of one learner.
@@ -68,6 +79,12 @@ pub struct RunSummary {
     pub prediction_m: Option<f64>,
     /// See [`Metrics::prediction_mean_m`].
     pub prediction_mean_m: Option<f64>,
+    /// See [`Metrics::trace`].
+    #[serde(default)]
+    pub trace: Option<f64>,
+    /// See [`Metrics::bound_trace`].
+    #[serde(default)]
+    pub bound_trace: Option<f64>,
 }
 
 impl From<&Metrics> for RunSummary {
@@ -78,6 +95,8 @@ impl From<&Metrics> for RunSummary {
             location_m: metrics.location_m,
             prediction_m: metrics.prediction_m,
             prediction_mean_m: metrics.prediction_mean_m,
+            trace: metrics.trace,
+            bound_trace: metrics.bound_trace,
         }
     }
 }
@@ -115,6 +134,12 @@ pub struct Curve {
     pub prediction_m: Option<Quantiles>,
     /// See [`Metrics::prediction_mean_m`].
     pub prediction_mean_m: Option<Quantiles>,
+    /// See [`Metrics::trace`].
+    #[serde(default)]
+    pub trace: Option<Quantiles>,
+    /// See [`Metrics::bound_trace`].
+    #[serde(default)]
+    pub bound_trace: Option<Quantiles>,
     /// Every joint by itself, base first: medians over the runs.
     pub joints: Vec<JointMetrics>,
 }
@@ -147,6 +172,7 @@ pub struct SelectionTime {
 #[derive(Clone, Debug)]
 pub struct Trace {
     seed: u64,
+    movements_by_counting: usize,
     learners: Vec<LearnerTrace>,
 }
 
@@ -197,7 +223,8 @@ impl Trace {
             trace.converged_at = verdict.convergence.converged_at();
             trace.recovered_at = verdict.recovery.converged_at();
         }
-        Ok(Self { seed: experiment.description().seed, learners })
+        let description = experiment.description();
+        Ok(Self { seed: description.seed, movements_by_counting: description.movements_by_counting, learners })
     }
 }
 
@@ -206,7 +233,18 @@ impl Comparison {
     pub fn of(scenario: &str, steps: u64, traces: &[Trace]) -> Self {
         let count = traces.first().map_or(0, |trace| trace.learners.len());
         let learners = (0..count).map(|index| LearnerComparison::of(index, steps, traces)).collect();
-        Self { scenario: scenario.to_owned(), steps, learners }
+        let movements_by_counting = traces.first().map_or(0, |trace| trace.movements_by_counting);
+        Self { scenario: scenario.to_owned(), steps, movements_by_counting, best_designs: Vec::new(), learners }
+    }
+
+    /// The same beside the best designs of the scenario.
+    pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
+        let best = best_designs.last().map(|design| design.best_design_trace);
+        for learner in &mut self.learners {
+            let bound = learner.curve.last().and_then(|end| end.bound_trace).map(|bound| bound.median);
+            learner.efficiency = best.zip(bound).map(|(best, bound)| best / bound);
+        }
+        Self { best_designs, ..self }
     }
 }
 
@@ -250,6 +288,8 @@ impl LearnerComparison {
                     location_m: over_runs(|errors| errors.location_m),
                     prediction_m: over_runs(|errors| errors.prediction_m),
                     prediction_mean_m: over_runs(|errors| errors.prediction_mean_m),
+                    trace: over_runs(|errors| errors.trace),
+                    bound_trace: over_runs(|errors| errors.bound_trace),
                     joints: (0..joints).map(|joint| of_joint(movements as usize, joint)).collect(),
                 }
             })
@@ -261,6 +301,7 @@ impl LearnerComparison {
             summary: Summary::of(runs.iter().map(|run| run.converged_at)),
             runs,
             curve,
+            efficiency: None,
             selection_ms: SelectionTime { median: median(&times), p95: nearest_rank(&times, 0.95) },
         }
     }

@@ -17,7 +17,7 @@ use rerun::{
     log::{Chunk, RowId},
 };
 
-use super::{RecordingError, model::single, scene::Scene};
+use super::{RecordingError, model::single, recorder::BEST_DESIGN, scene::Scene};
 use crate::experiment::Description;
 
 /// Where the camera stands, as seen from the scene's centre, in sizes of the arm: aside, a little ahead and above.
@@ -37,9 +37,12 @@ const CHARTS: [(&str, &str); 3] = [
 const CHARTS_WITHOUT_TRUTH: [(&str, &str); 2] =
     [("Prediction error, mean (m)", "prediction_mean_m"), ("Trace of the covariance, tr(W P)", "trace")];
 
+/// The trace beside its limits, in a tab where the truth is known.
+const TRACE: (&str, [&str; 2]) = ("Trace, and the least possible", ["trace", "bound_trace"]);
+
 /// Whether a metric has its curve in some arrangement.
 pub(super) fn shows(metric: &str) -> bool {
-    CHARTS.iter().chain(&CHARTS_WITHOUT_TRUTH).any(|(_, shown)| *shown == metric)
+    TRACE.1.contains(&metric) || CHARTS.iter().chain(&CHARTS_WITHOUT_TRUTH).any(|(_, shown)| *shown == metric)
 }
 
 /// The arrangement as messages: the learners side by side above; below, the curves, DIRECT's partition and the note.
@@ -86,6 +89,12 @@ pub(super) fn messages(
         let view = Spatial2DView::new(format!("DIRECT, {name}")).with_origin(root.join(&EntityPath::from("direct")));
         let bounds = Range2D { x_range: [-0.08, 1.08].into(), y_range: [-0.16, 1.16].into() };
         tabs.push(properties.of(view.into(), "VisualBounds2D", &Bounds::new(VisualBounds2D(bounds))));
+    }
+    if description.truth.is_some() {
+        let of_learner = |root: &&EntityPath| TRACE.1.map(|metric| format!("+ {root}/metrics/{metric}"));
+        let contents = learners.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")]);
+        let view = TimeSeriesView::new(TRACE.0).with_origin("/").with_contents(contents);
+        tabs.push(properties.of(view.into(), "PlotLegend", &PlotLegend::new().with_corner(Corner2D::RightTop)));
     }
     tabs.push(TextDocumentView::new("Note").with_origin("/note").into());
     below.push(Tabs::new(tabs).into());

@@ -17,7 +17,7 @@ pub(super) fn note(description: &Description) -> TextDocument {
 }
 
 fn markdown(description: &Description) -> String {
-    let Description { scenario, title, seed, version, parameters, thresholds, .. } = description;
+    let Description { scenario, title, seed, version, parameters, thresholds, movements_by_counting, .. } = description;
     let mut text = format!(
         "# {title}\n\nScenario `{scenario}`, seed {seed}, {parameters} learned parameters, recorded by body-schema \
          {version}.\n\n"
@@ -49,7 +49,10 @@ fn markdown(description: &Description) -> String {
          - **Marker**: pale as predicted before the measurement, yellow as measured; no yellow point after a miss.\n\
          - **Partition**: how DIRECT divided the joint box to choose the movement, as the slice through the chosen \
          configuration (vermillion) along two joints, each from limit to limit. Brighter is a lower criterion, so \
-         better; thick outlines are what would be divided next; dots are centres outside the slice.\n\n\
+         better; thick outlines are what would be divided next; dots are centres outside the slice.\n\
+         - **Limits**: `bound_trace`, pale, is the least trace that the data of a learner allow; the best design, grey, the \
+         least that as many movements allow, if it was computed (`--limits`). There are as many equations as unknowns after \
+         {movements_by_counting} movements.\n\n\
          Lengths in metres, in the frame of the measurements; `_deg` in degrees; joint values in radians or metres.\n\n\
          `converged_at` asks for an orientation error up to {}° and a location error up to {} m.\n\n",
         if description.head.is_some() { HEAD } else { "" },
