@@ -83,8 +83,7 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
             "Lines: medians over the seeds; bands: quartiles. Dashed grey: thresholds; ▾: median movement from which both \
              errors stay below them."
                 .to_owned(),
-            "⌈m/3⌉: as many equations as unknowns. Least possible: the Cramér–Rao bound of a learner's data; best design: \
-             of any so many movements."
+            "⌈m/3⌉: as many equations as unknowns. Least possible: Cramér–Rao, for the movements made; best design: for any."
                 .to_owned(),
         ],
     };
