@@ -12,7 +12,7 @@ fn designs(name: &str, steps: u64) -> Vec<body_schema::experiment::BestDesign> {
 #[test]
 fn lengths_double_up_to_the_whole_run() {
     let movements = |steps| designs("head-fov", steps).iter().map(|design| design.movements).collect::<Vec<_>>();
-    assert_eq!(movements(0), []);
+    assert_eq!(movements(0), [0; 0]);
     assert_eq!(movements(3), [3]);
     assert_eq!(movements(5), [5]);
     assert_eq!(movements(23), [5, 10, 20, 23]);
@@ -24,9 +24,11 @@ fn more_movements_allow_less_error_and_a_design_starts_well_from_a_shorter_one()
     let found = designs("arm-6dof", 40);
     assert!(found.windows(2).all(|pair| pair[1].best_design_trace < pair[0].best_design_trace), "{found:?}");
     assert!(found.iter().all(|design| (0.0..=0.01).contains(&design.gap)), "{found:?}");
-    let alone = limits.best_design(40, 0.01).expect("noise");
-    let last = found.last().expect("designs").best_design_trace;
-    assert!((last / alone.trace - 1.0).abs() < 0.01, "{last} and {}", alone.trace);
+    // Nothing that a longer search from elsewhere finds is below what the certificate says.
+    let last = found.last().expect("designs");
+    let alone = limits.best_design(40, 1e-4).expect("noise");
+    let least = last.best_design_trace * (1.0 - last.gap);
+    assert!((least..=least * 1.01).contains(&alone.trace), "{last:?} and {} to within {}", alone.trace, alone.gap);
 }
 
 #[test]

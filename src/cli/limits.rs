@@ -16,10 +16,11 @@ pub fn say<'a>(
     let reached: Vec<String> =
         efficiencies.filter_map(|(name, efficiency)| Some(format!("{name} {:.0} %", 100.0 * efficiency?))).collect();
     output::say(format!(
-        "best possible design of {} movements: trace {:.3e} (certified to within {:.1} %); of that efficiency, {}",
+        "best possible design of {} movements: trace {:.3e} (optimal to within {:.1} %); of that efficiency, {}",
         best.movements,
         best.best_design_trace,
-        100.0 * best.gap,
+        // What rounds to nothing is still no proof of the optimum itself.
+        (100.0 * best.gap).max(0.1),
         if reached.is_empty() { "nobody's is known".to_owned() } else { reached.join(", ") }
     ))
 }

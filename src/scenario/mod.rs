@@ -9,6 +9,7 @@ mod data;
 mod edit;
 mod error;
 mod experiment;
+mod limits;
 mod raw;
 mod summary;
 mod validate;
