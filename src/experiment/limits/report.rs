@@ -35,8 +35,8 @@ const SHORTEST: u64 = 5;
 /// Designs are searched until they are certified to be this near to the optimum.
 const GAP: f64 = 0.01;
 
-/// The best designs of 5, 10, 20, … movements and of all, stretch by stretch, in the order of steps; none for a sensor without noise. It
-/// takes about a second for six joints, and a minute or more for twenty.
+/// The best designs of 5, 10, 20, … movements and of all, stretch by stretch, in the order of steps; none for a sensor
+/// without noise. A development build takes a second for 6 joints, half a minute for 12, some minutes for 20.
 pub fn best_designs(stretches: &[Stretch]) -> Vec<BestDesign> {
     let mut found = Vec::new();
     for Stretch { limits, from, to } in stretches {
