@@ -44,14 +44,23 @@ impl Server {
     }
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn the_page_steps_and_shows() {
-    let Some(browser) = Browser::start().await else { return };
+/// What a browser is told by its flags when it may not draw at all.
+const NO_WEBGL: &[&str] = &["--disable-3d-apis", "--disable-gpu", "--disable-software-rasterizer"];
+
+/// Does something with a server in a browser of its own, and holds what must always hold: every request goes to the
+/// server, and the content security policy refuses nothing.
+async fn in_browser<Visit: Future<Output = ()> + Send + 'static>(
+    flags: &[&str],
+    visit: impl FnOnce(Browser, Server) -> Visit,
+) {
+    // One after the other: each draws without a graphics card, with all the processors there are.
+    static TURN: tokio::sync::Mutex<()> = tokio::sync::Mutex::const_new(());
+    let _turn = TURN.lock().await;
+    let Some(browser) = Browser::start(flags).await else { return };
     let server = Server::start(([127, 0, 0, 1], 0).into()).await;
     let address = server.address;
     // In a task of its own, so that the browser is closed whatever becomes of it.
-    let page = browser.clone();
-    let outcome = tokio::spawn(async move { visit(&page, server).await }).await;
+    let outcome = tokio::spawn(visit(browser.clone(), server)).await;
     let (errors, hosts) = (browser.errors().await, browser.hosts().await);
     browser.stop().await;
     if let Err(panic) = outcome {
@@ -61,6 +70,30 @@ async fn the_page_steps_and_shows() {
     // While the server was away, requests had to fail, but none for the content security policy.
     assert!(!errors.iter().any(|error| error.contains("Content Security Policy")), "{errors:#?}");
     assert_eq!(hosts, [address.to_string()], "every request goes to this host");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_page_steps_and_shows() {
+    in_browser(&[], |page, server| async move { visit(&page, server).await }).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn two_tabs_do_not_mix_and_late_visitors_see_everything() {
+    in_browser(&[], |page, server| async move { visit_in_tabs(&page, server).await }).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn without_webgl_the_page_says_what_to_do() {
+    in_browser(NO_WEBGL, |page, server| async move {
+        page.open(&format!("http://{}/", server.address)).await;
+        page.wait_for_state("the end", "state.phase === 'failed'").await;
+        let text = page.evaluate("document.getElementById('panel-cover').innerText").await;
+        for word in ["cannot be shown", "WebGL 2", "/v1/openapi.json"] {
+            assert!(text.as_str().expect("text").contains(word), "{word} is in: {text}");
+        }
+        server.stop().await;
+    })
+    .await;
 }
 
 const SPACE: char = ' ';
@@ -116,6 +149,68 @@ async fn visit(page: &Browser, server: Server) {
     page.wait_for_state("the loss", "state.phase === 'lost'").await;
     let server = Server::start(address).await;
     page.wait_for_state("the run", "state.phase === 'ready' && state.step === '3'").await;
+    server.stop().await;
+}
+
+async fn visit_in_tabs(page: &Browser, server: Server) {
+    let address = server.address;
+    let session = "document.getElementById('mirror').dataset.session";
+    page.open(&format!("http://{address}/?v=1&scenario=arm-6dof&seed=1&learners=random")).await;
+    page.wait_for_state("the first tab", "state.phase === 'ready' && state.step === '1'").await;
+    page.press(ESCAPE).await;
+    let first = page.evaluate(session).await;
+
+    // Another tab has a session of its own.
+    let one = page.tab().await;
+    let other = page.new_tab().await;
+    page.open(&format!("http://{address}/?v=1&scenario=arm-6dof&seed=2&learners=random")).await;
+    page.wait_for_state("the second tab", "state.phase === 'ready' && state.step === '1'").await;
+    assert_ne!(page.evaluate(session).await, first);
+    for step in 2..=4 {
+        page.press('s').await;
+        page.wait_for_state("a step", &format!("state.phase === 'ready' && state.step === '{step}'")).await;
+    }
+    let words = page.evaluate("document.getElementById('mirror').textContent").await;
+    assert!(words.as_str().expect("text").contains("seed 2"), "{words}");
+    page.switch_to(&one).await;
+    page.wait_for_state("the first tab as it was", "state.latest === '1'").await;
+    assert_eq!(page.evaluate(session).await, first);
+    let words = page.evaluate("document.getElementById('mirror').textContent").await;
+    assert!(words.as_str().expect("text").contains("seed 1"), "{words}");
+
+    // Whoever comes late to the second session sees it from its first step on …
+    page.switch_to(&other).await;
+    let second = page.evaluate(session).await;
+    page.wait_for("the address", "new URLSearchParams(location.search).get('step') === '4'").await;
+    let link = page.evaluate("location.search").await;
+    page.switch_to(&one).await;
+    page.open(&format!("http://{address}/{}", link.as_str().expect("text"))).await;
+    page.wait_for_state("all steps", "state.phase === 'ready' && state.step === '4' && state.latest === '4'").await;
+    assert_eq!(page.evaluate(session).await, second);
+    for step in (0..4).rev() {
+        page.press(LEFT).await;
+        page.wait_for_state("an earlier step", &format!("state.step === '{step}' && state.latest === '4'")).await;
+    }
+
+    // … even over a slow connection, which neither loses a step nor holds up the server.
+    page.slow_down(Some((400, 20_000))).await;
+    page.press('s').await;
+    page.wait_for_state("a slow step", "state.latest === '5' && state.phase === 'ready'").await;
+    page.press(SPACE).await;
+    page.wait_for_state("slow steps", "Number(state.latest) >= 15").await;
+    page.press(SPACE).await;
+    page.slow_down(None).await;
+    page.wait_for_state("the pause", "state.phase === 'ready' && state.step === state.latest").await;
+
+    // Leaving somebody else's session does not end it.
+    page.press('r').await;
+    page.wait_for_state("a session of its own", &format!("state.phase === 'ready' && state.session !== {second}"))
+        .await;
+    page.switch_to(&other).await;
+    page.wait_for_state("the other's steps", "state.phase === 'ready' && Number(state.latest) >= 15").await;
+    assert_eq!(page.evaluate(session).await, second);
+    page.press('s').await;
+    page.wait_for_state("one more", "Number(state.latest) >= 16 && state.phase === 'ready'").await;
     server.stop().await;
 }
 

@@ -11,7 +11,7 @@ use std::{fs, path::PathBuf};
 
 use body_schema::{
     experiment::{Comparison, Description, StepReport, Trace, best_designs},
-    recording::{LiveLog, Recorder, RecordingError, SIGMAS, StepsCsv, Target, comparison_csv, learner_color},
+    recording::{EllipsoidSize, LiveLog, Recorder, RecordingError, StepsCsv, Target, comparison_csv, learner_color},
     scenario::{Scenario, builtin},
 };
 use checks::check;
@@ -64,9 +64,7 @@ fn a_recording_holds_what_the_reports_said() {
         assert_eq!(reading.timelines(), ["step"]);
         assert_eq!(reading.steps("/gradient/failure"), [4]);
         let note = reading.note();
-        let sigma = format!("{SIGMAS}σ");
-        for word in ["arm-6dof", "seed 3", "active", "gradient", &sigma, "metres", "body-schema run arm-6dof --seed 3"]
-        {
+        for word in ["arm-6dof", "seed 3", "active", "gradient", "1σ", "metres", "body-schema run arm-6dof --seed 3"] {
             assert!(note.contains(word), "the note says {word}: {note}");
         }
     }
@@ -181,6 +179,46 @@ fn the_arrangement_comes_with_the_recording() {
     record(&description, &reports, Target::live(live.clone()));
     let views = Reading::of(&live.complete().unwrap()).views;
     assert!(!views.iter().any(|view| view.contains("Orientation") || view.contains("DIRECT")), "{views:?}");
+}
+
+#[test]
+fn a_page_with_curves_of_its_own_takes_the_scene_alone() {
+    let (description, reports) = run("arm-6dof", 2);
+    let live = LiveLog::new();
+    record(&description, &reports, Target::live(live.clone()));
+    let (whole, scene) = (live.parts_from(0), live.scene_parts_from(0));
+    assert_eq!(whole.len(), scene.len());
+    let differing: Vec<usize> = (0..whole.len()).filter(|index| whole[*index] != scene[*index]).collect();
+    assert_eq!(differing.len(), 1, "only the arrangement differs");
+    let place = differing[0];
+    let views = |part: &bytes::Bytes| {
+        let messages = reading::messages(&[live.header(), part.clone()].concat());
+        assert!(messages.iter().all(|message| message.store_id().is_blueprint()));
+        format!("{messages:?}").matches("TimeSeries").count()
+    };
+    assert!(views(&whole[place]) > 0 && views(&scene[place]) == 0);
+    assert_eq!(live.scene_parts_from(place)[0], scene[place]);
+    assert_eq!(live.scene_parts_from(place + 1), live.parts_from(place + 1));
+}
+
+#[test]
+fn ellipsoids_are_as_large_as_was_asked() {
+    let (description, reports) = run("arm-6dof", 1);
+    let half_sizes = |size: EllipsoidSize| {
+        let live = LiveLog::new();
+        record(&description, &reports, Target::live(live.clone()).with_ellipsoids(size));
+        let reading = Reading::of(&live.complete().unwrap());
+        assert!(reading.note().contains(size.label()), "the note says how large");
+        let found = reading.ellipsoids("/active/point_ellipsoids", 1);
+        found.into_iter().map(|(_, [a, b, _], _)| [a, b]).collect::<Vec<_>>().concat()
+    };
+    let one = half_sizes(EllipsoidSize::OneSigma);
+    // A pivot's covariance has no part along its axis: two dimensions.
+    for (size, factor) in [(EllipsoidSize::TwoSigma, 2.0), (EllipsoidSize::NinetyFivePercent, 2.447_746_8)] {
+        for (large, small) in half_sizes(size).iter().zip(&one) {
+            assert!((large / small - factor).abs() < 1e-4, "{size:?}: {large} / {small}");
+        }
+    }
 }
 
 #[test]

@@ -56,7 +56,8 @@ struct ScenarioArguments {
     /// A built-in scenario (see `body-schema scenarios`) or the path of a scenario file
     #[arg(value_name = "SCENARIO")]
     scenario: String,
-    /// A learner of the scenario; repeat for several [default: all of them]
+    /// A learner of the scenario, or estimator:policy, as in smoother:random; repeat for several [default: the scenario's
+    /// main ones]
     #[arg(long = "learner", value_name = "NAME")]
     learners: Vec<String>,
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use body_schema::{
     experiment::{Experiment, RunResult, SETTLING_STEPS, best_designs},
-    recording::{Recorder, StepsCsv, Target},
+    recording::{EllipsoidSize, Recorder, StepsCsv, Target},
     scenario::Scenario,
 };
 
@@ -27,6 +27,9 @@ pub struct Arguments {
     /// Write a Rerun recording to FILE (open it with Rerun 0.36)
     #[arg(long, value_name = "FILE")]
     rrd: Option<PathBuf>,
+    /// How large the recording's ellipsoids are
+    #[arg(long, value_name = "SIZE", default_value = "1-sigma", requires = "rrd")]
+    ellipsoids: EllipsoidSize,
     /// Write every step of every learner as CSV to FILE
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -49,7 +52,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (scenario, learners) = arguments.scenario.load()?;
     let steps = steps_of(&scenario, arguments.steps)?;
     let mut experiment = scenario.experiment(arguments.seed, learners)?;
-    let mut recorder = arguments.rrd.as_deref().map(|path| recorder(&experiment, path)).transpose()?;
+    let mut recorder =
+        arguments.rrd.as_deref().map(|path| recorder(&experiment, path, arguments.ellipsoids)).transpose()?;
     let mut csv = arguments.csv.as_deref().map(|path| steps_csv(&experiment, path)).transpose()?;
 
     let bar = progress::bar(steps, &scenario.name);
@@ -107,8 +111,8 @@ fn ending(scenario: &Scenario, is_settled: bool, steps: u64) -> String {
 
 type CsvFile = StepsCsv<std::io::BufWriter<std::fs::File>>;
 
-fn recorder(experiment: &Experiment, path: &Path) -> Result<Recorder> {
-    Ok(Recorder::new(experiment.description(), Target::file(path))?)
+fn recorder(experiment: &Experiment, path: &Path, ellipsoids: EllipsoidSize) -> Result<Recorder> {
+    Ok(Recorder::new(experiment.description(), Target::file(path).with_ellipsoids(ellipsoids))?)
 }
 
 fn steps_csv(experiment: &Experiment, path: &Path) -> Result<CsvFile> {

@@ -45,16 +45,68 @@ pub(super) fn shows(metric: &str) -> bool {
     TRACE.1.contains(&metric) || CHARTS.iter().chain(&CHARTS_WITHOUT_TRUTH).any(|(_, shown)| *shown == metric)
 }
 
-/// The arrangement as messages: the learners side by side above; below, the curves, DIRECT's partition and the note.
+/// What is arranged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Arrangement {
+    /// The learners side by side above; below, the curves, DIRECT's partition and the note.
+    Whole,
+    /// The learners alone, for a page that has curves of its own. DIRECT's partition and the note fill a gap.
+    Scene,
+}
+
+/// An arrangement as messages.
 pub(super) fn messages(
     description: &Description,
     learners: &[&EntityPath],
     scene: &Scene,
+    arrangement: Arrangement,
     application: ApplicationId,
 ) -> Result<Vec<LogMsg>, RecordingError> {
     let mut properties = Properties::default();
-    let names = || learners.iter().zip(&description.learners);
-    let arms = names().map(|(root, learner)| {
+    let arms = arms(description, learners, scene, &mut properties);
+    let partitions = partitions(description, learners, &mut properties);
+    let note = || -> ContainerLike { TextDocumentView::new("Note").with_origin("/note").into() };
+    let root: ContainerLike = match arrangement {
+        Arrangement::Whole => {
+            let columns = arms.len().clamp(1, 3) as u32;
+            let mut below = charts(description, learners, &mut properties);
+            let limits = limits(description, learners, &mut properties);
+            below.push(Tabs::new(partitions.into_iter().chain(limits).chain([note()])).into());
+            let above = Grid::new(arms).with_grid_columns(columns);
+            Vertical::new([above.into(), Horizontal::new(below).into()]).with_row_shares(vec![3.0, 2.0]).into()
+        }
+        Arrangement::Scene => {
+            // Two stand one above the other: an arm is rather wide than high, and so is a view of half the height.
+            let columns = if arms.len() > 2 { 2 } else { 1 };
+            let mut views = arms;
+            if !views.len().is_multiple_of(columns) {
+                views.push(Tabs::new(partitions.into_iter().chain([note()])).into());
+            }
+            Grid::new(views).with_grid_columns(columns as u32).into()
+        }
+    };
+    let blueprint = Blueprint::new(root)
+        .with_auto_views(false)
+        .with_auto_layout(false)
+        .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Hidden))
+        .with_selection_panel(SelectionPanel::from_state(PanelState::Hidden))
+        .with_time_panel(
+            TimePanel::new()
+                .with_state(PanelState::Collapsed)
+                .with_timeline(super::TIMELINE)
+                .with_play_state(PlayState::Following),
+        );
+    encode(&blueprint, properties, application)
+}
+
+/// A view of each learner's estimate beside the truth.
+fn arms(
+    description: &Description,
+    learners: &[&EntityPath],
+    scene: &Scene,
+    properties: &mut Properties,
+) -> Vec<ContainerLike> {
+    let views = learners.iter().zip(&description.learners).map(|(root, learner)| {
         let name = format!("{} ({} × {})", learner.name, learner.estimator, learner.policy);
         let view = Spatial3DView::new(name).with_origin("/").with_contents([
             "+ /world/truth/**".to_owned(),
@@ -71,47 +123,40 @@ pub(super) fn messages(
             properties.of(view, "Background", &Background::new(BackgroundKind::SolidColor).with_color(BACKGROUND));
         properties.of(view, "LineGrid3D", &LineGrid3D::new().with_visible(false))
     });
-    let arms = Grid::new(arms.collect::<Vec<_>>()).with_grid_columns(learners.len().clamp(1, 3) as u32);
+    views.collect()
+}
 
+/// The curves of all learners, metric by metric.
+fn charts(description: &Description, learners: &[&EntityPath], properties: &mut Properties) -> Vec<ContainerLike> {
     let charts: &[(&str, &str)] = if description.truth.is_some() { &CHARTS } else { &CHARTS_WITHOUT_TRUTH };
-    let mut below: Vec<ContainerLike> = Vec::new();
-    for (title, metric) in charts {
+    let views = charts.iter().map(|(title, metric)| {
         let contents = learners.iter().map(|root| format!("+ {root}/metrics/{metric}"));
         let view = TimeSeriesView::new(*title).with_origin("/").with_contents(contents);
-        below.push(properties.of(view.into(), "PlotLegend", &PlotLegend::new().with_corner(Corner2D::RightTop)));
-    }
-    let mut tabs: Vec<ContainerLike> = Vec::new();
-    // A box is divided by DIRECT; recorded movements are tried one by one.
-    for (root, _) in
-        names().filter(|(_, l)| l.policy.starts_with("active") && description.movements_available.is_none())
-    {
+        properties.of(view.into(), "PlotLegend", &PlotLegend::new().with_corner(Corner2D::RightTop))
+    });
+    views.collect()
+}
+
+/// The traces of all learners beside their limits, where the truth is known.
+fn limits(description: &Description, learners: &[&EntityPath], properties: &mut Properties) -> Option<ContainerLike> {
+    description.truth.as_ref()?;
+    let of_learner = |root: &&EntityPath| TRACE.1.map(|metric| format!("+ {root}/metrics/{metric}"));
+    let contents = learners.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")]);
+    let view = TimeSeriesView::new(TRACE.0).with_origin("/").with_contents(contents);
+    Some(properties.of(view.into(), "PlotLegend", &PlotLegend::new().with_corner(Corner2D::RightTop)))
+}
+
+/// The partitions of those who have any: a box is divided by DIRECT, recorded movements are tried one by one.
+fn partitions(description: &Description, learners: &[&EntityPath], properties: &mut Properties) -> Vec<ContainerLike> {
+    let divides = |policy: &str| policy.starts_with("active") && description.movements_available.is_none();
+    let views = learners.iter().zip(&description.learners).filter(|(_, learner)| divides(&learner.policy));
+    let views = views.map(|(root, _)| {
         let name = root.last().map(|part| part.ui_string()).unwrap_or_default();
         let view = Spatial2DView::new(format!("DIRECT, {name}")).with_origin(root.join(&EntityPath::from("direct")));
         let bounds = Range2D { x_range: [-0.08, 1.08].into(), y_range: [-0.16, 1.16].into() };
-        tabs.push(properties.of(view.into(), "VisualBounds2D", &Bounds::new(VisualBounds2D(bounds))));
-    }
-    if description.truth.is_some() {
-        let of_learner = |root: &&EntityPath| TRACE.1.map(|metric| format!("+ {root}/metrics/{metric}"));
-        let contents = learners.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")]);
-        let view = TimeSeriesView::new(TRACE.0).with_origin("/").with_contents(contents);
-        tabs.push(properties.of(view.into(), "PlotLegend", &PlotLegend::new().with_corner(Corner2D::RightTop)));
-    }
-    tabs.push(TextDocumentView::new("Note").with_origin("/note").into());
-    below.push(Tabs::new(tabs).into());
-
-    let root = Vertical::new([arms.into(), Horizontal::new(below).into()]).with_row_shares(vec![3.0, 2.0]);
-    let blueprint = Blueprint::new(root)
-        .with_auto_views(false)
-        .with_auto_layout(false)
-        .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Hidden))
-        .with_selection_panel(SelectionPanel::from_state(PanelState::Hidden))
-        .with_time_panel(
-            TimePanel::new()
-                .with_state(PanelState::Collapsed)
-                .with_timeline(super::TIMELINE)
-                .with_play_state(PlayState::Following),
-        );
-    encode(&blueprint, properties, application)
+        properties.of(view.into(), "VisualBounds2D", &Bounds::new(VisualBounds2D(bounds)))
+    });
+    views.collect()
 }
 
 /// Properties of views for which Rerun's Rust builders have no method; they are logged beside what the builders log.

@@ -1,9 +1,58 @@
 //! Covariances as ellipsoids.
 
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion};
+use serde::{Deserialize, Serialize};
 
-/// The size of every ellipsoid in a recording, in standard deviations along each of its axes.
-pub const SIGMAS: f64 = 1.0;
+/// How large the ellipsoids of a recording are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, utoipa::ToSchema)]
+pub enum EllipsoidSize {
+    /// One standard deviation along each principal axis.
+    #[default]
+    #[serde(rename = "1-sigma")]
+    #[value(name = "1-sigma")]
+    OneSigma,
+    /// Two standard deviations along each principal axis.
+    #[serde(rename = "2-sigma")]
+    #[value(name = "2-sigma")]
+    TwoSigma,
+    /// Holds 95 % of the normal distribution.
+    #[serde(rename = "95-percent")]
+    #[value(name = "95-percent")]
+    NinetyFivePercent,
+}
+
+impl EllipsoidSize {
+    /// Half-sizes in standard deviations, for a covariance of this rank (1 to 3).
+    ///
+    /// 95 % of a normal distribution in k dimensions lie within √χ²ₖ,₀.₉₅ standard deviations: 1.960, 2.448 and 2.795.
+    pub fn sigmas(self, rank: usize) -> f64 {
+        // Quantiles of χ² at 0.95 with 1, 2 and 3 degrees of freedom.
+        const CHI_SQUARED_95: [f64; 3] = [3.841_458_820_694_124, 5.991_464_547_107_979, 7.814_727_903_251_179];
+        match self {
+            Self::OneSigma => 1.0,
+            Self::TwoSigma => 2.0,
+            Self::NinetyFivePercent => CHI_SQUARED_95[rank.clamp(1, 3) - 1].sqrt(),
+        }
+    }
+
+    /// As it stands in requests and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OneSigma => "1-sigma",
+            Self::TwoSigma => "2-sigma",
+            Self::NinetyFivePercent => "95-percent",
+        }
+    }
+
+    /// As it stands in labels and notes.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::OneSigma => "1σ",
+            Self::TwoSigma => "2σ",
+            Self::NinetyFivePercent => "95 %",
+        }
+    }
+}
 
 /// A direction without variance is drawn with this part of the largest half-size: a disc that can be seen edge-on.
 const FLATNESS: f64 = 0.02;
@@ -14,7 +63,7 @@ const NO_VARIANCE: f64 = 1e-9;
 /// What is drawn for a covariance.
 #[derive(Clone, Debug)]
 pub(super) struct Ellipsoid {
-    /// [`SIGMAS`] times the standard deviations along the axes, largest first at the first step.
+    /// Multiples of the standard deviations along the axes, largest first at the first step.
     pub(super) half_sizes: [f64; 3],
     /// Turns x, y, z into the axes.
     pub(super) rotation: UnitQuaternion<f64>,
@@ -27,7 +76,12 @@ pub(super) struct Axes(Option<Matrix3<f64>>);
 
 impl Axes {
     /// The ellipsoid of a covariance whose half-sizes are multiplied by `scale`; `None` if it is not finite.
-    pub(super) fn ellipsoid(&mut self, covariance: &[[f64; 3]; 3], scale: f64) -> Option<Ellipsoid> {
+    pub(super) fn ellipsoid(
+        &mut self,
+        covariance: &[[f64; 3]; 3],
+        size: EllipsoidSize,
+        scale: f64,
+    ) -> Option<Ellipsoid> {
         let matrix = Matrix3::from_fn(|row, column| 0.5 * (covariance[row][column] + covariance[column][row]));
         if !matrix.iter().all(|entry| entry.is_finite()) {
             return None;
@@ -37,9 +91,11 @@ impl Axes {
         self.0 = Some(axes);
         let variances = order.map(|index| eigen.eigenvalues[index].max(0.0));
         let largest = variances.iter().copied().fold(0.0, f64::max);
+        let rank = variances.iter().filter(|variance| **variance > NO_VARIANCE * largest).count();
+        let sigmas = size.sigmas(rank);
         let half_sizes = variances.map(|variance| {
             let shown = if variance > NO_VARIANCE * largest { variance.sqrt() } else { FLATNESS * largest.sqrt() };
-            SIGMAS * scale * shown
+            sigmas * scale * shown
         });
         Some(Ellipsoid {
             half_sizes,
@@ -85,7 +141,7 @@ impl Axes {
 mod tests {
     use nalgebra::{Matrix3, Rotation3, Vector3};
 
-    use super::*;
+    use super::{EllipsoidSize::OneSigma, *};
 
     fn rows(matrix: Matrix3<f64>) -> [[f64; 3]; 3] {
         matrix.transpose().into()
@@ -99,18 +155,18 @@ mod tests {
     #[test]
     fn is_the_covariance_again() {
         let covariance = turned([0.04, 0.01, 0.0025], 1.0);
-        let ellipsoid = Axes::default().ellipsoid(&covariance, 1.0).unwrap();
+        let ellipsoid = Axes::default().ellipsoid(&covariance, OneSigma, 1.0).unwrap();
         let axes = ellipsoid.rotation.to_rotation_matrix().into_inner();
-        let variances = Vector3::from(ellipsoid.half_sizes).map(|half| (half / SIGMAS).powi(2));
+        let variances = Vector3::from(ellipsoid.half_sizes).map(|half| half.powi(2));
         let again = axes * Matrix3::from_diagonal(&variances) * axes.transpose();
         assert!((again - Matrix3::from_fn(|i, j| covariance[i][j])).amax() < 1e-12);
-        assert!((ellipsoid.half_sizes[0] - SIGMAS * 0.2).abs() < 1e-12);
+        assert!((ellipsoid.half_sizes[0] - 0.2).abs() < 1e-12);
     }
 
     #[test]
     fn rank_two_is_a_disc() {
-        let ellipsoid = Axes::default().ellipsoid(&turned([0.04, 0.01, 0.0], 2.0), 0.5).unwrap();
-        let [a, b, c] = ellipsoid.half_sizes.map(|half| half / SIGMAS);
+        let ellipsoid = Axes::default().ellipsoid(&turned([0.04, 0.01, 0.0], 2.0), OneSigma, 0.5).unwrap();
+        let [a, b, c] = ellipsoid.half_sizes;
         assert!((a - 0.1).abs() < 1e-9 && (b - 0.05).abs() < 1e-9 && (c - 0.002).abs() < 1e-9);
     }
 
@@ -121,7 +177,8 @@ mod tests {
         for step in 0..200 {
             // At no step two are equal: a circle has no axes.
             let t = f64::from(step) / 199.0;
-            let ellipsoid = axes.ellipsoid(&turned([0.04, 0.01 + 0.06 * t, 0.03 - 0.02 * t], 2.0 * t), 1.0).unwrap();
+            let ellipsoid =
+                axes.ellipsoid(&turned([0.04, 0.01 + 0.06 * t, 0.03 - 0.02 * t], 2.0 * t), OneSigma, 1.0).unwrap();
             if let Some(last) = last {
                 assert!(ellipsoid.rotation.angle_to(&last) < 0.05, "step {step}");
             }
@@ -132,7 +189,31 @@ mod tests {
 
     #[test]
     fn what_is_not_finite_is_not_drawn() {
-        assert!(Axes::default().ellipsoid(&[[f64::NAN; 3]; 3], 1.0).is_none());
-        assert_eq!(Axes::default().ellipsoid(&[[0.0; 3]; 3], 1.0).unwrap().half_sizes, [0.0; 3]);
+        assert!(Axes::default().ellipsoid(&[[f64::NAN; 3]; 3], OneSigma, 1.0).is_none());
+        assert_eq!(Axes::default().ellipsoid(&[[0.0; 3]; 3], OneSigma, 1.0).unwrap().half_sizes, [0.0; 3]);
+    }
+
+    #[test]
+    fn ninety_five_percent_lie_within() {
+        use rand::{RngExt, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+        for (rank, variances) in [(1, [0.3, 0.0, 0.0]), (2, [0.3, 0.1, 0.0]), (3, [0.3, 0.1, 0.05])] {
+            let ellipsoid =
+                Axes::default().ellipsoid(&turned(variances, 0.8), EllipsoidSize::NinetyFivePercent, 1.0).unwrap();
+            let within = (0..20_000)
+                .filter(|_| {
+                    // A sample along each principal axis.
+                    let along = |i: usize, rng: &mut rand_chacha::ChaCha8Rng| {
+                        if i < rank {
+                            rng.sample::<f64, _>(rand_distr::StandardNormal) * variances[i].sqrt()
+                        } else {
+                            0.0
+                        }
+                    };
+                    (0..3).map(|i| (along(i, &mut rng) / ellipsoid.half_sizes[i]).powi(2)).sum::<f64>() <= 1.0
+                })
+                .count();
+            assert!((within as f64 / 20_000.0 - 0.95).abs() < 0.01, "rank {rank}: {within} of 20000");
+        }
     }
 }

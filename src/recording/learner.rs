@@ -6,7 +6,7 @@ use rerun::{
 };
 
 use super::{
-    blueprint,
+    EllipsoidSize, blueprint,
     colours::learner_color,
     head, metrics,
     model::{self, Uncertainty},
@@ -29,14 +29,14 @@ pub(super) struct LearnerEntities {
 
 impl LearnerEntities {
     /// Those of the learner at this place in the description.
-    pub(super) fn new(index: usize, name: &str, joints: usize) -> Self {
+    pub(super) fn new(index: usize, name: &str, joints: usize, ellipsoids: EllipsoidSize) -> Self {
         let root = EntityPath::new(vec![EntityPathPart::new(name)]);
         let metrics = root.join(&EntityPath::from("metrics"));
         Self {
             colour: learner_color(index),
             metrics: metrics::NAMES.iter().map(|name| metrics.join(&EntityPath::from(*name))).collect(),
             root,
-            uncertainty: Uncertainty::new(joints),
+            uncertainty: Uncertainty::new(joints, ellipsoids),
             plane: None,
             moved: false,
             failed: false,

@@ -23,9 +23,9 @@ use super::RecordingError;
 
 /// A growing log of encoded parts, in memory, for any number of readers at any speed. Clones share one log.
 ///
-/// Part 0 is the 12-byte header of an .rrd stream; every further part is one message. The parts in order are a valid
-/// stream at every moment, without a footer; a reader that takes single messages puts the header before each. Reader
-/// loops hold the index of their next part:
+/// Part 0 is the 12-byte header of an .rrd stream; every further part is one message, but for one that holds all
+/// messages of the arrangement of views. The parts in order are a valid stream at every moment, without a footer; a
+/// reader that takes single parts puts the header before each. Reader loops hold the index of their next part:
 ///
 /// ```
 /// # use body_schema::recording::LiveLog;
@@ -56,6 +56,8 @@ struct Shared {
 #[derive(Default)]
 struct State {
     parts: Vec<Bytes>,
+    /// The arrangement of views: its part, and what a page that has curves of its own takes in its place.
+    scene: Option<(usize, Bytes)>,
     bytes: usize,
     closed: bool,
 }
@@ -73,7 +75,7 @@ impl LiveLog {
         if let Err(error) = header.to_rrd_bytes(&mut bytes) {
             re_log::error!("no header for the live recording: {error}");
         }
-        let state = State { bytes: bytes.len(), parts: vec![Bytes::from(bytes)], closed: false };
+        let state = State { bytes: bytes.len(), parts: vec![Bytes::from(bytes)], ..State::default() };
         Self { shared: Arc::new(Shared { state: Mutex::new(state), length: watch::Sender::new(1) }) }
     }
 
@@ -85,6 +87,18 @@ impl LiveLog {
     /// The parts from `index` on; cheap, the bytes are shared.
     pub fn parts_from(&self, index: usize) -> Vec<Bytes> {
         self.state().parts.get(index..).map(<[Bytes]>::to_vec).unwrap_or_default()
+    }
+
+    /// The same for a page that has curves of its own: the views are arranged for the scene alone.
+    pub fn scene_parts_from(&self, index: usize) -> Vec<Bytes> {
+        let state = self.state();
+        let mut parts = state.parts.get(index..).map(<[Bytes]>::to_vec).unwrap_or_default();
+        if let Some((place, scene)) = &state.scene
+            && let Some(part) = place.checked_sub(index).and_then(|place| parts.get_mut(place))
+        {
+            *part = scene.clone();
+        }
+        parts
     }
 
     /// The number of parts; at least 1, the header.
@@ -128,31 +142,37 @@ impl LiveLog {
         Ok(())
     }
 
+    /// Appends an arrangement of views, as one part: the whole one, and that of the scene alone.
+    pub(super) fn append_arrangement(&self, whole: &[LogMsg], scene: &[LogMsg]) -> Result<(), RecordingError> {
+        let encode = |messages: &[LogMsg]| -> Result<Bytes, RecordingError> {
+            Ok(messages.iter().map(encode).collect::<Result<Vec<_>, _>>()?.concat().into())
+        };
+        let (whole, scene) = (encode(whole)?, encode(scene)?);
+        let mut state = self.state();
+        if !state.closed {
+            state.bytes += whole.len();
+            state.scene = Some((state.parts.len(), scene));
+            state.parts.push(whole);
+            self.shared.length.send_replace(state.parts.len());
+        }
+        Ok(())
+    }
+
     /// Everything so far as a finished .rrd file: the many small chunks of a live session put together, with a footer.
     ///
     /// Takes about as long as it took to encode the session: run it where it may block.
     pub fn complete(&self) -> Result<Vec<u8>, RecordingError> {
-        let stream = self.parts_from(0).concat();
-        let decoded = |source: re_log_encoding::DecodeError| RecordingError::Encode(source.to_string());
-        let mut rest = Vec::new();
-        // What is static comes first.
-        let mut chunks: BTreeMap<(bool, EntityPath), (StoreId, Vec<Chunk>)> = BTreeMap::new();
-        for message in DecoderApp::decode_eager(Cursor::new(stream)).map_err(decoded)? {
-            match message.map_err(decoded)? {
-                LogMsg::ArrowMsg(store, message) if store.is_recording() => {
-                    let chunk = Chunk::from_arrow_msg(&message)?;
-                    let key = (!chunk.is_static(), chunk.entity_path().clone());
-                    chunks.entry(key).or_insert_with(|| (store, Vec::new())).1.push(chunk);
-                }
-                other => rest.push(other),
-            }
-        }
-        for (store, chunks) in chunks.into_values() {
-            for chunk in merged(chunks)? {
-                rest.push(LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?));
-            }
-        }
-        Ok(Encoder::encode(rest.into_iter().map(Ok))?)
+        let messages = put_together(self.parts_from(0).concat())?;
+        Ok(Encoder::encode(messages.into_iter().map(Ok))?)
+    }
+
+    /// Some of its parts, without the header, as one: the many small chunks of a live session put together. Readers
+    /// that are far behind take in one large part much faster than a thousand small ones.
+    ///
+    /// Takes about as long as it took to encode the parts: run it where it may block.
+    pub fn put_together(&self, parts: &[Bytes]) -> Result<Bytes, RecordingError> {
+        let messages = put_together([&[self.header()], parts].concat().concat())?;
+        Ok(messages.iter().map(encode).collect::<Result<Vec<_>, _>>()?.concat().into())
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -189,6 +209,29 @@ fn encode(message: &LogMsg) -> Result<Bytes, RecordingError> {
     let mut bytes = Vec::new();
     message.to_transport(EncodingOptions::PROTOBUF_COMPRESSED.compression)?.to_rrd_bytes(&mut bytes)?;
     Ok(Bytes::from(bytes))
+}
+
+/// The messages of a stream, with the chunks of each entity put together; what is static comes first.
+fn put_together(stream: Vec<u8>) -> Result<Vec<LogMsg>, RecordingError> {
+    let decoded = |source: re_log_encoding::DecodeError| RecordingError::Encode(source.to_string());
+    let mut messages = Vec::new();
+    let mut chunks: BTreeMap<(bool, EntityPath), (StoreId, Vec<Chunk>)> = BTreeMap::new();
+    for message in DecoderApp::decode_eager(Cursor::new(stream)).map_err(decoded)? {
+        match message.map_err(decoded)? {
+            LogMsg::ArrowMsg(store, message) if store.is_recording() => {
+                let chunk = Chunk::from_arrow_msg(&message)?;
+                let key = (!chunk.is_static(), chunk.entity_path().clone());
+                chunks.entry(key).or_insert_with(|| (store, Vec::new())).1.push(chunk);
+            }
+            other => messages.push(other),
+        }
+    }
+    for (store, chunks) in chunks.into_values() {
+        for chunk in merged(chunks)? {
+            messages.push(LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?));
+        }
+    }
+    Ok(messages)
 }
 
 /// Beyond this many rows chunks are no longer put together: viewers load by chunk.

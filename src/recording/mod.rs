@@ -59,7 +59,7 @@ mod scene;
 pub use self::{
     colours::{TRUTH_COLOR, hex, learner_color},
     csv::{StepsCsv, comparison_csv},
-    ellipsoid::SIGMAS,
+    ellipsoid::EllipsoidSize,
     error::RecordingError,
     live::LiveLog,
     recorder::{Recorder, Target},

@@ -9,7 +9,7 @@ use rerun::{
 
 use super::{
     colours::tint,
-    ellipsoid::{Axes, Ellipsoid, SIGMAS},
+    ellipsoid::{Axes, Ellipsoid, EllipsoidSize},
 };
 use crate::experiment::{JointDescription, ModelReport};
 
@@ -54,6 +54,7 @@ pub(super) fn origins(model: &ModelReport) -> Vec<[f64; 3]> {
 
 /// The ellipsoids of one learner, continuous from step to step.
 pub(super) struct Uncertainty {
+    size: EllipsoidSize,
     points: Vec<Axes>,
     marker: Axes,
     directions: Vec<Axes>,
@@ -69,9 +70,9 @@ struct Instance {
 
 impl Uncertainty {
     /// For an arm of so many joints.
-    pub(super) fn new(joints: usize) -> Self {
+    pub(super) fn new(joints: usize, size: EllipsoidSize) -> Self {
         let axes = vec![Axes::default(); joints];
-        Self { points: axes.clone(), marker: Axes::default(), directions: axes }
+        Self { size, points: axes.clone(), marker: Axes::default(), directions: axes }
     }
 
     /// The points on the axes, then the marker. `None` if the learner keeps no covariance of any.
@@ -87,7 +88,7 @@ impl Uncertainty {
             });
         let marker =
             model.marker_covariance_m2.map(|covariance| (model.marker_m, covariance, &mut self.marker, "marker"));
-        Instances::new(points.chain(marker), 1.0, colour)
+        Instances::new(points.chain(marker), self.size, 1.0, colour)
     }
 
     /// The directions, at the tips of arrows `length_m` long. `None` if the learner keeps no covariance of any.
@@ -105,7 +106,7 @@ impl Uncertainty {
                 Some((tip, joint.direction_covariance_rad2?, axes, description.name.as_str()))
             },
         );
-        Instances::new(tips, length_m, tint(colour, 0.5))
+        Instances::new(tips, self.size, length_m, tint(colour, 0.5))
     }
 }
 
@@ -118,6 +119,7 @@ pub(super) struct Instances {
 impl Instances {
     fn new<'a>(
         covariances: impl Iterator<Item = ([f64; 3], [[f64; 3]; 3], &'a mut Axes, &'a str)>,
+        size: EllipsoidSize,
         scale: f64,
         colour: [u8; 3],
     ) -> Option<Self> {
@@ -125,8 +127,8 @@ impl Instances {
         let instances: Vec<Instance> = covariances
             .filter_map(|(centre, covariance, axes, name)| {
                 any = true;
-                let label = format!("{name} ({SIGMAS}σ)");
-                Some(Instance { centre, label, covariance, ellipsoid: axes.ellipsoid(&covariance, scale)? })
+                let label = format!("{name} ({})", size.label());
+                Some(Instance { centre, label, covariance, ellipsoid: axes.ellipsoid(&covariance, size, scale)? })
             })
             .collect();
         any.then(|| Self {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use rerun::{MediaType, TextDocument};
 
-use super::{SIGMAS, TRUTH_COLOR, colours::hex, colours::learner_color};
+use super::{EllipsoidSize, TRUTH_COLOR, colours::hex, colours::learner_color};
 use crate::{experiment::Description, kinematics::JointKind};
 
 const HEAD: &str = "- **Head** in pale grey: the cone of the lens at rest, and the square over which its axis can turn; in the \
@@ -15,11 +15,11 @@ const LIMITS: &str = "- **Limits** beside the trace: `bound_trace`, pale, is the
                       the least that any so many movements allow, if it was computed (`run --limits`).\n";
 
 /// The note, in markdown.
-pub(super) fn note(description: &Description) -> TextDocument {
-    TextDocument::new(markdown(description)).with_media_type(MediaType::markdown())
+pub(super) fn note(description: &Description, ellipsoids: EllipsoidSize) -> TextDocument {
+    TextDocument::new(markdown(description, ellipsoids)).with_media_type(MediaType::markdown())
 }
 
-fn markdown(description: &Description) -> String {
+fn markdown(description: &Description, ellipsoids: EllipsoidSize) -> String {
     let Description { scenario, title, seed, version, parameters, thresholds, movements_by_counting, .. } = description;
     let mut text = format!(
         "# {title}\n\nScenario `{scenario}`, seed {seed}, {parameters} learned parameters (as many equations after \
@@ -28,8 +28,13 @@ fn markdown(description: &Description) -> String {
     // Writing to a String does not fail.
     let _ = write!(
         text,
-        "```\nbody-schema run {scenario} --seed {seed} --steps M --rrd FILE\n```\nmakes this recording again, but for \
-         the times in `selection_ms`.\n\n## Learners\n\n| learner | estimator | policy | colour |\n|---|---|---|---|\n"
+        "```\nbody-schema run {scenario} --seed {seed} --steps M{} --rrd FILE{}\n```\nmakes this recording again, but for \
+         the times in `selection_ms`.\n\n## Learners\n\n| learner | estimator | policy | colour |\n|---|---|---|---|\n",
+        description.learners.iter().map(|learner| format!(" --learner {}", learner.name)).collect::<String>(),
+        match ellipsoids {
+            EllipsoidSize::OneSigma => String::new(),
+            other => format!(" --ellipsoids {}", other.name()),
+        }
     );
     for (index, learner) in description.learners.iter().enumerate() {
         let colour = hex(learner_color(index));
@@ -47,9 +52,8 @@ fn markdown(description: &Description) -> String {
         "{}- **Estimate** in the learner's colour: thick the arm at θ = 0, with one arrow per joint axis (a sliding \
          joint's stands at the next joint); thin and pale the arm in the configuration of the step's movement, beside \
          the true one.\n\
-         - **Ellipsoids** are {SIGMAS}σ along each principal axis: of the points on the axes (flat along the axis, \
-         where a point means nothing), and, paler, at the tips of the arrows those of the directions, as the tips would move. \
-         In two dimensions 1σ holds 39 % of a normal distribution, in three 20 %.\n\
+         - **Ellipsoids** {}: of the points on the axes (flat along the axis, \
+         where a point means nothing), and, paler, at the tips of the arrows those of the directions, as the tips would move.\n\
          - **Marker**: pale as predicted before the measurement, yellow as measured; no yellow point after a miss.\n\
          - **Partition**: how DIRECT divided the joint box to choose the movement, as the slice through the chosen \
          configuration (vermillion) along two joints, each from limit to limit. Brighter is a lower criterion, so \
@@ -58,6 +62,13 @@ fn markdown(description: &Description) -> String {
          Lengths in metres, in the frame of the measurements; `_deg` in degrees; joint values in radians or metres.\n\n\
          `converged_at` asks for an orientation error up to {}° and a location error up to {} m.\n\n",
         if description.head.is_some() { HEAD } else { "" },
+        match ellipsoids {
+            EllipsoidSize::OneSigma =>
+                "reach 1σ along each principal axis (in two dimensions that holds 39 % of a normal distribution, in three 20 %)",
+            EllipsoidSize::TwoSigma =>
+                "reach 2σ along each principal axis (in two dimensions that holds 86 % of a normal distribution, in three 74 %)",
+            EllipsoidSize::NinetyFivePercent => "hold 95 % of a normal distribution",
+        },
         thresholds.orientation_deg,
         thresholds.location_m
     );

@@ -9,7 +9,8 @@ use rerun::{
 };
 
 use super::{
-    LiveLog, RecordingError, TRUTH_COLOR, blueprint,
+    EllipsoidSize, LiveLog, RecordingError, TRUTH_COLOR,
+    blueprint::{self, Arrangement},
     colours::{learner_color, tint},
     file::RrdFile,
     head,
@@ -39,6 +40,7 @@ pub struct Target {
     file: Option<PathBuf>,
     live: Option<LiveLog>,
     recording_id: Option<String>,
+    ellipsoids: EllipsoidSize,
 }
 
 impl Target {
@@ -62,6 +64,12 @@ impl Target {
     /// twice gives each run an id of its own. Otherwise it is made of scenario and seed.
     pub fn with_recording_id(mut self, id: impl Into<String>) -> Self {
         self.recording_id = Some(id.into());
+        self
+    }
+
+    /// Sets the size of all ellipsoids; otherwise 1σ.
+    pub fn with_ellipsoids(mut self, size: EllipsoidSize) -> Self {
+        self.ellipsoids = size;
         self
     }
 }
@@ -102,7 +110,7 @@ pub struct Recorder {
 impl Recorder {
     /// Opens the target and records what stays the same.
     pub fn new(description: &Description, target: Target) -> Result<Self, RecordingError> {
-        let Target { file, live, recording_id } = target;
+        let Target { file, live, recording_id, ellipsoids } = target;
         let names: Vec<&str> = description.learners.iter().map(|learner| learner.name.as_str()).collect();
         // Viewers keep one arrangement per application: those of different learners must not meet.
         let application = format!("body-schema-{}-{}", description.scenario, names.join("-"));
@@ -114,14 +122,14 @@ impl Recorder {
             file: file.as_deref().map(RrdFile::create).transpose()?,
             live,
             learners: (names.iter().enumerate())
-                .map(|(index, name)| LearnerEntities::new(index, name, description.joints.len()))
+                .map(|(index, name)| LearnerEntities::new(index, name, description.joints.len(), ellipsoids))
                 .collect(),
             arrow_m: None,
             waiting_steps: 0,
             waiting_leaves: 0,
             finished: false,
         };
-        recorder.begin()?;
+        recorder.begin(ellipsoids)?;
         Ok(recorder)
     }
 
@@ -216,14 +224,14 @@ impl Recorder {
         self.file.as_mut().map_or(Ok(()), |file| file.append(messages)).and(live)
     }
 
-    fn begin(&mut self) -> Result<(), RecordingError> {
+    fn begin(&mut self, ellipsoids: EllipsoidSize) -> Result<(), RecordingError> {
         let info = StoreInfo::new(self.store.clone(), StoreSource::Other("body-schema".to_owned()));
         self.send(&[SetStoreInfo { row_id: *RowId::new(), info }.into()])?;
         let Self { description, rows, .. } = self;
         let name = format!("{}, seed {}", description.scenario, description.seed);
         rows.always(&EntityPath::properties(), &[&RecordingInfo::new().with_name(name)]);
         rows.always(&EntityPath::root(), &[&ViewCoordinates::RIGHT_HAND_Z_UP()]);
-        rows.always(&EntityPath::from("note"), &[&note(description)]);
+        rows.always(&EntityPath::from("note"), &[&note(description, ellipsoids)]);
         for (index, learner) in self.learners.iter().enumerate() {
             let colour = learner_color(index);
             let name = &description.learners[index].name;
@@ -274,8 +282,15 @@ impl Recorder {
             self.rows.always(&EntityPath::from("world/head/frustum"), &[&head::frustum(head)]);
         }
         let learners: Vec<&EntityPath> = self.learners.iter().map(|learner| &learner.root).collect();
-        let blueprint = blueprint::messages(&self.description, &learners, &scene, self.store.application_id().clone())?;
-        self.send(&blueprint)?;
+        let arrange = |arrangement| {
+            let application = self.store.application_id().clone();
+            blueprint::messages(&self.description, &learners, &scene, arrangement, application)
+        };
+        let whole = arrange(Arrangement::Whole)?;
+        if let Some(live) = &self.live {
+            live.append_arrangement(&whole, &arrange(Arrangement::Scene)?)?;
+        }
+        self.file.as_mut().map_or(Ok(()), |file| file.append(&whole))?;
         Ok(arrow_m)
     }
 }

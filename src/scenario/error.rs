@@ -45,7 +45,7 @@ pub enum ScenarioError {
         known: Vec<String>,
     },
     /// The scenario offers no such learner.
-    #[error("scenario `{scenario}` has no learner `{name}`; it offers: {}", known.join(", "))]
+    #[error("scenario `{scenario}` has no learner `{name}`; it offers: {}; or write estimator:policy, as in smoother:random", known.join(", "))]
     UnknownLearner {
         /// The scenario.
         scenario: String,
@@ -53,6 +53,14 @@ pub enum ScenarioError {
         name: String,
         /// All names.
         known: Vec<String>,
+    },
+    /// The parts of a composed learner do not fit.
+    #[error("there is no learner `{name}`: {what}")]
+    Misfit {
+        /// The name asked for.
+        name: String,
+        /// Why not.
+        what: String,
     },
     /// A learner is named twice.
     #[error("learner `{0}` is named twice; name each learner once")]

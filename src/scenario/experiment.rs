@@ -42,30 +42,6 @@ impl Scenario {
         self.assemble(seed, &self.chosen(learners)?, world, evaluation, &briefing)
     }
 
-    /// The learners of these names, in this order; without names those that run by default.
-    pub fn chosen(&self, names: Option<&[String]>) -> Result<Vec<LearnerSpec>, ScenarioError> {
-        let Some(names) = names else {
-            return Ok(self.learners.iter().filter(|spec| spec.by_default).cloned().collect());
-        };
-        if names.is_empty() {
-            return Err(ScenarioError::NoLearner);
-        }
-        let mut chosen: Vec<LearnerSpec> = Vec::new();
-        for name in names {
-            let spec = self.learners.iter().find(|spec| spec.name == *name);
-            let spec = spec.ok_or_else(|| ScenarioError::UnknownLearner {
-                scenario: self.name.clone(),
-                name: name.clone(),
-                known: self.learners.iter().map(|spec| spec.name.clone()).collect(),
-            })?;
-            if chosen.contains(spec) {
-                return Err(ScenarioError::RepeatedLearner(name.clone()));
-            }
-            chosen.push(spec.clone());
-        }
-        Ok(chosen)
-    }
-
     fn draw(&self, seed: u64) -> Result<(World, Evaluation, Briefing), ScenarioError> {
         match &self.world {
             WorldSpec::Simulated { sigma_m, initial_error, watch, change } => {

@@ -9,6 +9,7 @@ mod data;
 mod edit;
 mod error;
 mod experiment;
+mod learners;
 mod limits;
 mod raw;
 mod summary;
@@ -22,11 +23,12 @@ pub use builtin::{BUILTIN, Builtin, builtin};
 pub use data::Recording;
 pub use edit::edited;
 pub use error::{Problem, ScenarioError};
+pub use learners::{EstimatorKind, LearnerSpec, PolicyKind};
 pub use summary::{ScenarioSummary, WorldKind};
 
 use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
-    experiment::{LearnerDescription, Thresholds},
+    experiment::Thresholds,
     kinematics::{Chain, Quantity, TangentLayout},
     optimize::Settings,
     selection::{CriterionUnits, Planning, Watch},
@@ -205,100 +207,4 @@ pub struct SelectionSpec {
     pub units: CriterionUnits,
     /// How movements are planned ahead, by learners that plan.
     pub planning: Planning,
-}
-
-/// A learner that a scenario offers.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LearnerSpec {
-    /// Its name.
-    pub name: String,
-    /// Its estimator.
-    pub estimator: EstimatorKind,
-    /// Its policy.
-    pub policy: PolicyKind,
-    /// Whether its filter adds the scenario's stabilising noise.
-    pub stabilising: bool,
-    /// Whether it runs when no learner is named.
-    pub by_default: bool,
-}
-
-impl LearnerSpec {
-    fn description(&self) -> LearnerDescription {
-        LearnerDescription {
-            name: self.name.clone(),
-            estimator: self.estimator.name().to_owned(),
-            policy: self.policy.name().to_owned(),
-        }
-    }
-}
-
-/// The estimators that a scenario can name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum EstimatorKind {
-    /// Recursive least squares.
-    Rls,
-    /// Recursive least squares by the unscented transform.
-    Unscented,
-    /// Recursive least squares in the paper's six numbers per joint: a comparison, which shows no covariance.
-    RlsSixNumbers,
-    /// Stochastic gradient.
-    Gradient,
-    /// Maximum a posteriori over all measurements, with several hypotheses.
-    Smoother,
-}
-
-impl EstimatorKind {
-    /// Its name in files and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Rls => "rls",
-            Self::Unscented => "unscented",
-            Self::RlsSixNumbers => "rls-six-numbers",
-            Self::Gradient => "gradient",
-            Self::Smoother => "smoother",
-        }
-    }
-
-    fn keeps_covariance(self) -> bool {
-        matches!(self, Self::Rls | Self::Unscented | Self::Smoother)
-    }
-}
-
-/// The policies that a scenario can name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PolicyKind {
-    /// Minimises the A-criterion; where a head watches, weighed by the chance of being seen.
-    Active,
-    /// The same, but where a head watches with blind faith in the predicted marker: a comparison.
-    ActiveNaive,
-    /// Plans the movements that are still needed together; what `active` is for a smoother.
-    ActivePlanned,
-    /// As `active`, but by original DIRECT, whatever the scenario's variant.
-    ActiveDirect,
-    /// As `active`, but the best of as many random configurations: the floor of every search.
-    ActiveRandomSearch,
-    /// As `active`, but by Bayesian optimisation with as many evaluations.
-    ActiveBayesian,
-    /// As `active`, but with the expectation of (7) by Monte Carlo over the posterior.
-    ActiveMonteCarlo,
-    /// Draws uniformly.
-    Random,
-}
-
-impl PolicyKind {
-    /// Its name in files and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Active => "active",
-            Self::ActiveNaive => "active-naive",
-            Self::ActivePlanned => "active-planned",
-            Self::ActiveDirect => "active-direct",
-            Self::ActiveRandomSearch => "active-random-search",
-            Self::ActiveBayesian => "active-bayesian",
-            Self::ActiveMonteCarlo => "active-monte-carlo",
-            Self::Random => "random",
-        }
-    }
 }

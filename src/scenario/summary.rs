@@ -23,6 +23,8 @@ pub struct ScenarioSummary {
     pub steps: u64,
     /// The learners it offers.
     pub learners: Vec<LearnerDescription>,
+    /// What else can be compared: every estimator with every policy that fits it, by names such as `smoother:random`.
+    pub compositions: Vec<LearnerDescription>,
     /// The thresholds of `converged_at`.
     pub thresholds: Thresholds,
 }
@@ -52,6 +54,7 @@ impl Scenario {
             parameters: self.robot.layout.dimension(),
             steps: self.steps,
             learners: self.learners.iter().map(super::LearnerSpec::description).collect(),
+            compositions: self.compositions().iter().map(super::LearnerSpec::description).collect(),
             thresholds: self.thresholds,
         }
     }

@@ -117,9 +117,10 @@ impl From<ScenarioError> for Problem {
     fn from(error: ScenarioError) -> Self {
         let field = match &error {
             ScenarioError::UnknownScenario { .. } => "scenario",
-            ScenarioError::UnknownLearner { .. } | ScenarioError::RepeatedLearner(_) | ScenarioError::NoLearner => {
-                "learners"
-            }
+            ScenarioError::UnknownLearner { .. }
+            | ScenarioError::Misfit { .. }
+            | ScenarioError::RepeatedLearner(_)
+            | ScenarioError::NoLearner => "learners",
             ScenarioError::Registration { .. } => "seed",
             ScenarioError::Invalid { .. } | ScenarioError::Experiment(_) => {
                 return Self::new(Kind::EngineFailed, error.to_string());

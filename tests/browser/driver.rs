@@ -12,7 +12,7 @@ use std::{
 use fantoccini::{
     Client, ClientBuilder,
     actions::{InputSource, KeyAction, KeyActions},
-    wd::WebDriverCompatibleCommand,
+    wd::{WebDriverCompatibleCommand, WindowHandle},
 };
 use hyper_util::client::legacy::connect::HttpConnector;
 use reqwest::{Method, Url};
@@ -35,8 +35,8 @@ pub struct Browser {
 }
 
 impl Browser {
-    /// Starts a browser; without one the test is skipped, unless it must not be.
-    pub async fn start() -> Option<Self> {
+    /// Starts a browser with these flags too; without one the test is skipped, unless it must not be.
+    pub async fn start(more_flags: &[&str]) -> Option<Self> {
         let driver = find("CHROMEDRIVER", &["chromedriver"]);
         let chromium = find("CHROMIUM", &["chromium", "chromium-browser", "google-chrome"]);
         let (Some(driver), Some(chromium)) = (&driver, &chromium) else {
@@ -50,6 +50,7 @@ impl Browser {
         let (driver, port) = Driver::start(driver);
         let profile = tempfile::tempdir().expect("a directory");
         let mut flags: Vec<String> = FLAGS.split(' ').map(str::to_owned).collect();
+        flags.extend(more_flags.iter().map(|flag| (*flag).to_owned()));
         flags.push(format!("--user-data-dir={}", profile.path().display()));
         let capabilities = json!({
             "goog:chromeOptions": { "args": flags, "binary": chromium },
@@ -69,6 +70,27 @@ impl Browser {
 
     pub async fn open(&self, address: &str) {
         self.client.goto(address).await.expect("the page");
+    }
+
+    /// The tab that is in front.
+    pub async fn tab(&self) -> WindowHandle {
+        self.client.window().await.expect("a tab")
+    }
+
+    /// Opens a tab and puts it in front.
+    pub async fn new_tab(&self) -> WindowHandle {
+        let tab = self.client.new_window(true).await.expect("a tab").handle;
+        self.switch_to(&tab).await;
+        tab
+    }
+
+    pub async fn switch_to(&self, tab: &WindowHandle) {
+        self.client.switch_to_window(tab.clone()).await.expect("the tab");
+    }
+
+    /// Gives the tab a connection with a latency (ms) and a throughput (bytes a second); `None` for the usual one.
+    pub async fn slow_down(&self, conditions: Option<(u64, u64)>) {
+        self.client.issue_cmd(Network(conditions)).await.expect("another connection");
     }
 
     /// The value of a JavaScript expression.
@@ -173,6 +195,22 @@ impl WebDriverCompatibleCommand for Log {
 
     fn method_and_body(&self, _: &Url) -> (Method, Option<String>) {
         (Method::POST, Some(json!({ "type": self.0 }).to_string()))
+    }
+}
+
+/// Chromedriver's own command for the connection.
+#[derive(Debug)]
+struct Network(Option<(u64, u64)>);
+
+impl WebDriverCompatibleCommand for Network {
+    fn endpoint(&self, base: &Url, session: Option<&str>) -> Result<Url, <Url as std::str::FromStr>::Err> {
+        base.join(&format!("session/{}/chromium/network_conditions", session.unwrap_or_default()))
+    }
+
+    fn method_and_body(&self, _: &Url) -> (Method, Option<String>) {
+        let Some((latency, throughput)) = self.0 else { return (Method::DELETE, None) };
+        let conditions = json!({ "offline": false, "latency": latency, "throughput": throughput });
+        (Method::POST, Some(json!({ "network_conditions": conditions }).to_string()))
     }
 }
 

@@ -5,8 +5,11 @@ use std::io::Cursor;
 use body_schema::recording::learner_color;
 
 const LEARNERS: usize = 3;
-/// Learners' views stand side by side above the curves, which have the same colours; this is their share of the height.
-const SCENES: f64 = 0.5;
+/// Three learners' views stand in two columns and two rows; DIRECT's partition is in the last place.
+const COLUMNS: usize = 2;
+const ROWS: usize = 2;
+/// Titles above a view and the time below all of them, pixels.
+const MARGIN: usize = 40;
 /// How far a channel may be from its colour: edges are smoothed and bodies shaded.
 const TOLERANCE: u8 = 40;
 /// So many pixels are an arm, not a label.
@@ -15,6 +18,7 @@ const ARM: usize = 150;
 /// The part of a screenshot in which the learners' arms are.
 pub struct Picture {
     width: usize,
+    height: usize,
     pixels: Vec<[u8; 3]>,
 }
 
@@ -28,13 +32,10 @@ impl Picture {
         let info = reader.next_frame(&mut bytes).expect("a frame");
         let (width, height) = (info.width as usize, info.height as usize);
         let samples = info.color_type.samples();
-        let below = top + 30;
-        let scenes = below..top + ((height - top) as f64 * SCENES) as usize;
-        let rows = bytes.chunks(info.line_size).enumerate().filter(|(row, _)| scenes.contains(row));
-        let pixels = rows
-            .flat_map(|(_, row)| row.chunks(samples).take(width).skip(left))
-            .map(|pixel| [pixel[0], pixel[1], pixel[2]]);
-        Self { width: width - left, pixels: pixels.collect() }
+        let rows = bytes.chunks(info.line_size).take(height).skip(top);
+        let pixels =
+            rows.flat_map(|row| row.chunks(samples).take(width).skip(left)).map(|pixel| [pixel[0], pixel[1], pixel[2]]);
+        Self { width: width - left, height: height - top, pixels: pixels.collect() }
     }
 
     /// How many pixels of its own colour each learner's view has.
@@ -42,9 +43,18 @@ impl Picture {
         std::array::from_fn(|learner| {
             let colour = learner_color(learner);
             let near = |pixel: &[u8; 3]| pixel.iter().zip(colour).all(|(a, b)| a.abs_diff(b) <= TOLERANCE);
-            let in_view = |index: usize| index % self.width * LEARNERS / self.width == learner;
+            let in_view = |index: usize| self.learner(index) == Some(learner);
             self.pixels.iter().enumerate().filter(|(index, pixel)| in_view(*index) && near(pixel)).count()
         })
+    }
+
+    /// In whose view a pixel is.
+    fn learner(&self, index: usize) -> Option<usize> {
+        let (row, column) = (index / self.width, index % self.width);
+        let height = self.height / ROWS;
+        let view = row / height * COLUMNS + column * COLUMNS / self.width;
+        let inside = (MARGIN..height.saturating_sub(MARGIN)).contains(&(row % height));
+        (inside && view < LEARNERS).then_some(view)
     }
 
     pub fn shows_all_learners(&self) -> bool {
@@ -56,7 +66,7 @@ impl Picture {
         let mut changed = [0; LEARNERS];
         for (index, (a, b)) in self.pixels.iter().zip(&other.pixels).enumerate() {
             if a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > TOLERANCE) {
-                changed[index % self.width * LEARNERS / self.width] += 1;
+                self.learner(index).into_iter().for_each(|learner| changed[learner] += 1);
             }
         }
         changed.iter().all(|count| *count >= ARM)

@@ -186,3 +186,79 @@ async fn the_websocket_carries_reports_and_recording_and_resumes() {
     drop(whole.flush().await);
     server.stop().await;
 }
+
+#[tokio::test]
+async fn whoever_is_far_behind_gets_parts_put_together() {
+    let server = Server::start().await;
+    let session = server.open_quick(1).await;
+    for _ in 0..30 {
+        server.step(&session, 1).await;
+    }
+    let connect = async |query: &str| {
+        let stream = TcpStream::connect(server.address).await.expect("a connection");
+        let url = format!("ws://{}{session}/live{query}", server.address);
+        client_async(url, stream).await.expect("a WebSocket").0
+    };
+    // A late visitor: header, one part, the index of the next, and then every report.
+    let mut late = connect("").await;
+    let (mut parts, mut next, mut steps) = (Vec::new(), 0, Vec::new());
+    while steps.last() != Some(&30) {
+        match timeout(SOON, late.next()).await.expect("soon").expect("a message").expect("no error") {
+            Message::Binary(part) => parts.push(part),
+            Message::Text(text) => {
+                let event: Value = serde_json::from_str(&text).expect("JSON");
+                match event["type"].as_str() {
+                    Some("parts") => next = event["data"]["next"].as_u64().expect("an index"),
+                    Some("step") => steps.push(event["data"]["step"].as_u64().expect("a step")),
+                    _ => {}
+                }
+            }
+            other => panic!("unexpected: {other:?}"),
+        }
+    }
+    assert_eq!(steps, (0..=30).collect::<Vec<_>>());
+    assert!(parts.len() < 10, "{} parts", parts.len());
+    assert_eq!(steps_of_recording(&parts.concat()), (0..=30).collect());
+    // It resumes from there.
+    let mut resumed = connect(&format!("?from={next}&step=31")).await;
+    resumed.next().await.expect("a message").expect("the description");
+    server.step(&session, 1).await;
+    let mut bytes = parts[0].to_vec();
+    while let Message::Binary(part) =
+        timeout(SOON, resumed.next()).await.expect("soon").expect("one").expect("no error")
+    {
+        bytes.extend_from_slice(&part);
+    }
+    // What was left for a quiet moment may come with it; nothing is lost.
+    assert!(steps_of_recording(&bytes).contains(&31));
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn a_client_that_does_not_read_holds_nobody_up() {
+    let server = Server::start().await;
+    let session = server.open_quick(1).await;
+    let stream = TcpStream::connect(server.address).await.expect("a connection");
+    let url = format!("ws://{}{session}/live", server.address);
+    let mut slow = client_async(url, stream).await.expect("a WebSocket").0;
+    // More than the buffers between the two hold.
+    for _ in 0..20 {
+        timeout(SOON, server.step(&session, 50)).await.expect("steps are made all the same");
+    }
+    let (mut steps, mut bytes) = (Vec::new(), Vec::new());
+    while steps.last() != Some(&1000) {
+        match timeout(SOON, slow.next()).await.expect("soon").expect("a message").expect("no error") {
+            Message::Binary(part) => bytes.extend_from_slice(&part),
+            Message::Text(text) => {
+                let event: Value = serde_json::from_str(&text).expect("JSON");
+                if event["type"] == "step" {
+                    steps.push(event["data"]["step"].as_u64().expect("a step"));
+                }
+            }
+            other => panic!("unexpected: {other:?}"),
+        }
+    }
+    assert_eq!(steps, (0..=1000).collect::<Vec<_>>(), "each report once");
+    assert_eq!(steps_of_recording(&bytes), (0..=1000).collect());
+    server.stop().await;
+}

@@ -2,7 +2,6 @@
 
 use body_schema::{
     experiment::{Description, LearnerReport, ModelReport, StepReport},
-    recording::SIGMAS,
     selection::Partition,
 };
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -93,7 +92,7 @@ fn check_ellipsoids(reading: &Reading, entity: &str, step: u64, expected: &[([f6
         for (axis, half) in half_sizes.into_iter().enumerate() {
             let axis: Vector3<f64> = axes.column(axis).into();
             let standard_deviation = axis.dot(&(covariance * axis)).max(0.0).sqrt();
-            let expected = SIGMAS * scale * standard_deviation;
+            let expected = scale * standard_deviation;
             if expected > 1e-3 * largest {
                 close(&[half], &[expected], "half-size");
             } else {

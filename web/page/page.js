@@ -39,10 +39,9 @@ const commands = {
   find: ({ session: id }) =>
     request("find", "GET", `/v1/sessions/${encodeURIComponent(id)}`, undefined, follow).catch(() => {}),
 
-  open({ scenario, seed, learners, sigmas }) {
-    const size = sigmas === "1" ? {} : { sigmas };
+  open({ scenario, seed, learners, ellipsoids }) {
     const before = session;
-    return request("open", "POST", "/v1/sessions", { scenario, seed, learners, ...size }, (next) => {
+    return request("open", "POST", "/v1/sessions", { scenario, seed, learners, ellipsoids }, (next) => {
       // The old one goes only after the new one has come, and only if it was opened here.
       if (before !== null && kept(OWN) === before) ask("DELETE", `/v1/sessions/${before}`).catch(() => {});
       keep(OWN, next.id);

@@ -2,8 +2,10 @@
 
 /** How long to wait before each attempt to reconnect, ms; the last holds for all further ones. */
 const BACK_OFF_MS = [500, 1000, 2000, 4000, 8000];
-/** The close codes that say that the session was deleted, and that its engine has failed. */
+/** How reports begin, and what says which part of the recording is next. */
 const STEP = /^\{"type":"step","data":\{"step":(\d+)/;
+const PARTS = /^\{"type":"parts","data":\{"next":(\d+)\}\}$/;
+/** The close codes that say that the session was deleted, and that its engine has failed. */
 const [CLOSE_DELETED, CLOSE_FAILED] = [4404, 4500];
 
 /** An error that the server explained (RFC 9457). */
@@ -82,6 +84,11 @@ export class Follower {
     if (data instanceof ArrayBuffer) {
       this.#part += 1;
       this.#on.part(data);
+      return;
+    }
+    const parts = PARTS.exec(data);
+    if (parts !== null) {
+      this.#part = Number(parts[1]);
       return;
     }
     // Reports are long; that they begin with their step spares reading them twice.

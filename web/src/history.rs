@@ -16,6 +16,8 @@ pub struct Row {
     pub prediction_m: Option<f64>,
     /// tr(W P).
     pub trace: Option<f64>,
+    /// Cramér–Rao bound on it, given the data collected.
+    pub bound: Option<f64>,
     /// Expected fall of the trace.
     pub gain: Option<f64>,
     /// How long the choice took, ms.
@@ -38,6 +40,7 @@ impl Row {
             location_m: metrics.location_m,
             prediction_m: metrics.prediction_mean_m,
             trace: metrics.trace,
+            bound: metrics.bound_trace,
             gain: movement.as_ref().and_then(|movement| movement.gain),
             selection_ms: movement.as_ref().map(|movement| movement.selection_ms),
             movements: metrics.movements,

@@ -134,7 +134,7 @@ pub enum Command {
         /// The learners; null for all.
         learners: Option<Vec<String>>,
         /// How large ellipsoids are drawn.
-        sigmas: String,
+        ellipsoids: String,
     },
     /// Make steps.
     Step {

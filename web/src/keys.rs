@@ -23,7 +23,8 @@ impl Panel {
         let typing = ctx.text_edit_focused();
         self.set_typing(typing);
         if ctx.input(|input| input.key_pressed(Key::Escape)) {
-            (self.help, self.tour) = (false, None);
+            self.help = false;
+            self.close_tour();
         }
         if typing {
             return;
@@ -63,7 +64,11 @@ impl Panel {
             self.change_speed(false);
         }
         if pressed(Key::T) {
-            self.tour = if self.tour.is_some() { None } else { Some(0) };
+            if self.tour.is_some() {
+                self.close_tour();
+            } else {
+                self.tour = Some(0);
+            }
         }
         if pressed(Key::Questionmark) || (pressed(Key::Slash) && ctx.input(|input| input.modifiers.shift)) {
             self.help = !self.help;

@@ -228,9 +228,9 @@ impl Panel {
         self.opening = true;
         self.restoring = (step > 0).then(|| step.min(MAX_RESTORED));
         self.wanted = self.restoring;
-        let Settings { scenario, seed, learners, sigmas, .. } = self.settings.clone();
+        let Settings { scenario, seed, learners, ellipsoids, .. } = self.settings.clone();
         let learners = Some(learners).filter(|learners| !learners.is_empty());
-        self.ask(Command::Open { scenario, seed, learners, sigmas });
+        self.ask(Command::Open { scenario, seed, learners, ellipsoids });
     }
 
     fn adopt(&mut self, session: Session) {
@@ -238,9 +238,7 @@ impl Panel {
         self.settings.scenario.clone_from(&description.scenario);
         self.settings.seed = description.seed;
         self.seed_text = description.seed.to_string();
-        let all = self.scenario().map_or(0, |scenario| scenario.learners.len());
-        let names: Vec<String> = description.learners.iter().map(|learner| learner.name.clone()).collect();
-        self.settings.learners = if names.len() == all { Vec::new() } else { names };
+        self.settings.learners = description.learners.iter().map(|learner| learner.name.clone()).collect();
         self.settings.session = Some(session.id.clone());
         self.history = History::new(description);
         self.why = Why::default();

@@ -56,7 +56,7 @@ impl Tab {
 }
 
 /// How large ellipsoids are drawn in the scene, with their names in the address and for people.
-pub const SIGMAS: [(&str, &str); 3] = [("1", "1σ"), ("2", "2σ"), ("95", "95 %")];
+pub const ELLIPSOIDS: [(&str, &str); 3] = [("1-sigma", "1σ"), ("2-sigma", "2σ"), ("95-percent", "95 %")];
 
 /// Everything that an address holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +65,7 @@ pub struct Settings {
     pub scenario: String,
     /// Seed of all random streams.
     pub seed: u64,
-    /// The learners to compare; empty means all.
+    /// The learners to compare; empty means those that the scenario runs by default.
     pub learners: Vec<String>,
     /// The step that is shown.
     pub step: u64,
@@ -82,7 +82,7 @@ pub struct Settings {
     /// The joints of the slice.
     pub joints: Option<(usize, usize)>,
     /// How large ellipsoids are.
-    pub sigmas: String,
+    pub ellipsoids: String,
     /// The session, which only this server knows.
     pub session: Option<String>,
 }
@@ -100,7 +100,7 @@ impl Default for Settings {
             tab: Tab::Charts,
             learner: None,
             joints: None,
-            sigmas: "1".to_owned(),
+            ellipsoids: ELLIPSOIDS[0].0.to_owned(),
             session: None,
         }
     }
@@ -166,9 +166,12 @@ impl Settings {
                 let pair: Option<(usize, usize)> = pair.filter(|(a, b)| a != b);
                 self.joints = Some(pair.ok_or_else(|| wrong("two joints", "the first two".to_owned()))?);
             }
-            "sigmas" => {
-                let found = SIGMAS.iter().find(|(name, _)| *name == value);
-                found.ok_or_else(|| wrong("1, 2 or 95", "1".to_owned()))?.0.clone_into(&mut self.sigmas);
+            "ellipsoids" => {
+                let found = ELLIPSOIDS.iter().find(|(name, _)| *name == value);
+                found
+                    .ok_or_else(|| wrong("1-sigma, 2-sigma or 95-percent", "1-sigma".to_owned()))?
+                    .0
+                    .clone_into(&mut self.ellipsoids);
             }
             "session" => self.session = Some(value.to_owned()),
             // Browsers and those who pass links on add what they like.
@@ -188,18 +191,15 @@ impl Settings {
             first
         });
         scenario.name.clone_into(&mut self.scenario);
-        let offered = |name: &String| scenario.learners.iter().any(|learner| learner.name == *name);
+        let offered = |name: &String| scenario.offered().any(|learner| learner.name == *name);
         for name in self.learners.iter().filter(|name| !offered(name)) {
             notices.push(format!("{} has no learner “{}”; it is left out.", scenario.name, short(name)));
         }
         self.learners.retain(offered);
         // In the scenario's order, so that one choice has one address.
-        let place = |name: &String| scenario.learners.iter().position(|learner| learner.name == *name);
+        let place = |name: &String| scenario.offered().position(|learner| learner.name == *name);
         self.learners.sort_by_key(place);
         self.learners.dedup();
-        if self.learners.len() == scenario.learners.len() {
-            self.learners.clear();
-        }
         if let Some((a, b)) = self.joints.filter(|(a, b)| (*a).max(*b) >= scenario.joints.len()) {
             let count = scenario.joints.len();
             notices.push(format!("{} has {count} joints, so there is no slice through {a} and {b}.", scenario.name));
@@ -239,8 +239,8 @@ impl Settings {
         if let Some((a, b)) = self.joints {
             add("joints", &format!("{a},{b}"));
         }
-        if self.sigmas != usual.sigmas {
-            add("sigmas", &self.sigmas);
+        if self.ellipsoids != usual.ellipsoids {
+            add("ellipsoids", &self.ellipsoids);
         }
         if let Some(session) = self.session.as_ref().filter(|_| with_session) {
             add("session", session);
@@ -300,7 +300,7 @@ mod tests {
             tab: Tab::Why,
             learner: Some("active".to_owned()),
             joints: Some((0, 3)),
-            sigmas: "95".to_owned(),
+            ellipsoids: "95-percent".to_owned(),
             session: Some("3f2a".to_owned()),
         };
         assert_eq!(Settings::parse(&settings.query(true)), (settings.clone(), Vec::new()));
@@ -324,7 +324,7 @@ mod tests {
             "joints=1",
             "joints=2,2",
             "joints=a,b",
-            "sigmas=3",
+            "ellipsoids=3",
             "v=2",
             "v=",
             "colour=blue",

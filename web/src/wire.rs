@@ -19,6 +19,16 @@ pub struct Scenario {
     pub steps: u64,
     /// The learners it offers.
     pub learners: Vec<Learner>,
+    /// What else can be compared: any estimator with any policy that fits it.
+    #[serde(default)]
+    pub compositions: Vec<Learner>,
+}
+
+impl Scenario {
+    /// Every learner that can be compared, the scenario's own first.
+    pub fn offered(&self) -> impl Iterator<Item = &Learner> {
+        self.learners.iter().chain(&self.compositions)
+    }
 }
 
 /// A joint.
@@ -64,6 +74,9 @@ pub struct Description {
     pub seed: u64,
     /// The joints, base first.
     pub joints: Vec<Joint>,
+    /// Number of learned parameters.
+    #[serde(default)]
+    pub parameters: u64,
     /// The learners, in the order of every report.
     pub learners: Vec<Learner>,
     /// The thresholds of convergence.
@@ -74,6 +87,13 @@ pub struct Description {
     /// After so many movements the body changes.
     #[serde(default)]
     pub change_at: Option<u64>,
+}
+
+impl Description {
+    /// Movements after which there are as many equations as unknowns, three each: a yardstick, not a bound.
+    pub fn movements_by_counting(&self) -> u64 {
+        self.parameters.div_ceil(3)
+    }
 }
 
 /// A session.
@@ -135,6 +155,8 @@ pub struct Metrics {
     pub prediction_mean_m: Option<f64>,
     /// tr(W P).
     pub trace: Option<f64>,
+    /// Cramér–Rao bound of the data collected on the trace of the error's covariance.
+    pub bound_trace: Option<f64>,
     /// Movements made.
     pub movements: u64,
     /// Movements after which the marker was not seen.

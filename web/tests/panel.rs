@@ -21,7 +21,7 @@ fn an_opened_page_asks_for_a_session_and_its_first_step() {
     assert_eq!(page.commands(), [Command::Scenarios]);
     page.tell(scenarios());
     let learners = Some(vec!["active".to_owned(), "random".to_owned()]);
-    let open = Command::Open { scenario: "head-fov".to_owned(), seed: 7, learners, sigmas: "1".to_owned() };
+    let open = Command::Open { scenario: "head-fov".to_owned(), seed: 7, learners, ellipsoids: "1-sigma".to_owned() };
     assert_eq!(page.commands(), [open]);
     assert!(page.has("Opening a session"));
 }
@@ -176,7 +176,10 @@ fn a_reload_finds_its_session_or_computes_it_again() {
         Command::Address { query } => Some(query),
         _ => None,
     });
-    assert_eq!(query.as_deref(), Some("v=1&scenario=head-fov&seed=3&step=5&session=head-fov-3"));
+    assert_eq!(
+        query.as_deref(),
+        Some("v=1&scenario=head-fov&seed=3&learners=active,random,gradient&step=5&session=head-fov-3")
+    );
 }
 
 #[test]
@@ -190,6 +193,30 @@ fn learners_and_seeds_are_chosen() {
     page.tell(json!({ "is": "connected" }));
     page.press(Key::R);
     assert!(matches!(page.commands().last(), Some(Command::Open { seed: 5, .. })));
+    let compared = |page: &mut Page, toggled: Option<&str>| {
+        toggled.into_iter().for_each(|label| page.toggle(label));
+        let commands = page.commands();
+        let Some(Command::Open { learners: Some(learners), .. }) = commands.last() else { panic!("{commands:?}") };
+        let learners = learners.clone();
+        page.tell(json!({ "is": "session", "session": session("arm-6dof", 5, Some(learners.clone())) }));
+        learners
+    };
+    assert_eq!(compared(&mut page, Some("gradient")), ["active", "random"]);
+    // Any estimator with any policy.
+    page.click("Add…");
+    page.click("smoother:random");
+    assert_eq!(compared(&mut page, None), ["active", "random", "smoother:random"]);
+    assert_eq!(compared(&mut page, Some("active")), ["random", "smoother:random"]);
+}
+
+#[test]
+fn escape_ends_the_tour_for_good() {
+    let mut page = Page::with_session("");
+    page.make_steps(1, |_, _, _| {});
+    page.press(Key::T);
+    assert!(page.harness.state().tour.is_some());
+    page.press(Key::Escape);
+    assert!(page.harness.state().tour.is_none() && page.commands().contains(&Command::Known));
 }
 
 #[test]

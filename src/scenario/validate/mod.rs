@@ -11,8 +11,9 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use toml::Spanned;
 
 use super::{
-    EstimatorKind, Filter, LearnerSpec, PolicyKind, Prior, Scenario, SelectionSpec, SmootherSpec,
+    EstimatorKind, Filter, LearnerSpec, Prior, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError, similar},
+    learners::{Fault, misfit},
     raw,
 };
 use crate::{
@@ -236,15 +237,16 @@ impl Check<'_> {
                 let mend = "give each learner a name of its own, of letters, digits, '-' and '_'";
                 self.problem(learner.name.span(), format!("{key}.name"), what, mend);
             }
-            if policy != PolicyKind::Random && !learner.estimator.keeps_covariance() {
-                let what = format!("`{}` keeps no covariance to choose by", learner.estimator.name());
-                let mend = "write `policy = \"random\"`, or another estimator";
-                self.problem(learner.policy.span(), format!("{key}.policy"), what, mend);
-            }
-            if learner.estimator == EstimatorKind::RlsSixNumbers && learns_marker {
-                let mend = "write `estimator = \"rls\"`, or set `learn_marker = false`";
-                let what = "six numbers per joint leave no place for a learned marker";
-                self.problem(learner.name.span(), format!("{key}.estimator"), what, mend);
+            match misfit(learner.estimator, policy, learns_marker) {
+                Some((Fault::Policy, what)) => {
+                    let mend = "write `policy = \"random\"`, or another estimator";
+                    self.problem(learner.policy.span(), format!("{key}.policy"), what, mend);
+                }
+                Some((Fault::Estimator, what)) => {
+                    let mend = "write `estimator = \"rls\"`, or set `learn_marker = false`";
+                    self.problem(learner.name.span(), format!("{key}.estimator"), what, mend);
+                }
+                None => {}
             }
             if let (Some(key_span), EstimatorKind::Gradient) = (&learner.stabilising_noise, learner.estimator) {
                 let mend = "remove it; only `rls` adds this noise";

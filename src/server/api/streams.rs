@@ -22,6 +22,7 @@ use utoipa::ToSchema;
 
 use crate::{
     experiment::{Description, StepReport},
+    recording::LiveLog,
     server::{
         App, extract,
         problem::Problem,
@@ -31,6 +32,8 @@ use crate::{
 
 /// How many reports are taken from the history at a time.
 const BATCH: usize = 64;
+/// From so many waiting parts on, a WebSocket gets them put together: a viewer takes some dozens a frame.
+const MANY_PARTS: usize = 200;
 /// Silence after which a comment or a ping shows that the connection still stands.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// Why the WebSocket was closed: the session was deleted …
@@ -52,6 +55,11 @@ pub(super) enum LiveEvent {
     /// One for each step, from the one asked for on.
     #[schema(value_type = StepReport)]
     Step(#[serde(serialize_with = "report")] Arc<StepReport>),
+    /// After several parts of the recording were sent as one: which part is the next, to resume from.
+    Parts {
+        /// Its index.
+        next: usize,
+    },
 }
 
 fn report<S: serde::Serializer>(report: &Arc<StepReport>, serializer: S) -> Result<S::Ok, S::Error> {
@@ -104,7 +112,7 @@ pub(super) async fn events(
 )]
 pub(super) async fn live_recording(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
     let session = app.sessions.get(&id)?;
-    let body = Body::from_stream(parts(Parts::new(&session, 0)));
+    let body = Body::from_stream(parts(Parts::new(&session, 0, LiveLog::parts_from)));
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], body).into_response())
 }
 
@@ -123,9 +131,10 @@ fn parts(parts: Parts) -> impl Stream<Item = Result<Bytes, Infallible>> {
 
 /// Everything over one WebSocket, for a page: reports as text (LiveEvent), the recording as binary messages.
 ///
-/// A binary message is one part of the recording: part 0 is the 12-byte header of an .rrd stream, each further part is
-/// one message, and any part after the header makes a valid stream with the header in front. A report comes after the
-/// part that records it.
+/// A binary message is one part of the recording: part 0 is the 12-byte header of an .rrd stream, and any part after it
+/// makes a valid stream with the header in front. Views are arranged for the scene alone, as a page has curves of its
+/// own. Many parts at once are put together into one, and a `parts` event says which is the next. A report comes after
+/// the part that records it.
 #[utoipa::path(get, path = "/v1/sessions/{id}/live", tag = "sessions", operation_id = "followSession",
     params(
         ("id" = String, Path, description = "The session's id", format = "uuid"),
@@ -153,7 +162,8 @@ pub(super) async fn live(
         Ok(upgrade) => upgrade,
         Err(rejection) => return Ok(rejection.into_response()),
     };
-    let readers = (Reports::new(&session, step.unwrap_or(0)), Parts::new(&session, from.unwrap_or(0)));
+    let readers =
+        (Reports::new(&session, step.unwrap_or(0)), Parts::new(&session, from.unwrap_or(0), LiveLog::scene_parts_from));
     let description = session.description().clone();
     // Clients have nothing to say; what they say must not fill the memory.
     let upgrade = upgrade.max_message_size(1 << 10);
@@ -177,14 +187,13 @@ async fn follow(
             biased;
             message = socket.recv() => if message.transpose()?.is_none() { return Ok(()) },
             batch = parts.next() => match batch {
-                Some(batch) => for part in batch { socket.send(Message::Binary(part)).await? },
+                Some(batch) => send_parts(&mut socket, &parts, batch).await?,
                 None => break,
             },
             batch = reports.next() => {
                 // Both may have come since the parts were asked for.
-                for part in parts.ready() {
-                    socket.send(Message::Binary(part)).await?;
-                }
+                let ready = parts.ready();
+                send_parts(&mut socket, &parts, ready).await?;
                 for report in batch.into_iter().flatten() {
                     socket.send(text(&LiveEvent::Step(report))?).await?;
                 }
@@ -203,6 +212,23 @@ async fn follow(
         None => (CLOSE_DELETED, "the session was deleted".to_owned()),
     };
     socket.send(Message::Close(Some(CloseFrame { code, reason: reason.into() }))).await
+}
+
+/// Sends parts that have just been read: one by one, or put together if there are many.
+async fn send_parts(socket: &mut WebSocket, parts: &Parts, mut batch: Vec<Bytes>) -> Result<(), axum::Error> {
+    if batch.len() < MANY_PARTS {
+        for part in batch {
+            socket.send(Message::Binary(part)).await?;
+        }
+        return Ok(());
+    }
+    let live = parts.session.live().clone();
+    if batch[0] == live.header() {
+        socket.send(Message::Binary(batch.remove(0))).await?;
+    }
+    let made = tokio::task::spawn_blocking(move || live.put_together(&batch)).await.map_err(axum::Error::new)?;
+    socket.send(Message::Binary(made.map_err(axum::Error::new)?)).await?;
+    socket.send(text(&LiveEvent::Parts { next: parts.next })?).await
 }
 
 fn text(event: &LiveEvent) -> Result<Message, axum::Error> {
@@ -247,14 +273,15 @@ impl Reports {
 /// Reads parts of the recording from an index on.
 struct Parts {
     session: Watching,
+    read: fn(&LiveLog, usize) -> Vec<Bytes>,
     next: usize,
     more: watch::Receiver<usize>,
 }
 
 impl Parts {
-    fn new(session: &Arc<Session>, first: u64) -> Self {
+    fn new(session: &Arc<Session>, first: u64, read: fn(&LiveLog, usize) -> Vec<Bytes>) -> Self {
         let more = session.live().subscribe();
-        Self { next: usize::try_from(first).unwrap_or(usize::MAX), more, session: session.watch() }
+        Self { next: usize::try_from(first).unwrap_or(usize::MAX), more, read, session: session.watch() }
     }
 
     /// The next parts, as soon as there are any; `None` when none are coming. Cancelling loses nothing.
@@ -274,7 +301,7 @@ impl Parts {
     }
 
     fn ready(&mut self) -> Vec<Bytes> {
-        let batch = self.session.live().parts_from(self.next);
+        let batch = (self.read)(self.session.live(), self.next);
         self.next += batch.len();
         batch
     }

@@ -16,7 +16,7 @@ use uuid::Uuid;
 use super::Shared;
 use crate::{
     experiment::{AppraisalReport, Choice, Description, Experiment, RunResult, StepReport},
-    recording::{Recorder, Target},
+    recording::{EllipsoidSize, Recorder, Target},
     scenario::builtin,
     server::{
         MAX_STEPS_PER_SESSION,
@@ -37,6 +37,7 @@ pub(super) struct Setup {
     pub(super) scenario: String,
     pub(super) seed: u64,
     pub(super) learners: Option<Vec<String>>,
+    pub(super) ellipsoids: EllipsoidSize,
     /// The recording's file, if one is kept.
     pub(super) file: Option<PathBuf>,
     pub(super) shared: Arc<Shared>,
@@ -80,10 +81,10 @@ pub(super) type Reply<T> = oneshot::Sender<Result<T, Problem>>;
 
 /// The body of the thread. `opened` hears of the description once the session stands.
 pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply<Description>) {
-    let Setup { id, scenario, seed, learners, file, shared, permit } = setup;
+    let Setup { id, scenario, seed, learners, ellipsoids, file, shared, permit } = setup;
     let open = || -> Result<(Experiment, Recorder), Problem> {
         let experiment = builtin(&scenario)?.experiment(seed, learners.as_deref())?;
-        let target = Target::live(shared.live.clone()).with_recording_id(id.to_string());
+        let target = Target::live(shared.live.clone()).with_recording_id(id.to_string()).with_ellipsoids(ellipsoids);
         let target = file.iter().fold(target, |target, file| target.and_file(file));
         let mut recorder = Recorder::new(experiment.description(), target)
             .and_then(|mut recorder| recorder.log(experiment.latest()).map(|()| recorder))

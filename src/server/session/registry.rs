@@ -17,9 +17,12 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::{Budget, Session, Shared, engine, lock};
-use crate::server::{
-    IDLE_AFTER, MAX_SESSIONS,
-    problem::{Kind, Problem},
+use crate::{
+    recording::EllipsoidSize,
+    server::{
+        IDLE_AFTER, MAX_SESSIONS,
+        problem::{Kind, Problem},
+    },
 };
 
 /// How long a session may take to end after it was told to.
@@ -40,6 +43,9 @@ pub struct NewSession {
     #[serde(default)]
     #[schema(example = json!(["active", "random"]))]
     pub learners: Option<Vec<String>>,
+    /// How large the ellipsoids of its recording are.
+    #[serde(default)]
+    pub ellipsoids: EllipsoidSize,
 }
 
 fn first_seed() -> u64 {
@@ -80,6 +86,7 @@ impl Sessions {
             scenario: new.scenario,
             seed: new.seed,
             learners: new.learners,
+            ellipsoids: new.ellipsoids,
             file: self.data_dir.as_ref().zip(file.as_ref()).map(|(directory, file)| directory.join(file)),
             shared: shared.clone(),
             permit,
@@ -186,7 +193,12 @@ mod tests {
     #[tokio::test]
     async fn a_panic_of_the_engine_is_a_problem_for_its_requests_and_hangs_none() {
         let sessions = Sessions::new(Budget::new(usize::MAX), None, CancellationToken::new());
-        let new = |scenario: &str| NewSession { scenario: scenario.to_owned(), seed: 1, learners: None };
+        let new = |scenario: &str| NewSession {
+            scenario: scenario.to_owned(),
+            seed: 1,
+            learners: None,
+            ellipsoids: EllipsoidSize::default(),
+        };
         let session = sessions.open(new("arm-6dof")).await.expect("a session");
         session.make_steps(2, None).await.expect("steps");
         session.panic();
@@ -205,7 +217,12 @@ mod tests {
     #[tokio::test]
     async fn full_memory_refuses_steps_until_a_session_goes() {
         let sessions = Sessions::new(Budget::new(300_000), None, CancellationToken::new());
-        let new = NewSession { scenario: "arm-6dof".to_owned(), seed: 1, learners: Some(vec!["random".to_owned()]) };
+        let new = NewSession {
+            scenario: "arm-6dof".to_owned(),
+            seed: 1,
+            learners: Some(vec!["random".to_owned()]),
+            ellipsoids: EllipsoidSize::default(),
+        };
         let (first, second) = (sessions.open(new.clone()).await.expect("one"), sessions.open(new).await.expect("two"));
         first.make_steps(300, None).await.expect("the last command may overshoot");
         assert_eq!(second.make_steps(1, None).await.expect_err("full").status, 503);

@@ -22,6 +22,8 @@ struct Chart {
     /// Whether convergence is marked on it.
     judged: bool,
     value: fn(&Row) -> Option<f64>,
+    /// What it cannot fall below.
+    bound: fn(&Row) -> Option<f64>,
 }
 
 const CHARTS: [Chart; 6] = [
@@ -32,6 +34,7 @@ const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: true,
         value: |row| row.orientation_deg,
+        bound: |_| None,
     },
     Chart {
         title: "Location error",
@@ -40,6 +43,7 @@ const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: true,
         value: |row| Some(row.location_m? * 1e3),
+        bound: |_| None,
     },
     Chart {
         title: "Prediction error",
@@ -48,14 +52,17 @@ const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: false,
         value: |row| Some(row.prediction_m? * 1e3),
+        bound: |_| None,
     },
     Chart {
         title: "Uncertainty",
         unit: "tr(W P)",
-        tip: "Trace of the weighted covariance: what the active learner makes as small as it can",
+        tip: "Trace of the weighted covariance: what the active learner makes as small as it can. Thin: the Cramér–Rao \
+              bound, below which nobody's error can fall with the same data",
         logarithmic: true,
         judged: false,
         value: |row| row.trace,
+        bound: |row| row.bound,
     },
     Chart {
         title: "Misses",
@@ -64,6 +71,7 @@ const CHARTS: [Chart; 6] = [
         logarithmic: false,
         judged: false,
         value: |row| Some(row.misses as f64),
+        bound: |_| None,
     },
     Chart {
         title: "Time of a choice",
@@ -72,6 +80,7 @@ const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: false,
         value: |row| row.selection_ms.filter(|ms| *ms > 0.0),
+        bound: |_| None,
     },
 ];
 
@@ -98,7 +107,7 @@ impl Chart {
     }
 }
 
-/// Marks at 1, 2 and 5 of every power of ten, y being its logarithm.
+/// Marks at powers of ten and, where they are few, between them, y being its logarithm.
 fn decades(input: GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     if !(low.is_finite() && high.is_finite()) || high - low > 40.0 {
@@ -107,11 +116,12 @@ fn decades(input: GridInput) -> Vec<GridMark> {
     let mut marks = Vec::new();
     for decade in low.floor() as i32..=high.ceil() as i32 {
         marks.push(GridMark { value: f64::from(decade), step_size: 1.0 });
-        if high - low < 2.5 {
-            marks.extend(
-                [2.0f64, 5.0].map(|digit| GridMark { value: f64::from(decade) + digit.log10(), step_size: 0.5 }),
-            );
-        }
+        let digits: &[f64] = match high - low {
+            range if range < 0.7 => &[1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0],
+            range if range < 2.5 => &[2.0, 5.0],
+            _ => &[],
+        };
+        marks.extend(digits.iter().map(|digit| GridMark { value: f64::from(decade) + digit.log10(), step_size: 0.5 }));
     }
     // Labels are drawn for every mark, wherever it lies.
     marks.retain(|mark| (low..=high).contains(&mark.value));
@@ -154,6 +164,14 @@ impl Panel {
             }
             let converged =
                 (0..description.learners.len()).any(|i| self.history.converged_at(self.cursor, i).is_some());
+            if description.truth.is_some() && description.parameters > 0 {
+                let tip = format!(
+                    "{} unknowns, three equations a movement: nobody can know everything earlier without an initial guess",
+                    description.parameters
+                );
+                let text = format!("dotted: {} movements, as many equations as unknowns", description.movements_by_counting());
+                ui.label(RichText::new(text).weak()).on_hover_text(tip);
+            }
             if converged {
                 ui.label(RichText::new("filled mark: converged").weak());
             }
@@ -212,11 +230,21 @@ impl Panel {
                 let line = HLine::new("threshold", chart.y(threshold)).color(threshold_colour).width(1.0);
                 plot.hline(line.style(LineStyle::Dashed { length: 3.0 }).allow_hover(false));
             }
+            if chart.judged && description.parameters > 0 {
+                let counted = VLine::new("", description.movements_by_counting() as f64).color(cursor_colour);
+                plot.vline(counted.width(1.0).style(LineStyle::Dotted { spacing: 4.0 }).allow_hover(false));
+            }
             plot.vline(VLine::new("", self.cursor as f64).color(cursor_colour).width(1.0).allow_hover(false));
             for (index, learner) in description.learners.iter().enumerate() {
                 let colour = colours::learner(index);
                 let curve: Vec<[f64; 2]> =
                     self.history.curve(index, chart.value).into_iter().map(|[x, y]| [x, chart.y(y)]).collect();
+                let bound = self.history.curve(index, chart.bound).into_iter();
+                let bound: Vec<[f64; 2]> = bound.map(|[x, y]| [x, chart.y(y)]).collect();
+                if !bound.is_empty() {
+                    let name = format!("bound of {}'s data", learner.name);
+                    plot.line(Line::new(name, bound).color(colour.gamma_multiply(0.6)).width(1.0));
+                }
                 let line = Line::new(&learner.name, PlotPoints::from(curve)).color(colour).width(1.8);
                 plot.line(line.style(colours::line_style(index)));
                 let at = |step: u64| Some([step as f64, chart.y((chart.value)(self.history.row(step, index)?)?)]);

@@ -2,7 +2,7 @@
 
 use egui::{Button, ProgressBar, RichText, Slider, Ui};
 
-use super::alarm;
+use super::{NARROW, alarm};
 use crate::{
     panel::{Link, Panel},
     play::SPEEDS,
@@ -13,7 +13,9 @@ impl Panel {
     pub(super) fn controls(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
             ui.heading("body-schema");
-            ui.label(RichText::new("learn a robot's body from a few well-chosen movements").weak());
+            if ui.available_width() > NARROW {
+                ui.label(RichText::new("learn a robot's body from a few well-chosen movements").weak());
+            }
         });
         ui.add_space(2.0);
         ui.horizontal_wrapped(|ui| {

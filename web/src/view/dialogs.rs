@@ -85,9 +85,16 @@ impl Panel {
                     }
                 });
             });
-        if next.is_none() {
+        match next {
+            Some(_) => self.tour = next,
+            None => self.close_tour(),
+        }
+    }
+
+    /// Whoever has closed the tour need not be offered it again.
+    pub(crate) fn close_tour(&mut self) {
+        if self.tour.take().is_some() {
             self.ask(Command::Known);
         }
-        self.tour = next;
     }
 }

@@ -37,10 +37,22 @@ pub(crate) fn good(ui: &Ui) -> egui::Color32 {
     }
 }
 
+/// Below this width words are shortened.
+pub(crate) const NARROW: f32 = 440.0;
+
+/// egui's small print is too small and its weak colour too weak to be read by everybody.
+fn legible(ui: &mut Ui) {
+    ui.visuals_mut().weak_text_alpha = 0.8;
+    if let Some(small) = ui.style_mut().text_styles.get_mut(&egui::TextStyle::Small) {
+        small.size = 11.0;
+    }
+}
+
 impl Panel {
     /// Draws the panel and takes in what the visitor does.
     pub fn ui(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
+        legible(ui);
         self.take_keys(&ctx);
         let again = self.tick(ctx.input(|input| input.time));
         ctx.request_repaint_after(std::time::Duration::from_secs_f64(again.unwrap_or(1.0).clamp(0.005, 1.0)));

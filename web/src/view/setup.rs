@@ -2,7 +2,14 @@
 
 use egui::{ComboBox, RichText, TextEdit, Ui};
 
-use crate::{panel::Panel, settings::MAX_SEED, wire::Scenario};
+use crate::{
+    panel::Panel,
+    settings::MAX_SEED,
+    wire::{Learner, Scenario},
+};
+
+/// There are so many colours, dashes and markers.
+const MOST_LEARNERS: usize = 6;
 
 /// A scenario in figures.
 fn figures(scenario: &Scenario) -> String {
@@ -48,38 +55,61 @@ impl Panel {
         ui.label(RichText::new(figures(&scenario)).weak().small());
         ui.horizontal_wrapped(|ui| {
             ui.label("Compare");
-            for learner in &scenario.learners {
-                let mut on = self.is_compared(&learner.name);
-                let last = on && self.compared(&scenario).len() == 1;
-                let tip = if last {
-                    "At least one learner is needed".to_owned()
-                } else {
-                    format!("Estimator {}, policy {}. A change begins the run anew.", learner.estimator, learner.policy)
-                };
-                let toggled = ui.add_enabled(!last, egui::Checkbox::new(&mut on, &learner.name));
-                if toggled.on_hover_text(&tip).on_disabled_hover_text(&tip).changed() {
-                    self.compare(&scenario, &learner.name, on);
-                }
+            let compared = self.settings.learners.clone();
+            let own = scenario.learners.iter();
+            let composed = scenario.compositions.iter().filter(|learner| compared.contains(&learner.name));
+            for learner in own.chain(composed) {
+                self.choose_learner_to_compare(ui, learner, &compared);
             }
+            self.add_learner(ui, &scenario, &compared);
         });
     }
 
-    fn is_compared(&self, name: &str) -> bool {
-        self.settings.learners.is_empty() || self.settings.learners.iter().any(|learner| learner == name)
-    }
-
-    fn compared(&self, scenario: &Scenario) -> Vec<String> {
-        let names = scenario.learners.iter().map(|learner| learner.name.clone());
-        names.filter(|name| self.is_compared(name)).collect()
-    }
-
-    fn compare(&mut self, scenario: &Scenario, name: &str, on: bool) {
-        let mut compared = self.compared(scenario);
-        compared.retain(|learner| learner != name);
-        if on {
-            compared.push(name.to_owned());
+    fn choose_learner_to_compare(&mut self, ui: &mut Ui, learner: &Learner, compared: &[String]) {
+        let mut on = compared.contains(&learner.name);
+        let refused = if on && compared.len() == 1 {
+            Some("At least one learner is needed".to_owned())
+        } else if !on && compared.len() >= MOST_LEARNERS {
+            Some(format!("{MOST_LEARNERS} learners are as many as can be told apart"))
+        } else {
+            None
+        };
+        let about =
+            format!("Estimator {}, policy {}. A change begins the run anew.", learner.estimator, learner.policy);
+        let toggled = ui.add_enabled(refused.is_none(), egui::Checkbox::new(&mut on, &learner.name));
+        if toggled.on_hover_text(about).on_disabled_hover_text(refused.unwrap_or_default()).changed() {
+            self.compare(&learner.name, on);
         }
-        self.settings.learners = compared;
+    }
+
+    /// Any estimator with any policy.
+    fn add_learner(&mut self, ui: &mut Ui, scenario: &Scenario, compared: &[String]) {
+        let others = || scenario.compositions.iter().filter(|learner| !compared.contains(&learner.name));
+        if others().next().is_none() || compared.len() >= MOST_LEARNERS {
+            return;
+        }
+        let mut chosen = None;
+        let menu = ui.menu_button("Add…", |ui| {
+            egui::ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
+                for learner in others() {
+                    if ui.button(&learner.name).clicked() {
+                        chosen = Some(learner.name.clone());
+                        ui.close();
+                    }
+                }
+            });
+        });
+        menu.response.on_hover_text("Any estimator with any policy; the run begins anew");
+        if let Some(name) = chosen {
+            self.compare(&name, true);
+        }
+    }
+
+    fn compare(&mut self, name: &str, on: bool) {
+        self.settings.learners.retain(|learner| learner != name);
+        if on {
+            self.settings.learners.push(name.to_owned());
+        }
         self.settings.validate(&self.scenarios);
         self.open(1);
     }

@@ -2,7 +2,7 @@
 
 use egui::{RichText, Ui};
 
-use crate::{host::Command, panel::Panel, settings::SIGMAS};
+use crate::{host::Command, panel::Panel, settings::ELLIPSOIDS};
 
 impl Panel {
     /// The command that computes what is shown.
@@ -10,8 +10,13 @@ impl Panel {
         let settings = &self.settings;
         let steps = self.cursor.max(1);
         let learners: String = settings.learners.iter().map(|name| format!(" --learner {name}")).collect();
+        let ellipsoids = if settings.ellipsoids == ELLIPSOIDS[0].0 {
+            String::new()
+        } else {
+            format!(" --ellipsoids {}", settings.ellipsoids)
+        };
         format!(
-            "body-schema run {} --seed {} --steps {steps}{learners} --rrd run.rrd",
+            "body-schema run {} --seed {} --steps {steps}{learners} --rrd run.rrd{ellipsoids}",
             settings.scenario, settings.seed
         )
     }
@@ -62,12 +67,12 @@ impl Panel {
         ui.label(RichText::new("The scene").strong());
         ui.horizontal_wrapped(|ui| {
             ui.label("Ellipsoids of uncertainty");
-            let mut sigmas = self.settings.sigmas.clone();
-            for (name, text) in SIGMAS {
-                ui.radio_value(&mut sigmas, name.to_owned(), text);
+            let mut ellipsoids = self.settings.ellipsoids.clone();
+            for (name, text) in ELLIPSOIDS {
+                ui.radio_value(&mut ellipsoids, name.to_owned(), text);
             }
-            if sigmas != self.settings.sigmas {
-                self.settings.sigmas = sigmas;
+            if ellipsoids != self.settings.ellipsoids {
+                self.settings.ellipsoids = ellipsoids;
                 self.open(self.history.latest());
             }
         });

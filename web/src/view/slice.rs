@@ -7,7 +7,7 @@ use crate::{colours::viridis, panel::Panel, wire::Selection};
 
 /// Room for the values of the joints, at the left and below.
 const MARGIN: (f32, f32) = (44.0, 34.0);
-const LARGEST: f32 = 420.0;
+const LARGEST: f32 = 300.0;
 
 impl Panel {
     /// Draws the slice; the point that was clicked, in the unit square.
@@ -111,8 +111,8 @@ impl Panel {
             painter.text(pos2(square.left() - 4.0, y), align, value(b, share), font.clone(), colour);
         }
         let below = pos2(square.center().x, square.bottom() + 15.0);
-        painter.text(below, Align2::CENTER_TOP, format!("{}", selection.joints[a].name), font.clone(), colour);
-        let name = painter.layout_no_wrap(format!("{}", selection.joints[b].name), font.clone(), colour);
+        painter.text(below, Align2::CENTER_TOP, &selection.joints[a].name, font.clone(), colour);
+        let name = painter.layout_no_wrap(selection.joints[b].name.clone(), font.clone(), colour);
         let start = pos2(square.left() - MARGIN.0, square.center().y + name.size().x / 2.0);
         painter.add(egui::epaint::TextShape::new(start, name, colour).with_angle(-std::f32::consts::FRAC_PI_2));
         let legend = pos2(square.left(), square.bottom() + 32.0);
@@ -125,7 +125,11 @@ impl Panel {
             );
             painter.rect_filled(strip, 0.0, viridis(f64::from(step) / f64::from(steps - 1)));
         }
-        let text = "teaches little … much   outlined: divided next, ×: chosen";
+        let text = if square.width() >= LARGEST {
+            "teaches little … much   outlined: divided next, ×: chosen"
+        } else {
+            "little … much   outlined: next"
+        };
         painter.text(pos2(bar.right() + 6.0, legend.y), Align2::LEFT_TOP, text, font, colour);
     }
 }

@@ -1,4 +1,5 @@
 //! A panel with a page that is played by the test.
+#![allow(dead_code, reason = "each test uses a part")]
 
 use body_schema_panel::{
     Panel,
@@ -14,6 +15,8 @@ pub struct Page {
     /// What the panel asked for and the test has not looked at.
     asked: Vec<Command>,
     step: u64,
+    /// How many learners are compared.
+    learners: usize,
 }
 
 impl Page {
@@ -27,7 +30,8 @@ impl Page {
             .with_size(size)
             .with_max_steps(50)
             .build_ui_state(|ui, panel: &mut Panel| panel.ui(ui), Panel::default());
-        let mut page = Self { harness, asked: Vec::new(), step: 0 };
+        harness.ctx.set_theme(egui::Theme::Light);
+        let mut page = Self { harness, asked: Vec::new(), step: 0, learners: 3 };
         page.tell(json!({ "is": "begin", "query": query, "known": true }));
         page
     }
@@ -48,7 +52,9 @@ impl Page {
         });
         let (scenario, seed, learners) = opened.expect("the panel opens a session");
         self.step = 0;
-        self.tell(json!({ "is": "session", "session": session(&scenario, seed, learners) }));
+        let session = session(&scenario, seed, learners);
+        self.learners = session["description"]["learners"].as_array().expect("learners").len();
+        self.tell(json!({ "is": "session", "session": session }));
         self.tell(json!({ "is": "connected" }));
         self.report(|_, _| {});
     }
@@ -75,7 +81,7 @@ impl Page {
 
     /// The next step's report, changed by `change` per learner.
     pub fn report(&mut self, change: impl Fn(usize, &mut Value)) {
-        let report = report(self.step, change);
+        let report = report(self.step, self.learners, change);
         self.step += 1;
         self.tell(json!({ "is": "live", "message": { "type": "step", "data": report } }));
     }
@@ -115,6 +121,11 @@ impl Page {
         self.run();
     }
 
+    pub fn toggle(&mut self, label: &str) {
+        self.harness.get_by_role_and_label(egui::accesskit::Role::CheckBox, label).click();
+        self.run();
+    }
+
     pub fn has(&self, label: &str) -> bool {
         self.harness.query_all_by_label_contains(label).next().is_some()
     }
@@ -137,6 +148,10 @@ fn learners() -> Value {
     ])
 }
 
+fn compositions() -> Value {
+    json!([{ "name": "smoother:random", "estimator": "smoother", "policy": "random" }])
+}
+
 fn joints() -> Value {
     json!([
         { "name": "shoulder", "kind": "revolute", "learned": true, "limits": [-1.5, 1.5] },
@@ -147,18 +162,16 @@ fn joints() -> Value {
 fn scenario(name: &str, steps: u64) -> Value {
     json!({
         "name": name, "title": format!("The arm of {name}"), "world": "simulated", "joints": joints(), "parameters": 8,
-        "steps": steps, "learners": learners(), "thresholds": { "orientation_deg": 5.0, "location_m": 0.02 },
+        "steps": steps, "learners": learners(), "compositions": compositions(), "thresholds": { "orientation_deg": 5.0, "location_m": 0.02 },
     })
 }
 
 pub fn session(scenario: &str, seed: u64, chosen: Option<Vec<String>>) -> Value {
-    let all = learners();
-    let chosen: Vec<&Value> = all
-        .as_array()
-        .expect("learners")
-        .iter()
-        .filter(|one| chosen.as_ref().is_none_or(|names| names.iter().any(|name| one["name"] == *name)))
-        .collect();
+    let all = [learners(), compositions()];
+    let own = chosen.is_none();
+    let all = all.iter().take(if own { 1 } else { 2 }).flat_map(|list| list.as_array().expect("learners"));
+    let chosen: Vec<&Value> =
+        all.filter(|one| chosen.as_ref().is_none_or(|names| names.iter().any(|name| one["name"] == *name))).collect();
     json!({
         "id": format!("{scenario}-{seed}"), "step": 0, "remaining": null,
         "description": {
@@ -168,8 +181,8 @@ pub fn session(scenario: &str, seed: u64, chosen: Option<Vec<String>>) -> Value 
     })
 }
 
-fn report(step: u64, change: impl Fn(usize, &mut Value)) -> Value {
-    let learners: Vec<Value> = (0..3)
+fn report(step: u64, learners: usize, change: impl Fn(usize, &mut Value)) -> Value {
+    let learners: Vec<Value> = (0..learners)
         .map(|index| {
             let error = 40.0 / (1.0 + step as f64 * [0.4, 0.1, 0.02][index]);
             let mut learner = json!({
