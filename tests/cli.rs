@@ -109,6 +109,48 @@ fn run_writes_all_that_it_is_asked_for() {
 }
 
 #[test]
+fn a_run_ends_as_soon_as_every_learner_is_settled_and_says_why() {
+    let command = ["run", "arm-6dof", "--learner", "global", "--seed", "3", "--until", "settled"];
+    let result = json(&[&command[..], &["--json", "-"]].concat());
+    let (steps, settled) = (result["steps"].as_u64().expect("steps"), result["learners"][0]["settled_at"].as_u64());
+    assert!(settled == Some(steps) && steps < 40, "{steps} {settled:?}");
+    let said = |arguments: &[&str]| String::from_utf8_lossy(&body_schema(arguments).stdout).into_owned();
+    let text = said(&command);
+    assert!(text.contains(&format!("stopped after {steps} movements")) && text.contains("25 mm"), "{text}");
+    let text = said(&[&command[..], &["--steps", "3"]].concat());
+    assert!(text.contains("made all 3 movements") && text.contains("not settled"), "{text}");
+}
+
+#[test]
+fn the_limits_stand_beside_the_learners() {
+    let command =
+        ["compare", "arm-6dof", "--learner", "active", "--learner", "random", "--seeds", "2", "--steps", "12"];
+    let plain = json(&[&command[..], &["--json", "-"]].concat());
+    assert_eq!(plain["movements_by_counting"], 8);
+    assert!(
+        plain["best_designs"].as_array().is_some_and(Vec::is_empty) && plain["learners"][0]["efficiency"].is_null()
+    );
+    let value = json(&[&command[..], &["--limits", "--json", "-"]].concat());
+    let designs = value["best_designs"].as_array().expect("designs");
+    assert_eq!(designs.iter().map(|design| design["movements"].as_u64()).collect::<Vec<_>>(), [5, 10, 12].map(Some));
+    let best = designs[2]["best_design_trace"].as_f64().expect("a trace");
+    assert!(designs.iter().all(|design| design["gap"].as_f64().is_some_and(|gap| (0.0..=0.01).contains(&gap))));
+    for learner in value["learners"].as_array().expect("learners") {
+        let bound = learner["curve"][12]["bound_trace"]["median"].as_f64().expect("a bound");
+        let efficiency = learner["efficiency"].as_f64().expect("an efficiency");
+        assert!((efficiency - best / bound).abs() < 1e-9 && (0.0..1.0).contains(&efficiency), "{efficiency}");
+        assert!(learner["runs"][0]["final"]["bound_trace"].is_f64());
+    }
+    let text = String::from_utf8_lossy(&body_schema(&[&command[..], &["--limits"]].concat()).stdout).into_owned();
+    for part in ["equations as unknowns: 8", "best possible design of 12 movements", "random "] {
+        assert!(text.contains(part), "{text}");
+    }
+    let run = json(&["run", "tiago-mocap", "--learner", "random", "--steps", "3", "--limits", "--json", "-"]);
+    assert!(run["best_designs"].as_array().is_some_and(Vec::is_empty), "the truth is not known");
+    assert_eq!(run["movements_by_counting"], 11);
+}
+
+#[test]
 fn bad_input_exits_with_two_and_says_what_to_do() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("bad.toml");

@@ -10,7 +10,7 @@ mod reading;
 use std::{fs, path::PathBuf};
 
 use body_schema::{
-    experiment::{Comparison, Description, StepReport, Trace},
+    experiment::{Comparison, Description, StepReport, Trace, best_designs},
     recording::{EllipsoidSize, LiveLog, Recorder, RecordingError, StepsCsv, Target, comparison_csv, learner_color},
     scenario::{Scenario, builtin},
 };
@@ -96,7 +96,7 @@ fn the_entities_are_the_documented_ones() {
         }
         expected.extend(entities.iter().map(|entity| format!("/{learner}/{entity}")));
         for metric in
-            "orientation_deg axis_deg location_m prediction_m prediction_mean_m expected_prediction_m trace nis \
+            "orientation_deg axis_deg location_m prediction_m prediction_mean_m expected_prediction_m trace bound_trace nis \
                        nis_dof nees nees_dof movements misses settled selection_ms criterion gain evaluations"
                 .split_whitespace()
         {
@@ -318,6 +318,30 @@ fn errors_name_the_file() {
 }
 
 #[test]
+fn the_best_designs_stand_at_their_steps() {
+    let (description, reports) = run("arm-6dof", 12);
+    let designs = best_designs(&builtin("arm-6dof").unwrap().limits_along(12));
+    assert_eq!(designs.iter().map(|design| design.step).collect::<Vec<_>>(), [5, 10, 12]);
+    let live = LiveLog::new();
+    let mut recorder = Recorder::new(&description, Target::live(live.clone())).unwrap();
+    reports.iter().for_each(|report| recorder.log(report).unwrap());
+    recorder.log_best_designs(&designs).unwrap();
+    recorder.finish().unwrap();
+    let reading = Reading::of(&live.complete().unwrap());
+    check(&reading, &description, &reports);
+    let series = "/limits/best_design_trace";
+    assert_eq!(reading.steps(series), [i64::MIN, 5, 10, 12], "static, then where designs are");
+    for design in &designs {
+        let found = reading.numbers(series, "Scalars:scalars", Some(design.step));
+        assert_eq!(found, Some(vec![design.best_design_trace]));
+        for learner in &reports[design.step as usize].learners {
+            let bound = learner.metrics.bound_trace.unwrap();
+            assert!(bound >= design.best_design_trace * (1.0 - design.gap), "{}: {bound}", learner.name);
+        }
+    }
+}
+
+#[test]
 fn steps_as_csv() {
     let (description, mut reports) = run("tiago-mocap", 2);
     reports[2].learners[1].movement.as_mut().unwrap().measured_marker_m = None;
@@ -361,7 +385,8 @@ fn comparisons_as_csv() {
         ["learner", "movements", "metric", "mean", "median", "q25", "q75"].as_slice()
     );
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-    assert_eq!(rows.len(), 3 * 3 * 5);
+    // The gradient keeps no covariance, and so no trace.
+    assert_eq!(rows.len(), 3 * 3 * 6 + 2 * 3);
     let expected = comparison.learners[1].curve[2].location_m.unwrap();
     let row = rows.iter().find(|row| [&row[0], &row[1], &row[2]] == ["random", "2", "location_m"]).unwrap();
     assert_eq!(row[4].parse(), Ok(expected.median));

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use body_schema::{
-    experiment::{Comparison, LearnerComparison, Trace},
+    experiment::{Comparison, LearnerComparison, Trace, best_designs},
     recording::comparison_csv,
     scenario::{Scenario, ScenarioError},
 };
 use comfy_table::Table;
 use rayon::prelude::*;
 
-use super::{ScenarioArguments, Seeds, output, progress, steps_of};
+use super::{ScenarioArguments, Seeds, limits, output, progress, steps_of};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -32,6 +32,10 @@ pub struct Arguments {
     /// Run on so many threads [default: one per core]; the outcome does not depend on it
     #[arg(long, value_name = "N")]
     threads: Option<std::num::NonZeroUsize>,
+    /// Set the best possible designs of 5, 10, 20, … movements beside the learners: what nobody can beat with as many.
+    /// It takes a second for 6 joints, half a minute for 12, minutes for 20
+    #[arg(long)]
+    limits: bool,
 }
 
 pub fn compare(arguments: &Arguments) -> Result<()> {
@@ -42,7 +46,8 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
         &format!("{} × {} seeds", scenario.name, arguments.seeds.count()),
     );
     let comparison = super::on_threads(arguments.threads, || {
-        over_seeds(&scenario, learners, &arguments.seeds, steps, &|| bar.inc(1))
+        let comparison = over_seeds(&scenario, learners, &arguments.seeds, steps, &|| bar.inc(1))?;
+        Ok(if arguments.limits { comparison.beside(best_designs(&scenario.limits_along(steps))) } else { comparison })
     })?;
     bar.finish_and_clear();
     if let Some(path) = &arguments.csv {
@@ -57,6 +62,8 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
         let seeds = arguments.seeds.count();
         output::say(format!("{scenario}: {seeds} seeds, {steps} movements each"))?;
         output::say(table(&comparison))?;
+        let efficiencies = comparison.learners.iter().map(|learner| (learner.name.as_str(), learner.efficiency));
+        limits::say(comparison.movements_by_counting, &comparison.best_designs, efficiencies)?;
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Commands, their arguments, and what becomes of their errors.
 
 mod compare;
+mod limits;
 mod output;
 mod paper;
 mod progress;

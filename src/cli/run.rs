@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use body_schema::{
-    experiment::{Experiment, RunResult},
+    experiment::{Experiment, RunResult, SETTLING_STEPS, best_designs},
     recording::{EllipsoidSize, Recorder, StepsCsv, Target},
+    scenario::Scenario,
 };
 
-use super::{ScenarioArguments, output, progress, steps_of};
+use super::{ScenarioArguments, limits, output, progress, steps_of};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -35,6 +36,9 @@ pub struct Arguments {
     /// Write the outcome and the learned models as JSON to FILE, or to standard output for `-`
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Set the best possible designs of several lengths beside the learners (see `compare --help`)
+    #[arg(long)]
+    limits: bool,
 }
 
 /// What may end a run early.
@@ -54,34 +58,55 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
     let bar = progress::bar(steps, &scenario.name);
     observe(&experiment, recorder.as_mut(), csv.as_mut())?;
+    let mut is_settled = false;
     for _ in 0..steps {
         experiment.step()?;
         observe(&experiment, recorder.as_mut(), csv.as_mut())?;
         bar.inc(1);
-        let is_settled = experiment.latest().learners.iter().all(|learner| learner.metrics.settled);
-        if arguments.until == Some(Until::Settled) && is_settled {
+        is_settled = experiment.latest().learners.iter().all(|learner| learner.metrics.settled);
+        if arguments.until.is_some() && is_settled {
             break;
         }
     }
     bar.finish_and_clear();
 
+    let mut result = experiment.result();
+    if arguments.limits {
+        let stretches = scenario.limits_along(result.steps);
+        result = result.beside(best_designs(&stretches));
+    }
+    if let Some(recorder) = &mut recorder {
+        recorder.log_best_designs(&result.best_designs)?;
+    }
     if let Some(recorder) = recorder {
         recorder.finish()?;
     }
     if let Some(csv) = &mut csv {
         csv.flush().context("cannot finish the CSV file")?;
     }
-    let result = experiment.result();
     if let Some(path) = &arguments.json {
         output::write_json(path, &result)?;
     }
     if !arguments.json.as_deref().is_some_and(output::is_stdout) {
         summarise(&result)?;
+        if arguments.until.is_some() {
+            output::say(ending(&scenario, is_settled, result.steps))?;
+        }
         for path in [&arguments.rrd, &arguments.csv, &arguments.json].into_iter().flatten() {
             output::say(format!("wrote {}", path.display()))?;
         }
     }
     Ok(())
+}
+
+/// Why a run ended that was to end early.
+fn ending(scenario: &Scenario, is_settled: bool, steps: u64) -> String {
+    let target = format!("{} mm for {SETTLING_STEPS} steps", 1e3 * scenario.settled_below_m);
+    if is_settled {
+        format!("stopped after {steps} movements: every learner is settled, its own expected error was below {target}")
+    } else {
+        format!("made all {steps} movements: some learner is not settled, its own expected error below {target}")
+    }
 }
 
 type CsvFile = StepsCsv<std::io::BufWriter<std::fs::File>>;
@@ -112,6 +137,8 @@ fn summarise(result: &RunResult) -> Result<()> {
         let verdict = match (&learner.failure, learner.converged_at) {
             (Some(failure), _) => failure.clone(),
             (None, Some(at)) => format!("converged at {at}"),
+            // Too soon for 20 further movements to confirm it.
+            (None, None) if learner.settled_at.is_some_and(|at| at == result.steps) => "settled".into(),
             (None, None) if metrics.orientation_deg.is_none() && metrics.location_m.is_none() => "truth unknown".into(),
             (None, None) => "not converged".into(),
         };
@@ -126,5 +153,7 @@ fn summarise(result: &RunResult) -> Result<()> {
         ]
     });
     let header = ["learner", "orient. (deg)", "axis (deg)", "location (mm)", "predict. (mm)", "misses", "verdict"];
-    output::say(output::table(header, rows))
+    output::say(output::table(header, rows))?;
+    let efficiencies = result.learners.iter().map(|learner| (learner.name.as_str(), learner.efficiency));
+    limits::say(result.movements_by_counting, &result.best_designs, efficiencies)
 }

@@ -1,25 +1,31 @@
 //! Unscented recursive least squares: the filter of (2)–(5) without linearisation.
 //!
 //! The marker's mean and covariances under the belief come from 2m + 1 chains (Julier and Uhlmann 1997), on the
-//! manifold: with L the Cholesky factor of P, and its columns lᵢ,
+//! manifold: with L the Cholesky factor of P, its columns lᵢ, s² = 3, and the markers at the centre and at either side
 //!
 //! ```text
-//! x₀ = x,   x±ᵢ = x ⊞ ±√(m + κ) lᵢ,    w₀ = κ/(m + κ),   wᵢ = 1/(2(m + κ))
-//! ŷ = Σ wᵢ h(xᵢ),   S = Σ wᵢ (h(xᵢ) − ŷ)(h(xᵢ) − ŷ)ᵀ + R,   C = Σ wᵢ δᵢ (h(xᵢ) − ŷ)ᵀ
+//! y₀ = h(x),   y±ᵢ = h(x ⊞ ±s lᵢ),   Δᵢ = (y₊ᵢ − y₋ᵢ)/2s,   Bᵢ = (y₊ᵢ + y₋ᵢ − 2y₀)/2s²
+//! ŷ = y₀ + Σ Bᵢ,   S = Σ ΔᵢΔᵢᵀ + (s² − 1) Σ BᵢBᵢᵀ + R,   C = Σ lᵢ Δᵢᵀ
 //! K = C S⁻¹,   x ← x ⊞ K (y − ŷ),   P ← J (P − K S Kᵀ) Jᵀ
 //! ```
 //!
-//! with δᵢ the coordinates of xᵢ and J the change of chart. Its second moments see the bend of rotations: where the
-//! belief is wide S is larger than H P Hᵀ + R, and the filter is less sure of itself than the linearised one. κ = 1
-//! keeps all weights positive. The name is kept from the paper's recursive least squares: the state does not move.
+//! with J the change of chart. ŷ and C are those of the unscented transform with κ = 3 − m, its authors' choice for a
+//! normal distribution: the points stay at √3 standard deviations however many parameters there are, where a fixed κ
+//! would send them to √(m + κ), half a turn away for an arm that is hardly known. The weight of the centre is negative
+//! then, and S could be indefinite; in the form above (the divided differences of Nørgaard, Poulsen and Ravn 2000,
+//! their second-order filter) it never is.
+//!
+//! The second moments see the bend of rotations: where the belief is wide S is larger than H P Hᵀ + R, and the filter is
+//! less sure of itself than the linearised one. The name is kept from the paper's recursive least squares: the state
+//! does not move.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
 use super::{Belief, ChangeDetector, EstimationError, Estimator, StabilisingNoise, Update};
 use crate::sensing::{Observation, isotropic};
 
-/// κ.
-const KAPPA: f64 = 1.0;
+/// s², the kurtosis of a normal distribution.
+const SPREAD: f64 = 3.0;
 
 /// Recursive least squares by the unscented transform.
 #[derive(Clone, Debug)]
@@ -42,24 +48,19 @@ impl UnscentedRls {
         let Belief { chain, layout, noise_m2, .. } = &self.belief;
         let m = layout.dimension();
         let diverged = || EstimationError::Diverged("an update was not a finite number");
-        let root = Cholesky::new(self.covariance.clone()).ok_or_else(diverged)?.l() * (m as f64 + KAPPA).sqrt();
-        let weight = 0.5 / (m as f64 + KAPPA);
+        let root = Cholesky::new(self.covariance.clone()).ok_or_else(diverged)?.l();
+        let spread = SPREAD.sqrt();
         let centre = chain.marker_at(positions).coords;
-        let mut markers = Vec::with_capacity(2 * m);
+        let (mut mean, mut s, mut cross) = (centre, isotropic(*noise_m2), DMatrix::zeros(m, 3));
         for column in root.column_iter() {
-            let delta: DVector<f64> = column.into_owned();
+            let delta: DVector<f64> = column * spread;
             let above = chain.retract(layout, &delta).marker_at(positions).coords;
             let below = chain.retract(layout, &-delta).marker_at(positions).coords;
-            markers.push((above, below));
-        }
-        let first = KAPPA / (m as f64 + KAPPA);
-        let mean = centre * first + markers.iter().map(|(a, b)| (a + b) * weight).sum::<Vector3<f64>>();
-        let mut s: Matrix3<f64> = isotropic(*noise_m2) + (centre - mean) * (centre - mean).transpose() * first;
-        let mut cross = DMatrix::zeros(m, 3);
-        for (column, (above, below)) in root.column_iter().zip(&markers) {
-            let (a, b) = (above - mean, below - mean);
-            s += (a * a.transpose() + b * b.transpose()) * weight;
-            cross += column * (a - b).transpose() * weight;
+            let slope = (above - below) / (2.0 * spread);
+            let bend = (above + below - centre * 2.0) / (2.0 * SPREAD);
+            mean += bend;
+            s += slope * slope.transpose() + bend * bend.transpose() * (SPREAD - 1.0);
+            cross += column * slope.transpose();
         }
         let inverse = s.cholesky().ok_or_else(diverged)?.inverse();
         let innovation = measured - mean;

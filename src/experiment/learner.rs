@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Steps in a row for which the expected error must stay below the target before a learner calls itself settled.
-const SETTLING_STEPS: u32 = 5;
+pub const SETTLING_STEPS: u32 = 5;
 
 /// The estimate's weight among all hypotheses below which a learner is not settled.
 const UNAMBIGUOUS: f64 = 0.99;

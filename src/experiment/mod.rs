@@ -22,8 +22,8 @@ pub use comparison::{
     Comparison, Curve, LearnerComparison, Quantiles, RunSummary, SeedRun, SelectionTime, Summary, Trace,
 };
 pub use convergence::{CONFIRMATION, Convergence, Thresholds};
-pub use learner::{Learner, Record};
-pub use limits::{Design, Limits, movements_by_counting};
+pub use learner::{Learner, Record, SETTLING_STEPS};
+pub use limits::{BestDesign, Design, Limits, Stretch, best_designs, movements_by_counting};
 pub use metrics::{Evaluation, JointMetrics, Metrics, axis_deg, location_m, nees, orientation_deg};
 pub use report::{
     Description, GazeReport, HeadDescription, JointDescription, JointReport, LearnerDescription, LearnerReport,

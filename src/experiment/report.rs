@@ -30,6 +30,9 @@ pub struct Description {
     pub joints: Vec<JointDescription>,
     /// Number of learned parameters in tangent coordinates.
     pub parameters: usize,
+    /// Movements after which there are as many equations as unknowns, three per movement seen: a yardstick to draw
+    /// beside curves, not a bound.
+    pub movements_by_counting: usize,
     /// The learners, in the order of every report.
     pub learners: Vec<LearnerDescription>,
     /// The thresholds of `converged_at`.

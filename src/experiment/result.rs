@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Experiment, convergence::Thresholds, metrics::Metrics, report::array};
+use super::{BestDesign, Experiment, convergence::Thresholds, metrics::Metrics, report::array};
 use crate::{
     estimation::Belief,
     kinematics::{JointKind, chart},
@@ -22,6 +22,13 @@ pub struct RunResult {
     pub steps: u64,
     /// The thresholds of `converged_at`.
     pub thresholds: Thresholds,
+    /// See [`Description::movements_by_counting`](super::Description::movements_by_counting).
+    #[serde(default)]
+    pub movements_by_counting: usize,
+    /// The best designs of several lengths up to this run's, by step; empty unless they were asked for, and where no
+    /// truth is known.
+    #[serde(default)]
+    pub best_designs: Vec<BestDesign>,
     /// The learners.
     pub learners: Vec<LearnerResult>,
 }
@@ -51,6 +58,10 @@ pub struct LearnerResult {
     pub settled_at: Option<u64>,
     /// Why the learner stopped learning, if it did.
     pub failure: Option<String>,
+    /// The A-efficiency of the data collected: the trace of the last of `best_designs` as a fraction of `bound_trace` at
+    /// the end; null without one of them.
+    #[serde(default)]
+    pub efficiency: Option<f64>,
     /// The metrics at the end.
     pub metrics: Metrics,
     /// The learned model.
@@ -135,6 +146,17 @@ impl Model {
     }
 }
 
+impl RunResult {
+    /// The same beside the best designs of the scenario.
+    pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
+        let best = best_designs.last().map(|design| design.best_design_trace);
+        for learner in &mut self.learners {
+            learner.efficiency = best.zip(learner.metrics.bound_trace).map(|(best, bound)| best / bound);
+        }
+        Self { best_designs, ..self }
+    }
+}
+
 impl Experiment {
     /// The outcome so far.
     pub fn result(&self) -> RunResult {
@@ -155,6 +177,7 @@ impl Experiment {
                 false_alarms: verdict.false_alarms,
                 settled_at: verdict.settled_at,
                 failure: report.failure.clone(),
+                efficiency: None,
                 metrics: report.metrics.clone(),
                 model: Model::new(learner.estimator.belief(), &names),
             })
@@ -165,6 +188,8 @@ impl Experiment {
             version: description.version.clone(),
             steps: self.latest.step,
             thresholds: description.thresholds,
+            movements_by_counting: description.movements_by_counting,
+            best_designs: Vec::new(),
             learners,
         }
     }

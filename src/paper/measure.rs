@@ -8,7 +8,7 @@ use super::{
     outcome::{LearnedJoint, Outcome, Search, Timing, Trial, is_kept},
 };
 use crate::{
-    experiment::{Comparison, Experiment, ExperimentError, Trace},
+    experiment::{Comparison, Experiment, ExperimentError, Trace, best_designs},
     optimize::History,
     scenario::{Scenario, edited},
 };
@@ -29,7 +29,12 @@ impl Measurement<'_> {
     /// Runs the experiment, on all cores; the outcome does not depend on how many there are, but for times.
     pub fn run(&self) -> Result<Outcome, PaperError> {
         match self.experiment.kind {
-            Kind::Comparison { .. } => Ok(Outcome::Trials(vec![self.trial(self.scenario, None)?])),
+            Kind::Comparison { .. } => {
+                let mut trial = self.trial(self.scenario, None)?;
+                let steps = self.experiment.kind.steps(self.plan.quick);
+                trial.comparison = trial.comparison.beside(best_designs(&self.scenario.limits_along(steps)));
+                Ok(Outcome::Trials(vec![trial]))
+            }
             Kind::Sweep { key, values, .. } => {
                 let trials = values.iter().map(|value| {
                     let scenario = self.with(&[(key, toml::Value::Float(*value))])?;

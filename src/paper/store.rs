@@ -35,7 +35,7 @@ pub struct Fingerprint {
 }
 
 /// Raise this when outcomes mean something else than before.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 impl Fingerprint {
     /// The fingerprint of an experiment under a plan.

@@ -17,7 +17,7 @@ use rerun::{
     log::{Chunk, RowId},
 };
 
-use super::{RecordingError, model::single, scene::Scene};
+use super::{RecordingError, model::single, recorder::BEST_DESIGN, scene::Scene};
 use crate::experiment::Description;
 
 /// Where the camera stands, as seen from the scene's centre, in sizes of the arm: aside, a little ahead and above.
@@ -37,9 +37,12 @@ const CHARTS: [(&str, &str); 3] = [
 const CHARTS_WITHOUT_TRUTH: [(&str, &str); 2] =
     [("Prediction error, mean (m)", "prediction_mean_m"), ("Trace of the covariance, tr(W P)", "trace")];
 
+/// The trace beside its limits, in a tab where the truth is known.
+const TRACE: (&str, [&str; 2]) = ("Trace, and the least possible", ["trace", "bound_trace"]);
+
 /// Whether a metric has its curve in some arrangement.
 pub(super) fn shows(metric: &str) -> bool {
-    CHARTS.iter().chain(&CHARTS_WITHOUT_TRUTH).any(|(_, shown)| *shown == metric)
+    TRACE.1.contains(&metric) || CHARTS.iter().chain(&CHARTS_WITHOUT_TRUTH).any(|(_, shown)| *shown == metric)
 }
 
 /// What is arranged.
@@ -67,7 +70,8 @@ pub(super) fn messages(
         Arrangement::Whole => {
             let columns = arms.len().clamp(1, 3) as u32;
             let mut below = charts(description, learners, &mut properties);
-            below.push(Tabs::new(partitions.into_iter().chain([note()])).into());
+            let limits = limits(description, learners, &mut properties);
+            below.push(Tabs::new(partitions.into_iter().chain(limits).chain([note()])).into());
             let above = Grid::new(arms).with_grid_columns(columns);
             Vertical::new([above.into(), Horizontal::new(below).into()]).with_row_shares(vec![3.0, 2.0]).into()
         }
@@ -131,6 +135,15 @@ fn charts(description: &Description, learners: &[&EntityPath], properties: &mut 
         properties.of(view.into(), "PlotLegend", &PlotLegend::new().with_corner(Corner2D::RightTop))
     });
     views.collect()
+}
+
+/// The traces of all learners beside their limits, where the truth is known.
+fn limits(description: &Description, learners: &[&EntityPath], properties: &mut Properties) -> Option<ContainerLike> {
+    description.truth.as_ref()?;
+    let of_learner = |root: &&EntityPath| TRACE.1.map(|metric| format!("+ {root}/metrics/{metric}"));
+    let contents = learners.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")]);
+    let view = TimeSeriesView::new(TRACE.0).with_origin("/").with_contents(contents);
+    Some(properties.of(view.into(), "PlotLegend", &PlotLegend::new().with_corner(Corner2D::RightTop)))
 }
 
 /// The partitions of those who have any: a box is divided by DIRECT, recorded movements are tried one by one.

@@ -72,6 +72,8 @@ pub fn comparison_csv(comparison: &Comparison, output: impl io::Write) -> Result
                 ("location_m", point.location_m),
                 ("prediction_m", point.prediction_m),
                 ("prediction_mean_m", point.prediction_mean_m),
+                ("trace", point.trace),
+                ("bound_trace", point.bound_trace),
             ];
             for (metric, quantiles) in metrics {
                 let Some(Quantiles { mean, median, q25, q75 }) = quantiles else { continue };

@@ -3,7 +3,7 @@
 use crate::experiment::LearnerReport;
 
 /// Names, in the order of [`values`].
-pub(super) const NAMES: [&str; 18] = [
+pub(super) const NAMES: [&str; 19] = [
     "orientation_deg",
     "axis_deg",
     "location_m",
@@ -11,6 +11,7 @@ pub(super) const NAMES: [&str; 18] = [
     "prediction_mean_m",
     "expected_prediction_m",
     "trace",
+    "bound_trace",
     "nis",
     "nis_dof",
     "nees",
@@ -37,6 +38,7 @@ pub(super) fn values(report: &LearnerReport) -> [Option<f64>; NAMES.len()] {
         metrics.prediction_mean_m,
         metrics.expected_prediction_m,
         metrics.trace,
+        metrics.bound_trace,
         metrics.nis,
         metrics.nis_dof.map(|dof| dof as f64),
         metrics.nees,

@@ -26,6 +26,7 @@
 //! | `/{learner}/direct/axes` | LineStrips2D, Points2D, static | frame and labels of the slice: joints and limits |
 //! | `/{learner}/direct/leaves` | plain data | the whole partition, see [`Recorder`] |
 //! | `/{learner}/metrics/{name}` | Scalars, SeriesLines | every metric, and what is known of the choice |
+//! | `/limits/best_design_trace` | Scalars, SeriesLines | the best designs of 5, 10, 20, … movements, beside the traces; only with `run --limits` |
 //! | `/{learner}/failure` | TextLog | why the learner stopped, once, if it did |
 //!
 //! The two ellipsoid entities also carry the covariances themselves as `covariances`: nine f64 per instance, row by

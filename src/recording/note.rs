@@ -11,16 +11,19 @@ const HEAD: &str = "- **Head** in pale grey: the cone of the lens at rest, and t
                     learner's pale colour the cone after the head has followed the marker. A marker outside it is missed: red, where \
                     it truly was.\n";
 
+const LIMITS: &str = "- **Limits** beside the trace: `bound_trace`, pale, is the least that a learner's data allow; the best design, grey, \
+                      the least that any so many movements allow, if it was computed (`run --limits`).\n";
+
 /// The note, in markdown.
 pub(super) fn note(description: &Description, ellipsoids: EllipsoidSize) -> TextDocument {
     TextDocument::new(markdown(description, ellipsoids)).with_media_type(MediaType::markdown())
 }
 
 fn markdown(description: &Description, ellipsoids: EllipsoidSize) -> String {
-    let Description { scenario, title, seed, version, parameters, thresholds, .. } = description;
+    let Description { scenario, title, seed, version, parameters, thresholds, movements_by_counting, .. } = description;
     let mut text = format!(
-        "# {title}\n\nScenario `{scenario}`, seed {seed}, {parameters} learned parameters, recorded by body-schema \
-         {version}.\n\n"
+        "# {title}\n\nScenario `{scenario}`, seed {seed}, {parameters} learned parameters (as many equations after \
+         {movements_by_counting} movements), recorded by body-schema {version}.\n\n"
     );
     // Writing to a String does not fail.
     let _ = write!(
@@ -43,6 +46,7 @@ fn markdown(description: &Description, ellipsoids: EllipsoidSize) -> String {
     } else {
         text.push_str("- The truth is not known: errors that need it are absent; prediction is judged over held-out measurements.\n");
     }
+    let limits = description.truth.as_ref().map_or("", |_| LIMITS);
     let _ = write!(
         text,
         "{}- **Estimate** in the learner's colour: thick the arm at θ = 0, with one arrow per joint axis (a sliding \
@@ -53,7 +57,8 @@ fn markdown(description: &Description, ellipsoids: EllipsoidSize) -> String {
          - **Marker**: pale as predicted before the measurement, yellow as measured; no yellow point after a miss.\n\
          - **Partition**: how DIRECT divided the joint box to choose the movement, as the slice through the chosen \
          configuration (vermillion) along two joints, each from limit to limit. Brighter is a lower criterion, so \
-         better; thick outlines are what would be divided next; dots are centres outside the slice.\n\n\
+         better; thick outlines are what would be divided next; dots are centres outside the slice.\n\
+         {limits}\n\
          Lengths in metres, in the frame of the measurements; `_deg` in degrees; joint values in radians or metres.\n\n\
          `converged_at` asks for an orientation error up to {}° and a location error up to {} m.\n\n",
         if description.head.is_some() { HEAD } else { "" },

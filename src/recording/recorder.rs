@@ -3,7 +3,7 @@
 use std::{collections::BTreeSet, path::PathBuf};
 
 use rerun::{
-    RecordingInfo, SeriesLines, ViewCoordinates,
+    RecordingInfo, Scalars, SeriesLines, ViewCoordinates,
     external::re_log_types::{ApplicationId, EntityPath, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource},
     log::RowId,
 };
@@ -11,16 +11,16 @@ use rerun::{
 use super::{
     EllipsoidSize, LiveLog, RecordingError, TRUTH_COLOR,
     blueprint::{self, Arrangement},
-    colours::learner_color,
+    colours::{learner_color, tint},
     file::RrdFile,
     head,
     learner::LearnerEntities,
-    model,
+    metrics, model,
     note::note,
     rows::Rows,
     scene::Scene,
 };
-use crate::experiment::{Description, ModelReport, StepReport};
+use crate::experiment::{BestDesign, Description, ModelReport, StepReport};
 
 /// So many steps are written at once unless somebody flushes earlier …
 const BATCH_STEPS: usize = 64;
@@ -30,6 +30,9 @@ const BATCH_LEAVES: usize = 200_000;
 
 /// Length of the arrows, as a part of the size of the arm.
 const ARROW: f64 = 0.22;
+
+/// The series of the best designs.
+pub(super) const BEST_DESIGN: &str = "limits/best_design_trace";
 
 /// Where a recording goes.
 #[derive(Clone, Default)]
@@ -159,6 +162,24 @@ impl Recorder {
         if self.waiting_steps >= BATCH_STEPS || self.waiting_leaves >= BATCH_LEAVES { self.flush() } else { Ok(()) }
     }
 
+    /// Records the best designs of several lengths, each at the step at which as many movements are made. At any time
+    /// before the end.
+    pub fn log_best_designs(&mut self, designs: &[BestDesign]) -> Result<(), RecordingError> {
+        if designs.is_empty() {
+            return Ok(());
+        }
+        let series = EntityPath::from(BEST_DESIGN);
+        let line = SeriesLines::new()
+            .with_colors([rerun::Color::from(TRUTH_COLOR)])
+            .with_names(["best design"])
+            .with_widths([1.5]);
+        self.rows.always(&series, &[&line]);
+        for design in designs {
+            self.rows.at(design.step, &series, &[&Scalars::new([design.best_design_trace])]);
+        }
+        self.flush()
+    }
+
     /// Writes the steps that wait. When this returns they are in the log, and with the operating system.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         (self.waiting_steps, self.waiting_leaves) = (0, 0);
@@ -214,11 +235,16 @@ impl Recorder {
         for (index, learner) in self.learners.iter().enumerate() {
             let colour = learner_color(index);
             let name = &description.learners[index].name;
-            for series in &learner.metrics {
+            for (series, metric) in learner.metrics.iter().zip(metrics::NAMES) {
+                // Beside the trace itself, and paler.
+                let (name, colour, width) = match metric {
+                    "bound_trace" => (format!("{name}: least possible"), tint(colour, 0.45), 1.2),
+                    _ => (name.clone(), colour, 2.0),
+                };
                 let line = SeriesLines::new()
                     .with_colors([rerun::Color::from(colour)])
-                    .with_names([name.clone()])
-                    .with_widths([2.0]);
+                    .with_names([name])
+                    .with_widths([width]);
                 rows.always(series, &[&line]);
             }
         }

@@ -7,14 +7,14 @@ use rand::{RngExt, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    ErrorDraw, EstimatorKind, InitialError, LearnerSpec, PolicyKind, Prior, Recording, Scenario, ScenarioError,
+    ErrorDraw, EstimatorKind, Filter, InitialError, LearnerSpec, PolicyKind, Prior, Recording, Scenario, ScenarioError,
     SmootherSpec, WorldSpec,
 };
 use crate::{
     estimation::{self, Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls, anywhere},
     experiment::{
-        Change, Description, Evaluation, Experiment, HeadDescription, Learner, Limits, ModelReport, Record, Stream,
-        World,
+        Change, Description, Evaluation, Experiment, HeadDescription, Learner, ModelReport, Record, Stream, World,
+        movements_by_counting,
     },
     kinematics::{Chain, Joint, registration::register},
     optimize::{Settings, Variant},
@@ -40,16 +40,6 @@ impl Scenario {
     pub fn experiment(&self, seed: u64, learners: Option<&[String]>) -> Result<Experiment, ScenarioError> {
         let (world, evaluation, briefing) = self.draw(seed)?;
         self.assemble(seed, &self.chosen(learners)?, world, evaluation, &briefing)
-    }
-
-    /// What the limits of this scenario are computed from; `None` where no truth is known or the sensor has no noise.
-    pub fn limits(&self) -> Option<Limits> {
-        let WorldSpec::Simulated { sigma_m, .. } = self.world else { return None };
-        let layout = self.robot.layout.clone();
-        let prior_sd = self.prior.standard_deviations(&layout);
-        let weights = Weights::new(self.selection.units, &layout, &prior_sd);
-        let (truth, limits) = (self.robot.chain.clone(), self.robot.limits.clone());
-        (sigma_m > 0.0).then_some(Limits { truth, layout, limits, prior_sd, sigma_m, weights })
     }
 
     fn draw(&self, seed: u64) -> Result<(World, Evaluation, Briefing), ScenarioError> {
@@ -169,8 +159,9 @@ impl Scenario {
                     }
                     EstimatorKind::Unscented => {
                         let prior = DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd));
-                        let stabilising = self.filter.stabilising.filter(|_| spec.stabilising);
-                        Box::new(UnscentedRls::new(belief, prior, stabilising))
+                        let Filter { noise_m2, stabilising } = self.unscented;
+                        let belief = Belief { noise_m2, ..belief };
+                        Box::new(UnscentedRls::new(belief, prior, stabilising.filter(|_| spec.stabilising)))
                     }
                     EstimatorKind::RlsSixNumbers => {
                         let Prior { direction_rad, point_m, .. } = self.prior;
@@ -208,6 +199,7 @@ impl Scenario {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             joints: self.robot.joint_descriptions(),
             parameters: layout.dimension(),
+            movements_by_counting: movements_by_counting(layout.dimension()),
             learners: specs.iter().map(LearnerSpec::description).collect(),
             thresholds: self.thresholds,
             movements_available: briefing.actions.remaining(),

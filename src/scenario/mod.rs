@@ -10,6 +10,7 @@ mod edit;
 mod error;
 mod experiment;
 mod learners;
+mod limits;
 mod raw;
 mod summary;
 mod validate;
@@ -50,6 +51,8 @@ pub struct Scenario {
     pub prior: Prior,
     /// Values of the recursive least squares.
     pub filter: Filter,
+    /// Values of the unscented form; those of `filter` unless the file says otherwise.
+    pub unscented: Filter,
     /// Values of the smoother.
     pub smoother: SmootherSpec,
     /// Rate η of the stochastic gradient.

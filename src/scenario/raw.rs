@@ -22,6 +22,7 @@ pub struct Scenario {
     pub change: Option<Spanned<Change>>,
     pub prior: Spanned<Prior>,
     pub filter: Filter,
+    pub unscented: Option<Filter>,
     pub smoother: Option<Smoother>,
     pub gradient: Gradient,
     pub selection: Selection,

@@ -113,6 +113,7 @@ fn check_metrics(reading: &Reading, step: u64, learner: &LearnerReport) {
         ("prediction_mean_m", metrics.prediction_mean_m),
         ("expected_prediction_m", metrics.expected_prediction_m),
         ("trace", metrics.trace),
+        ("bound_trace", metrics.bound_trace),
         ("nis", metrics.nis),
         ("nis_dof", metrics.nis_dof.map(|dof| dof as f64)),
         ("nees", metrics.nees),

@@ -1,6 +1,6 @@
-//! Figs. 4, 5 and 6: three errors of all learners against the number of movements.
+//! Figs. 4, 5 and 6: three errors of all learners against the number of movements, and what could be reached.
 
-use super::{Figure, Source};
+use super::{Figure, Source, limits};
 use crate::{
     experiment::{Curve, LearnerComparison, Quantiles},
     paper::chart::{Axis, Chart, Layer, Panel, Style},
@@ -20,7 +20,8 @@ struct Quantity {
 }
 
 pub fn figure(source: Source<'_>) -> Option<Figure> {
-    let learners = &source.outcome.trials().first()?.comparison.learners;
+    let comparison = &source.outcome.trials().first()?.comparison;
+    let learners = &comparison.learners;
     let thresholds = source.scenario.thresholds;
     let location_cm = thresholds.location_m * 100.0;
     let quantities = [
@@ -60,34 +61,42 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
         Some(_) => Axis::linear("movements", [].into_iter()).over(0.0, last),
         None => Axis::log("movements", [1.0, last].into_iter()).over(1.0, last.max(2.0)),
     };
-    let panels = quantities.iter().map(|quantity| panel(quantity, learners, &styles, &x, change)).collect();
+    let mut marks = vec![limits::counting(comparison)];
+    marks.extend(change.map(|x| Layer::Event { x, label: "change".into(), colour: TRUTH_COLOR, dashes: "6 2" }));
+    let mut panels: Vec<Panel> =
+        quantities.iter().map(|quantity| panel(quantity, learners, &styles, &x, &marks)).collect();
+    let mut legend: Vec<_> = learners.iter().map(|learner| learner.name.clone()).zip(styles.iter().copied()).collect();
+    let mut rows = Vec::new();
+    if let Some(panel) = limits::panel(source, comparison, &styles, &x, &marks) {
+        let below = panels.split_off(2.min(panels.len()));
+        rows = vec![panels, below.into_iter().chain([panel]).collect()];
+        legend.extend(limits::legend());
+    } else {
+        rows.push(panels);
+    }
     let chart = Chart {
         title: source.title(),
         subtitle: source.provenance(),
-        legend: learners.iter().map(|learner| learner.name.clone()).zip(styles.iter().copied()).collect(),
-        rows: vec![panels],
+        legend,
+        rows,
         notes: vec![
             "Lines: medians over the seeds; bands: quartiles. Dashed grey: thresholds; ▾: median movement from which both \
              errors stay below them."
+                .to_owned(),
+            "⌈m/3⌉: as many equations as unknowns. Least possible: Cramér–Rao, for the movements made; best design: for any."
                 .to_owned(),
         ],
     };
     let caption = format!(
         "{}: prediction, orientation (every joint's axis with respect to every other's) and location error of each \
-         learner; median and quartiles over the seeds, {}",
+         learner; median and quartiles over the seeds; and the covariance beside what could be reached, {}",
         source.title(),
         source.provenance()
     );
     Some(Figure { id: source.experiment.id.to_owned(), caption, chart })
 }
 
-fn panel(
-    quantity: &Quantity,
-    learners: &[LearnerComparison],
-    styles: &[Style],
-    x: &Axis,
-    change: Option<f64>,
-) -> Panel {
+fn panel(quantity: &Quantity, learners: &[LearnerComparison], styles: &[Style], x: &Axis, marks: &[Layer]) -> Panel {
     // A log axis has no place for movement 0.
     let points = |learner: &LearnerComparison| -> Vec<(f64, Quantiles)> {
         let after_start = learner.curve.iter().filter(|point| point.movements > 0);
@@ -106,9 +115,7 @@ fn panel(
         seen.push(*y);
         layers.push(Layer::Level { y: *y, label: label.clone() });
     }
-    if let Some(x) = change {
-        layers.push(Layer::Event { x, label: "change".into(), colour: TRUTH_COLOR, dashes: "6 2" });
-    }
+    layers.extend_from_slice(marks);
     for (learner, style) in learners.iter().zip(styles) {
         if let Some(median) = learner.summary.median_converged_at.filter(|_| quantity.events) {
             let label = median.to_string();

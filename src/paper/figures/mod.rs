@@ -2,6 +2,7 @@
 
 mod curves;
 mod joints;
+mod limits;
 mod partition;
 mod sweep;
 

@@ -118,12 +118,14 @@ impl Check<'_> {
         let robot = self.robot(&raw.robot)?;
         let world = self.world(raw, &robot, open);
         let learners = self.learners(&raw.learners, raw.robot.learn_marker);
+        let filter = self.filter("filter", &raw.filter);
         Some(Scenario {
             name: name.clone(),
             title: raw.title.clone(),
             steps: self.at_least_one("steps", &raw.steps),
             prior: self.prior(raw),
-            filter: self.filter(&raw.filter),
+            filter,
+            unscented: raw.unscented.as_ref().map_or(filter, |unscented| self.filter("unscented", unscented)),
             smoother: self.smoother(raw),
             gradient_rate: self.positive("gradient.rate", &raw.gradient.rate),
             selection: self.selection(&raw.selection),
@@ -154,13 +156,14 @@ impl Check<'_> {
         }
     }
 
-    fn filter(&mut self, raw: &raw::Filter) -> Filter {
+    fn filter(&mut self, section: &str, raw: &raw::Filter) -> Filter {
+        let key = |key: &str| format!("{section}.{key}");
         let stabilising = raw.stabilising_noise.as_ref().map(|noise| StabilisingNoise {
-            variance: self.not_negative("filter.stabilising_noise.variance", &noise.variance),
-            first_step: self.at_least_one("filter.stabilising_noise.first_step", &noise.first_step),
-            every: self.at_least_one("filter.stabilising_noise.every", &noise.every),
+            variance: self.not_negative(&key("stabilising_noise.variance"), &noise.variance),
+            first_step: self.at_least_one(&key("stabilising_noise.first_step"), &noise.first_step),
+            every: self.at_least_one(&key("stabilising_noise.every"), &noise.every),
         });
-        let noise_m2 = self.positive("filter.measurement_variance_m2", &raw.measurement_variance_m2);
+        let noise_m2 = self.positive(&key("measurement_variance_m2"), &raw.measurement_variance_m2);
         Filter { noise_m2, stabilising }
     }
 

@@ -1,11 +1,17 @@
 //! A comparison of learners over many seeds.
 
+mod statistics;
+mod trace;
+
+pub use trace::Trace;
+
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Experiment, StepReport,
+    BestDesign,
     metrics::{JointMetrics, Metrics},
 };
+use statistics::{median, nearest_rank};
 
 /// Many runs of the same learners, one per seed: `compare --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -15,6 +21,13 @@ pub struct Comparison {
     pub scenario: String,
     /// Steps of every run.
     pub steps: u64,
+    /// See [`Description::movements_by_counting`](crate::experiment::Description::movements_by_counting).
+    #[serde(default)]
+    pub movements_by_counting: usize,
+    /// The best designs of several lengths up to these runs', by step; empty unless they were asked for, and where no
+    /// truth is known.
+    #[serde(default)]
+    pub best_designs: Vec<BestDesign>,
     /// The learners.
     pub learners: Vec<LearnerComparison>,
 }
@@ -33,6 +46,10 @@ pub struct LearnerComparison {
     pub curve: Vec<Curve>,
     /// How long choosing one movement took, milliseconds.
     pub selection_ms: SelectionTime,
+    /// The A-efficiency of the data collected: the trace of the last of `best_designs` as a fraction of the median
+    /// `bound_trace` at the end; null without one of them.
+    #[serde(default)]
+    pub efficiency: Option<f64>,
 }
 
 /// One run of one learner.
@@ -68,6 +85,12 @@ pub struct RunSummary {
     pub prediction_m: Option<f64>,
     /// See [`Metrics::prediction_mean_m`].
     pub prediction_mean_m: Option<f64>,
+    /// See [`Metrics::trace`].
+    #[serde(default)]
+    pub trace: Option<f64>,
+    /// See [`Metrics::bound_trace`].
+    #[serde(default)]
+    pub bound_trace: Option<f64>,
 }
 
 impl From<&Metrics> for RunSummary {
@@ -78,6 +101,8 @@ impl From<&Metrics> for RunSummary {
             location_m: metrics.location_m,
             prediction_m: metrics.prediction_m,
             prediction_mean_m: metrics.prediction_mean_m,
+            trace: metrics.trace,
+            bound_trace: metrics.bound_trace,
         }
     }
 }
@@ -115,6 +140,12 @@ pub struct Curve {
     pub prediction_m: Option<Quantiles>,
     /// See [`Metrics::prediction_mean_m`].
     pub prediction_mean_m: Option<Quantiles>,
+    /// See [`Metrics::trace`].
+    #[serde(default)]
+    pub trace: Option<Quantiles>,
+    /// See [`Metrics::bound_trace`].
+    #[serde(default)]
+    pub bound_trace: Option<Quantiles>,
     /// Every joint by itself, base first: medians over the runs.
     pub joints: Vec<JointMetrics>,
 }
@@ -143,70 +174,23 @@ pub struct SelectionTime {
     pub p95: Option<f64>,
 }
 
-/// What is kept of one run of all learners.
-#[derive(Clone, Debug)]
-pub struct Trace {
-    seed: u64,
-    learners: Vec<LearnerTrace>,
-}
-
-#[derive(Clone, Debug)]
-struct LearnerTrace {
-    name: String,
-    converged_at: Option<u64>,
-    recovered_at: Option<u64>,
-    movements: u64,
-    misses: u64,
-    errors: Vec<RunSummary>,
-    joints: Vec<Vec<JointMetrics>>,
-    selection_ms: Vec<f64>,
-}
-
-impl Trace {
-    /// Runs `experiment` for `steps` steps and calls `tick` after each.
-    pub fn run(mut experiment: Experiment, steps: u64, mut tick: impl FnMut()) -> Result<Self, super::ExperimentError> {
-        let mut learners: Vec<LearnerTrace> = experiment
-            .description()
-            .learners
-            .iter()
-            .map(|learner| LearnerTrace {
-                name: learner.name.clone(),
-                converged_at: None,
-                recovered_at: None,
-                movements: 0,
-                misses: 0,
-                errors: Vec::with_capacity(steps as usize + 1),
-                joints: Vec::with_capacity(steps as usize + 1),
-                selection_ms: Vec::with_capacity(steps as usize),
-            })
-            .collect();
-        let mut take = |report: &StepReport| {
-            for (trace, learner) in learners.iter_mut().zip(&report.learners) {
-                trace.errors.push(RunSummary::from(&learner.metrics));
-                trace.joints.push(learner.metrics.joints.clone());
-                trace.selection_ms.extend(learner.movement.as_ref().map(|movement| movement.selection_ms));
-                (trace.movements, trace.misses) = (learner.metrics.movements, learner.metrics.misses);
-            }
-        };
-        take(experiment.latest());
-        for _ in 0..steps {
-            take(experiment.step()?);
-            tick();
-        }
-        for (trace, verdict) in learners.iter_mut().zip(&experiment.verdicts) {
-            trace.converged_at = verdict.convergence.converged_at();
-            trace.recovered_at = verdict.recovery.converged_at();
-        }
-        Ok(Self { seed: experiment.description().seed, learners })
-    }
-}
-
 impl Comparison {
     /// Puts together the runs of one scenario, in the order given.
     pub fn of(scenario: &str, steps: u64, traces: &[Trace]) -> Self {
         let count = traces.first().map_or(0, |trace| trace.learners.len());
         let learners = (0..count).map(|index| LearnerComparison::of(index, steps, traces)).collect();
-        Self { scenario: scenario.to_owned(), steps, learners }
+        let movements_by_counting = traces.first().map_or(0, |trace| trace.movements_by_counting);
+        Self { scenario: scenario.to_owned(), steps, movements_by_counting, best_designs: Vec::new(), learners }
+    }
+
+    /// The same beside the best designs of the scenario.
+    pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
+        let best = best_designs.last().map(|design| design.best_design_trace);
+        for learner in &mut self.learners {
+            let bound = learner.curve.last().and_then(|end| end.bound_trace).map(|bound| bound.median);
+            learner.efficiency = best.zip(bound).map(|(best, bound)| best / bound);
+        }
+        Self { best_designs, ..self }
     }
 }
 
@@ -250,6 +234,8 @@ impl LearnerComparison {
                     location_m: over_runs(|errors| errors.location_m),
                     prediction_m: over_runs(|errors| errors.prediction_m),
                     prediction_mean_m: over_runs(|errors| errors.prediction_mean_m),
+                    trace: over_runs(|errors| errors.trace),
+                    bound_trace: over_runs(|errors| errors.bound_trace),
                     joints: (0..joints).map(|joint| of_joint(movements as usize, joint)).collect(),
                 }
             })
@@ -261,76 +247,8 @@ impl LearnerComparison {
             summary: Summary::of(runs.iter().map(|run| run.converged_at)),
             runs,
             curve,
+            efficiency: None,
             selection_ms: SelectionTime { median: median(&times), p95: nearest_rank(&times, 0.95) },
         }
-    }
-}
-
-impl Summary {
-    /// The summary of runs by when they converged.
-    pub fn of(converged_at: impl Iterator<Item = Option<u64>>) -> Self {
-        let mut late: Vec<f64> = converged_at.map(|at| at.map_or(f64::INFINITY, |at| at as f64)).collect();
-        late.sort_by(f64::total_cmp);
-        let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
-        Self {
-            runs: late.len(),
-            converged: late.iter().filter(|at| at.is_finite()).count(),
-            median_converged_at: finite(median(&late)),
-            p90_converged_at: finite(nearest_rank(&late, 0.9)),
-            max_converged_at: finite(late.last().copied()),
-        }
-    }
-}
-
-impl Quantiles {
-    fn of(mut values: Vec<f64>) -> Option<Self> {
-        values.sort_by(f64::total_cmp);
-        Some(Self {
-            mean: values.iter().sum::<f64>() / values.len() as f64,
-            median: median(&values)?,
-            q25: nearest_rank(&values, 0.25)?,
-            q75: nearest_rank(&values, 0.75)?,
-        })
-    }
-}
-
-/// The median of sorted values.
-fn median(sorted: &[f64]) -> Option<f64> {
-    let count = sorted.len();
-    match count {
-        0 => None,
-        _ if count % 2 == 1 => Some(sorted[count / 2]),
-        _ => Some(0.5 * (sorted[count / 2 - 1] + sorted[count / 2])),
-    }
-}
-
-/// The smallest of sorted values that a fraction `q` of them does not exceed.
-fn nearest_rank(sorted: &[f64], q: f64) -> Option<f64> {
-    let rank = (q * sorted.len() as f64).ceil().max(1.0) as usize;
-    sorted.get(rank - 1).copied()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_run_that_did_not_converge_is_infinitely_late() {
-        let summary = Summary::of([Some(10), None, Some(30), Some(20)].into_iter());
-        assert_eq!((summary.runs, summary.converged), (4, 3));
-        assert_eq!(summary.median_converged_at, Some(25.0));
-        assert_eq!(summary.p90_converged_at, None);
-        assert_eq!(summary.max_converged_at, None);
-        assert_eq!(Summary::of([Some(1), None].into_iter()).median_converged_at, None);
-        assert_eq!(Summary::of([].into_iter()).median_converged_at, None);
-    }
-
-    #[test]
-    fn quantiles_are_nearest_rank() {
-        let values: Vec<f64> = (1..=20).map(f64::from).collect();
-        assert_eq!(nearest_rank(&values, 0.9), Some(18.0));
-        assert_eq!(nearest_rank(&values, 0.25), Some(5.0));
-        assert_eq!(median(&values), Some(10.5));
-        assert_eq!(Quantiles::of(vec![]), None);
     }
 }
