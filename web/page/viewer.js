@@ -19,10 +19,10 @@ const ECHO_MS = 3000;
  */
 export async function startViewer(canvas, addresses, progress, scrubbed) {
   keepToThisHost();
-  const [, response] = await Promise.all([loadScript(addresses.script), fetch(addresses.wasm)]);
-  if (!response.ok) throw new Error(`the viewer could not be loaded (${response.status})`);
-  // `wasm_bindgen` is what the script defines.
-  await wasm_bindgen({ module_or_path: withProgress(response, progress) });
+  await Promise.all([loadScript(addresses.script), load(addresses.wasm, progress)]);
+  // `wasm_bindgen` is what the script defines. Browsers keep what they have compiled only if they get the response as it
+  // came, so it is asked for once more: from the browser's cache.
+  await wasm_bindgen({ module_or_path: fetch(addresses.wasm) });
   let viewer = null;
   const handle = new wasm_bindgen.WebHandle({
     on_viewer_event: (json) => viewer?.hear(JSON.parse(json)),
@@ -64,23 +64,21 @@ function loadScript(address) {
 }
 
 /**
- * The same response, whose reading is reported.
- * @param {Response} response
+ * Brings a file into the browser's cache.
+ * @param {string} address
  * @param {(fraction: number | null) => void} progress
  */
-function withProgress(response, progress) {
+async function load(address, progress) {
+  const response = await fetch(address);
+  if (!response.ok) throw new Error(`the viewer could not be loaded (${response.status})`);
   const total = Number(response.headers.get("uncompressed-length"));
   let loaded = 0;
-  const counted = response.body.pipeThrough(
-    new TransformStream({
-      transform(chunk, controller) {
-        loaded += chunk.byteLength;
-        progress(total ? Math.min(loaded / total, 1) : null);
-        controller.enqueue(chunk);
-      },
-    }),
-  );
-  return new Response(counted, { headers: { "Content-Type": "application/wasm" } });
+  for (const reader = response.body.getReader(); ; ) {
+    const { done, value } = await reader.read();
+    if (done) return;
+    loaded += value.byteLength;
+    progress(total ? Math.min(loaded / total, 1) : null);
+  }
 }
 
 /** A running viewer that shows one recording at a time. */

@@ -128,6 +128,25 @@ fn decades(input: GridInput) -> Vec<GridMark> {
     marks
 }
 
+/// Marks at some five whole steps.
+fn steps(input: GridInput) -> Vec<GridMark> {
+    let (low, high) = input.bounds;
+    let range = high - low;
+    if !(range.is_finite() && range > 0.0) {
+        return Vec::new();
+    }
+    let rough = (range / 5.0).max(1.0);
+    let power = 10f64.powf(rough.log10().floor());
+    let nice = [1.0, 2.0, 5.0, 10.0].into_iter().find(|digit| digit * power >= rough).unwrap_or(10.0) * power;
+    let first = (low / nice).ceil() as i64;
+    (first..)
+        .map(|k| k as f64 * nice)
+        .take_while(|value| *value <= high)
+        .take(20)
+        .map(|value| GridMark { value, step_size: nice })
+        .collect()
+}
+
 impl Panel {
     pub(super) fn charts(&mut self, ui: &mut Ui) {
         self.legend(ui);
@@ -183,6 +202,7 @@ impl Panel {
         let description = self.description()?;
         ui.horizontal(|ui| {
             ui.label(RichText::new(format!("{}, {}", chart.title, chart.unit)).strong()).on_hover_text(chart.tip);
+            ui.label(RichText::new("over movements").weak().small());
         });
         let mut plot = Plot::new(chart.title)
             .height(HEIGHT)
@@ -196,6 +216,7 @@ impl Panel {
             .set_margin_fraction(vec2(0.02, 0.08))
             .y_axis_min_width(34.0)
             .show_crosshair(false)
+            .x_grid_spacer(steps)
             .x_axis_formatter(|mark, _| if mark.value < 0.0 { String::new() } else { mark.value.to_string() })
             .y_axis_formatter(|mark, _| chart.number(mark.value))
             .label_formatter(|hover| match hover {

@@ -31,8 +31,9 @@ pub const TOUR: [(&str, &str); 5] = [
     ),
     (
         "What to try next",
-        "Press N for another seed, or run ten in the charts to see that it is no luck. Choose head-fov, where the arm \
-         may leave the camera's view, or tiago-mocap, a real robot. “Share” holds a link to exactly what you see.",
+        "Tick “global” above: it weighs all movements together, plans ahead and needs about ten. Press N for another \
+         seed, or run ten in the charts to see that it is no luck. Choose head-fov, where the arm may leave the camera's \
+         view, or tiago-mocap, a real robot. “Share” holds a link to exactly what you see.",
     ),
 ];
 
