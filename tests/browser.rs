@@ -126,6 +126,22 @@ async fn visit(page: &Browser, server: Server) {
     let words = page.evaluate("document.getElementById('mirror').textContent").await;
     assert!(words.as_str().expect("text").contains("active: not converged"), "{words}");
 
+    // Moving the scene's time moves the panel: a click on the left end of its timeline.
+    let scene = "(({ left, bottom, width }) => [left, bottom, width])\
+        (document.getElementById('viewer').getBoundingClientRect())";
+    let place = page.evaluate(scene).await;
+    let [left, bottom, width] = [0, 1, 2].map(|index| place[index].as_f64().expect("a number"));
+    let latest = page.evaluate("document.getElementById('mirror').dataset.latest").await;
+    let moved = format!("document.getElementById('mirror').dataset.step !== {latest}");
+    // While the scene is on its way to the latest step, clicks have no effect.
+    for _ in 0..20 {
+        page.click(left + 0.45 * width, bottom - 14.0).await;
+        if page.evaluate(&moved).await == true {
+            break;
+        }
+    }
+    page.wait_for_state("an earlier step", &format!("state.step !== {latest} && state.latest === {latest}")).await;
+
     // A reload keeps session and step.
     page.wait_for(
         "the address",

@@ -115,6 +115,18 @@ impl Browser {
         self.client.perform_actions(keys).await.expect("a key press");
     }
 
+    /// Clicks on a point of the page, pixels from its upper left corner.
+    pub async fn click(&self, x: f64, y: f64) {
+        for (kind, button, clicks) in
+            [("mouseMoved", "none", 0), ("mousePressed", "left", 1), ("mouseReleased", "left", 1)]
+        {
+            let event = json!({ "type": kind, "x": x, "y": y, "button": button, "clickCount": clicks });
+            self.client.issue_cmd(DevTools("Input.dispatchMouseEvent", event)).await.expect("a click");
+            // Viewers look at the pointer once a frame.
+            tokio::time::sleep(Duration::from_millis(300)).await;
+        }
+    }
+
     /// What the page tells assistive technology, and scripts.
     pub async fn wait_for_state(&self, what: &str, condition: &str) {
         let condition = format!("((state) => {condition})(document.getElementById('mirror').dataset)");
@@ -195,6 +207,20 @@ impl WebDriverCompatibleCommand for Log {
 
     fn method_and_body(&self, _: &Url) -> (Method, Option<String>) {
         (Method::POST, Some(json!({ "type": self.0 }).to_string()))
+    }
+}
+
+/// A command of the developer tools, by way of chromedriver.
+#[derive(Debug)]
+struct DevTools(&'static str, Value);
+
+impl WebDriverCompatibleCommand for DevTools {
+    fn endpoint(&self, base: &Url, session: Option<&str>) -> Result<Url, <Url as std::str::FromStr>::Err> {
+        base.join(&format!("session/{}/goog/cdp/execute", session.unwrap_or_default()))
+    }
+
+    fn method_and_body(&self, _: &Url) -> (Method, Option<String>) {
+        (Method::POST, Some(json!({ "cmd": self.0, "params": self.1 }).to_string()))
     }
 }
 

@@ -93,6 +93,7 @@ export class Viewer {
   #step = 0;
   #waiting = [];
   #seeking = false;
+  #check = 0;
   #scrubbed;
   /** When which step was sought: the viewer tells of these too. */
   #sought = new Map();
@@ -106,9 +107,20 @@ export class Viewer {
   hear(event) {
     if (event.type !== "time_update" || this.#channel === null || this.#seeking || this.#sought.size === 0) return;
     const step = Math.round(event.time);
-    const now = performance.now();
-    const echo = step === this.#step || now - (this.#sought.get(step) ?? -Infinity) < ECHO_MS;
-    if (!echo && step >= 0) this.#scrubbed(step);
+    if (step === this.#step || step < 0) return;
+    const echo = performance.now() - (this.#sought.get(step) ?? -Infinity) < ECHO_MS;
+    if (!echo) return this.#scrubbed(step);
+    // An echo comes once. Was it the visitor after all, the viewer stays where it is.
+    this.#sought.delete(step);
+    this.#check ||= setTimeout(() => this.#compare(), ECHO_MS);
+  }
+
+  /** Tells where the viewer is, if it is not where it was sent. */
+  #compare() {
+    this.#check = 0;
+    if (this.#channel === null || this.#seeking) return;
+    const time = this.#handle.get_time_for_timeline(this.#channel, TIMELINE);
+    if (time !== undefined && Math.round(time) !== this.#step) this.#scrubbed(Math.round(time));
   }
 
   /** Begins a recording. @param {string} id its recording id */
@@ -121,9 +133,10 @@ export class Viewer {
   /** Ends the recording; what was shown stays. */
   close() {
     clearTimeout(this.#timer);
+    clearTimeout(this.#check);
     if (this.#channel !== null) this.#handle.close_channel(this.#channel);
     this.#channel = this.#header = null;
-    [this.#parts, this.#timer, this.#step] = [[], 0, 0];
+    [this.#parts, this.#timer, this.#check, this.#step] = [[], 0, 0, 0];
     this.#sought.clear();
     this.#wake();
   }

@@ -245,6 +245,9 @@ impl Panel {
         (self.cursor, self.shown, self.sought, self.awaited) = (0, 0, None, None);
         (self.opening, self.busy, self.stopped) = (false, false, None);
         self.link = Link::Loading;
+        if self.restoring.is_none() {
+            self.wanted = self.wanted.map(|wanted| wanted.min(session.step));
+        }
         self.session = Some(session);
     }
 
@@ -318,9 +321,11 @@ impl Panel {
             (self.awaited, self.busy) = (None, false);
         }
         match self.wanted {
+            // What comes after it on the way to the session's latest step does not move it.
             Some(wanted) if self.history.latest() >= wanted => {
-                self.wanted = None;
                 self.cursor = wanted;
+                let made = self.session.as_ref().map_or(0, |session| session.step);
+                self.wanted = Some(wanted).filter(|_| self.history.latest() < made);
             }
             _ if following => self.cursor = self.history.latest(),
             _ => {}

@@ -53,7 +53,7 @@ impl Panel {
         if !self.is_ready() || self.restoring.is_some() {
             return;
         }
-        self.stopped = None;
+        (self.stopped, self.wanted) = (None, None);
         self.cursor = self.history.latest();
         self.pace = Pace { asked_at: self.now - 1.0 / self.settings.speed, settled: self.settled().0 };
         self.playing = true;
@@ -113,6 +113,7 @@ impl Panel {
     /// Shows a step that was made.
     pub fn scrub(&mut self, step: u64) {
         let step = step.min(self.history.latest());
+        self.wanted = None;
         if step != self.cursor {
             self.pause();
             self.cursor = step;

@@ -183,6 +183,18 @@ fn a_reload_finds_its_session_or_computes_it_again() {
 }
 
 #[test]
+fn a_reload_shows_the_step_that_was_shown_not_the_latest() {
+    let mut page = Page::open("scenario=arm-6dof&seed=1&step=2&session=arm-6dof-1");
+    page.tell(scenarios());
+    let mut session = session("arm-6dof", 1, None);
+    session["step"] = json!(5);
+    page.tell(json!({ "is": "session", "session": session }));
+    page.tell(json!({ "is": "connected" }));
+    (0..=5).for_each(|_| page.report(|_, _| {}));
+    assert_eq!((page.harness.state().cursor, page.harness.state().history.latest()), (2, 5));
+}
+
+#[test]
 fn learners_and_seeds_are_chosen() {
     let mut page = Page::with_session("");
     page.make_steps(1, |_, _, _| {});
