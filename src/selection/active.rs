@@ -235,19 +235,7 @@ impl Policy for Active {
             Actions::Pool(pool) => {
                 let criterion = ACriterion::new(belief, &self.weights)?;
                 let candidates: Vec<&[f64]> = pool.iter().map(|movement| movement.configuration.as_slice()).collect();
-                let values = criterion.evaluate(&candidates);
-                let (movement, value) =
-                    pool.iter().zip(values).min_by(|a, b| a.1.total_cmp(&b.1)).ok_or(SelectionError::Exhausted)?;
-                if !value.is_finite() {
-                    return Err(SelectionError::NoFiniteCriterion);
-                }
-                Ok(Selection {
-                    movement: movement.clone(),
-                    criterion: Some(value),
-                    gain: Some(criterion.trace() - value),
-                    evaluations: pool.len(),
-                    partition: None,
-                })
+                Selection::of_pool(pool, criterion.evaluate(&candidates), criterion.trace())
             }
         }
     }

@@ -116,7 +116,17 @@ pub struct Appraisal {
 }
 
 /// Candidates per batch product: enough to fill the matrix kernel, few enough to share among cores.
-pub(super) const CHUNK: usize = 32;
+const CHUNK: usize = 32;
+
+/// The values of all candidates, in order, a chunk at a time: on several cores with the feature `parallel`.
+pub(super) fn in_chunks<C: Sync>(candidates: &[C], evaluate: impl Fn(&[C]) -> Vec<f64> + Sync) -> Vec<f64> {
+    #[cfg(feature = "parallel")]
+    if candidates.len() > CHUNK {
+        use rayon::prelude::*;
+        return candidates.par_chunks(CHUNK).flat_map_iter(&evaluate).collect();
+    }
+    candidates.chunks(CHUNK).flat_map(evaluate).collect()
+}
 
 impl<'a> ACriterion<'a> {
     /// The criterion at `belief`, which must hold a covariance.
@@ -193,12 +203,7 @@ impl<'a> ACriterion<'a> {
     /// C(θ) of every candidate, in order. Chunks run on several cores with the feature `parallel`; the values do not
     /// depend on how many.
     pub fn evaluate<C: AsRef<[f64]> + Sync>(&self, candidates: &[C]) -> Vec<f64> {
-        #[cfg(feature = "parallel")]
-        if candidates.len() > CHUNK {
-            use rayon::prelude::*;
-            return candidates.par_chunks(CHUNK).flat_map_iter(|chunk| self.evaluate_chunk(chunk)).collect();
-        }
-        candidates.chunks(CHUNK).flat_map(|chunk| self.evaluate_chunk(chunk)).collect()
+        in_chunks(candidates, |chunk| self.evaluate_chunk(chunk))
     }
 
     /// The criterion of one candidate and what it rests on; an error if it is not a number.

@@ -91,6 +91,22 @@ impl Selection {
         let movement = Movement { configuration, row: None };
         Self { movement, criterion: None, gain: None, evaluations: 0, partition: None }
     }
+
+    /// The best of recorded movements by the values of their criterion, which was `trace` before.
+    pub(crate) fn of_pool(pool: &[Movement], values: Vec<f64>, trace: f64) -> Result<Self, SelectionError> {
+        let best = pool.iter().zip(values).min_by(|a, b| a.1.total_cmp(&b.1));
+        let (movement, value) = best.ok_or(SelectionError::Exhausted)?;
+        if !value.is_finite() {
+            return Err(SelectionError::NoFiniteCriterion);
+        }
+        Ok(Self {
+            movement: movement.clone(),
+            criterion: Some(value),
+            gain: Some(trace - value),
+            evaluations: pool.len(),
+            partition: None,
+        })
+    }
 }
 
 /// Why no movement could be chosen.

@@ -22,7 +22,7 @@ use nalgebra::{Matrix3, Point3};
 
 use super::{
     ACriterion, Optimality, SelectionError, Sight, Weights,
-    criterion::{CHUNK, Prediction},
+    criterion::{Prediction, in_chunks},
 };
 use crate::{
     estimation::Belief,
@@ -139,12 +139,7 @@ impl<'a> Outlook<'a> {
 
     /// C(θ) of every candidate, in order. The values do not depend on the number of cores.
     pub fn evaluate<C: AsRef<[f64]> + Sync>(&self, candidates: &[C]) -> Vec<f64> {
-        #[cfg(feature = "parallel")]
-        if candidates.len() > CHUNK {
-            use rayon::prelude::*;
-            return candidates.par_chunks(CHUNK).flat_map_iter(|chunk| self.evaluate_chunk(chunk)).collect();
-        }
-        candidates.chunks(CHUNK).flat_map(|chunk| self.evaluate_chunk(chunk)).collect()
+        in_chunks(candidates, |chunk| self.evaluate_chunk(chunk))
     }
 
     fn evaluate_chunk<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {

@@ -152,19 +152,7 @@ impl Planner {
     fn select_from_pool(&self, belief: &Belief, pool: &[Movement]) -> Result<Selection, SelectionError> {
         let outlook = Outlook::new(belief, &self.weights, self.planning.optimality, &self.workspace)?;
         let candidates: Vec<&[f64]> = pool.iter().map(|movement| movement.configuration.as_slice()).collect();
-        let values = outlook.evaluate(&candidates);
-        let (movement, value) =
-            pool.iter().zip(values).min_by(|a, b| a.1.total_cmp(&b.1)).ok_or(SelectionError::Exhausted)?;
-        if !value.is_finite() {
-            return Err(SelectionError::NoFiniteCriterion);
-        }
-        Ok(Selection {
-            movement: movement.clone(),
-            criterion: Some(value),
-            gain: Some(outlook.trace() - value),
-            evaluations: pool.len(),
-            partition: None,
-        })
+        Selection::of_pool(pool, outlook.evaluate(&candidates), outlook.trace())
     }
 }
 

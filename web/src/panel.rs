@@ -1,12 +1,12 @@
-//! The panel's state, and what events do to it.
+//! The panel's state.
 
 use crate::{
     history::History,
-    host::{Command, Event, Live, Mirror},
+    host::{Command, Mirror},
     seeds::SeedRuns,
-    settings::{MAX_RESTORED, Settings},
+    settings::Settings,
     why::Why,
-    wire::{Description, Problem, Report, Scenario, Session},
+    wire::{Description, Scenario, Session},
 };
 
 /// What the panel can do at the moment.
@@ -64,7 +64,7 @@ pub struct Panel {
     /// A request for steps is under way.
     pub(crate) busy: bool,
     /// The step whose report is awaited.
-    awaited: Option<u64>,
+    pub(crate) awaited: Option<u64>,
     /// Steps up to this one are made at once, to restore a run.
     pub(crate) restoring: Option<u64>,
     /// The step to show once it is there.
@@ -158,197 +158,5 @@ impl Panel {
     pub fn restored(&self) -> Option<f32> {
         let target = self.restoring?;
         Some(self.history.latest() as f32 / target.max(1) as f32)
-    }
-
-    /// Takes in what happened.
-    pub fn receive(&mut self, event: Event) {
-        match event {
-            Event::Begin { query, known } => self.begin(&query, known),
-            Event::Scenarios { scenarios } => self.take_scenarios(scenarios),
-            Event::Session { session: Some(session) } => self.adopt(*session),
-            Event::Session { session: None } => {
-                self.notice("The session of this address is gone; its run is computed again.".to_owned());
-                self.open(self.settings.step);
-            }
-            Event::Refused { asked, problem } => self.refused(&asked, &problem),
-            Event::Connected => self.link = Link::Connected,
-            Event::Live { message: Live::Step(report) } => self.take(&report),
-            Event::Live { message: Live::Description(_) } => {}
-            Event::Stepped { session, step } => {
-                if self.session.as_ref().is_some_and(|current| current.id == session) {
-                    self.stepped(step);
-                }
-            }
-            Event::Lost { seconds } => {
-                self.link = Link::Lost(seconds);
-                self.busy = false;
-            }
-            Event::Ended { failure, unseen } => self.ended(failure, unseen),
-            Event::Shown { step } => self.shown = step,
-            Event::Scrubbed { step } => self.scrub(step),
-            Event::NoScene { reason } => self.no_scene = Some(reason),
-            Event::Selection { learner, selection } => self.why.answered(&learner, selection.map(|answer| *answer)),
-            Event::Evaluation { evaluation } => self.why.evaluated(*evaluation),
-            Event::Seeds { seed, reports, done } => self.seeds.take(seed, &reports, done),
-            Event::Copied { done } => {
-                let text = if done { "Copied." } else { "The browser does not allow copying." };
-                self.copied = Some(text.to_owned());
-            }
-        }
-    }
-
-    fn begin(&mut self, query: &str, known: bool) {
-        let (settings, notices) = Settings::parse(query);
-        self.settings = settings;
-        self.seed_text = self.settings.seed.to_string();
-        notices.into_iter().for_each(|notice| self.notice(notice));
-        if !known {
-            self.tour = Some(0);
-        }
-        self.ask(Command::Scenarios);
-    }
-
-    fn take_scenarios(&mut self, scenarios: Vec<Scenario>) {
-        self.scenarios = scenarios;
-        let notices = self.settings.validate(&self.scenarios);
-        notices.into_iter().for_each(|notice| self.notice(notice));
-        match self.settings.session.clone() {
-            Some(session) => {
-                self.wanted = Some(self.settings.step);
-                self.opening = true;
-                self.ask(Command::Find { session });
-            }
-            None => self.open(self.settings.step),
-        }
-    }
-
-    /// Leaves the session and opens that of the settings, at this step.
-    pub(crate) fn open(&mut self, step: u64) {
-        self.pause();
-        self.opening = true;
-        self.restoring = (step > 0).then(|| step.min(MAX_RESTORED));
-        self.wanted = self.restoring;
-        let Settings { scenario, seed, learners, ellipsoids, .. } = self.settings.clone();
-        let learners = Some(learners).filter(|learners| !learners.is_empty());
-        self.ask(Command::Open { scenario, seed, learners, ellipsoids });
-    }
-
-    fn adopt(&mut self, session: Session) {
-        let description = &session.description;
-        self.settings.scenario.clone_from(&description.scenario);
-        self.settings.seed = description.seed;
-        self.seed_text = description.seed.to_string();
-        self.settings.learners = description.learners.iter().map(|learner| learner.name.clone()).collect();
-        self.settings.session = Some(session.id.clone());
-        self.history = History::new(description);
-        self.why = Why::default();
-        (self.cursor, self.shown, self.sought, self.awaited) = (0, 0, None, None);
-        (self.opening, self.busy, self.stopped) = (false, false, None);
-        self.link = Link::Loading;
-        if self.restoring.is_none() {
-            self.wanted = self.wanted.map(|wanted| wanted.min(session.step));
-        }
-        self.session = Some(session);
-    }
-
-    fn refused(&mut self, asked: &str, problem: &Problem) {
-        let sentence = problem.sentence();
-        match asked {
-            "scenarios" => self.link = Link::Unreachable(sentence),
-            "open" => {
-                self.opening = false;
-                // The server has the last word on what an address may ask for.
-                match problem.field.as_deref() {
-                    Some(field) if self.session.is_none() => self.fall_back(field, &sentence),
-                    _ if self.session.is_none() => self.link = Link::Unreachable(sentence),
-                    _ => self.notice(format!("No new session: {sentence}.")),
-                }
-            }
-            "find" => {
-                self.opening = false;
-                self.link = Link::Unreachable(sentence);
-            }
-            "step" => {
-                // Somebody else has stepped this session: their steps are on their way.
-                if let (409, Some(step)) = (problem.status, problem.step) {
-                    self.stepped(step);
-                } else {
-                    self.busy = false;
-                    self.pause();
-                    self.restoring = None;
-                    if problem.status != 0 {
-                        self.notice(format!("No step: {sentence}."));
-                    }
-                }
-            }
-            "select" => self.why.refused(problem),
-            "evaluate" => {
-                self.why.evaluating = false;
-                self.notice(format!("This posture cannot be judged: {sentence}."));
-            }
-            "seeds" => {
-                self.seeds.cancel();
-                self.notice(format!("The other seeds stopped: {sentence}."));
-            }
-            _ => self.notice(sentence),
-        }
-    }
-
-    fn fall_back(&mut self, field: &str, sentence: &str) {
-        let usual = Settings::default();
-        let (seed, scenario) = (self.settings.seed, self.settings.scenario.clone());
-        self.settings.learners.clear();
-        if field != "learners" {
-            self.settings.seed = usual.seed;
-        }
-        self.notice(format!("The server does not take this address: {sentence}. Defaults are used instead."));
-        let is_new = seed != self.settings.seed || field == "learners" || scenario != self.settings.scenario;
-        if is_new { self.open(1) } else { self.link = Link::Unreachable(sentence.to_owned()) }
-    }
-
-    /// The session is at this step; its reports may still be on their way, and until then nothing is asked for.
-    fn stepped(&mut self, step: u64) {
-        self.awaited = Some(step).filter(|step| *step > self.history.latest());
-        self.busy = self.awaited.is_some();
-    }
-
-    fn take(&mut self, report: &Report) {
-        let following = self.cursor == self.history.latest();
-        if !self.history.take(report) {
-            return;
-        }
-        if self.awaited.is_some_and(|step| step <= self.history.latest()) {
-            (self.awaited, self.busy) = (None, false);
-        }
-        match self.wanted {
-            // What comes after it on the way to the session's latest step does not move it.
-            Some(wanted) if self.history.latest() >= wanted => {
-                self.cursor = wanted;
-                let made = self.session.as_ref().map_or(0, |session| session.step);
-                self.wanted = Some(wanted).filter(|_| self.history.latest() < made);
-            }
-            _ if following => self.cursor = self.history.latest(),
-            _ => {}
-        }
-    }
-
-    fn ended(&mut self, failure: Option<String>, unseen: bool) {
-        self.busy = false;
-        match failure {
-            Some(failure) => {
-                self.pause();
-                self.link = Link::Failed(failure);
-            }
-            None if unseen => {
-                let (latest, cursor) = (self.history.latest(), self.cursor);
-                self.notice(format!("The server was started anew; the run is computed again up to step {latest}."));
-                self.open(latest);
-                self.wanted = self.wanted.map(|_| cursor);
-            }
-            None => {
-                self.pause();
-                self.link = Link::Expired;
-            }
-        }
     }
 }

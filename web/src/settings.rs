@@ -1,12 +1,7 @@
-//! What the visitor chose, as it stands in the page's address.
-//!
-//! An address may come from anywhere and from any version: what is unknown or out of range is replaced by its default,
-//! with a notice, and nothing is ever refused as a whole.
+//! What the visitor chose.
 
 use crate::wire::Scenario;
 
-/// The version of the address; raised when a name changes its meaning.
-const VERSION: &str = "1";
 /// The fastest playing, steps a second.
 pub const MAX_SPEED: f64 = 100.0;
 /// The slowest.
@@ -107,80 +102,6 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Reads an address's query, with a notice for everything that could not be used.
-    pub fn parse(query: &str) -> (Self, Vec<String>) {
-        let (mut settings, mut notices) = (Self::default(), Vec::new());
-        for pair in query.trim_start_matches('?').split('&').filter(|pair| !pair.is_empty()) {
-            let (name, value) = pair.split_once('=').unwrap_or((pair, ""));
-            let value = decode(value);
-            if let Err(notice) = settings.set(name, &value) {
-                notices.push(notice);
-            }
-        }
-        (settings, notices)
-    }
-
-    fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
-        let wrong = |range: &str, used: String| {
-            let value: String = value.chars().take(40).collect();
-            format!("The address says {name}={value}, which is not {range}; {used} is used instead.")
-        };
-        let number =
-            |range: std::ops::RangeInclusive<u64>| value.parse::<u64>().ok().filter(|number| range.contains(number));
-        match name {
-            "v" if value == VERSION => {}
-            "v" => return Err(format!("The address is of version {value}; this page reads version {VERSION}.")),
-            "scenario" => value.clone_into(&mut self.scenario),
-            "seed" => {
-                let range = format!("a whole number up to {MAX_SEED}");
-                self.seed = number(0..=MAX_SEED).ok_or_else(|| wrong(&range, self.seed.to_string()))?;
-            }
-            "learners" => {
-                self.learners = value.split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect();
-            }
-            "step" => {
-                let range = format!("a step up to {MAX_RESTORED}");
-                self.step = number(0..=MAX_RESTORED).ok_or_else(|| wrong(&range, self.step.to_string()))?;
-            }
-            "speed" => {
-                let range = format!("from {MIN_SPEED} to {MAX_SPEED}");
-                let speed = value.parse::<f64>().ok().filter(|speed| (MIN_SPEED..=MAX_SPEED).contains(speed));
-                self.speed = speed.ok_or_else(|| wrong(&range, self.speed.to_string()))?;
-            }
-            "to" => {
-                let range = format!("a step from 1 to {MAX_RUN}");
-                let to = number(1..=MAX_RUN).ok_or_else(|| wrong(&range, "the scenario's last step".to_owned()))?;
-                self.run_to = Some(to);
-            }
-            "stop" => {
-                let found = StopWhen::ALL.iter().find(|(_, name, _)| *name == value);
-                self.stop = found.ok_or_else(|| wrong("never, first or all", "all".to_owned()))?.0;
-            }
-            "tab" => {
-                let found = Tab::ALL.iter().find(|(_, name, _)| *name == value);
-                self.tab = found.ok_or_else(|| wrong("charts, why or share", "charts".to_owned()))?.0;
-            }
-            "why" => self.learner = Some(value.to_owned()),
-            "joints" => {
-                let pair = value.split_once(',').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
-                let pair: Option<(usize, usize)> = pair.filter(|(a, b)| a != b);
-                self.joints = Some(pair.ok_or_else(|| wrong("two joints", "the first two".to_owned()))?);
-            }
-            "ellipsoids" => {
-                let found = ELLIPSOIDS.iter().find(|(name, _)| *name == value);
-                found
-                    .ok_or_else(|| wrong("1-sigma, 2-sigma or 95-percent", "1-sigma".to_owned()))?
-                    .0
-                    .clone_into(&mut self.ellipsoids);
-            }
-            "session" => self.session = Some(value.to_owned()),
-            // Browsers and those who pass links on add what they like.
-            _ if name.starts_with("utm_") => {}
-            _ => return Err(format!("The address names “{}”, which this page does not know.", short(name))),
-        }
-        Ok(())
-    }
-
     /// Holds the choice against what there is; what does not exist is replaced, with a notice.
     pub fn validate(&mut self, scenarios: &[Scenario]) -> Vec<String> {
         let mut notices = Vec::new();
@@ -210,130 +131,9 @@ impl Settings {
         }
         notices
     }
-
-    /// The query of this choice, without a question mark. A link to give away names no session.
-    pub fn query(&self, with_session: bool) -> String {
-        let usual = Self::default();
-        let mut query = format!("v={VERSION}&scenario={}&seed={}", encode(&self.scenario), self.seed);
-        let mut add = |name: &str, value: &str| query += &format!("&{name}={}", encode(value));
-        if !self.learners.is_empty() {
-            add("learners", &self.learners.join(","));
-        }
-        add("step", &self.step.to_string());
-        if self.speed != usual.speed {
-            add("speed", &self.speed.to_string());
-        }
-        if let Some(to) = self.run_to {
-            add("to", &to.to_string());
-        }
-        let named = |stop| StopWhen::ALL.iter().find(|(known, ..)| *known == stop).map_or("", |(_, name, _)| name);
-        if self.stop != usual.stop {
-            add("stop", named(self.stop));
-        }
-        if self.tab != usual.tab {
-            add("tab", Tab::ALL.iter().find(|(known, ..)| *known == self.tab).map_or("", |(_, name, _)| name));
-        }
-        if let Some(learner) = &self.learner {
-            add("why", learner);
-        }
-        if let Some((a, b)) = self.joints {
-            add("joints", &format!("{a},{b}"));
-        }
-        if self.ellipsoids != usual.ellipsoids {
-            add("ellipsoids", &self.ellipsoids);
-        }
-        if let Some(session) = self.session.as_ref().filter(|_| with_session) {
-            add("session", session);
-        }
-        query
-    }
 }
 
-fn short(text: &str) -> String {
+/// As much of a text as a notice can hold.
+pub(crate) fn short(text: &str) -> String {
     text.chars().take(40).collect()
-}
-
-/// Percent-decoding; what is malformed stays as it is.
-fn decode(text: &str) -> String {
-    let bytes = text.as_bytes();
-    let mut decoded = Vec::with_capacity(bytes.len());
-    let mut rest = bytes;
-    while let Some((&first, tail)) = rest.split_first() {
-        let hex = tail.get(..2).and_then(|two| u8::from_str_radix(std::str::from_utf8(two).ok()?, 16).ok());
-        match (first, hex) {
-            (b'%', Some(byte)) => {
-                decoded.push(byte);
-                rest = &tail[2..];
-            }
-            (b'+', _) => {
-                decoded.push(b' ');
-                rest = tail;
-            }
-            _ => {
-                decoded.push(first);
-                rest = tail;
-            }
-        }
-    }
-    String::from_utf8_lossy(&decoded).into_owned()
-}
-
-fn encode(text: &str) -> String {
-    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.~,".contains(&byte);
-    text.bytes().map(|byte| if plain(byte) { (byte as char).to_string() } else { format!("%{byte:02X}") }).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_address_is_read_back_as_it_was_written() {
-        let settings = Settings {
-            scenario: "head-fov".to_owned(),
-            seed: MAX_SEED,
-            learners: vec!["active".to_owned(), "random".to_owned()],
-            step: 57,
-            speed: 2.5,
-            run_to: Some(300),
-            stop: StopWhen::First,
-            tab: Tab::Why,
-            learner: Some("active".to_owned()),
-            joints: Some((0, 3)),
-            ellipsoids: "95-percent".to_owned(),
-            session: Some("3f2a".to_owned()),
-        };
-        assert_eq!(Settings::parse(&settings.query(true)), (settings.clone(), Vec::new()));
-        assert_eq!(Settings::parse(&format!("?{}", settings.query(false))).0.session, None);
-        assert_eq!(Settings::parse(&Settings::default().query(true)), (Settings::default(), Vec::new()));
-    }
-
-    #[test]
-    fn what_is_wrong_in_an_address_gives_a_notice_and_a_default() {
-        for query in [
-            "seed=-1",
-            "seed=1.5",
-            "seed=9007199254740993",
-            "step=999999999",
-            "speed=0",
-            "speed=NaN",
-            "speed=inf",
-            "to=0",
-            "stop=sometimes",
-            "tab=secret",
-            "joints=1",
-            "joints=2,2",
-            "joints=a,b",
-            "ellipsoids=3",
-            "v=2",
-            "v=",
-            "colour=blue",
-            "%",
-        ] {
-            let (settings, notices) = Settings::parse(query);
-            assert_eq!((settings, notices.len()), (Settings::default(), 1), "{query}");
-        }
-        assert_eq!(Settings::parse("?scenario=%E2%82%AC%zz%").0.scenario, "€%zz%");
-        assert!(Settings::parse("utm_source=x&").1.is_empty());
-    }
 }

@@ -2,6 +2,7 @@
 //!
 //! What is needed all the time stands at the top and stays; the rest scrolls under it.
 
+mod chart;
 mod charts;
 mod controls;
 mod diagram;
