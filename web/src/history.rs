@@ -120,6 +120,11 @@ impl History {
         true
     }
 
+    /// The first step; 0 before any.
+    pub fn first(&self) -> u64 {
+        self.first
+    }
+
     /// The latest step; 0 before any.
     pub fn latest(&self) -> u64 {
         self.first + self.rows.len().saturating_sub(1) as u64

@@ -92,7 +92,7 @@ pub enum Event {
     Seeds {
         /// Its seed.
         seed: u64,
-        /// Its reports, from step 0 on.
+        /// Its next reports; a request for steps answers with those it made, so that the first is of step 1.
         reports: Vec<Report>,
         /// Whether this seed is done.
         done: bool,

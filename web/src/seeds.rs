@@ -77,8 +77,9 @@ impl SeedRuns {
     /// The band of a learner, over the steps that at least three seeds have reached.
     pub fn band(&self, learner: usize, value: impl Fn(&Row) -> Option<f64>) -> Option<Band> {
         let mut band = Band::default();
+        let first = self.runs.values().map(|run| run.first()).min()?;
         let furthest = self.runs.values().map(|run| run.latest()).max()?;
-        for step in 0..=furthest {
+        for step in first..=furthest {
             let rows = self.runs.values().filter_map(|run| run.row(step, learner));
             let mut values: Vec<f64> = rows.filter_map(&value).filter(|value| value.is_finite()).collect();
             if values.len() < FEWEST {

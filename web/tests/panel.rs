@@ -5,7 +5,7 @@ mod support;
 use body_schema_panel::{Link, host::Command, settings::Tab};
 use egui::Key;
 use serde_json::json;
-use support::{Page, scenarios, selection, session};
+use support::{Page, report, scenarios, selection, session};
 
 fn steps(commands: &[Command]) -> Vec<u64> {
     let counts = commands.iter().filter_map(|command| match command {
@@ -275,8 +275,17 @@ fn other_seeds_run_in_the_background_and_can_be_cancelled() {
     let commands = page.commands();
     assert!(matches!(commands.last(), Some(Command::Seeds { seeds, .. }) if seeds.len() == 10), "{commands:?}");
     assert!(page.has("0 of 10 seeds"));
+    // As the page hears of them: from step 1 on.
+    for seed in 2..=5 {
+        let reports: Vec<_> = (1..=8).map(|step| report(step, 3, |_, _| {})).collect();
+        page.tell(json!({ "is": "seeds", "seed": seed, "reports": reports, "done": true }));
+    }
+    assert!(page.has("4 of 10 seeds"));
+    let band = page.harness.state().band(0, |row| row.orientation_deg).expect("enough seeds");
+    assert_eq!(band.steps, (1..=8).map(f64::from).collect::<Vec<_>>());
     page.click("Cancel");
     assert_eq!(page.commands(), [Command::CancelSeeds]);
+    assert!(page.has("bands: the middle 80 % of 4 seeds"));
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod support;
 use egui::{Key, Theme, Vec2, vec2};
 use egui_kittest::{Harness, SnapshotOptions, SnapshotResult, SnapshotResults};
 use serde_json::{Value, json};
-use support::{Page, scenarios, selection};
+use support::{Page, report, scenarios, selection};
 
 /// Beside the scene on a screen of 1280 × 800, above it on a narrow one, and on a large screen.
 const USUAL: Vec2 = vec2(486.0, 800.0);
@@ -87,6 +87,22 @@ fn the_panel_looks_as_it_should() {
     page.harness.ctx.set_theme(Theme::Light);
     page.tell(json!({ "is": "ended", "failure": null, "unseen": false }));
     held(&mut page, "expired");
+
+    let mut page = run("speed=100&to=60&stop=never", USUAL, 60);
+    page.harness.state_mut().run_seeds();
+    for seed in 0..5u64 {
+        let luck = 0.7 + 0.15 * seed as f64;
+        let unlucky = |step: u64, learner: usize, value: &mut Value| {
+            faring(step, learner, value);
+            for error in ["orientation_deg", "location_m", "prediction_mean_m"] {
+                value["metrics"][error] = json!(value["metrics"][error].as_f64().expect("an error") * luck);
+            }
+        };
+        let reports: Vec<Value> =
+            (1..=60).map(|step| report(step, 3, |learner, value| unlucky(step, learner, value))).collect();
+        page.tell(json!({ "is": "seeds", "seed": seed, "reports": reports, "done": true }));
+    }
+    held(&mut page, "bands");
 
     let mut page = run("speed=100&to=60&stop=never", NARROW, 60);
     held(&mut page, "narrow");

@@ -181,7 +181,7 @@ pub fn session(scenario: &str, seed: u64, chosen: Option<Vec<String>>) -> Value 
     })
 }
 
-fn report(step: u64, learners: usize, change: impl Fn(usize, &mut Value)) -> Value {
+pub fn report(step: u64, learners: usize, change: impl Fn(usize, &mut Value)) -> Value {
     let learners: Vec<Value> = (0..learners)
         .map(|index| {
             let error = 40.0 / (1.0 + step as f64 * [0.4, 0.1, 0.02][index]);
