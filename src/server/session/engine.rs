@@ -109,8 +109,9 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
         Err(problem) => drop(opened.send(Err(problem))),
     }
     shared.live.close();
-    shared.ended.cancel();
+    // Before anybody hears of the end: whoever deletes a session may open another at once.
     drop(permit);
+    shared.ended.cancel();
 }
 
 struct Engine<'a> {
