@@ -209,6 +209,8 @@ impl Panel {
         }
         let left = self.run_to().saturating_sub(self.history.latest()).min(self.remaining().unwrap_or(u64::MAX));
         self.request(due.clamp(1, MOST_AT_ONCE).min(left.max(1)));
+        // The part of a step that is due already counts for the next, or every step would come a little late.
+        self.pace.asked_at -= elapsed - due as f64 / self.settings.speed;
         None
     }
 
