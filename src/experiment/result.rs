@@ -149,9 +149,8 @@ impl Model {
 impl RunResult {
     /// The same beside the best designs of the scenario.
     pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
-        let best = best_designs.last().map(|design| design.best_design_trace);
         for learner in &mut self.learners {
-            learner.efficiency = best.zip(learner.metrics.bound_trace).map(|(best, bound)| best / bound);
+            learner.efficiency = BestDesign::efficiency(&best_designs, learner.metrics.bound_trace);
         }
         Self { best_designs, ..self }
     }

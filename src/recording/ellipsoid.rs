@@ -35,15 +35,6 @@ impl EllipsoidSize {
         }
     }
 
-    /// As it stands in requests and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::OneSigma => "1-sigma",
-            Self::TwoSigma => "2-sigma",
-            Self::NinetyFivePercent => "95-percent",
-        }
-    }
-
     /// As it stands in labels and notes.
     pub fn label(self) -> &'static str {
         match self {

@@ -91,9 +91,8 @@ impl LiveLog {
 
     /// The same for a page that has curves of its own: the views are arranged for the scene alone.
     pub fn scene_parts_from(&self, index: usize) -> Vec<Bytes> {
-        let state = self.state();
-        let mut parts = state.parts.get(index..).map(<[Bytes]>::to_vec).unwrap_or_default();
-        if let Some((place, scene)) = &state.scene
+        let mut parts = self.parts_from(index);
+        if let Some((place, scene)) = &self.state().scene
             && let Some(part) = place.checked_sub(index).and_then(|place| parts.get_mut(place))
         {
             *part = scene.clone();
@@ -131,31 +130,30 @@ impl LiveLog {
     /// Encodes messages and appends them, one part each; on an error none. A closed log ignores them.
     pub fn append(&self, messages: &[LogMsg]) -> Result<(), RecordingError> {
         let parts = messages.iter().map(encode).collect::<Result<Vec<_>, _>>()?;
-        let mut state = self.state();
-        if state.closed {
-            return Ok(());
-        }
-        state.bytes += parts.iter().map(Bytes::len).sum::<usize>();
-        state.parts.extend(parts);
-        // Under the lock, so that the lengths are sent in order.
-        self.shared.length.send_replace(state.parts.len());
+        self.push(parts, None);
         Ok(())
     }
 
     /// Appends an arrangement of views, as one part: the whole one, and that of the scene alone.
     pub(super) fn append_arrangement(&self, whole: &[LogMsg], scene: &[LogMsg]) -> Result<(), RecordingError> {
-        let encode = |messages: &[LogMsg]| -> Result<Bytes, RecordingError> {
-            Ok(messages.iter().map(encode).collect::<Result<Vec<_>, _>>()?.concat().into())
-        };
-        let (whole, scene) = (encode(whole)?, encode(scene)?);
-        let mut state = self.state();
-        if !state.closed {
-            state.bytes += whole.len();
-            state.scene = Some((state.parts.len(), scene));
-            state.parts.push(whole);
-            self.shared.length.send_replace(state.parts.len());
-        }
+        let (whole, scene) = (encode_all(whole)?, encode_all(scene)?);
+        self.push(vec![whole], Some(scene));
         Ok(())
+    }
+
+    /// Appends parts, the first of which a page may take otherwise. A closed log ignores them.
+    fn push(&self, parts: Vec<Bytes>, scene: Option<Bytes>) {
+        let mut state = self.state();
+        if state.closed {
+            return;
+        }
+        if let Some(scene) = scene {
+            state.scene = Some((state.parts.len(), scene));
+        }
+        state.bytes += parts.iter().map(Bytes::len).sum::<usize>();
+        state.parts.extend(parts);
+        // Under the lock, so that the lengths are sent in order.
+        self.shared.length.send_replace(state.parts.len());
     }
 
     /// Everything so far as a finished .rrd file: the many small chunks of a live session put together, with a footer.
@@ -171,8 +169,7 @@ impl LiveLog {
     ///
     /// Takes about as long as it took to encode the parts: run it where it may block.
     pub fn put_together(&self, parts: &[Bytes]) -> Result<Bytes, RecordingError> {
-        let messages = put_together([&[self.header()], parts].concat().concat())?;
-        Ok(messages.iter().map(encode).collect::<Result<Vec<_>, _>>()?.concat().into())
+        encode_all(&put_together([&[self.header()], parts].concat().concat())?)
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -209,6 +206,11 @@ fn encode(message: &LogMsg) -> Result<Bytes, RecordingError> {
     let mut bytes = Vec::new();
     message.to_transport(EncodingOptions::PROTOBUF_COMPRESSED.compression)?.to_rrd_bytes(&mut bytes)?;
     Ok(Bytes::from(bytes))
+}
+
+/// Messages as one part.
+fn encode_all(messages: &[LogMsg]) -> Result<Bytes, RecordingError> {
+    Ok(messages.iter().map(encode).collect::<Result<Vec<_>, _>>()?.concat().into())
 }
 
 /// The messages of a stream, with the chunks of each entity put together; what is static comes first.

@@ -51,6 +51,7 @@ mod metrics;
 mod model;
 mod movement;
 mod note;
+mod palette;
 mod partition;
 mod recorder;
 mod rows;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use clap::ValueEnum;
 use rerun::{MediaType, TextDocument};
 
 use super::{EllipsoidSize, TRUTH_COLOR, colours::hex, colours::learner_color};
@@ -31,10 +32,10 @@ fn markdown(description: &Description, ellipsoids: EllipsoidSize) -> String {
         "```\nbody-schema run {scenario} --seed {seed} --steps M{} --rrd FILE{}\n```\nmakes this recording again, but for \
          the times in `selection_ms`.\n\n## Learners\n\n| learner | estimator | policy | colour |\n|---|---|---|---|\n",
         description.learners.iter().map(|learner| format!(" --learner {}", learner.name)).collect::<String>(),
-        match ellipsoids {
-            EllipsoidSize::OneSigma => String::new(),
-            other => format!(" --ellipsoids {}", other.name()),
-        }
+        ellipsoids
+            .to_possible_value()
+            .filter(|_| ellipsoids != EllipsoidSize::default())
+            .map_or(String::new(), |size| format!(" --ellipsoids {}", size.get_name()))
     );
     for (index, learner) in description.learners.iter().enumerate() {
         let colour = hex(learner_color(index));

@@ -287,10 +287,10 @@ impl Recorder {
             blueprint::messages(&self.description, &learners, &scene, arrangement, application)
         };
         let whole = arrange(Arrangement::Whole)?;
-        if let Some(live) = &self.live {
-            live.append_arrangement(&whole, &arrange(Arrangement::Scene)?)?;
-        }
-        self.file.as_mut().map_or(Ok(()), |file| file.append(&whole))?;
+        let scene = arrange(Arrangement::Scene)?;
+        // To both targets, whatever happens to the other.
+        let live = self.live.as_ref().map_or(Ok(()), |live| live.append_arrangement(&whole, &scene));
+        self.file.as_mut().map_or(Ok(()), |file| file.append(&whole)).and(live)?;
         Ok(arrow_m)
     }
 }

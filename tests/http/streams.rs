@@ -9,7 +9,7 @@ use rerun::log::{Chunk, LogMsg};
 use serde_json::Value;
 use tokio::{net::TcpStream, time::timeout};
 use tokio_tungstenite::{
-    client_async,
+    WebSocketStream, client_async,
     tungstenite::{Message, protocol::frame::coding::CloseCode},
 };
 
@@ -27,6 +27,13 @@ pub fn steps_of_recording(bytes: &[u8]) -> BTreeSet<i64> {
         }
     }
     steps
+}
+
+/// The WebSocket of a session.
+async fn follow(server: &Server, session: &str, query: &str) -> WebSocketStream<TcpStream> {
+    let stream = TcpStream::connect(server.address).await.expect("a connection");
+    let url = format!("ws://{}{session}/live{query}", server.address);
+    client_async(url, stream).await.expect("a WebSocket").0
 }
 
 /// The events of a stream, as they come.
@@ -132,12 +139,7 @@ async fn the_websocket_carries_reports_and_recording_and_resumes() {
     let server = Server::start().await;
     let session = server.open_quick(1).await;
     server.step(&session, 3).await;
-    let connect = async |query: &str| {
-        let stream = TcpStream::connect(server.address).await.expect("a connection");
-        let url = format!("ws://{}{session}/live{query}", server.address);
-        client_async(url, stream).await.expect("a WebSocket").0
-    };
-    let mut whole = connect("").await;
+    let mut whole = follow(&server, &session, "").await;
     let (mut parts, mut steps) = (Vec::new(), Vec::new());
     let first = timeout(SOON, whole.next()).await.expect("soon").expect("a message").expect("no error");
     let first: Value = serde_json::from_str(first.to_text().expect("text")).expect("JSON");
@@ -158,7 +160,7 @@ async fn the_websocket_carries_reports_and_recording_and_resumes() {
     assert_eq!(steps, [0, 1, 2, 3]);
     assert_eq!(parts[0].len(), 12);
 
-    let mut resumed = connect(&format!("?from={}&step=4", parts.len())).await;
+    let mut resumed = follow(&server, &session, &format!("?from={}&step=4", parts.len())).await;
     resumed.next().await.expect("a message").expect("the description");
     server.step(&session, 1).await;
     let mut bytes = parts[0].to_vec();
@@ -194,13 +196,10 @@ async fn whoever_is_far_behind_gets_parts_put_together() {
     for _ in 0..30 {
         server.step(&session, 1).await;
     }
-    let connect = async |query: &str| {
-        let stream = TcpStream::connect(server.address).await.expect("a connection");
-        let url = format!("ws://{}{session}/live{query}", server.address);
-        client_async(url, stream).await.expect("a WebSocket").0
-    };
+    // A download completes the recording: nothing is left for a quiet moment, which might be now.
+    assert!(server.get(&format!("{session}/recording.rrd")).await.status().is_success());
     // A late visitor: header, one part, the index of the next, and then every report.
-    let mut late = connect("").await;
+    let mut late = follow(&server, &session, "").await;
     let (mut parts, mut next, mut steps) = (Vec::new(), 0, Vec::new());
     while steps.last() != Some(&30) {
         match timeout(SOON, late.next()).await.expect("soon").expect("a message").expect("no error") {
@@ -220,7 +219,7 @@ async fn whoever_is_far_behind_gets_parts_put_together() {
     assert!(parts.len() < 10, "{} parts", parts.len());
     assert_eq!(steps_of_recording(&parts.concat()), (0..=30).collect());
     // It resumes from there.
-    let mut resumed = connect(&format!("?from={next}&step=31")).await;
+    let mut resumed = follow(&server, &session, &format!("?from={next}&step=31")).await;
     resumed.next().await.expect("a message").expect("the description");
     server.step(&session, 1).await;
     let mut bytes = parts[0].to_vec();
@@ -238,9 +237,7 @@ async fn whoever_is_far_behind_gets_parts_put_together() {
 async fn a_client_that_does_not_read_holds_nobody_up() {
     let server = Server::start().await;
     let session = server.open_quick(1).await;
-    let stream = TcpStream::connect(server.address).await.expect("a connection");
-    let url = format!("ws://{}{session}/live", server.address);
-    let mut slow = client_async(url, stream).await.expect("a WebSocket").0;
+    let mut slow = follow(&server, &session, "").await;
     // More than the buffers between the two hold.
     for _ in 0..20 {
         timeout(SOON, server.step(&session, 50)).await.expect("steps are made all the same");

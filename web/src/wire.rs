@@ -77,6 +77,9 @@ pub struct Description {
     /// Number of learned parameters.
     #[serde(default)]
     pub parameters: u64,
+    /// Movements after which there are as many equations as unknowns: a yardstick, not a bound.
+    #[serde(default)]
+    pub movements_by_counting: u64,
     /// The learners, in the order of every report.
     pub learners: Vec<Learner>,
     /// The thresholds of convergence.
@@ -87,13 +90,6 @@ pub struct Description {
     /// After so many movements the body changes.
     #[serde(default)]
     pub change_at: Option<u64>,
-}
-
-impl Description {
-    /// Movements after which there are as many equations as unknowns, three each: a yardstick, not a bound.
-    pub fn movements_by_counting(&self) -> u64 {
-        self.parameters.div_ceil(3)
-    }
 }
 
 /// A session.

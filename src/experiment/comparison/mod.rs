@@ -185,10 +185,9 @@ impl Comparison {
 
     /// The same beside the best designs of the scenario.
     pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
-        let best = best_designs.last().map(|design| design.best_design_trace);
         for learner in &mut self.learners {
             let bound = learner.curve.last().and_then(|end| end.bound_trace).map(|bound| bound.median);
-            learner.efficiency = best.zip(bound).map(|(best, bound)| best / bound);
+            learner.efficiency = BestDesign::efficiency(&best_designs, bound);
         }
         Self { best_designs, ..self }
     }

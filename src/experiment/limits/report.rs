@@ -19,6 +19,13 @@ pub struct BestDesign {
     pub gap: f64,
 }
 
+impl BestDesign {
+    /// The A-efficiency of data whose bound is tr(W F⁻¹): the trace of the last of the best designs as a fraction of it.
+    pub fn efficiency(designs: &[Self], bound_trace: Option<f64>) -> Option<f64> {
+        Some(designs.last()?.best_design_trace / bound_trace?)
+    }
+}
+
 /// Steps of a run during which the body stays the same, and its limits there.
 #[derive(Clone, Debug)]
 pub struct Stretch {

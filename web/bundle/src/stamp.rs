@@ -10,7 +10,8 @@ const CRATES: [&str; 8] = ["eframe", "egui", "egui_plot", "epaint", "serde", "se
 
 /// The stamp of the panel's sources, given the folder of the workspace.
 pub fn of_sources(workspace: &Path) -> io::Result<String> {
-    let mut files = vec![workspace.join("web/Cargo.toml")];
+    // The palette is the one of recordings.
+    let mut files = vec![workspace.join("web/Cargo.toml"), workspace.join("src/recording/palette.rs")];
     collect(&workspace.join("web/src"), &mut files)?;
     files.sort();
     let mut hash = Fnv::new();

@@ -15,7 +15,7 @@ pub(super) struct Chart {
     pub(super) judged: bool,
     pub(super) value: fn(&Row) -> Option<f64>,
     /// What it cannot fall below.
-    pub(super) bound: fn(&Row) -> Option<f64>,
+    pub(super) bound: Option<fn(&Row) -> Option<f64>>,
 }
 
 pub(super) const CHARTS: [Chart; 6] = [
@@ -26,7 +26,7 @@ pub(super) const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: true,
         value: |row| row.orientation_deg,
-        bound: |_| None,
+        bound: None,
     },
     Chart {
         title: "Location error",
@@ -35,7 +35,7 @@ pub(super) const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: true,
         value: |row| Some(row.location_m? * 1e3),
-        bound: |_| None,
+        bound: None,
     },
     Chart {
         title: "Prediction error",
@@ -44,7 +44,7 @@ pub(super) const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: false,
         value: |row| Some(row.prediction_m? * 1e3),
-        bound: |_| None,
+        bound: None,
     },
     Chart {
         title: "Uncertainty",
@@ -54,7 +54,7 @@ pub(super) const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: false,
         value: |row| row.trace,
-        bound: |row| row.bound,
+        bound: Some(|row| row.bound),
     },
     Chart {
         title: "Misses",
@@ -63,7 +63,7 @@ pub(super) const CHARTS: [Chart; 6] = [
         logarithmic: false,
         judged: false,
         value: |row| Some(row.misses as f64),
-        bound: |_| None,
+        bound: None,
     },
     Chart {
         title: "Time of a choice",
@@ -72,7 +72,7 @@ pub(super) const CHARTS: [Chart; 6] = [
         logarithmic: true,
         judged: false,
         value: |row| row.selection_ms.filter(|ms| *ms > 0.0),
-        bound: |_| None,
+        bound: None,
     },
 ];
 

@@ -49,12 +49,12 @@ impl Panel {
             }
             let converged =
                 (0..description.learners.len()).any(|i| self.history.converged_at(self.cursor, i).is_some());
-            if description.truth.is_some() && description.parameters > 0 {
+            if description.truth.is_some() && description.movements_by_counting > 0 {
                 let tip = format!(
                     "{} unknowns, three equations a movement: nobody can know everything earlier without an initial guess",
                     description.parameters
                 );
-                let text = format!("dotted: {} movements, as many equations as unknowns", description.movements_by_counting());
+                let text = format!("dotted: {} movements, as many equations as unknowns", description.movements_by_counting);
                 ui.label(RichText::new(text).weak()).on_hover_text(tip);
             }
             if converged {
@@ -117,8 +117,8 @@ impl Panel {
                 let line = HLine::new("threshold", chart.y(threshold)).color(threshold_colour).width(1.0);
                 plot.hline(line.style(LineStyle::Dashed { length: 3.0 }).allow_hover(false));
             }
-            if chart.judged && description.parameters > 0 {
-                let counted = VLine::new("", description.movements_by_counting() as f64).color(cursor_colour);
+            if chart.judged && description.movements_by_counting > 0 {
+                let counted = VLine::new("", description.movements_by_counting as f64).color(cursor_colour);
                 plot.vline(counted.width(1.0).style(LineStyle::Dotted { spacing: 4.0 }).allow_hover(false));
             }
             plot.vline(VLine::new("", self.cursor as f64).color(cursor_colour).width(1.0).allow_hover(false));
@@ -126,9 +126,9 @@ impl Panel {
                 let colour = colours::learner(index);
                 let curve: Vec<[f64; 2]> =
                     self.history.curve(index, chart.value).into_iter().map(|[x, y]| [x, chart.y(y)]).collect();
-                let bound = self.history.curve(index, chart.bound).into_iter();
-                let bound: Vec<[f64; 2]> = bound.map(|[x, y]| [x, chart.y(y)]).collect();
-                if !bound.is_empty() {
+                if let Some(bound) = chart.bound {
+                    let bound: Vec<[f64; 2]> =
+                        self.history.curve(index, bound).into_iter().map(|[x, y]| [x, chart.y(y)]).collect();
                     let name = format!("bound of {}'s data", learner.name);
                     plot.line(Line::new(name, bound).color(colour.gamma_multiply(0.6)).width(1.0));
                 }
