@@ -1,23 +1,29 @@
-//! An estimated chain and its covariance.
+//! An estimated state and its covariance.
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix3x2};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
 
-use crate::kinematics::{Chain, TangentLayout, chart, jacobian::jacobian};
+use crate::{
+    kinematics::{Joint, chart},
+    model::{Block, Layout, State, jacobian},
+    sensing::{Observation, Rig},
+};
 
-/// What an estimator believes: a chain, and the covariance of its learned parameters in the chart at that chain.
+/// What an estimator believes: a state, and the covariance of its learned parameters in the chart at that state.
 #[derive(Clone, Debug)]
 pub struct Belief {
-    /// The estimated chain, the origin of the chart.
-    pub chain: Chain,
+    /// The estimated state, the origin of the chart.
+    pub state: State,
     /// Which parameters are learned, and their order in the covariance.
-    pub layout: Arc<TangentLayout>,
-    /// P (m × m), symmetric and positive; m², m rad and rad². `None` for an estimator that keeps none.
+    pub layout: Arc<Layout>,
+    /// How the estimator takes measurements to be made, whitened by the noise that it assumes. That may differ from the
+    /// sensors' own.
+    pub rig: Arc<Rig>,
+    /// P (m × m), symmetric and positive, in the products of the coordinates' units. `None` for an estimator that keeps
+    /// none.
     pub covariance: Option<DMatrix<f64>>,
-    /// R = r I as the estimator assumes it: r in m². It may differ from the sensor's own.
-    pub noise_m2: f64,
-    /// Other chains that explain what was seen, the likeliest first; empty if the estimator keeps one hypothesis.
+    /// Other states that explain what was seen, the likeliest first; empty if the estimator keeps one hypothesis.
     pub alternatives: Vec<Alternative>,
 }
 
@@ -26,22 +32,57 @@ pub struct Belief {
 pub struct Alternative {
     /// Its probability. The estimate's own is what all alternatives leave of 1.
     pub weight: f64,
-    /// The chain.
-    pub chain: Chain,
+    /// The state.
+    pub state: State,
     /// Its covariance, in the chart at it.
     pub covariance: DMatrix<f64>,
 }
 
 impl Belief {
+    /// Of one hypothesis without a covariance.
+    pub fn new(state: State, layout: Arc<Layout>, rig: Arc<Rig>) -> Self {
+        Self { state, layout, rig, covariance: None, alternatives: Vec::new() }
+    }
+
+    /// The same with a covariance.
+    pub fn with_covariance(self, covariance: DMatrix<f64>) -> Self {
+        Self { covariance: Some(covariance), ..self }
+    }
+
     /// The probability of the estimate, as against its alternatives.
     pub fn weight(&self) -> f64 {
         1.0 - self.alternatives.iter().map(|alternative| alternative.weight).sum::<f64>()
     }
 
+    /// Forgets all but the `count` heaviest hypotheses, the estimate included; the others' weights are shared out among
+    /// those that stay, in proportion.
+    pub fn truncate(&mut self, count: usize) {
+        let own = self.weight();
+        self.alternatives.truncate(count.saturating_sub(1));
+        let total = own + self.alternatives.iter().map(|alternative| alternative.weight).sum::<f64>();
+        if total > 0.0 {
+            self.alternatives.iter_mut().for_each(|alternative| alternative.weight /= total);
+        }
+    }
+
+    /// Normalised innovation squared `eᵀ S⁻¹ e`, `S = H P Hᵀ + I`, of an observation under the estimate, and its degrees
+    /// of freedom, the equations seen; `None` without a covariance, without equations, and where it is no number.
+    pub fn nis(&self, positions: &[f64], observation: &Observation) -> Option<(f64, usize)> {
+        let covariance = self.covariance.as_ref()?;
+        let equations = self.rig.equations_of(&self.state, &self.layout, positions, observation);
+        let d = equations.residual.len();
+        if d == 0 {
+            return None;
+        }
+        let s = equations.rows.transpose() * covariance * &equations.rows + DMatrix::identity(d, d);
+        let nis = equations.residual.dot(&s.cholesky()?.solve(&equations.residual));
+        nis.is_finite().then_some((nis, d))
+    }
+
     /// The covariance of the predicted marker, `H P Hᵀ` (m²), without the measurement noise.
     pub fn marker_covariance(&self, positions: &[f64]) -> Option<Matrix3<f64>> {
         let covariance = self.covariance.as_ref()?;
-        let (_, h) = jacobian(&self.chain, &self.layout, positions);
+        let (_, h) = jacobian(&self.state, &self.layout, positions);
         let spread = &h * covariance * h.transpose();
         Some(spread.fixed_view::<3, 3>(0, 0).into_owned())
     }
@@ -58,35 +99,77 @@ impl Belief {
         Some(sum / configurations.len() as f64)
     }
 
-    /// The covariance (m², measurement frame) of the point of a joint's axis that lies `along` metres from the pivot:
-    /// rank 2, flat along the axis. To first order that point moves by B (a + along · d).
+    /// The covariance (m², frame of the measurements) of the point of a joint's axis that lies `along` metres from the
+    /// pivot. To first order that point moves by B (a + along · d), and with the base. Where the base is known it has
+    /// rank 2, flat along the axis.
     pub fn point_covariance(&self, joint: usize, along: f64) -> Option<Matrix3<f64>> {
-        let (point, direction) = (self.layout.point(joint)?.start, self.layout.direction(joint)?.start);
-        let covariance = self.covariance.as_ref()?;
-        let block = |row, column| covariance.fixed_view::<2, 2>(row, column).into_owned();
-        let cross: Matrix2<f64> = block(point, direction);
-        self.embedded(
-            joint,
-            block(point, point) + (cross + cross.transpose()) * along + block(direction, direction) * (along * along),
-        )
+        let (points, directions) = (self.layout.point(joint)?, self.layout.direction(joint)?);
+        let Joint::Revolute(line) = self.state.joints.get(joint)? else { return None };
+        let basis = self.basis(joint)?;
+        let mut h = self.base_columns(&(self.state.base * line.slid(along).point).coords, true);
+        for k in 0..2 {
+            h.set_column(points.start + k, &basis.column(k));
+            h.set_column(directions.start + k, &(basis.column(k) * along));
+        }
+        self.spread(&h)
     }
 
-    /// The covariance of a joint's axis direction (rad², measurement frame): rank 2, flat along the axis.
+    /// The covariance of a joint's axis direction (rad², frame of the measurements): rank 2, flat along the axis.
     pub fn direction_covariance(&self, joint: usize) -> Option<Matrix3<f64>> {
-        let start = self.layout.direction(joint)?.start;
-        self.embedded(joint, self.covariance.as_ref()?.fixed_view::<2, 2>(start, start).into_owned())
+        let directions = self.layout.direction(joint)?;
+        let axis = self.state.base.rotation * self.state.joints.get(joint)?.direction().into_inner();
+        let basis = self.basis(joint)?;
+        let mut h = self.base_columns(&axis, false);
+        (0..2).for_each(|k| h.set_column(directions.start + k, &basis.column(k)));
+        self.spread(&h)
     }
 
-    /// The covariance of the marker p₀ (m²), if it is learned.
+    /// The covariance of the marker p₀ (m², frame of the measurements), if it is learned.
     pub fn hand_marker_covariance(&self) -> Option<Matrix3<f64>> {
         let start = self.layout.marker()?.start;
-        Some(self.covariance.as_ref()?.fixed_view::<3, 3>(start, start).into_owned())
+        let mut h = self.base_columns(&(self.state.base * self.state.marker()).coords, true);
+        let rotation = self.state.base.rotation.to_rotation_matrix();
+        (0..3).for_each(|k| h.set_column(start + k, &rotation.matrix().column(k)));
+        self.spread(&h)
     }
 
-    fn embedded(&self, joint: usize, block: Matrix2<f64>) -> Option<Matrix3<f64>> {
-        let basis: Matrix3x2<f64> = chart::basis(&self.chain.joints.get(joint)?.direction());
-        Some(basis * block * basis.transpose())
+    /// The basis of a joint's chart, in the frame of the measurements.
+    fn basis(&self, joint: usize) -> Option<nalgebra::Matrix3x2<f64>> {
+        let rotation = self.state.base.rotation.to_rotation_matrix();
+        Some(rotation.matrix() * chart::basis(&self.state.joints.get(joint)?.direction()))
     }
+
+    /// How an unknown base moves a point (m), or turns a vector.
+    fn base_columns(&self, x: &nalgebra::Vector3<f64>, is_point: bool) -> Matrix3xX<f64> {
+        let mut h = Matrix3xX::zeros(self.layout.dimension());
+        if let Some(range) = self.layout.block(Block::Base) {
+            let arm = if is_point { x - self.state.base.translation.vector } else { *x };
+            if is_point {
+                h.fixed_view_mut::<3, 3>(0, range.start).fill_with_identity();
+            }
+            h.fixed_view_mut::<3, 3>(0, range.start + 3).copy_from(&-arm.cross_matrix());
+        }
+        h
+    }
+
+    fn spread(&self, h: &Matrix3xX<f64>) -> Option<Matrix3<f64>> {
+        let spread = h * self.covariance.as_ref()? * h.transpose();
+        Some(spread.fixed_view::<3, 3>(0, 0).into_owned())
+    }
+}
+
+/// S = H P Hᵀ + I of whitened rows Hᵀ (m × d), and P Hᵀ.
+pub(super) fn innovation_covariance(covariance: &DMatrix<f64>, rows: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    let numerator = covariance * rows;
+    let mut s = rows.tr_mul(&numerator);
+    s = (&s + s.transpose()) * 0.5;
+    (0..s.nrows()).for_each(|k| s[(k, k)] += 1.0);
+    (s, numerator)
+}
+
+/// Whether all are finite numbers.
+pub(super) fn is_finite(vector: &DVector<f64>, matrix: &DMatrix<f64>) -> bool {
+    vector.iter().chain(matrix.iter()).all(|x| x.is_finite())
 }
 
 #[cfg(test)]
@@ -95,39 +178,68 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::kinematics::{Joint, laws::random_chain};
+    use crate::model::laws::{random_arm, random_state};
 
-    /// The covariance of a point away from the pivot, against the derivative of that point of the retracted line.
+    fn random_belief(seed: u64) -> (Belief, DMatrix<f64>, ChaCha8Rng) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let state = random_state(&mut rng, 5);
+        let blocks = (0..5).map(Block::Axis).chain([Block::Target(0)]);
+        let layout = Layout::new(&state, blocks.chain((seed % 2 == 0).then_some(Block::Base)));
+        let m = layout.dimension();
+        let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-0.5..0.5));
+        let covariance = &root * root.transpose();
+        let belief = Belief::new(state, Arc::new(layout), Arc::new(Rig::tracker(1.0)));
+        (belief.with_covariance(covariance.clone()), covariance, rng)
+    }
+
+    /// Covariances of a point away from the pivot, of a direction and of the marker, against differences of what the
+    /// retracted state has there, with the base known and unknown.
     #[test]
-    fn the_covariance_of_a_slid_point_follows_the_line() {
+    fn covariances_follow_the_state() {
         for seed in 0..20 {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let chain = random_chain(&mut rng, 5);
-            let layout = Arc::new(TangentLayout::new(&chain.joints, &[], false));
-            let m = layout.dimension();
-            let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-0.5..0.5));
-            let covariance = &root * root.transpose();
+            let (belief, covariance, mut rng) = random_belief(seed);
             let along = rng.random_range(-0.8..0.8);
-            let belief =
-                Belief { chain, layout, covariance: Some(covariance.clone()), noise_m2: 1.0, alternatives: Vec::new() };
-            for (index, joint) in belief.chain.joints.iter().enumerate() {
-                let Joint::Revolute(line) = joint else {
-                    assert!(belief.point_covariance(index, along).is_none());
-                    continue;
-                };
+            let m = belief.layout.dimension();
+            let against = |of: &dyn Fn(&State) -> nalgebra::Vector3<f64>, found: Matrix3<f64>| {
                 let moved = |k: usize, step: f64| {
-                    let mut delta = nalgebra::DVector::zeros(m);
+                    let mut delta = DVector::zeros(m);
                     delta[k] = step;
-                    let retracted = belief.chain.retract(&belief.layout, &delta).joints[index];
-                    let retracted = retracted.line().map(|line| line.slid(along).point);
-                    retracted.unwrap_or(line.point).coords
+                    of(&belief.state.retract(&belief.layout, &delta))
                 };
                 let columns: Vec<_> = (0..m).map(|k| (moved(k, 1e-6) - moved(k, -1e-6)) / 2e-6).collect();
-                let derivative = nalgebra::Matrix3xX::from_columns(&columns);
+                let derivative = Matrix3xX::from_columns(&columns);
                 let expected = &derivative * &covariance * derivative.transpose();
-                let found = belief.point_covariance(index, along).expect("a revolute joint");
-                assert!((expected - found).amax() < 1e-6, "seed {seed}, joint {index}");
+                assert!((expected - found).amax() < 1e-6, "seed {seed}");
+            };
+            for index in 0..5 {
+                let direction = |state: &State| state.base * state.joints[index].direction().into_inner();
+                against(&direction, belief.direction_covariance(index).expect("kept"));
+                if belief.state.joints[index].line().is_none() {
+                    assert!(belief.point_covariance(index, along).is_none());
+                    continue;
+                }
+                let point = |state: &State| {
+                    let line = state.joints[index].line().expect("revolute");
+                    (state.base * line.slid(along).point).coords
+                };
+                against(&point, belief.point_covariance(index, along).expect("a revolute joint"));
             }
+            let marker = |state: &State| (state.base * state.marker()).coords;
+            against(&marker, belief.hand_marker_covariance().expect("learned"));
         }
+    }
+
+    /// With sixteen equal hypotheses of which eight are looked at, the estimate counts an eighth.
+    #[test]
+    fn hypotheses_that_are_cut_off_count_for_nobody() {
+        let state = random_arm(&mut ChaCha8Rng::seed_from_u64(1), 2);
+        let layout = Arc::new(Layout::of_arm(&state, &[], false));
+        let covariance = DMatrix::identity(layout.dimension(), layout.dimension());
+        let rival = Alternative { weight: 1.0 / 16.0, state: state.clone(), covariance: covariance.clone() };
+        let mut belief = Belief::new(state, layout, Arc::new(Rig::tracker(1.0))).with_covariance(covariance);
+        belief.alternatives = vec![rival; 15];
+        belief.truncate(8);
+        assert_eq!(belief.alternatives.len(), 7);
+        assert!((belief.weight() - 0.125).abs() < 1e-12, "{}", belief.weight());
     }
 }

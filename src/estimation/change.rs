@@ -1,15 +1,16 @@
 //! Noticing that the body has changed.
 //!
-//! As long as a belief is honest, the normalised innovations squared are χ² distributed with three degrees of freedom
-//! each, and so the sum over the last k of them with 3k. A change shows in sums that no chance explains:
+//! As long as a belief is honest, the normalised innovations squared are χ² distributed with as many degrees of freedom
+//! as equations were seen, and so is the sum over the last k of them, with their sum. A change shows in sums that no
+//! chance explains:
 //!
 //! ```text
-//! Σ NIS over the last k > χ²₃ₖ quantile,    k = 1 … 5
+//! Σ NIS over the last k > χ² quantile of their degrees of freedom,    k = 1 … 5
 //! ```
 //!
 //! with the quantile by Wilson and Hilferty (1931) at z standard deviations. A filter that assumes another noise than
-//! the sensor's, and is never at rest, has innovations of another scale and with heavier tails. For it the mean of the
-//! last eight is compared with that of forty before: four times as much is a change. (On `body-change`, seeds 1001 to
+//! the sensor's, and is never at rest, has innovations of another scale and with heavier tails. For it the mean per
+//! degree of freedom of the last eight is compared with that of forty before: four times as much is a change. (On `body-change`, seeds 1001 to
 //! 1012, that ratio reaches 3.7 for `active` and 2.8 for `random` before the change, 4.3 to 10 and 2.8 to 5.1 after it.)
 
 use std::collections::VecDeque;
@@ -29,8 +30,8 @@ const SILENT: usize = 100;
 #[derive(Clone, Debug)]
 pub struct ChangeDetector {
     relative: bool,
-    /// The latest first.
-    recent: VecDeque<f64>,
+    /// Normalised innovations squared with their degrees of freedom, the latest first.
+    recent: VecDeque<(f64, f64)>,
     observed: usize,
 }
 
@@ -45,9 +46,9 @@ impl ChangeDetector {
         Self { relative: true, ..Self::honest() }
     }
 
-    /// Takes in a normalised innovation squared (three degrees of freedom) and says whether the body has changed.
-    pub fn observe(&mut self, nis: f64) -> bool {
-        self.recent.push_front(nis);
+    /// Takes in a normalised innovation squared and its degrees of freedom, and says whether the body has changed.
+    pub fn observe(&mut self, nis: f64, degrees: usize) -> bool {
+        self.recent.push_front((nis, degrees as f64));
         self.recent.truncate(RECENT + BASELINE);
         self.observed += 1;
         let alarm = if self.relative { self.stands_out() } else { self.is_improbable() };
@@ -64,23 +65,27 @@ impl ChangeDetector {
     }
 
     fn is_improbable(&self) -> bool {
-        let mut sum = 0.0;
-        self.recent.iter().take(WINDOW).enumerate().any(|(index, nis)| {
+        let (mut sum, mut total) = (0.0, 0.0);
+        self.recent.iter().take(WINDOW).any(|(nis, degrees)| {
             sum += nis;
-            sum > quantile(3.0 * (index + 1) as f64, DEVIATIONS)
+            total += degrees;
+            sum > quantile(total, DEVIATIONS)
         })
     }
 
     fn stands_out(&self) -> bool {
-        let mean = |values: &mut dyn Iterator<Item = &f64>, count: usize| values.sum::<f64>() / count as f64;
-        let latest = mean(&mut self.recent.iter().take(RECENT), RECENT);
-        let before = mean(&mut self.recent.iter().skip(RECENT), BASELINE);
+        let mean = |values: &mut dyn Iterator<Item = &(f64, f64)>| {
+            let (sum, total) = values.fold((0.0, 0.0), |(sum, total), (nis, degrees)| (sum + nis, total + degrees));
+            sum / total
+        };
+        let latest = mean(&mut self.recent.iter().take(RECENT));
+        let before = mean(&mut self.recent.iter().skip(RECENT));
         self.observed >= SILENT && latest > RATIO * before
     }
 }
 
 /// The quantile of χ² with so many degrees of freedom that lies `deviations` standard deviations out.
-fn quantile(degrees: f64, deviations: f64) -> f64 {
+pub(super) fn quantile(degrees: f64, deviations: f64) -> f64 {
     let variance = 2.0 / (9.0 * degrees);
     degrees * (1.0 - variance + deviations * variance.sqrt()).powi(3)
 }
@@ -101,8 +106,8 @@ mod tests {
     fn chance_alone_raises_no_alarm_and_a_bias_does() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         for mut detector in [ChangeDetector::honest(), ChangeDetector::relative()] {
-            assert!((0..20_000).all(|_| !detector.observe(nis(&mut rng, 0.0))));
-            assert!((0..10).any(|_| detector.observe(nis(&mut rng, 6.0))));
+            assert!((0..20_000).all(|_| !detector.observe(nis(&mut rng, 0.0), 3)));
+            assert!((0..10).any(|_| detector.observe(nis(&mut rng, 6.0), 3)));
         }
     }
 

@@ -8,12 +8,15 @@
 //! ```
 //!
 //! in the same tangent coordinates as the filter, so that axes stay of unit length by construction. Points move in
-//! metres and directions in radians under one rate η, that is, with a characteristic length of 1 m.
+//! metres and directions in radians under one rate η, that is, with a characteristic length of 1 m. Its rig whitens by
+//! σ = 1 m: errors are in metres. (Another channel's errors count in proportion to its own σ.)
+
+use std::sync::Arc;
 
 use nalgebra::DVector;
 
 use super::{Belief, EstimationError, Estimator, Update};
-use crate::{kinematics::jacobian::jacobian, sensing::Observation};
+use crate::sensing::Observation;
 
 /// A step beyond this many metres or radians has nothing to do with a robot any more. (A NaN is not below it.)
 const LARGEST_STEP: f64 = 1e6;
@@ -28,7 +31,8 @@ pub struct Gradient {
 impl Gradient {
     /// Starts from `belief`, whose covariance is dropped: a gradient keeps none.
     pub fn new(belief: Belief, rate: f64) -> Self {
-        Self { belief: Belief { covariance: None, ..belief }, rate }
+        let rig = Arc::new(belief.rig.assuming(1.0));
+        Self { belief: Belief { covariance: None, rig, ..belief }, rate }
     }
 }
 
@@ -37,43 +41,42 @@ impl Estimator for Gradient {
         &self.belief
     }
 
-    fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
-        if let Some(measured) = observation.position() {
-            let Belief { chain, layout, .. } = &self.belief;
-            let (predicted, h) = jacobian(chain, layout, positions);
-            let delta: DVector<f64> = h.transpose() * (measured - predicted) * self.rate;
-            if !delta.iter().all(|x| x.abs() < LARGEST_STEP) {
-                return Err(EstimationError::Diverged("a gradient step left all bounds; the rate is too large"));
-            }
-            self.belief.chain = chain.retract(layout, &delta);
+    fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
+        let Belief { state, layout, rig, .. } = &self.belief;
+        let equations = rig.equations_of(state, layout, positions, observation);
+        let delta: DVector<f64> = equations.rows * equations.residual * self.rate;
+        if !delta.iter().all(|x| x.abs() < LARGEST_STEP) {
+            return Err(EstimationError::Diverged("a gradient step left all bounds; the rate is too large"));
         }
+        self.belief.state = state.retract(layout, &delta);
         Ok(Update::default())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::kinematics::{TangentLayout, laws::random_chain};
+    use crate::{
+        model::{Layout, laws::random_arm},
+        sensing::Rig,
+    };
 
     #[test]
     fn a_small_step_lowers_the_error_it_descends() {
         for seed in 0..50 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let chain = random_chain(&mut rng, 5);
-            let layout = Arc::new(TangentLayout::new(&chain.joints, &[], true));
+            let state = random_arm(&mut rng, 5);
+            let layout = Arc::new(Layout::of_arm(&state, &[], true));
             let theta: Vec<f64> = (0..5).map(|_| rng.random_range(-1.5..1.5)).collect();
-            let target = chain.marker_at(&theta) + nalgebra::Vector3::new(0.05, -0.02, 0.03);
-            let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-4, alternatives: Vec::new() };
+            let target = state.marker_at(&theta) + nalgebra::Vector3::new(0.05, -0.02, 0.03);
+            let belief = Belief::new(state, layout, Arc::new(Rig::tracker(0.01)));
             let mut gradient = Gradient::new(belief, 1e-3);
-            let error = |gradient: &Gradient| (gradient.belief().chain.marker_at(&theta) - target).norm();
+            let error = |gradient: &Gradient| (gradient.belief().state.marker_at(&theta) - target).norm();
             let before = error(&gradient);
-            gradient.update(&theta, &Observation::Seen(target)).expect("a finite step");
+            gradient.update(&theta, &Observation::seen(target)).expect("a finite step");
             assert!(error(&gradient) < before, "seed {seed}");
         }
     }

@@ -1,6 +1,6 @@
-//! Estimators of the chain, and what they believe.
+//! Estimators of a robot's state, and what they believe.
 //!
-//! * [`Belief`]: the estimated chain and its covariance in minimal tangent coordinates.
+//! * [`Belief`]: the estimated state and its covariance in minimal tangent coordinates.
 //! * [`Estimator`]: takes a movement and its observation, revises the belief.
 //! * [`Rls`]: recursive least squares, (2)–(5) of the paper: an extended Kalman filter with a constant state.
 //! * [`UnscentedRls`]: the same by the unscented transform, without linearisation.
@@ -8,6 +8,8 @@
 //! * [`Gradient`]: the stochastic gradient, the paper's baseline.
 //! * [`Smoother`]: maximum a posteriori over all measurements, with several hypotheses.
 //! * [`ChangeDetector`]: notices from the innovations that the body has changed.
+//!
+//! All of them read observations through a whitened [`Rig`](crate::sensing::Rig): R = I.
 
 mod belief;
 mod change;
@@ -22,26 +24,34 @@ pub use change::ChangeDetector;
 pub use gradient::Gradient;
 pub use rls::{Rls, StabilisingNoise};
 pub use six_numbers::SixNumbers;
-pub(crate) use smoother::anywhere;
-pub use smoother::{HypothesisSettings, Prior, Smoother};
+pub use smoother::{HypothesisSettings, Smoother};
 pub use unscented::UnscentedRls;
 
-use crate::sensing::Observation;
+use crate::sensing::{Observation, Refused};
 
 /// Revises a belief after each movement.
 pub trait Estimator: Send {
     /// What is believed now.
     fn belief(&self) -> &Belief;
 
-    /// Takes in what was observed after moving to `positions` (rad or m, one per joint).
-    fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError>;
+    /// Takes in what was observed after moving to `positions` (rad or m, one per joint), which
+    /// [fits](Observation::check) the belief's rig. An estimator that diverges keeps the belief that it had.
+    fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError>;
+
+    /// As [`correct`](Self::correct), for observations that nobody has looked at: what does not fit is refused, and
+    /// nothing is changed by it.
+    fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
+        let belief = self.belief();
+        observation.check(&belief.rig, belief.state.joints.len(), positions)?;
+        self.correct(positions, observation)
+    }
 }
 
 /// What an update found before it changed the belief.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Update {
-    /// Normalised innovation squared, `(y − h)ᵀ S⁻¹ (y − h)` with `S = H P Hᵀ + R`, and its degrees of freedom; `None`
-    /// for a miss and for an estimator without a covariance.
+    /// Normalised innovation squared, `eᵀ S⁻¹ e` with `S = H P Hᵀ + I` of whitened equations, and its degrees of freedom,
+    /// the equations seen; `None` for a miss and for an estimator without a covariance.
     pub nis: Option<(f64, usize)>,
     /// Whether the estimator noticed at this movement that the body has changed.
     pub change_noticed: bool,
@@ -50,7 +60,10 @@ pub struct Update {
 /// Why an estimator could not take in an observation. Its belief stays as it was.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EstimationError {
-    /// The update left the range of numbers.
+    /// The observation is none of this robot's; the estimator goes on.
+    #[error("the measurement was refused: {0}")]
+    Refused(#[from] Refused),
+    /// The update left the range of numbers; the estimator cannot go on.
     #[error("the estimate diverged: {0}")]
     Diverged(&'static str),
 }

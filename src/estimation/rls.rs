@@ -3,19 +3,21 @@
 //! The paper's equations, in minimal tangent coordinates (x becomes the chart's origin, + becomes a retraction):
 //!
 //! ```text
-//! S = H P Hᵀ + R,   K = P Hᵀ S⁻¹                    (4)
+//! S = H P Hᵀ + I,   K = P Hᵀ S⁻¹                    (4)
 //! x ← x ⊞ K (y − h(x, θ))                           (2)
-//! P ← J [(I − K H) P (I − K H)ᵀ + K R Kᵀ] Jᵀ        (3), J carries P to the chart at the new x
+//! P ← J [(I − K H) P (I − K H)ᵀ + K Kᵀ] Jᵀ          (3), J carries P to the chart at the new x
 //! P ← P + σn² I                                     (5), on the steps that the schedule names
 //! ```
+//!
+//! with H and y − h whitened, so that the paper's R is I.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector};
 
-use super::{Belief, ChangeDetector, EstimationError, Estimator, Update};
-use crate::{
-    kinematics::jacobian::jacobian,
-    sensing::{Observation, isotropic},
+use super::{
+    Belief, ChangeDetector, EstimationError, Estimator, Update,
+    belief::{innovation_covariance, is_finite},
 };
+use crate::{model::State, sensing::Observation};
 
 /// The stabilising noise of (5) and when it is added.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,31 +53,32 @@ impl Rls {
         Self { belief, covariance, stabilising, step: 0, changes: ChangeDetector::relative() }
     }
 
-    /// The update (2)–(4) with what was seen; the covariance before (5).
+    /// The update (2)–(4) with what was seen, the covariance before (5), and the normalised innovation squared; `None` if
+    /// nothing was.
     fn corrected(
         &self,
         positions: &[f64],
-        measured: &Vector3<f64>,
-    ) -> Result<(crate::kinematics::Chain, DMatrix<f64>, f64), EstimationError> {
-        let (chain, layout, p) = (&self.belief.chain, &self.belief.layout, &self.covariance);
-        let noise = isotropic(self.belief.noise_m2);
-        let (predicted, h) = jacobian(chain, layout, positions);
-        let innovation = measured - predicted.coords;
-        let gain_numerator = p * h.transpose();
-        let s = (&h * &gain_numerator).fixed_view::<3, 3>(0, 0).into_owned() + noise;
-        let s_inverse =
-            s.cholesky().ok_or(EstimationError::Diverged("the innovation covariance is not positive"))?.inverse();
-        let k = gain_numerator * s_inverse;
+        observation: &Observation,
+    ) -> Result<Option<(State, DMatrix<f64>, (f64, usize))>, EstimationError> {
+        let (state, layout, p) = (&self.belief.state, &self.belief.layout, &self.covariance);
+        let equations = self.belief.rig.equations_of(state, layout, positions, observation);
+        let innovation = &equations.residual;
+        if innovation.is_empty() {
+            return Ok(None);
+        }
+        let (s, numerator) = innovation_covariance(p, &equations.rows);
+        let s = s.cholesky().ok_or(EstimationError::Diverged("the innovation covariance is not positive"))?;
+        let k = s.solve(&numerator.transpose()).transpose();
         let delta: DVector<f64> = &k * innovation;
-        let shrink = DMatrix::identity(p.nrows(), p.ncols()) - &k * &h;
-        let joseph = &shrink * p * shrink.transpose() + &k * noise * k.transpose();
-        let transport = chain.transport(layout, &delta);
+        let shrink = DMatrix::identity(p.nrows(), p.ncols()) - &k * equations.rows.transpose();
+        let joseph = &shrink * p * shrink.transpose() + &k * k.transpose();
+        let transport = state.transport(layout, &delta);
         let covariance = &transport * joseph * transport.transpose();
-        let nis = (innovation.transpose() * s_inverse * innovation).x;
-        if !(delta.iter().chain(covariance.iter()).all(|x| x.is_finite()) && nis.is_finite()) {
+        let nis = innovation.dot(&s.solve(innovation));
+        if !(is_finite(&delta, &covariance) && nis.is_finite()) {
             return Err(EstimationError::Diverged("an update was not a finite number"));
         }
-        Ok((chain.retract(layout, &delta), covariance, nis))
+        Ok(Some((state.retract(layout, &delta), covariance, (nis, innovation.len()))))
     }
 }
 
@@ -84,13 +87,12 @@ impl Estimator for Rls {
         &self.belief
     }
 
-    fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
+    fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let mut update = Update::default();
-        if let Some(measured) = observation.position() {
-            let (chain, covariance, nis) = self.corrected(positions, &measured.coords)?;
-            self.belief.chain = chain;
+        if let Some((state, covariance, nis)) = self.corrected(positions, observation)? {
+            self.belief.state = state;
             self.covariance = covariance;
-            update = Update { nis: Some((nis, 3)), change_noticed: self.changes.observe(nis) };
+            update = Update { nis: Some(nis), change_noticed: self.changes.observe(nis.0, nis.1) };
         }
         self.step += 1;
         if let Some(noise) = self.stabilising.filter(|noise| noise.is_due(self.step)) {
@@ -119,29 +121,34 @@ fn symmetrise(matrix: &mut DMatrix<f64>) {
 mod tests {
     use std::sync::Arc;
 
-    use nalgebra::Point3;
+    use nalgebra::{Point3, Vector3};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::kinematics::{TangentLayout, laws::random_chain};
+    use crate::{
+        model::{Layout, jacobian, laws::random_arm},
+        sensing::Rig,
+    };
+
+    const SIGMA: f64 = 1e-2;
 
     fn random_filter(seed: u64, stabilising: Option<StabilisingNoise>) -> (Rls, ChaCha8Rng) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let chain = random_chain(&mut rng, 6);
-        let layout = Arc::new(TangentLayout::new(&chain.joints, &[], true));
+        let state = random_arm(&mut rng, 6);
+        let layout = Arc::new(Layout::of_arm(&state, &[], true));
         let covariance = DMatrix::identity(layout.dimension(), layout.dimension()) * 0.2;
-        let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-4, alternatives: Vec::new() };
+        let belief = Belief::new(state, layout, Arc::new(Rig::tracker(SIGMA)));
         (Rls::new(belief, covariance, stabilising), rng)
     }
 
     fn random_update(filter: &mut Rls, rng: &mut ChaCha8Rng) {
         let theta: Vec<f64> = (0..6).map(|_| rng.random_range(-1.5..1.5)).collect();
         // Half of the markers near the prediction, half anywhere: innovations small and absurd.
-        let near = filter.belief().chain.marker_at(&theta);
+        let near = filter.belief().state.marker_at(&theta);
         let spread = if rng.random_range(0..2) == 0 { 0.01 } else { 1.0 };
         let measured = near + Vector3::from_fn(|_, _| rng.random_range(-spread..spread));
-        let observation = if rng.random_range(0..10) == 0 { Observation::Missed } else { Observation::Seen(measured) };
+        let observation = if rng.random_range(0..10) == 0 { Observation::missed(1) } else { Observation::seen(measured) };
         filter.update(&theta, &observation).expect("a finite update");
     }
 
@@ -168,13 +175,13 @@ mod tests {
         let (mut filter, _) = random_filter(3, None);
         let theta = [0.3, -0.5, 0.9, 0.1, -1.0, 0.4];
         let before = filter.belief().clone();
-        let (predicted, h) = jacobian(&before.chain, &before.layout, &theta);
-        let update = filter.update(&theta, &Observation::Seen(predicted)).expect("an update");
+        let (predicted, h) = jacobian(&before.state, &before.layout, &theta);
+        let update = filter.update(&theta, &Observation::seen(predicted)).expect("an update");
         let information = before.covariance.expect("a covariance").try_inverse().expect("positive")
-            + h.transpose() * &h / before.noise_m2;
+            + h.transpose() * &h / SIGMA.powi(2);
         let expected = information.try_inverse().expect("positive");
         assert!((filter.belief().covariance.as_ref().expect("a covariance") - expected).amax() < 1e-9);
-        let moved = before.chain.local(&before.layout, &filter.belief().chain).expect("in the chart");
+        let moved = before.state.local(&before.layout, &filter.belief().state).expect("in the chart");
         assert!(moved.amax() < 1e-12);
         assert!(update.nis.is_some_and(|(nis, dof)| nis.abs() < 1e-12 && dof == 3));
     }
@@ -186,10 +193,10 @@ mod tests {
         let before = filter.belief().clone();
         let trace = |filter: &Rls| filter.belief().covariance.as_ref().map_or(0.0, DMatrix::trace);
         let start = trace(&filter);
-        filter.update(&[0.0; 6], &Observation::Missed).expect("an update");
-        assert_eq!(filter.belief().chain, before.chain);
+        filter.update(&[0.0; 6], &Observation::missed(1)).expect("an update");
+        assert_eq!(filter.belief().state, before.state);
         assert_eq!(trace(&filter), start);
-        filter.update(&[0.0; 6], &Observation::Missed).expect("an update");
+        filter.update(&[0.0; 6], &Observation::missed(1)).expect("an update");
         let added = 0.5 * before.layout.dimension() as f64;
         assert!((trace(&filter) - start - added).abs() < 1e-9);
     }
@@ -198,9 +205,9 @@ mod tests {
     fn a_measurement_that_is_no_number_is_refused_and_leaves_the_belief() {
         let (mut filter, _) = random_filter(5, None);
         let before = filter.belief().clone();
-        let result = filter.update(&[0.1; 6], &Observation::Seen(Point3::new(f64::NAN, 0.0, 0.0)));
-        assert!(matches!(result, Err(EstimationError::Diverged(_))));
-        assert_eq!(filter.belief().chain, before.chain);
+        let result = filter.update(&[0.1; 6], &Observation::seen(Point3::new(f64::NAN, 0.0, 0.0)));
+        assert!(matches!(result, Err(EstimationError::Refused(_))));
+        assert_eq!(filter.belief().state, before.state);
         assert_eq!(filter.belief().covariance, before.covariance);
     }
 }

@@ -3,22 +3,27 @@
 //! The paper writes an axis as a direction w and a point v, three numbers each, and filters all six:
 //!
 //! ```text
-//! K = P Hᵀ (H P Hᵀ + R)⁻¹,   (w, v) ← (w, v) + K (y − h),   w ← w/‖w‖,   P as in (3) and (5)
+//! K = P Hᵀ (H P Hᵀ + I)⁻¹,   (w, v) ← (w, v) + K (y − h),   w ← w/‖w‖,   P as in (3) and (5)
 //! ```
 //!
 //! A line has four degrees of freedom. The other two, the length of w and the place of v along the axis, move nothing
 //! that can be measured: no data shrink their variance, and the stabilising noise makes it grow for ever. So this
 //! estimator keeps its covariance to itself; a trace or an ellipsoid of it would mislead.
 
-use nalgebra::{DMatrix, DVector, Matrix3xX, UnitVector3, Vector3};
+use nalgebra::{DMatrix, DVector, UnitVector3, Vector3};
 
-use super::{Belief, EstimationError, Estimator, StabilisingNoise, Update};
+use super::{
+    Belief, EstimationError, Estimator, StabilisingNoise, Update,
+    belief::{innovation_covariance, is_finite},
+};
 use crate::{
-    kinematics::{Joint, jacobian::walk},
-    sensing::{Observation, isotropic},
+    kinematics::Joint,
+    model::{Pass, State},
+    sensing::Observation,
 };
 
-/// The filter in six numbers per learned revolute joint, three per learned prismatic joint. The marker must be known.
+/// The filter in six numbers per learned revolute joint, three per learned prismatic joint. Base and marker must be known,
+/// and of all channels it reads the marker's position alone.
 #[derive(Clone, Debug)]
 pub struct SixNumbers {
     belief: Belief,
@@ -32,7 +37,7 @@ impl SixNumbers {
     /// point (m).
     pub fn new(belief: Belief, direction_sd: f64, point_sd: f64, stabilising: Option<StabilisingNoise>) -> Self {
         let variances: Vec<f64> = belief
-            .chain
+            .state
             .joints
             .iter()
             .enumerate()
@@ -46,54 +51,66 @@ impl SixNumbers {
         Self { belief: Belief { covariance: None, ..belief }, covariance, stabilising, step: 0 }
     }
 
-    /// The predicted marker and its derivative by all numbers, w before v, joint by joint.
-    fn jacobian(&self, positions: &[f64]) -> (Vector3<f64>, Matrix3xX<f64>) {
-        let mut h = Matrix3xX::zeros(self.covariance.nrows());
-        let mut column = 0;
-        let (marker, _) = walk(&self.belief.chain, positions, |index, derivative| {
-            if !self.belief.layout.is_learned(index) {
-                return;
-            }
-            let units = [Vector3::x(), Vector3::y(), Vector3::z()];
-            let mut put = |value| {
-                h.set_column(column, &value);
-                column += 1;
+    /// The transposed derivative of the marker by all numbers, w before v, joint by joint, and its predicted position.
+    fn rows(&self, positions: &[f64]) -> (DMatrix<f64>, Vector3<f64>) {
+        let Belief { state, layout, .. } = &self.belief;
+        let mut pass = Pass::new(state, layout);
+        let marker = pass.at(positions).target(0);
+        let mut rows = DMatrix::zeros(self.covariance.nrows(), 3);
+        let mut number = 0;
+        for (index, joint) in state.joints.iter().enumerate().filter(|(index, _)| layout.is_learned(*index)) {
+            let (before, after) = (pass.link(index), pass.link(index + 1));
+            let w = joint.direction().into_inner();
+            let mut put = |column: Vector3<f64>| {
+                rows.row_mut(number).copy_from(&column.transpose());
+                number += 1;
             };
-            // The length of w does not count: only what is ⟂ w turns the axis.
-            let w = derivative.joint.direction().into_inner();
-            units.iter().for_each(|e| put(derivative.direction(&(e - w * w.dot(e)))));
-            if derivative.joint.line().is_some() {
-                units.iter().for_each(|e| put(derivative.point(e)));
+            for k in 0..3 {
+                // The length of w does not count: only what is ⟂ w turns the axis.
+                let e = Vector3::ith(k, 1.0) - w * w[k];
+                put(match joint {
+                    Joint::Revolute(line) => {
+                        let turn = (before.rotation - after.rotation) * w.cross(&e);
+                        turn.cross(&(marker - before.point(&line.point.coords)))
+                    }
+                    Joint::Prismatic(_) => before.rotation * e * state.theta(index, positions),
+                });
             }
-        });
-        (marker.coords, h)
+            if joint.line().is_some() {
+                (0..3).for_each(|k| put((before.rotation - after.rotation).column(k).into_owned()));
+            }
+        }
+        (rows, marker)
     }
 
-    fn correct(&mut self, positions: &[f64], measured: &Vector3<f64>) -> Result<f64, EstimationError> {
+    /// The state and the covariance after a measured marker, and the normalised innovation squared.
+    fn corrected(
+        &self,
+        positions: &[f64],
+        measured: &Vector3<f64>,
+    ) -> Result<(State, DMatrix<f64>, f64), EstimationError> {
         let p = &self.covariance;
-        let noise = isotropic(self.belief.noise_m2);
-        let (predicted, h) = self.jacobian(positions);
-        let innovation = measured - predicted;
-        let numerator = p * h.transpose();
-        let s = (&h * &numerator).fixed_view::<3, 3>(0, 0).into_owned() + noise;
+        let weight = self.belief.rig.marker_sigma().recip();
+        let (rows, predicted) = self.rows(positions);
+        let (rows, innovation) = (rows * weight, (measured - predicted) * weight);
         let diverged = || EstimationError::Diverged("an update was not a finite number");
-        let s_inverse = s.cholesky().ok_or_else(diverged)?.inverse();
-        let k = numerator * s_inverse;
+        let (s, numerator) = innovation_covariance(p, &rows);
+        let s = s.cholesky().ok_or_else(diverged)?;
+        let k = s.solve(&numerator.transpose()).transpose();
         let delta: DVector<f64> = &k * innovation;
-        let shrink = DMatrix::identity(p.nrows(), p.ncols()) - &k * &h;
-        let covariance = &shrink * p * shrink.transpose() + &k * noise * k.transpose();
-        if !delta.iter().chain(covariance.iter()).all(|x| x.is_finite()) {
+        let shrink = DMatrix::identity(p.nrows(), p.ncols()) - &k * rows.transpose();
+        let covariance = &shrink * p * shrink.transpose() + &k * k.transpose();
+        if !is_finite(&delta, &covariance) {
             return Err(diverged());
         }
-        self.covariance = (&covariance + covariance.transpose()) * 0.5;
         let mut at = 0;
         let mut take = || {
             at += 3;
             delta.fixed_rows::<3>(at - 3).into_owned()
         };
-        let layout = self.belief.layout.clone();
-        for (_, joint) in self.belief.chain.joints.iter_mut().enumerate().filter(|(index, _)| layout.is_learned(*index))
-        {
+        let mut state = self.belief.state.clone();
+        let layout = &self.belief.layout;
+        for (_, joint) in state.joints.iter_mut().enumerate().filter(|(index, _)| layout.is_learned(*index)) {
             match joint {
                 Joint::Revolute(line) => {
                     line.direction = UnitVector3::new_normalize(line.direction.into_inner() + take());
@@ -102,7 +119,7 @@ impl SixNumbers {
                 Joint::Prismatic(w) => *w = UnitVector3::new_normalize(w.into_inner() + take()),
             }
         }
-        Ok((innovation.transpose() * s_inverse * innovation).x)
+        Ok((state, (&covariance + covariance.transpose()) * 0.5, innovation.dot(&s.solve(&innovation))))
     }
 }
 
@@ -111,10 +128,12 @@ impl Estimator for SixNumbers {
         &self.belief
     }
 
-    fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
+    fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let mut update = Update::default();
-        if let Some(measured) = observation.position() {
-            update.nis = Some((self.correct(positions, &measured.coords)?, 3));
+        if let Some(measured) = observation.marker(&self.belief.rig) {
+            let (state, covariance, nis) = self.corrected(positions, &measured.coords)?;
+            (self.belief.state, self.covariance) = (state, covariance);
+            update.nis = Some((nis, 3));
         }
         self.step += 1;
         if let Some(noise) = self.stabilising.filter(|noise| noise.is_due(self.step)) {
@@ -132,25 +151,28 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::kinematics::{TangentLayout, laws::random_chain};
+    use crate::{
+        model::{Layout, laws::random_arm},
+        sensing::Rig,
+    };
 
     /// To first order both parameterisations make the same step: the two surplus numbers change no measurement.
     #[test]
     fn a_small_update_moves_the_marker_as_minimal_coordinates_do() {
         for seed in 0..20 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let chain = random_chain(&mut rng, 5);
-            let layout = Arc::new(TangentLayout::new(&chain.joints, &[], false));
+            let state = random_arm(&mut rng, 5);
+            let layout = Arc::new(Layout::of_arm(&state, &[], false));
             let m = layout.dimension();
             let theta: Vec<f64> = (0..5).map(|_| rng.random_range(-1.5..1.5)).collect();
-            let y = chain.marker_at(&theta) + Vector3::new(1e-5, -2e-5, 1e-5);
-            let belief = Belief { chain, layout, covariance: None, noise_m2: 1e-2, alternatives: Vec::new() };
+            let y = state.marker_at(&theta) + Vector3::new(1e-5, -2e-5, 1e-5);
+            let belief = Belief::new(state, layout, Arc::new(Rig::tracker(0.1)));
             let mut six = SixNumbers::new(belief.clone(), 0.5, 0.5, None);
             let mut minimal = super::super::Rls::new(belief, DMatrix::identity(m, m) * 0.25, None);
-            six.update(&theta, &Observation::Seen(y)).expect("an update");
-            minimal.update(&theta, &Observation::Seen(y)).expect("an update");
+            six.update(&theta, &Observation::seen(y)).expect("an update");
+            minimal.update(&theta, &Observation::seen(y)).expect("an update");
             let other: Vec<f64> = (0..5).map(|_| rng.random_range(-1.5..1.5)).collect();
-            let difference = six.belief().chain.marker_at(&other) - minimal.belief().chain.marker_at(&other);
+            let difference = six.belief().state.marker_at(&other) - minimal.belief().state.marker_at(&other);
             assert!(difference.norm() < 1e-8, "seed {seed}: {difference}");
         }
     }

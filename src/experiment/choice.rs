@@ -8,8 +8,9 @@ use super::{
     report::{LearnerReport, MovementReport, array},
 };
 use crate::{
-    optimize::{DirectError, History, Settings, Variant},
-    selection::{Appraisal, Partition, SelectionError},
+    kinematics::JointBox,
+    optimize::{DirectError, History, Variant},
+    selection::{Appraisal, Search, SelectionError},
 };
 
 /// Why there is no answer.
@@ -51,7 +52,7 @@ pub struct Choice {
     pub epsilon: f64,
     /// The joints, which span the unit cube.
     pub joints: Vec<SearchedJoint>,
-    /// tr(W P) before the movement.
+    /// The criterion before the movement: tr(W P), but for a policy that goes by more.
     pub trace: Option<f64>,
     /// Evaluations of the criterion.
     pub evaluations: usize,
@@ -77,7 +78,8 @@ pub struct SearchedJoint {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
 pub struct ChosenReport {
-    /// The rectangle at whose centre it is.
+    /// The rectangle that holds it: at its centre, if DIRECT chose it. A policy that plans chooses otherwise; the boxes are
+    /// then those of a search for the movement that teaches most at once.
     #[serde(rename = "box")]
     pub rectangle: usize,
     /// The configuration, rad or m per joint.
@@ -86,9 +88,9 @@ pub struct ChosenReport {
     pub point: Vec<f64>,
     /// C(θ).
     pub criterion: Option<f64>,
-    /// tr(W P) − C(θ): by how much the trace was expected to fall.
+    /// By how much the criterion was expected to fall.
     pub predicted_gain: Option<f64>,
-    /// By how much it fell; the stabilising noise lets it rise again.
+    /// By how much it fell; stabilising noise lets it rise again.
     pub realised_gain: Option<f64>,
 }
 
@@ -141,9 +143,9 @@ pub struct AppraisalReport {
     pub configuration: Vec<f64>,
     /// C(θ) under the belief before the last movement.
     pub criterion: f64,
-    /// tr(W P) − C(θ).
+    /// By how much that is less than before.
     pub gain: f64,
-    /// tr(W P).
+    /// The criterion before: tr(W P), but for a policy that goes by more.
     pub trace: f64,
     /// The predicted marker, metres.
     pub predicted_marker_m: [f64; 3],
@@ -154,13 +156,13 @@ pub struct AppraisalReport {
 }
 
 impl AppraisalReport {
-    pub(super) fn of(configuration: &[f64], trace: f64, appraisal: &Appraisal) -> Self {
+    pub(super) fn of(configuration: &[f64], appraisal: &Appraisal) -> Self {
         let rows = |matrix: &Matrix3<f64>| [0, 1, 2].map(|row| [0, 1, 2].map(|column| matrix[(row, column)]));
         Self {
             configuration: configuration.to_vec(),
             criterion: appraisal.criterion,
             gain: appraisal.gain,
-            trace,
+            trace: appraisal.before,
             predicted_marker_m: array(&appraisal.marker.coords),
             marker_covariance_m2: rows(&appraisal.marker_covariance),
             chance_of_being_seen: appraisal.chance,
@@ -169,18 +171,21 @@ impl AppraisalReport {
 }
 
 impl Choice {
-    /// `traces` are tr(W P) before and after the movement. The joints are left to the caller, who knows their names.
+    /// `values` are the criterion before and after the movement. The joints are left to the caller, who knows their names.
     pub(super) fn of(
         step: u64,
         report: &LearnerReport,
         movement: &MovementReport,
-        partition: &Partition,
-        settings: Settings,
-        traces: [Option<f64>; 2],
+        search: Search,
+        limits: &JointBox,
+        values: [Option<f64>; 2],
     ) -> Result<Self, ChoiceError> {
-        let values: Vec<f64> = partition.leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)).collect();
+        let point = limits.to_unit(&movement.configuration);
+        let Search { settings, partition } = search;
+        let partition = partition.choosing(&point);
+        let of_leaves: Vec<f64> = partition.leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)).collect();
         let dimension = partition.leaves.first().map_or(0, |leaf| leaf.centre.len());
-        let history = History::replay(dimension, settings, &values)?;
+        let history = History::replay(dimension, settings, &of_leaves)?;
         let boxes: Vec<BoxReport> = partition
             .leaves
             .iter()
@@ -202,7 +207,7 @@ impl Choice {
             hull: moment.potentially_optimal,
             lower_right_hull: moment.hull.iter().map(|point| point.rectangle).collect(),
         });
-        let [before, after] = traces;
+        let [before, after] = values;
         Ok(Self {
             step,
             learner: report.name.clone(),
@@ -214,11 +219,11 @@ impl Choice {
             epsilon: settings.epsilon,
             joints: Vec::new(),
             trace: before,
-            evaluations: movement.evaluations,
+            evaluations: partition.leaves.len(),
             chosen: ChosenReport {
                 rectangle: partition.chosen,
                 configuration: movement.configuration.clone(),
-                point: partition.leaves.get(partition.chosen).map(|leaf| leaf.centre.clone()).unwrap_or_default(),
+                point,
                 criterion: movement.criterion,
                 predicted_gain: movement.gain,
                 realised_gain: before.zip(after).map(|(before, after)| before - after),
@@ -230,10 +235,11 @@ impl Choice {
 }
 
 impl Experiment {
-    /// How DIRECT chose the last movement of a learner.
+    /// How the last movement of a learner was chosen, by DIRECT or in sight of what DIRECT finds.
     pub fn choice(&self, learner: &str) -> Result<Choice, ChoiceError> {
         let index = self.index_of(learner)?;
-        let choice = self.learners[index].choice(self.latest.step, &self.latest.learners[index])?;
+        let limits = self.joint_box()?;
+        let choice = self.learners[index].choice(self.latest.step, &self.latest.learners[index], &limits)?;
         let joints = self.description.joints.iter();
         let joints = joints.map(|joint| SearchedJoint { name: joint.name.clone(), limits: joint.limits }).collect();
         Ok(Choice { joints, ..choice })
@@ -243,23 +249,24 @@ impl Experiment {
     /// before the first movement, what it would teach now.
     pub fn appraise(&self, learner: &str, configuration: &[f64]) -> Result<AppraisalReport, ChoiceError> {
         let index = self.index_of(learner)?;
-        let joints = &self.description.joints;
-        if configuration.len() != joints.len() {
-            let (found, wanted) = (configuration.len(), joints.len());
+        let limits = self.joint_box()?;
+        if configuration.len() != limits.dimension() {
+            let (found, wanted) = (configuration.len(), limits.dimension());
             return Err(ChoiceError::Configuration(format!("has {found} numbers; this robot has {wanted} joints")));
         }
-        for (joint, q) in joints.iter().zip(configuration) {
-            let [lower, upper] = joint.limits;
-            // Half a thousandth of the range is forgiven to those who round.
-            let slack = 5e-4 * (upper - lower);
-            if !(*q >= lower - slack && *q <= upper + slack) {
-                let name = &joint.name;
+        for (joint, q) in configuration.iter().enumerate() {
+            if !limits.is_within(joint, *q, JointBox::ROUNDING) {
+                let (name, lower, upper) = (&self.description.joints[joint].name, limits.lower(joint), limits.upper(joint));
                 let said = format!("has {q} for `{name}`, whose limits are {lower} and {upper} (rad or m)");
                 return Err(ChoiceError::Configuration(said));
             }
         }
-        let limits: Vec<(f64, f64)> = joints.iter().map(|joint| (joint.limits[0], joint.limits[1])).collect();
-        self.learners[index].appraise(configuration, &limits, &self.world)
+        self.learners[index].appraise(configuration)
+    }
+
+    fn joint_box(&self) -> Result<JointBox, ChoiceError> {
+        let limits = self.description.joints.iter().map(|joint| (joint.limits[0], joint.limits[1]));
+        JointBox::new(limits.collect()).map_err(|error| ChoiceError::Configuration(error.to_string()))
     }
 
     fn index_of(&self, learner: &str) -> Result<usize, ChoiceError> {
@@ -288,9 +295,9 @@ mod tests {
             assert_eq!(choice.boxes.len(), choice.evaluations);
             let same = experiment.appraise("active", &choice.chosen.configuration).expect("an appraisal");
             let (found, chosen) = (same.criterion, choice.chosen.criterion.expect("a criterion"));
-            assert!((found - chosen).abs() < 0.02 * same.trace, "{name}: {found} {chosen}");
+            assert!((found - chosen).abs() < 1e-9 * same.trace, "{name}: {found} {chosen}");
             let other = experiment.appraise("active", &vec![0.0; choice.joints.len()]).expect("an appraisal");
-            assert!(other.gain <= same.gain * 1.02, "{name}: {} {}", other.gain, same.gain);
+            assert!(other.gain <= same.gain * (1.0 + 1e-9), "{name}: {} {}", other.gain, same.gain);
             assert!(matches!(experiment.choice("random"), Err(ChoiceError::NotSearched(_))));
             assert!(experiment.appraise("random", &choice.chosen.configuration).is_ok(), "it has a covariance too");
             assert!(matches!(

@@ -1,18 +1,18 @@
-//! One learner of a comparison: an estimator, a policy, and what was seen so far.
+//! One learner of a comparison: an agent, and how it has fared.
 
-use rand_chacha::ChaCha8Rng;
-use web_time::Instant;
-
-use super::choice::{AppraisalReport, Choice, ChoiceError};
 use super::{
-    metrics::{self, Evaluation, Metrics},
+    agent::{AbsorbError, Agent, Executed, OwnedStandpoint, Proposal},
+    choice::{AppraisalReport, Choice, ChoiceError},
+    judge::Judge,
+    metrics::Metrics,
     report::{GazeReport, LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
     world::World,
 };
 use crate::{
-    estimation::{Belief, Estimator, Update},
-    kinematics::Chain,
-    selection::{ACriterion, Actions, Policy, Selection, SelectionError, Sight, Visibility, Weights},
+    estimation::{Belief, Update},
+    kinematics::JointBox,
+    model::State,
+    selection::{SelectionError, Weights},
     sensing::Observation,
 };
 
@@ -22,80 +22,91 @@ pub const SETTLING_STEPS: u32 = 5;
 /// The estimate's weight among all hypotheses below which a learner is not settled.
 const UNAMBIGUOUS: f64 = 0.99;
 
-/// What a learner is told: nothing here comes from the truth.
+/// An agent in a comparison.
 pub struct Learner {
     /// Its name, estimator and policy.
     pub description: LearnerDescription,
-    /// Revises its belief.
-    pub estimator: Box<dyn Estimator>,
-    /// Chooses its movements.
-    pub policy: Box<dyn Policy>,
-    /// What it may do.
-    pub actions: Actions,
-    /// The weights of its criterion and of its trace.
-    pub weights: Weights,
+    agent: Agent,
+    /// The weights of its trace.
+    weights: Weights,
     /// Configurations over which it judges itself.
-    pub workspace: Vec<Vec<f64>>,
+    workspace: Vec<Vec<f64>>,
     /// It calls itself settled when its expected prediction error stays below this, metres.
-    pub settled_below_m: f64,
-    /// What it believed before its last movement; at the start, what it believes.
-    pub before: Belief,
-    /// Random numbers of its policy.
-    pub rng: ChaCha8Rng,
-    /// How it has fared.
-    pub record: Record,
+    settled_below_m: f64,
+    /// Where it stood before its last movement; at the start, where it stands.
+    before: OwnedStandpoint,
+    /// What it proposed last.
+    last: Option<Proposal>,
+    record: Record,
 }
 
 /// Counters of one learner.
 #[derive(Clone, Debug, Default)]
-pub struct Record {
+struct Record {
     movements: u64,
     misses: u64,
     steps_below_target: u32,
     changes_noticed: u64,
-    failure: Option<String>,
 }
 
 impl Learner {
-    /// Chooses the next movement and says how long that took, in milliseconds. `None` once the learner has failed.
-    pub(super) fn choose(&mut self) -> Result<Option<(Selection, f64)>, SelectionError> {
-        if self.record.failure.is_some() {
-            return Ok(None);
-        }
-        let start = Instant::now();
-        match self.policy.select(self.estimator.belief(), &self.actions, &mut self.rng) {
-            Ok(selection) => Ok(Some((selection, start.elapsed().as_secs_f64() * 1e3))),
-            Err(error @ SelectionError::NoFiniteCriterion) => {
-                self.record.failure = Some(error.to_string());
-                Ok(None)
-            }
-            Err(error) => Err(error),
-        }
+    /// An agent that judges itself over `workspace` and is settled below that expected error, metres.
+    pub fn new(
+        description: LearnerDescription,
+        agent: Agent,
+        weights: Weights,
+        workspace: Vec<Vec<f64>>,
+        settled_below_m: f64,
+    ) -> Self {
+        let before = agent.standpoint().to_owned();
+        let record = Record::default();
+        Self { description, agent, weights, workspace, settled_below_m, before, last: None, record }
     }
 
-    /// Takes in what was seen after `selection`.
+    /// What it believes.
+    pub fn belief(&self) -> &Belief {
+        self.agent.belief()
+    }
+
+    /// How many movements it can still make; `None` without an end.
+    pub(super) fn remaining(&self) -> Option<usize> {
+        self.agent.actions().remaining()
+    }
+
+    /// Its next movement; `None` once it has ended.
+    pub(super) fn propose(&mut self) -> Result<Option<Proposal>, SelectionError> {
+        Ok(self.agent.propose(1)?.first().cloned())
+    }
+
+    /// Takes in what was seen after a proposal was carried out.
     pub(super) fn learn(
         &mut self,
-        (selection, selection_ms): (Selection, f64),
-        observation: &Observation,
+        proposal: Proposal,
+        observation: Observation,
         world: &World,
-    ) -> (MovementReport, Update) {
+    ) -> Result<(MovementReport, Update), AbsorbError> {
         let truth = world.truth();
-        let configuration = selection.movement.configuration.clone();
-        self.before = self.estimator.belief().clone();
-        let predicted = self.before.chain.marker_at(&configuration);
-        self.policy.observe(&selection.movement, &self.actions, observation);
-        self.actions.use_up(&selection.movement);
+        let movement = proposal.selection.movement.clone();
+        let configuration = movement.configuration.clone();
+        let before = self.agent.standpoint().to_owned();
+        let predicted = before.belief.state.marker_at(&configuration);
+        let measured = observation.marker(&before.belief.rig);
+        let seen = !observation.is_miss();
+        let executed = Executed { proposal: Some(proposal.id), movement, observation };
+        let update = match self.agent.absorb(&[executed]) {
+            Ok(updates) => updates.first().copied().unwrap_or_default(),
+            Err(AbsorbError::Ended(_)) => Update::default(),
+            Err(refused) => return Err(refused),
+        };
+        self.before = before;
         self.record.movements += 1;
-        self.record.misses += u64::from(*observation == Observation::Missed);
-        let update = self.estimator.update(&configuration, observation).unwrap_or_else(|error| {
-            self.record.failure = Some(error.to_string());
-            Update::default()
-        });
+        self.record.misses += u64::from(!seen);
+        self.record.changes_noticed += u64::from(update.change_noticed);
+        let selection = &proposal.selection;
         let report = MovementReport {
             predicted_marker_m: array(&predicted.coords),
-            measured_marker_m: observation.position().map(|position| array(&position.coords)),
-            estimated_skeleton_m: arrays(&shown(&self.estimator.belief().chain, truth).skeleton(&configuration)),
+            measured_marker_m: measured.map(|position| array(&position.coords)),
+            estimated_skeleton_m: arrays(&shown(&self.belief().state, truth).skeleton(&configuration)),
             true_skeleton_m: truth.map(|truth| arrays(&truth.skeleton(&configuration))),
             gaze: gaze(world, &configuration),
             row: selection.movement.row,
@@ -103,39 +114,39 @@ impl Learner {
             criterion: selection.criterion,
             gain: selection.gain,
             evaluations: selection.evaluations,
-            selection_ms,
-            partition: selection.partition,
+            selection_ms: proposal.selection_ms,
+            seen,
+            partition: selection.search.as_ref().map(|search| search.partition.clone()),
         };
-        (report, update)
+        self.last = Some(proposal);
+        Ok((report, update))
     }
 
-    /// How its last movement was chosen, as far as DIRECT chose it.
-    pub(super) fn choice(&self, step: u64, report: &LearnerReport) -> Result<Choice, ChoiceError> {
+    /// How its last movement was chosen: the search by DIRECT that found it, or for a policy that plans, how the criterion
+    /// of the next movement looked and where in it the movement lies.
+    pub(super) fn choice(
+        &self,
+        step: u64,
+        report: &LearnerReport,
+        limits: &JointBox,
+    ) -> Result<Choice, ChoiceError> {
         let not_searched = || ChoiceError::NotSearched(self.description.name.clone());
         let movement = report.movement.as_ref().ok_or_else(not_searched)?;
-        let partition = movement.partition.as_ref().ok_or_else(not_searched)?;
-        let settings = self.policy.direct().ok_or_else(not_searched)?;
-        let traces = [&self.before, self.estimator.belief()]
-            .map(|belief| belief.covariance.as_ref().map(|covariance| self.weights.trace(covariance)));
-        Choice::of(step, report, movement, partition, settings, traces)
+        let selection = &self.last.as_ref().ok_or_else(not_searched)?.selection;
+        let (before, after) = (self.before.borrowed(), self.agent.standpoint());
+        let search = match (&selection.plan, &selection.search) {
+            (None, Some(search)) => search.clone(),
+            (None, None) => return Err(not_searched()),
+            (Some(_), _) => self.agent.explain(before)?.ok_or_else(not_searched)?,
+        };
+        let value = |standpoint| self.agent.appraise(standpoint, &movement.configuration).map(|it| it.before).ok();
+        Choice::of(step, report, movement, search, limits, [value(before), value(after)])
     }
 
-    /// What another movement would have taught instead of the last one, within the joints' `limits`.
-    pub(super) fn appraise(
-        &self,
-        configuration: &[f64],
-        limits: &[(f64, f64)],
-        world: &World,
-    ) -> Result<AppraisalReport, ChoiceError> {
-        let unseen = world.head().map(|head| Visibility::new(*head));
-        let visibility = self.policy.visibility().or(unseen.as_ref());
-        let criterion = ACriterion::new(&self.before, &self.weights)?;
-        let criterion = match visibility {
-            Some(visibility) => criterion.watched(Sight::Chance(visibility, limits)),
-            None => criterion,
-        };
-        let appraisal = criterion.appraise(configuration)?;
-        Ok(AppraisalReport::of(configuration, criterion.trace(), &appraisal))
+    /// What another movement would have taught instead of the last one, by what this learner chooses by.
+    pub(super) fn appraise(&self, configuration: &[f64]) -> Result<AppraisalReport, ChoiceError> {
+        let appraisal = self.agent.appraise(self.before.borrowed(), configuration)?;
+        Ok(AppraisalReport::of(configuration, &appraisal))
     }
 
     /// The learner as it stands, judged against the truth where one is known.
@@ -143,12 +154,10 @@ impl Learner {
         &mut self,
         movement: Option<MovementReport>,
         update: Update,
-        evaluation: &Evaluation,
-        truth: Option<&Chain>,
+        judge: &Judge,
+        truth: Option<&State>,
     ) -> LearnerReport {
-        self.record.changes_noticed += u64::from(update.change_noticed);
-        let belief = self.estimator.belief();
-        let (estimate, layout) = (&belief.chain, &*belief.layout);
+        let belief = self.agent.belief();
         let expected = belief.expected_error_m(&self.workspace);
         let is_certain = belief.weight() > UNAMBIGUOUS;
         if is_certain && expected.is_some_and(|error| error < self.settled_below_m) {
@@ -156,33 +165,23 @@ impl Learner {
         } else {
             self.record.steps_below_target = 0;
         }
-        let prediction = evaluation.prediction_m(estimate);
-        let nees = truth.and_then(|truth| metrics::nees(belief, truth));
         let metrics = Metrics {
-            orientation_deg: truth.and_then(|truth| metrics::orientation_deg(estimate, truth, layout)),
-            axis_deg: truth.and_then(|truth| metrics::axis_deg(estimate, truth, layout)),
-            location_m: truth.and_then(|truth| metrics::location_m(estimate, truth, layout)),
-            prediction_m: prediction.map(|(rms, _)| rms),
-            prediction_mean_m: prediction.map(|(_, mean)| mean),
             expected_prediction_m: expected,
             trace: belief.covariance.as_ref().map(|covariance| self.weights.trace(covariance)),
             nis: update.nis.map(|(nis, _)| nis),
             nis_dof: update.nis.map(|(_, dof)| dof),
-            nees,
-            nees_dof: nees.map(|_| layout.dimension()),
             movements: self.record.movements,
             misses: self.record.misses,
             settled: self.record.steps_below_target >= SETTLING_STEPS,
-            bound_trace: None,
             changes_noticed: self.record.changes_noticed,
-            joints: evaluation.joints(estimate, truth, layout),
+            ..judge.metrics(belief, truth)
         };
         LearnerReport {
             name: self.description.name.clone(),
             movement,
             estimate: ModelReport::of_belief(belief, truth),
             metrics,
-            failure: self.record.failure.clone(),
+            failure: self.agent.failure().map(str::to_owned),
         }
     }
 }

@@ -1,11 +1,14 @@
 //! How far an estimate is from the truth, and how well it predicts.
+//!
+//! Axes are compared in the frame of the measurements ([`State::measured`]); where the measurements leave a gauge, with the
+//! truth moved along it onto the estimate (see [`Gauge`](super::gauge::Gauge)).
 
-use nalgebra::{DMatrix, Point3};
+use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    estimation::Belief,
-    kinematics::{Chain, Joint, TangentLayout},
+    kinematics::Joint,
+    model::{Layout, State},
 };
 
 /// The metrics of one learner after one step. What needs the truth is null where none is known.
@@ -30,7 +33,7 @@ pub struct Metrics {
     pub nis: Option<f64>,
     /// Its degrees of freedom.
     pub nis_dof: Option<usize>,
-    /// Normalised estimation error squared, eᵀP⁻¹e in tangent coordinates.
+    /// Normalised estimation error squared, eᵀP⁻¹e in tangent coordinates, in the subspace that measurements determine.
     pub nees: Option<f64>,
     /// Its degrees of freedom.
     pub nees_dof: Option<usize>,
@@ -40,8 +43,8 @@ pub struct Metrics {
     pub misses: u64,
     /// The learner's own verdict: its expected prediction error has been below the scenario's target for 5 steps.
     pub settled: bool,
-    /// tr(W F⁻¹), the least error that the data collected so far allow, at the truth and with the prior (see
-    /// [`Limits`](super::Limits)); since the change of the body, if it changed.
+    /// tr(W F⁻¹), what prior and data collected so far allow, linearised at the truth (see [`design`](crate::design));
+    /// since the change of the body, if it changed.
     #[serde(default)]
     pub bound_trace: Option<f64>,
     /// How often the learner noticed a change of the body.
@@ -67,7 +70,7 @@ pub struct JointMetrics {
 }
 
 /// Mean absolute difference of the angles between axes, over pairs of learned revolute joints, degrees.
-pub fn orientation_deg(estimate: &Chain, truth: &Chain, layout: &TangentLayout) -> Option<f64> {
+pub fn orientation_deg(estimate: &State, truth: &State, layout: &Layout) -> Option<f64> {
     let pairs = learned_revolute(estimate, truth, layout);
     let angle = |a: &Joint, b: &Joint| a.direction().angle(&b.direction()).to_degrees();
     let differences = (0..pairs.len()).flat_map(|j| (0..j).map(move |i| (i, j))).map(|(i, j)| {
@@ -78,7 +81,7 @@ pub fn orientation_deg(estimate: &Chain, truth: &Chain, layout: &TangentLayout) 
 }
 
 /// Mean angle between estimated and true directions of all learned joints, degrees.
-pub fn axis_deg(estimate: &Chain, truth: &Chain, layout: &TangentLayout) -> Option<f64> {
+pub fn axis_deg(estimate: &State, truth: &State, layout: &Layout) -> Option<f64> {
     let learned = (0..layout.joints()).filter(|&index| layout.is_learned(index));
     mean(learned.map(|index| {
         let (estimate, truth) = (&estimate.joints[index], &truth.joints[index]);
@@ -87,19 +90,12 @@ pub fn axis_deg(estimate: &Chain, truth: &Chain, layout: &TangentLayout) -> Opti
 }
 
 /// Mean distance of the true axis points to the estimated lines of learned revolute joints, metres.
-pub fn location_m(estimate: &Chain, truth: &Chain, layout: &TangentLayout) -> Option<f64> {
+pub fn location_m(estimate: &State, truth: &State, layout: &Layout) -> Option<f64> {
     mean(
         learned_revolute(estimate, truth, layout)
             .into_iter()
             .filter_map(|(estimate, truth)| Some(estimate.line()?.distance_to(&truth.line()?.point))),
     )
-}
-
-/// Normalised estimation error squared of a belief; `None` without a covariance, or with the truth out of its chart.
-pub fn nees(belief: &Belief, truth: &Chain) -> Option<f64> {
-    let covariance: &DMatrix<f64> = belief.covariance.as_ref()?;
-    let error = belief.chain.local(&belief.layout, truth)?;
-    Some(error.dot(&covariance.clone().cholesky()?.solve(&error)))
 }
 
 /// The configurations over which estimates are judged, and where the marker is there.
@@ -115,8 +111,8 @@ pub struct Evaluation {
 const SIGNAL_SIZE: usize = 50;
 
 impl Evaluation {
-    /// Against the noise-free markers of a true chain.
-    pub fn of_truth(configurations: Vec<Vec<f64>>, truth: &Chain, sigma_m: f64) -> Self {
+    /// Against the noise-free markers of the truth.
+    pub fn of_truth(configurations: Vec<Vec<f64>>, truth: &State, sigma_m: f64) -> Self {
         let pair = |theta: Vec<f64>| {
             let marker = truth.marker_at(&theta);
             (theta, marker)
@@ -130,10 +126,15 @@ impl Evaluation {
     }
 
     /// The same configurations, against another truth.
-    pub fn follow(&mut self, truth: &Chain) {
+    pub fn follow(&mut self, truth: &State) {
         for (theta, marker) in &mut self.targets {
             *marker = truth.marker_at(theta);
         }
+    }
+
+    /// The joint positions.
+    pub fn configurations(&self) -> Vec<Vec<f64>> {
+        self.targets.iter().map(|(theta, _)| theta.clone()).collect()
     }
 
     /// Joint positions and markers.
@@ -142,13 +143,13 @@ impl Evaluation {
     }
 
     /// Root mean square and mean of the distances between predicted and true marker, metres.
-    pub fn prediction_m(&self, estimate: &Chain) -> Option<(f64, f64)> {
+    pub fn prediction_m(&self, estimate: &State) -> Option<(f64, f64)> {
         let distances = || self.targets.iter().map(|(theta, marker)| (estimate.marker_at(theta) - marker).norm());
         Some((mean(distances().map(|d| d * d))?.sqrt(), mean(distances())?))
     }
 
     /// Every joint by itself.
-    pub fn joints(&self, estimate: &Chain, truth: Option<&Chain>, layout: &TangentLayout) -> Vec<JointMetrics> {
+    pub fn joints(&self, estimate: &State, truth: Option<&State>, layout: &Layout) -> Vec<JointMetrics> {
         let judged = |index: usize| {
             let truth = truth.filter(|_| layout.is_learned(index))?;
             let (found, wanted) = (estimate.joints.get(index)?, truth.joints.get(index)?);
@@ -161,18 +162,18 @@ impl Evaluation {
         (0..layout.joints()).map(|index| judged(index).unwrap_or_default()).collect()
     }
 
-    fn signal_to_noise(&self, index: usize, found: &Joint, truth: &Chain) -> Option<f64> {
+    fn signal_to_noise(&self, index: usize, found: &Joint, truth: &State) -> Option<f64> {
         let sigma = self.sigma_m.filter(|sigma| *sigma > 0.0)?;
-        let mut chain = truth.clone();
-        *chain.joints.get_mut(index)? = *found;
+        let mut state = truth.clone();
+        *state.joints.get_mut(index)? = *found;
         let displacements = self.targets.iter().take(SIGNAL_SIZE);
         Some(
-            mean(displacements.map(|(theta, marker)| (chain.marker_at(theta) - marker).norm_squared()))?.sqrt() / sigma,
+            mean(displacements.map(|(theta, marker)| (state.marker_at(theta) - marker).norm_squared()))?.sqrt() / sigma,
         )
     }
 }
 
-fn learned_revolute<'a>(estimate: &'a Chain, truth: &'a Chain, layout: &TangentLayout) -> Vec<(&'a Joint, &'a Joint)> {
+fn learned_revolute<'a>(estimate: &'a Chain, truth: &'a Chain, layout: &Layout) -> Vec<(&'a Joint, &'a Joint)> {
     (0..layout.joints())
         .filter(|&index| layout.point(index).is_some())
         .map(|index| (&estimate.joints[index], &truth.joints[index]))
@@ -199,9 +200,9 @@ mod tests {
     /// One joint about z, off by 0.1 m along y: at θ the marker is displaced by (I − R(θ)) (0, 0.1, 0).
     #[test]
     fn the_signal_of_a_joint_worked_by_hand() {
-        let truth = Chain { joints: vec![line([0., 0., 1.], [0., 0., 0.])], marker: Point3::new(1., 0., 0.) };
-        let estimate = Chain { joints: vec![line([0., 0., 1.], [0., 0.1, 0.])], ..truth.clone() };
-        let layout = TangentLayout::new(&truth.joints, &[], false);
+        let truth = State::arm(vec![line([0., 0., 1.], [0., 0., 0.])], Point3::new(1., 0., 0.));
+        let estimate = State { joints: vec![line([0., 0., 1.], [0., 0.1, 0.])], ..truth.clone() };
+        let layout = Layout::of_arm(&truth, &[], false);
         let turns = [60_f64, 180.].map(|degrees| vec![degrees.to_radians()]);
         let evaluation = Evaluation::of_truth(turns.into(), &truth, 0.05);
         let joint = evaluation.joints(&estimate, Some(&truth), &layout)[0];
@@ -210,23 +211,19 @@ mod tests {
         assert!((joint.signal_to_noise.expect("a truth") - expected).abs() < 1e-9);
         assert!((joint.location_m.expect("a line") - 0.1).abs() < 1e-12 && joint.axis_deg == Some(0.0));
         assert_eq!(evaluation.joints(&estimate, None, &layout), [JointMetrics::default()]);
-        let known = TangentLayout::new(&truth.joints, &[false], true);
+        let known = Layout::of_arm(&truth, &[false], true);
         assert_eq!(evaluation.joints(&estimate, Some(&truth), &known), [JointMetrics::default()]);
     }
 
     #[test]
     fn metrics_of_a_chain_worked_by_hand() {
-        let truth = Chain {
-            joints: vec![line([0., 0., 1.], [0., 0., 0.]), line([1., 0., 0.], [0., 0., 1.])],
-            marker: Point3::new(0., 0., 2.),
-        };
+        let joints = vec![line([0., 0., 1.], [0., 0., 0.]), line([1., 0., 0.], [0., 0., 1.])];
+        let truth = State::arm(joints, Point3::new(0., 0., 2.));
         // The second axis tilted by 30 deg towards the first and shifted by 0.1 m; the first flipped.
         let half = 30_f64.to_radians();
-        let estimate = Chain {
-            joints: vec![line([0., 0., -1.], [0., 0., 5.]), line([half.cos(), 0., half.sin()], [7., 0.1, 1.])],
-            marker: truth.marker,
-        };
-        let layout = TangentLayout::new(&truth.joints, &[], false);
+        let joints = vec![line([0., 0., -1.], [0., 0., 5.]), line([half.cos(), 0., half.sin()], [7., 0.1, 1.])];
+        let estimate = State { joints, ..truth.clone() };
+        let layout = Layout::of_arm(&truth, &[], false);
         // ∠ true 90 deg; ∠ estimated between −z and the tilted axis: 120 deg.
         assert!((orientation_deg(&estimate, &truth, &layout).expect("a pair") - 30.0).abs() < 1e-9);
         assert!((axis_deg(&estimate, &truth, &layout).expect("joints") - (180.0 + 30.0) / 2.0).abs() < 1e-9);
@@ -234,7 +231,7 @@ mod tests {
         let expected = (0.01_f64 + 3.5 * 3.5).sqrt() / 2.0;
         assert!((location_m(&estimate, &truth, &layout).expect("lines") - expected).abs() < 1e-9);
         assert_eq!(orientation_deg(&truth, &truth, &layout), Some(0.0));
-        let known = TangentLayout::new(&truth.joints, &[false, false], true);
+        let known = Layout::of_arm(&truth, &[false, false], true);
         assert_eq!(location_m(&estimate, &truth, &known), None);
     }
 }

@@ -1,20 +1,23 @@
 //! Several learners in one world, step by step.
 //!
-//! At every step each learner chooses a movement, the world shows it the marker there, and it revises its belief. All
-//! learners start from the same estimate and see the same noise. One [`StepReport`] per step is all that the outside
-//! reads.
+//! At every step each [`Agent`] proposes a movement, the world carries it out and shows what is seen there, and the agent
+//! absorbs it. All start from the same estimate and see the same noise. The [`Judge`], who alone knows the truth, turns what
+//! they believe into metrics. One [`StepReport`] per step is all that the outside reads.
 
+mod agent;
 mod choice;
 mod comparison;
 mod convergence;
+mod gauge;
+mod judge;
 mod learner;
-mod limits;
 mod metrics;
 mod report;
 mod result;
 mod streams;
 mod world;
 
+pub use agent::{AbsorbError, Agent, Event, Executed, OwnedStandpoint, Proposal, Standpoint};
 pub use choice::{
     AppraisalReport, BoxReport, Choice, ChoiceError, ChosenReport, IterationReport, SearchedJoint, ShapeReport,
 };
@@ -22,20 +25,19 @@ pub use comparison::{
     Comparison, Curve, LearnerComparison, Quantiles, RunSummary, SeedRun, SelectionTime, Summary, Trace,
 };
 pub use convergence::{CONFIRMATION, Convergence, Thresholds};
-pub use learner::{Learner, Record, SETTLING_STEPS};
-pub use limits::{BestDesign, Design, Limits, Stretch, best_designs, movements_by_counting};
-pub use metrics::{Evaluation, JointMetrics, Metrics, axis_deg, location_m, nees, orientation_deg};
+pub use gauge::Gauge;
+pub use judge::{Judge, Verdict};
+pub use learner::{Learner, SETTLING_STEPS};
+pub use metrics::{Evaluation, JointMetrics, Metrics, axis_deg, location_m, orientation_deg};
 pub use report::{
     Description, GazeReport, HeadDescription, JointDescription, JointReport, LearnerDescription, LearnerReport,
     ModelReport, MovementReport, StepReport,
 };
 pub use result::{JointModel, LearnerResult, MarkerModel, Model, RunResult};
 pub use streams::Stream;
-pub use world::{Change, NoiseSequence, World};
+pub use world::{Change, NoiseSequence, World, WorldError};
 
-use nalgebra::DMatrix;
-
-use crate::{estimation::Update, selection::SelectionError};
+use crate::{design::Problem, estimation::Update, selection::SelectionError};
 
 /// A running comparison of learners.
 pub struct Experiment {
@@ -43,33 +45,11 @@ pub struct Experiment {
     world: World,
     noise: NoiseSequence,
     learners: Vec<Learner>,
-    evaluation: Evaluation,
-    verdicts: Vec<Verdict>,
-    bounds: Option<Bounds>,
+    judge: Judge,
     latest: StepReport,
 }
 
-/// What the data of every learner allow.
-struct Bounds {
-    limits: Limits,
-    /// Λ₀ + Σ HᵀH/σ² at the truth, one per learner.
-    information: Vec<DMatrix<f64>>,
-}
-
-/// What is known of one learner's run so far.
-struct Verdict {
-    /// Up to the change of the body, if there is one.
-    convergence: Convergence,
-    /// From the change on.
-    recovery: Convergence,
-    settled_at: Option<u64>,
-    /// Movements after the change at which the learner first noticed it.
-    noticed_at: Option<u64>,
-    /// Changes noticed before there was one.
-    false_alarms: u64,
-}
-
-/// Why a step could not be made. The experiment stays as it was.
+/// Why a step could not be made. The experiment stays as it was: the same step can be asked for again.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExperimentError {
     /// A learner could not choose.
@@ -80,44 +60,46 @@ pub enum ExperimentError {
         /// Why.
         source: SelectionError,
     },
+    /// The world has nothing to show after a movement.
+    #[error("nothing can be measured after the movement of learner `{learner}`: {source}")]
+    World {
+        /// Its name.
+        learner: String,
+        /// Why.
+        source: WorldError,
+    },
+    /// A learner refused what it was shown.
+    #[error("learner `{learner}`: {source}")]
+    Absorb {
+        /// Its name.
+        learner: String,
+        /// Why.
+        source: AbsorbError,
+    },
 }
 
 impl Experiment {
-    /// A comparison of `learners` in `world`, judged over `evaluation`; step 0 is reported at once.
-    pub fn new(description: Description, world: World, learners: Vec<Learner>, evaluation: Evaluation) -> Self {
-        let verdicts = learners
-            .iter()
-            .map(|_| {
-                let unjudged = Convergence::new(description.thresholds);
-                Verdict {
-                    convergence: unjudged.clone(),
-                    recovery: unjudged,
-                    settled_at: None,
-                    noticed_at: None,
-                    false_alarms: 0,
-                }
-            })
-            .collect();
+    /// A comparison of `learners` in `world`, judged over `evaluation`; step 0 is reported at once. With a `problem`
+    /// reports tell also what the data of every learner allow (see [`design`](crate::design)).
+    pub fn new(
+        description: Description,
+        world: World,
+        mut learners: Vec<Learner>,
+        evaluation: Evaluation,
+        problem: Option<Problem>,
+    ) -> Self {
+        let mut judge = Judge::new(evaluation, learners.len(), description.thresholds, description.change_at);
+        if let (Some(truth), Some(learner)) = (world.truth(), learners.first()) {
+            judge.study(learner.belief(), truth);
+        }
+        problem.into_iter().for_each(|problem| judge.bound(problem));
+        let truth = world.truth();
+        let reports =
+            learners.iter_mut().map(|learner| learner.report(None, Update::default(), &judge, truth)).collect();
+        let mut latest = StepReport { step: 0, learners: reports, truth: None };
+        judge.conclude(&mut latest);
         let noise = NoiseSequence::new(description.seed);
-        let latest = StepReport { step: 0, learners: Vec::new(), truth: None };
-        let mut experiment = Self { description, world, noise, learners, evaluation, verdicts, bounds: None, latest };
-        let truth = experiment.world.truth();
-        let reports = experiment
-            .learners
-            .iter_mut()
-            .map(|learner| learner.report(None, Update::default(), &experiment.evaluation, truth))
-            .collect();
-        experiment.conclude(StepReport { step: 0, learners: reports, truth: None });
-        experiment
-    }
-
-    /// The same with the bound of the data collected in every report (see [`Limits`]).
-    pub fn bounded(mut self, limits: Limits) -> Self {
-        let information = vec![limits.prior(); self.learners.len()];
-        let bound = limits.bound(&limits.prior());
-        self.latest.learners.iter_mut().for_each(|learner| learner.metrics.bound_trace = bound);
-        self.bounds = Some(Bounds { limits, information });
-        self
+        Self { description, world, noise, learners, judge, latest }
     }
 
     /// What stays the same from step to step.
@@ -132,7 +114,7 @@ impl Experiment {
 
     /// How many steps can still be made; `None` without an end.
     pub fn remaining(&self) -> Option<usize> {
-        self.learners.iter().filter_map(|learner| learner.actions.remaining()).min()
+        self.learners.iter().filter_map(Learner::remaining).min()
     }
 
     /// The truth, for those who judge: reports, recordings, bounds.
@@ -142,78 +124,59 @@ impl Experiment {
 
     /// One movement of every learner.
     pub fn step(&mut self) -> Result<&StepReport, ExperimentError> {
-        // All choose before any moves, so that a failed choice leaves the experiment as it was.
-        let choices = self
-            .learners
-            .iter_mut()
-            .map(|learner| {
-                learner
-                    .choose()
-                    .map_err(|source| ExperimentError::Selection { learner: learner.description.name.clone(), source })
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        let noise = self.noise.draw();
-        let has_changed = self.world.advance(self.latest.step);
+        // All propose and the world shows what it has before any learns, so that a failure leaves the experiment as it was:
+        // proposals that nobody carried out are there still, and the same, when they are asked for again.
+        let mut proposals = Vec::with_capacity(self.learners.len());
+        for learner in &mut self.learners {
+            let proposed = learner.propose();
+            let name = || learner.description.name.clone();
+            proposals.push(proposed.map_err(|source| ExperimentError::Selection { learner: name(), source })?);
+        }
+        let mut noise = self.noise.clone();
+        let draw = noise.draw(self.world.equations());
+        let changed = self.world.changed_after(self.latest.step);
+        let world = changed.as_ref().unwrap_or(&self.world);
+        let mut observations = Vec::with_capacity(self.learners.len());
+        for (learner, proposal) in self.learners.iter().zip(&proposals) {
+            let Some(proposal) = proposal else {
+                observations.push(None);
+                continue;
+            };
+            let name = || learner.description.name.clone();
+            let movement = &proposal.selection.movement;
+            let observation =
+                world.observe(movement, &draw).map_err(|source| ExperimentError::World { learner: name(), source })?;
+            let belief = learner.belief();
+            observation.check(&belief.rig, belief.state.joints.len(), &movement.configuration).map_err(|refused| {
+                ExperimentError::Absorb { learner: name(), source: AbsorbError::Refused(refused) }
+            })?;
+            observations.push(Some(observation));
+        }
+        self.noise = noise;
+        let has_changed = changed.is_some();
+        if let Some(world) = changed {
+            world.truth().into_iter().for_each(|truth| self.judge.follow(truth));
+            self.world = world;
+        }
         let truth = self.world.truth();
-        if let (Some(truth), true) = (truth, has_changed) {
-            self.evaluation.follow(truth);
-        }
-        if let (Some(bounds), Some(truth), true) = (&mut self.bounds, truth, has_changed) {
-            // What was measured before says nothing certain of the new body.
-            bounds.limits.truth = truth.clone();
-            let prior = bounds.limits.prior();
-            bounds.information.fill(prior);
-        }
-        let mut reports: Vec<LearnerReport> = self
-            .learners
-            .iter_mut()
-            .zip(choices)
-            .map(|(learner, choice)| {
-                let (movement, update) = match choice {
-                    Some(choice) => {
-                        let observation = self.world.observe(&choice.0.movement, &noise);
-                        let (movement, update) = learner.learn(choice, &observation, &self.world);
-                        (Some(movement), update)
-                    }
-                    None => (None, Update::default()),
-                };
-                learner.report(movement, update, &self.evaluation, truth)
-            })
-            .collect();
-        if let Some(bounds) = &mut self.bounds {
-            for (report, information) in reports.iter_mut().zip(&mut bounds.information) {
-                if let Some(movement) = report.movement.as_ref().filter(|it| it.measured_marker_m.is_some()) {
-                    *information += bounds.limits.information(&movement.configuration);
+        let mut reports = Vec::with_capacity(self.learners.len());
+        for ((learner, proposal), observation) in self.learners.iter_mut().zip(proposals).zip(observations) {
+            let (movement, update) = match proposal.zip(observation) {
+                Some((proposal, observation)) => {
+                    let name = learner.description.name.clone();
+                    let learned = learner.learn(proposal, observation, &self.world);
+                    let (movement, update) =
+                        learned.map_err(|source| ExperimentError::Absorb { learner: name, source })?;
+                    (Some(movement), update)
                 }
-                report.metrics.bound_trace = bounds.limits.bound(information);
-            }
+                None => (None, Update::default()),
+            };
+            reports.push(learner.report(movement, update, &self.judge, truth));
         }
-        let truth = truth.filter(|_| has_changed).map(ModelReport::of_chain);
-        self.conclude(StepReport { step: self.latest.step + 1, learners: reports, truth });
-        Ok(&self.latest)
-    }
-
-    fn conclude(&mut self, report: StepReport) {
-        for (verdict, learner) in self.verdicts.iter_mut().zip(&report.learners) {
-            let metrics = &learner.metrics;
-            let since_change = self.description.change_at.and_then(|change| report.step.checked_sub(change));
-            match since_change {
-                Some(movements @ 1..) => {
-                    verdict.recovery.observe(movements, metrics.orientation_deg, metrics.location_m);
-                }
-                _ => verdict.convergence.observe(report.step, metrics.orientation_deg, metrics.location_m),
-            }
-            match since_change {
-                Some(movements @ 1..) if metrics.changes_noticed > verdict.false_alarms => {
-                    verdict.noticed_at.get_or_insert(movements);
-                }
-                Some(1..) => {}
-                _ => verdict.false_alarms = metrics.changes_noticed,
-            }
-            if metrics.settled && verdict.settled_at.is_none() {
-                verdict.settled_at = Some(metrics.movements);
-            }
-        }
+        let truth = truth.filter(|_| has_changed).map(ModelReport::of_state);
+        let mut report = StepReport { step: self.latest.step + 1, learners: reports, truth };
+        self.judge.conclude(&mut report);
         self.latest = report;
+        Ok(&self.latest)
     }
 }

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::{convergence::Thresholds, metrics::Metrics};
 use crate::{
     estimation::Belief,
-    kinematics::{Chain, JointKind},
+    kinematics::JointKind,
+    model::State,
     selection::Partition,
     sensing::{Gaze, Head},
 };
@@ -30,8 +31,8 @@ pub struct Description {
     pub joints: Vec<JointDescription>,
     /// Number of learned parameters in tangent coordinates.
     pub parameters: usize,
-    /// Movements after which there are as many equations as unknowns, three per movement seen: a yardstick to draw
-    /// beside curves, not a bound.
+    /// Movements after which there are as many independent equations as can be determined: a yardstick to draw beside
+    /// curves, not a bound.
     pub movements_by_counting: usize,
     /// The learners, in the order of every report.
     pub learners: Vec<LearnerDescription>,
@@ -185,7 +186,10 @@ pub struct MovementReport {
     pub evaluations: usize,
     /// How long the choice took, milliseconds of wall time.
     pub selection_ms: f64,
-    /// The minimiser's partition of the joint box. Too large for every report: recordings hold it, JSON does not.
+    /// Whether any channel had a reading.
+    #[serde(skip, default)]
+    pub seen: bool,
+    /// DIRECT's partition of the joint box; that of a planner was for the first movement that its plan lacked. Too large for every report: recordings hold it, JSON does not.
     #[serde(skip)]
     pub partition: Option<Partition>,
 }
@@ -218,9 +222,10 @@ pub struct JointReport {
 }
 
 impl ModelReport {
-    /// A chain without uncertainty.
-    pub fn of_chain(chain: &Chain) -> Self {
-        let joints = chain
+    /// A state without uncertainty, in the frame of the measurements.
+    pub fn of_state(state: &State) -> Self {
+        let state = state.measured();
+        let joints = state
             .joints
             .iter()
             .map(|joint| JointReport {
@@ -230,15 +235,15 @@ impl ModelReport {
                 direction_covariance_rad2: None,
             })
             .collect();
-        Self { joints, marker_m: array(&chain.marker.coords), marker_covariance_m2: None }
+        Self { joints, marker_m: array(&state.marker().coords), marker_covariance_m2: None }
     }
 
     /// A belief with what it holds of uncertainty; points on axes are those nearest to the truth's, where it is known.
-    pub fn of_belief(belief: &Belief, truth: Option<&Chain>) -> Self {
-        let shown = shown(&belief.chain, truth);
-        let mut model = Self::of_chain(&shown);
+    pub fn of_belief(belief: &Belief, truth: Option<&State>) -> Self {
+        let (shown, estimate) = (shown(&belief.state, truth), belief.state.measured());
+        let mut model = Self::of_state(&shown);
         for (index, joint) in model.joints.iter_mut().enumerate() {
-            let along = match (shown.joints[index].line(), belief.chain.joints[index].line()) {
+            let along = match (shown.joints[index].line(), estimate.joints[index].line()) {
                 (Some(shown), Some(line)) => line.direction.dot(&(shown.point - line.point)),
                 _ => 0.0,
             };
@@ -256,8 +261,9 @@ impl ModelReport {
 }
 
 /// An estimate as it is drawn beside the truth.
-pub(super) fn shown(estimate: &Chain, truth: Option<&Chain>) -> Chain {
-    truth.map_or_else(|| estimate.clone(), |truth| estimate.slid_towards(truth))
+pub(super) fn shown(estimate: &State, truth: Option<&State>) -> State {
+    let estimate = estimate.measured();
+    truth.map_or_else(|| estimate.clone().into_owned(), |truth| estimate.slid_towards(&truth.measured()))
 }
 
 pub(super) fn array(v: &Vector3<f64>) -> [f64; 3] {

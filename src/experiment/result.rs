@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{BestDesign, Experiment, convergence::Thresholds, metrics::Metrics, report::array};
+use super::{Experiment, convergence::Thresholds, metrics::Metrics, report::array};
 use crate::{
+    design::BestDesign,
     estimation::Belief,
     kinematics::{JointKind, chart},
 };
@@ -116,13 +117,17 @@ pub struct MarkerModel {
 impl Model {
     fn new(belief: &Belief, names: &[String]) -> Self {
         let layout = &belief.layout;
+        // With a base of its own the basis turns with it, as the axis does.
+        let state = belief.state.measured();
+        let rotation = belief.state.base.rotation;
         let joints = belief
-            .chain
+            .state
             .joints
             .iter()
             .enumerate()
-            .map(|(index, joint)| {
-                let basis = chart::basis(&joint.direction());
+            .zip(&state.joints)
+            .map(|((index, own), joint)| {
+                let basis = rotation.to_rotation_matrix().matrix() * chart::basis(&own.direction());
                 let coordinates = [layout.point(index), layout.direction(index)];
                 JointModel {
                     name: names.get(index).cloned().unwrap_or_default(),
@@ -136,7 +141,7 @@ impl Model {
             })
             .collect();
         let marker = MarkerModel {
-            position_m: array(&belief.chain.marker.coords),
+            position_m: array(&state.marker().coords),
             learned: layout.marker().is_some(),
             coordinates: layout.marker().into_iter().flatten().collect(),
         };
@@ -165,7 +170,7 @@ impl Experiment {
             .learners
             .iter()
             .zip(&self.latest.learners)
-            .zip(&self.verdicts)
+            .zip(self.judge.verdicts())
             .map(|((learner, report), verdict)| LearnerResult {
                 name: report.name.clone(),
                 estimator: learner.description.estimator.clone(),
@@ -178,7 +183,7 @@ impl Experiment {
                 failure: report.failure.clone(),
                 efficiency: None,
                 metrics: report.metrics.clone(),
-                model: Model::new(learner.estimator.belief(), &names),
+                model: Model::new(learner.belief(), &names),
             })
             .collect();
         RunResult {

@@ -10,7 +10,7 @@ pub enum Stream {
     InitialEstimate = 1,
     /// The measurement noise, one draw per movement.
     Noise = 2,
-    /// The choices of a policy.
+    /// The choices of a policy, each keyed by its ordinal.
     Policy = 3,
     /// The configurations of the prediction error.
     Evaluation = 4,
@@ -23,6 +23,13 @@ pub enum Stream {
 }
 
 impl Stream {
+    /// The numbers of one item of this purpose, by its ordinal: each has 2³² words of the stream to itself.
+    pub fn keyed(self, seed: u64, ordinal: u64) -> ChaCha8Rng {
+        let mut rng = self.rng(seed);
+        rng.set_word_pos(u128::from(ordinal) << 32);
+        rng
+    }
+
     /// The stream of this purpose under a seed (ChaCha with 8 rounds).
     pub fn rng(self, seed: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

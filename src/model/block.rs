@@ -1,0 +1,104 @@
+//! The parameters that belong together.
+
+use nalgebra::DVector;
+
+use super::{Element, Place, Quantity, State};
+use crate::kinematics::JointKind;
+
+/// A group of parameters of a [`State`] that is learned or held as a whole. Indices count from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Block {
+    /// The pose of the base in the frame of the measurements.
+    Base,
+    /// The axis of a joint.
+    Axis(usize),
+    /// What is added to a joint's reading, rad or m.
+    Offset(usize),
+    /// What a joint's reading is multiplied by.
+    Ratio(usize),
+    /// Sine and cosine of a joint's reading, rad.
+    Eccentricity(usize),
+    /// The place of a target on its link.
+    Target(usize),
+    /// The pose of a device.
+    Device(usize),
+    /// Focal lengths and principal point of a camera.
+    Intrinsics(usize),
+    /// A place beside the robot.
+    Socket(usize),
+}
+
+impl Block {
+    /// Whether `state` has such a block.
+    pub fn is_in(&self, state: &State) -> bool {
+        match *self {
+            Self::Base => true,
+            Self::Axis(joint) | Self::Offset(joint) | Self::Ratio(joint) | Self::Eccentricity(joint) => {
+                joint < state.joints.len()
+            }
+            Self::Target(target) => target < state.targets.len(),
+            Self::Device(device) => device < state.devices.len(),
+            Self::Intrinsics(device) => {
+                state.devices.get(device).is_some_and(|device| device.intrinsics.is_some())
+            }
+            Self::Socket(socket) => socket < state.sockets.len(),
+        }
+    }
+
+    /// Its value in a state that has it.
+    pub fn of(&self, state: &State) -> Element {
+        let numbers = |numbers: &[f64]| Element::Numbers(DVector::from_column_slice(numbers));
+        match *self {
+            Self::Base => Element::Pose(state.base),
+            Self::Axis(joint) => Element::Axis(state.joints[joint]),
+            Self::Offset(joint) => numbers(&[state.corrections[joint].offset]),
+            Self::Ratio(joint) => numbers(&[state.corrections[joint].ratio]),
+            Self::Eccentricity(joint) => numbers(&[state.corrections[joint].sine, state.corrections[joint].cosine]),
+            Self::Target(target) => match &state.targets[target].place {
+                Place::Point(point) => Element::Point(*point),
+                Place::Pose(pose) => Element::Pose(*pose),
+            },
+            Self::Device(device) => Element::Pose(state.devices[device].pose),
+            Self::Intrinsics(device) => numbers(&state.devices[device].intrinsics.unwrap_or_default()),
+            Self::Socket(socket) => Element::Point(state.sockets[socket]),
+        }
+    }
+
+    /// Gives it another value of the same kind.
+    pub fn put(&self, state: &mut State, element: Element) {
+        match (*self, element) {
+            (Self::Base, Element::Pose(pose)) => state.base = pose,
+            (Self::Axis(joint), Element::Axis(axis)) => state.joints[joint] = axis,
+            (Self::Offset(joint), Element::Numbers(numbers)) => state.corrections[joint].offset = numbers[0],
+            (Self::Ratio(joint), Element::Numbers(numbers)) => state.corrections[joint].ratio = numbers[0],
+            (Self::Eccentricity(joint), Element::Numbers(numbers)) => {
+                (state.corrections[joint].sine, state.corrections[joint].cosine) = (numbers[0], numbers[1]);
+            }
+            (Self::Target(target), Element::Point(point)) => state.targets[target].place = Place::Point(point),
+            (Self::Target(target), Element::Pose(pose)) => state.targets[target].place = Place::Pose(pose),
+            (Self::Device(device), Element::Pose(pose)) => state.devices[device].pose = pose,
+            (Self::Intrinsics(device), Element::Numbers(n)) => {
+                state.devices[device].intrinsics = Some([n[0], n[1], n[2], n[3]]);
+            }
+            (Self::Socket(socket), Element::Point(point)) => state.sockets[socket] = point,
+            (block, element) => debug_assert!(false, "{block:?} is no {element:?}"),
+        }
+    }
+
+    /// What each of its tangent coordinates measures.
+    pub fn quantities(&self, state: &State) -> Vec<Quantity> {
+        use Quantity::{Angle, Length, Pixels, Ratio};
+        let turns = |joint: usize| state.joints[joint].kind() == JointKind::Revolute;
+        match *self {
+            Self::Axis(joint) if turns(joint) => vec![Length, Length, Angle, Angle],
+            Self::Axis(_) => vec![Angle, Angle],
+            Self::Offset(joint) => vec![if turns(joint) { Angle } else { Length }],
+            Self::Ratio(_) => vec![Ratio],
+            Self::Eccentricity(joint) => vec![if turns(joint) { Angle } else { Length }; 2],
+            Self::Target(target) if matches!(state.targets[target].place, Place::Point(_)) => vec![Length; 3],
+            Self::Socket(_) => vec![Length; 3],
+            Self::Intrinsics(_) => vec![Pixels; 4],
+            Self::Base | Self::Target(_) | Self::Device(_) => vec![Length, Length, Length, Angle, Angle, Angle],
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! The values that blocks of parameters take, and their minimal coordinates.
+//!
+//! Every element x has a chart, with the origin at x:
+//!
+//! ```text
+//! retract(x, δ)       the element at coordinates δ
+//! local(x, y)         the coordinates of y, the inverse of retract; none where the chart ends
+//! transport(x, δ)     ∂ local(x′, retract(x, δ)) / ∂δ with x′ = retract(x, δ) held: carries covariances to the new chart
+//! ```
+//!
+//! | element | coordinates | retraction |
+//! |---|---|---|
+//! | line (revolute axis) | 2 of its point ⟂ w (m), 2 of its direction (rad) | [`chart`] |
+//! | direction (prismatic axis) | 2 (rad) | [`chart`] |
+//! | point | 3 (m) | t + δ |
+//! | pose | 3 of its origin (m), 3 of its rotation (rad) | (t + ν, exp(\[ω\]×) R) |
+//! | numbers | as many | x + δ |
+
+use nalgebra::{DMatrix, DVector, DVectorView, Isometry3, Matrix2, Matrix3, Point3, Translation3, UnitVector3, Vector3};
+
+use crate::kinematics::{Joint, chart, rotation};
+
+/// A value of one block of parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Element {
+    /// The axis of a joint: a line or a direction.
+    Axis(Joint),
+    /// A point, metres.
+    Point(Point3<f64>),
+    /// A rigid placement.
+    Pose(Isometry3<f64>),
+    /// Plain numbers.
+    Numbers(DVector<f64>),
+}
+
+/// How far an element is from a guess, in coordinates that hold everywhere, not only where a chart at the guess does.
+#[derive(Clone, Debug)]
+pub struct Displacement {
+    /// r, zero at the guess, and to first order the tangent coordinates there.
+    pub value: DVector<f64>,
+    /// ∂r/∂δ in the chart at the element.
+    pub derivative: DMatrix<f64>,
+    /// The same without the curvature of the sphere, which grows without bound towards the antipode of a direction: what
+    /// serves as Gauss and Newton's approximation.
+    pub slope: DMatrix<f64>,
+}
+
+impl Element {
+    /// Number of minimal coordinates.
+    pub fn dimension(&self) -> usize {
+        match self {
+            Self::Axis(joint) => joint.degrees_of_freedom(),
+            Self::Point(_) => 3,
+            Self::Pose(_) => 6,
+            Self::Numbers(numbers) => numbers.len(),
+        }
+    }
+
+    /// The element at coordinates δ.
+    pub fn retract(&self, delta: &DVectorView<'_, f64>) -> Self {
+        match self {
+            Self::Axis(Joint::Revolute(line)) => {
+                Self::Axis(Joint::Revolute(chart::retract_line(line, &delta.fixed_rows::<4>(0).into_owned())))
+            }
+            Self::Axis(Joint::Prismatic(w)) => {
+                Self::Axis(Joint::Prismatic(chart::retract_direction(w, &delta.fixed_rows::<2>(0).into_owned())))
+            }
+            Self::Point(point) => Self::Point(point + delta.fixed_rows::<3>(0)),
+            Self::Pose(pose) => Self::Pose(Isometry3::from_parts(
+                Translation3::from(pose.translation.vector + delta.fixed_rows::<3>(0)),
+                rotation::turned(&pose.rotation, &delta.fixed_rows::<3>(3).into_owned()),
+            )),
+            Self::Numbers(numbers) => Self::Numbers(numbers + delta),
+        }
+    }
+
+    /// The coordinates of `other` in the chart at `self`; `None` outside the chart (directions of lines 90 deg or more
+    /// apart, opposite directions) and for an element of another kind.
+    pub fn local(&self, other: &Self) -> Option<DVector<f64>> {
+        Some(match (self, other) {
+            (Self::Axis(Joint::Revolute(line)), Self::Axis(Joint::Revolute(other))) => {
+                DVector::from_column_slice(chart::local_line(line, other)?.as_slice())
+            }
+            (Self::Axis(Joint::Prismatic(w)), Self::Axis(Joint::Prismatic(other))) => {
+                DVector::from_column_slice(chart::local_direction(w, other)?.as_slice())
+            }
+            (Self::Point(point), Self::Point(other)) => DVector::from_column_slice((other - point).as_slice()),
+            (Self::Pose(pose), Self::Pose(other)) => {
+                let shift = other.translation.vector - pose.translation.vector;
+                let turn = rotation::between(&pose.rotation, &other.rotation);
+                DVector::from_iterator(6, shift.iter().chain(turn.iter()).copied())
+            }
+            (Self::Numbers(numbers), Self::Numbers(other)) if numbers.len() == other.len() => other - numbers,
+            _ => return None,
+        })
+    }
+
+    /// The derivative of the change of chart from `self` to `self.retract(δ)`, at δ.
+    pub fn transport(&self, delta: &DVectorView<'_, f64>) -> DMatrix<f64> {
+        let mut transport = DMatrix::identity(self.dimension(), self.dimension());
+        let mut turn = |start: usize, w: &UnitVector3<f64>| {
+            let d = delta.fixed_rows::<2>(start).into_owned();
+            let w_new = chart::retract_direction(w, &d);
+            transport.fixed_view_mut::<2, 2>(start, start).copy_from(&chart::direction_transport(w, &d, &w_new));
+            w_new
+        };
+        match self {
+            Self::Axis(Joint::Revolute(line)) => {
+                let w_new = turn(2, &line.direction);
+                transport.fixed_view_mut::<2, 2>(0, 0).copy_from(&chart::point_transport(&line.direction, &w_new));
+            }
+            Self::Axis(Joint::Prismatic(w)) => {
+                turn(0, w);
+            }
+            Self::Pose(_) => {
+                let jacobian = rotation::left_jacobian(&delta.fixed_rows::<3>(3).into_owned());
+                transport.fixed_view_mut::<3, 3>(3, 3).copy_from(&jacobian);
+            }
+            Self::Point(_) | Self::Numbers(_) => {}
+        }
+        transport
+    }
+
+    /// The derivative of the change of chart from `self` to `there`, by the coordinates at `there`: of
+    /// `self.local(there.retract(ε))` at ε = 0. `None` outside the chart. Where `there` is `self.retract(δ)` it is the
+    /// inverse of the transport at δ; but a line may be written with another pivot.
+    pub fn change_of_chart(&self, there: &Self) -> Option<DMatrix<f64>> {
+        if let (Self::Axis(Joint::Revolute(line)), Self::Axis(Joint::Revolute(there))) = (self, there) {
+            let change = chart::line_change(line, there)?;
+            return Some(DMatrix::from_column_slice(4, 4, change.as_slice()));
+        }
+        let delta = self.local(there)?;
+        self.transport(&delta.rows(0, delta.len())).try_inverse()
+    }
+
+    /// How far `other` is from the guess `self`. A line counts by the distance of its own pivot from the guess's; write
+    /// it with the pivot nearest to that first.
+    ///
+    /// For a line (v, w) and the guess (v₀, w₀), Q the parallel transport from w to w₀ along their great circle and B₀
+    /// the basis at w₀,
+    ///
+    /// ```text
+    /// r = ( B₀ᵀ Q (I − wwᵀ)(v − v₀),   local(w₀, w) )
+    /// ```
+    ///
+    /// whose two norms are the distance of v₀ from the line and the angle to the guessed direction.
+    pub fn displacement(&self, other: &Self) -> Option<Displacement> {
+        match (self, other) {
+            (Self::Axis(guess), Self::Axis(joint)) if guess.kind() == joint.kind() => Some(axis(guess, joint)),
+            (Self::Pose(guess), Self::Pose(pose)) => {
+                let value = self.local(other)?;
+                let turn = rotation::between(&guess.rotation, &pose.rotation);
+                let mut derivative = DMatrix::identity(6, 6);
+                let inverse = rotation::left_jacobian(&turn).try_inverse()?;
+                derivative.fixed_view_mut::<3, 3>(3, 3).copy_from(&inverse);
+                let mut slope = DMatrix::identity(6, 6);
+                let parallel = half_turned(&turn);
+                slope.fixed_view_mut::<3, 3>(3, 3).copy_from(&parallel);
+                Some(Displacement { value, derivative, slope })
+            }
+            _ => {
+                let value = self.local(other)?;
+                let identity = DMatrix::identity(value.len(), value.len());
+                Some(Displacement { value, derivative: identity.clone(), slope: identity })
+            }
+        }
+    }
+}
+
+/// The orthogonal part of the inverse left Jacobian: exp(−\[ω\]×/2).
+fn half_turned(omega: &Vector3<f64>) -> Matrix3<f64> {
+    nalgebra::Rotation3::from_scaled_axis(-0.5 * omega).into_inner()
+}
+
+/// The displacement of an axis.
+fn axis(guess: &Joint, joint: &Joint) -> Displacement {
+    let (w0, w) = (guess.direction(), joint.direction());
+    let (basis0, basis) = (chart::basis(&w0), chart::basis(&w));
+    // Opposite directions are π apart; along which great circle is anybody's choice.
+    let angle = chart::local_direction(&w0, &w)
+        .unwrap_or_else(|| nalgebra::Vector2::new(std::f64::consts::PI, 0.0));
+    let parallel = Parallel::new(&w, &w0);
+    let carried = basis0.transpose() * parallel.matrix * basis;
+    let exact = chart::direction_transport(&w0, &angle, &w).try_inverse();
+    let dimension = joint.degrees_of_freedom();
+    let directions = dimension - 2;
+    let mut value = DVector::zeros(dimension);
+    let mut slope = DMatrix::zeros(dimension, dimension);
+    value.fixed_rows_mut::<2>(directions).copy_from(&angle);
+    slope.fixed_view_mut::<2, 2>(directions, directions).copy_from(&carried);
+    let mut derivative = slope.clone();
+    let finite = |matrix: &Matrix2<f64>| matrix.iter().all(|x| x.is_finite());
+    if let Some(exact) = exact.filter(finite) {
+        derivative.fixed_view_mut::<2, 2>(directions, directions).copy_from(&exact);
+    }
+    if let (Joint::Revolute(guess), Joint::Revolute(line)) = (guess, joint) {
+        let offset = line.point - guess.point;
+        let along = w.dot(&offset);
+        let across = offset - w.into_inner() * along;
+        value.fixed_rows_mut::<2>(0).copy_from(&(basis0.transpose() * (parallel.matrix * across)));
+        // ∂a/∂(a, d) = [I, −(w·offset) I]: turning the line about its pivot carries it past the guess.
+        for matrix in [&mut slope, &mut derivative] {
+            matrix.fixed_view_mut::<2, 2>(0, 0).copy_from(&carried);
+            matrix.fixed_view_mut::<2, 2>(0, 2).copy_from(&(carried * -along));
+        }
+        for k in 0..2 {
+            let e: Vector3<f64> = basis.column(k).into_owned();
+            // The parallel transport turns as well.
+            let column = basis0.transpose() * (parallel.along(&e) * across);
+            for row in 0..2 {
+                derivative[(row, 2 + k)] += column[row];
+            }
+        }
+    }
+    Displacement { value, derivative, slope }
+}
+
+/// The smallest rotation that carries w into w₀: `I + [k]× + [k]×²/(1 + c)` with k = w × w₀, c = w·w₀.
+struct Parallel {
+    to: Vector3<f64>,
+    cross: Matrix3<f64>,
+    cosine: f64,
+    matrix: Matrix3<f64>,
+}
+
+impl Parallel {
+    fn new(from: &UnitVector3<f64>, to: &UnitVector3<f64>) -> Self {
+        let cross = from.cross(to).cross_matrix();
+        let cosine = from.dot(to).max(-1.0 + 1e-12);
+        let matrix = Matrix3::identity() + cross + cross * cross / (1.0 + cosine);
+        Self { to: to.into_inner(), cross, cosine, matrix }
+    }
+
+    /// The derivative as w moves by `e` ⟂ w.
+    fn along(&self, e: &Vector3<f64>) -> Matrix3<f64> {
+        let change = e.cross(&self.to).cross_matrix();
+        let rest = 1.0 + self.cosine;
+        change + (change * self.cross + self.cross * change) / rest
+            - self.cross * self.cross * (e.dot(&self.to) / (rest * rest))
+    }
+}

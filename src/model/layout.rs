@@ -1,0 +1,108 @@
+//! Which parameters are learned, and where each stands in the tangent vector.
+
+use std::ops::Range;
+
+use super::{Block, State};
+
+/// The order of the learned parameters in the tangent vector δ and in every covariance.
+///
+/// Blocks stand in the order of [`Block`]: base, axes, corrections of readings, targets, devices, intrinsics, sockets;
+/// within a kind by index. A revolute joint's axis takes four places, first two for its point (metres, ⟂ w), then two
+/// for its direction (radians); a prismatic joint's two, for its direction; a point three (metres), a pose six.
+///
+/// The paper writes six numbers per joint. A line has four degrees of freedom, so the other two move nothing that can
+/// be measured: no data shrink their covariance, and ellipsoids and traces that contain them mislead.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layout {
+    entries: Vec<(Block, Range<usize>)>,
+    /// By joint: where its axis stands.
+    axes: Vec<Option<Range<usize>>>,
+    quantities: Vec<Quantity>,
+}
+
+/// What one tangent coordinate measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Metres.
+    Length,
+    /// Radians.
+    Angle,
+    /// Without a unit.
+    Ratio,
+    /// Pixels.
+    Pixels,
+}
+
+impl Layout {
+    /// The layout of the blocks of `state` that `learned` names; those that the state does not have are left out.
+    pub fn new(state: &State, learned: impl IntoIterator<Item = Block>) -> Self {
+        let mut blocks: Vec<Block> = learned.into_iter().filter(|block| block.is_in(state)).collect();
+        blocks.sort_unstable();
+        blocks.dedup();
+        let mut layout = Self { entries: Vec::new(), axes: vec![None; state.joints.len()], quantities: Vec::new() };
+        for block in blocks {
+            let start = layout.quantities.len();
+            layout.quantities.extend(block.quantities(state));
+            let range = start..layout.quantities.len();
+            if let Block::Axis(joint) = block {
+                layout.axes[joint] = Some(range.clone());
+            }
+            layout.entries.push((block, range));
+        }
+        layout
+    }
+
+    /// The axes of joints marked in `learned` (those beyond its end count as learned), and the marker if `learn_marker`.
+    pub fn of_arm(state: &State, learned: &[bool], learn_marker: bool) -> Self {
+        let is_learned = |joint: &usize| learned.get(*joint).copied().unwrap_or(true);
+        let axes = (0..state.joints.len()).filter(is_learned).map(Block::Axis);
+        Self::new(state, axes.chain(learn_marker.then_some(Block::Target(0))))
+    }
+
+    /// Number of learned parameters, m.
+    pub fn dimension(&self) -> usize {
+        self.quantities.len()
+    }
+
+    /// Number of joints of the robot, learned or not.
+    pub fn joints(&self) -> usize {
+        self.axes.len()
+    }
+
+    /// The learned blocks in order, and where each stands.
+    pub fn blocks(&self) -> impl Iterator<Item = (Block, Range<usize>)> + '_ {
+        self.entries.iter().cloned()
+    }
+
+    /// Where a block stands, if it is learned.
+    pub fn block(&self, block: Block) -> Option<Range<usize>> {
+        self.entries.iter().find(|(known, _)| *known == block).map(|(_, range)| range.clone())
+    }
+
+    /// Whether the axis of joint `index` is learned.
+    pub fn is_learned(&self, index: usize) -> bool {
+        self.axes.get(index).is_some_and(Option::is_some)
+    }
+
+    /// Where the point of joint `index` stands (a learned revolute joint only): two coordinates.
+    pub fn point(&self, index: usize) -> Option<Range<usize>> {
+        let range = self.axes.get(index)?.as_ref()?;
+        (range.len() == 4).then(|| range.start..range.start + 2)
+    }
+
+    /// Where the direction of joint `index` stands (a learned joint only): two coordinates.
+    pub fn direction(&self, index: usize) -> Option<Range<usize>> {
+        let range = self.axes.get(index)?.as_ref()?;
+        Some(range.end - 2..range.end)
+    }
+
+    /// Where the marker, the first target, stands if it is learned: three coordinates of its origin.
+    pub fn marker(&self) -> Option<Range<usize>> {
+        self.block(Block::Target(0)).map(|range| range.start..range.start + 3)
+    }
+
+    /// What each tangent coordinate measures, in order.
+    pub fn quantities(&self) -> &[Quantity] {
+        &self.quantities
+    }
+}

@@ -1,0 +1,27 @@
+//! What can be learned of a robot: its parameters in blocks, and how they move its links.
+//!
+//! * [`State`]: base, joints, corrections of readings, targets, devices, sockets; forward kinematics.
+//! * [`Block`]: parameters that belong together; [`Element`]: their values, with chart and transport.
+//! * [`Layout`]: which blocks are learned, and where each stands in the tangent vector.
+//! * [`Prior`]: what is known before any measurement, with a full covariance, or anywhere within bounds.
+//! * [`Pass`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
+//!   and not among the kinematics since it is the layout that says which parameters there are.
+//! * [`registration`]: base and marker of a nominal robot, fitted to measurements.
+
+mod block;
+mod element;
+mod layout;
+mod pass;
+mod prior;
+pub mod registration;
+mod state;
+
+pub use block::Block;
+pub use element::{Displacement, Element};
+pub use layout::{Layout, Quantity};
+pub use pass::{Frame, Motion, Pass, Twist, jacobian};
+pub use prior::{Normal, Prior, PriorError, anywhere};
+pub use state::{Correction, Device, Place, State, Target};
+
+#[cfg(test)]
+pub(crate) mod laws;

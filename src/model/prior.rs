@@ -1,0 +1,277 @@
+//! What is known of a robot before any measurement.
+//!
+//! Some blocks are known to lie around a guess, with a joint covariance P₀ of their tangent coordinates; others are only
+//! known to lie anywhere within bounds. The prior must hold everywhere, also for a line turned by more than 90 deg from
+//! the guess, where the chart at the guess ends. So it is written in the [displacements](super::Displacement) r of the
+//! blocks, which do not end:
+//!
+//! ```text
+//! cost = ½ rᵀ P₀⁻¹ r
+//! ```
+//!
+//! Near the guess this is the Gaussian of covariance P₀ in tangent coordinates. For a line whose point and direction have
+//! one standard deviation each it is `‖(I − wwᵀ)(v − v₀)‖² / 2σₚ² + ∠(w, w₀)² / 2σd²`, wherever the line is.
+//!
+//! A block that may be anywhere within ±b of the origin has directions and rotations uniform on their spheres: they cost
+//! nothing, and their information enters the covariance only, as the reciprocal of the variance per coordinate of such a
+//! draw in the chart at its own mean: π²/4 − 1 rad² for a direction, (π²/3 + 2)/3 rad² for a rotation. Points cost what a
+//! Gaussian of standard deviation b/√3 does, that of a coordinate uniform within ±b.
+
+use std::{f64::consts::PI, ops::Range};
+
+use nalgebra::{
+    Cholesky, DMatrix, DVector, Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, UnitVector3, Vector3,
+};
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+
+use super::{Block, Element, Layout, Quantity, State};
+use crate::kinematics::{Joint, Line, chart};
+
+/// What is known of the learned blocks of a state before any measurement.
+#[derive(Clone, Debug)]
+pub struct Prior {
+    guess: State,
+    blocks: Vec<(Block, Range<usize>, Knowledge)>,
+    /// P₀; of blocks that may be anywhere the variance of such a draw, on the diagonal.
+    covariance: DMatrix<f64>,
+    /// P₀⁻¹ of the blocks around the guess; nothing of the others.
+    information: DMatrix<f64>,
+    /// L with L Lᵀ = P₀.
+    root: DMatrix<f64>,
+    /// Pairs of blocks around the guess, by their places, whose information is not zero.
+    coupled: Vec<(usize, usize)>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Knowledge {
+    Around,
+    /// Within ± so many metres.
+    Anywhere(f64),
+}
+
+/// Why there is no such prior.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PriorError {
+    /// The covariance is not symmetric and positive, or not of the layout's dimension.
+    #[error("the prior covariance of {0} parameters is not symmetric and positive")]
+    NotPositive(usize),
+    /// Numbers have no bounds within which they could be anywhere.
+    #[error("{0:?} cannot be anywhere within bounds: only axes, points and poses can")]
+    Unbounded(Block),
+}
+
+/// The variance of each coordinate of a direction uniform on the sphere, E θ²/2 with θ its angle to the pole.
+const UNIFORM_DIRECTION: f64 = PI * PI / 4.0 - 1.0;
+/// The variance of each coordinate of a uniform rotation, E φ²/3 with φ its angle.
+const UNIFORM_ROTATION: f64 = (PI * PI / 3.0 + 2.0) / 3.0;
+
+/// A cost's second and first derivatives: information (m × m) and descent direction −∂cost/∂δ.
+pub type Normal<'a> = (&'a mut DMatrix<f64>, &'a mut DVector<f64>);
+
+impl Prior {
+    /// Around `guess` with the covariance P₀ (m × m) of its tangent coordinates.
+    pub fn around(guess: State, layout: &Layout, covariance: DMatrix<f64>) -> Result<Self, PriorError> {
+        Self::new(guess, layout, covariance, |_| None)
+    }
+
+    /// Around `guess` with independent standard deviations, one per tangent coordinate.
+    pub fn with_deviations(guess: State, layout: &Layout, deviations: &DVector<f64>) -> Result<Self, PriorError> {
+        Self::around(guess, layout, DMatrix::from_diagonal(&deviations.map(|sd| sd * sd)))
+    }
+
+    /// As [`around`](Self::around), but blocks for which `within` tells a bound (metres) may be anywhere within it: of
+    /// what the guess and the covariance say of them nothing counts.
+    pub fn new(
+        guess: State,
+        layout: &Layout,
+        mut covariance: DMatrix<f64>,
+        within: impl Fn(Block) -> Option<f64>,
+    ) -> Result<Self, PriorError> {
+        let m = layout.dimension();
+        let not_positive = || PriorError::NotPositive(m);
+        if covariance.shape() != (m, m) || (&covariance - covariance.transpose()).amax() > 1e-9 * covariance.amax() {
+            return Err(not_positive());
+        }
+        let mut blocks = Vec::new();
+        for (block, range) in layout.blocks() {
+            let Some(bound) = within(block) else {
+                blocks.push((block, range, Knowledge::Around));
+                continue;
+            };
+            let element = block.of(&guess);
+            if matches!(element, Element::Numbers(_)) {
+                return Err(PriorError::Unbounded(block));
+            }
+            let angle = if matches!(element, Element::Pose(_)) { UNIFORM_ROTATION } else { UNIFORM_DIRECTION };
+            for k in range.clone() {
+                covariance.row_mut(k).fill(0.0);
+                covariance.column_mut(k).fill(0.0);
+                let is_angle = layout.quantities()[k] == Quantity::Angle;
+                covariance[(k, k)] = if is_angle { angle } else { bound * bound / 3.0 };
+            }
+            blocks.push((block, range, Knowledge::Anywhere(bound)));
+        }
+        let cholesky = Cholesky::new(covariance.clone()).ok_or_else(not_positive)?;
+        let mut information = if is_diagonal(&covariance) {
+            DMatrix::from_diagonal(&covariance.diagonal().map(f64::recip))
+        } else {
+            cholesky.inverse()
+        };
+        for (_, range, _) in blocks.iter().filter(|(.., knowledge)| *knowledge != Knowledge::Around) {
+            range.clone().for_each(|k| information.column_mut(k).fill(0.0));
+        }
+        let mut coupled = Vec::new();
+        for (i, (_, rows, _)) in blocks.iter().enumerate() {
+            for (j, (_, columns, _)) in blocks.iter().enumerate() {
+                let shared = information.view((rows.start, columns.start), (rows.len(), columns.len()));
+                if shared.iter().any(|x| *x != 0.0) {
+                    coupled.push((i, j));
+                }
+            }
+        }
+        Ok(Self { guess, blocks, covariance, information, root: cholesky.l(), coupled })
+    }
+
+    /// The state to start from. Blocks that may be anywhere mean nothing in it.
+    pub fn guess(&self) -> &State {
+        &self.guess
+    }
+
+    /// P₀, with the variance of a draw for blocks that may be anywhere.
+    pub fn covariance(&self) -> &DMatrix<f64> {
+        &self.covariance
+    }
+
+    /// Whether any block may be anywhere.
+    pub fn is_vague(&self) -> bool {
+        self.blocks.iter().any(|(.., knowledge)| *knowledge != Knowledge::Around)
+    }
+
+    /// The points that axes are pinned to: every line is written with its point nearest to these.
+    pub fn pins(&self) -> State {
+        let mut pins = self.guess.clone();
+        for (block, _, knowledge) in &self.blocks {
+            if let (Block::Axis(joint), Knowledge::Anywhere(_)) = (block, knowledge)
+                && let Joint::Revolute(line) = &mut pins.joints[*joint]
+            {
+                line.point = Point3::origin();
+            }
+        }
+        pins
+    }
+
+    /// The cost of `state`, whose axes are written with their points nearest to the [pins](Self::pins). Its derivatives
+    /// in the chart at `state` are added to `normal`, if wanted: the descent exactly, the information by Gauss and Newton.
+    pub fn cost(&self, state: &State, mut normal: Option<Normal<'_>>) -> f64 {
+        let mut cost = 0.0;
+        let mut displaced = Vec::with_capacity(self.blocks.len());
+        for (block, range, knowledge) in &self.blocks {
+            let element = block.of(state);
+            match knowledge {
+                Knowledge::Around => displaced.push(block.of(&self.guess).displacement(&element)),
+                Knowledge::Anywhere(bound) => {
+                    cost += anywhere_cost(&element, range, *bound, normal.as_mut().map(|(i, d)| (&mut **i, &mut **d)));
+                    displaced.push(None);
+                }
+            }
+        }
+        for &(i, j) in &self.coupled {
+            let (Some(a), Some(b)) = (&displaced[i], &displaced[j]) else { return f64::INFINITY };
+            let (rows, columns) = (&self.blocks[i].1, &self.blocks[j].1);
+            let shared = self.information.view((rows.start, columns.start), (rows.len(), columns.len()));
+            let pull = shared * &b.value;
+            cost += 0.5 * a.value.dot(&pull);
+            if let Some((information, descent)) = &mut normal {
+                let mut place = information.view_mut((rows.start, columns.start), (rows.len(), columns.len()));
+                place += a.slope.transpose() * shared * &b.slope;
+                let mut place = descent.rows_mut(rows.start, rows.len());
+                place -= a.derivative.transpose() * pull;
+            }
+        }
+        cost
+    }
+
+    /// A state drawn from the prior.
+    pub fn draw(&self, layout: &Layout, rng: &mut impl Rng) -> State {
+        let standard = DVector::from_fn(layout.dimension(), |_, _| rng.sample::<f64, _>(StandardNormal));
+        let mut drawn = self.guess.retract(layout, &(&self.root * standard));
+        for (block, _, knowledge) in &self.blocks {
+            if let Knowledge::Anywhere(bound) = knowledge {
+                let element = anywhere(&block.of(&self.guess), *bound, rng);
+                block.put(&mut drawn, element);
+            }
+        }
+        drawn
+    }
+}
+
+fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
+    (0..matrix.ncols()).all(|column| (0..matrix.nrows()).all(|row| row == column || matrix[(row, column)] == 0.0))
+}
+
+/// The cost of a block that may be anywhere, and its derivatives.
+fn anywhere_cost(element: &Element, range: &Range<usize>, bound: f64, normal: Option<Normal<'_>>) -> f64 {
+    let information = 3.0 / (bound * bound);
+    // (coordinate, offset from the origin, how the angle after next carries it along)
+    let (offsets, lever, angles): (Vec<f64>, f64, Range<usize>) = match element {
+        Element::Axis(Joint::Revolute(line)) => {
+            let offset = line.point.coords;
+            let across = chart::basis(&line.direction).transpose() * offset;
+            (across.as_slice().to_vec(), -line.direction.dot(&offset), range.start + 2..range.end)
+        }
+        Element::Axis(Joint::Prismatic(_)) => (Vec::new(), 0.0, range.clone()),
+        Element::Point(point) => (point.coords.as_slice().to_vec(), 0.0, range.end..range.end),
+        Element::Pose(pose) => (pose.translation.vector.as_slice().to_vec(), 0.0, range.start + 3..range.end),
+        Element::Numbers(_) => (Vec::new(), 0.0, range.end..range.end),
+    };
+    if let Some((matrix, vector)) = normal {
+        for (k, offset) in offsets.iter().enumerate() {
+            let row = range.start + k;
+            matrix[(row, row)] += information;
+            vector[row] -= information * offset;
+            // Turning a line about its pivot carries it past the origin.
+            if lever != 0.0 {
+                let column = row + 2;
+                matrix[(row, column)] += information * lever;
+                matrix[(column, row)] += information * lever;
+                matrix[(column, column)] += information * lever * lever;
+                vector[column] -= information * lever * offset;
+            }
+        }
+        let uniform = if matches!(element, Element::Pose(_)) { UNIFORM_ROTATION } else { UNIFORM_DIRECTION };
+        angles.for_each(|k| matrix[(k, k)] += uniform.recip());
+    }
+    0.5 * information * offsets.iter().map(|offset| offset * offset).sum::<f64>()
+}
+
+/// An element of the same kind, its directions and rotations uniform, its points uniform within ±`bound` (metres).
+pub fn anywhere(element: &Element, bound: f64, rng: &mut impl Rng) -> Element {
+    match element {
+        Element::Axis(Joint::Revolute(_)) => {
+            let direction = uniform_direction(rng);
+            Element::Axis(Joint::Revolute(Line { point: uniform_point(bound, rng), direction }))
+        }
+        Element::Axis(Joint::Prismatic(_)) => Element::Axis(Joint::Prismatic(uniform_direction(rng))),
+        Element::Point(_) => Element::Point(uniform_point(bound, rng)),
+        Element::Pose(_) => {
+            let translation = Translation3::from(uniform_point(bound, rng).coords);
+            let numbers = nalgebra::Vector4::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
+            let rotation = UnitQuaternion::from_quaternion(Quaternion::from_vector(numbers));
+            Element::Pose(Isometry3::from_parts(translation, rotation))
+        }
+        Element::Numbers(numbers) => Element::Numbers(numbers.clone()),
+    }
+}
+
+fn uniform_direction(rng: &mut impl Rng) -> UnitVector3<f64> {
+    // Archimedes: the height of a uniform direction is uniform.
+    let height: f64 = rng.random_range(-1.0..=1.0);
+    let turn: f64 = rng.random_range(0.0..std::f64::consts::TAU);
+    let radius = (1.0 - height * height).max(0.0).sqrt();
+    UnitVector3::new_normalize(Vector3::new(radius * turn.cos(), radius * turn.sin(), height))
+}
+
+fn uniform_point(bound: f64, rng: &mut impl Rng) -> Point3<f64> {
+    Point3::from(Vector3::from_fn(|_, _| bound * rng.random_range(-1.0..=1.0)))
+}

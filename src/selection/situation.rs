@@ -1,0 +1,69 @@
+//! What a choice rests on.
+
+use std::collections::VecDeque;
+
+use super::{Actions, Movement, visibility::MEMORY};
+use crate::{estimation::Belief, sensing::Observation};
+
+/// Everything that a policy chooses from. A policy remembers nothing itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Situation<'a> {
+    /// What is believed, given also what pending proposals are expected to teach.
+    pub belief: &'a Belief,
+    /// What may be done.
+    pub actions: &'a Actions,
+    /// What was done.
+    pub history: &'a History,
+}
+
+/// What policies go by of all that happened: made of the list of events, and nothing else.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct History {
+    has_moved: bool,
+    misses: VecDeque<Vec<f64>>,
+    plan: Option<Planned>,
+}
+
+/// Movements that were planned with a proposal and come after it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Planned {
+    /// Joint positions, rad or m.
+    pub poses: Vec<Vec<f64>>,
+    /// How many of them are to be made before the next plan.
+    pub committed: usize,
+}
+
+impl History {
+    /// A movement was proposed, with this plan if there is one.
+    pub fn proposed(&mut self, plan: Option<&Planned>) {
+        if let Some(plan) = plan {
+            self.plan = Some(plan.clone());
+        }
+    }
+
+    /// A movement was made.
+    pub fn moved(&mut self, movement: &Movement, actions: &Actions, observation: &Observation) {
+        self.has_moved = true;
+        if let (Actions::Box(limits), true) = (actions, observation.is_miss()) {
+            self.misses.push_back(limits.to_unit(&movement.configuration));
+            if self.misses.len() > MEMORY {
+                self.misses.pop_front();
+            }
+        }
+    }
+
+    /// Whether any movement was made.
+    pub fn has_moved(&self) -> bool {
+        self.has_moved
+    }
+
+    /// The latest movements after which nothing was seen, scaled to the unit cube of the joint box.
+    pub fn misses(&self) -> &VecDeque<Vec<f64>> {
+        &self.misses
+    }
+
+    /// The plan of the latest proposal.
+    pub fn plan(&self) -> Option<&Planned> {
+        self.plan.as_ref()
+    }
+}

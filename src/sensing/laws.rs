@@ -1,0 +1,110 @@
+//! What every channel in the list must keep.
+
+use nalgebra::DVector;
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use super::{CHANNELS, Rig, examples};
+use crate::model::{
+    Layout, Pass,
+    laws::{all_blocks, random_state},
+};
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Whitened rows are the derivative of the whitened prediction, in every block of the model; both ways of predicting
+    /// agree.
+    #[test]
+    fn rows_equal_central_differences(seed: u64, joints in 1_usize..=12) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let state = random_state(&mut rng, joints);
+        let layout = Layout::new(&state, all_blocks(&state));
+        let m = layout.dimension();
+        let positions: Vec<f64> = (0..joints).map(|_| rng.random_range(-2.0..2.0)).collect();
+        for channel in examples(&mut rng, &state) {
+            let d = channel.equations();
+            let (mut reading, mut rows) = (vec![0.0; d], vec![0.0; d * m]);
+            let mut pass = Pass::new(&state, &layout);
+            let seen = channel.rows(pass.at(&positions), &mut reading, &mut rows);
+            let mut predicted = vec![0.0; d];
+            prop_assert_eq!(channel.predict(&state, &positions, &mut predicted), seen);
+            if !seen {
+                prop_assert!(rows.iter().all(|row| *row == 0.0));
+                continue;
+            }
+            let mut difference = vec![0.0; d];
+            channel.difference(&reading, &predicted, &mut difference);
+            prop_assert!(difference.iter().all(|x| x.abs() < 1e-8 / channel.sigma()));
+            let scale = rows.iter().fold(1.0 / channel.sigma(), |scale: f64, row| scale.max(row.abs()));
+            for k in 0..m {
+                let step = 1e-6;
+                let moved = |sign: f64| {
+                    let mut delta = DVector::zeros(m);
+                    delta[k] = sign * step;
+                    let mut reading = vec![0.0; d];
+                    channel.predict(&state.retract(&layout, &delta), &positions, &mut reading);
+                    reading
+                };
+                let mut slope = vec![0.0; d];
+                channel.difference(&moved(1.0), &moved(-1.0), &mut slope);
+                for (row, slope) in slope.iter().enumerate() {
+                    let (found, wanted) = (rows[row * m + k], slope / (2.0 * step));
+                    prop_assert!((found - wanted).abs() < 1e-5 * scale, "{channel:?} row {row} column {k}: {found} {wanted}");
+                }
+            }
+        }
+    }
+
+    /// Noise put on a reading and taken off again is standard normal once whitened.
+    #[test]
+    fn whitening_undoes_the_noise(seed: u64) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let state = random_state(&mut rng, 4);
+        let positions: Vec<f64> = (0..4).map(|_| rng.random_range(-2.0..2.0)).collect();
+        for channel in examples(&mut rng, &state) {
+            let d = channel.equations();
+            let mut reading = vec![0.0; d];
+            if !channel.predict(&state, &positions, &mut reading) {
+                continue;
+            }
+            let v: Vec<f64> = (0..d).map(|_| rng.sample(StandardNormal)).collect();
+            let mut measured = reading.clone();
+            channel.disturb(&mut measured, &v);
+            let mut whitened = vec![0.0; d];
+            channel.difference(&measured, &reading, &mut whitened);
+            prop_assert!(whitened.iter().zip(&v).all(|(found, v)| (found - v).abs() < 1e-6), "{channel:?}");
+            let doubled = channel.with_sigma(channel.sigma() * 2.0);
+            let mut halved = vec![0.0; d];
+            doubled.difference(&measured, &reading, &mut halved);
+            prop_assert!(halved.iter().zip(&v).all(|(found, v)| (2.0 * found - v).abs() < 1e-6));
+        }
+    }
+}
+
+/// A rig stacks its channels; a reading that is missing leaves its equations out.
+#[test]
+fn a_rig_stacks_its_channels() {
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let state = random_state(&mut rng, 5);
+    let layout = Layout::new(&state, all_blocks(&state));
+    let mut channels = examples(&mut rng, &state);
+    channels.extend(examples(&mut rng, &state));
+    let rig = Rig::new(channels);
+    let positions = [0.3, -0.2, 0.9, 1.1, -0.4];
+    let v: Vec<f64> = (0..rig.equations()).map(|_| rng.sample(StandardNormal)).collect();
+    let mut observation = rig.observe(&state, &positions, &v);
+    let equations = rig.equations_of(&state, &layout, &positions, &observation);
+    assert_eq!(equations.rows.shape(), (layout.dimension(), rig.equations()));
+    assert!(equations.residual.iter().zip(&v).all(|(found, v)| (found - v).abs() < 1e-6));
+    let squared: f64 = v.iter().map(|v| v * v).sum();
+    assert!((rig.squared_error(&state, &positions, &observation) - squared).abs() < 1e-6 * squared);
+    observation.readings[0] = None;
+    let fewer = rig.equations_of(&state, &layout, &positions, &observation);
+    let missing = rig.channels()[0].equations();
+    assert_eq!(fewer.residual.len(), rig.equations() - missing);
+    assert_eq!(fewer.rows, equations.rows.columns(missing, rig.equations() - missing));
+    assert_eq!(CHANNELS.len() * 2, rig.channels().len());
+}

@@ -1,0 +1,116 @@
+//! What came of a movement.
+
+use nalgebra::Point3;
+
+use super::Rig;
+
+/// The readings of one movement, one entry per channel of its [`Rig`]; `None` where the channel had none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Observation {
+    /// In the order of the rig's channels, each in its channel's own units.
+    pub readings: Vec<Option<Vec<f64>>>,
+}
+
+/// Why an observation was refused. Nothing was changed by it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Refused {
+    /// Not as many positions as joints.
+    #[error("{found} joint positions were given; this robot has {wanted} joints")]
+    Joints {
+        /// Positions given.
+        found: usize,
+        /// Joints.
+        wanted: usize,
+    },
+    /// A joint position that is no finite number.
+    #[error("the position of joint {joint} (counted from 0) is {value}, not a finite number")]
+    Position {
+        /// The joint.
+        joint: usize,
+        /// What was given.
+        value: f64,
+    },
+    /// Not as many readings as channels.
+    #[error("{found} readings were given; there are {wanted} channels (write none where a channel saw nothing)")]
+    Channels {
+        /// Readings given.
+        found: usize,
+        /// Channels.
+        wanted: usize,
+    },
+    /// A reading of the wrong length.
+    #[error("the reading of channel {channel} (counted from 0) has {found} numbers instead of {wanted}")]
+    Length {
+        /// The channel.
+        channel: usize,
+        /// Numbers given.
+        found: usize,
+        /// Numbers of its readings.
+        wanted: usize,
+    },
+    /// A reading that is no finite number.
+    #[error("the reading of channel {channel} (counted from 0) is {value}, not a finite number")]
+    Reading {
+        /// The channel.
+        channel: usize,
+        /// What was given.
+        value: f64,
+    },
+}
+
+impl Observation {
+    /// A reading of the only channel.
+    pub fn of(reading: impl Into<Vec<f64>>) -> Self {
+        Self { readings: vec![Some(reading.into())] }
+    }
+
+    /// A position of the marker seen by the only channel, metres.
+    pub fn seen(position: Point3<f64>) -> Self {
+        Self::of(position.coords.as_slice())
+    }
+
+    /// No reading of any of so many channels. The movement counts all the same.
+    pub fn missed(channels: usize) -> Self {
+        Self { readings: vec![None; channels] }
+    }
+
+    /// Whether no channel had a reading.
+    pub fn is_miss(&self) -> bool {
+        self.readings.iter().all(Option::is_none)
+    }
+
+    /// Equations that it brings.
+    pub fn equations(&self) -> usize {
+        self.readings.iter().flatten().map(Vec::len).sum()
+    }
+
+    /// The measured position of the marker, where a channel of `rig` measured it, metres.
+    pub fn marker(&self, rig: &Rig) -> Option<Point3<f64>> {
+        let reading = self.readings.get(rig.marker_channel()?)?.as_ref()?;
+        Some(Point3::new(*reading.first()?, *reading.get(1)?, *reading.get(2)?))
+    }
+
+    /// Whether it can be an observation of `rig` after a movement of so many `joints` to `positions`.
+    pub fn check(&self, rig: &Rig, joints: usize, positions: &[f64]) -> Result<(), Refused> {
+        if positions.len() != joints {
+            return Err(Refused::Joints { found: positions.len(), wanted: joints });
+        }
+        if let Some((joint, value)) = positions.iter().enumerate().find(|(_, value)| !value.is_finite()) {
+            return Err(Refused::Position { joint, value: *value });
+        }
+        let wanted = rig.channels().len();
+        if self.readings.len() != wanted {
+            return Err(Refused::Channels { found: self.readings.len(), wanted });
+        }
+        for (channel, (sensor, reading)) in rig.channels().iter().zip(&self.readings).enumerate() {
+            let Some(reading) = reading else { continue };
+            if reading.len() != sensor.equations() {
+                return Err(Refused::Length { channel, found: reading.len(), wanted: sensor.equations() });
+            }
+            if let Some(value) = reading.iter().find(|value| !value.is_finite()) {
+                return Err(Refused::Reading { channel, value: *value });
+            }
+        }
+        Ok(())
+    }
+}

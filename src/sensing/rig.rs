@@ -1,0 +1,227 @@
+//! The channels of a robot together.
+
+use std::{ops::Range, sync::Arc};
+
+use nalgebra::{DMatrix, DVector, Matrix3};
+
+use super::{Channel, Observation, Position};
+use crate::model::{Layout, Pass, State};
+
+/// All channels through which a robot is observed. What it hands out is whitened: R = I.
+#[derive(Clone, Debug)]
+pub struct Rig {
+    channels: Vec<Arc<dyn Channel>>,
+    /// Where each channel's equations stand among all.
+    places: Vec<Range<usize>>,
+    marker: Option<usize>,
+}
+
+/// What an observation says of a state: `residual ≈ H δ + v`, `v ~ N(0, I)`.
+#[derive(Clone, Debug)]
+pub struct Equations {
+    /// Hᵀ (m × d), whitened; d equations, those of the readings that there were.
+    pub rows: DMatrix<f64>,
+    /// L⁻¹ (y ⊖ h), d numbers.
+    pub residual: DVector<f64>,
+}
+
+impl Rig {
+    /// Of these channels.
+    pub fn new(channels: Vec<Arc<dyn Channel>>) -> Self {
+        let mut places = Vec::with_capacity(channels.len());
+        let mut start = 0;
+        for channel in &channels {
+            places.push(start..start + channel.equations());
+            start += channel.equations();
+        }
+        let marker = channels.iter().position(|channel| channel.target() == Some(0));
+        Self { channels, places, marker }
+    }
+
+    /// A tracker of the marker alone, with so much noise per coordinate (metres).
+    pub fn tracker(sigma_m: f64) -> Self {
+        Self::new(vec![Arc::new(Position::of_marker(sigma_m))])
+    }
+
+    /// The channels in order.
+    pub fn channels(&self) -> &[Arc<dyn Channel>] {
+        &self.channels
+    }
+
+    /// Equations of a movement of which nothing is missed, d.
+    pub fn equations(&self) -> usize {
+        self.places.last().map_or(0, |place| place.end)
+    }
+
+    /// The channel that measures the marker's position.
+    pub fn marker_channel(&self) -> Option<usize> {
+        self.marker
+    }
+
+    /// σ of the channel that measures the marker's position, metres; not a number if there is none.
+    pub fn marker_sigma(&self) -> f64 {
+        self.marker.map_or(f64::NAN, |channel| self.channels[channel].sigma())
+    }
+
+    /// σ of the first channel, in its own unit.
+    pub fn sigma(&self) -> f64 {
+        self.channels.first().map_or(0.0, |channel| channel.sigma())
+    }
+
+    /// The same channels with σ of the first as `sigma`, and those of the others changed in proportion.
+    pub fn assuming(&self, sigma: f64) -> Self {
+        let factor = sigma / self.sigma();
+        let scaled = self.channels.iter().enumerate().map(|(index, channel)| {
+            // Not by the factor: σ is to be `sigma` to the last bit, also where it was 0.
+            channel.with_sigma(if index == 0 { sigma } else { channel.sigma() * factor })
+        });
+        Self::new(scaled.collect())
+    }
+
+    /// H P Hᵀ of the marker's position (m²), of the whitened spread of all equations; `None` if no channel measures it.
+    pub fn marker_spread(&self, spread: impl Fn(usize, usize) -> f64) -> Option<Matrix3<f64>> {
+        let channel = self.marker?;
+        let (start, variance) = (self.places[channel].start, self.channels[channel].sigma().powi(2));
+        Some(Matrix3::from_fn(|row, column| spread(start + row, start + column) * variance))
+    }
+
+    /// Where the marker's predicted position stands among all predicted readings.
+    pub fn marker_place(&self) -> Option<Range<usize>> {
+        Some(self.places[self.marker?].clone())
+    }
+
+    /// All predicted readings at one posture (d numbers; NaN where there is none) and their whitened rows, transposed:
+    /// d columns of m numbers in `rows`, which are all zero at first.
+    #[inline]
+    pub fn rows(&self, pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
+        let m = rows.len() / readings.len().max(1);
+        for (channel, place) in self.channels.iter().zip(&self.places) {
+            let reading = &mut readings[place.clone()];
+            if !channel.rows(pass, reading, &mut rows[place.start * m..place.end * m]) {
+                reading.fill(f64::NAN);
+            }
+        }
+    }
+
+    /// Hᵀ, whitened, of a movement of which nothing is missed (m × d); zero where a channel has no prediction.
+    pub fn jacobian(&self, state: &State, layout: &Layout, positions: &[f64]) -> DMatrix<f64> {
+        let mut pass = Pass::new(state, layout);
+        let mut rows = DMatrix::zeros(layout.dimension(), self.equations());
+        self.rows(pass.at(positions), &mut vec![0.0; self.equations()], rows.as_mut_slice());
+        rows
+    }
+
+    /// L⁻¹ (y ⊖ h) of all equations; 0 where either has no reading.
+    pub fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
+        for (channel, place) in self.channels.iter().zip(&self.places) {
+            let (y, h, whitened) = (&y[place.clone()], &h[place.clone()], &mut whitened[place.clone()]);
+            if y.iter().chain(h).any(|x| x.is_nan()) {
+                whitened.fill(0.0);
+            } else {
+                channel.difference(y, h, whitened);
+            }
+        }
+    }
+
+    /// What an observation says of the state, linearised there. A reading without a prediction says nothing.
+    pub fn equations_of(
+        &self,
+        state: &State,
+        layout: &Layout,
+        positions: &[f64],
+        observation: &Observation,
+    ) -> Equations {
+        let mut pass = Pass::new(state, layout);
+        pass.at(positions);
+        let mut rows = DMatrix::zeros(layout.dimension(), observation.equations());
+        let mut residual = DVector::zeros(observation.equations());
+        let found = self.linearise(&pass, observation, rows.as_mut_slice(), residual.as_mut_slice());
+        if found == residual.len() {
+            return Equations { rows, residual };
+        }
+        Equations { rows: rows.columns(0, found).into_owned(), residual: residual.rows(0, found).into_owned() }
+    }
+
+    /// Writes Hᵀ (columns of m numbers, all zero at first) and the residual of an observation where `pass` stands, and
+    /// returns how many equations those are: a reading without a prediction says nothing.
+    pub fn linearise(
+        &self,
+        pass: &Pass<'_>,
+        observation: &Observation,
+        rows: &mut [f64],
+        residual: &mut [f64],
+    ) -> usize {
+        let m = pass.layout().dimension();
+        let mut scratch = Scratch::default();
+        let mut at = 0;
+        for (channel, reading) in self.channels.iter().zip(&observation.readings) {
+            let Some(reading) = reading else { continue };
+            let end = at + reading.len();
+            let predicted = scratch.take(reading.len());
+            if channel.rows(pass, predicted, &mut rows[at * m..end * m]) {
+                channel.difference(reading, predicted, &mut residual[at..end]);
+                at = end;
+            }
+        }
+        at
+    }
+
+    /// L⁻¹ (y ⊖ h) of an observation, of those readings that have a prediction.
+    pub fn residual(&self, state: &State, positions: &[f64], observation: &Observation) -> DVector<f64> {
+        let mut residual = Vec::with_capacity(observation.equations());
+        for (channel, reading) in self.channels.iter().zip(&observation.readings) {
+            let Some(reading) = reading else { continue };
+            let mut predicted = vec![0.0; reading.len()];
+            if channel.predict(state, positions, &mut predicted) {
+                let start = residual.len();
+                residual.resize(start + reading.len(), 0.0);
+                channel.difference(reading, &predicted, &mut residual[start..]);
+            }
+        }
+        DVector::from_vec(residual)
+    }
+
+    /// ‖L⁻¹ (y ⊖ h)‖² of an observation.
+    pub fn squared_error(&self, state: &State, positions: &[f64], observation: &Observation) -> f64 {
+        let (mut sum, mut predicted, mut whitened) = (0.0, Scratch::default(), Scratch::default());
+        for (channel, reading) in self.channels.iter().zip(&observation.readings) {
+            let Some(reading) = reading else { continue };
+            let (predicted, whitened) = (predicted.take(reading.len()), whitened.take(reading.len()));
+            if channel.predict(state, positions, predicted) {
+                channel.difference(reading, predicted, whitened);
+                sum += whitened.iter().map(|x| x * x).sum::<f64>();
+            }
+        }
+        sum
+    }
+
+    /// What is observed of a robot that is as `state` says: its readings at `positions`, with `v` (d standard normal
+    /// numbers) as noise.
+    pub fn observe(&self, state: &State, positions: &[f64], v: &[f64]) -> Observation {
+        let reading = |(channel, place): (&Arc<dyn Channel>, &Range<usize>)| {
+            let mut reading = vec![0.0; channel.equations()];
+            channel.predict(state, positions, &mut reading).then(|| {
+                channel.disturb(&mut reading, &v[place.clone()]);
+                reading
+            })
+        };
+        Observation { readings: self.channels.iter().zip(&self.places).map(reading).collect() }
+    }
+}
+
+/// Room for the numbers of one reading, on the stack where they are few.
+#[derive(Default)]
+struct Scratch {
+    few: [f64; 12],
+    many: Vec<f64>,
+}
+
+impl Scratch {
+    fn take(&mut self, count: usize) -> &mut [f64] {
+        if count <= self.few.len() {
+            return &mut self.few[..count];
+        }
+        self.many.resize(count, 0.0);
+        &mut self.many
+    }
+}
