@@ -12,6 +12,7 @@
 //! * [`Joint`], [`Line`]: one twist, revolute or prismatic, and its exponential.
 //! * [`Chain`]: forward kinematics.
 //! * [`TangentLayout`]: which parameters are learned and where each stands in the tangent vector.
+//! * [`JointBox`]: the limits of the joints, and the unit cube that stands for them.
 //! * [`chart`]: minimal coordinates of lines and directions (retraction, local coordinates, change of chart).
 //! * [`jacobian`]: the analytic derivative of the marker in those coordinates.
 //! * [`registration`]: a chain carried into the frame of measurements by a rigid fit.
@@ -20,11 +21,13 @@ mod chain;
 pub mod chart;
 pub mod jacobian;
 mod joint;
+mod joint_box;
 mod layout;
 pub mod registration;
 
 pub use chain::Chain;
 pub use joint::{Joint, JointKind, Line};
+pub use joint_box::{JointBox, JointBoxError};
 pub use layout::{Quantity, TangentLayout};
 
 #[cfg(test)]
