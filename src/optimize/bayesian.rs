@@ -22,7 +22,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::Minimum;
+use super::minimum::Minimum;
 
 /// Candidates among which the next point is chosen.
 const CANDIDATES: usize = 200;

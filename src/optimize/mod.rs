@@ -6,8 +6,8 @@
 //!
 //! # Algorithm
 //!
-//! The cube [0, 1]ⁿ is divided into rectangles (boxes, for n > 2), each evaluated at its centre c. Every side has a
-//! trisection level l and is 3⁻ˡ long. An iteration
+//! The cube [0, 1]ⁿ is divided into hyperrectangles, here called rectangles, each evaluated at its centre c. Every side
+//! has a trisection level l and is 3⁻ˡ long. An iteration
 //!
 //! 1. **chooses** the potentially optimal rectangles j of size dⱼ and value fⱼ, those for which some rate K > 0 has
 //!
@@ -97,12 +97,14 @@
 
 mod bayesian;
 mod direct;
+mod minimum;
 mod polish;
 
 pub use bayesian::bayesian;
+pub use minimum::Minimum;
 pub use polish::{Polish, polish};
 
 pub use direct::{
-    Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Minimum, Moment, Partition, Rectangle, Settings, Shape,
-    Variant, minimize,
+    Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Moment, Partition, Rectangle, Settings, Shape, Variant,
+    minimize,
 };

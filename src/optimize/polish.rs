@@ -130,7 +130,7 @@ mod tests {
         /// A convex quadratic over the cube: at the result the gradient points outwards wherever a bound is met, and
         /// vanishes elsewhere.
         #[test]
-        fn ends_at_a_stationary_point_of_the_box(
+        fn ends_at_a_stationary_point_of_the_cube(
             centre in prop::collection::vec(-0.5..1.5_f64, 4),
             start in prop::collection::vec(0.0..1.0_f64, 4),
         ) {

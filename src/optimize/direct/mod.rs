@@ -1,5 +1,6 @@
 //! DIRECT and DIRECT-l; the parent module documents the algorithms.
 
+mod batch;
 mod classes;
 mod history;
 mod hull;
@@ -10,9 +11,10 @@ mod search;
 mod settings;
 mod ternary;
 
+pub use batch::Batch;
 pub use history::{History, Moment, Shape};
 pub use hull::HullPoint;
-pub use minimize::{Batch, Minimum, minimize};
+pub use minimize::minimize;
 pub use partition::{Partition, Rectangle};
 pub use search::Direct;
 pub use settings::{DirectError, Settings, Variant};

@@ -1,9 +1,9 @@
 //! The search itself: ask, tell, divide, choose.
 
+use super::batch::Batch;
 use super::classes::SizeClasses;
 use super::hull::{HullPoint, lower_right_hull};
 use super::lineage::{Lineage, surrogate};
-use super::minimize::Batch;
 use super::partition::{Partition, Rectangles};
 use super::settings::{DirectError, Settings, Variant};
 
