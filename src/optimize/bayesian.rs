@@ -22,7 +22,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::minimum::Minimum;
+use super::{Minimum, least};
 
 /// Candidates among which the next point is chosen.
 const CANDIDATES: usize = 200;
@@ -54,8 +54,8 @@ pub fn bayesian(dimension: usize, evaluations: usize, seed: u64, mut f: impl FnM
             values.push(value);
         }
     }
-    let best = (0..values.len()).min_by(|&a, &b| values[a].total_cmp(&values[b]))?;
-    Some(Minimum { point: points[best].as_slice().to_vec(), value: values[best], evaluations })
+    let (best, value) = least(points.iter().zip(values))?;
+    Some(Minimum { point: best.as_slice().to_vec(), value, evaluations })
 }
 
 /// A Gaussian process conditioned on the values seen.
@@ -74,10 +74,11 @@ struct Process<'a> {
 impl<'a> Process<'a> {
     fn fit(points: &'a [DVector<f64>], values: &[f64], length: f64) -> Option<Self> {
         let count = values.len();
-        let best = (0..count).min_by(|&a, &b| values[a].total_cmp(&values[b]))?;
+        let (best, best_value) = least(values.iter().copied().enumerate())?;
         let mean = values.iter().sum::<f64>() / count as f64;
         let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count as f64;
-        if variance <= 0.0 {
+        // Values all alike have no length, and those too large to be squared no variance.
+        if !(variance > 0.0 && variance.is_finite()) {
             return None;
         }
         let kernel = DMatrix::from_fn(count, count, |i, j| {
@@ -89,17 +90,7 @@ impl<'a> Process<'a> {
         let log_determinant: f64 = cholesky.l_dirty().diagonal().iter().map(|l| l.ln()).sum();
         let log_likelihood = -0.5 * standard.dot(&weights) - log_determinant;
         let inverse_root = cholesky.l().solve_lower_triangular(&DMatrix::identity(count, count))?;
-        Some(Self {
-            points,
-            length,
-            mean,
-            variance,
-            inverse_root,
-            weights,
-            best,
-            best_value: values[best],
-            log_likelihood,
-        })
+        Some(Self { points, length, mean, variance, inverse_root, weights, best, best_value, log_likelihood })
     }
 
     fn expected_improvement(&self, x: &DVector<f64>) -> f64 {
@@ -142,12 +133,8 @@ fn distance(a: &DVector<f64>, b: &DVector<f64>) -> f64 {
 }
 
 fn likeliest_length(points: &[DVector<f64>], values: &[f64]) -> Option<f64> {
-    let likelihood = |length: &f64| Process::fit(points, values, *length).map(|process| process.log_likelihood);
-    LENGTHS
-        .iter()
-        .filter_map(|length| Some((likelihood(length)?, *length)))
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, length)| length)
+    let cost = |length| Process::fit(points, values, length).map(|process| -process.log_likelihood);
+    least(LENGTHS.into_iter().filter_map(|length| Some((length, cost(length)?)))).map(|(length, _)| length)
 }
 
 fn uniform(dimension: usize, rng: &mut ChaCha8Rng) -> DVector<f64> {
@@ -194,6 +181,18 @@ mod tests {
         for (z, expected) in [(0.0, 0.5), (1.0, 0.841_344_7), (-1.96, 0.024_997_9), (3.0, 0.998_650_1)] {
             assert!((normal_distribution(z) - expected).abs() < 1e-6);
         }
+    }
+
+    /// Their variance is infinite, which makes the likelihood of every length NaN, and NaN sorts above all numbers.
+    #[test]
+    fn values_too_large_to_be_squared_are_not_modelled() {
+        let points: Vec<DVector<f64>> = [0.1, 0.4, 0.8].map(|x| DVector::from_element(1, x)).to_vec();
+        for values in [[1e200, -1e200, 3e200], [1e308, 1.5e308, 1.7e308]] {
+            assert_eq!(likeliest_length(&points, &values), None);
+            assert!(Process::fit(&points, &values, 0.3).is_none());
+        }
+        let found = bayesian(2, 60, 1, |x| 1e200 * branin(x)).expect("finite values");
+        assert!(found.value.is_finite() && found.evaluations == 60);
     }
 
     #[test]

@@ -102,6 +102,7 @@ mod polish;
 
 pub use bayesian::bayesian;
 pub use minimum::Minimum;
+pub(crate) use minimum::least;
 pub use polish::{Polish, polish};
 
 pub use direct::{

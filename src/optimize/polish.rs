@@ -13,6 +13,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::least;
+
 /// How far a polish goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Polish {
@@ -50,10 +52,12 @@ pub fn polish(start: &[f64], settings: Polish, mut evaluate: impl FnMut(&[Vec<f6
         let pressed = |k: usize| (x[k] <= 0.0 && gradient[k] >= 0.0) || (x[k] >= 1.0 && gradient[k] <= 0.0);
         let free = DVector::from_fn(n, |k, _| f64::from(!pressed(k)));
         let restricted = gradient.component_mul(&free);
-        if restricted.amax() == 0.0 {
+        let steepness = restricted.amax();
+        // Where finite values differ by more than the greatest number, no direction can be computed.
+        if steepness == 0.0 || !steepness.is_finite() {
             break;
         }
-        let steepest = &restricted * (-FIRST_STEP / restricted.amax());
+        let steepest = &restricted * (-FIRST_STEP / steepness);
         let newton = inverse_hessian.as_ref().map(|b| -(b * &restricted).component_mul(&free));
         let is_descent = |d: &DVector<f64>| d.dot(&restricted) < 0.0 && d.iter().all(|d| d.is_finite());
         let is_newton = newton.as_ref().is_some_and(is_descent);
@@ -63,8 +67,7 @@ pub fn polish(start: &[f64], settings: Polish, mut evaluate: impl FnMut(&[Vec<f6
             .map(|t| x.iter().zip(&direction).map(|(x, d)| (x + t * d).clamp(0.0, 1.0)).collect())
             .collect();
         let values = evaluate(&trials);
-        let best = trials.into_iter().zip(values).filter(|(_, v)| v.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1));
-        match best {
+        match least(trials.into_iter().zip(values)) {
             Some((trial, lower)) if lower < value => {
                 let gained = value - lower;
                 (x, value) = (trial, lower);
@@ -157,6 +160,17 @@ mod tests {
     fn reaches_a_corner_that_direct_cannot() {
         let f = |points: &[Vec<f64>]| points.iter().map(|x| x.iter().sum::<f64>()).collect::<Vec<f64>>();
         assert_eq!(polish(&[0.5, 0.3, 0.9], SETTINGS, f), (vec![0.0; 3], 0.0));
+    }
+
+    #[test]
+    fn a_cliff_too_steep_for_a_gradient_sends_nobody_to_nowhere() {
+        let mut asked = Vec::new();
+        let cliff = |points: &[Vec<f64>]| {
+            asked.extend(points.iter().flatten().copied());
+            points.iter().map(|x| if x[0] > 0.5 { 1e308 } else { -1e308 }).collect::<Vec<f64>>()
+        };
+        assert_eq!(polish(&[0.5, 0.2], SETTINGS, cliff), (vec![0.5, 0.2], -1e308));
+        assert!(asked.iter().all(|x| (0.0..=1.0).contains(x)), "{asked:?}");
     }
 
     #[test]

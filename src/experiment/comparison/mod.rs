@@ -11,7 +11,7 @@ use super::{
     BestDesign,
     metrics::{JointMetrics, Metrics},
 };
-use statistics::{median, nearest_rank};
+use statistics::{median, nearest_rank, sorted};
 
 /// Many runs of the same learners, one per seed: `compare --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -150,7 +150,7 @@ pub struct Curve {
     pub joints: Vec<JointMetrics>,
 }
 
-/// One error over the runs.
+/// One error over the runs in which it is a finite number.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
 pub struct Quantiles {
@@ -209,11 +209,7 @@ impl LearnerComparison {
         let joints = of_learner().filter_map(|(_, trace)| trace.joints.first()).map(Vec::len).min().unwrap_or(0);
         let of_joint = |movements: usize, joint: usize| {
             let metrics = || of_learner().filter_map(|(_, trace)| trace.joints.get(movements)?.get(joint));
-            let over_runs = |metric: fn(&JointMetrics) -> Option<f64>| {
-                let mut values: Vec<f64> = metrics().filter_map(metric).collect();
-                values.sort_by(f64::total_cmp);
-                median(&values)
-            };
+            let over_runs = |metric: fn(&JointMetrics) -> Option<f64>| median(&sorted(metrics().filter_map(metric)));
             JointMetrics {
                 axis_deg: over_runs(|joint| joint.axis_deg),
                 location_m: over_runs(|joint| joint.location_m),
@@ -223,8 +219,7 @@ impl LearnerComparison {
         let curve = (0..=steps)
             .map(|movements| {
                 let over_runs = |error: fn(&RunSummary) -> Option<f64>| {
-                    let values = of_learner().filter_map(|(_, trace)| error(trace.errors.get(movements as usize)?));
-                    Quantiles::of(values.collect())
+                    Quantiles::of(of_learner().filter_map(|(_, trace)| error(trace.errors.get(movements as usize)?)))
                 };
                 Curve {
                     movements,
@@ -239,8 +234,7 @@ impl LearnerComparison {
                 }
             })
             .collect();
-        let mut times: Vec<f64> = of_learner().flat_map(|(_, trace)| trace.selection_ms.iter().copied()).collect();
-        times.sort_by(f64::total_cmp);
+        let times = sorted(of_learner().flat_map(|(_, trace)| trace.selection_ms.iter().copied()));
         Self {
             name: of_learner().next().map(|(_, trace)| trace.name.clone()).unwrap_or_default(),
             summary: Summary::of(runs.iter().map(|run| run.converged_at)),

@@ -19,8 +19,9 @@ impl Summary {
 }
 
 impl Quantiles {
-    pub(super) fn of(mut values: Vec<f64>) -> Option<Self> {
-        values.sort_by(f64::total_cmp);
+    /// Of the runs whose value is finite; `None` if there is none.
+    pub(super) fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let values = sorted(values);
         Some(Self {
             mean: values.iter().sum::<f64>() / values.len() as f64,
             median: median(&values)?,
@@ -28,6 +29,14 @@ impl Quantiles {
             q75: nearest_rank(&values, 0.75)?,
         })
     }
+}
+
+/// The finite ones among values, in ascending order. An estimate that diverged may have errors that are no numbers;
+/// with their sign they would sort below or above all others.
+pub(super) fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut finite: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
+    finite.sort_by(f64::total_cmp);
+    finite
 }
 
 /// The median of sorted values.
@@ -68,5 +77,14 @@ mod tests {
         assert_eq!(nearest_rank(&values, 0.25), Some(5.0));
         assert_eq!(median(&values), Some(10.5));
         assert_eq!(Quantiles::of(vec![]), None);
+    }
+
+    #[test]
+    fn errors_that_are_no_numbers_are_left_out() {
+        let wanted = Quantiles::of(vec![1.0, 2.0, 3.0]);
+        for wrong in [f64::NAN, -f64::NAN, f64::INFINITY] {
+            assert_eq!(Quantiles::of(vec![3.0, wrong, 1.0, 2.0]), wanted);
+            assert_eq!(Quantiles::of(vec![wrong]), None);
+        }
     }
 }

@@ -174,8 +174,9 @@ impl<'a> Search<'a> {
             let seen = self.problem.seen(&self.scaled(point));
             seen.map_or(f64::NEG_INFINITY, |h| (&h * &state.sensitivity).dot(&h) / self.problem.sigma_m.powi(2))
         };
-        let mut values: Vec<(f64, usize)> =
-            self.candidates.iter().enumerate().map(|(index, point)| (phi(point), index)).collect();
+        let values = self.candidates.iter().enumerate().map(|(index, point)| (phi(point), index));
+        // Poses out of sight, and those whose sensitivity cannot be computed, favour nobody.
+        let mut values: Vec<(f64, usize)> = values.filter(|(phi, _)| phi.is_finite()).collect();
         values.sort_by(|a, b| b.0.total_cmp(&a.0));
         let settings = Polish { steps: 40, tolerance: 1e-6 };
         let polished = values.iter().take(count).map(|(_, index)| {
@@ -208,5 +209,23 @@ impl<'a> Search<'a> {
 
     fn design(self, state: &State, excess: f64) -> Design {
         Design { poses: self.poses, shares: self.shares, trace: state.trace, gap: (excess / state.trace).max(0.0) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::builtin;
+
+    use super::*;
+
+    #[test]
+    fn a_sensitivity_that_is_no_number_is_nobodys_favourite() {
+        let limits = builtin("arm-6dof").expect("built in").limits().expect("simulated");
+        let mut search = Search::new(&limits, 20, None);
+        let state = search.state().expect("informative");
+        let wanted = search.favoured(&state, POLISHED);
+        let n = limits.limits.len();
+        search.candidates.splice(0..0, [vec![f64::NAN; n], vec![-f64::NAN; n]]);
+        assert_eq!(search.favoured(&state, POLISHED), wanted);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::search::Direct;
 use super::settings::{DirectError, Settings};
-use crate::optimize::minimum::Minimum;
+use crate::optimize::Minimum;
 
 /// Minimises an objective over the unit cube until the search has ended, which is usually when the budget has.
 /// `None` if no point was feasible, that is if the objective was finite nowhere.
