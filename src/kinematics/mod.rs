@@ -21,7 +21,7 @@ mod joint_box;
 pub mod rotation;
 
 pub use joint::{Joint, JointKind, Line};
-pub use joint_box::JointBox;
+pub use joint_box::{JointBox, JointBoxError};
 
 #[cfg(test)]
 mod laws;

@@ -257,7 +257,8 @@ mod tests {
         assert!(two.sees(&at(&two, 0.0, 0.0, 0.5)));
         let gaze = two.gaze(0.2, 0.1);
         let eyes: Vec<_> = two.eyes(&gaze).collect();
-        assert!((eyes[0] - eyes[1]).norm() - 0.1 < 1e-12 && (eyes[0] - eyes[1]).dot(&gaze.direction).abs() < 1e-12);
+        let between = eyes[0] - eyes[1];
+        assert!((between.norm() - 0.1).abs() < 1e-12 && between.dot(&gaze.direction).abs() < 1e-12, "{between}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     experiment::Summary,
+    optimize::least,
     paper::{outcome::Trial, report::Agreement},
     scenario::EstimatorKind,
 };
@@ -240,7 +241,7 @@ fn accuracy_limit(evidence: &Evidence<'_>) -> Option<Finding> {
         .collect();
     let list: Vec<String> =
         errors.iter().map(|(value, error)| format!("{value:e}: {} mm", short(error * 1e3))).collect();
-    let lowest = errors.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let lowest = least(errors.iter().copied())?;
     let most = errors.last()?;
     // Little noise leaves runs stuck; from the best value on, more noise must cost accuracy.
     let rises = errors.iter().filter(|(value, _)| *value >= lowest.0).is_sorted_by(|a, b| a.1 <= b.1);
