@@ -124,4 +124,5 @@ fn what_cannot_be_done_is_said() {
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{message}");
     assert!(message.contains("/dev/null/paper") && message.contains("--out"), "{message}");
+    assert_eq!(message.matches("os error").count(), 1, "the cause is told once: {message}");
 }
