@@ -22,7 +22,8 @@
 //!
 //! These do no input or output, know no threads but those of the feature `parallel`, and build without default
 //! features for `wasm32-unknown-unknown`. With the feature `app` (on by default) come `recording` (Rerun and CSV
-//! files), `paper` (the paper's experiments beside its numbers), `server` (HTTP and the page) and the command line.
+//! files), `chart` (panels of curves for print, as SVG and PNG; private), `paper` (the paper's experiments beside its
+//! numbers, drawn as charts), `server` (HTTP and the page) and the command line.
 //!
 //! # Notation, frames and units
 //!
@@ -51,6 +52,8 @@
 //! *Randomness.* One ChaCha stream per purpose and seed ([`experiment::Stream`]). The same seed gives the same numbers on
 //! the same machine, whatever the number of threads.
 
+#[cfg(feature = "app")]
+mod chart;
 pub mod estimation;
 pub mod experiment;
 pub mod kinematics;

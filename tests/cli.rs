@@ -145,9 +145,67 @@ fn the_limits_stand_beside_the_learners() {
     for part in ["equations as unknowns: 8", "best possible design of 12 movements", "random "] {
         assert!(text.contains(part), "{text}");
     }
-    let run = json(&["run", "tiago-mocap", "--learner", "random", "--steps", "3", "--limits", "--json", "-"]);
-    assert!(run["best_designs"].as_array().is_some_and(Vec::is_empty), "the truth is not known");
+    let run = json(&["run", "tiago-mocap", "--learner", "random", "--steps", "3", "--json", "-"]);
+    assert!(run["best_designs"].as_array().is_some_and(Vec::is_empty), "nobody asked for them");
     assert_eq!(run["movements_by_counting"], 11);
+}
+
+#[test]
+fn limits_are_refused_where_there_are_none() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("exact.toml");
+    let text = include_str!("../scenarios/arm-6dof.toml").replace("sigma_m = 0.01", "sigma_m = 0.0");
+    std::fs::write(&file, text).expect("written");
+    for command in ["run", "compare"] {
+        for (scenario, why) in [("tiago-mocap", "recorded data"), (file.to_str().expect("a path"), "without noise")] {
+            let (code, message) = failure(&[command, scenario, "--steps", "3", "--limits"]);
+            assert_eq!(code, 2, "{message}");
+            assert!(message.contains("--limits") && message.contains(why), "{message}");
+        }
+    }
+}
+
+#[test]
+fn learners_that_cannot_settle_are_not_waited_for() {
+    let command = |learners: &[&'static str]| {
+        let named = learners.iter().flat_map(|name| ["--learner", *name]);
+        ["run", "arm-6dof", "--seed", "3", "--until", "settled"].into_iter().chain(named).collect::<Vec<_>>()
+    };
+    let output = body_schema(&command(&["global", "gradient"]));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("stopped after") && text.contains("`gradient` not waited for"), "{text}");
+    let (code, message) = failure(&command(&["gradient", "rls-six-numbers:random"]));
+    assert_eq!(code, 2, "{message}");
+    assert!(message.contains("`gradient`, `rls-six-numbers:random` can never settle"), "{message}");
+}
+
+#[test]
+fn two_outputs_cannot_be_one_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
+    std::fs::create_dir(path("sub")).expect("a folder");
+    let (same, other_way, different) = (path("a"), path("sub/../a"), path("b"));
+    for (arguments, options) in [
+        (["run", "--rrd", &same, "--csv", &other_way], ["--rrd", "--csv"]),
+        (["run", "--csv", &same, "--json", &same], ["--csv", "--json"]),
+        (["compare", "--json", &other_way, "--csv", &same], ["--json", "--csv"]),
+    ] {
+        let (code, message) = failure(&[&arguments[..], &["arm-6dof", "--steps", "1"]].concat());
+        assert_eq!(code, 2, "{message}");
+        assert!(options.iter().all(|option| message.contains(option)), "{message}");
+        assert!(!folder.path().join("a").exists(), "refused before anything runs");
+    }
+    let output = body_schema(&["run", "arm-6dof", "--steps", "1", "--csv", &same, "--json", &different]);
+    assert!(output.status.success());
+}
+
+#[test]
+fn global_runs_wherever_its_name_is_offered_and_on_recorded_data() {
+    let result = json(&["run", "tiago-mocap", "--learner", "global", "--json", "-"]);
+    let learner = &result["learners"][0];
+    assert_eq!((learner["name"].as_str(), learner["estimator"].as_str()), (Some("global"), Some("smoother")));
+    assert!(learner["failure"].is_null() && learner["metrics"]["movements"] == 27, "{learner}");
+    assert!(learner["metrics"]["prediction_mean_m"].as_f64().is_some_and(|error| error < 0.005), "{learner}");
 }
 
 #[test]
@@ -157,11 +215,20 @@ fn bad_input_exits_with_two_and_says_what_to_do() {
     let text = include_str!("../scenarios/arm-6dof.toml").replace("sigma_m = 0.01", "sigma = 0.01");
     std::fs::write(&file, text).expect("written");
     let file = file.to_str().expect("a plain path");
-    let cases: [(&[&str], &[&str]); 10] = [
+    let binary = folder.path().join("tiago-mocap.csv");
+    std::fs::write(&binary, b"x1,y1\n\xff\xfe\0").expect("written");
+    let measured = folder.path().join("measured.toml");
+    std::fs::write(&measured, include_str!("../scenarios/tiago-mocap.toml")).expect("written");
+    let (binary, measured) = (binary.to_str().expect("a plain path"), measured.to_str().expect("a plain path"));
+    let cases: [(&[&str], &[&str]); 14] = [
         (&["check", file], &["bad.toml:", "`sensor.sigma`", "`sigma_m`"]),
         (&["run", "arm-6dofx"], &["did you mean `arm-6dof`"]),
         (&["run", "no/such.toml"], &["no/such.toml"]),
         (&["run", "arm-6dof", "--learner", "clever"], &["`clever`", "active, random, gradient"]),
+        (&["run", "arm-6dof", "--learner", "actve"], &["did you mean `active`"]),
+        (&["run", "tiago-mocap", "--learner", "rls:active-direct"], &["every row is tried", "write `rls:active`"]),
+        (&["check", measured], &["measurements.file", "tiago-mocap.csv is not text", "UTF-8"]),
+        (&["check", binary], &["tiago-mocap.csv is not text"]),
         (&["run", "arm-6dof", "--learner", "active", "--learner", "active"], &["named twice"]),
         (&["run", "tiago-mocap", "--steps", "28"], &["27 movements", "--steps 27"]),
         (&["compare", "arm-6dof", "--seeds", "9..3"], &["3..9"]),
@@ -185,6 +252,7 @@ fn what_cannot_be_written_exits_with_one_and_names_the_file() {
         let (code, message) = failure(&["run", "arm-6dof", "--steps", "1", option, "/no/such/folder/x"]);
         assert_eq!(code, 1, "{option}: {message}");
         assert!(message.contains("/no/such/folder/x"), "{option}: {message}");
+        assert_eq!(message.matches("os error").count(), 1, "the cause is told once: {message}");
     }
 }
 

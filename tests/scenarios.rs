@@ -113,8 +113,54 @@ fn wrong_types_and_broken_toml_are_located() {
     assert_eq!(problem.line, line, "{problem}");
     let (problem, line) = one(ARM, "axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0]");
     assert_eq!((problem.key.as_str(), problem.line), ("robot.joint[1].axis", line));
+    let (problem, line) = one(ARM, "sigma_m = 0.01", "sigma_m = .03");
+    assert_eq!(problem.line, line, "{problem}");
+    assert!(problem.what.contains("`.03`") && problem.mend.contains("write 0.03"), "{problem}");
     let (problem, _) = one(ARM, "variant = \"direct-l\"", "variant = \"simplex\"");
     assert!(problem.mend.contains("direct-l"), "{problem}");
+}
+
+#[test]
+fn a_list_of_another_length_is_refused_and_nothing_is_dropped() {
+    for (text, from, to, key, what, mend) in [
+        (
+            ARM,
+            "marker_m = [0.66, 0.02, 0.05]",
+            "marker_m = [0.66, 0.02, 0.05, 1.0]",
+            "robot.marker_m",
+            "has 4 numbers",
+            "write three, x, y, z in metres",
+        ),
+        (
+            ARM,
+            "limits_deg = [-90.0, 60.0]",
+            "limits_deg = [-90.0, 60.0, 90.0]",
+            "robot.joint[1].limits_deg",
+            "has 3 numbers",
+            "write two, the lower and the upper in degrees",
+        ),
+        (
+            ARM,
+            "axis = [0.0, 1.0, 0.0]",
+            "axis = [0.0, 1.0, 0.0, 0.0]",
+            "robot.joint[1].axis",
+            "has 4 numbers",
+            "write three, x, y, z",
+        ),
+        (ARM, "axis = [0.0, 1.0, 0.0]", "axis = 1.0", "robot.joint[1].axis", "floating point", "write three, x, y, z"),
+        (
+            TIAGO,
+            "[\"x1\", \"y1\", \"z1\"]",
+            "[\"x1\", \"y1\", \"z1\", \"x2\"]",
+            "measurements.marker_columns_m",
+            "has 4 names",
+            "write three, x, y, z",
+        ),
+    ] {
+        let (problem, line) = one(text, from, to);
+        assert_eq!((problem.key.as_str(), problem.line), (key, line), "{problem}");
+        assert!(problem.what.contains(what) && problem.mend.contains(mend), "{problem}");
+    }
 }
 
 #[test]
@@ -139,6 +185,16 @@ fn contradictions_are_refused() {
 }
 
 #[test]
+fn searches_that_differ_only_over_a_box_are_refused_over_recorded_rows() {
+    for search in ["direct", "random-search", "bayesian", "monte-carlo", "naive"] {
+        let policy = format!("policy = \"active-{search}\"");
+        let (problem, _) = one(TIAGO, "policy = \"active\"", &policy);
+        assert_eq!(problem.key, "learner[0].policy");
+        assert!(problem.what.contains("every row is tried") && problem.mend.contains("\"active\""), "{problem}");
+    }
+}
+
+#[test]
 fn measured_data_are_checked() {
     let (problem, line) = one(TIAGO, "held_out = 7", "held_out = 31");
     assert_eq!((problem.key.as_str(), problem.line), ("measurements.held_out", line));
@@ -146,8 +202,43 @@ fn measured_data_are_checked() {
     assert!(problem.what.contains("no column `x9`"), "{problem}");
     let (problem, _) = one(TIAGO, "column = \"arm_3_joint\"\n", "");
     assert_eq!(problem.key, "robot.joint[3].column");
+    for (csv, what, mend) in [
+        (TIAGO_CSV.replace(',', ";"), "separated by semicolons", "write commas"),
+        (format!("{TIAGO_CSV}\0"), "is not text", "CSV"),
+    ] {
+        let problem = problems(TIAGO, Ok(&csv)).remove(0);
+        assert!(problem.what.contains("tiago-mocap.csv") && problem.what.contains(what), "{problem}");
+        assert!(problem.mend.contains(mend), "{problem}");
+    }
     let found = problems(TIAGO, Err("no such file"));
     assert!(found[0].what.contains("no such file"), "{found:?}");
+}
+
+#[test]
+fn sections_without_a_use_can_be_left_out() {
+    let without = |text: &str, section: &str, end: &str| {
+        let start = text.find(section).expect("the section");
+        let length = text[start..].find(end).expect("what follows it");
+        format!("{}{}", &text[..start], &text[start + length..])
+    };
+    // Measured data are judged by no thresholds.
+    let tiago = TIAGO.replace("[selection]", "[thresholds]\norientation_deg = 4.0\nlocation_m = 0.03\n\n[selection]");
+    let thresholds =
+        |text: &str| Scenario::parse("my.toml", text, &|_| Ok(TIAGO_CSV.to_owned())).expect("valid").thresholds;
+    assert_eq!((thresholds(&tiago).orientation_deg, thresholds(&tiago).location_m), (4.0, 0.03));
+    assert_eq!((thresholds(TIAGO).orientation_deg, thresholds(TIAGO).location_m), (5.0, 0.02));
+    // A simulated world is.
+    let found = problems(&without(ARM, "[thresholds]", "[settled]"), Err("none"));
+    assert_eq!((found.len(), found[0].key.as_str()), (1, "thresholds"), "{found:?}");
+    // A learner by the gradient says its rate; where there is none, a composed one has the default.
+    let arm = without(ARM, "[gradient]", "[selection]");
+    let found = problems(&arm, Err("none"));
+    assert_eq!((found.len(), found[0].key.as_str()), (1, "gradient.rate"), "{found:?}");
+    let arm = without(&arm, "[[learner]]\nname = \"gradient\"", "[[learner]]\nname = \"unscented\"");
+    let scenario =
+        Scenario::parse("my.toml", &arm, &|_| Err("none".to_owned())).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(scenario.gradient_rate, 0.1);
+    scenario.experiment(1, Some(&["gradient:random".to_owned()])).expect("starts").step().expect("steps");
 }
 
 #[test]

@@ -41,6 +41,10 @@ pub struct Arguments {
 pub fn compare(arguments: &Arguments) -> Result<()> {
     let (scenario, learners) = arguments.scenario.load()?;
     let steps = steps_of(&scenario, arguments.steps)?;
+    if arguments.limits {
+        limits::check(&scenario)?;
+    }
+    output::distinct([("--json", &arguments.json), ("--csv", &arguments.csv)])?;
     let bar = progress::bar(
         arguments.seeds.count() * steps,
         &format!("{} × {} seeds", scenario.name, arguments.seeds.count()),

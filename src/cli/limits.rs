@@ -1,9 +1,22 @@
 //! What any learner could reach, beside what the learners did, in lines to read.
 
 use anyhow::Result;
-use body_schema::experiment::BestDesign;
+use body_schema::{
+    experiment::BestDesign,
+    scenario::{Scenario, WorldSpec},
+};
 
-use super::output;
+use super::{BadInput, output};
+
+/// Refuses to look for best designs where there can be none.
+pub fn check(scenario: &Scenario) -> Result<()> {
+    let why = match &scenario.world {
+        _ if scenario.limits().is_some() => return Ok(()),
+        WorldSpec::Measured { .. } => "replays recorded data, whose truth and noise are not known",
+        WorldSpec::Simulated { .. } => "has a sensor without noise, which any movements determine exactly",
+    };
+    Err(BadInput(format!("--limits: scenario `{}` {why}; leave --limits out", scenario.name)).into())
+}
 
 /// Prints the counting yardstick, and where best designs were asked for how near each learner's data came to the last.
 pub fn say<'a>(

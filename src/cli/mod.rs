@@ -1,6 +1,7 @@
 //! Commands, their arguments, and what becomes of their errors.
 
 mod compare;
+mod input;
 mod limits;
 mod output;
 mod paper;
@@ -10,16 +11,16 @@ mod scenarios;
 mod seeds;
 mod serve;
 mod sweep;
-
-use std::path::PathBuf;
+mod until;
 
 use anyhow::{Context, Result};
 use body_schema::{
     paper::PaperError,
-    scenario::{BUILTIN, Scenario, ScenarioError, builtin},
+    scenario::{Scenario, ScenarioError},
 };
 use clap::{Parser, Subcommand};
 
+use input::load_scenario;
 use seeds::Seeds;
 
 /// Learn a robot's kinematic body schema from a few well-chosen movements, and watch it happen.
@@ -112,28 +113,21 @@ pub fn is_bad_input(error: &anyhow::Error) -> bool {
     })
 }
 
+/// The error with its causes. Many of our errors name their cause in the midst of what they say, before the mend: a
+/// cause that was already told is not told again.
+pub fn told(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |told, cause| match told.as_str() {
+        "" => cause,
+        _ if told.contains(&cause) => told,
+        _ => format!("{told}: {cause}"),
+    })
+}
+
 /// Whether the reader of our output went away, as `head` does: no failure.
 pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
     })
-}
-
-/// A built-in scenario by name, or else a file by path.
-fn load_scenario(name: &str) -> Result<Scenario> {
-    let path = PathBuf::from(name);
-    if BUILTIN.iter().any(|builtin| builtin.name == name) {
-        return Ok(builtin(name)?);
-    }
-    let looks_like_a_path = path.extension().is_some() || name.contains(std::path::MAIN_SEPARATOR) || path.exists();
-    if !looks_like_a_path {
-        return Ok(builtin(name)?);
-    }
-    let text = std::fs::read_to_string(&path)
-        .map_err(|error| BadInput(format!("cannot read the scenario {}: {error}", path.display())))?;
-    let folder = path.parent().map(PathBuf::from).unwrap_or_default();
-    let open = |file: &str| std::fs::read_to_string(folder.join(file)).map_err(|error| error.to_string());
-    Ok(Scenario::parse(name, &text, &open)?)
 }
 
 /// How many steps to run: what was asked, else the scenario's own; no more than there are recorded movements.
@@ -147,5 +141,22 @@ fn steps_of(scenario: &Scenario, asked: Option<u64>) -> Result<u64> {
         ))
         .into()),
         _ => Ok(steps),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cause_is_told_once() {
+        let cause = || std::io::Error::from(std::io::ErrorKind::NotFound);
+        let named = PaperError::Write { path: "a".into(), source: cause() };
+        let text = told(&anyhow::Error::new(named).context("cannot run"));
+        assert_eq!(
+            text,
+            "cannot run: cannot write a: entity not found; name a folder that may be written to with --out"
+        );
+        assert_eq!(told(&anyhow::Error::new(cause()).context("cannot write b")), "cannot write b: entity not found");
     }
 }

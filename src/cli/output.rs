@@ -3,12 +3,14 @@
 use std::{
     fs::File,
     io::{BufWriter, Write},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use anyhow::{Context, Result};
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use serde::Serialize;
+
+use super::BadInput;
 
 /// Whether a path means standard output.
 pub fn is_stdout(path: &Path) -> bool {
@@ -23,6 +25,30 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
         return Ok(());
     }
     std::fs::write(path, text + "\n").with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Refuses two options that would write to the same file, whatever the ways that lead to it.
+pub fn distinct<'a>(outputs: impl IntoIterator<Item = (&'static str, &'a Option<PathBuf>)>) -> Result<()> {
+    let mut taken: Vec<(&str, PathBuf)> = Vec::new();
+    let given = outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?)));
+    for (option, path) in given.filter(|(_, path)| !is_stdout(path)) {
+        let place = resolved(path);
+        if let Some((other, _)) = taken.iter().find(|(_, known)| *known == place) {
+            let path = path.display();
+            return Err(BadInput(format!("{other} and {option} would both write {path}; name two files")).into());
+        }
+        taken.push((option, place));
+    }
+    Ok(())
+}
+
+/// Where a path leads; of a file that is not there yet, where its folder is.
+fn resolved(path: &Path) -> PathBuf {
+    let in_folder = || {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Some(folder.canonicalize().ok()?.join(path.file_name()?))
+    };
+    path.canonicalize().ok().or_else(in_folder).unwrap_or_else(|| path.to_owned())
 }
 
 /// Creates a file for buffered writing.

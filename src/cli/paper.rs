@@ -16,7 +16,7 @@ pub struct Arguments {
     /// Run only this experiment; repeat for several. Of the others, what DIR holds is shown [default: all]
     #[arg(long, value_name = "ID")]
     only: Vec<String>,
-    /// Keep outcomes, figures and tables in DIR; outcomes kept there are not measured again
+    /// Keep outcomes, figures and tables in DIR; outcomes kept there by this same program are not measured again
     /// [default: paper, with --quick paper/quick]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,

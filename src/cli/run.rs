@@ -4,12 +4,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use body_schema::{
-    experiment::{Experiment, RunResult, SETTLING_STEPS, best_designs},
+    experiment::{Experiment, RunResult, best_designs},
     recording::{EllipsoidSize, Recorder, StepsCsv, Target},
-    scenario::Scenario,
 };
 
-use super::{ScenarioArguments, limits, output, progress, steps_of};
+use super::{
+    ScenarioArguments, limits, output, progress, steps_of,
+    until::{Ending, Until},
+};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -21,7 +23,7 @@ pub struct Arguments {
     /// Movements to make [default: the scenario's]
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
-    /// Stop as soon as every learner calls itself settled, at the latest after the movements to make
+    /// Stop as soon as every learner that can tell calls itself settled, at the latest after the movements to make
     #[arg(long, value_name = "WHEN")]
     until: Option<Until>,
     /// Write a Rerun recording to FILE (open it with Rerun 0.36)
@@ -41,16 +43,15 @@ pub struct Arguments {
     limits: bool,
 }
 
-/// What may end a run early.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Until {
-    /// The learners' own verdict, without truth.
-    Settled,
-}
-
 pub fn run(arguments: &Arguments) -> Result<()> {
     let (scenario, learners) = arguments.scenario.load()?;
     let steps = steps_of(&scenario, arguments.steps)?;
+    if arguments.limits {
+        limits::check(&scenario)?;
+    }
+    output::distinct([("--rrd", &arguments.rrd), ("--csv", &arguments.csv), ("--json", &arguments.json)])?;
+    let specs = scenario.chosen(learners)?;
+    let ending = arguments.until.map(|Until::Settled| Ending::of(&scenario, &specs)).transpose()?;
     let mut experiment = scenario.experiment(arguments.seed, learners)?;
     let mut recorder =
         arguments.rrd.as_deref().map(|path| recorder(&experiment, path, arguments.ellipsoids)).transpose()?;
@@ -58,13 +59,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
     let bar = progress::bar(steps, &scenario.name);
     observe(&experiment, recorder.as_mut(), csv.as_mut())?;
-    let mut is_settled = false;
     for _ in 0..steps {
         experiment.step()?;
         observe(&experiment, recorder.as_mut(), csv.as_mut())?;
         bar.inc(1);
-        is_settled = experiment.latest().learners.iter().all(|learner| learner.metrics.settled);
-        if arguments.until.is_some() && is_settled {
+        if ending.as_ref().is_some_and(|ending| ending.is_reached(experiment.latest())) {
             break;
         }
     }
@@ -89,24 +88,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if !arguments.json.as_deref().is_some_and(output::is_stdout) {
         summarise(&result)?;
-        if arguments.until.is_some() {
-            output::say(ending(&scenario, is_settled, result.steps))?;
+        if let Some(ending) = &ending {
+            output::say(ending.told(experiment.latest()))?;
         }
         for path in [&arguments.rrd, &arguments.csv, &arguments.json].into_iter().flatten() {
             output::say(format!("wrote {}", path.display()))?;
         }
     }
     Ok(())
-}
-
-/// Why a run ended that was to end early.
-fn ending(scenario: &Scenario, is_settled: bool, steps: u64) -> String {
-    let target = format!("{} mm for {SETTLING_STEPS} steps", 1e3 * scenario.settled_below_m);
-    if is_settled {
-        format!("stopped after {steps} movements: every learner is settled, its own expected error was below {target}")
-    } else {
-        format!("made all {steps} movements: some learner is not settled, its own expected error below {target}")
-    }
 }
 
 type CsvFile = StepsCsv<std::io::BufWriter<std::fs::File>>;

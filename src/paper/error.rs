@@ -2,8 +2,7 @@
 
 use std::{io, path::PathBuf};
 
-use super::chart::RasterError;
-use crate::{experiment::ExperimentError, optimize::DirectError, scenario::ScenarioError};
+use crate::{chart::RasterError, experiment::ExperimentError, optimize::DirectError, scenario::ScenarioError};
 
 /// Why the paper could not be rerun. What was measured before is kept.
 #[derive(Debug, thiserror::Error)]

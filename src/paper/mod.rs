@@ -1,7 +1,7 @@
 //! The paper's experiments, rerun and set beside its numbers.
 //!
-//! [`run`] carries out the [`EXPERIMENTS`], keeps each outcome in a folder so that an interrupted run continues, draws
-//! the figures, and judges every number and remark of the paper by what was measured. It writes
+//! [`run`] carries out the [`EXPERIMENTS`], keeps each outcome in a folder so that an interrupted run of the same
+//! program continues, draws the figures, and judges every number and remark of the paper by what was measured. It writes
 //!
 //! | file | what |
 //! |---|---|
@@ -12,7 +12,6 @@
 //!
 //! Experiments, claims and their texts are data; figures measured are never written down in code.
 
-mod chart;
 mod claims;
 mod error;
 mod experiments;
@@ -29,7 +28,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-pub use chart::RasterError;
+pub use crate::chart::RasterError;
 pub use error::PaperError;
 pub use experiments::{EXPERIMENTS, Kind, PaperExperiment};
 pub use report::{Agreement, FigureEntry, Report, Row};
@@ -40,7 +39,10 @@ use measure::Measurement;
 use outcome::Outcome;
 use store::{Fingerprint, Store};
 
-use crate::scenario::{BUILTIN, Scenario, builtin};
+use crate::{
+    chart,
+    scenario::{BUILTIN, Scenario, builtin},
+};
 
 /// What is to be run, and where its outcomes go.
 #[derive(Clone, Debug)]
@@ -110,10 +112,11 @@ pub enum Ending {
 pub fn run(plan: &Plan, progress: &dyn Progress) -> Result<Report, PaperError> {
     plan.check()?;
     let store = Store::open(&plan.out)?;
+    let build = store::build();
     let mut outcomes = BTreeMap::new();
     let mut figures = Vec::new();
     for experiment in EXPERIMENTS {
-        let (outcome, how) = obtain(experiment, plan, &store, progress)?;
+        let (outcome, how) = obtain(experiment, plan, &store, build.clone(), progress)?;
         progress.finish(experiment, how);
         if let Ok((scenario, outcome)) = &outcome {
             for figure in figures::figures(experiment, scenario, plan, outcome) {
@@ -143,6 +146,7 @@ fn obtain(
     experiment: &'static PaperExperiment,
     plan: &Plan,
     store: &Store,
+    build: Option<String>,
     progress: &dyn Progress,
 ) -> Result<(Obtained, Ending), PaperError> {
     if !BUILTIN.iter().any(|found| found.name == experiment.scenario) {
@@ -150,7 +154,7 @@ fn obtain(
     }
     let scenario =
         builtin(experiment.scenario).map_err(|source| PaperError::Scenario { experiment: experiment.id, source })?;
-    let fingerprint = Fingerprint::new(experiment, &scenario, plan);
+    let fingerprint = Fingerprint::new(experiment, &scenario, plan, build);
     if let Some(outcome) = store.load(&fingerprint) {
         return Ok((Ok((scenario, outcome)), Ending::Reused));
     }

@@ -29,6 +29,7 @@ pub const BUILTIN: &[Builtin] = builtins![
     "head-fov",
     "head-fov-excursion",
     "head-fov-doubled-error",
+    "head-fov-doubled-error-up-to",
     "body-change",
     "tiago-mocap",
 ];

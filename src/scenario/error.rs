@@ -45,22 +45,30 @@ pub enum ScenarioError {
         known: Vec<String>,
     },
     /// The scenario offers no such learner.
-    #[error("scenario `{scenario}` has no learner `{name}`; it offers: {}; or write estimator:policy, as in smoother:random", known.join(", "))]
+    #[error(
+        "scenario `{scenario}` has no learner `{name}`{}; it offers: {}; or write estimator:policy, as in smoother:random",
+        suggestion(suggested),
+        known.join(", ")
+    )]
     UnknownLearner {
         /// The scenario.
         scenario: String,
         /// The name asked for.
         name: String,
+        /// What was probably meant.
+        suggested: Option<String>,
         /// All names.
         known: Vec<String>,
     },
     /// The parts of a composed learner do not fit.
-    #[error("there is no learner `{name}`: {what}")]
+    #[error("there is no learner `{name}`: {what}; write `{fitting}`")]
     Misfit {
         /// The name asked for.
         name: String,
         /// Why not.
         what: String,
+        /// The nearest that there is.
+        fitting: String,
     },
     /// A learner is named twice.
     #[error("learner `{0}` is named twice; name each learner once")]

@@ -1,6 +1,6 @@
 //! The learners of a scenario: those that its file names, and any estimator with any policy.
 
-use super::{Scenario, ScenarioError};
+use super::{Scenario, ScenarioError, WorldSpec, error::similar};
 use crate::experiment::LearnerDescription;
 
 /// A learner that a scenario offers.
@@ -59,7 +59,8 @@ impl EstimatorKind {
         }
     }
 
-    pub(super) fn keeps_covariance(self) -> bool {
+    /// Whether it knows how sure it is: what active selection chooses by, and a learner calls itself settled by.
+    pub fn keeps_covariance(self) -> bool {
         matches!(self, Self::Rls | Self::Unscented | Self::Smoother)
     }
 }
@@ -112,6 +113,18 @@ impl PolicyKind {
             Self::Random => "random",
         }
     }
+
+    /// Whether it is `Active` but for how a box of joint limits is searched; over recorded rows they are all the same.
+    fn varies_the_search(self) -> bool {
+        matches!(
+            self,
+            Self::ActiveNaive
+                | Self::ActiveDirect
+                | Self::ActiveRandomSearch
+                | Self::ActiveBayesian
+                | Self::ActiveMonteCarlo
+        )
+    }
 }
 
 /// Stands between estimator and policy in the name of a composed learner.
@@ -154,9 +167,7 @@ impl Scenario {
         };
         pairs
             .filter(|pair| !named(pair))
-            .filter_map(|(estimator, policy)| {
-                self.compose(&format!("{}{SEPARATOR}{}", estimator.name(), policy.name())).ok()
-            })
+            .filter_map(|(estimator, policy)| self.compose(&composed(estimator, policy)).ok())
             .collect()
     }
 
@@ -164,16 +175,59 @@ impl Scenario {
         let unknown = || ScenarioError::UnknownLearner {
             scenario: self.name.clone(),
             name: name.to_owned(),
+            suggested: self.similar_learner(name),
             known: self.learners.iter().map(|spec| spec.name.clone()).collect(),
         };
         let (estimator, policy) = name.split_once(SEPARATOR).ok_or_else(unknown)?;
         let estimator = EstimatorKind::ALL.into_iter().find(|kind| kind.name() == estimator).ok_or_else(unknown)?;
         let policy = PolicyKind::ALL.into_iter().find(|kind| kind.name() == policy).ok_or_else(unknown)?;
-        if let Some((_, what)) = misfit(estimator, policy, self.robot.layout.marker().is_some()) {
-            return Err(ScenarioError::Misfit { name: name.to_owned(), what });
+        match misfit(estimator, policy, self.setting()) {
+            None => Ok(LearnerSpec { name: name.to_owned(), estimator, policy, stabilising: true, by_default: false }),
+            Some(Misfit { what, .. }) => {
+                Err(ScenarioError::Misfit { name: name.to_owned(), what, fitting: self.fitting(estimator, policy) })
+            }
         }
-        Ok(LearnerSpec { name: name.to_owned(), estimator, policy, stabilising: true, by_default: false })
     }
+
+    fn setting(&self) -> Setting {
+        Setting {
+            learns_marker: self.robot.layout.marker().is_some(),
+            is_measured: matches!(self.world, WorldSpec::Measured { .. }),
+        }
+    }
+
+    /// The name of the pair nearest to these two that fits.
+    fn fitting(&self, mut estimator: EstimatorKind, mut policy: PolicyKind) -> String {
+        while let Some(misfit) = misfit(estimator, policy, self.setting()) {
+            (estimator, policy) = misfit.instead;
+        }
+        composed(estimator, policy)
+    }
+
+    /// What was probably meant by the name of a learner that is not there: one of the scenario's, or two halves.
+    fn similar_learner(&self, name: &str) -> Option<String> {
+        let Some((estimator, policy)) = name.split_once(SEPARATOR) else {
+            return similar(name, self.learners.iter().map(|spec| spec.name.as_str())).map(str::to_owned);
+        };
+        let estimator = similar(estimator, EstimatorKind::ALL.map(EstimatorKind::name))?;
+        let policy = similar(policy, PolicyKind::ALL.map(PolicyKind::name))?;
+        let estimator = EstimatorKind::ALL.into_iter().find(|kind| kind.name() == estimator)?;
+        let policy = PolicyKind::ALL.into_iter().find(|kind| kind.name() == policy)?;
+        Some(self.fitting(estimator, policy))
+    }
+}
+
+fn composed(estimator: EstimatorKind, policy: PolicyKind) -> String {
+    format!("{}{SEPARATOR}{}", estimator.name(), policy.name())
+}
+
+/// What of a scenario decides which learners fit it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Setting {
+    /// Whether the marker is learned.
+    pub learns_marker: bool,
+    /// Whether recorded rows are replayed.
+    pub is_measured: bool,
 }
 
 /// What of a learner is at fault.
@@ -183,13 +237,28 @@ pub(super) enum Fault {
     Policy,
 }
 
-/// Why an estimator cannot learn by a policy, or not this arm.
-pub(super) fn misfit(estimator: EstimatorKind, policy: PolicyKind, learns_marker: bool) -> Option<(Fault, String)> {
+/// Why an estimator cannot learn by a policy, or not here.
+#[derive(Clone, Debug)]
+pub(super) struct Misfit {
+    pub fault: Fault,
+    pub what: String,
+    /// The same with the fault mended.
+    pub instead: (EstimatorKind, PolicyKind),
+}
+
+/// Why an estimator cannot learn by a policy in such a scenario, if it cannot.
+pub(super) fn misfit(estimator: EstimatorKind, policy: PolicyKind, setting: Setting) -> Option<Misfit> {
     if policy != PolicyKind::Random && !estimator.keeps_covariance() {
-        return Some((Fault::Policy, format!("`{}` keeps no covariance to choose by", estimator.name())));
+        let what = format!("`{}` keeps no covariance to choose by", estimator.name());
+        return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Random) });
     }
-    if estimator == EstimatorKind::RlsSixNumbers && learns_marker {
-        return Some((Fault::Estimator, "six numbers per joint leave no place for a learned marker".to_owned()));
+    if estimator == EstimatorKind::RlsSixNumbers && setting.learns_marker {
+        let what = "six numbers per joint leave no place for a learned marker".to_owned();
+        return Some(Misfit { fault: Fault::Estimator, what, instead: (EstimatorKind::Rls, policy) });
+    }
+    if setting.is_measured && policy.varies_the_search() {
+        let what = format!("over recorded rows `{}` has nothing to search: every row is tried", policy.name());
+        return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
     }
     None
 }
@@ -232,5 +301,44 @@ mod tests {
             assert!(matches!(chosen(name), Err(ScenarioError::UnknownLearner { .. })), "{name}");
         }
         assert_eq!(chosen("smoother:random").unwrap()[0].estimator, EstimatorKind::Smoother);
+    }
+
+    #[test]
+    fn over_recorded_rows_there_is_nothing_to_search() {
+        let (simulated, measured) = (builtin("arm-6dof").unwrap(), builtin("tiago-mocap").unwrap());
+        let chosen = |scenario: &Scenario, name: &str| scenario.chosen(Some(&[name.to_owned()]));
+        for search in ["direct", "random-search", "bayesian", "monte-carlo", "naive"] {
+            let name = format!("rls:active-{search}");
+            chosen(&simulated, &name).unwrap();
+            let message = chosen(&measured, &name).unwrap_err().to_string();
+            assert!(message.contains("every row is tried") && message.ends_with("write `rls:active`"), "{message}");
+            assert!(measured.compositions().iter().all(|spec| !spec.name.ends_with(search)), "{search} is offered");
+        }
+        for name in ["rls:active", "smoother:active", "smoother:active-planned", "unscented:random"] {
+            chosen(&measured, name).unwrap();
+        }
+        // What is suggested fits in every respect.
+        let message = chosen(&measured, "rls-six-numbers:active-direct").unwrap_err().to_string();
+        assert!(message.ends_with("write `rls:random`"), "{message}");
+    }
+
+    #[test]
+    fn a_misspelt_name_gets_a_suggestion() {
+        let scenario = builtin("arm-6dof").unwrap();
+        for (name, meant) in [
+            ("actve", "active"),
+            ("gobal", "global"),
+            ("smother:random", "smoother:random"),
+            ("smoother:randon", "smoother:random"),
+            ("smother:activ", "smoother:active"),
+            ("gradiant:active", "gradient:random"),
+        ] {
+            let message = scenario.chosen(Some(&[name.to_owned()])).unwrap_err().to_string();
+            assert!(message.contains(&format!("did you mean `{meant}`?")), "{message}");
+        }
+        for name in ["xyz", "xyz:random", "rls:xyz"] {
+            let message = scenario.chosen(Some(&[name.to_owned()])).unwrap_err().to_string();
+            assert!(!message.contains("did you mean") && message.contains("active, random"), "{message}");
+        }
     }
 }

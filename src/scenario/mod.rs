@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 
 pub use builtin::{BUILTIN, Builtin, builtin};
-pub use data::Recording;
+pub use data::{DataError, Recording};
 pub use edit::edited;
 pub use error::{Problem, ScenarioError};
 pub use learners::{EstimatorKind, LearnerSpec, PolicyKind};
@@ -55,11 +55,13 @@ pub struct Scenario {
     pub unscented: Filter,
     /// Values of the smoother.
     pub smoother: SmootherSpec,
-    /// Rate η of the stochastic gradient.
+    /// Rate η of the stochastic gradient; [`GRADIENT_RATE`](Self::GRADIENT_RATE) where the file has no learner by it and
+    /// says nothing.
     pub gradient_rate: f64,
     /// How movements are chosen actively.
     pub selection: SelectionSpec,
-    /// Thresholds of `converged_at`.
+    /// Thresholds of `converged_at`; [`THRESHOLDS`](Self::THRESHOLDS) where measurements are replayed and the file says
+    /// nothing.
     pub thresholds: Thresholds,
     /// Expected prediction error below which a learner calls itself settled, metres.
     pub settled_below_m: f64,
@@ -74,6 +76,12 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// The rate η of a gradient that is composed, as in `gradient:random`, where the file has no `[gradient]`.
+    pub const GRADIENT_RATE: f64 = 0.1;
+
+    /// What recorded measurements would be judged by, were the truth known: 5° and 2 cm.
+    pub const THRESHOLDS: Thresholds = Thresholds { orientation_deg: 5.0, location_m: 0.02 };
+
     /// The text of a data file that this scenario has already read.
     pub fn data_file(&self, file: &str) -> Result<String, String> {
         match &self.data {

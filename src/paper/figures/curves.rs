@@ -2,8 +2,8 @@
 
 use super::{Figure, Source, limits};
 use crate::{
+    chart::{Axis, Chart, Layer, Panel, Style},
     experiment::{Curve, LearnerComparison, Quantiles},
-    paper::chart::{Axis, Chart, Layer, Panel, Style},
     recording::{TRUTH_COLOR, learner_color},
     scenario::WorldSpec,
 };

@@ -2,11 +2,9 @@
 
 use super::{Figure, Source};
 use crate::{
+    chart::{Axis, Chart, Layer, Panel, Style},
     experiment::{Curve, JointMetrics, LearnerComparison},
-    paper::{
-        chart::{Axis, Chart, Layer, Panel, Style},
-        outcome::LearnedJoint,
-    },
+    paper::outcome::LearnedJoint,
 };
 
 /// More joints than this cannot be told apart in one panel.

@@ -2,8 +2,8 @@
 
 use super::Source;
 use crate::{
+    chart::{Axis, Layer, Panel, Style},
     experiment::{BestDesign, Comparison, Curve, LearnerComparison, Quantiles},
-    paper::chart::{Axis, Layer, Panel, Style},
     recording::TRUTH_COLOR,
     selection::CriterionUnits,
 };

@@ -8,11 +8,10 @@ mod sweep;
 
 use super::{
     Plan,
-    chart::Chart,
     experiments::{Kind, PaperExperiment},
     outcome::Outcome,
 };
-use crate::scenario::Scenario;
+use crate::{chart::Chart, scenario::Scenario};
 
 /// A figure: its name, its caption, and the drawing.
 #[derive(Clone, Debug)]

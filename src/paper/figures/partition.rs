@@ -2,10 +2,8 @@
 
 use super::{Figure, Source};
 use crate::{
-    paper::{
-        chart::{Axis, Chart, Colour, Layer, Marker, Panel, Style},
-        outcome::{Outcome, Search},
-    },
+    chart::{Axis, Chart, Colour, Layer, Marker, Panel, Style},
+    paper::outcome::{Outcome, Search},
     recording::learner_color,
     selection::Leaf,
 };

@@ -2,10 +2,8 @@
 
 use super::{Figure, Source};
 use crate::{
-    paper::{
-        chart::{Axis, Chart, Layer, Panel, Scale, Style},
-        experiments::Kind,
-    },
+    chart::{Axis, Chart, Layer, Panel, Scale, Style},
+    paper::experiments::Kind,
     recording::learner_color,
 };
 

@@ -73,7 +73,7 @@ impl Check<'_> {
             self.problem(span, key(wanted), "missing", mend);
             return None;
         };
-        let [lower, upper] = *given.get_ref();
+        let raw::Exactly([lower, upper]) = *given.get_ref();
         if !(lower.is_finite() && upper.is_finite()) {
             self.problem(given.span(), key(wanted), "a limit is not finite", format!("write two numbers, in {unit}"));
             return None;

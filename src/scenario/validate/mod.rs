@@ -13,7 +13,7 @@ use toml::Spanned;
 use super::{
     EstimatorKind, Filter, LearnerSpec, Prior, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError, similar},
-    learners::{Fault, misfit},
+    learners::{Fault, Misfit, Setting, misfit},
     raw,
 };
 use crate::{
@@ -84,16 +84,18 @@ impl Check<'_> {
         *value.get_ref()
     }
 
-    fn point(&mut self, key: &str, value: &Spanned<[f64; 3]>) -> Point3<f64> {
-        if !value.get_ref().iter().all(|x| x.is_finite()) {
+    fn point(&mut self, key: &str, value: &Spanned<raw::Exactly<f64, 3>>) -> Point3<f64> {
+        let raw::Exactly(coordinates) = *value.get_ref();
+        if !coordinates.iter().all(|x| x.is_finite()) {
             self.problem(value.span(), key, "a coordinate is not finite", "write three finite numbers, in metres");
         }
-        Point3::from(*value.get_ref())
+        Point3::from(coordinates)
     }
 
     /// A direction; refused unless its length is 1.
-    fn unit(&mut self, key: &str, value: &Spanned<[f64; 3]>) -> Option<UnitVector3<f64>> {
-        let direction = Vector3::from(*value.get_ref());
+    fn unit(&mut self, key: &str, value: &Spanned<raw::Exactly<f64, 3>>) -> Option<UnitVector3<f64>> {
+        let raw::Exactly(coordinates) = *value.get_ref();
+        let direction = Vector3::from(coordinates);
         let length = direction.norm();
         // A NaN fails this comparison as well.
         if (length - 1.0).abs() <= UNIT_TOLERANCE {
@@ -117,7 +119,8 @@ impl Check<'_> {
         }
         let robot = self.robot(&raw.robot)?;
         let world = self.world(raw, &robot, open);
-        let learners = self.learners(&raw.learners, raw.robot.learn_marker);
+        let setting = Setting { learns_marker: raw.robot.learn_marker, is_measured: raw.measurements.is_some() };
+        let learners = self.learners(&raw.learners, setting);
         let filter = self.filter("filter", &raw.filter);
         Some(Scenario {
             name: name.clone(),
@@ -127,12 +130,9 @@ impl Check<'_> {
             filter,
             unscented: raw.unscented.as_ref().map_or(filter, |unscented| self.filter("unscented", unscented)),
             smoother: self.smoother(raw),
-            gradient_rate: self.positive("gradient.rate", &raw.gradient.rate),
+            gradient_rate: self.gradient_rate(raw),
             selection: self.selection(&raw.selection),
-            thresholds: Thresholds {
-                orientation_deg: self.positive("thresholds.orientation_deg", &raw.thresholds.orientation_deg),
-                location_m: self.positive("thresholds.location_m", &raw.thresholds.location_m),
-            },
+            thresholds: self.thresholds(raw),
             settled_below_m: self.positive("settled.expected_prediction_m", &raw.settled.expected_prediction_m),
             promises: self.promises(&raw.promises, &learners),
             learners,
@@ -187,6 +187,35 @@ impl Check<'_> {
         SmootherSpec { noise_m2, hypotheses }
     }
 
+    /// The rate of the gradient. A file that has learn by it says which; others leave it to a default.
+    fn gradient_rate(&mut self, raw: &raw::Scenario) -> f64 {
+        if let Some(gradient) = &raw.gradient {
+            return self.positive("gradient.rate", &gradient.rate);
+        }
+        let learners = raw.learners.get_ref();
+        if let Some(learner) = learners.iter().find(|learner| learner.estimator == EstimatorKind::Gradient) {
+            let what = format!("missing: learner `{}` learns by it", learner.name.get_ref());
+            self.problem(learner.name.span(), "gradient.rate", what, "add `[gradient]` with `rate = 0.1`, say");
+        }
+        Scenario::GRADIENT_RATE
+    }
+
+    /// The thresholds of convergence. Where no truth is known nothing is judged by them.
+    fn thresholds(&mut self, raw: &raw::Scenario) -> Thresholds {
+        if let Some(thresholds) = &raw.thresholds {
+            return Thresholds {
+                orientation_deg: self.positive("thresholds.orientation_deg", &thresholds.orientation_deg),
+                location_m: self.positive("thresholds.location_m", &thresholds.location_m),
+            };
+        }
+        if let Some(sensor) = &raw.sensor {
+            let what = "missing: a simulated world is judged by them";
+            let mend = "add `[thresholds]` with `orientation_deg = …` and `location_m = …`";
+            self.problem(sensor.span(), "thresholds", what, mend);
+        }
+        Scenario::THRESHOLDS
+    }
+
     fn selection(&mut self, raw: &raw::Selection) -> SelectionSpec {
         let units = match (raw.units, &raw.characteristic_length_m) {
             (raw::Units::CharacteristicLength, None) => CriterionUnits::CharacteristicLength(1.0),
@@ -226,7 +255,7 @@ impl Check<'_> {
         SelectionSpec { search, units, planning }
     }
 
-    fn learners(&mut self, raw: &Spanned<Vec<raw::Learner>>, learns_marker: bool) -> Vec<LearnerSpec> {
+    fn learners(&mut self, raw: &Spanned<Vec<raw::Learner>>, setting: Setting) -> Vec<LearnerSpec> {
         let mut learners: Vec<LearnerSpec> = Vec::new();
         for (index, learner) in raw.get_ref().iter().enumerate() {
             let (name, policy) = (learner.name.get_ref(), *learner.policy.get_ref());
@@ -237,12 +266,12 @@ impl Check<'_> {
                 let mend = "give each learner a name of its own, of letters, digits, '-' and '_'";
                 self.problem(learner.name.span(), format!("{key}.name"), what, mend);
             }
-            match misfit(learner.estimator, policy, learns_marker) {
-                Some((Fault::Policy, what)) => {
-                    let mend = "write `policy = \"random\"`, or another estimator";
+            match misfit(learner.estimator, policy, setting) {
+                Some(Misfit { fault: Fault::Policy, what, instead: (_, policy) }) => {
+                    let mend = format!("write `policy = \"{}\"`", policy.name());
                     self.problem(learner.policy.span(), format!("{key}.policy"), what, mend);
                 }
-                Some((Fault::Estimator, what)) => {
+                Some(Misfit { fault: Fault::Estimator, what, .. }) => {
                     let mend = "write `estimator = \"rls\"`, or set `learn_marker = false`";
                     self.problem(learner.name.span(), format!("{key}.estimator"), what, mend);
                 }

@@ -3,7 +3,7 @@
 use toml::Spanned;
 
 use super::{Check, raw};
-use crate::scenario::{InitialError, Recording, Robot, WorldSpec};
+use crate::scenario::{DataError, InitialError, Recording, Robot, WorldSpec};
 
 impl Check<'_> {
     pub(super) fn world(
@@ -84,19 +84,18 @@ impl Check<'_> {
         let text = match open(file) {
             Ok(text) => text,
             Err(error) => {
-                let mend = "name a file beside the scenario that can be read";
-                self.problem(measurements.file.span(), "measurements.file", format!("{file}: {error}"), mend);
+                let mend = "name a file beside the scenario that can be read, CSV as text in UTF-8";
+                self.problem(measurements.file.span(), "measurements.file", format!("{file} {error}"), mend);
                 return None;
             }
         };
         if columns.len() < raw.robot.joints.get_ref().len() {
             return None;
         }
-        let recording = match Recording::from_csv(&text, &columns, measurements.marker_columns_m.get_ref()) {
+        let recording = match Recording::from_csv(&text, &columns, &measurements.marker_columns_m.get_ref().0) {
             Ok(recording) => recording,
-            Err(error) => {
-                let mend = "correct the data file or the names of its columns";
-                self.problem(measurements.file.span(), "measurements.file", format!("{file} {error}"), mend);
+            Err(DataError { what, mend }) => {
+                self.problem(measurements.file.span(), "measurements.file", format!("{file} {what}"), mend);
                 return None;
             }
         };

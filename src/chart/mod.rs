@@ -2,6 +2,9 @@
 //!
 //! Nothing here knows what is plotted. Curves differ in colour, in dashes and in markers, so that they can be told
 //! apart in grey.
+//!
+//! A [`Chart`] is a grid of [`Panel`]s; a panel has two axes ([`Axis`], linear or logarithmic) and [`Layer`]s that are drawn
+//! in order. Sizes are in pixels of the drawing, places on a panel in the units of its axes.
 
 mod axis;
 mod panel;

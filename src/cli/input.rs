@@ -1,0 +1,51 @@
+//! Where scenarios and their data come from.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use body_schema::scenario::{BUILTIN, Scenario, builtin};
+
+use super::BadInput;
+
+/// A built-in scenario by name, or else a file by path.
+pub fn load_scenario(name: &str) -> Result<Scenario> {
+    let path = PathBuf::from(name);
+    if BUILTIN.iter().any(|builtin| builtin.name == name) {
+        return Ok(builtin(name)?);
+    }
+    let looks_like_a_path = path.extension().is_some() || name.contains(std::path::MAIN_SEPARATOR) || path.exists();
+    if !looks_like_a_path {
+        return Ok(builtin(name)?);
+    }
+    let text = read_text(&path).map_err(|error| BadInput(format!("the scenario {} {error}", path.display())))?;
+    let folder = path.parent().map(PathBuf::from).unwrap_or_default();
+    Ok(Scenario::parse(name, &text, &|file| read_text(&folder.join(file)))?)
+}
+
+/// The text of a file. An error continues a sentence that begins with the file's name.
+fn read_text(path: &Path) -> Result<String, String> {
+    let bytes = std::fs::read(path).map_err(|error| format!("cannot be read: {error}"))?;
+    String::from_utf8(bytes).map_err(|error| match error.as_bytes() {
+        // The byte order marks of UTF-16, as spreadsheets write it.
+        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => "is text in UTF-16; save it in UTF-8".to_owned(),
+        _ => format!("is not text in UTF-8: its byte {} is not", error.utf8_error().valid_up_to() + 1),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_text_is_said() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("data.csv");
+        let error = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).expect("written");
+            read_text(&path).expect_err("no text")
+        };
+        assert_eq!(error(b"x,y\n\x80"), "is not text in UTF-8: its byte 5 is not");
+        assert_eq!(error(b"\xff\xfex\0"), "is text in UTF-16; save it in UTF-8");
+        assert!(read_text(&folder.path().join("none")).expect_err("no file").starts_with("cannot be read: "));
+    }
+}

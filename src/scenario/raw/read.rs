@@ -1,0 +1,100 @@
+//! Reading the keys, and the errors of it.
+
+use super::Scenario;
+use crate::scenario::error::{Problem, similar};
+
+/// Reads the keys of `text`.
+pub fn read(text: &str) -> Result<Scenario, Problem> {
+    let deserializer = toml::Deserializer::parse(text).map_err(|error| problem(text, "", &error))?;
+    serde_path_to_error::deserialize(deserializer).map_err(|error| {
+        let path = readable_path(&error.path().to_string());
+        problem(text, &path, error.inner())
+    })
+}
+
+/// The line (from 1) of a byte offset.
+pub fn line_of(text: &str, offset: usize) -> usize {
+    text.as_bytes().iter().take(offset).filter(|&&byte| byte == b'\n').count() + 1
+}
+
+/// Drops what `Spanned` adds to paths, but for the index of a sequence.
+fn readable_path(path: &str) -> String {
+    let mut readable = String::new();
+    for part in path.split('.') {
+        let (name, index) = part.find('[').map_or((part, ""), |bracket| part.split_at(bracket));
+        if !(name.starts_with("$__") || name == "?" || name.is_empty()) {
+            if !readable.is_empty() {
+                readable.push('.');
+            }
+            readable.push_str(name);
+        }
+        readable.push_str(index);
+    }
+    readable
+}
+
+fn problem(text: &str, path: &str, error: &toml::de::Error) -> Problem {
+    let message = error.message().to_owned();
+    let line = error.span().map_or(1, |span| line_of(text, span.start));
+    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    let below = |key: &str| match path {
+        "" => key.to_owned(),
+        _ if path == key || path.ends_with(&format!(".{key}")) => path.to_owned(),
+        _ => format!("{path}.{key}"),
+    };
+    match quoted.split_first() {
+        Some((unknown, expected)) if message.starts_with("unknown field") => {
+            let with_unit = expected.iter().find(|known| known.starts_with(&format!("{unknown}_")));
+            let mend = match (with_unit, similar(unknown, expected.iter().copied())) {
+                (Some(known), _) => format!("write `{known}`: the unit belongs to the key"),
+                (None, Some(known)) => format!("did you mean `{known}`? The keys here are {}", expected.join(", ")),
+                (None, None) => format!("remove it; the keys here are {}", expected.join(", ")),
+            };
+            Problem { line, key: below(unknown), what: "unknown key".into(), mend }
+        }
+        Some((missing, _)) if message.starts_with("missing field") => Problem {
+            line,
+            key: below(missing),
+            what: "missing".into(),
+            mend: format!("add `{missing} = …` here; the built-in scenarios show each key with its meaning"),
+        },
+        Some((value, expected)) if message.starts_with("unknown variant") => Problem {
+            line,
+            key: path.to_owned(),
+            what: format!("`{value}` is not a choice"),
+            mend: format!("write one of {}", expected.join(", ")),
+        },
+        _ if let Some(number) = error.span().and_then(|span| without_zero(text, span.start)) => Problem {
+            line,
+            key: "(file)".to_owned(),
+            what: format!("`{number}` is no number in TOML"),
+            mend: format!("write {}", number.replacen('.', "0.", 1)),
+        },
+        _ => {
+            let key = if path.is_empty() { "(file)".to_owned() } else { path.to_owned() };
+            let (what, mend) = match message.split_once(", expected ") {
+                Some((what, expected)) => (what.to_owned(), format!("write {expected}{}", unit(&key))),
+                None => (message.clone(), "correct the TOML on this line".to_owned()),
+            };
+            Problem { line, key, what, mend }
+        }
+    }
+}
+
+/// The unit that a key names, as the end of a sentence.
+fn unit(key: &str) -> &'static str {
+    match key.rsplit_once('_') {
+        Some((_, "m")) => " in metres",
+        Some((_, "deg")) => " in degrees",
+        _ => "",
+    }
+}
+
+/// The number around a byte offset whose first digit is missing, as `.03`.
+fn without_zero(text: &str, offset: usize) -> Option<&str> {
+    let is_part = |c: char| c.is_ascii_alphanumeric() || "+-.".contains(c);
+    let start = offset - text.get(..offset)?.rsplit(|c| !is_part(c)).next()?.len();
+    let word = text[start..].split(|c| !is_part(c)).next()?;
+    let digits = word.trim_start_matches(['+', '-']).strip_prefix('.')?;
+    (digits.starts_with(|c: char| c.is_ascii_digit()) && word.parse::<f64>().is_ok()).then_some(word)
+}
