@@ -52,11 +52,14 @@
 //! *Randomness.* One ChaCha stream per purpose and seed ([`experiment::Stream`]). The same seed gives the same numbers on
 //! the same machine, whatever the number of threads.
 
+pub mod assembly;
 #[cfg(feature = "app")]
 mod chart;
+pub mod design;
 pub mod estimation;
 pub mod experiment;
 pub mod kinematics;
+pub mod model;
 pub mod optimize;
 #[cfg(feature = "app")]
 pub mod paper;

@@ -52,8 +52,8 @@ mod tests {
         let arm = random_arm(&mut ChaCha8Rng::seed_from_u64(2), 4);
         let limits = JointBox::new(vec![(-1.0, 1.0); 4]).expect("limits");
         let rig = Rig::tracker(0.01);
-        let axes = Layout::of_arm(&arm, &[], false);
-        let with_base = Layout::new(&arm, (0..4).map(Block::Axis).chain([Block::Base]));
+        let axes = Layout::of_arm(&arm, &[], true);
+        let with_base = Layout::new(&arm, (0..4).map(Block::Axis).chain([Block::Base, Block::Target(0)]));
         assert_eq!(with_base.dimension(), axes.dimension() + 6);
         let alone = movements_by_counting(&arm, &axes, &rig, &limits);
         assert_eq!(movements_by_counting(&arm, &with_base, &rig, &limits), alone, "the base adds nothing");

@@ -120,7 +120,8 @@ impl<'a> Search<'a> {
                 (search.poses, search.shares) = (design.poses.clone(), design.shares.clone());
             }
             None => {
-                let seen = search.candidates.iter().filter(|point| problem.seen(&problem.limits.from_unit(point)).is_some());
+                let seen =
+                    search.candidates.iter().filter(|point| problem.seen(&problem.limits.from_unit(point)).is_some());
                 let seen: Vec<Vec<f64>> = seen.cloned().collect();
                 search.join(seen.iter().step_by(seen.len().div_ceil(STARTING).max(1)).cloned().collect());
             }

@@ -156,7 +156,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let mut detector = ChangeDetector { deviations: 3.0, ..ChangeDetector::honest() };
         let draws = 100_000;
-        let alarms = (0..draws).filter(|_| detector.observe(nis(&mut rng, 0.0))).count();
+        let alarms = (0..draws).filter(|_| detector.observe(nis(&mut rng, 0.0), 3)).count();
         let [least, most] = [tails(3.0)[0], tails(3.0).iter().sum()].map(|share| share * f64::from(draws));
         assert!((least..=most).contains(&(alarms as f64)), "{alarms}, not {least} to {most}");
     }

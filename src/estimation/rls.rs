@@ -148,7 +148,8 @@ mod tests {
         let near = filter.belief().state.marker_at(&theta);
         let spread = if rng.random_range(0..2) == 0 { 0.01 } else { 1.0 };
         let measured = near + Vector3::from_fn(|_, _| rng.random_range(-spread..spread));
-        let observation = if rng.random_range(0..10) == 0 { Observation::missed(1) } else { Observation::seen(measured) };
+        let observation =
+            if rng.random_range(0..10) == 0 { Observation::missed(1) } else { Observation::seen(measured) };
         filter.update(&theta, &observation).expect("a finite update");
     }
 

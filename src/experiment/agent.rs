@@ -14,7 +14,9 @@ use super::streams::Stream;
 use crate::{
     estimation::{Belief, EstimationError, Estimator, Update},
     kinematics::JointBox,
-    selection::{Actions, Appraisal, History, Movement, Policy, Search, Selection, SelectionError, Situation, condition},
+    selection::{
+        Actions, Appraisal, History, Movement, Policy, Search, Selection, SelectionError, Situation, condition,
+    },
     sensing::{Observation, Refused},
 };
 
@@ -201,11 +203,7 @@ impl Agent {
     }
 
     /// What a movement would teach it where it stood at `standpoint`, by what it chooses by.
-    pub fn appraise(
-        &self,
-        standpoint: Standpoint<'_>,
-        configuration: &[f64],
-    ) -> Result<Appraisal, SelectionError> {
+    pub fn appraise(&self, standpoint: Standpoint<'_>, configuration: &[f64]) -> Result<Appraisal, SelectionError> {
         self.policy.appraise(&standpoint.situation(), &self.limits, configuration)
     }
 
@@ -230,11 +228,7 @@ impl<'a> Standpoint<'a> {
 
     /// A copy to keep.
     pub fn to_owned(&self) -> OwnedStandpoint {
-        OwnedStandpoint {
-            belief: self.belief.clone(),
-            actions: self.actions.clone(),
-            history: self.history.clone(),
-        }
+        OwnedStandpoint { belief: self.belief.clone(), actions: self.actions.clone(), history: self.history.clone() }
     }
 }
 

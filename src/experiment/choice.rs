@@ -256,7 +256,8 @@ impl Experiment {
         }
         for (joint, q) in configuration.iter().enumerate() {
             if !limits.is_within(joint, *q, JointBox::ROUNDING) {
-                let (name, lower, upper) = (&self.description.joints[joint].name, limits.lower(joint), limits.upper(joint));
+                let (name, lower, upper) =
+                    (&self.description.joints[joint].name, limits.lower(joint), limits.upper(joint));
                 let said = format!("has {q} for `{name}`, whose limits are {lower} and {upper} (rad or m)");
                 return Err(ChoiceError::Configuration(said));
             }

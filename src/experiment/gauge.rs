@@ -131,10 +131,8 @@ impl Gauge {
         let m = self.layout.dimension();
         let across = DMatrix::identity(m, m) - &free * free.transpose();
         let eigen = SymmetricEigen::new(across);
-        let determined: Vec<DVector<f64>> = (0..m)
-            .filter(|k| eigen.eigenvalues[*k] > 0.5)
-            .map(|k| eigen.eigenvectors.column(k).into_owned())
-            .collect();
+        let determined: Vec<DVector<f64>> =
+            (0..m).filter(|k| eigen.eigenvalues[*k] > 0.5).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
         let determined = DMatrix::from_columns(&determined);
         let error = determined.tr_mul(&error);
         let covariance = determined.transpose() * covariance * &determined;

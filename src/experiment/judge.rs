@@ -46,13 +46,7 @@ pub struct Verdict {
 impl Verdict {
     fn new(thresholds: Thresholds) -> Self {
         let unjudged = Convergence::new(thresholds);
-        Self {
-            convergence: unjudged.clone(),
-            recovery: unjudged,
-            settled_at: None,
-            noticed_at: None,
-            false_alarms: 0,
-        }
+        Self { convergence: unjudged.clone(), recovery: unjudged, settled_at: None, noticed_at: None, false_alarms: 0 }
     }
 }
 

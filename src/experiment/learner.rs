@@ -124,12 +124,7 @@ impl Learner {
 
     /// How its last movement was chosen: the search by DIRECT that found it, or for a policy that plans, how the criterion
     /// of the next movement looked and where in it the movement lies.
-    pub(super) fn choice(
-        &self,
-        step: u64,
-        report: &LearnerReport,
-        limits: &JointBox,
-    ) -> Result<Choice, ChoiceError> {
+    pub(super) fn choice(&self, step: u64, report: &LearnerReport, limits: &JointBox) -> Result<Choice, ChoiceError> {
         let not_searched = || ChoiceError::NotSearched(self.description.name.clone());
         let movement = report.movement.as_ref().ok_or_else(not_searched)?;
         let selection = &self.last.as_ref().ok_or_else(not_searched)?.selection;

@@ -173,7 +173,7 @@ impl Evaluation {
     }
 }
 
-fn learned_revolute<'a>(estimate: &'a Chain, truth: &'a Chain, layout: &Layout) -> Vec<(&'a Joint, &'a Joint)> {
+fn learned_revolute<'a>(estimate: &'a State, truth: &'a State, layout: &Layout) -> Vec<(&'a Joint, &'a Joint)> {
     (0..layout.joints())
         .filter(|&index| layout.point(index).is_some())
         .map(|index| (&estimate.joints[index], &truth.joints[index]))

@@ -10,6 +10,8 @@ mod comparison;
 mod convergence;
 mod gauge;
 mod judge;
+#[cfg(test)]
+mod laws;
 mod learner;
 mod metrics;
 mod report;

@@ -1,6 +1,6 @@
 //! One joint: a twist of unit pitch-free motion, and its exponential.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, UnitVector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3};
 use serde::{Deserialize, Serialize};
 
 /// A directed line in space: the axis of a revolute joint at θ = 0.
@@ -102,14 +102,6 @@ impl Joint {
                 point + r * cos + w.cross(&r) * sin + w * (w.dot(&r) * (1.0 - cos))
             }
             Self::Prismatic(direction) => x + direction.into_inner() * position,
-        }
-    }
-
-    /// The rotation matrix of e^{ξθ} (the identity for a prismatic joint).
-    pub(crate) fn rotation(&self, position: f64) -> Matrix3<f64> {
-        match self {
-            Self::Revolute(line) => *Rotation3::from_axis_angle(&line.direction, position).matrix(),
-            Self::Prismatic(_) => Matrix3::identity(),
         }
     }
 

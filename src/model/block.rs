@@ -38,9 +38,7 @@ impl Block {
             }
             Self::Target(target) => target < state.targets.len(),
             Self::Device(device) => device < state.devices.len(),
-            Self::Intrinsics(device) => {
-                state.devices.get(device).is_some_and(|device| device.intrinsics.is_some())
-            }
+            Self::Intrinsics(device) => state.devices.get(device).is_some_and(|device| device.intrinsics.is_some()),
             Self::Socket(socket) => socket < state.sockets.len(),
         }
     }

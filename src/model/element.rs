@@ -16,7 +16,9 @@
 //! | pose | 3 of its origin (m), 3 of its rotation (rad) | (t + ν, exp(\[ω\]×) R) |
 //! | numbers | as many | x + δ |
 
-use nalgebra::{DMatrix, DVector, DVectorView, Isometry3, Matrix2, Matrix3, Point3, Translation3, UnitVector3, Vector3};
+use nalgebra::{
+    DMatrix, DVector, DVectorView, Isometry3, Matrix2, Matrix3, Point3, Translation3, UnitVector3, Vector3,
+};
 
 use crate::kinematics::{Joint, chart, rotation};
 
@@ -177,8 +179,7 @@ fn axis(guess: &Joint, joint: &Joint) -> Displacement {
     let (w0, w) = (guess.direction(), joint.direction());
     let (basis0, basis) = (chart::basis(&w0), chart::basis(&w));
     // Opposite directions are π apart; along which great circle is anybody's choice.
-    let angle = chart::local_direction(&w0, &w)
-        .unwrap_or_else(|| nalgebra::Vector2::new(std::f64::consts::PI, 0.0));
+    let angle = chart::local_direction(&w0, &w).unwrap_or_else(|| nalgebra::Vector2::new(std::f64::consts::PI, 0.0));
     let parallel = Parallel::new(&w, &w0);
     let carried = basis0.transpose() * parallel.matrix * basis;
     let exact = chart::direction_transport(&w0, &angle, &w).try_inverse();

@@ -6,7 +6,7 @@ use super::error::similar;
 
 /// Recorded joint positions and marker positions, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Recording {
+pub struct Measurements {
     /// Joint positions, rad or m per joint.
     pub configurations: Vec<Vec<f64>>,
     /// Measured markers, metres.
@@ -29,7 +29,7 @@ impl DataError {
     }
 }
 
-impl Recording {
+impl Measurements {
     /// Reads the named columns of a CSV text with a header line: columns are separated by commas, and a number has a
     /// decimal point if anything (`0.03`, `.03`, `3e-2`). An error says which line or column is at fault.
     pub fn from_csv(text: &str, joint_columns: &[&str], marker_columns: &[String; 3]) -> Result<Self, DataError> {
@@ -42,7 +42,7 @@ impl Recording {
             |name: &str| header.iter().position(|title| title == name).ok_or_else(|| unknown_column(name, &header));
         let joints = joint_columns.iter().map(|name| column(name)).collect::<Result<Vec<_>, _>>()?;
         let marker = marker_columns.iter().map(|name| column(name)).collect::<Result<Vec<_>, _>>()?;
-        let mut recording = Self::default();
+        let mut measurements = Self::default();
         for record in reader.records() {
             let record = record.map_err(|error| unreadable(&error))?;
             let line = record.position().map_or(0, csv::Position::line);
@@ -50,11 +50,11 @@ impl Recording {
                 let title = header.get(*index).unwrap_or_default();
                 number(record.get(*index).unwrap_or_default(), &format!("line {line}, column `{title}`"))
             };
-            recording.configurations.push(joints.iter().map(number).collect::<Result<_, _>>()?);
+            measurements.configurations.push(joints.iter().map(number).collect::<Result<_, _>>()?);
             let marker = marker.iter().map(number).collect::<Result<Vec<_>, _>>()?;
-            recording.markers_m.push(Point3::from_slice(&marker));
+            measurements.markers_m.push(Point3::from_slice(&marker));
         }
-        Ok(recording)
+        Ok(measurements)
     }
 }
 
@@ -116,22 +116,22 @@ mod tests {
 
     #[test]
     fn reads_columns_by_name() {
-        let recording = Recording::from_csv(
+        let measurements = Measurements::from_csv(
             TEXT.split_inclusive('\n').take(2).collect::<String>().as_str(),
             &["b", "a"],
             &marker(),
         )
         .expect("a valid table");
-        assert_eq!(recording.configurations, vec![vec![0.25, 0.5]]);
-        assert_eq!(recording.markers_m, vec![Point3::new(1.0, 2.0, 3.0)]);
+        assert_eq!(measurements.configurations, vec![vec![0.25, 0.5]]);
+        assert_eq!(measurements.markers_m, vec![Point3::new(1.0, 2.0, 3.0)]);
     }
 
     #[test]
     fn numbers_may_leave_out_the_zero_before_the_point() {
         let text = "\u{feff}x,y,z,a\n.03,-.5,+1.,3e-2\n";
-        let recording = Recording::from_csv(text, &["a"], &marker()).expect("a valid table");
-        assert_eq!(recording.markers_m, vec![Point3::new(0.03, -0.5, 1.0)]);
-        assert_eq!(recording.configurations, vec![vec![0.03]]);
+        let measurements = Measurements::from_csv(text, &["a"], &marker()).expect("a valid table");
+        assert_eq!(measurements.markers_m, vec![Point3::new(0.03, -0.5, 1.0)]);
+        assert_eq!(measurements.configurations, vec![vec![0.03]]);
     }
 
     #[test]
@@ -152,7 +152,7 @@ mod tests {
             ("x,y,z,a\n1,2,3,\0\n", "a", "is not text: its byte 15 is 0", "export the table as CSV"),
             ("\0\0\0\0", "a", "is not text: its byte 1 is 0", "export the table as CSV"),
         ] {
-            let error = Recording::from_csv(text, &[joint], &marker()).expect_err(text);
+            let error = Measurements::from_csv(text, &[joint], &marker()).expect_err(text);
             assert!(error.what.contains(what) && error.mend.contains(mend), "{text:?}: {error}");
         }
     }

@@ -2,7 +2,10 @@
 
 use std::fmt;
 
-use crate::{experiment::ExperimentError, kinematics::registration::RegistrationError};
+use crate::{
+    experiment::ExperimentError,
+    model::{PriorError, registration::RegistrationError},
+};
 
 /// One thing that is wrong in a scenario file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -76,7 +79,7 @@ pub enum ScenarioError {
     /// No learner is named.
     #[error("no learner is named; leave the list out to take the scenario's own")]
     NoLearner,
-    /// The nominal chain does not fit the measurements.
+    /// The nominal robot does not fit the measurements.
     #[error("scenario `{scenario}`, seed {seed}: {source}")]
     Registration {
         /// The scenario.
@@ -85,6 +88,14 @@ pub enum ScenarioError {
         seed: u64,
         /// Why.
         source: RegistrationError,
+    },
+    /// The prior is none.
+    #[error("scenario `{scenario}`: {source}")]
+    Prior {
+        /// The scenario.
+        scenario: String,
+        /// Why.
+        source: PriorError,
     },
     /// A run failed.
     #[error(transparent)]

@@ -19,7 +19,7 @@ pub struct LearnerSpec {
 }
 
 impl LearnerSpec {
-    pub(super) fn description(&self) -> LearnerDescription {
+    pub(crate) fn description(&self) -> LearnerDescription {
         LearnerDescription {
             name: self.name.clone(),
             estimator: self.estimator.name().to_owned(),
@@ -193,6 +193,7 @@ impl Scenario {
         Setting {
             learns_marker: self.robot.layout.marker().is_some(),
             is_measured: matches!(self.world, WorldSpec::Measured { .. }),
+            sees_markers_alone: self.rig.channels().iter().all(|channel| channel.target() == Some(0)),
         }
     }
 
@@ -228,6 +229,8 @@ pub(super) struct Setting {
     pub learns_marker: bool,
     /// Whether recorded rows are replayed.
     pub is_measured: bool,
+    /// Whether nothing but the marker's position is measured.
+    pub sees_markers_alone: bool,
 }
 
 /// What of a learner is at fault.
@@ -254,6 +257,10 @@ pub(super) fn misfit(estimator: EstimatorKind, policy: PolicyKind, setting: Sett
     }
     if estimator == EstimatorKind::RlsSixNumbers && setting.learns_marker {
         let what = "six numbers per joint leave no place for a learned marker".to_owned();
+        return Some(Misfit { fault: Fault::Estimator, what, instead: (EstimatorKind::Rls, policy) });
+    }
+    if estimator == EstimatorKind::RlsSixNumbers && !setting.sees_markers_alone {
+        let what = "six numbers per joint read nothing but the marker's position".to_owned();
         return Some(Misfit { fault: Fault::Estimator, what, instead: (EstimatorKind::Rls, policy) });
     }
     if setting.is_measured && policy.varies_the_search() {

@@ -2,25 +2,23 @@
 //!
 //! A scenario is TOML, read in two stages: `raw` says which keys there are, and `validate` turns them into a
 //! [`Scenario`] whose values can be relied on. Every problem names the file, the line, the key and the mend. From a
-//! scenario and a seed, [`Scenario::experiment`] draws an experiment.
+//! scenario and a seed, [`assembly`](crate::assembly) draws an experiment.
 
 mod builtin;
 mod data;
 mod edit;
 mod error;
-mod experiment;
 mod learners;
-mod limits;
 mod raw;
 mod summary;
 mod validate;
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use nalgebra::DVector;
 
 pub use builtin::{BUILTIN, Builtin, builtin};
-pub use data::{DataError, Recording};
+pub use data::{DataError, Measurements};
 pub use edit::edited;
 pub use error::{Problem, ScenarioError};
 pub use learners::{EstimatorKind, LearnerSpec, PolicyKind};
@@ -29,9 +27,11 @@ pub use summary::{ScenarioSummary, WorldKind};
 use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
     experiment::Thresholds,
-    kinematics::{Chain, Quantity, TangentLayout},
+    kinematics::JointBox,
+    model::{Block, Layout, Quantity, State},
     optimize::Settings,
-    selection::{CriterionUnits, Planning, Watch},
+    selection::{CriterionUnits, Planning, Watch, Weights},
+    sensing::Rig,
 };
 
 /// A validated scenario.
@@ -47,6 +47,8 @@ pub struct Scenario {
     pub robot: Robot,
     /// Where it moves.
     pub world: WorldSpec,
+    /// What is measured, with the sensors' own noise; with what the filter assumes where measurements are replayed.
+    pub rig: Arc<Rig>,
     /// Prior standard deviations.
     pub prior: Prior,
     /// Values of the recursive least squares.
@@ -82,6 +84,12 @@ impl Scenario {
     /// What recorded measurements would be judged by, were the truth known: 5° and 2 cm.
     pub const THRESHOLDS: Thresholds = Thresholds { orientation_deg: 5.0, location_m: 0.02 };
 
+    /// The weights of the criterion.
+    pub fn weights(&self) -> Weights {
+        let layout = &self.robot.layout;
+        Weights::new(self.selection.units, layout, &self.prior.standard_deviations(layout))
+    }
+
     /// The text of a data file that this scenario has already read.
     pub fn data_file(&self, file: &str) -> Result<String, String> {
         match &self.data {
@@ -96,21 +104,19 @@ impl Scenario {
 pub struct Robot {
     /// Joint names, base first.
     pub names: Vec<String>,
-    /// The chain at θ = 0.
-    pub chain: Chain,
-    /// Which parameters are learned.
-    pub layout: TangentLayout,
-    /// Joint limits, rad or m.
-    pub limits: Vec<(f64, f64)>,
+    /// Its parameters.
+    pub state: State,
+    /// Which of them are learned.
+    pub layout: Layout,
+    /// Joint limits.
+    pub limits: JointBox,
 }
 
 /// The world of a scenario.
 #[derive(Clone, Debug)]
 pub enum WorldSpec {
-    /// The robot's chain is the truth; the initial estimate is drawn around it.
+    /// The robot is the truth; the initial estimate is drawn around it.
     Simulated {
-        /// Standard deviation of the tracker per coordinate, metres.
-        sigma_m: f64,
         /// How wrong the initial estimate is.
         initial_error: InitialError,
         /// The head that watches, if the marker is not always seen.
@@ -118,10 +124,10 @@ pub enum WorldSpec {
         /// How the body changes during a run, if it does.
         change: Option<ChangeSpec>,
     },
-    /// A recorded data set is replayed; the initial estimate is the nominal chain, registered to the training rows.
+    /// A recorded data set is replayed; the initial estimate is the nominal robot, registered to the training rows.
     Measured {
         /// The rows.
-        recording: Recording,
+        measurements: Measurements,
         /// How many rows, drawn by seed, are held out for the prediction error.
         held_out: usize,
     },
@@ -132,8 +138,8 @@ pub enum WorldSpec {
 pub struct ChangeSpec {
     /// The number of movements after which it happens.
     pub step: u64,
-    /// The true chain from then on.
-    pub truth: Chain,
+    /// The true state from then on.
+    pub truth: State,
 }
 
 /// How the error of the initial estimate is drawn.
@@ -175,24 +181,26 @@ pub struct Prior {
 
 impl Prior {
     /// The standard deviation of every tangent coordinate.
-    pub fn standard_deviations(&self, layout: &TangentLayout) -> DVector<f64> {
-        let quantities = layout.quantities();
-        DVector::from_iterator(
-            quantities.len(),
-            quantities.iter().map(|quantity| match quantity {
-                Quantity::Direction => self.direction_rad,
-                Quantity::Point => self.point_m,
-                Quantity::Marker => self.marker_m,
-            }),
-        )
+    pub fn standard_deviations(&self, layout: &Layout) -> DVector<f64> {
+        let mut deviations = DVector::zeros(layout.dimension());
+        for (block, range) in layout.blocks() {
+            for k in range {
+                deviations[k] = match (block, layout.quantities()[k]) {
+                    (Block::Axis(_), Quantity::Length) => self.point_m,
+                    (_, Quantity::Length) => self.marker_m,
+                    _ => self.direction_rad,
+                };
+            }
+        }
+        deviations
     }
 }
 
 /// Values of the recursive least squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filter {
-    /// R = r I as the filter assumes it: r in m².
-    pub noise_m2: f64,
+    /// σ of the first channel as the filter assumes it, √r of its R = r I; the other channels' in proportion.
+    pub sigma: f64,
     /// The stabilising noise of (5), if any.
     pub stabilising: Option<StabilisingNoise>,
 }
@@ -200,8 +208,8 @@ pub struct Filter {
 /// Values of the smoother.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SmootherSpec {
-    /// The measurement variance per coordinate that it assumes, m²: the sensor's own unless the file says otherwise.
-    pub noise_m2: f64,
+    /// σ of the first channel as it assumes it: the sensor's own unless the file says otherwise.
+    pub sigma: f64,
     /// How many hypotheses it keeps and searches.
     pub hypotheses: HypothesisSettings,
 }

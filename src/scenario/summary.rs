@@ -61,8 +61,8 @@ impl Scenario {
 }
 
 impl super::Robot {
-    pub(super) fn joint_descriptions(&self) -> Vec<JointDescription> {
-        (self.names.iter().zip(&self.chain.joints).zip(&self.limits).enumerate())
+    pub(crate) fn joint_descriptions(&self) -> Vec<JointDescription> {
+        (self.names.iter().zip(&self.state.joints).zip(self.limits.joints()).enumerate())
             .map(|(index, ((name, joint), &(lower, upper)))| JointDescription {
                 name: name.clone(),
                 kind: joint.kind(),

@@ -1,6 +1,6 @@
 //! What makes a movement good: the alphabet of optimal design.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use super::Weights;
 use crate::model::{Layout, State, jacobian};
@@ -14,7 +14,33 @@ pub enum Optimality {
     A,
     /// ½ ln det P, the entropy of the parameters in nats. W does not matter.
     D,
-    /// The greatest eigenvalue of W^½ (P − Gᵀ S⁻¹ G) W^½ by power iteration; `update` holds Gᵀ and S⁻¹.
+    /// The greatest eigenvalue of W^½ P W^½, the squared error of what is known worst.
+    E,
+    /// Mean of tr(H P Hᵀ) over the workspace, the squared error of predicted markers, m². W does not matter.
+    I,
+}
+
+/// ½ ln det P; infinite if P is not positive.
+pub(super) fn half_log_determinant(covariance: &DMatrix<f64>) -> f64 {
+    Cholesky::new(covariance.clone())
+        .map_or(f64::INFINITY, |cholesky| cholesky.l_dirty().diagonal().iter().map(|x| x.ln()).sum())
+}
+
+/// Mean of HᵀH over the workspace, H being the marker's (m).
+pub(super) fn prediction_metric(state: &State, layout: &Layout, workspace: &[Vec<f64>]) -> DMatrix<f64> {
+    let m = layout.dimension();
+    let sum = workspace.iter().fold(DMatrix::zeros(m, m), |sum, theta| {
+        let (_, h) = jacobian(state, layout, theta);
+        sum + h.transpose() * h
+    });
+    sum / workspace.len().max(1) as f64
+}
+
+/// Steps of Lanczos' iteration.
+const STEPS: usize = 16;
+
+/// The greatest eigenvalue of W^½ (P − Gᵀ S⁻¹ G) W^½, by Lanczos' iteration with full reorthogonalisation (Golub and Van
+/// Loan, *Matrix Computations*, §10.3): from below, and near. `update` holds Gᵀ and S⁻¹.
 pub(super) fn greatest_eigenvalue(
     covariance: &DMatrix<f64>,
     weights: &Weights,
@@ -22,21 +48,33 @@ pub(super) fn greatest_eigenvalue(
 ) -> f64 {
     let m = covariance.nrows();
     let root = weights.roots();
+    let steps = STEPS.min(m);
+    let mut basis: Vec<DVector<f64>> = Vec::with_capacity(steps);
+    let mut projected = DMatrix::zeros(steps, steps);
     // Not a symmetric start, which could be orthogonal to the eigenvector.
     let mut v = DVector::from_fn(m, |k, _| 1.0 + 0.37 * (k as f64).sin()).normalize();
-    let mut value = 0.0;
-    for _ in 0..STEPS {
+    for step in 0..steps {
         let scaled = v.component_mul(&root);
         let mut next = covariance * &scaled;
         if let Some((gain, inverse)) = update {
             next -= gain * (inverse * gain.tr_mul(&scaled));
         }
         next.component_mul_assign(&root);
-        value = next.norm();
-        if value <= 0.0 || !value.is_finite() {
+        projected[(step, step)] = v.dot(&next);
+        basis.push(v);
+        for _ in 0..2 {
+            for known in &basis {
+                next.axpy(-known.dot(&next), known, 1.0);
+            }
+        }
+        let length = next.norm();
+        if step + 1 == steps || length <= 1e-14 * projected[(step, step)].abs() || !length.is_finite() {
             break;
         }
-        v = next / value;
+        projected[(step + 1, step)] = length;
+        projected[(step, step + 1)] = length;
+        v = next / length;
     }
-    value
+    let found = projected.view((0, 0), (basis.len(), basis.len())).into_owned();
+    if found.iter().all(|x| x.is_finite()) { SymmetricEigen::new(found).eigenvalues.max() } else { f64::NAN }
 }

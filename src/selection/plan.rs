@@ -80,7 +80,7 @@ impl Plan {
 
 /// Changes the covariance of every hypothesis of `belief` as an observation after moving to `pose` would, counted `weight`
 /// times, by hypothesis; a negative weight takes it out again.
-pub(super) fn condition(belief: &mut Belief, pose: &[f64], weight: impl Fn(usize) -> f64) {
+pub(crate) fn condition(belief: &mut Belief, pose: &[f64], weight: impl Fn(usize) -> f64) {
     let Belief { state, layout, rig, covariance, alternatives } = belief;
     if let Some(covariance) = covariance {
         update(covariance, &rig.jacobian(state, layout, pose), weight(0));

@@ -127,8 +127,7 @@ impl Planner {
             criterion: Some(value),
             gain: Some(outlook.before() - value),
             evaluations,
-            search: partition
-                .map(|partition| Search { settings: self.search, partition: partition.choosing(&chosen) }),
+            search: partition.map(|partition| Search { settings: self.search, partition: partition.choosing(&chosen) }),
             plan: Some(Planned { poses, committed: committed.saturating_sub(1) }),
         })
     }

@@ -4,9 +4,7 @@
 //! P serves them all. What is left per candidate are d × d matrices; for three equations, as of a marker, their size is
 //! known when this is compiled.
 
-use nalgebra::{
-    Cholesky, Const, DMatrix, DefaultAllocator, Dim, Dyn, Matrix3, OMatrix, Point3, allocator::Allocator,
-};
+use nalgebra::{Cholesky, Const, DMatrix, DefaultAllocator, Dim, Dyn, Matrix3, OMatrix, Point3, allocator::Allocator};
 
 use crate::{
     model::{Layout, Pass, State},

@@ -2,6 +2,8 @@
 
 use std::{fmt, sync::Arc};
 
+use serde::{Deserialize, Serialize};
+
 use crate::model::{Pass, State};
 
 /// One kind of reading: what a model predicts for it, and how predictions differ from what was measured.
@@ -40,12 +42,13 @@ pub trait Channel: fmt::Debug + Send + Sync {
 }
 
 /// What a scenario may say of a sensor. A channel takes the keys that it knows and refuses the others.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Keys {
+    /// Which channel; `position` unless told otherwise.
+    pub channel: Option<String>,
     /// Standard deviation of the noise, metres.
     pub sigma_m: Option<f64>,
-    /// A fixed point beside the robot, metres, in the frame of the measurements.
-    pub to_m: Option<[f64; 3]>,
 }
 
 /// What is wrong with the keys of a sensor.
@@ -53,23 +56,32 @@ pub struct Keys {
 #[error("`{key}`: {what}")]
 pub struct KeyError {
     /// The key.
-    pub key: &'static str,
+    pub key: String,
     /// What is wrong.
-    pub what: &'static str,
+    pub what: String,
     /// How to mend it.
-    pub mend: &'static str,
+    pub mend: String,
 }
 
 impl Keys {
     pub(super) fn sigma_m(&self) -> Result<f64, KeyError> {
-        let error = |what| KeyError { key: "sigma_m", what, mend: "write `sigma_m = …`, 0 or more, in metres" };
-        let sigma = self.sigma_m.ok_or_else(|| error("missing"))?;
-        if sigma.is_finite() && sigma >= 0.0 { Ok(sigma) } else { Err(error("out of range")) }
+        let error = |what: String, mend: &str| KeyError { key: "sigma_m".to_owned(), what, mend: mend.to_owned() };
+        let sigma = self.sigma_m.ok_or_else(|| error("missing".to_owned(), "add `sigma_m = …`, in metres"))?;
+        let holds = sigma.is_finite() && sigma >= 0.0;
+        holds
+            .then_some(sigma)
+            .ok_or_else(|| error(format!("{sigma} is out of range"), "write a number that is 0 or more"))
     }
 
-    pub(super) fn without_to(&self) -> Result<(), KeyError> {
-        let what = "this channel has no use for it";
-        self.to_m.map_or(Ok(()), |_| Err(KeyError { key: "to_m", what, mend: "remove it" }))
+    /// Refuses keys that a channel has no use for.
+    pub(super) fn only(&self, known: &[&str]) -> Result<(), KeyError> {
+        let given = serde_json::to_value(self).unwrap_or_default();
+        let given = given.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
+        let unknown = given.map(|(key, _)| key).find(|key| *key != "channel" && !known.contains(&key.as_str()));
+        unknown.map_or(Ok(()), |key| {
+            let what = "this channel has no use for it".to_owned();
+            Err(KeyError { key: key.clone(), what, mend: format!("remove it; the keys here are {}", known.join(", ")) })
+        })
     }
 }
 
@@ -81,11 +93,17 @@ macro_rules! channels {
         /// The names of all channels, as scenarios write them.
         pub const CHANNELS: &[&str] = &[$(stringify!($module)),*];
 
-        /// The channel of that name with the keys of a scenario; `None` for a name that is not in [`CHANNELS`].
-        pub fn channel(name: &str, keys: &Keys) -> Option<Result<std::sync::Arc<dyn Channel>, KeyError>> {
-            match name {
-                $(stringify!($module) => Some($Type::from_keys(keys).map(|it| std::sync::Arc::new(it) as _)),)*
-                _ => None,
+        impl Keys {
+            /// The channel that these keys describe.
+            pub fn channel(&self) -> Result<std::sync::Arc<dyn Channel>, KeyError> {
+                match self.channel.as_deref().unwrap_or(CHANNELS[0]) {
+                    $(stringify!($module) => $Type::from_keys(self).map(|it| std::sync::Arc::new(it) as _),)*
+                    other => Err(KeyError {
+                        key: "channel".to_owned(),
+                        what: format!("there is no channel `{other}`"),
+                        mend: format!("write one of {}", CHANNELS.join(", ")),
+                    }),
+                }
             }
         }
 

@@ -14,7 +14,7 @@ mod laws;
 mod observation;
 mod rig;
 
-pub use channel::{Channel, Keys, KeyError};
+pub use channel::{Channel, KeyError, Keys};
 pub use head::{Gaze, Head};
 pub use observation::{Observation, Refused};
 pub use rig::{Equations, Rig};

@@ -21,7 +21,7 @@ impl Position {
     }
 
     pub(super) fn from_keys(keys: &Keys) -> Result<Self, KeyError> {
-        keys.without_to()?;
+        keys.only(&["sigma_m"])?;
         Ok(Self::of_marker(keys.sigma_m()?))
     }
 

@@ -138,7 +138,8 @@ fn near_the_truth_it_agrees_with_the_filter() {
     let sigma = 1e-5;
     let prior = Prior::with_deviations(guess.clone(), &layout, &deviations).expect("a prior");
     let settings = HypothesisSettings { kept: 1, spawned: 0 };
-    let mut smoother = Smoother::new(prior, layout.clone(), Arc::new(Rig::tracker(sigma)), settings, ChaCha8Rng::seed_from_u64(1));
+    let mut smoother =
+        Smoother::new(prior, layout.clone(), Arc::new(Rig::tracker(sigma)), settings, ChaCha8Rng::seed_from_u64(1));
     let mut information = DMatrix::from_diagonal(&deviations.map(|sd| sd.powi(-2)));
     for _ in 0..8 {
         let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();

@@ -152,8 +152,7 @@ impl Estimator for Smoother {
         let measurement = Measurement { positions: positions.to_vec(), observation: observation.clone() };
         self.posterior.measurements.push(measurement);
         // Before the belief is settled its innovations say little about the body.
-        let change_noticed =
-            self.is_settled() && nis.is_some_and(|(nis, degrees)| self.changes.observe(nis, degrees));
+        let change_noticed = self.is_settled() && nis.is_some_and(|(nis, degrees)| self.changes.observe(nis, degrees));
         if change_noticed {
             self.forget();
         }

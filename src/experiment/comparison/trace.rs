@@ -54,7 +54,7 @@ impl Trace {
             take(experiment.step()?);
             tick();
         }
-        for (trace, verdict) in learners.iter_mut().zip(&experiment.verdicts) {
+        for (trace, verdict) in learners.iter_mut().zip(experiment.judge.verdicts()) {
             trace.converged_at = verdict.convergence.converged_at();
             trace.recovered_at = verdict.recovery.converged_at();
         }

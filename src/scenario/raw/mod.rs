@@ -2,6 +2,7 @@
 
 mod exactly;
 mod read;
+mod sensors;
 
 use std::collections::BTreeMap;
 
@@ -13,6 +14,7 @@ use crate::{kinematics::JointKind, selection::Optimality};
 
 pub use exactly::Exactly;
 pub use read::{line_of, read};
+pub use sensors::Sensors;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -21,7 +23,7 @@ pub struct Scenario {
     pub title: String,
     pub steps: Spanned<u64>,
     pub robot: Robot,
-    pub sensor: Option<Spanned<Sensor>>,
+    pub sensor: Option<Spanned<Sensors>>,
     pub initial_error: Option<Spanned<InitialError>>,
     pub measurements: Option<Spanned<Measurements>>,
     pub head: Option<Spanned<Head>>,
@@ -65,12 +67,6 @@ pub struct Joint {
 
 fn yes() -> bool {
     true
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Sensor {
-    pub sigma_m: Spanned<f64>,
 }
 
 #[derive(Debug, Deserialize)]

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use super::{Check, raw};
 use crate::{
-    kinematics::{Chain, Joint, JointKind, Line, TangentLayout},
+    kinematics::{Joint, JointBox, JointKind, Line},
+    model::{Layout, State},
     scenario::Robot,
 };
 
@@ -29,13 +30,18 @@ impl Check<'_> {
         if names.is_empty() {
             self.problem(raw.joints.span(), "robot.joint", "there is no joint", "add a [[robot.joint]]");
         }
-        let layout = TangentLayout::new(&joints, &learned, raw.learn_marker);
+        let state = State::arm(joints, marker);
+        let layout = Layout::of_arm(&state, &learned, raw.learn_marker);
         if layout.dimension() == 0 {
             let mend = "set `learned = true` on a joint, or `learn_marker = true`";
             self.problem(raw.joints.span(), "robot.joint", "nothing is to be learned", mend);
         }
-        let complete = joints.len() == names.len() && limits.len() == names.len() && !names.is_empty();
-        complete.then_some(Robot { names, chain: Chain { joints, marker }, layout, limits })
+        let complete = state.joints.len() == names.len() && limits.len() == names.len() && !names.is_empty();
+        let limits = JointBox::new(limits).map_err(|error| {
+            self.problem(raw.joints.span(), "robot.joint", error.to_string(), "write limits that a robot can have");
+        });
+        let limits = limits.ok().filter(|_| complete)?;
+        Some(Robot { names, state, layout, limits })
     }
 
     fn joint(&mut self, raw: &raw::Joint, span: Range<usize>, key: &dyn Fn(&str) -> String) -> Option<Joint> {

@@ -12,7 +12,7 @@ use crate::{
 impl Check<'_> {
     pub(super) fn change(&mut self, raw: &raw::Change, robot: &Robot) -> Option<ChangeSpec> {
         let step = self.at_least_one("change.step", &raw.step);
-        let mut truth = robot.chain.clone();
+        let mut truth = robot.state.clone();
         if raw.tilt.is_none() && raw.shift.is_none() {
             self.problem(raw.step.span(), "change", "nothing changes", "add `tilt = { … }` or `shift = { … }`");
         }
@@ -49,7 +49,8 @@ impl Check<'_> {
                     line.point += by;
                 }
             }
-            truth.marker += by;
+            let marker = truth.marker() + by;
+            truth = truth.with_marker(marker);
         }
         Some(ChangeSpec { step, truth })
     }

@@ -34,7 +34,7 @@ impl Check<'_> {
         }
         let head = Head { position, look, pan_limit, tilt_limit, lens_half_angle, baseline };
         let visible_pose = self.visible_pose(&raw.visible_pose_deg, robot)?;
-        let marker = robot.chain.marker_at(&visible_pose);
+        let marker = robot.state.marker_at(&visible_pose);
         if self.problems.len() > problems {
             return None;
         }
@@ -56,7 +56,7 @@ impl Check<'_> {
     /// The positions of a pose (degrees or metres as the kind of each joint says), within the limits.
     fn visible_pose(&mut self, raw: &Spanned<Vec<f64>>, robot: &Robot) -> Option<Vec<f64>> {
         let key = "head.visible_pose_deg";
-        let (given, wanted) = (raw.get_ref(), robot.chain.joints.len());
+        let (given, wanted) = (raw.get_ref(), robot.state.joints.len());
         if given.len() != wanted {
             let what = format!("it has {} positions, the robot {wanted} joints", given.len());
             self.problem(raw.span(), key, what, "write one position per joint, base first");
@@ -64,7 +64,7 @@ impl Check<'_> {
         }
         let mut pose = Vec::new();
         for ((&value, name), (joint, &(lower, upper))) in
-            given.iter().zip(&robot.names).zip(robot.chain.joints.iter().zip(&robot.limits))
+            given.iter().zip(&robot.names).zip(robot.state.joints.iter().zip(robot.limits.joints()))
         {
             let revolute = joint.kind() == JointKind::Revolute;
             let position = if revolute { value.to_radians() } else { value };

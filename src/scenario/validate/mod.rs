@@ -21,6 +21,7 @@ use crate::{
     experiment::Thresholds,
     optimize::{Settings, Variant},
     selection::{CriterionUnits, Planning},
+    sensing::Rig,
 };
 
 /// How far from 1 the length of an axis may be: what is lost by writing six digits.
@@ -119,7 +120,12 @@ impl Check<'_> {
         }
         let robot = self.robot(&raw.robot)?;
         let world = self.world(raw, &robot, open);
-        let setting = Setting { learns_marker: raw.robot.learn_marker, is_measured: raw.measurements.is_some() };
+        let rig = self.rig(raw)?;
+        let setting = Setting {
+            learns_marker: raw.robot.learn_marker,
+            is_measured: raw.measurements.is_some(),
+            sees_markers_alone: rig.channels().iter().all(|channel| channel.target() == Some(0)),
+        };
         let learners = self.learners(&raw.learners, setting);
         let filter = self.filter("filter", &raw.filter);
         Some(Scenario {
@@ -129,7 +135,8 @@ impl Check<'_> {
             prior: self.prior(raw),
             filter,
             unscented: raw.unscented.as_ref().map_or(filter, |unscented| self.filter("unscented", unscented)),
-            smoother: self.smoother(raw),
+            smoother: self.smoother(raw, &rig),
+            rig,
             gradient_rate: self.gradient_rate(raw),
             selection: self.selection(&raw.selection),
             thresholds: self.thresholds(raw),
@@ -163,19 +170,18 @@ impl Check<'_> {
             first_step: self.at_least_one(&key("stabilising_noise.first_step"), &noise.first_step),
             every: self.at_least_one(&key("stabilising_noise.every"), &noise.every),
         });
-        let noise_m2 = self.positive(&key("measurement_variance_m2"), &raw.measurement_variance_m2);
-        Filter { noise_m2, stabilising }
+        let variance = self.positive(&key("measurement_variance_m2"), &raw.measurement_variance_m2);
+        Filter { sigma: variance.sqrt(), stabilising }
     }
 
-    fn smoother(&mut self, raw: &raw::Scenario) -> SmootherSpec {
+    fn smoother(&mut self, raw: &raw::Scenario, rig: &Rig) -> SmootherSpec {
         let default = HypothesisSettings::default();
         let given = raw.smoother.as_ref();
         let variance = given.and_then(|given| given.measurement_variance_m2.as_ref());
-        let sensor = raw.sensor.as_ref().map(|sensor| sensor.get_ref().sigma_m.get_ref().powi(2));
-        let noise_m2 = match variance {
-            Some(variance) => self.positive("smoother.measurement_variance_m2", variance),
+        let sigma = match variance {
+            Some(variance) => self.positive("smoother.measurement_variance_m2", variance).sqrt(),
             // A sensor without noise would make the posterior infinitely sharp.
-            None => sensor.map_or(*raw.filter.measurement_variance_m2.get_ref(), |variance| variance.max(1e-10)),
+            None => rig.sigma().max(1e-5),
         };
         let mut count = |key: &str, value: Option<&Spanned<u64>>, default: usize| {
             value.map_or(default, |value| self.at_least_one(key, value).min(1000) as usize)
@@ -184,7 +190,7 @@ impl Check<'_> {
             kept: count("smoother.hypotheses", given.and_then(|given| given.hypotheses.as_ref()), default.kept),
             spawned: count("smoother.spawned", given.and_then(|given| given.spawned.as_ref()), default.spawned),
         };
-        SmootherSpec { noise_m2, hypotheses }
+        SmootherSpec { sigma, hypotheses }
     }
 
     /// The rate of the gradient. A file that has learn by it says which; others leave it to a default.

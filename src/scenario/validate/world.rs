@@ -3,7 +3,12 @@
 use toml::Spanned;
 
 use super::{Check, raw};
-use crate::scenario::{DataError, InitialError, Recording, Robot, WorldSpec};
+use std::sync::Arc;
+
+use crate::{
+    scenario::{DataError, InitialError, Measurements, Robot, WorldSpec},
+    sensing::Rig,
+};
 
 impl Check<'_> {
     pub(super) fn world(
@@ -13,7 +18,7 @@ impl Check<'_> {
         open: &dyn Fn(&str) -> Result<String, String>,
     ) -> Option<WorldSpec> {
         match (&raw.sensor, &raw.initial_error, &raw.measurements) {
-            (Some(sensor), Some(error), None) => {
+            (Some(_), Some(error), None) => {
                 let marker_m = error.get_ref().marker_m.as_ref();
                 if raw.robot.learn_marker && marker_m.is_none() {
                     let mend = "add `marker_m = …`, or set `learn_marker = false`";
@@ -29,7 +34,6 @@ impl Check<'_> {
                 let watch = raw.head.as_ref().map(|head| self.head(head, robot));
                 let change = raw.change.as_ref().map(|change| self.change(change.get_ref(), robot));
                 Some(WorldSpec::Simulated {
-                    sigma_m: self.not_negative("sensor.sigma_m", &sensor.get_ref().sigma_m),
                     initial_error: InitialError {
                         draw: error.draw,
                         angle_rad: angle.to_radians(),
@@ -64,6 +68,36 @@ impl Check<'_> {
         }
     }
 
+    /// What is measured: the sensors of a simulated world; where measurements are replayed a tracker with the noise that
+    /// the filter assumes.
+    pub(super) fn rig(&mut self, raw: &raw::Scenario) -> Option<Arc<Rig>> {
+        let Some(sensors) = &raw.sensor else {
+            return Some(Arc::new(Rig::tracker(raw.filter.measurement_variance_m2.get_ref().sqrt())));
+        };
+        let given = sensors.get_ref();
+        let mut channels = Vec::new();
+        for (index, keys) in given.0.iter().enumerate() {
+            let section = if given.0.len() > 1 { format!("sensor[{index}]") } else { "sensor".to_owned() };
+            let span = if given.0.len() > 1 { keys.span() } else { sensors.span() };
+            match keys.get_ref().channel() {
+                Ok(channel) if given.0.len() > 1 && channel.sigma() == 0.0 => {
+                    let what = "several sensors are weighed by their noise, and this one has none";
+                    self.problem(span, format!("{section}.sigma_m"), what, "write a number above 0");
+                }
+                Ok(channel) => channels.push(channel),
+                Err(error) => self.problem(span, format!("{section}.{}", error.key), error.what, error.mend),
+            }
+        }
+        if given.0.is_empty() {
+            self.problem(sensors.span(), "sensor", "there is no sensor", "add `sigma_m = 0.01`, say");
+        }
+        if let Some(head) = raw.head.as_ref().filter(|_| channels.iter().any(|channel| channel.target() != Some(0))) {
+            let mend = "leave [head] out, or use sensors of the marker's position alone";
+            self.problem(head.span(), "head", "a head watches the marker, and not what another sensor measures", mend);
+        }
+        (channels.len() == given.0.len() && !channels.is_empty()).then(|| Arc::new(Rig::new(channels)))
+    }
+
     fn measured(
         &mut self,
         raw: &raw::Scenario,
@@ -92,22 +126,22 @@ impl Check<'_> {
         if columns.len() < raw.robot.joints.get_ref().len() {
             return None;
         }
-        let recording = match Recording::from_csv(&text, &columns, &measurements.marker_columns_m.get_ref().0) {
-            Ok(recording) => recording,
+        let rows = match Measurements::from_csv(&text, &columns, &measurements.marker_columns_m.get_ref().0) {
+            Ok(rows) => rows,
             Err(DataError { what, mend }) => {
                 self.problem(measurements.file.span(), "measurements.file", format!("{file} {what}"), mend);
                 return None;
             }
         };
-        let (rows, held_out) = (recording.markers_m.len(), *measurements.held_out.get_ref());
+        let (count, held_out) = (rows.markers_m.len(), *measurements.held_out.get_ref());
         // The rigid fit needs four rows at least.
-        if held_out == 0 || held_out + 4 > rows {
-            let what = format!("{held_out} of {rows} rows cannot be held out");
-            let mend = format!("write a number from 1 to {}", rows.saturating_sub(4));
+        if held_out == 0 || held_out + 4 > count {
+            let what = format!("{held_out} of {count} rows cannot be held out");
+            let mend = format!("write a number from 1 to {}", count.saturating_sub(4));
             self.problem(measurements.held_out.span(), "measurements.held_out", what, mend);
             return None;
         }
         self.data = Some((file.clone(), text));
-        Some(WorldSpec::Measured { recording, held_out })
+        Some(WorldSpec::Measured { measurements: rows, held_out })
     }
 }

@@ -1,0 +1,120 @@
+//! A learner as a scenario specifies it: its estimator, its policy, and what it is told.
+
+use std::sync::Arc;
+
+use super::Briefing;
+use crate::{
+    estimation::{Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls},
+    experiment::{Agent, Learner, Stream},
+    model::{Block, Layout, Prior},
+    optimize::{Settings, Variant},
+    scenario::{
+        ErrorDraw, EstimatorKind, Filter, InitialError, LearnerSpec, PolicyKind, Scenario, ScenarioError, SmootherSpec,
+        WorldSpec,
+    },
+    selection::{Active, Minimiser, Planner, Policy, Random},
+};
+
+/// States drawn from the posterior for one Monte Carlo evaluation of (7).
+const MONTE_CARLO_SAMPLES: usize = 16;
+
+impl Scenario {
+    pub(super) fn learner(
+        &self,
+        spec: &LearnerSpec,
+        seed: u64,
+        layout: &Arc<Layout>,
+        briefing: &Briefing,
+    ) -> Result<Learner, ScenarioError> {
+        let agent = self.agent_of(spec, seed, layout, briefing)?;
+        let workspace = briefing.workspace.clone();
+        Ok(Learner::new(spec.description(), agent, self.weights(), workspace, self.settled_below_m))
+    }
+
+    pub(super) fn agent_of(
+        &self,
+        spec: &LearnerSpec,
+        seed: u64,
+        layout: &Arc<Layout>,
+        briefing: &Briefing,
+    ) -> Result<Agent, ScenarioError> {
+        let estimator = self.estimator(spec, seed, layout, briefing)?;
+        let (actions, limits) = (briefing.actions.clone(), self.robot.limits.clone());
+        Ok(Agent::new(estimator, self.policy(spec, briefing), actions, limits, seed))
+    }
+
+    fn estimator(
+        &self,
+        spec: &LearnerSpec,
+        seed: u64,
+        layout: &Arc<Layout>,
+        briefing: &Briefing,
+    ) -> Result<Box<dyn Estimator>, ScenarioError> {
+        let belief = |sigma: f64| {
+            let rig = Arc::new(self.rig.assuming(sigma));
+            Belief::new(briefing.initial.clone(), layout.clone(), rig)
+        };
+        let covariance = briefing.covariance.clone();
+        let stabilising = |filter: Filter| filter.stabilising.filter(|_| spec.stabilising);
+        Ok(match spec.estimator {
+            EstimatorKind::Rls => Box::new(Rls::new(belief(self.filter.sigma), covariance, stabilising(self.filter))),
+            EstimatorKind::Unscented => {
+                let filter = self.unscented;
+                Box::new(UnscentedRls::new(belief(filter.sigma), covariance, stabilising(filter)))
+            }
+            EstimatorKind::RlsSixNumbers => {
+                let (direction, point) = (self.prior.direction_rad, self.prior.point_m);
+                Box::new(SixNumbers::new(belief(self.filter.sigma), direction, point, stabilising(self.filter)))
+            }
+            EstimatorKind::Smoother => {
+                let SmootherSpec { sigma, hypotheses } = self.smoother;
+                let bound = match &self.world {
+                    WorldSpec::Simulated {
+                        initial_error: InitialError { draw: ErrorDraw::Anywhere, point_m, .. },
+                        ..
+                    } => Some(*point_m),
+                    _ => None,
+                };
+                // Without a guess axes may be anywhere; a marker is known as well as the prior says.
+                let within = |block| bound.filter(|_| matches!(block, Block::Axis(_)));
+                let prior = Prior::new(briefing.initial.clone(), layout, covariance, within)
+                    .map_err(|source| ScenarioError::Prior { scenario: self.name.clone(), source })?;
+                let (rig, rng) = (Arc::new(self.rig.assuming(sigma)), Stream::Hypotheses.rng(seed));
+                Box::new(Smoother::new(prior, layout.clone(), rig, hypotheses, rng))
+            }
+            EstimatorKind::Gradient => Box::new(Gradient::new(belief(1.0), self.gradient_rate)),
+        })
+    }
+
+    fn policy(&self, spec: &LearnerSpec, briefing: &Briefing) -> Box<dyn Policy> {
+        let (weights, watch) = (self.weights(), briefing.watch.clone());
+        let kind = spec.policy;
+        let settings = self.selection.search;
+        let evaluations = settings.max_evaluations;
+        let minimiser = match kind {
+            PolicyKind::Random => return Box::new(Random::new(weights, watch)),
+            PolicyKind::Active | PolicyKind::ActivePlanned | PolicyKind::ActiveNaive | PolicyKind::ActiveMonteCarlo => {
+                Minimiser::Direct(settings)
+            }
+            PolicyKind::ActiveDirect => Minimiser::Direct(Settings { variant: Variant::Original, ..settings }),
+            PolicyKind::ActiveRandomSearch => Minimiser::Random { evaluations },
+            PolicyKind::ActiveBayesian => Minimiser::Bayesian { evaluations },
+        };
+        let samples = if kind == PolicyKind::ActiveMonteCarlo { MONTE_CARLO_SAMPLES } else { 0 };
+        let plans = kind == PolicyKind::ActivePlanned
+            || (kind == PolicyKind::Active && spec.estimator == EstimatorKind::Smoother);
+        if plans {
+            let planner = Planner::new(weights, settings, self.selection.planning, briefing.workspace.clone());
+            return Box::new(match watch {
+                Some(watch) => planner.watched(watch),
+                None => planner,
+            });
+        }
+        let active = Active::new(weights, minimiser).sampled(samples);
+        Box::new(match watch {
+            Some(watch) if kind == PolicyKind::ActiveNaive => active.watched_naively(watch),
+            Some(watch) => active.watched(watch),
+            None => active,
+        })
+    }
+}

@@ -1,0 +1,283 @@
+//! From a scenario and a seed to an experiment: everything that is drawn is drawn here.
+
+mod learners;
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, Rotation3, UnitVector3, Vector3};
+use rand::{RngExt, seq::SliceRandom};
+use rand_chacha::ChaCha8Rng;
+
+use crate::{
+    design::{Problem, Stretch, movements_by_counting},
+    experiment::{Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World},
+    kinematics::{Joint, JointBox},
+    model::{Block, Element, State, anywhere, registration::register},
+    scenario::{ErrorDraw, InitialError, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
+    selection::{Actions, Movement, Watch},
+    sensing::Observation,
+};
+
+/// Configurations over which the prediction error is judged in a simulated world.
+const EVALUATION_SIZE: usize = 200;
+/// Configurations over which a learner judges itself.
+const WORKSPACE_SIZE: usize = 32;
+
+/// What learners are told at the start. Nothing in it comes from the truth but through the drawn initial estimate.
+struct Briefing {
+    initial: State,
+    /// P₀ of recursive least squares and of a smoother with a guess.
+    covariance: DMatrix<f64>,
+    actions: Actions,
+    workspace: Vec<Vec<f64>>,
+    watch: Option<Watch>,
+}
+
+impl Scenario {
+    /// The experiment of a seed with the named learners; with all of the scenario's if none are named.
+    pub fn experiment(&self, seed: u64, learners: Option<&[String]>) -> Result<Experiment, ScenarioError> {
+        let (world, evaluation, briefing) = self.draw(seed)?;
+        self.assemble(seed, &self.chosen(learners)?, world, evaluation, &briefing)
+    }
+
+    /// The agent of a learner, told what the learners of this seed are told: what has no world to live in, but a robot of
+    /// its own.
+    pub fn agent(&self, learner: &LearnerSpec, seed: u64) -> Result<Agent, ScenarioError> {
+        let (.., briefing) = self.draw(seed)?;
+        self.agent_of(learner, seed, &Arc::new(self.robot.layout.clone()), &briefing)
+    }
+
+    /// What designs are sought for here; `None` where no truth is known or a sensor has no noise.
+    pub fn design_problem(&self) -> Option<Problem> {
+        let WorldSpec::Simulated { watch, .. } = &self.world else { return None };
+        if self.rig.channels().iter().any(|channel| channel.sigma() <= 0.0) {
+            return None;
+        }
+        let layout = self.robot.layout.clone();
+        let deviations = self.prior.standard_deviations(&layout);
+        Some(Problem {
+            truth: self.robot.state.clone(),
+            rig: self.rig.clone(),
+            limits: self.robot.limits.clone(),
+            head: watch.as_ref().map(|watch| watch.head),
+            prior: DMatrix::from_diagonal(&deviations.map(|sd| sd.powi(-2))),
+            weights: self.weights(),
+            layout,
+        })
+    }
+
+    /// The same along a run of so many steps, one stretch before a change of the body and one after it; empty where no
+    /// truth is known or a sensor has no noise.
+    pub fn design_stretches(&self, steps: u64) -> Vec<Stretch> {
+        let Some(problem) = self.design_problem() else { return Vec::new() };
+        let change = match &self.world {
+            WorldSpec::Simulated { change: Some(change), .. } if change.step < steps => change,
+            _ => return vec![Stretch { problem, from: 0, to: steps }],
+        };
+        let changed = Problem { truth: change.truth.clone(), ..problem.clone() };
+        vec![Stretch { problem, from: 0, to: change.step }, Stretch { problem: changed, from: change.step, to: steps }]
+    }
+
+    fn draw(&self, seed: u64) -> Result<(World, Evaluation, Briefing), ScenarioError> {
+        match &self.world {
+            WorldSpec::Simulated { initial_error, watch, change } => {
+                let truth = self.robot.state.clone();
+                let limits = &self.robot.limits;
+                let briefing = Briefing {
+                    initial: self.perturbed(initial_error, &mut Stream::InitialEstimate.rng(seed)),
+                    covariance: self.prior_covariance(),
+                    actions: Actions::Box(limits.clone()),
+                    // Uniform in the joint box, seen or not: what a head can see depends on the truth.
+                    workspace: drawn(limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true),
+                    watch: watch.clone(),
+                };
+                let head = watch.as_ref().map(|watch| watch.head);
+                let seen = |theta: &[f64]| head.is_none_or(|head| head.sees(&truth.marker_at(theta)));
+                let mut configurations = drawn(limits, EVALUATION_SIZE, Stream::Evaluation, seed, seen);
+                if configurations.is_empty() {
+                    configurations.extend(watch.as_ref().map(|watch| watch.visible_pose.clone()));
+                }
+                let evaluation = Evaluation::of_truth(configurations, &truth, self.rig.sigma());
+                let change = change.as_ref().map(|change| Change { step: change.step, truth: change.truth.clone() });
+                Ok((World::Simulated { truth, rig: self.rig.clone(), head, change }, evaluation, briefing))
+            }
+            WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, *held_out),
+        }
+    }
+
+    fn prior_covariance(&self) -> DMatrix<f64> {
+        let deviations = self.prior.standard_deviations(&self.robot.layout);
+        DMatrix::from_diagonal(&deviations.map(|sd| sd * sd))
+    }
+
+    /// Holds rows out, and registers the nominal robot to the others. What the fit leaves unsure of base and marker is
+    /// added to the prior: it correlates the axes.
+    fn draw_measured(
+        &self,
+        seed: u64,
+        measurements: &Measurements,
+        held_out: usize,
+    ) -> Result<(World, Evaluation, Briefing), ScenarioError> {
+        let mut rows: Vec<usize> = (0..measurements.markers_m.len()).collect();
+        rows.shuffle(&mut Stream::HeldOut.rng(seed));
+        let (test, training) = rows.split_at_mut(held_out);
+        training.sort_unstable();
+        let pair = |row: &usize| (measurements.configurations[*row].clone(), measurements.markers_m[*row]);
+        let data: Vec<_> = training.iter().map(pair).collect();
+        let layout = &self.robot.layout;
+        let registration = register(&self.robot.state, &data, layout.marker().is_some())
+            .map_err(|source| ScenarioError::Registration { scenario: self.name.clone(), seed, source })?;
+        let (initial, unsure) = registration.carried(layout);
+        let movement =
+            |row: &usize| Movement { configuration: measurements.configurations[*row].clone(), row: Some(*row) };
+        let briefing = Briefing {
+            initial,
+            covariance: self.prior_covariance() + unsure,
+            actions: Actions::Pool(training.iter().map(movement).collect()),
+            workspace: data.into_iter().map(|(theta, _)| theta).collect(),
+            watch: None,
+        };
+        let evaluation = Evaluation::of_measurements(test.iter().map(pair).collect());
+        let observations = measurements.markers_m.iter().map(|marker| Observation::seen(*marker)).collect();
+        Ok((World::Measured { observations }, evaluation, briefing))
+    }
+
+    /// The true state with the error of the initial estimate: for each learned joint three Euler angles, then for a
+    /// revolute one three coordinates; at last the marker.
+    fn perturbed(&self, error: &InitialError, rng: &mut ChaCha8Rng) -> State {
+        let mut state = self.robot.state.clone();
+        let layout = &self.robot.layout;
+        for (_, joint) in state.joints.iter_mut().enumerate().filter(|(index, _)| layout.is_learned(*index)) {
+            if error.draw == ErrorDraw::Anywhere {
+                if let Element::Axis(drawn) = anywhere(&Element::Axis(*joint), error.point_m, rng) {
+                    *joint = drawn;
+                }
+                continue;
+            }
+            let angles = error.draw(error.angle_rad, rng);
+            let turn = Rotation3::from_euler_angles(angles.x, angles.y, angles.z);
+            let turned = |w: &UnitVector3<f64>| UnitVector3::new_normalize(turn * w.into_inner());
+            match joint {
+                Joint::Revolute(line) => {
+                    line.direction = turned(&line.direction);
+                    line.point += error.draw(error.point_m, rng);
+                }
+                Joint::Prismatic(direction) => *direction = turned(direction),
+            }
+        }
+        if layout.block(Block::Target(0)).is_some() {
+            let marker = state.marker() + error.draw(error.marker_m, rng);
+            state = state.with_marker(marker);
+        }
+        state
+    }
+
+    fn assemble(
+        &self,
+        seed: u64,
+        specs: &[LearnerSpec],
+        world: World,
+        evaluation: Evaluation,
+        briefing: &Briefing,
+    ) -> Result<Experiment, ScenarioError> {
+        let robot = &self.robot;
+        let layout = Arc::new(robot.layout.clone());
+        let learners = specs
+            .iter()
+            .map(|spec| self.learner(spec, seed, &layout, briefing))
+            .collect::<Result<Vec<_>, ScenarioError>>()?;
+        let description = Description {
+            scenario: self.name.clone(),
+            title: self.title.clone(),
+            seed,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            joints: robot.joint_descriptions(),
+            parameters: layout.dimension(),
+            movements_by_counting: movements_by_counting(&robot.state, &layout, &self.rig.assuming(1.0), &robot.limits),
+            learners: specs.iter().map(LearnerSpec::description).collect(),
+            thresholds: self.thresholds,
+            movements_available: briefing.actions.remaining(),
+            truth: world.truth().map(ModelReport::of_state),
+            change_at: world.change().map(|change| change.step),
+            head: briefing.watch.as_ref().map(|watch| HeadDescription::of(&watch.head)),
+        };
+        Ok(Experiment::new(description, world, learners, evaluation, self.design_problem()))
+    }
+}
+
+/// Draws before giving up on finding more configurations that are wanted.
+const PATIENCE: usize = 100_000;
+
+/// Up to `count` configurations, uniform among those in the box that are `wanted`.
+fn drawn(limits: &JointBox, count: usize, stream: Stream, seed: u64, wanted: impl Fn(&[f64]) -> bool) -> Vec<Vec<f64>> {
+    let mut rng = stream.rng(seed);
+    let draws = std::iter::repeat_with(|| limits.draw(&mut rng)).take(PATIENCE);
+    draws.filter(|theta| wanted(theta)).take(count).collect()
+}
+
+impl InitialError {
+    fn draw(&self, size: f64, rng: &mut ChaCha8Rng) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| match self.draw {
+            ErrorDraw::UpTo | ErrorDraw::Anywhere => size * rng.random_range(-1.0..=1.0),
+            ErrorDraw::Exactly => size * if rng.random::<bool>() { 1.0 } else { -1.0 },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::builtin;
+
+    /// Judges look only where the head can see, by the truth.
+    #[test]
+    fn the_evaluation_set_lies_in_view() {
+        let scenario = builtin("head-fov").expect("a built-in scenario");
+        let (world, evaluation, briefing) = scenario.draw(5).expect("a world");
+        let head = world.head().expect("a head");
+        assert_eq!(evaluation.targets().len(), EVALUATION_SIZE);
+        assert!(evaluation.targets().iter().all(|(_, marker)| head.sees(marker)));
+        let truth = world.truth().expect("simulated");
+        assert!(briefing.workspace.iter().any(|theta| !head.sees(&truth.marker_at(theta))), "without truth");
+    }
+
+    /// No truth leaks: with the truth swapped behind the learners' backs, their first choices stay as they were, and
+    /// the choices after the first measurement do not.
+    #[test]
+    fn swapping_the_truth_changes_no_first_selection() {
+        for (name, learner) in [
+            ("arm-6dof", None),
+            ("arm-12dof", None),
+            ("head-fov", None),
+            ("arm-6dof", Some("global")),
+            ("arm-6dof-no-prior", Some("global")),
+            ("head-fov", Some("global")),
+        ] {
+            let scenario = builtin(name).expect("a built-in scenario");
+            let selections = |swap: bool| {
+                let (mut world, mut evaluation, briefing) = scenario.draw(11).expect("a world");
+                if let (true, World::Simulated { truth, .. }) = (swap, &mut world) {
+                    *truth = scenario.perturbed(
+                        &InitialError { draw: ErrorDraw::Exactly, angle_rad: 0.7, point_m: 0.3, marker_m: 0.1 },
+                        &mut Stream::InitialEstimate.rng(99),
+                    );
+                    evaluation.follow(truth);
+                }
+                let names = learner.map(|learner| [learner.to_owned()]);
+                let specs = scenario.chosen(names.as_ref().map(<[_; 1]>::as_slice)).expect("learners");
+                let mut experiment =
+                    scenario.assemble(11, &specs, world, evaluation, &briefing).expect("an experiment");
+                [(); 3].map(|()| {
+                    let report = experiment.step().expect("a step");
+                    let chosen = |learner: &crate::experiment::LearnerReport| {
+                        learner.movement.as_ref().expect("a movement").configuration.clone()
+                    };
+                    report.learners.iter().map(chosen).collect::<Vec<_>>()
+                })
+            };
+            let ([first, .., last], [first_swapped, .., last_swapped]) = (selections(false), selections(true));
+            assert_eq!(first, first_swapped, "{name}");
+            assert_ne!(last[0], last_swapped[0], "{name}: the active learner must have seen another marker");
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! Laws of agents, over all estimators and policies: propose and absorb are two, and a list of events tells all.
+
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{AbsorbError, Agent, Event, Executed};
+use crate::{
+    estimation::HypothesisSettings,
+    kinematics::JointBox,
+    scenario::{EstimatorKind, PolicyKind, Scenario, builtin},
+    selection::Movement,
+    sensing::Observation,
+};
+
+/// Every estimator with every policy that fits it.
+fn pairs(scenario: &Scenario) -> Vec<String> {
+    let pairs = EstimatorKind::ALL.into_iter().flat_map(|estimator| PolicyKind::ALL.map(|policy| (estimator, policy)));
+    pairs
+        .map(|(estimator, policy)| format!("{}:{}", estimator.name(), policy.name()))
+        .filter(|name| scenario.chosen(Some(std::slice::from_ref(name))).is_ok())
+        .collect()
+}
+
+fn agent(scenario: &Scenario, name: &str, seed: u64) -> Agent {
+    let spec = scenario.chosen(Some(&[name.to_owned()])).expect("fits").remove(0);
+    scenario.agent(&spec, seed).expect("an agent")
+}
+
+/// What an agent believes, bit by bit.
+fn belief_bits(agent: &Agent) -> Vec<u64> {
+    let belief = agent.belief();
+    let mut numbers = Vec::new();
+    let mut put = |state: &crate::model::State| {
+        for joint in &state.joints {
+            numbers.extend(joint.direction().iter().copied());
+            numbers.extend(
+                joint.line().into_iter().flat_map(|line| line.point.coords.iter().copied().collect::<Vec<_>>()),
+            );
+        }
+        numbers.extend(state.marker().coords.iter().copied());
+    };
+    put(&belief.state);
+    belief.alternatives.iter().for_each(|alternative| put(&alternative.state));
+    numbers.extend(belief.alternatives.iter().map(|alternative| alternative.weight));
+    numbers.extend(belief.covariance.iter().flat_map(|p| p.iter().copied()));
+    numbers.into_iter().map(f64::to_bits).collect()
+}
+
+/// Lives through a random list of events with a world that is the scenario's robot: proposals asked for once or twice,
+/// carried out as proposed or a little differently, out of order, never, or taken back; movements that nobody proposed;
+/// measurements that do not fit.
+fn live(scenario: &Scenario, agent: &mut Agent, seed: u64) -> Vec<Event> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let limits: &JointBox = &scenario.robot.limits;
+    let mut events = Vec::new();
+    for _ in 0..7 {
+        let known = agent.pending().len();
+        let count = rng.random_range(1..=2);
+        let first = agent.propose(count).expect("proposals").to_vec();
+        let again = agent.propose(count).expect("proposals").to_vec();
+        assert_eq!(first, again, "asking twice gives the same proposals");
+        events.extend(first[known..].iter().cloned().map(Event::Proposed));
+        if rng.random_range(0..6) == 0 {
+            let id = first[rng.random_range(0..first.len())].id;
+            assert!(agent.withdraw(id) && !agent.withdraw(id));
+            events.push(Event::Withdrawn(id));
+            continue;
+        }
+        let chosen = &first[rng.random_range(0..first.len())];
+        let (proposal, configuration) = match rng.random_range(0..4) {
+            0 => (None, limits.draw(&mut rng)),
+            1 => {
+                let shaken = chosen.selection.movement.configuration.iter().map(|q| q + rng.random_range(-0.01..0.01));
+                (Some(chosen.id), shaken.collect())
+            }
+            _ => (Some(chosen.id), chosen.selection.movement.configuration.clone()),
+        };
+        let noise: Vec<f64> = (0..scenario.rig.equations()).map(|_| rng.random_range(-1.0..1.0)).collect();
+        let observation = match rng.random_range(0..5) {
+            0 => Observation::missed(scenario.rig.channels().len()),
+            _ => scenario.rig.observe(&scenario.robot.state, &configuration, &noise),
+        };
+        let executed = Executed { proposal, movement: Movement { configuration, row: None }, observation };
+        refuses_what_does_not_fit(agent, &executed);
+        agent.absorb(std::slice::from_ref(&executed)).expect("a measurement");
+        events.push(Event::Executed(executed));
+    }
+    events
+}
+
+/// A bad measurement, alone or behind a good one, is refused with a reason, and nothing is changed by it.
+fn refuses_what_does_not_fit(agent: &mut Agent, good: &Executed) {
+    let before = (belief_bits(agent), agent.pending().to_vec());
+    let mut bad = Vec::new();
+    for observation in [
+        Observation { readings: Vec::new() },
+        Observation::of([1.0]),
+        Observation::of([f64::NAN, 0.0, 0.0]),
+        Observation::of([0.0, f64::INFINITY, 0.0]),
+    ] {
+        bad.push(Executed { observation, ..good.clone() });
+    }
+    for configuration in [Vec::new(), vec![f64::NAN; good.movement.configuration.len()]] {
+        bad.push(Executed { movement: Movement { configuration, row: None }, ..good.clone() });
+    }
+    for bad in bad {
+        for list in [vec![bad.clone()], vec![good.clone(), bad.clone()]] {
+            assert!(matches!(agent.absorb(&list), Err(AbsorbError::Refused(_))), "{bad:?}");
+            assert!(agent.failure().is_none());
+        }
+    }
+    assert!(before == (belief_bits(agent), agent.pending().to_vec()), "a refused measurement changed something");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(3))]
+
+    /// Replaying a list of events gives belief, pending proposals and the next proposal to the last bit; the belief depends
+    /// on the executed ones alone.
+    #[test]
+    fn a_list_of_events_tells_all(seed: u64) {
+        for name in ["arm-6dof-doubled-error", "head-fov"] {
+            let mut scenario = builtin(name).expect("built in");
+            // Short searches: what is replayed does not depend on how long they are.
+            scenario.selection.search.max_evaluations = 30;
+            scenario.smoother.hypotheses = HypothesisSettings { kept: 4, spawned: 3 };
+            for pair in pairs(&scenario) {
+                let mut lived = agent(&scenario, &pair, seed);
+                let events = live(&scenario, &mut lived, seed ^ 5);
+                let mut replayed = agent(&scenario, &pair, seed);
+                events.iter().for_each(|event| replayed.restore(event).expect("restored"));
+                prop_assert!(belief_bits(&lived) == belief_bits(&replayed), "{} {}: belief", name, pair);
+                prop_assert!(lived.pending() == replayed.pending(), "{} {}: pending", name, pair);
+                let next = |agent: &mut Agent| {
+                    let count = agent.pending().len() + 1;
+                    agent.propose(count).expect("a proposal").last().map(|proposal| proposal.selection.clone())
+                };
+                prop_assert!(next(&mut lived) == next(&mut replayed), "{} {}: next proposal", name, pair);
+                // Without any proposal the belief is the same.
+                let mut told = agent(&scenario, &pair, seed);
+                for event in &events {
+                    if let Event::Executed(executed) = event {
+                        let executed = Executed { proposal: None, ..executed.clone() };
+                        told.absorb(&[executed]).expect("a measurement");
+                    }
+                }
+                prop_assert!(belief_bits(&lived) == belief_bits(&told), "{} {}: belief without proposals", name, pair);
+            }
+        }
+    }
+}
+
+/// The numbers of a proposal depend on its ordinal alone, not on how many its forerunners used.
+#[test]
+fn random_numbers_are_keyed_by_the_ordinal() {
+    let scenario = builtin("arm-6dof").expect("built in");
+    let mut one_by_one = agent(&scenario, "rls:random", 3);
+    let all = agent(&scenario, "rls:random", 3).propose(4).expect("proposals").to_vec();
+    for (ordinal, expected) in all.iter().enumerate() {
+        let found = one_by_one.propose(1).expect("a proposal")[0].clone();
+        assert_eq!((found.id, &found.selection), (ordinal as u64, &expected.selection));
+        assert!(one_by_one.withdraw(found.id));
+    }
+}
+
+/// Two proposals at once are two movements.
+#[test]
+fn proposals_are_chosen_given_the_pending_ones() {
+    let scenario = builtin("arm-6dof").expect("built in");
+    for name in ["rls:active", "smoother:active-planned"] {
+        let mut agent = agent(&scenario, name, 3);
+        let proposals = agent.propose(3).expect("proposals").to_vec();
+        let gains: Vec<f64> = proposals.iter().filter_map(|proposal| proposal.selection.gain).collect();
+        assert!(gains.len() == 3 && gains.iter().all(|gain| *gain > 0.0), "{name}: {gains:?}");
+        for (index, a) in proposals.iter().enumerate() {
+            for b in &proposals[..index] {
+                assert_ne!(a.selection.movement, b.selection.movement, "{name}");
+            }
+        }
+    }
+}
