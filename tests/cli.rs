@@ -69,6 +69,24 @@ fn the_same_command_gives_the_same_outcome_with_one_and_with_two_threads() {
 }
 
 #[test]
+fn a_recording_that_is_asked_for_is_written_although_reruns_switch_is_off() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("a.rrd");
+    let output = Command::new(env!("CARGO_BIN_EXE_body-schema"))
+        .args(["run", "arm-6dof", "--steps", "2", "--rrd"])
+        .arg(&file)
+        .env("RERUN", "off")
+        .output()
+        .expect("the program starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let bytes = std::fs::read(&file).expect("a recording");
+    let messages = re_log_encoding::DecoderApp::decode_eager(std::io::Cursor::new(bytes)).expect("a stream");
+    let messages: Vec<_> = messages.collect::<Result<_, _>>().expect("a whole recording");
+    assert!(messages.iter().any(|message| message.store_id().is_recording()), "data");
+    assert!(messages.iter().any(|message| message.store_id().is_blueprint()), "an arrangement of views");
+}
+
+#[test]
 fn run_writes_all_that_it_is_asked_for() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();

@@ -12,6 +12,8 @@ mod errors;
 mod openapi;
 #[path = "http/pages.rs"]
 mod pages;
+#[path = "http/program.rs"]
+mod program;
 #[path = "http/sessions.rs"]
 mod sessions;
 #[path = "http/shutdown.rs"]

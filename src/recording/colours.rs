@@ -1,8 +1,13 @@
 //! Colours that keep their meaning everywhere: one per learner, grey for the truth, a scale for the criterion.
 
-pub use super::palette::learner_color;
-use super::palette::mix;
-pub(super) use super::palette::viridis;
+/// What the page draws with too: the panel's crate puts a module `colours` of its own around the same file, and wants
+/// nothing in it that it does not use.
+#[path = "palette.rs"]
+mod palette;
+
+pub use palette::learner_color;
+use palette::mix;
+pub(super) use palette::viridis;
 
 /// The colour of the truth: grey.
 pub const TRUTH_COLOR: [u8; 3] = [0x80, 0x80, 0x80];

@@ -20,6 +20,7 @@ impl<W: io::Write> StepsCsv<W> {
     /// Writes the header: `step`, `learner`, the metrics, the configuration as `q_{joint}_rad` or `q_{joint}_m`, the
     /// marker as measured and as predicted before the measurement.
     pub fn new(description: &Description, output: W) -> Result<Self, RecordingError> {
+        let mut table = Self::without_header(description, output);
         let mut header: Vec<String> =
             ["step", "learner"].iter().chain(&metrics::NAMES).map(|&s| s.to_owned()).collect();
         header.extend(description.joints.iter().map(|joint| match joint.kind {
@@ -29,9 +30,13 @@ impl<W: io::Write> StepsCsv<W> {
         for what in ["measured", "predicted"] {
             header.extend(["x", "y", "z"].map(|axis| format!("{what}_{axis}_m")));
         }
-        let mut writer = Writer::from_writer(output);
-        writer.write_record(&header)?;
-        Ok(Self { writer, joints: description.joints.len() })
+        table.writer.write_record(&header)?;
+        Ok(table)
+    }
+
+    /// Goes on with a table whose header is written elsewhere.
+    pub fn without_header(description: &Description, output: W) -> Self {
+        Self { writer: Writer::from_writer(output), joints: description.joints.len() }
     }
 
     /// Writes the rows of one step.

@@ -6,7 +6,7 @@ use rerun::{
 };
 
 use super::{
-    EllipsoidSize, blueprint,
+    EllipsoidSize, charts,
     colours::learner_color,
     head, metrics,
     model::{self, Uncertainty},
@@ -45,7 +45,7 @@ impl LearnerEntities {
 
     /// What no view of the arrangement shows.
     pub(super) fn hidden(&self) -> impl Iterator<Item = EntityPath> {
-        let series = self.metrics.iter().zip(metrics::NAMES).filter(|(_, name)| !blueprint::shows(name));
+        let series = self.metrics.iter().zip(metrics::NAMES).filter(|(_, name)| !charts::shows(name));
         series.map(|(series, _)| series.clone()).chain([self.entity("direct/leaves")])
     }
 
@@ -115,10 +115,10 @@ impl LearnerEntities {
         }
         if let Some(slice) = self.plane.and_then(|plane| Slice::of(partition, plane)) {
             rows.at(step, &self.entity("direct/criterion"), &[&slice.fill]);
-            rows.at(step, &self.entity("direct/boxes"), &[&slice.boxes]);
+            rows.at(step, &self.entity("direct/boxes"), &[&slice.outlines]);
             rows.at(step, &self.entity("direct/centres"), &[&slice.centres]);
             rows.at(step, &self.entity("direct/chosen"), &[&slice.chosen]);
         }
-        rows.at(step, &self.entity("direct/leaves"), &[&partition::leaves(partition)]);
+        rows.at(step, &self.entity("direct/leaves"), &[&partition::data(partition)]);
     }
 }

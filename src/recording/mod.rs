@@ -22,7 +22,7 @@
 //! | `/{learner}/marker/predicted`, `…/measured` | Points3D | the marker before the update; measured is empty after a miss |
 //! | `/{learner}/marker/missed` | Points3D | the true marker after a miss, otherwise empty; absent without a head |
 //! | `/{learner}/direct/criterion` | Image, Transform3D | the criterion over a slice of DIRECT's partition |
-//! | `/{learner}/direct/boxes`, `…/centres`, `…/chosen` | Boxes2D, Points2D | the leaves of the slice, the centres of the others, the choice |
+//! | `/{learner}/direct/boxes`, `…/centres`, `…/chosen` | Boxes2D, Points2D | the rectangles of the slice, the centres of the others, the choice |
 //! | `/{learner}/direct/axes` | LineStrips2D, Points2D, static | frame and labels of the slice: joints and limits |
 //! | `/{learner}/direct/leaves` | plain data | the whole partition, see [`Recorder`] |
 //! | `/{learner}/metrics/{name}` | Scalars, SeriesLines | every metric, and what is known of the choice |
@@ -39,23 +39,27 @@
 //! lasts. Two recordings of one seed hold the same data but for `selection_ms`, the wall time, and Rerun's random ids.
 
 mod blueprint;
+mod charts;
 mod colours;
+mod compact;
 mod csv;
 mod ellipsoid;
 mod error;
 mod file;
 mod head;
+mod layout;
 mod learner;
 mod live;
+mod message;
 mod metrics;
 mod model;
 mod movement;
 mod note;
-mod palette;
 mod partition;
 mod recorder;
 mod rows;
 mod scene;
+mod target;
 
 pub use self::{
     colours::{TRUTH_COLOR, hex, learner_color},
@@ -63,7 +67,8 @@ pub use self::{
     ellipsoid::EllipsoidSize,
     error::RecordingError,
     live::LiveLog,
-    recorder::{Recorder, Target},
+    recorder::Recorder,
+    target::Target,
 };
 
 /// The timeline of a recording: the step of the experiment, counted from 0.

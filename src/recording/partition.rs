@@ -22,7 +22,7 @@ const CHOSEN: [u8; 3] = [0xD5, 0x5E, 0x00];
 /// Pixels along each side of the picture of a slice: sides trisected up to four times fit exactly.
 const PIXELS: usize = 81;
 
-/// How bright the fill of a rectangle is beside its outline.
+/// How bright the fill of a face is beside its outline.
 const FILL: f64 = 0.5;
 
 /// The two joints that slices show: `x` to the right, `y` upwards, each from its lower limit to its upper. They are
@@ -35,12 +35,12 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    /// The two joints whose sides are divided most over all leaves, in the order of the arm; the first ones of a tie.
-    /// `None` for an empty partition.
+    /// The two joints whose sides are divided most over all rectangles, in the order of the arm; the first ones of a
+    /// tie. `None` for an empty partition.
     pub(super) fn of(partition: &Partition) -> Option<Self> {
         let dimension = partition.leaves.first()?.levels.len();
         let divisions =
-            |joint: usize| -> u64 { partition.leaves.iter().map(|leaf| u64::from(leaf.levels[joint])).sum() };
+            |joint: usize| -> u64 { partition.leaves.iter().map(|rectangle| u64::from(rectangle.levels[joint])).sum() };
         let mut joints: Vec<usize> = (0..dimension).collect();
         joints.sort_by_key(|&joint| std::cmp::Reverse(divisions(joint)));
         joints.truncate(2);
@@ -48,17 +48,18 @@ impl Plane {
         Some(Self { x: *joints.first()?, y: joints.get(1).copied() })
     }
 
-    /// Centre and half-sizes of a leaf in the unit square. Rerun's 2-D views have y downwards: upper limits are at 0.
-    fn rectangle(self, leaf: &Leaf) -> ([f32; 2], [f32; 2]) {
-        let (y, half_y) = self.y.map_or((0.5, 0.5), |y| (leaf.centre[y], leaf.half_side(y)));
-        ([leaf.centre[self.x] as f32, (1.0 - y) as f32], [leaf.half_side(self.x) as f32, half_y as f32])
+    /// Centre and half-sizes of a rectangle's face in the unit square. Rerun's 2-D views have y downwards: upper limits
+    /// are at 0.
+    fn face(self, rectangle: &Leaf) -> ([f32; 2], [f32; 2]) {
+        let (y, half_y) = self.y.map_or((0.5, 0.5), |y| (rectangle.centre[y], rectangle.half_side(y)));
+        ([rectangle.centre[self.x] as f32, (1.0 - y) as f32], [rectangle.half_side(self.x) as f32, half_y as f32])
     }
 
-    /// Whether a leaf cuts the slice through `chosen`: it contains it in all joints but the two.
-    fn cuts(self, leaf: &Leaf, chosen: &Leaf) -> bool {
-        (0..leaf.levels.len())
+    /// Whether a rectangle cuts the slice through `chosen`: it contains it in all joints but the two.
+    fn cuts(self, rectangle: &Leaf, chosen: &Leaf) -> bool {
+        (0..rectangle.levels.len())
             .filter(|&joint| joint != self.x && Some(joint) != self.y)
-            .all(|joint| leaf.spans(joint, chosen.centre[joint]))
+            .all(|joint| rectangle.spans(joint, chosen.centre[joint]))
     }
 
     /// The frame of the slice and the names and limits of its joints.
@@ -96,34 +97,35 @@ impl Plane {
 /// What is drawn of a slice.
 pub(super) struct Slice {
     pub(super) fill: Image,
-    pub(super) boxes: Boxes2D,
+    pub(super) outlines: Boxes2D,
     pub(super) centres: Points2D,
     pub(super) chosen: Points2D,
 }
 
 impl Slice {
-    /// The slice of a partition through its chosen leaf; `None` if it has none.
+    /// The slice of a partition through its chosen rectangle; `None` if it has none.
     pub(super) fn of(partition: &Partition, plane: Plane) -> Option<Self> {
         let chosen = partition.leaves.get(partition.chosen)?;
         let colour = scale(partition);
         let (mut cut, other): (Vec<&Leaf>, Vec<&Leaf>) =
-            partition.leaves.iter().partition(|leaf| plane.cuts(leaf, chosen));
+            partition.leaves.iter().partition(|rectangle| plane.cuts(rectangle, chosen));
         // Potentially optimal ones last, on top of their neighbours.
-        cut.sort_by_key(|leaf| leaf.potentially_optimal);
-        let rectangles = || cut.iter().map(|leaf| plane.rectangle(leaf));
+        cut.sort_by_key(|rectangle| rectangle.potentially_optimal);
+        let faces = || cut.iter().map(|rectangle| plane.face(rectangle));
         Some(Self {
-            fill: fill(cut.iter().map(|leaf| (plane.rectangle(leaf), colour(leaf)))),
-            boxes: Boxes2D::from_centers_and_half_sizes(rectangles().map(|(c, _)| c), rectangles().map(|(_, h)| h))
-                .with_colors(cut.iter().map(|leaf| Color::from(colour(leaf))))
+            fill: fill(cut.iter().map(|rectangle| (plane.face(rectangle), colour(rectangle)))),
+            outlines: Boxes2D::from_centers_and_half_sizes(faces().map(|(c, _)| c), faces().map(|(_, h)| h))
+                .with_colors(cut.iter().map(|rectangle| Color::from(colour(rectangle))))
                 .with_radii(
-                    cut.iter().map(|leaf| Radius::new_ui_points(if leaf.potentially_optimal { 2.5 } else { 1.0 })),
+                    cut.iter()
+                        .map(|rectangle| Radius::new_ui_points(if rectangle.potentially_optimal { 2.5 } else { 1.0 })),
                 )
                 .with_draw_order(10.0),
-            centres: Points2D::new(other.iter().map(|leaf| plane.rectangle(leaf).0))
-                .with_colors(other.iter().map(|leaf| Color::from(colour(leaf))))
+            centres: Points2D::new(other.iter().map(|rectangle| plane.face(rectangle).0))
+                .with_colors(other.iter().map(|rectangle| Color::from(colour(rectangle))))
                 .with_radii([Radius::new_ui_points(1.5)])
                 .with_draw_order(20.0),
-            chosen: Points2D::new([plane.rectangle(chosen).0])
+            chosen: Points2D::new([plane.face(chosen).0])
                 .with_colors([Color::from(CHOSEN)])
                 .with_radii([Radius::new_ui_points(5.0)])
                 .with_labels(["chosen"])
@@ -133,11 +135,11 @@ impl Slice {
     }
 }
 
-/// The rectangles as a picture; Rerun's boxes are outlines.
-fn fill(rectangles: impl Iterator<Item = (([f32; 2], [f32; 2]), [u8; 3])>) -> Image {
+/// The faces as a picture; Rerun's boxes are outlines.
+fn fill(faces: impl Iterator<Item = (([f32; 2], [f32; 2]), [u8; 3])>) -> Image {
     let mut pixels = vec![0; PIXELS * PIXELS * 3];
-    for ((centre, half), colour) in rectangles {
-        // Of rectangles smaller than a pixel the last one gets it.
+    for ((centre, half), colour) in faces {
+        // Of faces smaller than a pixel the last one gets it.
         let range = |side: usize| {
             let pixel = |place: f32| (place * PIXELS as f32).clamp(0.0, PIXELS as f32);
             let first = (pixel(centre[side] - half[side]) + 1e-3) as usize;
@@ -161,47 +163,53 @@ pub(super) fn fill_transform() -> Transform3D {
     Transform3D::from_scale([pixel, pixel, 1.0])
 }
 
-/// The colour of a leaf: viridis over the values of the partition, the lowest, which DIRECT looks for, brightest.
+/// The colour of a rectangle: viridis over the values of the partition, the lowest, which DIRECT looks for, brightest.
 fn scale(partition: &Partition) -> impl Fn(&Leaf) -> [u8; 3] {
     let (lowest, highest) = partition
         .leaves
         .iter()
-        .filter_map(|leaf| leaf.value)
+        .filter_map(|rectangle| rectangle.value)
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     let range = highest - lowest;
-    move |leaf| match leaf.value {
+    move |rectangle| match rectangle.value {
         Some(value) if range > 0.0 => viridis((highest - value) / range),
         Some(_) => viridis(1.0),
         None => NO_VALUE,
     }
 }
 
-/// All leaves as plain data.
-pub(super) fn leaves(partition: &Partition) -> DynamicArchetype {
-    let leaves = &partition.leaves;
-    let dimension = leaves.first().map_or(0, |leaf| leaf.levels.len());
+/// All rectangles as plain data.
+pub(super) fn data(partition: &Partition) -> DynamicArchetype {
+    let rectangles = &partition.leaves;
+    let dimension = rectangles.first().map_or(0, |rectangle| rectangle.levels.len());
     DynamicArchetype::new_without_archetype()
         .with_component_from_data(
             "centres",
-            Arc::new(Float64Array::from_iter_values(leaves.iter().flat_map(|leaf| leaf.centre.iter().copied()))),
+            Arc::new(Float64Array::from_iter_values(
+                rectangles.iter().flat_map(|rectangle| rectangle.centre.iter().copied()),
+            )),
         )
         .with_component_from_data(
             "levels",
-            Arc::new(UInt8Array::from_iter_values(leaves.iter().flat_map(|leaf| leaf.levels.iter().copied()))),
+            Arc::new(UInt8Array::from_iter_values(
+                rectangles.iter().flat_map(|rectangle| rectangle.levels.iter().copied()),
+            )),
         )
         .with_component_from_data(
             "values",
-            Arc::new(Float64Array::from_iter_values(leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)))),
+            Arc::new(Float64Array::from_iter_values(
+                rectangles.iter().map(|rectangle| rectangle.value.unwrap_or(f64::NAN)),
+            )),
         )
         .with_component_from_data(
             "generations",
             Arc::new(UInt32Array::from_iter_values(
-                leaves.iter().map(|leaf| u32::try_from(leaf.generation).unwrap_or(u32::MAX)),
+                rectangles.iter().map(|rectangle| u32::try_from(rectangle.generation).unwrap_or(u32::MAX)),
             )),
         )
         .with_component_from_data(
             "potentially_optimal",
-            Arc::new(leaves.iter().map(|leaf| Some(leaf.potentially_optimal)).collect::<BooleanArray>()),
+            Arc::new(rectangles.iter().map(|rectangle| Some(rectangle.potentially_optimal)).collect::<BooleanArray>()),
         )
         .with_component_from_data("dimension", Arc::new(UInt32Array::from_iter_values([dimension as u32])))
         .with_component_from_data("chosen", Arc::new(UInt32Array::from_iter_values([partition.chosen as u32])))

@@ -1,21 +1,21 @@
 //! The observer that records.
 
-use std::{collections::BTreeSet, path::PathBuf};
+use std::collections::BTreeSet;
 
 use rerun::{
     RecordingInfo, Scalars, SeriesLines, ViewCoordinates,
-    external::re_log_types::{ApplicationId, EntityPath, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource},
-    log::RowId,
+    external::re_log_types::{ApplicationId, EntityPath, LogMsg, StoreId},
 };
 
 use super::{
-    EllipsoidSize, LiveLog, RecordingError, TRUTH_COLOR,
+    EllipsoidSize, LiveLog, RecordingError, TRUTH_COLOR, Target,
     blueprint::{self, Arrangement},
+    charts::BEST_DESIGN,
     colours::{learner_color, tint},
     file::RrdFile,
     head,
     learner::LearnerEntities,
-    metrics, model,
+    message, metrics, model,
     note::note,
     rows::Rows,
     scene::Scene,
@@ -25,54 +25,11 @@ use crate::experiment::{BestDesign, Description, ModelReport, StepReport};
 /// So many steps are written at once unless somebody flushes earlier …
 const BATCH_STEPS: usize = 64;
 
-/// … or so many leaves of partitions, some tens of megabytes.
-const BATCH_LEAVES: usize = 200_000;
+/// … or so many rectangles of partitions, some tens of megabytes.
+const BATCH_RECTANGLES: usize = 200_000;
 
 /// Length of the arrows, as a part of the size of the arm.
 const ARROW: f64 = 0.22;
-
-/// The series of the best designs.
-pub(super) const BEST_DESIGN: &str = "limits/best_design_trace";
-
-/// Where a recording goes.
-#[derive(Clone, Default)]
-pub struct Target {
-    file: Option<PathBuf>,
-    live: Option<LiveLog>,
-    recording_id: Option<String>,
-    ellipsoids: EllipsoidSize,
-}
-
-impl Target {
-    /// A file, by convention `.rrd`. It is replaced if it exists.
-    pub fn file(path: impl Into<PathBuf>) -> Self {
-        Self::default().and_file(path)
-    }
-
-    /// A log that viewers follow.
-    pub fn live(log: LiveLog) -> Self {
-        Self { live: Some(log), ..Self::default() }
-    }
-
-    /// Also a file.
-    pub fn and_file(mut self, path: impl Into<PathBuf>) -> Self {
-        self.file = Some(path.into());
-        self
-    }
-
-    /// Sets the recording's id. Viewers take two recordings of one id for one: a server that runs a scenario and seed
-    /// twice gives each run an id of its own. Otherwise it is made of scenario and seed.
-    pub fn with_recording_id(mut self, id: impl Into<String>) -> Self {
-        self.recording_id = Some(id.into());
-        self
-    }
-
-    /// Sets the size of all ellipsoids; otherwise 1σ.
-    pub fn with_ellipsoids(mut self, size: EllipsoidSize) -> Self {
-        self.ellipsoids = size;
-        self
-    }
-}
 
 /// Records an experiment, as the module's documentation lists it.
 ///
@@ -83,12 +40,12 @@ impl Target {
 /// If the process is killed, the file holds everything up to the last batch. Viewers open it; `rerun rrd verify`
 /// complains of the missing footer, which `rerun rrd optimize` adds.
 ///
-/// # The leaves
+/// # The partition
 ///
-/// `/{learner}/direct/leaves` holds the whole partition of a step as components of plain numbers: `dimension` n, then
-/// for each leaf `centres` (n f64 in the unit cube), `levels` (n u8, side i is 3^−levelᵢ long), `values` (f64, NaN if
-/// the criterion was not finite), `generations` (u32), `potentially_optimal` (bool); `chosen` is the index of the leaf
-/// whose centre is the chosen configuration.
+/// `/{learner}/direct/leaves` holds all rectangles of a step as components of plain numbers: `dimension` n, then for
+/// each rectangle `centres` (n f64 in the unit cube), `levels` (n u8, side i is 3^−levelᵢ long), `values` (f64, NaN if
+/// the criterion was not finite), `generations` (u32), `potentially_optimal` (bool); `chosen` is the index of the
+/// rectangle whose centre is the chosen configuration.
 ///
 /// The slice in `direct/boxes` is the plane through the chosen configuration along two joints, in units of their
 /// limits: x = centre of the one, y = 1 − centre of the other, because Rerun draws y downwards and upper limits belong
@@ -103,7 +60,7 @@ pub struct Recorder {
     /// Known from the first report on.
     arrow_m: Option<f64>,
     waiting_steps: usize,
-    waiting_leaves: usize,
+    waiting_rectangles: usize,
     finished: bool,
 }
 
@@ -126,7 +83,7 @@ impl Recorder {
                 .collect(),
             arrow_m: None,
             waiting_steps: 0,
-            waiting_leaves: 0,
+            waiting_rectangles: 0,
             finished: false,
         };
         recorder.begin(ellipsoids)?;
@@ -156,10 +113,14 @@ impl Recorder {
         for (entities, learner) in learners.iter_mut().zip(&report.learners) {
             entities.log(rows, report.step, learner, description, arrow_m);
             let partition = learner.movement.as_ref().and_then(|movement| movement.partition.as_ref());
-            self.waiting_leaves += partition.map_or(0, |partition| partition.leaves.len());
+            self.waiting_rectangles += partition.map_or(0, |partition| partition.leaves.len());
         }
         self.waiting_steps += 1;
-        if self.waiting_steps >= BATCH_STEPS || self.waiting_leaves >= BATCH_LEAVES { self.flush() } else { Ok(()) }
+        if self.waiting_steps >= BATCH_STEPS || self.waiting_rectangles >= BATCH_RECTANGLES {
+            self.flush()
+        } else {
+            Ok(())
+        }
     }
 
     /// Records the best designs of several lengths, each at the step at which as many movements are made. At any time
@@ -182,7 +143,7 @@ impl Recorder {
 
     /// Writes the steps that wait. When this returns they are in the log, and with the operating system.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
-        (self.waiting_steps, self.waiting_leaves) = (0, 0);
+        (self.waiting_steps, self.waiting_rectangles) = (0, 0);
         self.write(|_| true)
     }
 
@@ -195,9 +156,9 @@ impl Recorder {
     }
 
     fn write(&mut self, wanted: impl Fn(&EntityPath) -> bool) -> Result<(), RecordingError> {
-        let messages = (self.rows.drain(wanted)?.into_iter())
-            .map(|chunk| Ok(LogMsg::ArrowMsg(self.store.clone(), chunk.to_arrow_msg()?)))
-            .collect::<Result<Vec<_>, RecordingError>>()?;
+        let chunks = self.rows.drain(wanted)?;
+        let messages: Vec<LogMsg> =
+            chunks.iter().map(|chunk| message::data(&self.store, chunk)).collect::<Result<_, _>>()?;
         self.send(&messages)
     }
 
@@ -225,8 +186,7 @@ impl Recorder {
     }
 
     fn begin(&mut self, ellipsoids: EllipsoidSize) -> Result<(), RecordingError> {
-        let info = StoreInfo::new(self.store.clone(), StoreSource::Other("body-schema".to_owned()));
-        self.send(&[SetStoreInfo { row_id: *RowId::new(), info }.into()])?;
+        self.send(&[message::store_info(&self.store)])?;
         let Self { description, rows, .. } = self;
         let name = format!("{}, seed {}", description.scenario, description.seed);
         rows.always(&EntityPath::properties(), &[&RecordingInfo::new().with_name(name)]);

@@ -60,6 +60,21 @@ async fn a_whole_life() {
 }
 
 #[tokio::test]
+async fn who_follows_the_events_need_not_get_the_reports_twice() {
+    let server = Server::start().await;
+    let session = server.open_quick(1).await;
+    let steps_of = |reports| json!({ "count": 2, "reports": reports });
+    let made: Value = server.post(&format!("{session}/steps"), steps_of(false)).await.json().await.expect("JSON");
+    assert_eq!(made, json!({ "step": 2, "remaining": null, "reports": [] }));
+    let made: Value = server.post(&format!("{session}/steps"), steps_of(true)).await.json().await.expect("JSON");
+    assert_eq!((&made["step"], steps(&made["reports"])), (&json!(4), vec![3, 4]));
+    assert_eq!(crate::streams::steps_of_events(&server, &session, 4).await, [0, 1, 2, 3, 4]);
+    let wrong = json!({ "reports": "none" });
+    problem(server.post(&format!("{session}/steps"), wrong).await, 422, Some("reports")).await;
+    server.stop().await;
+}
+
+#[tokio::test]
 async fn downloads_agree_with_the_reports() {
     let server = Server::start().await;
     let session = server.open_quick(7).await;

@@ -72,6 +72,16 @@ impl Events {
     }
 }
 
+/// The steps of a session's events, up to `last`.
+pub async fn steps_of_events(server: &Server, session: &str, last: u64) -> Vec<u64> {
+    let mut events = Events::open(server, session, None).await;
+    let mut steps = Vec::new();
+    while steps.last() != Some(&last) {
+        steps.push(events.next().await.expect("an event").0);
+    }
+    steps
+}
+
 #[tokio::test]
 async fn events_tell_late_visitors_everything_and_resume() {
     let server = Server::start().await;

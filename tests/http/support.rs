@@ -1,6 +1,6 @@
 //! A server on a port of its own, and a client for it.
 
-use std::{net::SocketAddr, path::PathBuf, time::Duration};
+use std::{net::SocketAddr, ops::Deref, path::PathBuf, time::Duration};
 
 use body_schema::server::{Options, ServerError, serve};
 use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
@@ -11,9 +11,9 @@ use tokio_util::sync::CancellationToken;
 /// Whatever takes longer than this hangs.
 pub const SOON: Duration = Duration::from_secs(60);
 
+/// A server within the test's own process.
 pub struct Server {
-    pub address: SocketAddr,
-    pub client: Client,
+    api: Api,
     shutdown: CancellationToken,
     serving: JoinHandle<Result<(), ServerError>>,
 }
@@ -28,7 +28,7 @@ impl Server {
         let address = listener.local_addr().expect("an address");
         let shutdown = CancellationToken::new();
         let serving = tokio::spawn(serve(listener, Options { data_dir, ..Options::default() }, shutdown.clone()));
-        Self { address, client: Client::builder().no_proxy().build().expect("a client"), shutdown, serving }
+        Self { api: Api::at(address), shutdown, serving }
     }
 
     /// Shuts the server down and waits for it.
@@ -36,6 +36,26 @@ impl Server {
         self.shutdown.cancel();
         let ended = timeout(SOON, self.serving).await.expect("the server ends");
         ended.expect("no panic").expect("no error");
+    }
+}
+
+impl Deref for Server {
+    type Target = Api;
+
+    fn deref(&self) -> &Api {
+        &self.api
+    }
+}
+
+/// What a server can be asked.
+pub struct Api {
+    pub address: SocketAddr,
+    pub client: Client,
+}
+
+impl Api {
+    pub fn at(address: SocketAddr) -> Self {
+        Self { address, client: Client::builder().no_proxy().build().expect("a client") }
     }
 
     pub fn request(&self, method: Method, path: &str) -> RequestBuilder {

@@ -49,8 +49,9 @@ const commands = {
     });
   },
 
+  // The reports come over the WebSocket.
   step: ({ session: id, count, expected_step }) =>
-    request("step", "POST", `/v1/sessions/${id}/steps`, { count, expected_step }, ({ step }) =>
+    request("step", "POST", `/v1/sessions/${id}/steps`, { count, expected_step, reports: false }, ({ step }) =>
       tell({ is: "stepped", session: id, step }),
     ),
 

@@ -10,7 +10,7 @@ use axum::{
 
 use super::{aside, json};
 use crate::{
-    experiment::{RunResult, StepReport},
+    experiment::RunResult,
     recording::{RecordingError, StepsCsv},
     server::{
         App,
@@ -49,14 +49,11 @@ pub(super) async fn recording(State(app): State<Arc<App>>, Path(id): Path<String
 )]
 pub(super) async fn steps_csv(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
     let session = app.sessions.get(&id)?;
-    let (description, reports): (_, Vec<Arc<StepReport>>) =
-        (session.description().clone(), session.reports(0, usize::MAX));
+    let (description, reports) = (session.description().clone(), session.reports(0, usize::MAX));
     let table = move || {
         let mut table = Vec::new();
-        let mut csv = StepsCsv::new(&description, &mut table)?;
-        reports.iter().try_for_each(|report| csv.write(report))?;
-        csv.flush()?;
-        drop(csv);
+        StepsCsv::new(&description, &mut table)?.flush()?;
+        reports.iter().for_each(|report| table.extend_from_slice(&report.rows));
         Ok(table)
     };
     let failed = |error: RecordingError| Problem::new(Kind::Internal, error.to_string());

@@ -2,6 +2,7 @@
 
 mod choices;
 mod downloads;
+mod readers;
 mod scenarios;
 mod sessions;
 mod streams;

@@ -9,6 +9,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use serde::{Deserialize, Serialize, Serializer};
+use serde_json::value::RawValue;
 use utoipa::ToSchema;
 
 use super::json;
@@ -40,10 +41,19 @@ pub struct StepRequest {
     /// The step that the session must be at; otherwise nothing is stepped (409). It makes a repeated request safe.
     #[serde(default)]
     pub expected_step: Option<u64>,
+    /// Whether the answer carries the reports of the steps. Whoever follows the session's events or its WebSocket gets
+    /// them there.
+    #[serde(default = "yes")]
+    #[schema(default = true)]
+    pub reports: bool,
 }
 
 fn one() -> u64 {
     1
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// What was made of a [`StepRequest`].
@@ -53,13 +63,13 @@ pub struct MadeSteps {
     pub step: u64,
     /// How many steps the recorded data set has left; null without an end.
     pub remaining: Option<u64>,
-    /// The reports of the steps made, in order.
+    /// The reports of the steps made, in order; empty if the request wants none.
     #[serde(serialize_with = "all")]
     #[schema(value_type = Vec<StepReport>)]
-    pub reports: Vec<Arc<StepReport>>,
+    pub reports: Vec<Arc<RawValue>>,
 }
 
-fn all<S: Serializer>(reports: &[Arc<StepReport>], serializer: S) -> Result<S::Ok, S::Error> {
+fn all<S: Serializer>(reports: &[Arc<RawValue>], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(reports.iter().map(AsRef::as_ref))
 }
 
@@ -143,7 +153,7 @@ pub(super) async fn delete(State(app): State<Arc<App>>, Path(id): Path<String>) 
 pub(super) async fn step(
     State(app): State<Arc<App>>,
     Path(id): Path<String>,
-    JsonBody(StepRequest { count, expected_step }): JsonBody<StepRequest>,
+    JsonBody(StepRequest { count, expected_step, reports }): JsonBody<StepRequest>,
 ) -> Result<Response, Problem> {
     let session = app.sessions.get(&id)?;
     if !(1..=MAX_STEPS_PER_REQUEST).contains(&count) {
@@ -151,7 +161,8 @@ pub(super) async fn step(
         return Err(Problem::new(Kind::InvalidValue, detail).field("count"));
     }
     let session = session.watch();
-    let reports = session.make_steps(count, expected_step).await?;
-    let step = reports.last().map_or(session.step(), |report| report.step);
+    let made = session.make_steps(count, expected_step).await?;
+    let step = made.last().map_or(session.step(), |report| report.step);
+    let reports = if reports { made.into_iter().map(|report| report.json).collect() } else { Vec::new() };
     json(MadeSteps { step, remaining: session.resource().remaining, reports }).await
 }

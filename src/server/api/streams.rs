@@ -1,5 +1,4 @@
-//! Following a session as it goes. Every reader holds an index and goes at its own pace: nothing is sent to it before it
-//! has taken what came before, and a slow one holds up nobody.
+//! Following a session as it goes: events, the recording, and a WebSocket for both.
 
 use std::{convert::Infallible, sync::Arc, time::Duration};
 
@@ -17,21 +16,16 @@ use axum::{
 };
 use futures_util::{Stream, stream::unfold};
 use serde::Serialize;
-use tokio::sync::watch;
+use serde_json::value::RawValue;
 use utoipa::ToSchema;
 
+use super::readers::{Parts, Reports};
 use crate::{
     experiment::{Description, StepReport},
     recording::LiveLog,
-    server::{
-        App, extract,
-        problem::Problem,
-        session::{Session, Watching},
-    },
+    server::{App, extract, problem::Problem, session::Kept},
 };
 
-/// How many reports are taken from the history at a time.
-const BATCH: usize = 64;
 /// From so many waiting parts on, a WebSocket gets them put together: a viewer takes some dozens a frame.
 const MANY_PARTS: usize = 200;
 /// Silence after which a comment or a ping shows that the connection still stands.
@@ -54,7 +48,7 @@ pub(super) enum LiveEvent {
     Description(Box<Description>),
     /// One for each step, from the one asked for on.
     #[schema(value_type = StepReport)]
-    Step(#[serde(serialize_with = "report")] Arc<StepReport>),
+    Step(#[serde(serialize_with = "report")] Arc<RawValue>),
     /// After several parts of the recording were sent as one: which part is the next, to resume from.
     Parts {
         /// Its index.
@@ -62,7 +56,7 @@ pub(super) enum LiveEvent {
     },
 }
 
-fn report<S: serde::Serializer>(report: &Arc<StepReport>, serializer: S) -> Result<S::Ok, S::Error> {
+fn report<S: serde::Serializer>(report: &Arc<RawValue>, serializer: S) -> Result<S::Ok, S::Error> {
     report.as_ref().serialize(serializer)
 }
 
@@ -87,15 +81,14 @@ pub(super) async fn events(
     let session = app.sessions.get(&id)?;
     let first = extract::last_event_id(&headers)?.map_or(0, |last| last.saturating_add(1));
     let events = unfold((Reports::new(&session, first), Vec::new().into_iter()), |(mut reports, mut batch)| async {
-        let report: Arc<StepReport> = match batch.next() {
+        let report: Kept = match batch.next() {
             Some(report) => report,
             None => {
                 batch = reports.next().await?.into_iter();
                 batch.next()?
             }
         };
-        // A report is plain data: writing it cannot fail.
-        let event = Event::default().id(report.step.to_string()).json_data(report.as_ref()).unwrap_or_default();
+        let event = Event::default().id(report.step.to_string()).data(report.json.get());
         Some((Ok::<_, Infallible>(event), (reports, batch)))
     });
     Ok(Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
@@ -195,7 +188,7 @@ async fn follow(
                 let ready = parts.ready();
                 send_parts(&mut socket, &parts, ready).await?;
                 for report in batch.into_iter().flatten() {
-                    socket.send(text(&LiveEvent::Step(report))?).await?;
+                    socket.send(text(&LiveEvent::Step(report.json))?).await?;
                 }
             }
             _ = ping.tick() => socket.send(Message::Ping(Bytes::new())).await?,
@@ -203,10 +196,10 @@ async fn follow(
     }
     while let Some(batch) = reports.next().await {
         for report in batch {
-            socket.send(text(&LiveEvent::Step(report))?).await?;
+            socket.send(text(&LiveEvent::Step(report.json))?).await?;
         }
     }
-    let (code, reason) = match reports.session.failure() {
+    let (code, reason) = match reports.failure() {
         _ if app.sessions.is_shutting_down() => (CLOSE_GOING_AWAY, "the server is shutting down".to_owned()),
         Some(failure) => (CLOSE_FAILED, failure.chars().take(CLOSE_REASON_CHARS).collect()),
         None => (CLOSE_DELETED, "the session was deleted".to_owned()),
@@ -222,99 +215,15 @@ async fn send_parts(socket: &mut WebSocket, parts: &Parts, mut batch: Vec<Bytes>
         }
         return Ok(());
     }
-    let live = parts.session.live().clone();
+    let live = parts.live().clone();
     if batch[0] == live.header() {
         socket.send(Message::Binary(batch.remove(0))).await?;
     }
     let made = tokio::task::spawn_blocking(move || live.put_together(&batch)).await.map_err(axum::Error::new)?;
     socket.send(Message::Binary(made.map_err(axum::Error::new)?)).await?;
-    socket.send(text(&LiveEvent::Parts { next: parts.next })?).await
+    socket.send(text(&LiveEvent::Parts { next: parts.next_index() })?).await
 }
 
 fn text(event: &LiveEvent) -> Result<Message, axum::Error> {
     serde_json::to_string(event).map(|text| Message::Text(text.into())).map_err(axum::Error::new)
-}
-
-/// Reads reports from an index on.
-struct Reports {
-    session: Watching,
-    next: usize,
-    more: watch::Receiver<usize>,
-}
-
-impl Reports {
-    fn new(session: &Arc<Session>, first: u64) -> Self {
-        Self {
-            next: usize::try_from(first).unwrap_or(usize::MAX),
-            more: session.new_reports(),
-            session: session.watch(),
-        }
-    }
-
-    /// The next reports, as soon as there are any; `None` when none are coming. Cancelling loses nothing.
-    async fn next(&mut self) -> Option<Vec<Arc<StepReport>>> {
-        loop {
-            // Asked first: what an ended engine has left is still read.
-            let ended = self.session.ended().is_cancelled();
-            self.more.borrow_and_update();
-            let batch = self.session.reports(self.next, BATCH);
-            if !batch.is_empty() {
-                self.next += batch.len();
-                return Some(batch);
-            }
-            if ended {
-                return None;
-            }
-            changed(&mut self.more, &self.session).await;
-        }
-    }
-}
-
-/// Reads parts of the recording from an index on.
-struct Parts {
-    session: Watching,
-    read: fn(&LiveLog, usize) -> Vec<Bytes>,
-    next: usize,
-    more: watch::Receiver<usize>,
-}
-
-impl Parts {
-    fn new(session: &Arc<Session>, first: u64, read: fn(&LiveLog, usize) -> Vec<Bytes>) -> Self {
-        let more = session.live().subscribe();
-        Self { next: usize::try_from(first).unwrap_or(usize::MAX), more, read, session: session.watch() }
-    }
-
-    /// The next parts, as soon as there are any; `None` when none are coming. Cancelling loses nothing.
-    async fn next(&mut self) -> Option<Vec<Bytes>> {
-        loop {
-            let ended = self.session.ended().is_cancelled();
-            self.more.borrow_and_update();
-            let batch = self.ready();
-            if !batch.is_empty() {
-                return Some(batch);
-            }
-            if ended {
-                return None;
-            }
-            changed(&mut self.more, &self.session).await;
-        }
-    }
-
-    fn ready(&mut self) -> Vec<Bytes> {
-        let batch = (self.read)(self.session.live(), self.next);
-        self.next += batch.len();
-        batch
-    }
-}
-
-async fn changed(more: &mut watch::Receiver<usize>, session: &Session) {
-    let ended = session.ended().cancelled();
-    tokio::select! {
-        biased;
-        changed = more.changed() => if changed.is_err() {
-            // Nothing more can be published, so only the end is left to wait for.
-            session.ended().cancelled().await;
-        },
-        () = ended => {}
-    }
 }

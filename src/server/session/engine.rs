@@ -13,9 +13,9 @@ use std::{
 use tokio::sync::{OwnedSemaphorePermit, oneshot};
 use uuid::Uuid;
 
-use super::Shared;
+use super::{Kept, Shared};
 use crate::{
-    experiment::{AppraisalReport, Choice, Description, Experiment, RunResult, StepReport},
+    experiment::{AppraisalReport, Choice, Description, Experiment, RunResult},
     recording::{EllipsoidSize, Recorder, Target},
     scenario::builtin,
     server::{
@@ -51,7 +51,7 @@ pub(super) enum Command {
     Step {
         count: u64,
         expected: Option<u64>,
-        reply: Reply<Vec<Arc<StepReport>>>,
+        reply: Reply<Vec<Kept>>,
     },
     Result {
         reply: Reply<RunResult>,
@@ -82,7 +82,7 @@ pub(super) type Reply<T> = oneshot::Sender<Result<T, Problem>>;
 /// The body of the thread. `opened` hears of the description once the session stands.
 pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply<Description>) {
     let Setup { id, scenario, seed, learners, ellipsoids, file, shared, permit } = setup;
-    let open = || -> Result<(Experiment, Recorder), Problem> {
+    let open = || -> Result<(Experiment, Recorder, Kept), Problem> {
         let experiment = builtin(&scenario)?.experiment(seed, learners.as_deref())?;
         let target = Target::live(shared.live.clone()).with_recording_id(id.to_string()).with_ellipsoids(ellipsoids);
         let target = file.iter().fold(target, |target, file| target.and_file(file));
@@ -90,11 +90,12 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
             .and_then(|mut recorder| recorder.log(experiment.latest()).map(|()| recorder))
             .map_err(|error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}")))?;
         recorder.flush().map_err(recording_failed)?;
-        Ok((experiment, recorder))
+        let start = Kept::of(experiment.latest(), experiment.description())?;
+        Ok((experiment, recorder, start))
     };
     match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
-        Ok((experiment, mut recorder)) => {
-            shared.publish(vec![kept(experiment.latest())], experiment.remaining());
+        Ok((experiment, mut recorder, start)) => {
+            shared.publish(vec![start], experiment.remaining());
             if opened.send(Ok(experiment.description().clone())).is_ok() {
                 let mut engine = Engine { experiment, shared: &shared };
                 let outcome = catch_unwind(AssertUnwindSafe(|| engine.serve(&commands, &mut recorder)));
@@ -170,8 +171,8 @@ impl Engine<'_> {
         count: u64,
         expected: Option<u64>,
         recorder: &mut Recorder,
-        reply: &mut Reply<Vec<Arc<StepReport>>>,
-    ) -> Result<Vec<Arc<StepReport>>, Problem> {
+        reply: &mut Reply<Vec<Kept>>,
+    ) -> Result<Vec<Kept>, Problem> {
         let step = self.experiment.latest().step;
         if let Some(expected) = expected.filter(|expected| *expected != step) {
             let detail = format!("the session is at step {step}, not {expected}; nothing was stepped");
@@ -199,9 +200,10 @@ impl Engine<'_> {
     }
 
     fn step(&mut self, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
-        let report = self.experiment.step().map_err(|error| Problem::new(Kind::EngineFailed, error.to_string()))?;
+        self.experiment.step().map_err(|error| Problem::new(Kind::EngineFailed, error.to_string()))?;
+        let report = self.experiment.latest();
         // The step stands even if it cannot be recorded.
-        batch.made.push(kept(report));
+        batch.made.push(Kept::of(report, self.experiment.description())?);
         recorder.log(report).map_err(recording_failed)
     }
 
@@ -231,18 +233,9 @@ impl Engine<'_> {
 
 /// The steps of one command.
 struct Batch {
-    made: Vec<Arc<StepReport>>,
+    made: Vec<Kept>,
     published: usize,
     last: Instant,
-}
-
-/// What is kept of a report for late visitors: all but the minimiser's partition, which only recordings hold.
-fn kept(report: &StepReport) -> Arc<StepReport> {
-    let mut report = report.clone();
-    for movement in report.learners.iter_mut().filter_map(|learner| learner.movement.as_mut()) {
-        movement.partition = None;
-    }
-    Arc::new(report)
 }
 
 fn recording_failed(error: impl std::fmt::Display) -> Problem {

@@ -1,9 +1,10 @@
 //! Sessions: experiments that clients step and watch.
 //!
-//! [`engine`] is the thread that computes, [`Shared`] is what it leaves for everyone to read, [`Session`] is the way to
-//! both, and [`registry`] keeps them all.
+//! [`engine`] is the thread that computes, [`Shared`] is what it leaves for everyone to read, each report as [`Kept`],
+//! [`Session`] is the way to both, and [`registry`] keeps them all.
 
 mod engine;
+mod kept;
 mod memory;
 mod registry;
 
@@ -23,13 +24,14 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use engine::Command;
+pub(super) use kept::Kept;
 pub(super) use memory::Budget;
 pub use registry::NewSession;
 pub(super) use registry::Sessions;
 
 use super::problem::{Kind, Problem};
 use crate::{
-    experiment::{AppraisalReport, Choice, Description, RunResult, StepReport},
+    experiment::{AppraisalReport, Choice, Description, RunResult},
     recording::LiveLog,
 };
 
@@ -54,7 +56,7 @@ pub struct SessionResource {
 /// What an engine leaves for everyone to read.
 struct Shared {
     /// One report per step, from step 0.
-    history: RwLock<Vec<Arc<StepReport>>>,
+    history: RwLock<Vec<Kept>>,
     /// The length of `history`, to wait on.
     reports: watch::Sender<usize>,
     /// The recording, as encoded bytes.
@@ -89,10 +91,9 @@ impl Shared {
         }
     }
 
-    fn publish(&self, reports: Vec<Arc<StepReport>>, remaining: Option<usize>) {
+    fn publish(&self, reports: Vec<Kept>, remaining: Option<usize>) {
         // The engine alone publishes, so that nothing comes between these.
-        let reported =
-            self.reported.load(Ordering::Relaxed) + reports.iter().map(|report| memory::of(report)).sum::<usize>();
+        let reported = self.reported.load(Ordering::Relaxed) + reports.iter().map(Kept::bytes).sum::<usize>();
         self.reported.store(reported, Ordering::Relaxed);
         let taken = reported + self.live.bytes();
         self.budget.take(taken - self.taken.swap(taken, Ordering::Relaxed));
@@ -160,7 +161,7 @@ impl Session {
     }
 
     /// The reports from step `first` on, at most `count`.
-    pub(super) fn reports(&self, first: usize, count: usize) -> Vec<Arc<StepReport>> {
+    pub(super) fn reports(&self, first: usize, count: usize) -> Vec<Kept> {
         let history = self.shared.history.read().unwrap_or_else(PoisonError::into_inner);
         history.iter().skip(first).take(count).cloned().collect()
     }
@@ -181,7 +182,7 @@ impl Session {
     }
 
     /// Makes `count` steps, after whatever the session is busy with.
-    pub(super) async fn make_steps(&self, count: u64, expected: Option<u64>) -> Result<Vec<Arc<StepReport>>, Problem> {
+    pub(super) async fn make_steps(&self, count: u64, expected: Option<u64>) -> Result<Vec<Kept>, Problem> {
         self.ask(|reply| Command::Step { count, expected, reply }).await
     }
 

@@ -215,6 +215,24 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn a_report_is_written_once_for_all_its_readers() {
+        let sessions = Sessions::new(Budget::new(usize::MAX), None, CancellationToken::new());
+        let new = NewSession {
+            scenario: "arm-6dof".to_owned(),
+            seed: 1,
+            learners: Some(vec!["random".to_owned()]),
+            ellipsoids: EllipsoidSize::default(),
+        };
+        let session = sessions.open(new).await.expect("a session");
+        let made = session.make_steps(2, None).await.expect("steps");
+        for _ in 0..2 {
+            for (made, read) in made.iter().zip(session.reports(1, 2)) {
+                assert!(Arc::ptr_eq(&made.json, &read.json) && Arc::ptr_eq(&made.rows, &read.rows));
+            }
+        }
+    }
+
+    #[tokio::test]
     async fn full_memory_refuses_steps_until_a_session_goes() {
         let sessions = Sessions::new(Budget::new(300_000), None, CancellationToken::new());
         let new = NewSession {

@@ -1,0 +1,55 @@
+//! Puts the many small chunks of a live session together.
+
+use std::{collections::BTreeMap, io::Cursor};
+
+use re_log_encoding::DecoderApp;
+use rerun::{
+    external::re_log_types::{EntityPath, StoreId},
+    log::{Chunk, LogMsg},
+};
+
+use super::{RecordingError, message};
+
+/// The messages of a stream, with the chunks of each entity put together; what is static comes first.
+pub(super) fn put_together(stream: Vec<u8>) -> Result<Vec<LogMsg>, RecordingError> {
+    let decoded = |source: re_log_encoding::DecodeError| RecordingError::Encode(source.to_string());
+    let mut messages = Vec::new();
+    let mut chunks: BTreeMap<(bool, EntityPath), (StoreId, Vec<Chunk>)> = BTreeMap::new();
+    for message in DecoderApp::decode_eager(Cursor::new(stream)).map_err(decoded)? {
+        match message.map_err(decoded)? {
+            LogMsg::ArrowMsg(store, message) if store.is_recording() => {
+                let chunk = Chunk::from_arrow_msg(&message)?;
+                let key = (!chunk.is_static(), chunk.entity_path().clone());
+                chunks.entry(key).or_insert_with(|| (store, Vec::new())).1.push(chunk);
+            }
+            other => messages.push(other),
+        }
+    }
+    for (store, chunks) in chunks.into_values() {
+        for chunk in merged(chunks)? {
+            messages.push(message::data(&store, &chunk)?);
+        }
+    }
+    Ok(messages)
+}
+
+/// Beyond this many rows chunks are no longer put together: viewers load by chunk.
+const ROWS: usize = 1024;
+
+/// Puts neighbouring chunks of one entity together, by halves: each row is copied only log₂ n times.
+fn merged(mut chunks: Vec<Chunk>) -> Result<Vec<Chunk>, RecordingError> {
+    if chunks.len() < 2 {
+        return Ok(chunks);
+    }
+    let mut right = merged(chunks.split_off(chunks.len() / 2))?.into_iter();
+    let mut left = merged(chunks)?;
+    if let (Some(last), Some(first)) = (left.pop(), right.next()) {
+        if last.num_rows() + first.num_rows() <= ROWS && last.concatenable(&first) {
+            left.push(Chunk::concat_and_sort(&last, &first)?);
+        } else {
+            left.extend([last, first]);
+        }
+    }
+    left.extend(right);
+    Ok(left)
+}

@@ -1,0 +1,174 @@
+//! Views in containers, and the blueprint that they make: what Rerun's own builders write through a stream, as messages.
+//!
+//! A blueprint is a store beside the recording's. Views and containers are entities of it, `view/{uuid}` and
+//! `container/{uuid}`; a container names its contents by their paths, and `viewport` names the outermost one.
+
+use rerun::{
+    Archetype, AsComponents, SerializedComponentBatch, StoreKind, Timeline,
+    external::{
+        re_log_types::{ApplicationId, BlueprintActivationCommand, EntityPath, LogMsg, StoreId},
+        re_sdk_types::blueprint::{
+            archetypes::{
+                ContainerBlueprint, PanelBlueprint, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
+            },
+            components::{ContainerKind, PanelState, PlayState, RootContainer},
+        },
+    },
+    log::{Chunk, RowId},
+};
+use uuid::Uuid;
+
+use super::{RecordingError, TIMELINE, message};
+
+/// A view, or a container of others.
+pub(super) enum Part {
+    View(Box<View>),
+    Container(Box<Container>),
+}
+
+/// One view of the recording.
+pub(super) struct View {
+    path: EntityPath,
+    archetype: ViewBlueprint,
+    contents: Vec<String>,
+    properties: Vec<(&'static str, Vec<SerializedComponentBatch>)>,
+}
+
+impl View {
+    /// A view of a class of Rerun's, `3D` say, with a title.
+    pub(super) fn new(class: &str, title: &str, origin: &EntityPath) -> Self {
+        Self {
+            path: format!("view/{}", Uuid::new_v4()).into(),
+            archetype: ViewBlueprint::new(class).with_display_name(title).with_space_origin(origin.to_string()),
+            contents: vec!["$origin/**".to_owned()],
+            properties: Vec::new(),
+        }
+    }
+
+    /// Shows what these rules say, instead of all that is below the origin.
+    pub(super) fn with_contents(mut self, rules: impl IntoIterator<Item = String>) -> Self {
+        self.contents = rules.into_iter().collect();
+        self
+    }
+
+    /// Sets a property, by the name of its archetype.
+    pub(super) fn with<A: Archetype + AsComponents>(mut self, property: &A) -> Self {
+        self.properties.push((A::name().short_name(), property.as_serialized_batches()));
+        self
+    }
+}
+
+/// Views and containers side by side, or one behind the other.
+pub(super) struct Container {
+    id: Uuid,
+    archetype: ContainerBlueprint,
+    contents: Vec<Part>,
+}
+
+impl Container {
+    fn new(kind: ContainerKind, contents: impl IntoIterator<Item = Part>) -> Self {
+        let contents: Vec<Part> = contents.into_iter().collect();
+        let paths = contents.iter().map(|part| part.path().to_string());
+        let archetype = ContainerBlueprint::new(kind).with_contents(paths);
+        Self { id: Uuid::new_v4(), archetype, contents }
+    }
+
+    pub(super) fn horizontal(contents: impl IntoIterator<Item = Part>) -> Self {
+        Self::new(ContainerKind::Horizontal, contents)
+    }
+
+    /// One above the other; `shares` are their parts of the height.
+    pub(super) fn vertical<const N: usize>(contents: [Part; N], shares: [f32; N]) -> Self {
+        let mut container = Self::new(ContainerKind::Vertical, contents);
+        container.archetype = container.archetype.with_row_shares(shares);
+        container
+    }
+
+    pub(super) fn tabs(contents: impl IntoIterator<Item = Part>) -> Self {
+        Self::new(ContainerKind::Tabs, contents)
+    }
+
+    pub(super) fn grid(contents: impl IntoIterator<Item = Part>, columns: u32) -> Self {
+        let mut container = Self::new(ContainerKind::Grid, contents);
+        container.archetype = container.archetype.with_grid_columns(columns);
+        container
+    }
+
+    fn path(&self) -> EntityPath {
+        format!("container/{}", self.id).into()
+    }
+
+    /// The messages of a blueprint of this container alone, with all panels out of the way: those of the blueprint's
+    /// store, the command that activates it last. `application` is that of the recording.
+    pub(super) fn messages(self, application: ApplicationId) -> Result<Vec<LogMsg>, RecordingError> {
+        let store = StoreId::random(StoreKind::Blueprint, application);
+        let mut blueprint = Blueprint { messages: vec![message::store_info(&store)], store };
+        let viewport = ViewportBlueprint::new().with_root_container(RootContainer(self.id.into()));
+        blueprint.add("viewport", &viewport.with_auto_layout(false).with_auto_views(false))?;
+        blueprint.add("blueprint_panel", &PanelBlueprint::new().with_state(PanelState::Hidden))?;
+        blueprint.add("selection_panel", &PanelBlueprint::new().with_state(PanelState::Hidden))?;
+        let time = TimePanelBlueprint::new().with_state(PanelState::Collapsed);
+        blueprint.add("time_panel", &time.with_timeline(TIMELINE).with_play_state(PlayState::Following))?;
+        blueprint.add_part(&self.into())?;
+        Ok(blueprint.activated())
+    }
+}
+
+impl Part {
+    fn path(&self) -> EntityPath {
+        match self {
+            Self::View(view) => view.path.clone(),
+            Self::Container(container) => container.path(),
+        }
+    }
+}
+
+impl From<View> for Part {
+    fn from(view: View) -> Self {
+        Self::View(Box::new(view))
+    }
+}
+
+impl From<Container> for Part {
+    fn from(container: Container) -> Self {
+        Self::Container(Box::new(container))
+    }
+}
+
+/// A blueprint's store as it is written.
+struct Blueprint {
+    store: StoreId,
+    messages: Vec<LogMsg>,
+}
+
+impl Blueprint {
+    fn add_part(&mut self, part: &Part) -> Result<(), RecordingError> {
+        match part {
+            Part::View(view) => {
+                let below = |name: &str| view.path.join(&EntityPath::from(name));
+                self.add(view.path.clone(), &view.archetype)?;
+                self.add(below("ViewContents"), &ViewContents::new(view.contents.iter().map(String::as_str)))?;
+                view.properties.iter().try_for_each(|(name, property)| self.add(below(name), property))
+            }
+            Part::Container(container) => {
+                self.add(container.path(), &container.archetype)?;
+                container.contents.iter().try_for_each(|part| self.add_part(part))
+            }
+        }
+    }
+
+    fn add(&mut self, entity: impl Into<EntityPath>, what: &dyn AsComponents) -> Result<(), RecordingError> {
+        // Viewers look for blueprints on this timeline.
+        let time = [(Timeline::new_sequence("blueprint"), 0)];
+        let chunk = Chunk::builder(entity).with_serialized_batches(RowId::new(), time, what.as_serialized_batches());
+        self.messages.push(message::data(&self.store, &chunk.build()?)?);
+        Ok(())
+    }
+
+    /// Whole: a viewer may take it up.
+    fn activated(mut self) -> Vec<LogMsg> {
+        let command = BlueprintActivationCommand { blueprint_id: self.store, make_active: true, make_default: true };
+        self.messages.push(command.into());
+        self.messages
+    }
+}

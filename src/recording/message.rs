@@ -1,0 +1,23 @@
+//! Messages of a recording or a blueprint, made without Rerun's stream.
+//!
+//! A `RecordingStream` comes with threads of its own, which those with a memory sink leave behind, reports errors to a
+//! log, and falls silent when the environment says `RERUN=off`. A recording here is asked for by name, so that it is
+//! made of the messages themselves.
+
+use rerun::{
+    external::re_log_types::{LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource},
+    log::{Chunk, RowId},
+};
+
+use super::RecordingError;
+
+/// The first message of a store: what it is.
+pub(super) fn store_info(store: &StoreId) -> LogMsg {
+    let info = StoreInfo::new(store.clone(), StoreSource::Other("body-schema".to_owned()));
+    SetStoreInfo { row_id: *RowId::new(), info }.into()
+}
+
+/// The message that adds a chunk to a store.
+pub(super) fn data(store: &StoreId, chunk: &Chunk) -> Result<LogMsg, RecordingError> {
+    Ok(LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?))
+}

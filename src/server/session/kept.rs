@@ -1,0 +1,49 @@
+//! What is kept of a step, written once for all who will read it.
+
+use std::{mem::size_of, sync::Arc};
+
+use serde_json::value::{RawValue, to_raw_value};
+
+use crate::{
+    experiment::{Description, StepReport},
+    recording::{RecordingError, StepsCsv},
+    server::problem::{Kind, Problem},
+};
+
+/// A report as its readers get it. Clones share the text.
+#[derive(Clone, Debug)]
+pub(in crate::server) struct Kept {
+    /// The step that it is of.
+    pub(in crate::server) step: u64,
+    /// All of it but the minimiser's partition, which only recordings hold.
+    pub(in crate::server) json: Arc<RawValue>,
+    /// Its rows of the table of all steps.
+    pub(in crate::server) rows: Arc<[u8]>,
+}
+
+impl Kept {
+    pub(super) fn of(report: &StepReport, description: &Description) -> Result<Self, Problem> {
+        let failed = |error: String| Problem::new(Kind::Internal, format!("the report cannot be written: {error}"));
+        let rows = rows(report, description).map_err(|error| failed(error.to_string()))?;
+        let mut report = report.clone();
+        for movement in report.learners.iter_mut().filter_map(|learner| learner.movement.as_mut()) {
+            movement.partition = None;
+        }
+        let json = to_raw_value(&report).map_err(|error| failed(error.to_string()))?;
+        Ok(Self { step: report.step, json: json.into(), rows: rows.into() })
+    }
+
+    /// How much memory it takes.
+    pub(super) fn bytes(&self) -> usize {
+        size_of::<Self>() + self.json.get().len() + self.rows.len()
+    }
+}
+
+fn rows(report: &StepReport, description: &Description) -> Result<Vec<u8>, RecordingError> {
+    let mut rows = Vec::new();
+    let mut table = StepsCsv::without_header(description, &mut rows);
+    table.write(report)?;
+    table.flush()?;
+    drop(table);
+    Ok(rows)
+}
