@@ -8,7 +8,7 @@ use super::{
     report::{LearnerReport, MovementReport, array},
 };
 use crate::{
-    optimize::{DirectError, History, Settings, Variant},
+    optimize::{DirectError, History, Settings},
     selection::{Appraisal, Partition, SelectionError},
 };
 
@@ -206,11 +206,7 @@ impl Choice {
         Ok(Self {
             step,
             learner: report.name.clone(),
-            variant: match settings.variant {
-                Variant::Original => "direct",
-                Variant::LocallyBiased => "direct-l",
-            }
-            .to_owned(),
+            variant: settings.variant.name().to_owned(),
             epsilon: settings.epsilon,
             joints: Vec::new(),
             trace: before,

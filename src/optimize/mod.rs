@@ -103,6 +103,6 @@ pub use bayesian::bayesian;
 pub use polish::{Polish, polish};
 
 pub use direct::{
-    Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Minimum, Moment, Partition, Rectangle, Settings, Shape,
-    Variant, minimize,
+    Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Minimum, Moment, Partition, Plane, Projection,
+    Rectangle, Settings, Shape, Variant, minimize,
 };

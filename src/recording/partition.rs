@@ -11,6 +11,7 @@ use super::colours::viridis;
 use crate::{
     experiment::JointDescription,
     kinematics::JointKind,
+    optimize::{Plane, Projection},
     selection::{Leaf, Partition},
 };
 
@@ -25,72 +26,42 @@ const PIXELS: usize = 81;
 /// How bright the fill of a rectangle is beside its outline.
 const FILL: f64 = 0.5;
 
-/// The two joints that slices show: `x` to the right, `y` upwards, each from its lower limit to its upper. They are
-/// chosen at the first partition and kept, so that the picture does not jump from step to step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Plane {
-    x: usize,
-    /// `None` for an arm of one joint.
-    y: Option<usize>,
+/// Centre and half-sizes of a leaf in a slice. Rerun's 2-D views have y downwards: upper limits are at 0.
+fn rectangle(plane: Plane, leaf: &Leaf) -> ([f32; 2], [f32; 2]) {
+    let Projection { centre: [x, y], half } = plane.project(&leaf.centre, &leaf.levels);
+    ([x as f32, (1.0 - y) as f32], half.map(|half| half as f32))
 }
 
-impl Plane {
-    /// The two joints whose sides are divided most over all leaves, in the order of the arm; the first ones of a tie.
-    /// `None` for an empty partition.
-    pub(super) fn of(partition: &Partition) -> Option<Self> {
-        let dimension = partition.leaves.first()?.levels.len();
-        let divisions =
-            |joint: usize| -> u64 { partition.leaves.iter().map(|leaf| u64::from(leaf.levels[joint])).sum() };
-        let mut joints: Vec<usize> = (0..dimension).collect();
-        joints.sort_by_key(|&joint| std::cmp::Reverse(divisions(joint)));
-        joints.truncate(2);
-        joints.sort_unstable();
-        Some(Self { x: *joints.first()?, y: joints.get(1).copied() })
-    }
-
-    /// Centre and half-sizes of a leaf in the unit square. Rerun's 2-D views have y downwards: upper limits are at 0.
-    fn rectangle(self, leaf: &Leaf) -> ([f32; 2], [f32; 2]) {
-        let (y, half_y) = self.y.map_or((0.5, 0.5), |y| (leaf.centre[y], leaf.half_side(y)));
-        ([leaf.centre[self.x] as f32, (1.0 - y) as f32], [leaf.half_side(self.x) as f32, half_y as f32])
-    }
-
-    /// Whether a leaf cuts the slice through `chosen`: it contains it in all joints but the two.
-    fn cuts(self, leaf: &Leaf, chosen: &Leaf) -> bool {
-        (0..leaf.levels.len())
-            .filter(|&joint| joint != self.x && Some(joint) != self.y)
-            .all(|joint| leaf.spans(joint, chosen.centre[joint]))
-    }
-
-    /// The frame of the slice and the names and limits of its joints.
-    pub(super) fn frame(self, joints: &[JointDescription]) -> [Box<dyn AsComponents>; 2] {
-        let square = [[0.0_f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
-        let label = |joint: usize, directions: [&str; 2]| {
-            joints.get(joint).map_or_else(String::new, |joint| {
-                let [lower, upper] = joint.limits.map(|limit| match joint.kind {
-                    JointKind::Revolute => format!("{:.0}°", limit.to_degrees()),
-                    JointKind::Prismatic => format!("{limit:.2} m"),
-                });
-                format!("{}: {lower} {}, {upper} {}", joint.name, directions[0], directions[1])
-            })
-        };
-        let mut labels = vec![([0.5_f32, 1.02], label(self.x, ["left", "right"]))];
-        labels.extend(self.y.map(|y| ([0.5, -0.09], label(y, ["bottom", "top"]))));
-        [
-            Box::new(
-                LineStrips2D::new([square])
-                    .with_colors([Color::from(FRAME)])
-                    .with_radii([Radius::new_ui_points(0.75)])
-                    .with_draw_order(1.0),
-            ),
-            Box::new(
-                Points2D::new(labels.iter().map(|(place, _)| *place))
-                    .with_colors([Color::from(LABEL)])
-                    .with_radii([Radius::new_ui_points(0.0)])
-                    .with_labels(labels.iter().map(|(_, label)| label.clone()))
-                    .with_show_labels(true),
-            ),
-        ]
-    }
+/// The frame of a slice and the names and limits of its joints, each from its lower limit to its upper: `x` to the
+/// right, `y` upwards.
+pub(super) fn frame(plane: Plane, joints: &[JointDescription]) -> [Box<dyn AsComponents>; 2] {
+    let square = [[0.0_f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
+    let label = |joint: usize, directions: [&str; 2]| {
+        joints.get(joint).map_or_else(String::new, |joint| {
+            let [lower, upper] = joint.limits.map(|limit| match joint.kind {
+                JointKind::Revolute => format!("{:.0}°", limit.to_degrees()),
+                JointKind::Prismatic => format!("{limit:.2} m"),
+            });
+            format!("{}: {lower} {}, {upper} {}", joint.name, directions[0], directions[1])
+        })
+    };
+    let mut labels = vec![([0.5_f32, 1.02], label(plane.x, ["left", "right"]))];
+    labels.extend(plane.y.map(|y| ([0.5, -0.09], label(y, ["bottom", "top"]))));
+    [
+        Box::new(
+            LineStrips2D::new([square])
+                .with_colors([Color::from(FRAME)])
+                .with_radii([Radius::new_ui_points(0.75)])
+                .with_draw_order(1.0),
+        ),
+        Box::new(
+            Points2D::new(labels.iter().map(|(place, _)| *place))
+                .with_colors([Color::from(LABEL)])
+                .with_radii([Radius::new_ui_points(0.0)])
+                .with_labels(labels.iter().map(|(_, label)| label.clone()))
+                .with_show_labels(true),
+        ),
+    ]
 }
 
 /// What is drawn of a slice.
@@ -107,23 +78,23 @@ impl Slice {
         let chosen = partition.leaves.get(partition.chosen)?;
         let colour = scale(partition);
         let (mut cut, other): (Vec<&Leaf>, Vec<&Leaf>) =
-            partition.leaves.iter().partition(|leaf| plane.cuts(leaf, chosen));
+            partition.leaves.iter().partition(|leaf| plane.cuts(&leaf.centre, &leaf.levels, &chosen.centre));
         // Potentially optimal ones last, on top of their neighbours.
         cut.sort_by_key(|leaf| leaf.potentially_optimal);
-        let rectangles = || cut.iter().map(|leaf| plane.rectangle(leaf));
+        let rectangles = || cut.iter().map(|leaf| rectangle(plane, leaf));
         Some(Self {
-            fill: fill(cut.iter().map(|leaf| (plane.rectangle(leaf), colour(leaf)))),
+            fill: fill(cut.iter().map(|leaf| (rectangle(plane, leaf), colour(leaf)))),
             boxes: Boxes2D::from_centers_and_half_sizes(rectangles().map(|(c, _)| c), rectangles().map(|(_, h)| h))
                 .with_colors(cut.iter().map(|leaf| Color::from(colour(leaf))))
                 .with_radii(
                     cut.iter().map(|leaf| Radius::new_ui_points(if leaf.potentially_optimal { 2.5 } else { 1.0 })),
                 )
                 .with_draw_order(10.0),
-            centres: Points2D::new(other.iter().map(|leaf| plane.rectangle(leaf).0))
+            centres: Points2D::new(other.iter().map(|leaf| rectangle(plane, leaf).0))
                 .with_colors(other.iter().map(|leaf| Color::from(colour(leaf))))
                 .with_radii([Radius::new_ui_points(1.5)])
                 .with_draw_order(20.0),
-            chosen: Points2D::new([plane.rectangle(chosen).0])
+            chosen: Points2D::new([rectangle(plane, chosen).0])
                 .with_colors([Color::from(CHOSEN)])
                 .with_radii([Radius::new_ui_points(5.0)])
                 .with_labels(["chosen"])

@@ -99,18 +99,6 @@ impl Partition {
     }
 }
 
-impl Leaf {
-    /// Half the length of side `index`, in the unit cube.
-    pub fn half_side(&self, index: usize) -> f64 {
-        0.5 * 3_f64.powi(-i32::from(self.levels[index]))
-    }
-
-    /// Whether `point` lies in this rectangle along side `index`.
-    pub fn spans(&self, index: usize, point: f64) -> bool {
-        (self.centre[index] - point).abs() <= self.half_side(index) * (1.0 + 1e-9)
-    }
-}
-
 impl Active {
     /// Selection by the A-criterion with `weights`, minimised by `search`.
     pub fn new(weights: Weights, search: Search) -> Self {
