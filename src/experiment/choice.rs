@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     kinematics::JointBox,
-    optimize::{DirectError, History, Variant},
+    optimize::{DirectError, History},
     selection::{Appraisal, Search, SelectionError},
 };
 
@@ -211,11 +211,7 @@ impl Choice {
         Ok(Self {
             step,
             learner: report.name.clone(),
-            variant: match settings.variant {
-                Variant::Original => "direct",
-                Variant::LocallyBiased => "direct-l",
-            }
-            .to_owned(),
+            variant: settings.variant.name().to_owned(),
             epsilon: settings.epsilon,
             joints: Vec::new(),
             trace: before,

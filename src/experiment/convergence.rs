@@ -29,6 +29,11 @@ impl Convergence {
         Self { thresholds, last_outside: None, latest: 0, judged: false }
     }
 
+    /// The same rule for a run that begins anew, with a body that has changed.
+    pub fn restart(&mut self) {
+        *self = Self::new(self.thresholds);
+    }
+
     /// Takes in the errors after so many movements; without the truth (`None`) nothing is judged.
     pub fn observe(&mut self, movements: u64, orientation_deg: Option<f64>, location_m: Option<f64>) {
         self.latest = movements;
@@ -44,10 +49,16 @@ impl Convergence {
         }
     }
 
-    /// The first movement of the final stretch within the thresholds, if 20 further movements confirm it.
-    pub fn converged_at(&self) -> Option<u64> {
+    /// The first movement of the stretch within the thresholds that lasts until now; `None` outside of them, and where
+    /// nothing is judged.
+    pub fn within_since(&self) -> Option<u64> {
         let first = self.last_outside.map_or(0, |last| last + 1);
-        (self.judged && self.latest >= first + CONFIRMATION).then_some(first)
+        (self.judged && first <= self.latest).then_some(first)
+    }
+
+    /// The same, if 20 further movements confirm it.
+    pub fn converged_at(&self) -> Option<u64> {
+        self.within_since().filter(|first| self.latest - first >= CONFIRMATION)
     }
 }
 
@@ -72,6 +83,20 @@ mod tests {
         assert_eq!(run(bad_until(31, 50)), None);
         assert_eq!(run((0..=100).map(|k| if k == 60 { 5.1 } else { 5.0 })), Some(61));
         assert_eq!(run((0..=100).map(|_| f64::NAN)), None);
+    }
+
+    #[test]
+    fn a_stretch_within_the_thresholds_is_told_before_it_is_confirmed() {
+        let mut convergence = Convergence::new(Thresholds { orientation_deg: 5.0, location_m: 0.02 });
+        assert_eq!(convergence.within_since(), None);
+        for (movements, (error, since)) in [(9.0, None), (1.0, Some(1)), (6.0, None), (4.0, Some(3))].iter().enumerate()
+        {
+            convergence.observe(movements as u64, Some(*error), None);
+            assert_eq!(convergence.within_since(), *since, "after {movements}");
+        }
+        convergence.restart();
+        convergence.observe(1, Some(4.0), None);
+        assert_eq!(convergence.within_since(), Some(0));
     }
 
     #[test]

@@ -106,6 +106,6 @@ pub(crate) use minimum::least;
 pub use polish::{Polish, polish};
 
 pub use direct::{
-    Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Moment, Partition, Rectangle, Settings, Shape, Variant,
-    minimize,
+    Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Moment, Partition, Plane, Projection, Rectangle,
+    Settings, Shape, Variant, contains, minimize,
 };

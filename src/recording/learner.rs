@@ -11,10 +11,13 @@ use super::{
     head, metrics,
     model::{self, Uncertainty},
     movement::Movement,
-    partition::{self, Plane, Slice},
+    partition::{self, Slice},
     rows::Rows,
 };
-use crate::experiment::{Description, LearnerReport};
+use crate::{
+    experiment::{Description, LearnerReport},
+    optimize::Plane,
+};
 
 /// The entities of one learner, and what they carry from step to step.
 pub(super) struct LearnerEntities {
@@ -22,6 +25,7 @@ pub(super) struct LearnerEntities {
     pub(super) root: EntityPath,
     pub(super) metrics: Vec<EntityPath>,
     uncertainty: Uncertainty,
+    /// What slices show: chosen at the first partition and kept, so that the picture does not jump from step to step.
     plane: Option<Plane>,
     moved: bool,
     failed: bool,
@@ -106,10 +110,10 @@ impl LearnerEntities {
         }
         let Some(partition) = report.and_then(|report| report.partition.as_ref()) else { return };
         if self.plane.is_none()
-            && let Some(plane) = Plane::of(partition)
+            && let Some(plane) = Plane::most_divided(partition.leaves.iter().map(|leaf| leaf.levels.as_slice()))
         {
             self.plane = Some(plane);
-            let [square, labels] = plane.frame(joints);
+            let [square, labels] = partition::frame(plane, joints);
             rows.always(&self.entity("direct/axes"), &[square.as_ref(), labels.as_ref()]);
             rows.always(&self.entity("direct/criterion"), &[&partition::fill_transform()]);
         }

@@ -11,6 +11,7 @@ use super::colours::viridis;
 use crate::{
     experiment::JointDescription,
     kinematics::JointKind,
+    optimize::{Plane, Projection},
     selection::{Leaf, Partition},
 };
 
@@ -25,73 +26,42 @@ const PIXELS: usize = 81;
 /// How bright the fill of a face is beside its outline.
 const FILL: f64 = 0.5;
 
-/// The two joints that slices show: `x` to the right, `y` upwards, each from its lower limit to its upper. They are
-/// chosen at the first partition and kept, so that the picture does not jump from step to step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Plane {
-    x: usize,
-    /// `None` for an arm of one joint.
-    y: Option<usize>,
+/// Centre and half-sizes of a rectangle's face in a slice. Rerun's 2-D views have y downwards: upper limits are at 0.
+fn face(plane: Plane, leaf: &Leaf) -> ([f32; 2], [f32; 2]) {
+    let Projection { centre: [x, y], half } = plane.project(&leaf.centre, &leaf.levels);
+    ([x as f32, (1.0 - y) as f32], half.map(|half| half as f32))
 }
 
-impl Plane {
-    /// The two joints whose sides are divided most over all rectangles, in the order of the arm; the first ones of a
-    /// tie. `None` for an empty partition.
-    pub(super) fn of(partition: &Partition) -> Option<Self> {
-        let dimension = partition.leaves.first()?.levels.len();
-        let divisions =
-            |joint: usize| -> u64 { partition.leaves.iter().map(|rectangle| u64::from(rectangle.levels[joint])).sum() };
-        let mut joints: Vec<usize> = (0..dimension).collect();
-        joints.sort_by_key(|&joint| std::cmp::Reverse(divisions(joint)));
-        joints.truncate(2);
-        joints.sort_unstable();
-        Some(Self { x: *joints.first()?, y: joints.get(1).copied() })
-    }
-
-    /// Centre and half-sizes of a rectangle's face in the unit square. Rerun's 2-D views have y downwards: upper limits
-    /// are at 0.
-    fn face(self, rectangle: &Leaf) -> ([f32; 2], [f32; 2]) {
-        let (y, half_y) = self.y.map_or((0.5, 0.5), |y| (rectangle.centre[y], rectangle.half_side(y)));
-        ([rectangle.centre[self.x] as f32, (1.0 - y) as f32], [rectangle.half_side(self.x) as f32, half_y as f32])
-    }
-
-    /// Whether a rectangle cuts the slice through `chosen`: it contains it in all joints but the two.
-    fn cuts(self, rectangle: &Leaf, chosen: &Leaf) -> bool {
-        (0..rectangle.levels.len())
-            .filter(|&joint| joint != self.x && Some(joint) != self.y)
-            .all(|joint| rectangle.spans(joint, chosen.centre[joint]))
-    }
-
-    /// The frame of the slice and the names and limits of its joints.
-    pub(super) fn frame(self, joints: &[JointDescription]) -> [Box<dyn AsComponents>; 2] {
-        let square = [[0.0_f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
-        let label = |joint: usize, directions: [&str; 2]| {
-            joints.get(joint).map_or_else(String::new, |joint| {
-                let [lower, upper] = joint.limits.map(|limit| match joint.kind {
-                    JointKind::Revolute => format!("{:.0}°", limit.to_degrees()),
-                    JointKind::Prismatic => format!("{limit:.2} m"),
-                });
-                format!("{}: {lower} {}, {upper} {}", joint.name, directions[0], directions[1])
-            })
-        };
-        let mut labels = vec![([0.5_f32, 1.02], label(self.x, ["left", "right"]))];
-        labels.extend(self.y.map(|y| ([0.5, -0.09], label(y, ["bottom", "top"]))));
-        [
-            Box::new(
-                LineStrips2D::new([square])
-                    .with_colors([Color::from(FRAME)])
-                    .with_radii([Radius::new_ui_points(0.75)])
-                    .with_draw_order(1.0),
-            ),
-            Box::new(
-                Points2D::new(labels.iter().map(|(place, _)| *place))
-                    .with_colors([Color::from(LABEL)])
-                    .with_radii([Radius::new_ui_points(0.0)])
-                    .with_labels(labels.iter().map(|(_, label)| label.clone()))
-                    .with_show_labels(true),
-            ),
-        ]
-    }
+/// The frame of a slice and the names and limits of its joints, each from its lower limit to its upper: `x` to the
+/// right, `y` upwards.
+pub(super) fn frame(plane: Plane, joints: &[JointDescription]) -> [Box<dyn AsComponents>; 2] {
+    let square = [[0.0_f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
+    let label = |joint: usize, directions: [&str; 2]| {
+        joints.get(joint).map_or_else(String::new, |joint| {
+            let [lower, upper] = joint.limits.map(|limit| match joint.kind {
+                JointKind::Revolute => format!("{:.0}°", limit.to_degrees()),
+                JointKind::Prismatic => format!("{limit:.2} m"),
+            });
+            format!("{}: {lower} {}, {upper} {}", joint.name, directions[0], directions[1])
+        })
+    };
+    let mut labels = vec![([0.5_f32, 1.02], label(plane.x, ["left", "right"]))];
+    labels.extend(plane.y.map(|y| ([0.5, -0.09], label(y, ["bottom", "top"]))));
+    [
+        Box::new(
+            LineStrips2D::new([square])
+                .with_colors([Color::from(FRAME)])
+                .with_radii([Radius::new_ui_points(0.75)])
+                .with_draw_order(1.0),
+        ),
+        Box::new(
+            Points2D::new(labels.iter().map(|(place, _)| *place))
+                .with_colors([Color::from(LABEL)])
+                .with_radii([Radius::new_ui_points(0.0)])
+                .with_labels(labels.iter().map(|(_, label)| label.clone()))
+                .with_show_labels(true),
+        ),
+    ]
 }
 
 /// What is drawn of a slice.
@@ -108,12 +78,12 @@ impl Slice {
         let chosen = partition.leaves.get(partition.chosen)?;
         let colour = scale(partition);
         let (mut cut, other): (Vec<&Leaf>, Vec<&Leaf>) =
-            partition.leaves.iter().partition(|rectangle| plane.cuts(rectangle, chosen));
+            partition.leaves.iter().partition(|leaf| plane.cuts(&leaf.centre, &leaf.levels, &chosen.centre));
         // Potentially optimal ones last, on top of their neighbours.
         cut.sort_by_key(|rectangle| rectangle.potentially_optimal);
-        let faces = || cut.iter().map(|rectangle| plane.face(rectangle));
+        let faces = || cut.iter().map(|rectangle| face(plane, rectangle));
         Some(Self {
-            fill: fill(cut.iter().map(|rectangle| (plane.face(rectangle), colour(rectangle)))),
+            fill: fill(cut.iter().map(|rectangle| (face(plane, rectangle), colour(rectangle)))),
             outlines: Boxes2D::from_centers_and_half_sizes(faces().map(|(c, _)| c), faces().map(|(_, h)| h))
                 .with_colors(cut.iter().map(|rectangle| Color::from(colour(rectangle))))
                 .with_radii(
@@ -121,11 +91,11 @@ impl Slice {
                         .map(|rectangle| Radius::new_ui_points(if rectangle.potentially_optimal { 2.5 } else { 1.0 })),
                 )
                 .with_draw_order(10.0),
-            centres: Points2D::new(other.iter().map(|rectangle| plane.face(rectangle).0))
+            centres: Points2D::new(other.iter().map(|rectangle| face(plane, rectangle).0))
                 .with_colors(other.iter().map(|rectangle| Color::from(colour(rectangle))))
                 .with_radii([Radius::new_ui_points(1.5)])
                 .with_draw_order(20.0),
-            chosen: Points2D::new([plane.face(chosen).0])
+            chosen: Points2D::new([face(plane, chosen).0])
                 .with_colors([Color::from(CHOSEN)])
                 .with_radii([Radius::new_ui_points(5.0)])
                 .with_labels(["chosen"])

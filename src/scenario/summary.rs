@@ -40,6 +40,13 @@ pub enum WorldKind {
     Measured,
 }
 
+impl ScenarioSummary {
+    /// Every learner that can be compared, the scenario's own first.
+    pub fn offered(&self) -> impl Iterator<Item = &LearnerDescription> {
+        self.learners.iter().chain(&self.compositions)
+    }
+}
+
 impl Scenario {
     /// The scenario in brief.
     pub fn summary(&self) -> ScenarioSummary {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::optimize::Direct;
+use crate::optimize::{Direct, contains};
 
 /// The rectangles into which DIRECT had divided the joint box when its budget ended.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -51,20 +51,8 @@ impl Partition {
 
     /// The same where another point of the unit cube was chosen.
     pub fn choosing(self, point: &[f64]) -> Self {
-        let holds = |leaf: &Leaf| point.iter().enumerate().all(|(index, x)| leaf.spans(index, *x));
+        let holds = |leaf: &Leaf| contains(&leaf.centre, &leaf.levels, point);
         let chosen = self.leaves.iter().position(holds).unwrap_or(self.chosen);
         Self { chosen, ..self }
-    }
-}
-
-impl Leaf {
-    /// Half the length of side `index`, in the unit cube.
-    pub fn half_side(&self, index: usize) -> f64 {
-        0.5 * 3_f64.powi(-i32::from(self.levels[index]))
-    }
-
-    /// Whether `point` lies in this rectangle along side `index`.
-    pub fn spans(&self, index: usize, point: f64) -> bool {
-        (self.centre[index] - point).abs() <= self.half_side(index) * (1.0 + 1e-9)
     }
 }

@@ -972,7 +972,7 @@ function __wbg_get_imports() {
                     const a = state0.a;
                     state0.a = 0;
                     try {
-                        return wasm_bindgen__convert__closures_____invoke__h15bb1ff319cd8aa6(a, state0.b, arg0, arg1);
+                        return wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Function_fn_wasm_bindgen_2e5cde4e98ad3f85___JsValue_____wasm_bindgen_2e5cde4e98ad3f85___sys__Undefined___js_sys_2aa85d35161d4623___Function_fn_wasm_bindgen_2e5cde4e98ad3f85___JsValue_____wasm_bindgen_2e5cde4e98ad3f85___sys__Undefined_______true_(a, state0.b, arg0, arg1);
                     } finally {
                         state0.a = a;
                     }
@@ -1342,23 +1342,23 @@ function __wbg_get_imports() {
             return ret;
         },
         __wbindgen_generic_0000000000000001: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 804, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__hd4b3e6f49c6065ea);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 824, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___wasm_bindgen_2e5cde4e98ad3f85___JsValue__core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsError___true_);
             return ret;
         },
         __wbindgen_generic_0000000000000002: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 396, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h2d970ddc59e12b5a);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 441, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true_);
             return ret;
         },
         __wbindgen_generic_0000000000000003: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 396, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h2d970ddc59e12b5a_8);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 441, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__8);
             return ret;
         },
         __wbindgen_generic_0000000000000004: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 429, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__he83d92da56e262a0);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 444, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsValue___true_);
             return ret;
         },
         __wbindgen_generic_0000000000000005: function(arg0, arg1) {
@@ -1416,30 +1416,30 @@ function __wbg_get_imports() {
     };
 }
 
-function wasm_bindgen__convert__closures_____invoke__he83d92da56e262a0(arg0, arg1) {
-    const ret = wasm.wasm_bindgen__convert__closures_____invoke__he83d92da56e262a0(arg0, arg1);
+function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsValue___true_(arg0, arg1) {
+    const ret = wasm.wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsValue___true_(arg0, arg1);
     if (ret[1]) {
         throw takeFromExternrefTable0(ret[0]);
     }
 }
 
-function wasm_bindgen__convert__closures_____invoke__h2d970ddc59e12b5a(arg0, arg1, arg2) {
-    wasm.wasm_bindgen__convert__closures_____invoke__h2d970ddc59e12b5a(arg0, arg1, arg2);
+function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true_(arg0, arg1, arg2) {
+    wasm.wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true_(arg0, arg1, arg2);
 }
 
-function wasm_bindgen__convert__closures_____invoke__h2d970ddc59e12b5a_8(arg0, arg1, arg2) {
-    wasm.wasm_bindgen__convert__closures_____invoke__h2d970ddc59e12b5a_8(arg0, arg1, arg2);
+function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__8(arg0, arg1, arg2) {
+    wasm.wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__8(arg0, arg1, arg2);
 }
 
-function wasm_bindgen__convert__closures_____invoke__hd4b3e6f49c6065ea(arg0, arg1, arg2) {
-    const ret = wasm.wasm_bindgen__convert__closures_____invoke__hd4b3e6f49c6065ea(arg0, arg1, arg2);
+function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___wasm_bindgen_2e5cde4e98ad3f85___JsValue__core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsError___true_(arg0, arg1, arg2) {
+    const ret = wasm.wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___wasm_bindgen_2e5cde4e98ad3f85___JsValue__core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsError___true_(arg0, arg1, arg2);
     if (ret[1]) {
         throw takeFromExternrefTable0(ret[0]);
     }
 }
 
-function wasm_bindgen__convert__closures_____invoke__h15bb1ff319cd8aa6(arg0, arg1, arg2, arg3) {
-    wasm.wasm_bindgen__convert__closures_____invoke__h15bb1ff319cd8aa6(arg0, arg1, arg2, arg3);
+function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Function_fn_wasm_bindgen_2e5cde4e98ad3f85___JsValue_____wasm_bindgen_2e5cde4e98ad3f85___sys__Undefined___js_sys_2aa85d35161d4623___Function_fn_wasm_bindgen_2e5cde4e98ad3f85___JsValue_____wasm_bindgen_2e5cde4e98ad3f85___sys__Undefined_______true_(arg0, arg1, arg2, arg3) {
+    wasm.wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Function_fn_wasm_bindgen_2e5cde4e98ad3f85___JsValue_____wasm_bindgen_2e5cde4e98ad3f85___sys__Undefined___js_sys_2aa85d35161d4623___Function_fn_wasm_bindgen_2e5cde4e98ad3f85___JsValue_____wasm_bindgen_2e5cde4e98ad3f85___sys__Undefined_______true_(arg0, arg1, arg2, arg3);
 }
 
 

@@ -1,12 +1,15 @@
 //! What events do to the panel's state.
 
+use body_schema::{experiment::StepReport, scenario::ScenarioSummary};
+
 use crate::{
     history::History,
     host::{Command, Event, Live},
     panel::{Link, Panel},
+    seeds::SeedRuns,
     settings::{MAX_RESTORED, Settings},
     why::Why,
-    wire::{Problem, Report, Scenario, Session},
+    wire::{Problem, Session},
 };
 
 impl Panel {
@@ -38,8 +41,10 @@ impl Panel {
             Event::Scrubbed { step } => self.scrub(step),
             Event::NoScene { reason } => self.no_scene = Some(reason),
             Event::Selection { learner, selection } => self.why.answered(&learner, selection.map(|answer| *answer)),
-            Event::Evaluation { evaluation } => self.why.evaluated(*evaluation),
-            Event::Seeds { seed, reports, done } => self.seeds.take(seed, &reports, done),
+            Event::Evaluation { evaluation } => self.why.appraised(*evaluation),
+            Event::Seeds { seed, reports, done } => {
+                self.seeds.iter_mut().for_each(|seeds| seeds.take(seed, &reports, done));
+            }
             Event::Copied { done } => {
                 let text = if done { "Copied." } else { "The browser does not allow copying." };
                 self.copied = Some(text.to_owned());
@@ -58,7 +63,7 @@ impl Panel {
         self.ask(Command::Scenarios);
     }
 
-    fn take_scenarios(&mut self, scenarios: Vec<Scenario>) {
+    fn take_scenarios(&mut self, scenarios: Vec<ScenarioSummary>) {
         self.scenarios = scenarios;
         let notices = self.settings.validate(&self.scenarios);
         notices.into_iter().for_each(|notice| self.notice(notice));
@@ -137,7 +142,7 @@ impl Panel {
                 self.notice(format!("This posture cannot be judged: {sentence}."));
             }
             "seeds" => {
-                self.seeds.cancel();
+                self.seeds.iter_mut().for_each(SeedRuns::cancel);
                 self.notice(format!("The other seeds stopped: {sentence}."));
             }
             _ => self.notice(sentence),
@@ -162,7 +167,7 @@ impl Panel {
         self.busy = self.awaited.is_some();
     }
 
-    fn take(&mut self, report: &Report) {
+    fn take(&mut self, report: &StepReport) {
         let following = self.cursor == self.history.latest();
         if !self.history.take(report) {
             return;

@@ -1,9 +1,6 @@
 //! What the learners have done so far: a few numbers per learner and step, small enough to keep them all.
 
-use crate::wire::{Description, LearnerReport, Report, Thresholds};
-
-/// Movements within the thresholds that must follow before a run counts as converged.
-pub const CONFIRMATION: u64 = 20;
+use body_schema::experiment::{Convergence, Description, LearnerReport, StepReport};
 
 /// One learner after one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,11 +27,17 @@ pub struct Row {
     pub settled: bool,
     /// It has stopped learning.
     pub failed: bool,
+    /// The step since which both errors are within the thresholds; `None` outside of them, and where no truth is known.
+    pub within_since: Option<u64>,
+    /// The same, once enough movements have confirmed it.
+    pub converged_at: Option<u64>,
 }
 
 impl Row {
-    fn of(report: &LearnerReport) -> Self {
-        let LearnerReport { movement, metrics, failure } = report;
+    /// `convergence` is judged up to this report, and counts from step `begin`.
+    fn of(report: &LearnerReport, convergence: &Convergence, begin: u64) -> Self {
+        let LearnerReport { movement, metrics, failure, .. } = report;
+        let step = |movements: u64| begin + movements;
         Self {
             orientation_deg: metrics.orientation_deg,
             location_m: metrics.location_m,
@@ -47,17 +50,14 @@ impl Row {
             misses: metrics.misses,
             settled: metrics.settled,
             failed: failure.is_some(),
+            within_since: convergence.within_since().map(step),
+            converged_at: convergence.converged_at().map(step),
         }
     }
 
-    /// Whether both errors are within the thresholds; `None` where no truth is known. A NaN is outside.
-    pub fn within(&self, thresholds: &Thresholds) -> Option<bool> {
-        if self.orientation_deg.is_none() && self.location_m.is_none() {
-            return None;
-        }
-        let orientation = self.orientation_deg.is_none_or(|error| error <= thresholds.orientation_deg);
-        let location = self.location_m.is_none_or(|error| error <= thresholds.location_m);
-        Some(orientation && location)
+    /// Whether there is a truth to judge by.
+    fn is_judged(&self) -> bool {
+        self.orientation_deg.is_some() || self.location_m.is_some()
     }
 }
 
@@ -83,8 +83,9 @@ pub enum Verdict {
 /// All steps of a session.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    thresholds: Thresholds,
     change_at: Option<u64>,
+    /// Per learner; the engine's rule, from the start or from the change of the body.
+    convergence: Vec<Convergence>,
     /// The step of the first row.
     first: u64,
     /// Step by step, all learners.
@@ -97,8 +98,8 @@ impl History {
     /// A session that has not begun.
     pub fn new(description: &Description) -> Self {
         Self {
-            thresholds: description.thresholds,
             change_at: description.change_at,
+            convergence: vec![Convergence::new(description.thresholds); description.learners.len()],
             first: 0,
             rows: Vec::new(),
             failures: vec![None; description.learners.len()],
@@ -106,7 +107,7 @@ impl History {
     }
 
     /// Takes a report in, the first whatever its step; one that is known already or leaves a gap changes nothing.
-    pub fn take(&mut self, report: &Report) -> bool {
+    pub fn take(&mut self, report: &StepReport) -> bool {
         if self.rows.is_empty() {
             self.first = report.step;
         }
@@ -116,7 +117,16 @@ impl History {
         for (failure, learner) in self.failures.iter_mut().zip(&report.learners) {
             failure.clone_from(&learner.failure);
         }
-        self.rows.push(report.learners.iter().map(Row::of).collect());
+        if self.change_at.is_some_and(|change| report.step == change + 1) {
+            self.convergence.iter_mut().for_each(Convergence::restart);
+        }
+        let begin = self.change_at.filter(|change| report.step > *change).unwrap_or(0);
+        let rows = self.convergence.iter_mut().zip(&report.learners).map(|(convergence, learner)| {
+            let metrics = &learner.metrics;
+            convergence.observe(report.step - begin, metrics.orientation_deg, metrics.location_m);
+            Row::of(learner, convergence, begin)
+        });
+        self.rows.push(rows.collect());
         true
     }
 
@@ -163,19 +173,18 @@ impl History {
         if step == 0 {
             return Verdict::Waiting;
         }
-        let Some(within) = row.within(&self.thresholds) else {
-            return if row.settled { Verdict::Settled } else { Verdict::Learning };
-        };
-        if !within {
-            return Verdict::Outside;
+        match (row.converged_at, row.within_since) {
+            _ if !row.is_judged() => {
+                if row.settled {
+                    Verdict::Settled
+                } else {
+                    Verdict::Learning
+                }
+            }
+            (Some(first), _) => Verdict::Converged(first),
+            (None, Some(first)) => Verdict::Within(first, step - first),
+            (None, None) => Verdict::Outside,
         }
-        let begin = self.change_at.filter(|change| step > *change).map_or(0, |change| change + 1);
-        let outside = (begin..step)
-            .rev()
-            .find(|step| self.row(*step, learner).and_then(|row| row.within(&self.thresholds)) == Some(false));
-        let first = outside.map_or(begin, |outside| outside + 1);
-        let confirmed = step - first;
-        if confirmed >= CONFIRMATION { Verdict::Converged(first) } else { Verdict::Within(first, confirmed) }
     }
 
     /// Where the learner converged, judged up to a step.

@@ -3,9 +3,13 @@
 //! The panel keeps no connection and reads no clock: the page tells it what happened ([`Event`]) and does what it asks
 //! ([`Command`]). So everything that it does can be tested without a browser.
 
+use body_schema::{
+    experiment::{AppraisalReport, Choice, StepReport},
+    scenario::ScenarioSummary,
+};
 use serde::{Deserialize, Serialize};
 
-use crate::wire::{Evaluation, Problem, Report, Scenario, Selection, Session};
+use crate::wire::{Problem, Session};
 
 /// What happened.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -21,7 +25,7 @@ pub enum Event {
     /// The scenarios there are.
     Scenarios {
         /// All of them.
-        scenarios: Vec<Scenario>,
+        scenarios: Vec<ScenarioSummary>,
     },
     /// The session that was asked for is there; null if there is none of that id.
     Session {
@@ -81,19 +85,19 @@ pub enum Event {
         /// The learner asked for.
         learner: String,
         /// The answer.
-        selection: Option<Box<Selection>>,
+        selection: Option<Box<Choice>>,
     },
     /// What another posture would have taught.
     Evaluation {
         /// The answer.
-        evaluation: Box<Evaluation>,
+        evaluation: Box<AppraisalReport>,
     },
     /// A part of a run in the background.
     Seeds {
         /// Its seed.
         seed: u64,
         /// Its next reports; a request for steps answers with those it made, so that the first is of step 1.
-        reports: Vec<Report>,
+        reports: Vec<StepReport>,
         /// Whether this seed is done.
         done: bool,
     },
@@ -111,7 +115,7 @@ pub enum Live {
     /// The first; the session's resource has said it already.
     Description(serde::de::IgnoredAny),
     /// A step.
-    Step(Report),
+    Step(StepReport),
 }
 
 /// What the page is to do.

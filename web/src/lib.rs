@@ -1,29 +1,35 @@
 //! The panel of body-schema's page.
 //!
 //! ```text
-//! host      what passes between the panel and the page: events in, commands out
-//! wire      what the server sends, as far as it is shown
-//! panel     the state                                    events     what happens, and what it does to the state
+//! wire      what the server itself says                  host       what passes between panel and page
 //! settings  the visitor's choice                         address    the choice as it stands in the page's address
-//! play      making steps and going through them          history    the numbers of every step, verdicts
-//! why       DIRECT's search, ready to be drawn           seeds      other seeds in the background
+//! history   the numbers of every step, verdicts          seeds      the runs of other seeds
+//! search    DIRECT's search, ready to be drawn           why        what was asked and answered about it
+//! panel     the state: all of the above
+//! events    what happens, and what it does to the state  play       making steps and going through them
+//! bands     running other seeds                          explain    asking why, and why not
 //! mirror    the state in words                           keys       the keyboard
 //! view/     how all of it looks
 //! shell     the WebAssembly that a browser runs (only there)
 //! ```
 //!
+//! Each module uses only those above it. What the engine reports is read in the engine's own types.
+//!
 //! Nothing but `shell` knows of a browser: the page opens connections, asks the server and moves Rerun's viewer; the
 //! panel decides. So tests drive it natively, by the labels that a visitor reads.
 
 mod address;
+mod bands;
 pub mod colours;
 mod events;
+mod explain;
 pub mod history;
 pub mod host;
 pub mod keys;
 mod mirror;
 pub mod panel;
 pub mod play;
+pub mod search;
 pub mod seeds;
 pub mod settings;
 #[cfg(target_arch = "wasm32")]

@@ -1,5 +1,7 @@
 //! The panel in words, for those who hear it and for scripts.
 
+use body_schema::experiment::CONFIRMATION;
+
 use crate::{
     history::Verdict,
     host::{Command, Mirror},
@@ -42,7 +44,7 @@ impl Panel {
             Verdict::Learning => "learning".to_owned(),
             Verdict::Settled => "settled".to_owned(),
             Verdict::Outside => "not converged".to_owned(),
-            Verdict::Within(first, confirmed) => format!("within since {first} ({confirmed}/20)"),
+            Verdict::Within(first, confirmed) => format!("within since {first} ({confirmed}/{CONFIRMATION})"),
             Verdict::Converged(first) => format!("converged at {first}"),
         }
     }

@@ -1,12 +1,14 @@
 //! The panel's state.
 
+use body_schema::{experiment::Description, scenario::ScenarioSummary};
+
 use crate::{
     history::History,
     host::{Command, Mirror},
     seeds::SeedRuns,
     settings::Settings,
     why::Why,
-    wire::{Description, Scenario, Session},
+    wire::Session,
 };
 
 /// What the panel can do at the moment.
@@ -26,12 +28,21 @@ pub enum Link {
     Failed(String),
 }
 
+/// How fast steps are made.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pace {
+    /// When the last steps were asked for.
+    pub(crate) asked_at: f64,
+    /// Learners that had settled when playing began.
+    pub(crate) settled: usize,
+}
+
 /// The panel.
 pub struct Panel {
     /// What the visitor chose.
     pub settings: Settings,
     /// What there is to choose from.
-    pub scenarios: Vec<Scenario>,
+    pub scenarios: Vec<ScenarioSummary>,
     /// What the visitor should know, newest last.
     pub notices: Vec<String>,
     /// Whether there is a session, and how it stands with it.
@@ -50,8 +61,8 @@ pub struct Panel {
     pub no_scene: Option<String>,
     /// How the last movement was chosen.
     pub why: Why,
-    /// Other seeds, in the background.
-    pub seeds: SeedRuns,
+    /// Other seeds, in the background, once they were asked for.
+    pub seeds: Option<SeedRuns>,
     /// The card of the tour that is open.
     pub tour: Option<usize>,
     /// Whether the help is open.
@@ -71,7 +82,7 @@ pub struct Panel {
     pub(crate) wanted: Option<u64>,
     pub(crate) shown: u64,
     pub(crate) sought: Option<u64>,
-    pub(crate) pace: crate::play::Pace,
+    pub(crate) pace: Pace,
     pub(crate) now: f64,
     pub(crate) said: (f64, Mirror),
     pub(crate) address: (f64, String),
@@ -92,7 +103,7 @@ impl Default for Panel {
             stopped: None,
             no_scene: None,
             why: Why::default(),
-            seeds: SeedRuns::default(),
+            seeds: None,
             tour: None,
             help: false,
             seed_text: "1".to_owned(),
@@ -104,7 +115,7 @@ impl Default for Panel {
             wanted: None,
             shown: 0,
             sought: None,
-            pace: crate::play::Pace::default(),
+            pace: Pace::default(),
             now: 0.0,
             said: (f64::NEG_INFINITY, Mirror::default()),
             address: (f64::NEG_INFINITY, String::new()),
@@ -145,7 +156,7 @@ impl Panel {
     }
 
     /// The chosen scenario.
-    pub fn scenario(&self) -> Option<&Scenario> {
+    pub fn scenario(&self) -> Option<&ScenarioSummary> {
         self.scenarios.iter().find(|scenario| scenario.name == self.settings.scenario)
     }
 

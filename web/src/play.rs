@@ -3,7 +3,7 @@
 use crate::{
     history::Row,
     host::Command,
-    panel::{Link, Panel},
+    panel::{Link, Pace, Panel},
     settings::{MAX_SPEED, MIN_SPEED, StopWhen},
 };
 
@@ -17,15 +17,6 @@ const RESTORED_AT_ONCE: u64 = 50;
 const SHOWN_WITHIN: f64 = 2.0;
 /// How often the address follows, s: browsers allow some hundred changes a minute.
 const ADDRESS_EVERY: f64 = 1.0;
-
-/// How fast steps are made.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Pace {
-    /// When the last steps were asked for.
-    asked_at: f64,
-    /// Learners that had settled when playing began.
-    settled: usize,
-}
 
 impl Panel {
     /// The last step of a run.

@@ -2,30 +2,24 @@
 
 use std::collections::BTreeMap;
 
-use crate::{
-    history::Row,
-    host::Command,
-    panel::Panel,
-    wire::{Description, Report},
-};
+use body_schema::experiment::{Description, StepReport};
+
+use crate::history::{History, Row};
 
 /// How many further seeds are run.
 pub const SEEDS: u64 = 10;
-/// How far each is run at most.
-const STEPS: u64 = 300;
 /// How few seeds make no band.
 const FEWEST: usize = 3;
 
 /// The runs of other seeds.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct SeedRuns {
     /// Whether they are being run.
     pub running: bool,
     description: Description,
-    total: u64,
     steps: u64,
     done: u64,
-    runs: BTreeMap<u64, crate::history::History>,
+    runs: BTreeMap<u64, History>,
 }
 
 /// What the middle 80 % of seeds did at a step: 10th, 50th and 90th percentile.
@@ -42,10 +36,15 @@ pub struct Band {
 }
 
 impl SeedRuns {
+    /// Runs of so many steps that have just been asked for.
+    pub(crate) fn new(description: Description, steps: u64) -> Self {
+        Self { running: true, description, steps, done: 0, runs: BTreeMap::new() }
+    }
+
     /// How much is done, 0 to 1.
     pub fn progress(&self) -> f32 {
         let made: u64 = self.runs.values().map(|run| run.latest()).sum();
-        made as f32 / (self.total * self.steps).max(1) as f32
+        made as f32 / (SEEDS * self.steps).max(1) as f32
     }
 
     /// How many seeds are done.
@@ -53,21 +52,16 @@ impl SeedRuns {
         self.done
     }
 
-    /// How many seeds were asked for.
-    pub fn total(&self) -> u64 {
-        self.total
-    }
-
-    pub(crate) fn take(&mut self, seed: u64, reports: &[Report], done: bool) {
+    pub(crate) fn take(&mut self, seed: u64, reports: &[StepReport], done: bool) {
         if !self.running {
             return;
         }
-        let run = self.runs.entry(seed).or_insert_with(|| crate::history::History::new(&self.description));
+        let run = self.runs.entry(seed).or_insert_with(|| History::new(&self.description));
         for report in reports {
             run.take(report);
         }
         self.done += u64::from(done);
-        self.running = self.done < self.total;
+        self.running = self.done < SEEDS;
     }
 
     pub(crate) fn cancel(&mut self) {
@@ -96,39 +90,7 @@ impl SeedRuns {
     }
 
     /// Whether these runs are of what is shown.
-    fn is_of(&self, description: &Description) -> bool {
+    pub(crate) fn is_of(&self, description: &Description) -> bool {
         self.description.scenario == description.scenario && self.description.learners == description.learners
-    }
-}
-
-impl Panel {
-    /// The band of a learner, if other seeds of what is shown were run.
-    pub fn band(&self, learner: usize, value: impl Fn(&Row) -> Option<f64>) -> Option<Band> {
-        self.seeds.is_of(self.description()?).then(|| self.seeds.band(learner, value))?
-    }
-
-    /// Runs other seeds of what is shown.
-    pub fn run_seeds(&mut self) {
-        let Some(description) = self.description().cloned() else { return };
-        let first = description.seed;
-        let steps = self
-            .run_to()
-            .min(STEPS)
-            .min(self.session.as_ref().and_then(|one| one.remaining.map(|left| left + one.step)).unwrap_or(STEPS));
-        let seeds: Vec<u64> =
-            (1..=SEEDS).map(|offset| first.wrapping_add(offset) % crate::settings::MAX_SEED).collect();
-        self.ask(Command::Seeds {
-            scenario: description.scenario.clone(),
-            learners: description.learners.iter().map(|learner| learner.name.clone()).collect(),
-            seeds,
-            steps,
-        });
-        self.seeds = SeedRuns { running: true, description, total: SEEDS, steps, ..SeedRuns::default() };
-    }
-
-    /// Stops running other seeds; what they have done stays.
-    pub fn cancel_seeds(&mut self) {
-        self.seeds.cancel();
-        self.ask(Command::CancelSeeds);
     }
 }

@@ -1,6 +1,6 @@
 //! What the visitor chose.
 
-use crate::wire::Scenario;
+use body_schema::scenario::ScenarioSummary;
 
 /// The fastest playing, steps a second.
 pub const MAX_SPEED: f64 = 100.0;
@@ -103,7 +103,7 @@ impl Default for Settings {
 
 impl Settings {
     /// Holds the choice against what there is; what does not exist is replaced, with a notice.
-    pub fn validate(&mut self, scenarios: &[Scenario]) -> Vec<String> {
+    pub fn validate(&mut self, scenarios: &[ScenarioSummary]) -> Vec<String> {
         let mut notices = Vec::new();
         let Some(first) = scenarios.first() else { return notices };
         let scenario = scenarios.iter().find(|scenario| scenario.name == self.scenario).unwrap_or_else(|| {

@@ -5,7 +5,7 @@ mod support;
 use body_schema_panel::{Link, host::Command, settings::Tab};
 use egui::Key;
 use serde_json::json;
-use support::{Page, report, scenarios, selection, session};
+use support::{Page, Server};
 
 fn steps(commands: &[Command]) -> Vec<u64> {
     let counts = commands.iter().filter_map(|command| match command {
@@ -19,7 +19,7 @@ fn steps(commands: &[Command]) -> Vec<u64> {
 fn an_opened_page_asks_for_a_session_and_its_first_step() {
     let mut page = Page::open("?scenario=head-fov&seed=7&learners=random,active");
     assert_eq!(page.commands(), [Command::Scenarios]);
-    page.tell(scenarios());
+    page.tell(Server::scenarios());
     let learners = Some(vec!["active".to_owned(), "random".to_owned()]);
     let open = Command::Open { scenario: "head-fov".to_owned(), seed: 7, learners, ellipsoids: "1-sigma".to_owned() };
     assert_eq!(page.commands(), [open]);
@@ -29,7 +29,7 @@ fn an_opened_page_asks_for_a_session_and_its_first_step() {
 #[test]
 fn what_an_address_gets_wrong_is_told_and_replaced() {
     let mut page = Page::open("?v=1&scenario=no-such&seed=-3&learners=active,nobody&colour=blue");
-    page.tell(scenarios());
+    page.tell(Server::scenarios());
     for text in ["seed=-3", "“no-such”", "“nobody”", "“colour”"] {
         assert!(page.has(text), "a notice about {text}");
     }
@@ -47,17 +47,16 @@ fn what_an_address_gets_wrong_is_told_and_replaced() {
 #[test]
 fn keys_drive_the_server_but_not_while_typing() {
     let mut page = Page::with_session("");
-    page.make_steps(1, |_, _, _| {});
     assert_eq!(page.harness.state().cursor, 1, "the first step shows what it is about");
     page.press(Key::S);
-    assert_eq!(page.make_steps(1, |_, _, _| {}), 1);
+    assert_eq!(page.make_steps(1), 1);
     page.press(Key::ArrowLeft);
     assert_eq!((page.harness.state().cursor, page.harness.state().history.latest()), (1, 2));
     page.press(Key::ArrowRight);
     assert_eq!(page.harness.state().cursor, 2, "recorded steps are gone through first");
     assert!(steps(&page.commands()).is_empty());
     page.press(Key::ArrowRight);
-    assert_eq!(page.make_steps(1, |_, _, _| {}), 1);
+    assert_eq!(page.make_steps(1), 1);
     page.press(Key::Plus);
     assert_eq!(page.harness.state().settings.speed, 20.0);
     page.press(Key::Minus);
@@ -77,56 +76,54 @@ fn keys_drive_the_server_but_not_while_typing() {
 #[test]
 fn a_run_stops_at_its_last_step_and_says_why() {
     let mut page = Page::with_session("to=12&speed=100");
-    page.make_steps(1, |_, _, _| {});
     page.click("Play");
     assert!(page.harness.state().playing);
-    page.make_steps(100, |_, _, _| {});
+    page.make_steps(100);
     assert_eq!(page.harness.state().history.latest(), 12);
     assert!(!page.harness.state().playing && page.has("Stopped at step 12, the last of this run"));
 }
 
 #[test]
 fn a_run_stops_when_all_that_judge_themselves_have_settled_and_plays_on() {
-    let mut page = Page::with_session("speed=50");
-    page.make_steps(1, |_, _, _| {});
-    let settle = |step: u64, learner: usize, value: &mut serde_json::Value| {
-        // The gradient keeps no uncertainty, so it never judges itself.
-        value["metrics"]["settled"] = json!(learner == 0 && step >= 8 || learner == 1 && step >= 20);
-    };
+    // The gradient keeps no uncertainty, so it never judges itself; the others settle after some fifteen movements.
+    let mut page = Page::with_session("learners=gradient,global,smoother:random&speed=50");
     page.press(Key::Space);
-    page.make_steps(200, settle);
+    page.make_steps(200);
     let latest = page.harness.state().history.latest();
+    let settled =
+        |name: &str| page.server.experiment().result().learners.iter().find(|one| one.name == name)?.settled_at;
+    let last = settled("global").max(settled("smoother:random")).expect("both settle");
     // Steps are made by the dozen where drawing is slow, so that the last of them may overshoot.
-    assert!((20..50).contains(&latest), "{latest}");
-    assert!(page.has("every learner that judges itself has settled"));
+    assert!((last..last + 25).contains(&latest), "{last} {latest}");
+    assert!(settled("gradient").is_none() && page.has("every learner that judges itself has settled"));
     page.press(Key::Space);
-    page.make_steps(20, settle);
+    page.make_steps(20);
     assert!(page.harness.state().history.latest() > latest, "play goes on");
 }
 
 #[test]
 fn convergence_and_divergence_are_shown() {
-    let mut page = Page::with_session("speed=100&to=80&stop=never");
-    page.make_steps(1, |_, _, _| {});
+    let mut page = Page::open("speed=100&to=80&stop=never");
+    // A gradient whose steps are far too large.
+    page.server.edit("gradient.rate", 1e6);
+    page.begin();
     page.press(Key::Space);
-    page.make_steps(80, |step, learner, value| {
-        if learner == 2 && step > 30 {
-            value["failure"] = json!("the estimate left every bound");
-        }
-    });
-    assert!(page.has("converged at 23"), "active: 40 / (1 + 0.4 n) ≤ 4 mm·200 from 23 on");
-    assert!(page.has("diverged"));
+    page.make_steps(80);
+    let result = page.server.experiment().result();
+    let converged = result.learners[0].converged_at.expect("the active learner converges within 80 movements");
+    assert!(page.has(&format!("converged at {converged}")) && page.has("diverged"));
     // Going back undoes the verdict: it is that of the step that is shown.
-    page.tell(json!({ "is": "scrubbed", "step": 30 }));
-    assert!(page.has("within since 23 (7/20)") && !page.has("diverged"));
+    page.tell(json!({ "is": "scrubbed", "step": converged + 7 }));
+    assert!(page.has(&format!("within since {converged} (7/20)")));
+    page.tell(json!({ "is": "scrubbed", "step": 1 }));
+    assert!(page.has("not converged") && !page.has("diverged"));
 }
 
 #[test]
 fn scene_and_panel_move_together() {
     let mut page = Page::with_session("");
-    page.make_steps(1, |_, _, _| {});
     page.press(Key::S);
-    page.make_steps(1, |_, _, _| {});
+    page.make_steps(1);
     page.commands();
     page.press(Key::ArrowLeft);
     assert!(page.commands().contains(&Command::Seek { step: 1 }));
@@ -140,9 +137,8 @@ fn scene_and_panel_move_together() {
 #[test]
 fn a_lost_server_loses_nothing() {
     let mut page = Page::with_session("speed=100&to=40&stop=never");
-    page.make_steps(1, |_, _, _| {});
     page.press(Key::Space);
-    page.make_steps(100, |_, _, _| {});
+    page.make_steps(100);
     page.tell(json!({ "is": "lost", "seconds": 0.5 }));
     assert!(page.has("The connection is lost") && page.harness.state().history.latest() == 40);
     page.tell(json!({ "is": "connected" }));
@@ -150,26 +146,26 @@ fn a_lost_server_loses_nothing() {
     // Started anew: the session is gone, and computed again.
     page.tell(json!({ "is": "ended", "failure": null, "unseen": true }));
     page.open_session();
-    page.make_steps(40, |_, _, _| {});
+    page.make_steps(40);
     assert_eq!((page.harness.state().history.latest(), page.harness.state().cursor), (40, 40));
     // Expired: it waits to be asked.
     page.tell(json!({ "is": "ended", "failure": null, "unseen": false }));
     assert!(page.has("This session has expired"));
     page.click("Restore");
     page.open_session();
-    page.make_steps(40, |_, _, _| {});
+    page.make_steps(40);
     assert_eq!(page.harness.state().history.latest(), 40);
 }
 
 #[test]
 fn a_reload_finds_its_session_or_computes_it_again() {
     let mut page = Page::open("?scenario=head-fov&seed=3&step=5&session=abc");
-    page.tell(scenarios());
+    page.tell(Server::scenarios());
     assert!(page.commands().contains(&Command::Find { session: "abc".to_owned() }));
     page.tell(json!({ "is": "session", "session": null }));
     assert!(page.has("is gone"));
     page.open_session();
-    page.make_steps(5, |_, _, _| {});
+    page.make_steps(5);
     assert_eq!(page.harness.state().cursor, 5);
     page.harness.run_steps(120);
     let query = page.commands().into_iter().rev().find_map(|command| match command {
@@ -178,31 +174,28 @@ fn a_reload_finds_its_session_or_computes_it_again() {
     });
     assert_eq!(
         query.as_deref(),
-        Some("v=1&scenario=head-fov&seed=3&learners=active,random,gradient&step=5&session=head-fov-3")
+        Some("v=1&scenario=head-fov&seed=3&learners=active,random,gradient,naive&step=5&session=head-fov-3")
     );
 }
 
 #[test]
 fn a_reload_shows_the_step_that_was_shown_not_the_latest() {
     let mut page = Page::open("scenario=arm-6dof&seed=1&step=2&session=arm-6dof-1");
-    page.tell(scenarios());
-    let mut session = session("arm-6dof", 1, None);
-    session["step"] = json!(5);
-    page.tell(json!({ "is": "session", "session": session }));
-    page.tell(json!({ "is": "connected" }));
-    (0..=5).for_each(|_| page.report(|_, _| {}));
+    page.tell(Server::scenarios());
+    page.server.open("arm-6dof", 1, None);
+    page.server.step(5);
+    page.follow();
     assert_eq!((page.harness.state().cursor, page.harness.state().history.latest()), (2, 5));
 }
 
 #[test]
 fn learners_and_seeds_are_chosen() {
     let mut page = Page::with_session("");
-    page.make_steps(1, |_, _, _| {});
     page.click("New seed");
     let commands = page.commands();
     assert!(matches!(commands.last(), Some(Command::Open { seed, .. }) if *seed != 1), "{commands:?}");
-    page.tell(json!({ "is": "session", "session": session("arm-6dof", 5, None) }));
-    page.tell(json!({ "is": "connected" }));
+    page.server.open("arm-6dof", 5, None);
+    page.follow();
     page.press(Key::R);
     assert!(matches!(page.commands().last(), Some(Command::Open { seed: 5, .. })));
     let compared = |page: &mut Page, toggled: Option<&str>| {
@@ -210,12 +203,14 @@ fn learners_and_seeds_are_chosen() {
         let commands = page.commands();
         let Some(Command::Open { learners: Some(learners), .. }) = commands.last() else { panic!("{commands:?}") };
         let learners = learners.clone();
-        page.tell(json!({ "is": "session", "session": session("arm-6dof", 5, Some(learners.clone())) }));
+        page.server.open("arm-6dof", 5, Some(&learners));
+        page.follow();
         learners
     };
     assert_eq!(compared(&mut page, Some("gradient")), ["active", "random"]);
     // Any estimator with any policy.
     page.click("Add…");
+    page.scroll_to("smoother:random");
     page.click("smoother:random");
     assert_eq!(compared(&mut page, None), ["active", "random", "smoother:random"]);
     assert_eq!(compared(&mut page, Some("active")), ["random", "smoother:random"]);
@@ -224,7 +219,6 @@ fn learners_and_seeds_are_chosen() {
 #[test]
 fn escape_ends_the_tour_for_good() {
     let mut page = Page::with_session("");
-    page.make_steps(1, |_, _, _| {});
     page.press(Key::T);
     assert!(page.harness.state().tour.is_some());
     page.press(Key::Escape);
@@ -234,22 +228,27 @@ fn escape_ends_the_tour_for_good() {
 #[test]
 fn the_choice_is_explained_and_challenged() {
     let mut page = Page::with_session("tab=why");
-    page.make_steps(1, |_, _, _| {});
     let commands = page.commands();
     let asked = |commands: &[Command]| commands.iter().any(|command| matches!(command, Command::Select { .. }));
     assert!(asked(&commands) || page.has("Asking the server"), "{commands:?}");
-    page.tell(json!({ "is": "selection", "learner": "active", "selection": selection(1) }));
-    assert!(page.has("How active chose movement 1") && page.has("DIRECT-L tried 7 postures"));
-    assert!(page.has("expected to fall by 0.600") && page.has("fell by 0.500"));
+    page.tell(page.server.selection("active"));
+    let choice = page.server.choice("active");
+    assert!(page.has("How active chose movement 1"));
+    assert!(page.has(&format!("DIRECT-L tried {} postures", choice.evaluations)));
+    let [expected, realised] =
+        [choice.chosen.predicted_gain, choice.chosen.realised_gain].map(|gain| gain.expect("a gain"));
+    assert!(page.has(&format!("expected to fall by {expected:.3}")) && page.has(&format!("fell by {realised:.3}")));
     let panel = page.harness.state_mut();
     assert_eq!(panel.settings.tab, Tab::Why);
-    panel.propose(vec![0.5, 1.0]);
+    let posture = vec![0.0; choice.joints.len()];
+    panel.propose(posture.clone());
     let commands = page.commands();
     assert!(matches!(&commands[..], [Command::Evaluate { learner, .. }] if learner == "active"), "{commands:?}");
-    page.tell(json!({ "is": "evaluation", "evaluation": {
-        "configuration": [0.5, 1.0], "criterion": 1.7, "gain": 0.3, "trace": 2.0, "predicted_marker_m": [0.1, 0.2, 0.3],
-        "marker_covariance_m2": [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]], "chance_of_being_seen": 0.5 } }));
-    assert!(page.has("by 0.300, 50 % of what DIRECT found") && page.has("chance of being seen 50 %"));
+    page.tell(page.server.evaluation("active", &posture));
+    let gain = page.server.experiment().appraise("active", &posture).expect("an appraisal").gain;
+    let share = gain / expected * 100.0;
+    assert!(gain < expected && page.has(&format!("by {gain:.3}, {share:.0} % of what DIRECT found")));
+    assert!(page.has("chance of being seen 100 %"));
     page.tell(json!({ "is": "refused", "asked": "select",
         "problem": { "status": 409, "title": "Not by DIRECT", "detail": "a random movement" } }));
     assert!(page.has("a random movement"));
@@ -258,11 +257,18 @@ fn the_choice_is_explained_and_challenged() {
 #[test]
 fn a_selection_that_does_not_hold_together_is_not_drawn() {
     let mut page = Page::with_session("tab=why");
-    page.make_steps(1, |_, _, _| {});
-    for (path, wrong) in [("/chosen/box", json!(99)), ("/iterations", json!([])), ("/boxes/0/shapes", json!([]))] {
-        let mut broken = selection(1);
-        *broken.pointer_mut(path).expect("a member") = wrong;
-        page.tell(json!({ "is": "selection", "learner": "active", "selection": broken }));
+    for (path, wrong) in [
+        ("/chosen/box", json!(9999)),
+        ("/iterations", json!([])),
+        ("/iterations/0/hull", json!([9999])),
+        ("/boxes/0/shapes", json!([])),
+        ("/boxes/0/shapes/0/levels", json!([0])),
+        ("/boxes/0/shapes/0/levels/0", json!(31)),
+        ("/variant", json!("simplex")),
+    ] {
+        let mut broken = page.server.selection("active");
+        *broken["selection"].pointer_mut(path).expect("a member") = wrong;
+        page.tell(broken);
         assert!(page.has("was not chosen by DIRECT"), "{path}");
     }
 }
@@ -270,15 +276,13 @@ fn a_selection_that_does_not_hold_together_is_not_drawn() {
 #[test]
 fn other_seeds_run_in_the_background_and_can_be_cancelled() {
     let mut page = Page::with_session("");
-    page.make_steps(1, |_, _, _| {});
     page.click("Is this luck? Run 10 more seeds");
     let commands = page.commands();
     assert!(matches!(commands.last(), Some(Command::Seeds { seeds, .. }) if seeds.len() == 10), "{commands:?}");
     assert!(page.has("0 of 10 seeds"));
     // As the page hears of them: from step 1 on.
     for seed in 2..=5 {
-        let reports: Vec<_> = (1..=8).map(|step| report(step, 3, |_, _| {})).collect();
-        page.tell(json!({ "is": "seeds", "seed": seed, "reports": reports, "done": true }));
+        page.tell(page.server.other_seed(seed, 8));
     }
     assert!(page.has("4 of 10 seeds"));
     let band = page.harness.state().band(0, |row| row.orientation_deg).expect("enough seeds");
@@ -291,7 +295,6 @@ fn other_seeds_run_in_the_background_and_can_be_cancelled() {
 #[test]
 fn a_newcomer_is_shown_around_once() {
     let mut page = Page::with_session("");
-    page.make_steps(1, |_, _, _| {});
     page.click("Tour");
     for title in ["What is learned", "random is wasteful", "ellipsoids", "DIRECT chooses"] {
         assert!(page.has(title), "{title}");
@@ -305,7 +308,6 @@ fn a_newcomer_is_shown_around_once() {
 #[test]
 fn everything_can_be_taken_away() {
     let mut page = Page::with_session("tab=share&learners=active,random");
-    page.make_steps(1, |_, _, _| {});
     assert!(page.has("body-schema run arm-6dof --seed 1 --steps 1 --learner active --learner random"));
     page.commands();
     for file in ["recording.rrd", "steps.csv", "result.json", "scenario.toml"] {

@@ -7,8 +7,8 @@ mod support;
 
 use egui::{Key, Theme, Vec2, vec2};
 use egui_kittest::{Harness, SnapshotOptions, SnapshotResult, SnapshotResults};
-use serde_json::{Value, json};
-use support::{Page, report, scenarios, selection};
+use serde_json::json;
+use support::Page;
 
 /// Beside the scene on a screen of 1280 × 800, above it on a narrow one, and on a large screen.
 const USUAL: Vec2 = vec2(486.0, 800.0);
@@ -34,27 +34,16 @@ fn hold(page: &mut Page, name: &str) -> SnapshotResult {
     page.harness.try_snapshot_options(name, &options)
 }
 
-/// Learners as they fare on arm-6dof: the first converges soon, the second late, the third hardly.
-fn faring(step: u64, learner: usize, report: &mut Value) {
-    let rate = [0.035, 0.012, 0.004][learner];
-    let wave = 1.0 + 0.1 * ((step as f64) * [0.9, 0.7, 0.5][learner]).sin();
-    let error = 30.0 * (-rate * step as f64).exp() * wave + 0.8;
-    report["metrics"]["orientation_deg"] = json!(error);
-    report["metrics"]["location_m"] = json!(error / 150.0);
-    report["metrics"]["prediction_mean_m"] = json!(error / 80.0);
-    if learner < 2 {
-        report["metrics"]["trace"] = json!(error / 10.0);
-    }
+/// A page after so many steps.
+fn run(query: &str, size: Vec2, steps: u64) -> Page {
+    play(Page::of_size(query, size), steps)
 }
 
-fn run(query: &str, size: Vec2, steps: u64) -> Page {
-    let mut page = Page::of_size(query, size);
-    page.tell(scenarios());
-    page.open_session();
-    page.make_steps(1, faring);
+fn play(mut page: Page, steps: u64) -> Page {
+    page.begin();
     if steps > 1 {
         page.press(Key::Space);
-        page.make_steps(steps - 1, faring);
+        page.make_steps(steps - 1);
     }
     page
 }
@@ -77,7 +66,7 @@ fn the_panel_looks_as_it_should() {
     page.press(Key::Questionmark);
     held(&mut page, "help");
 
-    let mut page = run("speed=100&to=140&stop=never", USUAL, 140);
+    let mut page = run("learners=active,random,global&speed=100&to=100&stop=never", USUAL, 100);
     held(&mut page, "converged");
     page.harness.ctx.set_theme(Theme::Dark);
     page.run();
@@ -90,36 +79,23 @@ fn the_panel_looks_as_it_should() {
 
     let mut page = run("speed=100&to=60&stop=never", USUAL, 60);
     page.harness.state_mut().run_seeds();
-    for seed in 0..5u64 {
-        let luck = 0.7 + 0.15 * seed as f64;
-        let unlucky = |step: u64, learner: usize, value: &mut Value| {
-            faring(step, learner, value);
-            for error in ["orientation_deg", "location_m", "prediction_mean_m"] {
-                value["metrics"][error] = json!(value["metrics"][error].as_f64().expect("an error") * luck);
-            }
-        };
-        let reports: Vec<Value> =
-            (1..=60).map(|step| report(step, 3, |learner, value| unlucky(step, learner, value))).collect();
-        page.tell(json!({ "is": "seeds", "seed": seed, "reports": reports, "done": true }));
+    for seed in 2..7 {
+        page.tell(page.server.other_seed(seed, 60));
     }
     held(&mut page, "bands");
 
     let mut page = run("speed=100&to=60&stop=never", NARROW, 60);
     held(&mut page, "narrow");
 
-    let mut page = run("speed=100&to=60&stop=never", USUAL, 30);
-    page.make_steps(30, |step, learner, report| {
-        faring(step, learner, report);
-        report["metrics"]["misses"] = json!(step / 5);
-        if learner == 2 {
-            report["failure"] = json!("the estimate ran away");
-        }
-    });
+    // A head that does not see every movement, and a gradient whose steps are far too large.
+    let mut page = Page::of_size("scenario=head-fov&speed=100&to=60&stop=never", USUAL);
+    page.server.edit("gradient.rate", 1e6);
+    let mut page = play(page, 60);
     held(&mut page, "diverged");
 
     for (name, size) in [("why", USUAL), ("why-wide", WIDE)] {
         let mut page = run("tab=why", size, 1);
-        page.tell(json!({ "is": "selection", "learner": "active", "selection": selection(1) }));
+        page.tell(page.server.selection("active"));
         held(&mut page, name);
     }
     held(&mut run("tab=share&learners=active,random", USUAL, 1), "share");

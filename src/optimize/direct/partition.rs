@@ -179,7 +179,7 @@ impl<'a> Partition<'a> {
             levels,
             value: all.values[index],
             score: score.is_finite().then_some(score),
-            size: self.variant.size(self.variant.class(levels), all.dimension),
+            size: self.variant.size_of(levels),
             generation: all.generations[index],
             potentially_optimal: all.chosen[index] == self.round,
         }

@@ -19,6 +19,24 @@ pub enum Variant {
 }
 
 impl Variant {
+    /// Its name in scenarios and reports: `direct` or `direct-l`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Original => "direct",
+            Self::LocallyBiased => "direct-l",
+        }
+    }
+
+    /// The variant of that name, if there is one.
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::Original, Self::LocallyBiased].into_iter().find(|variant| variant.name() == name)
+    }
+
+    /// The size of a rectangle of these levels, at least one and none above [`MAX_LEVEL`](super::MAX_LEVEL).
+    pub fn size_of(self, levels: &[u8]) -> f64 {
+        self.size(self.class(levels), levels.len())
+    }
+
     /// The size class of a rectangle: 0 is the whole cube, and larger numbers are smaller rectangles.
     ///
     /// Only longest sides are divided, so the levels of one rectangle differ by at most one and their sum
@@ -117,7 +135,7 @@ mod tests {
         for levels in [[0, 0, 0], [1, 0, 1], [1, 1, 1], [4, 5, 4]] {
             let corner = levels.map(|level| 0.5 * ternary::side(level));
             let expected = corner.iter().map(|half| half * half).sum::<f64>().sqrt();
-            let size = Variant::Original.size(Variant::Original.class(&levels), 3);
+            let size = Variant::Original.size_of(&levels);
             assert!((size / expected - 1.0).abs() < 1e-15);
         }
     }
@@ -125,8 +143,16 @@ mod tests {
     #[test]
     fn the_locally_biased_size_is_half_the_longest_side() {
         for (levels, expected) in [([0, 0], 0.5), ([1, 0], 0.5), ([1, 2], 0.5 / 3.0)] {
-            assert_eq!(Variant::LocallyBiased.size(Variant::LocallyBiased.class(&levels), 2), expected);
+            assert_eq!(Variant::LocallyBiased.size_of(&levels), expected);
         }
+    }
+
+    #[test]
+    fn variants_are_found_by_their_names() {
+        for variant in [Variant::Original, Variant::LocallyBiased] {
+            assert_eq!(Variant::named(variant.name()), Some(variant));
+        }
+        assert_eq!(Variant::named("DIRECT"), None);
     }
 
     #[test]

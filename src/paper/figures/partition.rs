@@ -3,6 +3,7 @@
 use super::{Figure, Source};
 use crate::{
     chart::{Axis, Chart, Colour, Layer, Marker, Panel, Style},
+    optimize::{Plane, Projection},
     paper::outcome::{Outcome, Search},
     recording::learner_color,
     selection::Leaf,
@@ -49,21 +50,10 @@ fn name(search: &Search) -> &'static str {
 fn slice(search: &Search) -> Option<Panel> {
     let leaves = &search.partition.leaves;
     let chosen = leaves.get(search.partition.chosen)?;
-    let divisions = |joint: usize| -> u64 { leaves.iter().map(|leaf| u64::from(leaf.levels[joint])).sum() };
-    let mut joints: Vec<usize> = (0..search.joints.len()).collect();
-    joints.sort_by_key(|joint| std::cmp::Reverse(divisions(*joint)));
-    joints.truncate(2);
-    joints.sort_unstable();
-    let [x, y] = joints.as_slice() else { return None };
-    let (x, y) = (*x, *y);
-    let mut cut: Vec<&Leaf> = leaves
-        .iter()
-        .filter(|leaf| {
-            (0..search.joints.len())
-                .filter(|joint| ![x, y].contains(joint))
-                .all(|joint| leaf.spans(joint, chosen.centre[joint]))
-        })
-        .collect();
+    let plane = Plane::most_divided(leaves.iter().map(|leaf| leaf.levels.as_slice()))?;
+    let (x, y) = (plane.x, plane.y?);
+    let cuts = |leaf: &&Leaf| plane.cuts(&leaf.centre, &leaf.levels, &chosen.centre);
+    let mut cut: Vec<&Leaf> = leaves.iter().filter(cuts).collect();
     cut.sort_by_key(|leaf| leaf.potentially_optimal);
     let values = || cut.iter().filter_map(|leaf| leaf.value);
     let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
@@ -71,19 +61,17 @@ fn slice(search: &Search) -> Option<Panel> {
         let [lower, upper] = search.joints[joint].1;
         (lower + place * (upper - lower)).to_degrees()
     };
-    let side = |leaf: &Leaf, joint: usize| {
-        let half = leaf.half_side(joint);
-        [degrees(joint, leaf.centre[joint] - half), degrees(joint, leaf.centre[joint] + half)]
-    };
-    let mut layers: Vec<Layer> = cut
-        .iter()
-        .map(|leaf| Layer::Cell {
-            x: side(leaf, x),
-            y: side(leaf, y),
+    let side = |joint: usize, centre: f64, half: f64| [centre - half, centre + half].map(|end| degrees(joint, end));
+    let cell = |leaf: &&Leaf| {
+        let Projection { centre, half } = plane.project(&leaf.centre, &leaf.levels);
+        Layer::Cell {
+            x: side(x, centre[0], half[0]),
+            y: side(y, centre[1], half[1]),
             fill: grey(leaf.value.map_or(1.0, |value| if high > low { (value - low) / (high - low) } else { 0.0 })),
             outline: if leaf.potentially_optimal { 2.4 } else { 0.8 },
-        })
-        .collect();
+        }
+    };
+    let mut layers: Vec<Layer> = cut.iter().map(cell).collect();
     let centre = |leaf: &Leaf| [degrees(x, leaf.centre[x]), degrees(y, leaf.centre[y])];
     layers.push(Layer::Points {
         points: cut.iter().map(|leaf| centre(leaf)).collect(),

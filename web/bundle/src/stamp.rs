@@ -8,10 +8,24 @@ use std::{
 /// The crates whose version changes the bundle.
 const CRATES: [&str; 8] = ["eframe", "egui", "egui_plot", "epaint", "serde", "serde_json", "wasm-bindgen", "web-sys"];
 
+/// What the panel takes of the engine: the types of its reports and the rules behind a picture, and the palette of
+/// recordings. All else of the engine may change without changing the bundle.
+const ENGINE: [&str; 10] = [
+    "src/experiment/choice.rs",
+    "src/experiment/convergence.rs",
+    "src/experiment/metrics.rs",
+    "src/experiment/report.rs",
+    "src/kinematics/joint.rs",
+    "src/optimize/direct/plane.rs",
+    "src/optimize/direct/settings.rs",
+    "src/optimize/direct/ternary.rs",
+    "src/recording/palette.rs",
+    "src/scenario/summary.rs",
+];
+
 /// The stamp of the panel's sources, given the folder of the workspace.
 pub fn of_sources(workspace: &Path) -> io::Result<String> {
-    // The palette is the one of recordings.
-    let mut files = vec![workspace.join("web/Cargo.toml"), workspace.join("src/recording/palette.rs")];
+    let mut files: Vec<PathBuf> = ENGINE.iter().chain(&["web/Cargo.toml"]).map(|file| workspace.join(file)).collect();
     collect(&workspace.join("web/src"), &mut files)?;
     files.sort();
     let mut hash = Fnv::new();

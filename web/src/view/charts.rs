@@ -7,7 +7,11 @@ use super::{
     chart::{CHARTS, Chart, decades, steps},
     learners::swatch,
 };
-use crate::{colours, panel::Panel};
+use crate::{
+    colours,
+    panel::Panel,
+    seeds::{SEEDS, SeedRuns},
+};
 
 /// From this width on there are two charts beside each other.
 const TWO_COLUMNS: f32 = 640.0;
@@ -155,12 +159,13 @@ impl Panel {
     fn seeds_row(&mut self, ui: &mut Ui) {
         ui.add_space(4.0);
         ui.horizontal_wrapped(|ui| {
-            if self.seeds.running {
+            if let Some(seeds) = self.seeds.as_ref().filter(|seeds| seeds.running) {
+                let (done, progress) = (seeds.done(), seeds.progress());
                 if ui.button("Cancel").on_hover_text("What has been computed stays").clicked() {
                     self.cancel_seeds();
                 }
-                let text = format!("{} of {} seeds", self.seeds.done(), self.seeds.total());
-                ui.add(egui::ProgressBar::new(self.seeds.progress()).text(text).desired_width(180.0));
+                let text = format!("{done} of {SEEDS} seeds");
+                ui.add(egui::ProgressBar::new(progress).text(text).desired_width(180.0));
             } else {
                 let tip = "Runs ten other seeds in the background: bands hold the middle 80 % of them";
                 let ready = self.is_ready();
@@ -171,8 +176,8 @@ impl Panel {
                 {
                     self.run_seeds();
                 }
-                if self.seeds.done() > 0 {
-                    ui.label(RichText::new(format!("bands: the middle 80 % of {} seeds", self.seeds.done())).weak());
+                if let Some(done) = self.seeds.as_ref().map(SeedRuns::done).filter(|done| *done > 0) {
+                    ui.label(RichText::new(format!("bands: the middle 80 % of {done} seeds")).weak());
                 }
             }
         });

@@ -16,6 +16,8 @@ fn fixed(value: Option<f64>, scale: f64, digits: usize) -> String {
 pub(super) fn swatch(ui: &mut Ui, index: usize) {
     let (rect, _) = ui.allocate_exact_size(vec2(22.0, 12.0), egui::Sense::hover());
     let stroke = egui::Stroke::new(2.5, colours::learner(index));
+    // Round dots and thick ends stay within.
+    let rect = rect.shrink2(vec2(1.5, 0.0));
     let line = [rect.left_center(), rect.right_center()];
     match colours::line_style(index) {
         LineStyle::Solid => ui.painter().add(Shape::line_segment(line, stroke)),

@@ -1,19 +1,22 @@
 //! What is compared: scenario, seed, learners.
 
+use body_schema::{
+    experiment::LearnerDescription,
+    scenario::{ScenarioSummary, WorldKind},
+};
 use egui::{ComboBox, RichText, TextEdit, Ui};
 
-use crate::{
-    panel::Panel,
-    settings::MAX_SEED,
-    wire::{Learner, Scenario},
-};
+use crate::{panel::Panel, settings::MAX_SEED};
 
 /// There are so many colours, dashes and markers.
 const MOST_LEARNERS: usize = 6;
 
 /// A scenario in figures.
-fn figures(scenario: &Scenario) -> String {
-    let world = if scenario.world == "measured" { "measured data" } else { "simulated" };
+fn figures(scenario: &ScenarioSummary) -> String {
+    let world = match scenario.world {
+        WorldKind::Measured => "measured data",
+        WorldKind::Simulated => "simulated",
+    };
     let (joints, parameters) = (scenario.joints.len(), scenario.parameters);
     let (learners, steps) = (scenario.learners.len(), scenario.steps);
     format!("{joints} joints · {parameters} parameters · {learners} learners · {steps} movements · {world}")
@@ -65,7 +68,7 @@ impl Panel {
         });
     }
 
-    fn choose_learner_to_compare(&mut self, ui: &mut Ui, learner: &Learner, compared: &[String]) {
+    fn choose_learner_to_compare(&mut self, ui: &mut Ui, learner: &LearnerDescription, compared: &[String]) {
         let mut on = compared.contains(&learner.name);
         let refused = if on && compared.len() == 1 {
             Some("At least one learner is needed".to_owned())
@@ -83,7 +86,7 @@ impl Panel {
     }
 
     /// Any estimator with any policy.
-    fn add_learner(&mut self, ui: &mut Ui, scenario: &Scenario, compared: &[String]) {
+    fn add_learner(&mut self, ui: &mut Ui, scenario: &ScenarioSummary, compared: &[String]) {
         let others = || scenario.compositions.iter().filter(|learner| !compared.contains(&learner.name));
         if others().next().is_none() || compared.len() >= MOST_LEARNERS {
             return;

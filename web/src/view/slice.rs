@@ -1,57 +1,53 @@
 //! The partition of the joint box, cut by the plane of two joints through the chosen configuration.
 
+use body_schema::optimize::{Plane, Projection};
 use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Shape, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::why::joint_value;
-use crate::{colours::viridis, panel::Panel, wire::Selection};
+use crate::{
+    colours::viridis,
+    panel::Panel,
+    search::{Cell, Search},
+};
 
 /// Room for the values of the joints, at the left and below.
-const MARGIN: (f32, f32) = (44.0, 34.0);
+const MARGIN: (f32, f32) = (48.0, 38.0);
+/// How far values stand off: the cross often marks a corner.
+const OFF: f32 = 8.0;
 const LARGEST: f32 = 300.0;
 
 impl Panel {
     /// Draws the slice; the point that was clicked, in the unit square.
-    pub(super) fn slice(
-        &self,
-        ui: &mut Ui,
-        selection: &Selection,
-        joints: (usize, usize),
-        iteration: usize,
-    ) -> Option<[f64; 2]> {
+    pub(super) fn slice(&self, ui: &mut Ui, search: &Search, plane: Plane, iteration: usize) -> Option<[f64; 2]> {
         let side = (ui.available_width() - MARGIN.0 - 8.0).clamp(120.0, LARGEST);
         let (area, response) =
             ui.allocate_exact_size(vec2(side + MARGIN.0 + 8.0, side + MARGIN.1 + 26.0), Sense::click());
         let square = Rect::from_min_size(area.min + vec2(MARGIN.0, 4.0), vec2(side, side));
         let at = |[x, y]: [f64; 2]| pos2(square.left() + x as f32 * side, square.bottom() - y as f32 * side);
-        let rectangles = selection.slice(joints, iteration);
-        let (low, high) = selection.range();
+        let cells = search.slice(plane, iteration);
+        let (low, high) = search.range();
         let painter = ui.painter().with_clip_rect(area.expand(2.0).intersect(ui.clip_rect()));
         let thin = Stroke::new(0.5, ui.visuals().panel_fill);
-        let place = |min: [f64; 2], max: [f64; 2]| Rect::from_two_pos(at(min), at(max));
-        for rectangle in &rectangles {
-            let rect = place(rectangle.min, rectangle.max);
+        let rect = |cell: &Cell| {
+            let Projection { centre: [x, y], half: [half_x, half_y] } = cell.place;
+            Rect::from_two_pos(at([x - half_x, y - half_y]), at([x + half_x, y + half_y]))
+        };
+        for cell in &cells {
             // Bright is good: a low criterion.
-            let colour = rectangle.value.map_or(Color32::GRAY, |value| viridis(1.0 - (value - low) / (high - low)));
-            painter.rect(rect, 0.0, colour, thin, StrokeKind::Inside);
+            let colour = cell.value.map_or(Color32::GRAY, |value| viridis(1.0 - (value - low) / (high - low)));
+            painter.rect(rect(cell), 0.0, colour, thin, StrokeKind::Inside);
         }
         let bold = Color32::from_rgb(0xD5, 0x5E, 0x00);
-        for rectangle in rectangles.iter().filter(|rectangle| rectangle.optimal) {
-            let rect = place(rectangle.min, rectangle.max).shrink(1.0);
-            painter.rect_stroke(rect, 0.0, Stroke::new(2.0, bold), StrokeKind::Inside);
+        for cell in cells.iter().filter(|cell| cell.optimal) {
+            painter.rect_stroke(rect(cell).shrink(1.0), 0.0, Stroke::new(2.0, bold), StrokeKind::Inside);
         }
-        let point = |configuration: &[f64]| {
-            let unit = |joint: usize| {
-                let [low, high] = selection.joints[joint].limits;
-                (configuration[joint] - low) / (high - low).max(f64::MIN_POSITIVE)
-            };
-            at([unit(joints.0), unit(joints.1)])
-        };
-        cross(&painter, at([selection.chosen.point[joints.0], selection.chosen.point[joints.1]]));
-        if let Some(proposed) = self.why.proposed.as_ref().filter(|proposed| proposed.len() == selection.joints.len()) {
-            let centre = point(proposed);
+        cross(&painter, at(search.chosen(plane)));
+        let joints = search.choice().joints.len();
+        if let Some(proposed) = self.why.proposed.as_ref().filter(|proposed| proposed.len() == joints) {
+            let centre = at(search.place(plane, proposed));
             painter.circle(centre, 6.0, Color32::WHITE, Stroke::new(2.5, Color32::BLACK));
         }
-        self.slice_axes(ui, &painter, square, selection, joints);
+        self.slice_axes(ui, &painter, square, search, plane);
         let inside = |pos: Pos2| {
             let x = f64::from((pos.x - square.left()) / side);
             let y = f64::from((square.bottom() - pos.y) / side);
@@ -59,37 +55,31 @@ impl Panel {
         };
         let hovered = response.hover_pos().and_then(inside);
         let clicked = response.interact_pointer_pos().filter(|_| response.clicked()).and_then(inside);
-        if let Some([x, y]) = hovered {
-            let under = |r: &&crate::why::Rectangle| x >= r.min[0] && x <= r.max[0] && y >= r.min[1] && y <= r.max[1];
-            let value = rectangles.iter().find(under).and_then(|rectangle| rectangle.value);
-            let configuration = selection.configuration(joints, [x, y]);
-            let words = [joints.0, joints.1].map(|joint| {
-                format!(
-                    "{} {}",
-                    selection.joints[joint].name,
-                    joint_value(self, selection, joint, configuration[joint])
-                )
-            });
-            let expected =
-                value.map_or(String::new(), |value| format!("\nexpected fall here {:.3}", selection.trace - value));
-            response.on_hover_text_at_pointer(format!("{}\n{}{expected}\nClick to propose it", words[0], words[1]));
+        if let (Some(place), Some(pointer)) = (hovered, response.hover_pos()) {
+            let under = cells.iter().find(|cell| rect(cell).contains(pointer));
+            let text = self.slice_hint(search, plane, place, under.and_then(|cell| cell.value));
+            response.on_hover_text_at_pointer(text);
         }
         clicked
     }
 
-    fn slice_axes(
-        &self,
-        ui: &Ui,
-        painter: &egui::Painter,
-        square: Rect,
-        selection: &Selection,
-        (a, b): (usize, usize),
-    ) {
+    /// What stands at the pointer: the joints there and what the search says of the rectangle under it.
+    fn slice_hint(&self, search: &Search, plane: Plane, place: [f64; 2], value: Option<f64>) -> String {
+        let configuration = search.configuration(plane, place);
+        let mut text = String::new();
+        for joint in plane.axes() {
+            let name = &search.choice().joints[joint].name;
+            text += &format!("{name} {}\n", joint_value(self, joint, configuration[joint]));
+        }
+        if let (Some(trace), Some(value)) = (search.choice().trace, value) {
+            text += &format!("expected fall here {:.3}\n", trace - value);
+        }
+        text + "Click to propose it"
+    }
+
+    fn slice_axes(&self, ui: &Ui, painter: &egui::Painter, square: Rect, search: &Search, plane: Plane) {
         let (font, colour) = (FontId::proportional(11.0), ui.visuals().text_color());
-        let value = |joint: usize, share: f64| {
-            let [low, high] = selection.joints[joint].limits;
-            joint_value(self, selection, joint, low + share * (high - low))
-        };
+        let value = |joint: usize, share: f64| joint_value(self, joint, search.value(joint, share));
         for share in [0.0, 0.5, 1.0] {
             let x = square.left() + share as f32 * square.width();
             let align = if share == 0.0 {
@@ -99,7 +89,8 @@ impl Panel {
             } else {
                 Align2::CENTER_TOP
             };
-            painter.text(pos2(x, square.bottom() + 2.0), align, value(a, share), font.clone(), colour);
+            painter.text(pos2(x, square.bottom() + OFF), align, value(plane.x, share), font.clone(), colour);
+            let Some(up) = plane.y else { continue };
             let y = square.bottom() - share as f32 * square.height();
             let align = if share == 0.0 {
                 Align2::RIGHT_BOTTOM
@@ -108,14 +99,17 @@ impl Panel {
             } else {
                 Align2::RIGHT_CENTER
             };
-            painter.text(pos2(square.left() - 4.0, y), align, value(b, share), font.clone(), colour);
+            painter.text(pos2(square.left() - OFF, y), align, value(up, share), font.clone(), colour);
         }
-        let below = pos2(square.center().x, square.bottom() + 15.0);
-        painter.text(below, Align2::CENTER_TOP, &selection.joints[a].name, font.clone(), colour);
-        let name = painter.layout_no_wrap(selection.joints[b].name.clone(), font.clone(), colour);
-        let start = pos2(square.left() - MARGIN.0, square.center().y + name.size().x / 2.0);
-        painter.add(egui::epaint::TextShape::new(start, name, colour).with_angle(-std::f32::consts::FRAC_PI_2));
-        let legend = pos2(square.left(), square.bottom() + 32.0);
+        let below = pos2(square.center().x, square.bottom() + OFF + 13.0);
+        let joints = &search.choice().joints;
+        painter.text(below, Align2::CENTER_TOP, &joints[plane.x].name, font.clone(), colour);
+        if let Some(up) = plane.y {
+            let name = painter.layout_no_wrap(joints[up].name.clone(), font.clone(), colour);
+            let start = pos2(square.left() - MARGIN.0, square.center().y + name.size().x / 2.0);
+            painter.add(egui::epaint::TextShape::new(start, name, colour).with_angle(-std::f32::consts::FRAC_PI_2));
+        }
+        let legend = pos2(square.left(), square.bottom() + OFF + 29.0);
         let bar = Rect::from_min_size(legend + vec2(0.0, 3.0), vec2(60.0, 9.0));
         let steps = 20;
         for step in 0..steps {

@@ -1,31 +1,25 @@
 //! Why this posture? DIRECT's search for the last movement, and what another posture would have taught.
 
+use body_schema::{experiment::Choice, kinematics::JointKind, optimize::Plane};
 use egui::{ComboBox, RichText, Slider, Ui};
 
-use crate::{panel::Panel, wire::Selection};
+use crate::{panel::Panel, search::Search};
 
 /// From this width on slice and diagram stand beside each other.
 const TWO_COLUMNS: f32 = 640.0;
 
 /// A joint's value with its unit: degrees, or millimetres along a slide.
-pub(super) fn joint_value(panel: &Panel, selection: &Selection, joint: usize, value: f64) -> String {
-    if is_slide(panel, selection, joint) {
-        format!("{:.0} mm", value * 1e3)
-    } else {
-        format!("{:.0}°", value.to_degrees())
+pub(super) fn joint_value(panel: &Panel, joint: usize, value: f64) -> String {
+    match panel.description().and_then(|description| description.joints.get(joint)).map(|joint| joint.kind) {
+        Some(JointKind::Prismatic) => format!("{:.0} mm", value * 1e3),
+        _ => format!("{:.0}°", value.to_degrees()),
     }
-}
-
-fn is_slide(panel: &Panel, selection: &Selection, joint: usize) -> bool {
-    let Some(name) = selection.joints.get(joint).map(|joint| &joint.name) else { return false };
-    let joints = panel.description().map_or(&[][..], |description| &description.joints);
-    joints.iter().any(|joint| joint.name == *name && joint.kind.as_deref() == Some("prismatic"))
 }
 
 impl Panel {
     pub(super) fn why(&mut self, ui: &mut Ui) {
         self.choose_learner(ui);
-        let Some(selection) = self.why.selection.clone() else {
+        let Some(search) = self.why.search.clone() else {
             let text = self.why.reason.clone().unwrap_or_else(|| match self.history.latest() {
                 0 => "No movement yet. Step once to see how DIRECT chooses.".to_owned(),
                 _ if self.explained().is_none() => "No learner here chooses its movements.".to_owned(),
@@ -34,18 +28,18 @@ impl Panel {
             ui.label(text);
             return;
         };
-        self.gains(ui, &selection);
-        let joints = self.choose_joints(ui, &selection);
-        let iteration = self.choose_iteration(ui, &selection);
+        self.gains(ui, search.choice());
+        let plane = self.choose_plane(ui, &search);
+        let iteration = self.choose_iteration(ui, &search);
         let columns = if ui.available_width() >= TWO_COLUMNS { 2 } else { 1 };
         ui.columns(columns, |uis| {
-            let proposed = self.slice(&mut uis[0], &selection, joints, iteration);
+            let proposed = self.slice(&mut uis[0], &search, plane, iteration);
             if let Some(place) = proposed {
-                self.propose(selection.configuration(joints, place));
+                self.propose(search.configuration(plane, place));
             }
-            self.diagram(&mut uis[columns - 1], &selection, iteration);
+            self.diagram(&mut uis[columns - 1], &search, iteration);
         });
-        self.proposal(ui, &selection);
+        self.proposal(ui, search.choice());
     }
 
     fn choose_learner(&mut self, ui: &mut Ui) {
@@ -70,17 +64,15 @@ impl Panel {
         }
     }
 
-    fn gains(&self, ui: &mut Ui, selection: &Selection) {
-        let Selection { step, learner, evaluations, chosen, variant, .. } = selection;
+    fn gains(&self, ui: &mut Ui, choice: &Choice) {
+        let Choice { step, learner, evaluations, chosen, variant, .. } = choice;
         let text =
             format!("How {learner} chose movement {step}: {} tried {evaluations} postures.", variant.to_uppercase());
         ui.add(egui::Label::new(RichText::new(text).strong()).wrap());
         let number = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.3}"));
-        let (predicted, realised) = (number(chosen.predicted_gain), number(chosen.realised_gain));
-        let text = format!(
-            "Uncertainty tr(W P) before: {:.3} · expected to fall by {predicted} · fell by {realised}",
-            selection.trace
-        );
+        let [before, predicted, realised] = [choice.trace, chosen.predicted_gain, chosen.realised_gain].map(number);
+        let text =
+            format!("Uncertainty tr(W P) before: {before} · expected to fall by {predicted} · fell by {realised}");
         ui.add(egui::Label::new(text).wrap());
         if self.cursor != *step {
             let text = format!(
@@ -91,20 +83,21 @@ impl Panel {
         }
     }
 
-    fn choose_joints(&mut self, ui: &mut Ui, selection: &Selection) -> (usize, usize) {
-        let count = selection.joints.len();
-        let fits = |(a, b): (usize, usize)| a < count && b < count && a != b;
-        let usual = selection.busiest();
-        let before = self.settings.joints.filter(|pair| fits(*pair)).unwrap_or(usual);
-        let (mut a, mut b) = before;
+    /// The joints of the slice: those divided most, unless the visitor chose others.
+    fn choose_plane(&mut self, ui: &mut Ui, search: &Search) -> Plane {
+        let joints = &search.choice().joints;
+        let fits = |(x, y): &(usize, usize)| x.max(y) < &joints.len() && x != y;
+        let chosen = self.settings.joints.filter(fits).map(|(x, y)| Plane { x, y: Some(y) });
+        let before = chosen.unwrap_or(search.busiest());
+        let Plane { mut x, y: Some(mut y) } = before else { return before };
+        let others = [y, x];
         ui.horizontal_wrapped(|ui| {
-            for (salt, joint, other) in [("across", &mut a, before.1), ("up", &mut b, before.0)] {
+            for ((salt, joint), other) in [("across", &mut x), ("up", &mut y)].into_iter().zip(others) {
                 let label = ui.label(salt);
                 ComboBox::from_id_salt(salt)
-                    .selected_text(&selection.joints[*joint].name)
+                    .selected_text(&joints[*joint].name)
                     .show_ui(ui, |ui| {
-                        for (index, choice) in selection.joints.iter().enumerate().filter(|(index, _)| *index != other)
-                        {
+                        for (index, choice) in joints.iter().enumerate().filter(|(index, _)| *index != other) {
                             ui.selectable_value(joint, index, &choice.name);
                         }
                     })
@@ -112,21 +105,22 @@ impl Panel {
                     .labelled_by(label.id);
             }
         });
-        if (a, b) != before && fits((a, b)) {
-            self.settings.joints = Some((a, b));
+        let plane = Plane { x, y: Some(y) };
+        if plane != before {
+            self.settings.joints = Some((x, y));
         }
-        (a, b)
+        plane
     }
 
-    fn choose_iteration(&mut self, ui: &mut Ui, selection: &Selection) -> usize {
-        let last = selection.last();
+    fn choose_iteration(&mut self, ui: &mut Ui, search: &Search) -> usize {
+        let last = search.last();
         let mut iteration = self.why.iteration.unwrap_or(last).min(last);
         ui.horizontal(|ui| {
             let label = ui.label("Iteration");
             ui.spacing_mut().slider_width = (ui.available_width() - 180.0).clamp(60.0, 320.0);
             let slider = ui.add(Slider::new(&mut iteration, 0..=last.max(1))).labelled_by(label.id);
             slider.on_hover_text("Watch DIRECT divide: outlined boxes are divided next");
-            let evaluations = selection.iterations.get(iteration).map_or(0, |iteration| iteration.evaluations);
+            let evaluations = search.choice().iterations.get(iteration).map_or(0, |iteration| iteration.evaluations);
             ui.label(RichText::new(format!("{evaluations} tried")).weak());
         });
         let iteration = iteration.min(last);
@@ -134,31 +128,31 @@ impl Panel {
         iteration
     }
 
-    fn proposal(&mut self, ui: &mut Ui, selection: &Selection) {
+    fn proposal(&mut self, ui: &mut Ui, choice: &Choice) {
         ui.add_space(6.0);
         let Some(proposed) = self.why.proposed.clone() else {
             ui.label("Could you choose better? Click a point of the slice.");
             return;
         };
-        let joints = selection.joints.iter().zip(&proposed).enumerate();
+        let joints = choice.joints.iter().zip(&proposed).enumerate();
         let words: Vec<String> = joints
-            .map(|(index, (joint, value))| format!("{} {}", joint.name, joint_value(self, selection, index, *value)))
+            .map(|(index, (joint, value))| format!("{} {}", joint.name, joint_value(self, index, *value)))
             .collect();
         ui.label(RichText::new("Your posture").strong()).on_hover_text(words.join("\n"));
-        let Some(evaluation) = &self.why.evaluation else {
+        let Some(appraisal) = &self.why.appraisal else {
             ui.label(if self.why.evaluating { "Asking what it would have taught…" } else { "No answer." });
             return;
         };
-        let gain = evaluation.gain;
-        let share = selection.chosen.predicted_gain.filter(|best| *best > 0.0).map(|best| gain / best * 100.0);
+        let gain = appraisal.gain;
+        let share = choice.chosen.predicted_gain.filter(|best| *best > 0.0).map(|best| gain / best * 100.0);
         let share = share.map_or(String::new(), |share| format!(", {share:.0} % of what DIRECT found"));
         ui.add(egui::Label::new(format!("It would have lowered the uncertainty by {gain:.3}{share}.")).wrap());
-        let [x, y, z] = evaluation.predicted_marker_m;
-        let spread = (0..3).map(|i| evaluation.marker_covariance_m2[i][i].max(0.0)).sum::<f64>().sqrt();
+        let [x, y, z] = appraisal.predicted_marker_m;
+        let spread = (0..3).map(|i| appraisal.marker_covariance_m2[i][i].max(0.0)).sum::<f64>().sqrt();
         let text = format!(
             "Marker expected at ({x:.2}, {y:.2}, {z:.2}) m, give or take {:.0} mm; chance of being seen {:.0} %.",
             spread * 1e3,
-            evaluation.chance_of_being_seen * 100.0
+            appraisal.chance_of_being_seen * 100.0
         );
         ui.add(egui::Label::new(text).wrap());
     }

@@ -1,0 +1,43 @@
+//! Running other seeds of what is shown, for the bands behind its curves.
+
+use crate::{
+    history::Row,
+    host::Command,
+    panel::Panel,
+    seeds::{Band, SEEDS, SeedRuns},
+    settings::MAX_SEED,
+};
+
+/// How far each is run at most.
+const STEPS: u64 = 300;
+
+impl Panel {
+    /// The band of a learner, if other seeds of what is shown were run.
+    pub fn band(&self, learner: usize, value: impl Fn(&Row) -> Option<f64>) -> Option<Band> {
+        let description = self.description()?;
+        self.seeds.as_ref().filter(|seeds| seeds.is_of(description))?.band(learner, value)
+    }
+
+    /// Runs other seeds of what is shown.
+    pub fn run_seeds(&mut self) {
+        let Some(description) = self.description().cloned() else { return };
+        let first = description.seed;
+        let steps = self
+            .run_to()
+            .min(STEPS)
+            .min(self.session.as_ref().and_then(|one| one.remaining.map(|left| left + one.step)).unwrap_or(STEPS));
+        self.ask(Command::Seeds {
+            scenario: description.scenario.clone(),
+            learners: description.learners.iter().map(|learner| learner.name.clone()).collect(),
+            seeds: (1..=SEEDS).map(|offset| first.wrapping_add(offset) % MAX_SEED).collect(),
+            steps,
+        });
+        self.seeds = Some(SeedRuns::new(description, steps));
+    }
+
+    /// Stops running other seeds; what they have done stays.
+    pub fn cancel_seeds(&mut self) {
+        self.seeds.iter_mut().for_each(SeedRuns::cancel);
+        self.ask(Command::CancelSeeds);
+    }
+}

@@ -1,0 +1,120 @@
+//! The server's part, played by the engine itself: what it reports is what visitors get.
+
+use body_schema::{
+    experiment::{Choice, Experiment, StepReport},
+    scenario::{Scenario, builtin, edited},
+};
+use serde_json::{Value, json};
+
+/// How long every choice is said to have taken, ms: the one number that is another in each run.
+const SELECTION_MS: f64 = 0.3;
+
+/// A server with one session at most, and its answers as the page passes them on.
+#[derive(Default)]
+pub struct Server {
+    /// What is other than in the scenario's file.
+    edits: Vec<(String, toml::Value)>,
+    experiment: Option<Experiment>,
+    reports: Vec<Value>,
+    /// How many of the reports the page has passed on.
+    told: usize,
+}
+
+impl Server {
+    /// Sets a number of every scenario opened from now on.
+    pub fn edit(&mut self, path: &str, value: f64) {
+        self.edits.push((path.to_owned(), value.into()));
+    }
+
+    /// What there is to choose from: as many scenarios as a test needs.
+    pub fn scenarios() -> Value {
+        let summaries = ["arm-6dof", "head-fov"].map(|name| builtin(name).expect("a built-in scenario").summary());
+        json!({ "is": "scenarios", "scenarios": summaries })
+    }
+
+    /// Opens a session, at step 0.
+    pub fn open(&mut self, scenario: &str, seed: u64, learners: Option<&[String]>) {
+        self.experiment = Some(self.begin(scenario, seed, learners));
+        (self.reports, self.told) = (Vec::new(), 0);
+        self.keep();
+    }
+
+    fn begin(&self, name: &str, seed: u64, learners: Option<&[String]>) -> Experiment {
+        let text = edited(&builtin(name).expect("a built-in scenario").source, &self.edits).expect("paths that exist");
+        let scenario = Scenario::parse(name, &text, &|file| Err(format!("{file} is not needed here")));
+        scenario.and_then(|scenario| scenario.experiment(seed, learners)).expect("an experiment")
+    }
+
+    /// The experiment of the session.
+    pub fn experiment(&self) -> &Experiment {
+        self.experiment.as_ref().expect("a session")
+    }
+
+    /// Makes steps.
+    pub fn step(&mut self, count: u64) {
+        for _ in 0..count {
+            self.experiment.as_mut().expect("a session").step().expect("a step");
+            self.keep();
+        }
+    }
+
+    fn keep(&mut self) {
+        self.reports.push(written(self.experiment().latest()));
+    }
+
+    /// The reports that the page has not passed on yet.
+    pub fn news(&mut self) -> Vec<Value> {
+        let news = self.reports[self.told..].to_vec();
+        self.told = self.reports.len();
+        news
+    }
+
+    /// The session's id.
+    pub fn id(&self) -> String {
+        let description = self.experiment().description();
+        format!("{}-{}", description.scenario, description.seed)
+    }
+
+    /// The session.
+    pub fn session(&self) -> Value {
+        let experiment = self.experiment();
+        json!({ "is": "session", "session": {
+            "id": self.id(), "step": experiment.latest().step, "remaining": experiment.remaining(),
+            "description": experiment.description(),
+        } })
+    }
+
+    /// How a learner's last movement was chosen.
+    pub fn choice(&self, learner: &str) -> Choice {
+        self.experiment().choice(learner).expect("a choice by DIRECT")
+    }
+
+    /// The same, passed on by the page.
+    pub fn selection(&self, learner: &str) -> Value {
+        json!({ "is": "selection", "learner": learner, "selection": self.choice(learner) })
+    }
+
+    /// What another posture would have taught.
+    pub fn evaluation(&self, learner: &str, configuration: &[f64]) -> Value {
+        let appraisal = self.experiment().appraise(learner, configuration).expect("an appraisal");
+        json!({ "is": "evaluation", "evaluation": appraisal })
+    }
+
+    /// The session's comparison with another seed, from step 1 on.
+    pub fn other_seed(&self, seed: u64, steps: u64) -> Value {
+        let description = self.experiment().description();
+        let learners: Vec<String> = description.learners.iter().map(|learner| learner.name.clone()).collect();
+        let mut experiment = self.begin(&description.scenario, seed, Some(&learners));
+        let reports: Vec<Value> = (0..steps).map(|_| written(experiment.step().expect("a step"))).collect();
+        json!({ "is": "seeds", "seed": seed, "reports": reports, "done": true })
+    }
+}
+
+/// A report as JSON.
+fn written(report: &StepReport) -> Value {
+    let mut report = report.clone();
+    for movement in report.learners.iter_mut().filter_map(|learner| learner.movement.as_mut()) {
+        movement.selection_ms = SELECTION_MS;
+    }
+    serde_json::to_value(report).expect("a report can be written")
+}
