@@ -7,10 +7,11 @@ use std::hint::black_box;
 
 use body_schema::{
     estimation::Belief,
-    kinematics::jacobian::jacobian,
+    model::jacobian,
     optimize::{Direct, Settings, Variant},
     scenario::{Scenario, builtin},
-    selection::{ACriterion, Actions, Active, Policy, Search, Weights},
+    selection::{Actions, Active, Criterion, History, Minimiser, Policy, Situation, Weights},
+    sensing::Rig,
 };
 use divan::Bencher;
 use nalgebra::DMatrix;
@@ -35,31 +36,28 @@ fn case(name: &str) -> Case {
     let scenario = builtin(name).expect("built in");
     let layout = scenario.robot.layout.clone();
     let prior_sd = scenario.prior.standard_deviations(&layout);
-    let weights = Weights::new(scenario.selection.units, &layout, &prior_sd);
+    let weights = scenario.weights();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut draw = || scenario.robot.limits.iter().map(|&(lower, upper)| rng.random_range(lower..upper)).collect();
+    let mut draw =
+        || scenario.robot.limits.joints().iter().map(|&(lower, upper)| rng.random_range(lower..upper)).collect();
     let candidates = (0..CANDIDATES).map(|_| draw()).collect();
-    let belief = Belief {
-        chain: scenario.robot.chain.clone(),
-        layout: layout.into(),
-        covariance: Some(DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd))),
-        noise_m2: scenario.filter.noise_m2,
-        alternatives: Vec::new(),
-    };
+    let rig = Rig::tracker(scenario.filter.sigma());
+    let belief = Belief::new(scenario.robot.state.clone(), layout.into(), rig.into())
+        .with_covariance(DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd)));
     Case { scenario, belief, weights, candidates }
 }
 
 #[divan::bench(args = SCENARIOS)]
 fn a_criterion_in_one_batch(bencher: Bencher<'_, '_>, name: &str) {
     let case = case(name);
-    let criterion = ACriterion::new(&case.belief, &case.weights).expect("a covariance");
+    let criterion = Criterion::new(&case.belief, &case.weights).expect("a covariance");
     bencher.bench(|| criterion.evaluate(black_box(&case.candidates)));
 }
 
 #[divan::bench(args = SCENARIOS)]
 fn b_criterion_one_at_a_time(bencher: Bencher<'_, '_>, name: &str) {
     let case = case(name);
-    let criterion = ACriterion::new(&case.belief, &case.weights).expect("a covariance");
+    let criterion = Criterion::new(&case.belief, &case.weights).expect("a covariance");
     bencher.bench(|| {
         let single = |theta| criterion.evaluate(std::slice::from_ref(black_box(theta)))[0];
         case.candidates.iter().map(single).collect::<Vec<f64>>()
@@ -73,10 +71,10 @@ fn c_posterior_of_every_candidate(bencher: Bencher<'_, '_>, name: &str) {
     let covariance = case.belief.covariance.clone().expect("a covariance");
     bencher.bench(|| {
         let posterior = |theta: &Vec<f64>| {
-            let (_, h) = jacobian(&case.belief.chain, &case.belief.layout, black_box(theta));
+            let (_, h) = jacobian(&case.belief.state, &case.belief.layout, black_box(theta));
             let numerator = &covariance * h.transpose();
             let mut s = &h * &numerator;
-            (0..3).for_each(|k| s[(k, k)] += case.belief.noise_m2);
+            (0..3).for_each(|k| s[(k, k)] += case.scenario.filter.variance);
             let gain = &numerator * s.try_inverse().expect("positive");
             case.weights.trace(&(&covariance - gain * numerator.transpose()))
         };
@@ -87,10 +85,12 @@ fn c_posterior_of_every_candidate(bencher: Bencher<'_, '_>, name: &str) {
 #[divan::bench(args = SCENARIOS)]
 fn d_one_active_selection(bencher: Bencher<'_, '_>, name: &str) {
     let case = case(name);
-    let mut active = Active::new(case.weights.clone(), Search::Direct(case.scenario.selection.search));
+    let active = Active::new(case.weights.clone(), Minimiser::Direct(case.scenario.selection.search));
     let actions = Actions::Box(case.scenario.robot.limits.clone());
+    let history = History::default();
+    let situation = Situation { belief: &case.belief, actions: &actions, history: &history };
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    bencher.bench_local(|| active.select(&case.belief, &actions, &mut rng).expect("a selection"));
+    bencher.bench_local(|| active.select(&situation, &mut rng).expect("a selection"));
 }
 
 #[divan::bench(args = [6, 12])]

@@ -6,9 +6,10 @@
 use std::hint::black_box;
 
 use body_schema::{
-    estimation::{Estimator, Prior, Smoother},
+    estimation::{Estimator, Smoother},
+    model::Prior,
     scenario::builtin,
-    sensing::Observation,
+    sensing::{Observation, Rig},
 };
 use divan::{Bencher, counter::ItemsCount};
 use nalgebra::Vector3;
@@ -32,21 +33,21 @@ fn case(name: &str, before: usize) -> (Smoother, Vec<Seen>) {
     let scenario = builtin(name).expect("built in");
     let layout = scenario.robot.layout.clone();
     let deviations = scenario.prior.standard_deviations(&layout);
-    let prior = Prior::Around { guess: scenario.robot.chain.clone(), deviations };
+    let prior = Prior::with_deviations(scenario.robot.state.clone(), &layout, &deviations).expect("a prior");
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let sigma_m = scenario.smoother.noise_m2.sqrt();
+    let sigma_m = scenario.smoother.sigma;
     let mut seen: Vec<Seen> = (0..before + TIMED)
         .map(|_| {
-            let limits = &scenario.robot.limits;
+            let limits = scenario.robot.limits.joints();
             let theta: Vec<f64> = limits.iter().map(|&(lower, upper)| rng.random_range(lower..upper)).collect();
             let noise = Vector3::from_fn(|_, _| StandardNormal.sample(&mut rng));
-            let marker = scenario.robot.chain.marker_at(&theta) + sigma_m * noise;
-            (theta, Observation::Seen(marker))
+            let marker = scenario.robot.state.marker_at(&theta) + sigma_m * noise;
+            (theta, Observation::seen(marker))
         })
         .collect();
     let next = seen.split_off(before);
     let settings = scenario.smoother.hypotheses;
-    let mut smoother = Smoother::new(prior, layout.into(), scenario.smoother.noise_m2, settings, rng);
+    let mut smoother = Smoother::new(prior, layout.into(), Rig::tracker(sigma_m).into(), settings, rng);
     observe(&mut smoother, &seen);
     (smoother, next)
 }

@@ -205,8 +205,8 @@ fn the_global_learner_notices_a_changed_body_and_learns_it_anew() {
 #[test]
 fn planned_movements_are_nearly_as_good_as_the_best_design() {
     let scenario = builtin("arm-6dof").expect("built in");
-    let limits = scenario.limits().expect("simulated");
-    let best = limits.best_design(40, 0.01).expect("noise");
+    let problem = scenario.design_problem().expect("simulated");
+    let best = problem.best_design(40, 0.01).expect("noise");
     assert!(best.gap <= 0.01, "gap {}", best.gap);
     assert!((best.shares.iter().sum::<f64>() - 1.0).abs() < 1e-9);
     let efficiency = |learner: &str| {

@@ -2,7 +2,7 @@
 
 use body_schema::{
     experiment::Summary,
-    kinematics::Chain,
+    model::State,
     scenario::{Problem, Scenario, ScenarioError, WorldSpec, builtin},
     sensing::Head,
 };
@@ -24,10 +24,10 @@ fn one(text: &str, from: &str, to: &str) -> (Problem, usize) {
     }
 }
 
-fn watched(scenario: &Scenario) -> (Head, Vec<f64>, Chain) {
+fn watched(scenario: &Scenario) -> (Head, Vec<f64>, State) {
     match &scenario.world {
         WorldSpec::Simulated { watch: Some(watch), .. } => {
-            (watch.head, watch.visible_pose.clone(), scenario.robot.chain.clone())
+            (watch.head, watch.visible_pose.clone(), scenario.robot.state.clone())
         }
         other => panic!("a head watches: {other:?}"),
     }
@@ -116,7 +116,7 @@ fn what_is_known_stays_fixed() {
         for learner in &report.learners {
             for (index, name) in scenario.robot.names.iter().enumerate() {
                 let joint = &learner.estimate.joints[index];
-                let truth = &scenario.robot.chain.joints[index];
+                let truth = &scenario.robot.state.joints[index];
                 let is_true = joint.axis == <[f64; 3]>::from(truth.direction().into_inner());
                 let known = frozen.contains(&name.as_str());
                 assert_eq!(is_true, known, "{name}");

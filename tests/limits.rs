@@ -1,12 +1,12 @@
-//! The limits beside a run: what the best designs are computed for, and that nobody beats them.
+//! The best designs beside a run: what they are computed for, and that nobody beats them.
 
 use body_schema::{
-    experiment::{best_designs, movements_by_counting},
+    design::{BestDesign, best_designs},
     scenario::{Scenario, builtin},
 };
 
-fn designs(name: &str, steps: u64) -> Vec<body_schema::experiment::BestDesign> {
-    best_designs(&builtin(name).expect("built in").limits_along(steps))
+fn designs(name: &str, steps: u64) -> Vec<BestDesign> {
+    best_designs(&builtin(name).expect("built in").design_stretches(steps))
 }
 
 #[test]
@@ -20,13 +20,13 @@ fn lengths_double_up_to_the_whole_run() {
 
 #[test]
 fn more_movements_allow_less_error_and_a_design_starts_well_from_a_shorter_one() {
-    let limits = builtin("arm-6dof").expect("built in").limits().expect("simulated");
+    let problem = builtin("arm-6dof").expect("built in").design_problem().expect("simulated");
     let found = designs("arm-6dof", 40);
     assert!(found.windows(2).all(|pair| pair[1].best_design_trace < pair[0].best_design_trace), "{found:?}");
     assert!(found.iter().all(|design| (0.0..=0.01).contains(&design.gap)), "{found:?}");
     // Nothing that a longer search from elsewhere finds is below what the certificate says.
     let last = found.last().expect("designs");
-    let alone = limits.best_design(40, 1e-4).expect("noise");
+    let alone = problem.best_design(40, 1e-4).expect("noise");
     let least = last.best_design_trace * (1.0 - last.gap);
     assert!((least..=least * 1.01).contains(&alone.trace), "{last:?} and {} to within {}", alone.trace, alone.gap);
 }
@@ -34,12 +34,12 @@ fn more_movements_allow_less_error_and_a_design_starts_well_from_a_shorter_one()
 #[test]
 fn a_head_limits_what_can_be_learned() {
     let scenario = builtin("head-fov").expect("built in");
-    let watched = scenario.limits().expect("simulated");
+    let watched = scenario.design_problem().expect("simulated");
     let mut unwatched = watched.clone();
     let head = unwatched.head.take().expect("a head");
-    let [seen, all] = [watched, unwatched].map(|limits| limits.best_design(20, 0.01).expect("noise"));
+    let [seen, all] = [watched, unwatched].map(|problem| problem.best_design(20, 0.01).expect("noise"));
     assert!(seen.trace > all.trace, "{} and {}", seen.trace, all.trace);
-    assert!(seen.poses.iter().all(|pose| head.sees(&scenario.robot.chain.marker_at(pose))));
+    assert!(seen.poses.iter().all(|pose| head.sees(&scenario.robot.state.marker_at(pose))));
 }
 
 #[test]
@@ -54,6 +54,5 @@ fn where_no_truth_or_no_noise_is_known_there_are_none() {
     assert!(designs("tiago-mocap", 10).is_empty());
     let text = builtin("arm-6dof").expect("built in").source.replace("sigma_m = 0.01", "sigma_m = 0.0");
     let exact = Scenario::parse("exact", &text, &|_| Err("none".into())).expect("a scenario");
-    assert!(best_designs(&exact.limits_along(10)).is_empty());
-    assert_eq!([0, 1, 3, 24, 25].map(movements_by_counting), [0, 1, 1, 8, 9]);
+    assert!(best_designs(&exact.design_stretches(10)).is_empty());
 }

@@ -10,7 +10,8 @@ mod reading;
 use std::{fs, path::PathBuf};
 
 use body_schema::{
-    experiment::{Comparison, Description, StepReport, Trace, best_designs},
+    design::best_designs,
+    experiment::{Comparison, Description, StepReport, Trace},
     recording::{EllipsoidSize, LiveLog, Recorder, RecordingError, StepsCsv, Target, comparison_csv, learner_color},
     scenario::{Scenario, builtin},
 };
@@ -320,7 +321,7 @@ fn errors_name_the_file() {
 #[test]
 fn the_best_designs_stand_at_their_steps() {
     let (description, reports) = run("arm-6dof", 12);
-    let designs = best_designs(&builtin("arm-6dof").unwrap().limits_along(12));
+    let designs = best_designs(&builtin("arm-6dof").unwrap().design_stretches(12));
     assert_eq!(designs.iter().map(|design| design.step).collect::<Vec<_>>(), [5, 10, 12]);
     let live = LiveLog::new();
     let mut recorder = Recorder::new(&description, Target::live(live.clone())).unwrap();

@@ -57,14 +57,14 @@ impl Scenario {
         let covariance = briefing.covariance.clone();
         let stabilising = |filter: Filter| filter.stabilising.filter(|_| spec.stabilising);
         Ok(match spec.estimator {
-            EstimatorKind::Rls => Box::new(Rls::new(belief(self.filter.sigma), covariance, stabilising(self.filter))),
+            EstimatorKind::Rls => Box::new(Rls::new(belief(self.filter.sigma()), covariance, stabilising(self.filter))),
             EstimatorKind::Unscented => {
                 let filter = self.unscented;
-                Box::new(UnscentedRls::new(belief(filter.sigma), covariance, stabilising(filter)))
+                Box::new(UnscentedRls::new(belief(filter.sigma()), covariance, stabilising(filter)))
             }
             EstimatorKind::RlsSixNumbers => {
                 let (direction, point) = (self.prior.direction_rad, self.prior.point_m);
-                Box::new(SixNumbers::new(belief(self.filter.sigma), direction, point, stabilising(self.filter)))
+                Box::new(SixNumbers::new(belief(self.filter.sigma()), direction, point, stabilising(self.filter)))
             }
             EstimatorKind::Smoother => {
                 let SmootherSpec { sigma, hypotheses } = self.smoother;

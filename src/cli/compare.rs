@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use body_schema::{
-    experiment::{Comparison, LearnerComparison, Trace, best_designs},
+    design::best_designs,
+    experiment::{Comparison, LearnerComparison, Trace},
     recording::comparison_csv,
     scenario::{Scenario, ScenarioError},
 };
@@ -51,7 +52,11 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
     );
     let comparison = super::on_threads(arguments.threads, || {
         let comparison = over_seeds(&scenario, learners, &arguments.seeds, steps, &|| bar.inc(1))?;
-        Ok(if arguments.limits { comparison.beside(best_designs(&scenario.limits_along(steps))) } else { comparison })
+        Ok(if arguments.limits {
+            comparison.beside(best_designs(&scenario.design_stretches(steps)))
+        } else {
+            comparison
+        })
     })?;
     bar.finish_and_clear();
     if let Some(path) = &arguments.csv {

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use body_schema::{
-    experiment::BestDesign,
+    design::BestDesign,
     scenario::{Scenario, WorldSpec},
 };
 
@@ -11,7 +11,7 @@ use super::{BadInput, output};
 /// Refuses to look for best designs where there can be none.
 pub fn check(scenario: &Scenario) -> Result<()> {
     let why = match &scenario.world {
-        _ if scenario.limits().is_some() => return Ok(()),
+        _ if scenario.design_problem().is_some() => return Ok(()),
         WorldSpec::Measured { .. } => "replays recorded data, whose truth and noise are not known",
         WorldSpec::Simulated { .. } => "has a sensor without noise, which any movements determine exactly",
     };

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use body_schema::{
-    experiment::{Experiment, RunResult, best_designs},
+    design::best_designs,
+    experiment::{Experiment, RunResult},
     recording::{EllipsoidSize, Recorder, StepsCsv, Target},
 };
 
@@ -71,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
     let mut result = experiment.result();
     if arguments.limits {
-        let stretches = scenario.limits_along(result.steps);
+        let stretches = scenario.design_stretches(result.steps);
         result = result.beside(best_designs(&stretches));
     }
     if let Some(recorder) = &mut recorder {

@@ -8,7 +8,8 @@ use super::{
     outcome::{LearnedJoint, Outcome, Search, Timing, Trial, is_kept},
 };
 use crate::{
-    experiment::{Comparison, Experiment, ExperimentError, Trace, best_designs},
+    design::best_designs,
+    experiment::{Comparison, Experiment, ExperimentError, Trace},
     optimize::History,
     scenario::{Scenario, edited},
 };
@@ -32,7 +33,7 @@ impl Measurement<'_> {
             Kind::Comparison { .. } => {
                 let mut trial = self.trial(self.scenario, None)?;
                 let steps = self.experiment.kind.steps(self.plan.quick);
-                trial.comparison = trial.comparison.beside(best_designs(&self.scenario.limits_along(steps)));
+                trial.comparison = trial.comparison.beside(best_designs(&self.scenario.design_stretches(steps)));
                 Ok(Outcome::Trials(vec![trial]))
             }
             Kind::Sweep { key, values, .. } => {
@@ -131,7 +132,7 @@ impl Measurement<'_> {
             .and_then(|movement| movement.partition.clone())
             .ok_or_else(|| self.impossible("nothing was searched"))?;
         let values: Vec<f64> = partition.leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)).collect();
-        let direct = History::replay(scenario.robot.limits.len(), scenario.selection.search, &values)?.search;
+        let direct = History::replay(scenario.robot.limits.dimension(), scenario.selection.search, &values)?.search;
         (self.tick)();
         Ok(Search {
             variant: variant.to_owned(),
@@ -141,7 +142,7 @@ impl Measurement<'_> {
                 .robot
                 .names
                 .iter()
-                .zip(&scenario.robot.limits)
+                .zip(scenario.robot.limits.joints())
                 .map(|(name, (lower, upper))| (name.clone(), [*lower, *upper]))
                 .collect(),
             partition,

@@ -20,7 +20,10 @@ use super::{
     rows::Rows,
     scene::Scene,
 };
-use crate::experiment::{BestDesign, Description, ModelReport, StepReport};
+use crate::{
+    design::BestDesign,
+    experiment::{Description, ModelReport, StepReport},
+};
 
 /// So many steps are written at once unless somebody flushes earlier …
 const BATCH_STEPS: usize = 64;

@@ -30,7 +30,7 @@ mod tests {
         let values = [("filter.measurement_variance_m2".to_owned(), Value::Float(0.5)), ("steps".into(), 7.into())];
         let text = edited(BUILTIN[0].text, &values).expect("paths that exist");
         let scenario = Scenario::parse("edited", &text, &|_| Err("no data".into())).expect("still valid");
-        assert_eq!(((scenario.filter.sigma.powi(2) * 1e9).round() / 1e9, scenario.steps), (0.5, 7));
+        assert_eq!((scenario.filter.variance, scenario.steps), (0.5, 7));
         assert_eq!(scenario.robot.names.len(), 6);
         let error = edited(BUILTIN[0].text, &[("filtre.x".into(), 1.into())]).expect_err("no such table");
         assert!(error.contains("filtre"), "{error}");

@@ -199,10 +199,17 @@ impl Prior {
 /// Values of the recursive least squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filter {
-    /// σ of the first channel as the filter assumes it, √r of its R = r I; the other channels' in proportion.
-    pub sigma: f64,
+    /// r of the R = r I that the filter assumes for the first channel, in the square of its unit.
+    pub variance: f64,
     /// The stabilising noise of (5), if any.
     pub stabilising: Option<StabilisingNoise>,
+}
+
+impl Filter {
+    /// σ of the first channel as the filter assumes it; the other channels' in proportion.
+    pub fn sigma(&self) -> f64 {
+        self.variance.sqrt()
+    }
 }
 
 /// Values of the smoother.

@@ -122,7 +122,7 @@ impl From<ScenarioError> for Problem {
             | ScenarioError::RepeatedLearner(_)
             | ScenarioError::NoLearner => "learners",
             ScenarioError::Registration { .. } => "seed",
-            ScenarioError::Invalid { .. } | ScenarioError::Experiment(_) => {
+            ScenarioError::Invalid { .. } | ScenarioError::Prior { .. } | ScenarioError::Experiment(_) => {
                 return Self::new(Kind::EngineFailed, error.to_string());
             }
         };

@@ -116,7 +116,7 @@ fn exists_rate(points: &[(f64, f64)], (size, value): (f64, f64)) -> bool {
 
 fn simulated(evidence: &Evidence<'_>, joints: usize) -> Option<Finding> {
     let scenario = evidence.scenario;
-    let WorldSpec::Simulated { sigma_m, initial_error, .. } = &scenario.world else { return None };
+    let WorldSpec::Simulated { initial_error, .. } = &scenario.world else { return None };
     let trial = evidence.outcome.trials().first()?;
     let runs = trial.comparison.learners.first()?.runs.len();
     let learned = trial.joints.len();
@@ -126,12 +126,12 @@ fn simulated(evidence: &Evidence<'_>, joints: usize) -> Option<Finding> {
         initial_error.angle_rad.to_degrees(),
         initial_error.point_m,
         evidence.steps,
-        short(sigma_m * 100.0),
-        scenario.filter.noise_m2,
+        short(scenario.rig.marker_sigma() * 100.0),
+        scenario.filter.variance,
     );
     let same = learned == joints
         && initial_error.draw == ErrorDraw::UpTo
-        && (sigma_m - 0.01).abs() < 1e-9
+        && (scenario.rig.marker_sigma() - 0.01).abs() < 1e-9
         && (evidence.steps, runs) == (1000, 20);
     Some(Finding {
         ours: None,
@@ -149,12 +149,12 @@ fn simulated(evidence: &Evidence<'_>, joints: usize) -> Option<Finding> {
 
 fn real_robot(evidence: &Evidence<'_>, angle_deg: f64, point_m: f64) -> Option<Finding> {
     let scenario = evidence.scenario;
-    let WorldSpec::Simulated { sigma_m, initial_error, .. } = &scenario.world else { return None };
+    let WorldSpec::Simulated { initial_error, .. } = &scenario.world else { return None };
     let trial = evidence.outcome.trials().first()?;
     let (joints, learned) = (scenario.robot.names.len(), trial.joints.len());
     let stabilising = scenario.filter.stabilising.map(|noise| noise.variance);
     // 90 % of a normal distribution lie within 1.645 σ.
-    let bound_cm = 1.645 * sigma_m * 100.0;
+    let bound_cm = 1.645 * scenario.rig.marker_sigma() * 100.0;
     let (size, reading) = match initial_error.draw {
         ErrorDraw::Exactly => (
             "exactly",
@@ -173,7 +173,7 @@ fn real_robot(evidence: &Evidence<'_>, angle_deg: f64, point_m: f64) -> Option<F
          initial error of {size} {:.0} deg and {} m",
         evidence.steps,
         short(bound_cm),
-        scenario.filter.noise_m2,
+        scenario.filter.variance,
         stabilising.map_or_else(|| "0".to_owned(), |variance| variance.to_string()),
         initial_error.angle_rad.to_degrees(),
         initial_error.point_m,
@@ -182,7 +182,7 @@ fn real_robot(evidence: &Evidence<'_>, angle_deg: f64, point_m: f64) -> Option<F
     let differences: Vec<&str> = [
         (learned != 4, "the number of learned joints"),
         (!near(bound_cm, 5.0), "the marker's error"),
-        (!near(scenario.filter.noise_m2, 0.01), "the filter's R"),
+        (!near(scenario.filter.variance, 0.01), "the filter's R"),
         (!stabilising.is_some_and(|variance| near(variance, 0.005)), "the stabilising noise"),
         (!near(initial_error.angle_rad.to_degrees(), angle_deg), "the error of the angles"),
         (!near(initial_error.point_m, point_m), "the error of the points"),

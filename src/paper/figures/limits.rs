@@ -3,7 +3,8 @@
 use super::Source;
 use crate::{
     chart::{Axis, Layer, Panel, Style},
-    experiment::{BestDesign, Comparison, Curve, LearnerComparison, Quantiles},
+    design::BestDesign,
+    experiment::{Comparison, Curve, LearnerComparison, Quantiles},
     recording::TRUTH_COLOR,
     selection::CriterionUnits,
 };

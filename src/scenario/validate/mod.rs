@@ -171,7 +171,7 @@ impl Check<'_> {
             every: self.at_least_one(&key("stabilising_noise.every"), &noise.every),
         });
         let variance = self.positive(&key("measurement_variance_m2"), &raw.measurement_variance_m2);
-        Filter { sigma: variance.sqrt(), stabilising }
+        Filter { variance, stabilising }
     }
 
     fn smoother(&mut self, raw: &raw::Scenario, rig: &Rig) -> SmootherSpec {
