@@ -98,8 +98,13 @@ impl Scenario {
                     configurations.extend(watch.as_ref().map(|watch| watch.visible_pose.clone()));
                 }
                 let evaluation = Evaluation::of_truth(configurations, &truth, self.rig.sigma());
-                let change = change.as_ref().map(|change| Change { step: change.step, truth: change.truth.clone() });
-                Ok((World::Simulated { truth, rig: self.rig.clone(), head, change }, evaluation, briefing))
+                let change = change.as_ref();
+                let change = change.map(|change| Box::new(Change { step: change.step, truth: change.truth.clone() }));
+                Ok((
+                    World::Simulated { truth: Box::new(truth), rig: self.rig.clone(), head, change },
+                    evaluation,
+                    briefing,
+                ))
             }
             WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, *held_out),
         }
@@ -257,7 +262,7 @@ mod tests {
             let selections = |swap: bool| {
                 let (mut world, mut evaluation, briefing) = scenario.draw(11).expect("a world");
                 if let (true, World::Simulated { truth, .. }) = (swap, &mut world) {
-                    *truth = scenario.perturbed(
+                    **truth = scenario.perturbed(
                         &InitialError { draw: ErrorDraw::Exactly, angle_rad: 0.7, point_m: 0.3, marker_m: 0.1 },
                         &mut Stream::InitialEstimate.rng(99),
                     );

@@ -158,6 +158,16 @@ impl Belief {
     }
 }
 
+/// What a filter makes of an observation.
+pub(super) struct Correction {
+    /// The state after it.
+    pub state: State,
+    /// P, in the chart there.
+    pub covariance: DMatrix<f64>,
+    /// The normalised innovation squared and its degrees of freedom.
+    pub nis: (f64, usize),
+}
+
 /// S = H P Hᵀ + I of whitened rows Hᵀ (m × d), and P Hᵀ.
 pub(super) fn innovation_covariance(covariance: &DMatrix<f64>, rows: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     let numerator = covariance * rows;
@@ -184,7 +194,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let state = random_state(&mut rng, 5);
         let blocks = (0..5).map(Block::Axis).chain([Block::Target(0)]);
-        let layout = Layout::new(&state, blocks.chain((seed % 2 == 0).then_some(Block::Base)));
+        let layout = Layout::new(&state, blocks.chain((seed.is_multiple_of(2)).then_some(Block::Base)));
         let m = layout.dimension();
         let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-0.5..0.5));
         let covariance = &root * root.transpose();

@@ -15,9 +15,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{
     Belief, ChangeDetector, EstimationError, Estimator, Update,
-    belief::{innovation_covariance, is_finite},
+    belief::{Correction, innovation_covariance, is_finite},
 };
-use crate::{model::State, sensing::Observation};
+use crate::sensing::Observation;
 
 /// The stabilising noise of (5) and when it is added.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,11 +55,7 @@ impl Rls {
 
     /// The update (2)–(4) with what was seen, the covariance before (5), and the normalised innovation squared; `None` if
     /// nothing was.
-    fn corrected(
-        &self,
-        positions: &[f64],
-        observation: &Observation,
-    ) -> Result<Option<(State, DMatrix<f64>, (f64, usize))>, EstimationError> {
+    fn corrected(&self, positions: &[f64], observation: &Observation) -> Result<Option<Correction>, EstimationError> {
         let (state, layout, p) = (&self.belief.state, &self.belief.layout, &self.covariance);
         let equations = self.belief.rig.equations_of(state, layout, positions, observation);
         let innovation = &equations.residual;
@@ -78,7 +74,8 @@ impl Rls {
         if !(is_finite(&delta, &covariance) && nis.is_finite()) {
             return Err(EstimationError::Diverged("an update was not a finite number"));
         }
-        Ok(Some((state.retract(layout, &delta), covariance, (nis, innovation.len()))))
+        let state = state.retract(layout, &delta);
+        Ok(Some(Correction { state, covariance, nis: (nis, innovation.len()) }))
     }
 }
 
@@ -89,7 +86,7 @@ impl Estimator for Rls {
 
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let mut update = Update::default();
-        if let Some((state, covariance, nis)) = self.corrected(positions, observation)? {
+        if let Some(Correction { state, covariance, nis }) = self.corrected(positions, observation)? {
             self.belief.state = state;
             self.covariance = covariance;
             update = Update { nis: Some(nis), change_noticed: self.changes.observe(nis.0, nis.1) };

@@ -14,13 +14,9 @@ use nalgebra::{DMatrix, DVector, UnitVector3, Vector3};
 
 use super::{
     Belief, EstimationError, Estimator, StabilisingNoise, Update,
-    belief::{innovation_covariance, is_finite},
+    belief::{Correction, innovation_covariance, is_finite},
 };
-use crate::{
-    kinematics::Joint,
-    model::{Pass, State},
-    sensing::Observation,
-};
+use crate::{kinematics::Joint, model::Pass, sensing::Observation};
 
 /// The filter in six numbers per learned revolute joint, three per learned prismatic joint. Base and marker must be known,
 /// and of all channels it reads the marker's position alone.
@@ -84,11 +80,7 @@ impl SixNumbers {
     }
 
     /// The state and the covariance after a measured marker, and the normalised innovation squared.
-    fn corrected(
-        &self,
-        positions: &[f64],
-        measured: &Vector3<f64>,
-    ) -> Result<(State, DMatrix<f64>, f64), EstimationError> {
+    fn corrected(&self, positions: &[f64], measured: &Vector3<f64>) -> Result<Correction, EstimationError> {
         let p = &self.covariance;
         let weight = self.belief.rig.marker_sigma().recip();
         let (rows, predicted) = self.rows(positions);
@@ -119,7 +111,8 @@ impl SixNumbers {
                 Joint::Prismatic(w) => *w = UnitVector3::new_normalize(w.into_inner() + take()),
             }
         }
-        Ok((state, (&covariance + covariance.transpose()) * 0.5, innovation.dot(&s.solve(&innovation))))
+        let nis = (innovation.dot(&s.solve(&innovation)), 3);
+        Ok(Correction { state, covariance: (&covariance + covariance.transpose()) * 0.5, nis })
     }
 }
 
@@ -131,9 +124,9 @@ impl Estimator for SixNumbers {
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let mut update = Update::default();
         if let Some(measured) = observation.marker(&self.belief.rig) {
-            let (state, covariance, nis) = self.corrected(positions, &measured.coords)?;
+            let Correction { state, covariance, nis } = self.corrected(positions, &measured.coords)?;
             (self.belief.state, self.covariance) = (state, covariance);
-            update.nis = Some((nis, 3));
+            update.nis = Some(nis);
         }
         self.step += 1;
         if let Some(noise) = self.stabilising.filter(|noise| noise.is_due(self.step)) {

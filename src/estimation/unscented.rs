@@ -21,7 +21,10 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::{Belief, ChangeDetector, EstimationError, Estimator, StabilisingNoise, Update, belief::is_finite};
+use super::{
+    Belief, ChangeDetector, EstimationError, Estimator, StabilisingNoise, Update,
+    belief::{Correction, is_finite},
+};
 use crate::{model::State, sensing::Observation};
 
 /// s², the kurtosis of a normal distribution.
@@ -46,11 +49,7 @@ impl UnscentedRls {
 
     /// The state and covariance after what was seen, before the stabilising noise, and the normalised innovation squared;
     /// `None` if nothing was.
-    fn corrected(
-        &self,
-        positions: &[f64],
-        observation: &Observation,
-    ) -> Result<Option<(State, DMatrix<f64>, (f64, usize))>, EstimationError> {
+    fn corrected(&self, positions: &[f64], observation: &Observation) -> Result<Option<Correction>, EstimationError> {
         let Belief { state, layout, rig, .. } = &self.belief;
         let m = layout.dimension();
         let diverged = || EstimationError::Diverged("an update was not a finite number");
@@ -88,7 +87,7 @@ impl UnscentedRls {
         if !(is_finite(&delta, &covariance) && nis.is_finite()) {
             return Err(diverged());
         }
-        Ok(Some((state.retract(layout, &delta), covariance, (nis, d))))
+        Ok(Some(Correction { state: state.retract(layout, &delta), covariance, nis: (nis, d) }))
     }
 }
 
@@ -99,7 +98,7 @@ impl Estimator for UnscentedRls {
 
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let mut update = Update::default();
-        if let Some((state, covariance, nis)) = self.corrected(positions, observation)? {
+        if let Some(Correction { state, covariance, nis }) = self.corrected(positions, observation)? {
             (self.belief.state, self.covariance) = (state, covariance);
             update = Update { nis: Some(nis), change_noticed: self.changes.observe(nis.0, nis.1) };
         }

@@ -21,13 +21,13 @@ pub enum World {
     /// A robot that is known here and nowhere else, seen through noisy channels.
     Simulated {
         /// The true state.
-        truth: State,
+        truth: Box<State>,
         /// The channels, with their true noise.
         rig: Arc<Rig>,
         /// The head that watches; without one every marker is seen.
         head: Option<Head>,
         /// How the body will change.
-        change: Option<Change>,
+        change: Option<Box<Change>>,
     },
     /// Recorded observations by row; no truth is known.
     Measured {
@@ -92,7 +92,7 @@ impl World {
     /// The change of the body that is still to come.
     pub fn change(&self) -> Option<&Change> {
         match self {
-            Self::Simulated { change, .. } => change.as_ref(),
+            Self::Simulated { change, .. } => change.as_deref(),
             Self::Measured { .. } => None,
         }
     }
@@ -109,7 +109,7 @@ impl World {
     pub(super) fn changed_after(&self, movements: u64) -> Option<Self> {
         let Self::Simulated { rig, head, change: Some(change), .. } = self else { return None };
         (change.step <= movements).then(|| Self::Simulated {
-            truth: change.truth.clone(),
+            truth: Box::new(change.truth.clone()),
             rig: rig.clone(),
             head: *head,
             change: None,
@@ -164,7 +164,8 @@ mod tests {
     fn a_body_beyond_all_numbers_shows_nothing() {
         let mut truth = random_arm(&mut ChaCha8Rng::seed_from_u64(1), 2);
         truth = truth.with_marker(nalgebra::Point3::new(f64::INFINITY, 0.0, 0.0));
-        let world = World::Simulated { truth, rig: Arc::new(Rig::tracker(0.1)), head: None, change: None };
+        let world =
+            World::Simulated { truth: Box::new(truth), rig: Arc::new(Rig::tracker(0.1)), head: None, change: None };
         let shown = world.observe(&Movement { configuration: vec![0.1; 2], row: None }, &[0.0; 3]);
         assert!(matches!(shown, Err(WorldError::NoMeasurement(_))), "{shown:?}");
     }

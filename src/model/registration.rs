@@ -279,7 +279,10 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    fn case(seed: u64, moving: &[usize], sigma: f64) -> (State, State, Vec<(Vec<f64>, Point3<f64>)>) {
+    type Case = (State, State, Vec<(Vec<f64>, Point3<f64>)>);
+
+    /// The nominal robot, the truth, and what was measured.
+    fn case(seed: u64, moving: &[usize], sigma: f64) -> Case {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let nominal = random_arm(&mut rng, 7);
         let base = Isometry3::new(Vector3::new(0.5, -1.0, 0.3), Vector3::from_fn(|_, _| rng.random_range(-3.0..3.0)));

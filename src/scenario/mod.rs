@@ -122,7 +122,7 @@ pub enum WorldSpec {
         /// The head that watches, if the marker is not always seen.
         watch: Option<Watch>,
         /// How the body changes during a run, if it does.
-        change: Option<ChangeSpec>,
+        change: Option<Box<ChangeSpec>>,
     },
     /// A recorded data set is replayed; the initial estimate is the nominal robot, registered to the training rows.
     Measured {

@@ -13,7 +13,7 @@ use super::{ErrorDraw, EstimatorKind, PolicyKind};
 use crate::{kinematics::JointKind, selection::Optimality};
 
 pub use exactly::Exactly;
-pub use read::{line_of, read};
+pub use read::{key_in, line_of, read};
 pub use sensors::Sensors;
 
 #[derive(Debug, Deserialize)]

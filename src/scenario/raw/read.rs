@@ -1,5 +1,7 @@
 //! Reading the keys, and the errors of it.
 
+use std::ops::Range;
+
 use super::Scenario;
 use crate::scenario::error::{Problem, similar};
 
@@ -15,6 +17,21 @@ pub fn read(text: &str) -> Result<Scenario, Problem> {
 /// The line (from 1) of a byte offset.
 pub fn line_of(text: &str, offset: usize) -> usize {
     text.as_bytes().iter().take(offset).filter(|&&byte| byte == b'\n').count() + 1
+}
+
+/// Where `key` is given a value in the table that begins at `table`; the table itself if that is not to be seen.
+pub fn key_in(text: &str, table: Range<usize>, key: &str) -> Range<usize> {
+    let mut at = text[..table.start].rfind('\n').map_or(0, |end| end + 1);
+    for (index, line) in text[at..].split_inclusive('\n').enumerate() {
+        if index > 0 && line.trim_start().starts_with('[') {
+            break;
+        }
+        if line.trim_start().strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('=')) {
+            return at..at + line.len();
+        }
+        at += line.len();
+    }
+    table
 }
 
 /// Drops what `Spanned` adds to paths, but for the index of a sequence.

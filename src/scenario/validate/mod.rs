@@ -120,11 +120,11 @@ impl Check<'_> {
         }
         let robot = self.robot(&raw.robot)?;
         let world = self.world(raw, &robot, open);
-        let rig = self.rig(raw)?;
+        let rig = self.rig(raw);
         let setting = Setting {
             learns_marker: raw.robot.learn_marker,
             is_measured: raw.measurements.is_some(),
-            sees_markers_alone: rig.channels().iter().all(|channel| channel.target() == Some(0)),
+            sees_markers_alone: rig.iter().flat_map(|rig| rig.channels()).all(|channel| channel.target() == Some(0)),
         };
         let learners = self.learners(&raw.learners, setting);
         let filter = self.filter("filter", &raw.filter);
@@ -135,8 +135,7 @@ impl Check<'_> {
             prior: self.prior(raw),
             filter,
             unscented: raw.unscented.as_ref().map_or(filter, |unscented| self.filter("unscented", unscented)),
-            smoother: self.smoother(raw, &rig),
-            rig,
+            smoother: self.smoother(raw, rig.as_deref()),
             gradient_rate: self.gradient_rate(raw),
             selection: self.selection(&raw.selection),
             thresholds: self.thresholds(raw),
@@ -145,6 +144,7 @@ impl Check<'_> {
             learners,
             robot,
             world: world?,
+            rig: rig?,
             source: self.text.to_owned(),
             data: self.data.take(),
         })
@@ -174,14 +174,14 @@ impl Check<'_> {
         Filter { variance, stabilising }
     }
 
-    fn smoother(&mut self, raw: &raw::Scenario, rig: &Rig) -> SmootherSpec {
+    fn smoother(&mut self, raw: &raw::Scenario, rig: Option<&Rig>) -> SmootherSpec {
         let default = HypothesisSettings::default();
         let given = raw.smoother.as_ref();
         let variance = given.and_then(|given| given.measurement_variance_m2.as_ref());
         let sigma = match variance {
             Some(variance) => self.positive("smoother.measurement_variance_m2", variance).sqrt(),
             // A sensor without noise would make the posterior infinitely sharp.
-            None => rig.sigma().max(1e-5),
+            None => rig.map_or(0.0, Rig::sigma).max(1e-5),
         };
         let mut count = |key: &str, value: Option<&Spanned<u64>>, default: usize| {
             value.map_or(default, |value| self.at_least_one(key, value).min(1000) as usize)

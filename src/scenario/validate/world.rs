@@ -41,7 +41,7 @@ impl Check<'_> {
                         marker_m: marker_m.map_or(0.0, |size| self.not_negative("initial_error.marker_m", size)),
                     },
                     watch: watch.flatten(),
-                    change: change.flatten(),
+                    change: change.flatten().map(Box::new),
                 })
             }
             (None, None, Some(measurements)) => {
@@ -85,7 +85,10 @@ impl Check<'_> {
                     self.problem(span, format!("{section}.sigma_m"), what, "write a number above 0");
                 }
                 Ok(channel) => channels.push(channel),
-                Err(error) => self.problem(span, format!("{section}.{}", error.key), error.what, error.mend),
+                Err(error) => {
+                    let place = raw::key_in(self.text, span, &error.key);
+                    self.problem(place, format!("{section}.{}", error.key), error.what, error.mend);
+                }
             }
         }
         if given.0.is_empty() {
