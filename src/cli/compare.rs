@@ -12,7 +12,7 @@ use body_schema::{
 use comfy_table::Table;
 use rayon::prelude::*;
 
-use super::{ScenarioArguments, Seeds, limits, output, progress, steps_of};
+use super::{ScenarioArguments, Seeds, designs, output, progress, steps_of};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -43,7 +43,7 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
     let (scenario, learners) = arguments.scenario.load()?;
     let steps = steps_of(&scenario, arguments.steps)?;
     if arguments.limits {
-        limits::check(&scenario)?;
+        designs::check(&scenario)?;
     }
     output::distinct([("--json", &arguments.json), ("--csv", &arguments.csv)])?;
     let bar = progress::bar(
@@ -72,7 +72,7 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
         output::say(format!("{scenario}: {seeds} seeds, {steps} movements each"))?;
         output::say(table(&comparison))?;
         let efficiencies = comparison.learners.iter().map(|learner| (learner.name.as_str(), learner.efficiency));
-        limits::say(comparison.movements_by_counting, &comparison.best_designs, efficiencies)?;
+        designs::say(comparison.movements_by_counting, &comparison.best_designs, efficiencies)?;
     }
     Ok(())
 }

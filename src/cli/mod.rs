@@ -1,8 +1,8 @@
 //! Commands, their arguments, and what becomes of their errors.
 
 mod compare;
+mod designs;
 mod input;
-mod limits;
 mod output;
 mod paper;
 mod progress;

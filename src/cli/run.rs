@@ -10,7 +10,7 @@ use body_schema::{
 };
 
 use super::{
-    ScenarioArguments, limits, output, progress, steps_of,
+    ScenarioArguments, designs, output, progress, steps_of,
     until::{Ending, Until},
 };
 
@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (scenario, learners) = arguments.scenario.load()?;
     let steps = steps_of(&scenario, arguments.steps)?;
     if arguments.limits {
-        limits::check(&scenario)?;
+        designs::check(&scenario)?;
     }
     output::distinct([("--rrd", &arguments.rrd), ("--csv", &arguments.csv), ("--json", &arguments.json)])?;
     let specs = scenario.chosen(learners)?;
@@ -145,5 +145,5 @@ fn summarise(result: &RunResult) -> Result<()> {
     let header = ["learner", "orient. (deg)", "axis (deg)", "location (mm)", "predict. (mm)", "misses", "verdict"];
     output::say(output::table(header, rows))?;
     let efficiencies = result.learners.iter().map(|learner| (learner.name.as_str(), learner.efficiency));
-    limits::say(result.movements_by_counting, &result.best_designs, efficiencies)
+    designs::say(result.movements_by_counting, &result.best_designs, efficiencies)
 }

@@ -68,7 +68,7 @@ impl Problem {
 }
 
 /// max φ − Σ pᵢ φᵢ over what was found.
-fn excess(found: &[(Vec<f64>, f64)], state: &State) -> f64 {
+fn excess(found: &[(Vec<f64>, f64)], state: &Standing) -> f64 {
     found.iter().map(|(_, sensitivity)| *sensitivity).fold(0.0, f64::max) - state.mean
 }
 
@@ -83,7 +83,7 @@ struct Search<'a> {
     shares: Vec<f64>,
 }
 
-struct State {
+struct Standing {
     trace: f64,
     /// N M⁻¹ W M⁻¹.
     sensitivity: DMatrix<f64>,
@@ -145,7 +145,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn state(&self) -> Option<State> {
+    fn state(&self) -> Option<Standing> {
         let mut m = self.problem.prior.clone();
         for (information, share) in self.information.iter().zip(&self.shares) {
             m += information * (share * self.movements);
@@ -154,7 +154,7 @@ impl<'a> Search<'a> {
         let weights = &self.problem.weights;
         let sensitivity = &inverse * weights.scale(&inverse) * self.movements;
         let mean = self.sensitivities(&sensitivity).zip(&self.shares).map(|(phi, share)| phi * share).sum();
-        Some(State { trace: weights.trace(&inverse), sensitivity, mean })
+        Some(Standing { trace: weights.trace(&inverse), sensitivity, mean })
     }
 
     fn sensitivities<'b>(&'b self, sensitivity: &'b DMatrix<f64>) -> impl Iterator<Item = f64> + 'b {
@@ -162,7 +162,7 @@ impl<'a> Search<'a> {
     }
 
     /// The `count` candidates of the greatest sensitivity, polished, with it.
-    fn favoured(&self, state: &State, count: usize) -> Vec<(Vec<f64>, f64)> {
+    fn favoured(&self, state: &Standing, count: usize) -> Vec<(Vec<f64>, f64)> {
         let phi = |point: &[f64]| {
             let seen = self.problem.seen(&self.problem.limits.from_unit(point));
             seen.map_or(f64::NEG_INFINITY, |rows| (&state.sensitivity * &rows).dot(&rows))
@@ -200,7 +200,7 @@ impl<'a> Search<'a> {
         Some(())
     }
 
-    fn design(self, state: &State, excess: f64) -> Design {
+    fn design(self, state: &Standing, excess: f64) -> Design {
         Design { poses: self.poses, shares: self.shares, trace: state.trace, gap: (excess / state.trace).max(0.0) }
     }
 }

@@ -159,7 +159,7 @@ impl Belief {
 }
 
 /// What a filter makes of an observation.
-pub(super) struct Correction {
+pub(super) struct Revision {
     /// The state after it.
     pub state: State,
     /// P, in the chart there.

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{
     Belief, ChangeDetector, EstimationError, Estimator, Update,
-    belief::{Correction, innovation_covariance, is_finite},
+    belief::{Revision, innovation_covariance, is_finite},
 };
 use crate::sensing::Observation;
 
@@ -55,7 +55,7 @@ impl Rls {
 
     /// The update (2)–(4) with what was seen, the covariance before (5), and the normalised innovation squared; `None` if
     /// nothing was.
-    fn corrected(&self, positions: &[f64], observation: &Observation) -> Result<Option<Correction>, EstimationError> {
+    fn corrected(&self, positions: &[f64], observation: &Observation) -> Result<Option<Revision>, EstimationError> {
         let (state, layout, p) = (&self.belief.state, &self.belief.layout, &self.covariance);
         let equations = self.belief.rig.equations_of(state, layout, positions, observation);
         let innovation = &equations.residual;
@@ -75,7 +75,7 @@ impl Rls {
             return Err(EstimationError::Diverged("an update was not a finite number"));
         }
         let state = state.retract(layout, &delta);
-        Ok(Some(Correction { state, covariance, nis: (nis, innovation.len()) }))
+        Ok(Some(Revision { state, covariance, nis: (nis, innovation.len()) }))
     }
 }
 
@@ -86,7 +86,7 @@ impl Estimator for Rls {
 
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let mut update = Update::default();
-        if let Some(Correction { state, covariance, nis }) = self.corrected(positions, observation)? {
+        if let Some(Revision { state, covariance, nis }) = self.corrected(positions, observation)? {
             self.belief.state = state;
             self.covariance = covariance;
             update = Update { nis: Some(nis), change_noticed: self.changes.observe(nis.0, nis.1) };

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector, UnitVector3, Vector3};
 
 use super::{
     Belief, EstimationError, Estimator, StabilisingNoise, Update,
-    belief::{Correction, innovation_covariance, is_finite},
+    belief::{Revision, innovation_covariance, is_finite},
 };
 use crate::{kinematics::Joint, model::Pass, sensing::Observation};
 
@@ -80,7 +80,7 @@ impl SixNumbers {
     }
 
     /// The state and the covariance after a measured marker, and the normalised innovation squared.
-    fn corrected(&self, positions: &[f64], measured: &Vector3<f64>) -> Result<Correction, EstimationError> {
+    fn corrected(&self, positions: &[f64], measured: &Vector3<f64>) -> Result<Revision, EstimationError> {
         let p = &self.covariance;
         let weight = self.belief.rig.marker_sigma().recip();
         let (rows, predicted) = self.rows(positions);
@@ -112,7 +112,7 @@ impl SixNumbers {
             }
         }
         let nis = (innovation.dot(&s.solve(&innovation)), 3);
-        Ok(Correction { state, covariance: (&covariance + covariance.transpose()) * 0.5, nis })
+        Ok(Revision { state, covariance: (&covariance + covariance.transpose()) * 0.5, nis })
     }
 }
 
@@ -124,7 +124,7 @@ impl Estimator for SixNumbers {
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let mut update = Update::default();
         if let Some(measured) = observation.marker(&self.belief.rig) {
-            let Correction { state, covariance, nis } = self.corrected(positions, &measured.coords)?;
+            let Revision { state, covariance, nis } = self.corrected(positions, &measured.coords)?;
             (self.belief.state, self.covariance) = (state, covariance);
             update.nis = Some(nis);
         }

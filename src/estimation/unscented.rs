@@ -23,7 +23,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::{
     Belief, ChangeDetector, EstimationError, Estimator, StabilisingNoise, Update,
-    belief::{Correction, is_finite},
+    belief::{Revision, is_finite},
 };
 use crate::{model::State, sensing::Observation};
 
@@ -49,7 +49,7 @@ impl UnscentedRls {
 
     /// The state and covariance after what was seen, before the stabilising noise, and the normalised innovation squared;
     /// `None` if nothing was.
-    fn corrected(&self, positions: &[f64], observation: &Observation) -> Result<Option<Correction>, EstimationError> {
+    fn corrected(&self, positions: &[f64], observation: &Observation) -> Result<Option<Revision>, EstimationError> {
         let Belief { state, layout, rig, .. } = &self.belief;
         let m = layout.dimension();
         let diverged = || EstimationError::Diverged("an update was not a finite number");
@@ -87,7 +87,7 @@ impl UnscentedRls {
         if !(is_finite(&delta, &covariance) && nis.is_finite()) {
             return Err(diverged());
         }
-        Ok(Some(Correction { state: state.retract(layout, &delta), covariance, nis: (nis, d) }))
+        Ok(Some(Revision { state: state.retract(layout, &delta), covariance, nis: (nis, d) }))
     }
 }
 
@@ -98,7 +98,7 @@ impl Estimator for UnscentedRls {
 
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let mut update = Update::default();
-        if let Some(Correction { state, covariance, nis }) = self.corrected(positions, observation)? {
+        if let Some(Revision { state, covariance, nis }) = self.corrected(positions, observation)? {
             (self.belief.state, self.covariance) = (state, covariance);
             update = Update { nis: Some(nis), change_noticed: self.changes.observe(nis.0, nis.1) };
         }

@@ -20,7 +20,7 @@ pub use block::Block;
 pub use element::{Displacement, Element};
 pub use layout::{Layout, Quantity};
 pub use pass::{Frame, Motion, Pass, Twist, jacobian};
-pub use prior::{Normal, Prior, PriorError, anywhere};
+pub use prior::{Derivatives, Prior, PriorError, anywhere};
 pub use state::{Correction, Device, Place, State, Target};
 
 #[cfg(test)]

@@ -67,7 +67,7 @@ const UNIFORM_DIRECTION: f64 = PI * PI / 4.0 - 1.0;
 const UNIFORM_ROTATION: f64 = (PI * PI / 3.0 + 2.0) / 3.0;
 
 /// A cost's second and first derivatives: information (m × m) and descent direction −∂cost/∂δ.
-pub type Normal<'a> = (&'a mut DMatrix<f64>, &'a mut DVector<f64>);
+pub type Derivatives<'a> = (&'a mut DMatrix<f64>, &'a mut DVector<f64>);
 
 impl Prior {
     /// Around `guess` with the covariance P₀ (m × m) of its tangent coordinates.
@@ -163,7 +163,7 @@ impl Prior {
 
     /// The cost of `state`, whose axes are written with their points nearest to the [pins](Self::pins). Its derivatives
     /// in the chart at `state` are added to `normal`, if wanted: the descent exactly, the information by Gauss and Newton.
-    pub fn cost(&self, state: &State, mut normal: Option<Normal<'_>>) -> f64 {
+    pub fn cost(&self, state: &State, mut normal: Option<Derivatives<'_>>) -> f64 {
         let mut cost = 0.0;
         let mut displaced = Vec::with_capacity(self.blocks.len());
         for (block, range, knowledge) in &self.blocks {
@@ -211,7 +211,7 @@ fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
 }
 
 /// The cost of a block that may be anywhere, and its derivatives.
-fn anywhere_cost(element: &Element, range: &Range<usize>, bound: f64, normal: Option<Normal<'_>>) -> f64 {
+fn anywhere_cost(element: &Element, range: &Range<usize>, bound: f64, normal: Option<Derivatives<'_>>) -> f64 {
     let information = 3.0 / (bound * bound);
     // (coordinate, offset from the origin, how the angle after next carries it along)
     let (offsets, lever, angles): (Vec<f64>, f64, Range<usize>) = match element {

@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::{
-    Actions, Appraisal, Criterion, Movement, Policy, Search, Selection, SelectionError, Sight, Situation, Visibility,
-    Watch, Weights, search::direct,
+    Actions, Appraisal, Criterion, Movement, Policy, Search, Selection, SelectionError, Sight, Situation, Watch,
+    Weights, search::direct,
 };
 use crate::{
     estimation::Belief,
@@ -92,7 +92,7 @@ impl Active {
     ) -> Result<Criterion<'a>, SelectionError> {
         let criterion = Criterion::new(belief, &self.weights)?;
         let Some(watch) = &self.watch else { return Ok(criterion) };
-        let visibility = Visibility::new(&watch.head, situation.history.misses());
+        let visibility = watch.visibility(situation.history);
         let sight = if self.naive { Sight::Predicted(visibility) } else { Sight::Chance(visibility, limits) };
         Ok(criterion.watched(sight))
     }
@@ -138,11 +138,7 @@ impl Active {
         };
         let before = criteria.iter().map(Criterion::before).sum::<f64>() / criteria.len() as f64;
         let Some((configuration, value)) = best.filter(|(_, value)| value.is_finite()) else {
-            return match &self.watch {
-                // Nothing in view was found: back to where the marker is known to be seen.
-                Some(watch) if before.is_finite() => Ok(Selection::plain(watch.visible_pose.clone())),
-                _ => Err(SelectionError::NoFiniteCriterion),
-            };
+            return Watch::fallback(self.watch.as_ref(), before);
         };
         Ok(Selection {
             criterion: Some(value),
@@ -157,8 +153,8 @@ impl Active {
 impl Policy for Active {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
         match situation.actions {
-            Actions::Box(limits) => match self.watch.as_ref().filter(|_| !situation.history.has_moved()) {
-                Some(watch) => Ok(Selection::plain(watch.visible_pose.clone())),
+            Actions::Box(limits) => match Watch::beginning(self.watch.as_ref(), situation.history) {
+                Some(beginning) => Ok(beginning),
                 None => self.search_box(situation, limits, rng),
             },
             Actions::Pool(pool) => {

@@ -4,7 +4,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{
     Actions, Appraisal, Movement, Optimality, Outlook, Partition, Planned, Policy, Search, Selection, SelectionError,
-    Sight, Situation, Visibility, Watch, Weights, plan::Plan, search::direct,
+    Sight, Situation, Watch, Weights, plan::Plan, search::direct,
 };
 use crate::{
     kinematics::JointBox,
@@ -117,7 +117,7 @@ impl Planner {
         // Of the plan, what teaches most at once comes first.
         let outlook = scene.outlook(&scene.now)?;
         let Some((index, value)) = least(outlook.evaluate(&poses).into_iter().enumerate()) else {
-            let selection = self.fallback(outlook.before())?;
+            let selection = Watch::fallback(self.watch.as_ref(), outlook.before())?;
             return Ok(Selection { plan: Some(Planned { poses, committed: 0 }), ..selection });
         };
         let configuration = poses.remove(index);
@@ -130,14 +130,6 @@ impl Planner {
             search: partition.map(|partition| Search { settings: self.search, partition: partition.choosing(&chosen) }),
             plan: Some(Planned { poses, committed: committed.saturating_sub(1) }),
         })
-    }
-
-    /// Nothing in view was found: back to where the marker is known to be seen.
-    fn fallback(&self, before: f64) -> Result<Selection, SelectionError> {
-        match &self.watch {
-            Some(watch) if before.is_finite() => Ok(Selection::plain(watch.visible_pose.clone())),
-            _ => Err(SelectionError::NoFiniteCriterion),
-        }
     }
 }
 
@@ -152,7 +144,7 @@ impl<'a> Scene<'a> {
         let outlook = Outlook::new(&plan.after, weights, planning.optimality, workspace)?.told(&plan.told());
         Ok(match watch {
             Some(watch) => {
-                let visibility = Visibility::new(&watch.head, self.situation.history.misses());
+                let visibility = watch.visibility(self.situation.history);
                 outlook.unsure(&self.now.after).watched(Sight::Chance(visibility, self.limits))
             }
             None => outlook,
@@ -254,8 +246,8 @@ impl Policy for Planner {
                 let candidates: Vec<&[f64]> = pool.iter().map(|movement| movement.configuration.as_slice()).collect();
                 Selection::of_pool(pool, outlook.evaluate(&candidates), outlook.before())
             }
-            Actions::Box(limits) => match self.watch.as_ref().filter(|_| !situation.history.has_moved()) {
-                Some(watch) => Ok(Selection::plain(watch.visible_pose.clone())),
+            Actions::Box(limits) => match Watch::beginning(self.watch.as_ref(), situation.history) {
+                Some(beginning) => Ok(beginning),
                 None => self.select_in_box(situation, limits),
             },
         }

@@ -4,8 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Actions, Appraisal, Criterion, Movement, Policy, Selection, SelectionError, Sight, Situation, Visibility, Watch,
-    Weights,
+    Actions, Appraisal, Criterion, Movement, Policy, Selection, SelectionError, Sight, Situation, Watch, Weights,
 };
 use crate::kinematics::JointBox;
 
@@ -44,10 +43,7 @@ impl Policy for Random {
     ) -> Result<Appraisal, SelectionError> {
         let criterion = Criterion::new(situation.belief, &self.weights)?;
         let criterion = match &self.watch {
-            Some(watch) => {
-                let visibility = Visibility::new(&watch.head, situation.history.misses());
-                criterion.watched(Sight::Chance(visibility, limits))
-            }
+            Some(watch) => criterion.watched(Sight::Chance(watch.visibility(situation.history), limits)),
             None => criterion,
         };
         criterion.appraise(configuration)

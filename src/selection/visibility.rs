@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Matrix3, Point3};
 
+use super::{History, Selection, SelectionError};
 use crate::sensing::Head;
 
 /// What is known of the head that watches; every learner of a scenario is told the same.
@@ -13,6 +14,26 @@ pub struct Watch {
     pub head: Head,
     /// A configuration at which the marker is known to be seen, rad or m.
     pub visible_pose: Vec<f64>,
+}
+
+impl Watch {
+    /// What is believed to be in view after what happened so far.
+    pub fn visibility<'a>(&'a self, history: &'a History) -> Visibility<'a> {
+        Visibility::new(&self.head, history.misses())
+    }
+
+    /// The first movement of all, where anybody watches: to where the marker is known to be seen.
+    pub(super) fn beginning(watch: Option<&Self>, history: &History) -> Option<Selection> {
+        let watch = watch.filter(|_| !history.has_moved())?;
+        Some(Selection::plain(watch.visible_pose.clone()))
+    }
+
+    /// The movement where a search found no finite criterion, whose value was `before` before: where nothing in view was
+    /// found, back to where the marker is known to be seen.
+    pub(super) fn fallback(watch: Option<&Self>, before: f64) -> Result<Selection, SelectionError> {
+        let watch = watch.filter(|_| before.is_finite()).ok_or(SelectionError::NoFiniteCriterion)?;
+        Ok(Selection::plain(watch.visible_pose.clone()))
+    }
 }
 
 /// How much a miss says about its neighbourhood, in units of the joint box (each joint's range is 1): at this distance
@@ -73,7 +94,7 @@ mod tests {
     use super::*;
     use crate::{
         kinematics::JointBox,
-        selection::{Actions, History, Movement},
+        selection::{Actions, Movement},
         sensing::Observation,
     };
 

@@ -2,7 +2,7 @@
 
 mod curves;
 mod joints;
-mod limits;
+mod designs;
 mod partition;
 mod sweep;
 
