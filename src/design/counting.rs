@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::{
     kinematics::JointBox,
-    model::{Layout, State, registration::rank},
+    model::{Layout, State, rank},
     sensing::Rig,
 };
 

@@ -13,6 +13,7 @@ mod element;
 mod layout;
 mod pass;
 mod prior;
+mod rank;
 pub mod registration;
 mod state;
 
@@ -21,6 +22,7 @@ pub use element::{Displacement, Element};
 pub use layout::{Layout, Quantity};
 pub use pass::{Frame, Motion, Pass, Twist, jacobian};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
+pub use rank::rank;
 pub use state::{Correction, Device, Place, State, Target};
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use nalgebra::{
     Vector3, Vector6,
 };
 
-use super::{Block, Layout, State, jacobian};
+use super::{Block, Layout, State, jacobian, rank};
 
 /// The result of a rigid fit.
 #[derive(Clone, Debug)]
@@ -62,8 +62,6 @@ pub enum RegistrationError {
     NotConverged(usize),
 }
 
-/// Singular values of the scaled Jacobian below this share of the greatest count as none.
-const NEGLIGIBLE: f64 = 1e-7;
 const STEPS: usize = 200;
 
 /// Fits the base of `state`, and its marker if `fit_marker`, to pairs of joint positions and measured marker positions.
@@ -113,20 +111,6 @@ impl Registration {
         let covariance = &spread * &self.covariance * spread.transpose();
         (carried, (&covariance + covariance.transpose()) * 0.5)
     }
-}
-
-/// The rank of a Jacobian with its columns scaled to one length.
-pub fn rank(h: &DMatrix<f64>) -> usize {
-    let mut scaled = h.clone();
-    for mut column in scaled.column_iter_mut() {
-        let length = column.norm();
-        if length > 0.0 {
-            column /= length;
-        }
-    }
-    let singular = SVD::new(scaled, false, false).singular_values;
-    let greatest = singular.amax();
-    singular.iter().filter(|value| greatest > 0.0 && **value > NEGLIGIBLE * greatest).count()
 }
 
 struct Fit<'a> {

@@ -16,7 +16,10 @@
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
 use super::{SelectionError, Weights};
-use crate::estimation::{Alternative, Belief};
+use crate::{
+    estimation::{Alternative, Belief},
+    model::rank,
+};
 
 /// Movements that are planned and not yet made, with what the belief would be after all of them.
 #[derive(Clone, Debug)]
@@ -38,15 +41,19 @@ impl Plan {
         Self { after, poses: Vec::new(), told: Vec::new(), chances: Vec::new() }
     }
 
-    /// How many movements are still needed: as many as have one equation for each direction in parameter space, weighted
-    /// as the criterion does, whose standard deviation exceeds `unknown`.
+    /// How many independent equations a movement brings, by the rank of its Jacobian at `posture` (rad or m); at least one.
+    pub fn equations(&self, posture: &[f64]) -> usize {
+        let Belief { state, layout, rig, .. } = &self.after;
+        rank(&rig.jacobian(state, layout, posture).transpose()).max(1)
+    }
+
+    /// How many directions in parameter space, weighted as the criterion does, have a standard deviation above `unknown`.
     pub fn unknown(&self, weights: &Weights, unknown: f64) -> Result<usize, SelectionError> {
         let covariance = self.after.covariance.as_ref().ok_or(SelectionError::NoCovariance)?;
         let root = weights.roots();
         let weighted = covariance.component_mul(&(&root * root.transpose()));
         let eigenvalues = SymmetricEigen::new(weighted).eigenvalues;
-        let directions = eigenvalues.iter().filter(|value| **value > unknown * unknown).count();
-        Ok(directions.div_ceil(self.after.rig.equations().max(1)))
+        Ok(eigenvalues.iter().filter(|value| **value > unknown * unknown).count())
     }
 
     /// Adds a pose that each hypothesis expects to be seen with these chances, and that tells pairs apart by `told`.

@@ -94,7 +94,10 @@ impl Planner {
 
     fn select_in_box(&self, situation: &Situation<'_>, limits: &JointBox) -> Result<Selection, SelectionError> {
         let scene = Scene::new(self, situation, limits);
-        let unknown = scene.now.unknown(&self.weights, self.planning.unknown)?;
+        // As many movements are needed as bring one independent equation for each unknown. How many one brings is much the
+        // same at any posture off the middle, where axes may be in line.
+        let equations = scene.now.equations(&limits.from_unit(&vec![0.37; limits.dimension()]));
+        let unknown = scene.now.unknown(&self.weights, self.planning.unknown)?.div_ceil(equations);
         let (mut evaluations, mut partition) = (0, None);
         let before = situation.history.plan();
         let mut committed = before.map_or(0, |plan| plan.committed);
@@ -104,8 +107,7 @@ impl Planner {
         } else {
             let determined = unknown == 0 && self.planning.ahead > 1;
             let wanted = if determined {
-                let Plan { after, .. } = &scene.now;
-                after.layout.dimension().div_ceil(after.rig.equations().max(1))
+                situation.belief.layout.dimension().div_ceil(equations)
             } else {
                 (unknown + self.planning.spare).max(self.planning.batch)
             };

@@ -1,8 +1,8 @@
 //! The paper's figures, drawn from outcomes.
 
 mod curves;
-mod joints;
 mod designs;
+mod joints;
 mod partition;
 mod sweep;
 
