@@ -308,3 +308,35 @@ fn what_is_held_out_touches_nothing_but_the_prediction_error() {
         assert_ne!(prediction, other_prediction);
     }
 }
+
+/// A robot whose marker no tracker sees: four cables measure how far it is from their anchors.
+#[test]
+fn distances_alone_are_a_sensor_too() {
+    let anchors = ["[1.0, 0.0, 0.8]", "[-0.6, 0.9, 0.5]", "[0.0, -1.0, -0.4]", "[0.3, 0.2, -1.1]"];
+    let cable = |to: &str| format!("[[sensor]]\nchannel = \"distance\"\nto_m = {to}\nsigma_m = 0.002\n");
+    let cables = anchors.map(cable).join("");
+    let text = ARM.replace("[sensor]\n", "# [sensor]\n").replace("sigma_m = 0.01", &cables);
+    let read = |text: &str| Scenario::parse("cables.toml", text, &|_| Err("none".to_owned()));
+    let scenario = read(&text).expect("a scenario");
+    assert_eq!((scenario.rig.channels().len(), scenario.rig.equations()), (4, 4));
+    let mut experiment = scenario.experiment(1001, Some(&["global".to_owned(), "active".to_owned()])).expect("starts");
+    // Four distances hold no more than the three coordinates of a position.
+    assert_eq!(experiment.description().movements_by_counting, 8);
+    (0..30).for_each(|_| assert!(experiment.step().is_ok()));
+    let [global, active] = [0, 1].map(|index| experiment.latest().learners[index].metrics.clone());
+    assert_eq!((global.nis_dof, active.nis_dof), (Some(4), Some(4)));
+    assert!(global.location_m.is_some_and(|error| error < 0.02), "{global:?}");
+    assert!(global.orientation_deg.is_some_and(|error| error < 5.0), "{global:?}");
+    for (from, to, key) in [
+        ("to_m = [1.0, 0.0, 0.8]", "to_m = [1.0, 0.0]", "sensor[0].to_m"),
+        ("to_m = [1.0, 0.0, 0.8]\n", "", "sensor[0].to_m"),
+        ("sigma_m = 0.002", "sigma_m = 0.0", "sensor[0].sigma_m"),
+        ("channel = \"distance\"", "channel = \"sonar\"", "sensor[0].channel"),
+        ("channel = \"distance\"", "channel = \"position\"", "sensor[0].to_m"),
+    ] {
+        let Err(ScenarioError::Invalid { problems, .. }) = read(&text.replacen(from, to, 1)) else {
+            panic!("{to} is refused")
+        };
+        assert_eq!(problems[0].key, key, "{problems:?}");
+    }
+}

@@ -2,6 +2,7 @@
 
 use std::{fmt, sync::Arc};
 
+use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{Pass, State};
@@ -49,6 +50,8 @@ pub struct Keys {
     pub channel: Option<String>,
     /// Standard deviation of the noise, metres.
     pub sigma_m: Option<f64>,
+    /// A fixed point in the frame of the measurements, three coordinates in metres.
+    pub to_m: Option<Vec<f64>>,
 }
 
 /// What is wrong with the keys of a sensor.
@@ -71,6 +74,15 @@ impl Keys {
         holds
             .then_some(sigma)
             .ok_or_else(|| error(format!("{sigma} is out of range"), "write a number that is 0 or more"))
+    }
+
+    pub(super) fn to_m(&self) -> Result<Point3<f64>, KeyError> {
+        let given = self.to_m.as_deref().unwrap_or_default();
+        let is_point = given.len() == 3 && given.iter().all(|x| x.is_finite());
+        let what = self.to_m.as_ref().map_or("missing".to_owned(), |given| format!("{given:?} is no point"));
+        let mend = "write `to_m = [x, y, z]`, in metres, in the frame of the measurements".to_owned();
+        let error = || KeyError { key: "to_m".to_owned(), what, mend };
+        is_point.then(|| Point3::from_slice(given)).ok_or_else(error)
     }
 
     /// Refuses keys that a channel has no use for.

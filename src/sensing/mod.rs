@@ -22,4 +22,6 @@ pub use rig::{Equations, Rig};
 channel::channels! {
     /// Where a target is, three coordinates.
     position::Position,
+    /// How far the marker is from a fixed point.
+    distance::Distance,
 }

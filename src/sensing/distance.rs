@@ -1,0 +1,71 @@
+//! The distance of the marker from a fixed point: `y = ‖p(θ) − a‖ + v`, `v ~ N(0, σ²)`, one equation. A laser, or a cable
+//! with an encoder.
+
+use std::sync::Arc;
+
+use nalgebra::Point3;
+
+use super::{Channel, KeyError, Keys};
+use crate::model::{Pass, State};
+
+/// The distance of the marker, the first target, from a point whose place is known, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distance {
+    /// a, in the frame of the measurements, metres.
+    pub to: Point3<f64>,
+    /// Standard deviation of the noise, metres.
+    pub sigma_m: f64,
+}
+
+impl Distance {
+    pub(super) fn from_keys(keys: &Keys) -> Result<Self, KeyError> {
+        keys.only(&["sigma_m", "to_m"])?;
+        Ok(Self { to: keys.to_m()?, sigma_m: keys.sigma_m()? })
+    }
+
+    #[cfg(test)]
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, _state: &State) -> Self {
+        use rand::RngExt;
+        let to = Point3::from(nalgebra::Vector3::from_fn(|_, _| rng.random_range(-2.0..2.0)));
+        Self { to, sigma_m: rng.random_range(0.001..0.1) }
+    }
+}
+
+impl Channel for Distance {
+    fn equations(&self) -> usize {
+        1
+    }
+
+    fn sigma(&self) -> f64 {
+        self.sigma_m
+    }
+
+    fn with_sigma(&self, sigma_m: f64) -> Arc<dyn Channel> {
+        Arc::new(Self { sigma_m, ..*self })
+    }
+
+    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
+        reading[0] = (state.marker_at(positions) - self.to).norm();
+        reading[0] > 0.0
+    }
+
+    fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
+        whitened[0] = (y[0] - h[0]) / self.sigma_m;
+    }
+
+    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+        let away = pass.target(0) - self.to.coords;
+        reading[0] = away.norm();
+        // At the point itself every direction leads away from it.
+        if reading[0] <= 0.0 {
+            return false;
+        }
+        let slope = away / (reading[0] * self.sigma_m);
+        pass.point_columns(0, |coordinate, column| rows[coordinate] = slope.dot(&column));
+        true
+    }
+
+    fn disturb(&self, reading: &mut [f64], v: &[f64]) {
+        reading[0] += self.sigma_m * v[0];
+    }
+}
