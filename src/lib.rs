@@ -12,13 +12,16 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`kinematics`] | joints as twists, chains as products of exponentials, minimal tangent coordinates, the Jacobian |
-//! | [`sensing`] | what is measured after a movement, and what a head can see |
+//! | [`kinematics`] | joints as twists, minimal coordinates of lines, directions and rotations, joint limits |
+//! | [`model`] | what can be learned, in blocks; the prior; one pass over the chain that gives every derivative |
+//! | [`sensing`] | what is measured after a movement, channel by channel and whitened; what a head can see |
 //! | [`estimation`] | estimators and their beliefs: recursive least squares, stochastic gradient, a smoother with several hypotheses |
 //! | [`optimize`] | DIRECT and a bounded local search: minimisers over the unit cube that know nothing of robots |
-//! | [`selection`] | the A-criterion, and the policies that choose movements or plan them |
-//! | [`experiment`] | several learners in one world; metrics; the reports that everything outside reads |
-//! | [`scenario`] | scenario files, strictly read, and the experiments drawn from them |
+//! | [`selection`] | the A-criterion and its kin, and the policies that choose movements or plan them |
+//! | [`design`] | the best movements there could be, and what data allow: for judges, who know the truth |
+//! | [`experiment`] | agents that propose and absorb, a world, a judge; the reports that everything outside reads |
+//! | [`scenario`] | scenario files, strictly read |
+//! | [`assembly`] | the experiments that are drawn from them |
 //!
 //! These do no input or output, know no threads but those of the feature `parallel`, and build without default
 //! features for `wasm32-unknown-unknown`. With the feature `app` (on by default) come `recording` (Rerun and CSV
@@ -30,20 +33,20 @@
 //! | paper | code | meaning |
 //! |---|---|---|
 //! | θ | `positions`, `configuration` | joint positions, rad (revolute) or m (prismatic) |
-//! | x | [`Chain`](kinematics::Chain) | all joint axes, and the marker p₀ on the hand |
+//! | x | [`State`](model::State) | all joint axes, the marker p₀ on the hand, and what else can be learned |
 //! | w, v | [`Line`](kinematics::Line)`::direction`, `::point` | unit direction of an axis, a point on it (its pivot) |
 //! | e^{ξθ} | [`Joint::exp`](kinematics::Joint::exp) | the motion of one joint |
-//! | h(x, θ) | [`Chain::marker_at`](kinematics::Chain::marker_at) | predicted marker |
-//! | y | [`Observation`](sensing::Observation) | measured marker |
-//! | H | [`jacobian`](kinematics::jacobian::jacobian) | ∂h/∂δ, 3 × m, in tangent coordinates δ |
+//! | h(x, θ) | [`Channel::predict`](sensing::Channel::predict), [`State::marker_at`](model::State::marker_at) | predicted readings, predicted marker |
+//! | y | [`Observation`](sensing::Observation) | measured readings |
+//! | H | [`Rig::jacobian`](sensing::Rig::jacobian), [`jacobian`](model::jacobian()) | ∂h/∂δ in tangent coordinates δ: whitened (transposed, m × d), of the marker (3 × m) |
 //! | P | [`Belief::covariance`](estimation::Belief::covariance) | covariance of δ, m × m |
-//! | R = r I | [`Belief::noise_m2`](estimation::Belief::noise_m2) | measurement covariance as the filter assumes it |
+//! | R | [`Belief::rig`](estimation::Belief::rig) | measurement covariance as the filter assumes it; I once equations are whitened |
 //! | σn² | [`StabilisingNoise`](estimation::StabilisingNoise) | noise added to P, (5) |
 //! | xⱼ, πⱼ, Pⱼ | [`Alternative`](estimation::Alternative) | other hypotheses, with weight and covariance |
-//! | C(θ) | [`ACriterion`](selection::ACriterion) | expected posterior error, (7) |
+//! | C(θ) | [`Criterion`](selection::Criterion) | expected posterior error, (7) |
 //!
-//! *Frame.* All axes and points are expressed at θ = 0 in the frame in which markers are measured. There is no base
-//! transform to calibrate beside them.
+//! *Frame.* Axes and points are expressed at θ = 0 in the frame in which markers are measured; where axes are all free
+//! there is no base transform to calibrate beside them. A base that is unknown is a block of its own.
 //!
 //! *Units.* Metres and radians inside; files and interfaces name the unit in the field (`sigma_m`, `limits_deg`).
 //!
