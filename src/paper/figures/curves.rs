@@ -1,6 +1,6 @@
 //! Figs. 4, 5 and 6: three errors of all learners against the number of movements, and what could be reached.
 
-use super::{Figure, Source, limits};
+use super::{Figure, Source, designs};
 use crate::{
     chart::{Axis, Chart, Layer, Panel, Style},
     experiment::{Curve, LearnerComparison, Quantiles},
@@ -61,16 +61,16 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
         Some(_) => Axis::linear("movements", [].into_iter()).over(0.0, last),
         None => Axis::log("movements", [1.0, last].into_iter()).over(1.0, last.max(2.0)),
     };
-    let mut marks = vec![limits::counting(comparison)];
+    let mut marks = vec![designs::counting(comparison)];
     marks.extend(change.map(|x| Layer::Event { x, label: "change".into(), colour: TRUTH_COLOR, dashes: "6 2" }));
     let mut panels: Vec<Panel> =
         quantities.iter().map(|quantity| panel(quantity, learners, &styles, &x, &marks)).collect();
     let mut legend: Vec<_> = learners.iter().map(|learner| learner.name.clone()).zip(styles.iter().copied()).collect();
     let mut rows = Vec::new();
-    if let Some(panel) = limits::panel(source, comparison, &styles, &x, &marks) {
+    if let Some(panel) = designs::panel(source, comparison, &styles, &x, &marks) {
         let below = panels.split_off(2.min(panels.len()));
         rows = vec![panels, below.into_iter().chain([panel]).collect()];
-        legend.extend(limits::legend());
+        legend.extend(designs::legend());
     } else {
         rows.push(panels);
     }
