@@ -6,7 +6,7 @@ use super::Briefing;
 use crate::{
     estimation::{Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls},
     experiment::{Agent, Learner, Stream},
-    model::{Block, Layout, Prior},
+    model::{Block, Prior},
     optimize::{Settings, Variant},
     scenario::{
         ErrorDraw, EstimatorKind, Filter, InitialError, LearnerSpec, PolicyKind, Scenario, ScenarioError, SmootherSpec,
@@ -19,26 +19,15 @@ use crate::{
 const MONTE_CARLO_SAMPLES: usize = 16;
 
 impl Scenario {
-    pub(super) fn learner(
-        &self,
-        spec: &LearnerSpec,
-        seed: u64,
-        layout: &Arc<Layout>,
-        briefing: &Briefing,
-    ) -> Result<Learner, ScenarioError> {
-        let agent = self.agent_of(spec, seed, layout, briefing)?;
+    pub(super) fn learner(&self, spec: &LearnerSpec, seed: u64, briefing: &Briefing) -> Result<Learner, ScenarioError> {
+        let agent = self.agent_of(spec, seed, briefing)?;
         let workspace = briefing.workspace.clone();
-        Ok(Learner::new(spec.description(), agent, self.weights(), workspace, self.settled_below_m))
+        let weights = briefing.weights.clone();
+        Ok(Learner::new(spec.description(), agent, weights, workspace, self.settled_below_m))
     }
 
-    pub(super) fn agent_of(
-        &self,
-        spec: &LearnerSpec,
-        seed: u64,
-        layout: &Arc<Layout>,
-        briefing: &Briefing,
-    ) -> Result<Agent, ScenarioError> {
-        let estimator = self.estimator(spec, seed, layout, briefing)?;
+    pub(super) fn agent_of(&self, spec: &LearnerSpec, seed: u64, briefing: &Briefing) -> Result<Agent, ScenarioError> {
+        let estimator = self.estimator(spec, seed, briefing)?;
         let (actions, limits) = (briefing.actions.clone(), self.robot.limits.clone());
         Ok(Agent::new(estimator, self.policy(spec, briefing), actions, limits, seed))
     }
@@ -47,9 +36,9 @@ impl Scenario {
         &self,
         spec: &LearnerSpec,
         seed: u64,
-        layout: &Arc<Layout>,
         briefing: &Briefing,
     ) -> Result<Box<dyn Estimator>, ScenarioError> {
+        let layout = &briefing.layout;
         let belief = |sigma: f64| {
             let rig = Arc::new(self.rig.assuming(sigma));
             Belief::new(briefing.initial.clone(), layout.clone(), rig)
@@ -87,7 +76,7 @@ impl Scenario {
     }
 
     fn policy(&self, spec: &LearnerSpec, briefing: &Briefing) -> Box<dyn Policy> {
-        let (weights, watch) = (self.weights(), briefing.watch.clone());
+        let (weights, watch) = (briefing.weights.clone(), briefing.watch.clone());
         let kind = spec.policy;
         let settings = self.selection.search;
         let evaluations = settings.max_evaluations;

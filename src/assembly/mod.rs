@@ -12,9 +12,12 @@ use crate::{
     design::{Problem, Stretch, movements_by_counting},
     experiment::{Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World},
     kinematics::{Joint, JointBox},
-    model::{Block, Element, State, anywhere, registration::register},
+    model::{
+        Block, Element, Layout, State, anywhere,
+        registration::{Registration, register},
+    },
     scenario::{ErrorDraw, InitialError, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
-    selection::{Actions, Movement, Watch},
+    selection::{Actions, Movement, Watch, Weights},
     sensing::Observation,
 };
 
@@ -26,6 +29,10 @@ const WORKSPACE_SIZE: usize = 32;
 /// What learners are told at the start. Nothing in it comes from the truth but through the drawn initial estimate.
 struct Briefing {
     initial: State,
+    /// What is learned.
+    layout: Arc<Layout>,
+    /// W.
+    weights: Weights,
     /// P₀ of recursive least squares and of a smoother with a guess.
     covariance: DMatrix<f64>,
     actions: Actions,
@@ -44,7 +51,7 @@ impl Scenario {
     /// its own.
     pub fn agent(&self, learner: &LearnerSpec, seed: u64) -> Result<Agent, ScenarioError> {
         let (.., briefing) = self.draw(seed)?;
-        self.agent_of(learner, seed, &Arc::new(self.robot.layout.clone()), &briefing)
+        self.agent_of(learner, seed, &briefing)
     }
 
     /// What designs are sought for here; `None` where no truth is known or a sensor has no noise.
@@ -84,6 +91,8 @@ impl Scenario {
                 let truth = self.robot.state.clone();
                 let limits = &self.robot.limits;
                 let briefing = Briefing {
+                    layout: Arc::new(self.robot.layout.clone()),
+                    weights: self.weights(),
                     initial: self.perturbed(initial_error, &mut Stream::InitialEstimate.rng(seed)),
                     covariance: self.prior_covariance(),
                     actions: Actions::Box(limits.clone()),
@@ -97,7 +106,7 @@ impl Scenario {
                 if configurations.is_empty() {
                     configurations.extend(watch.as_ref().map(|watch| watch.visible_pose.clone()));
                 }
-                let evaluation = Evaluation::of_truth(configurations, &truth, self.rig.sigma());
+                let evaluation = Evaluation::of_truth(configurations, &truth, self.marker_sigma());
                 let change = change.as_ref();
                 let change = change.map(|change| Box::new(Change { step: change.step, truth: change.truth.clone() }));
                 Ok((
@@ -108,6 +117,11 @@ impl Scenario {
             }
             WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, *held_out),
         }
+    }
+
+    /// What one measurement of the marker is worth, metres: of the tracker, or where none sees it of the first sensor.
+    fn marker_sigma(&self) -> f64 {
+        self.rig.marker_channel().map_or(self.rig.sigma(), |channel| self.rig.channels()[channel].sigma())
     }
 
     fn prior_covariance(&self) -> DMatrix<f64> {
@@ -129,15 +143,17 @@ impl Scenario {
         training.sort_unstable();
         let pair = |row: &usize| (measurements.configurations[*row].clone(), measurements.markers_m[*row]);
         let data: Vec<_> = training.iter().map(pair).collect();
-        let layout = &self.robot.layout;
-        let registration = register(&self.robot.state, &data, layout.marker().is_some())
+        let registration = register(&self.robot.state, &data, self.robot.layout.marker().is_some())
             .map_err(|source| ScenarioError::Registration { scenario: self.name.clone(), seed, source })?;
-        let (initial, unsure) = registration.carried(layout);
+        let (initial, layout, covariance) = self.registered(&registration);
+        let deviations = covariance.diagonal().map(f64::sqrt);
         let movement =
             |row: &usize| Movement { configuration: measurements.configurations[*row].clone(), row: Some(*row) };
         let briefing = Briefing {
             initial,
-            covariance: self.prior_covariance() + unsure,
+            weights: Weights::new(self.selection.units, &layout, &deviations),
+            layout: Arc::new(layout),
+            covariance,
             actions: Actions::Pool(training.iter().map(movement).collect()),
             workspace: data.into_iter().map(|(theta, _)| theta).collect(),
             watch: None,
@@ -145,6 +161,35 @@ impl Scenario {
         let evaluation = Evaluation::of_measurements(test.iter().map(pair).collect());
         let observations = measurements.markers_m.iter().map(|marker| Observation::seen(*marker)).collect();
         Ok((World::Measured { observations }, evaluation, briefing))
+    }
+
+    /// The robot after a rigid fit, what is learned of it, and its prior covariance. Where all axes and the marker are learned
+    /// the base is folded into them. Where something is held it must not move with an error of the fit: then the base is a
+    /// block of its own.
+    fn registered(&self, registration: &Registration) -> (State, Layout, DMatrix<f64>) {
+        let robot = &self.robot;
+        let is_free = robot.layout.block(Block::Target(0)).is_some()
+            && (0..robot.layout.joints()).all(|joint| robot.layout.is_learned(joint));
+        if is_free {
+            let (initial, unsure) = registration.carried(&robot.layout);
+            return (initial, robot.layout.clone(), self.prior_covariance() + unsure);
+        }
+        let state = registration.state.clone();
+        let layout = Layout::new(&state, robot.layout.blocks().map(|(block, _)| block).chain([Block::Base]));
+        let mut covariance = DMatrix::zeros(layout.dimension(), layout.dimension());
+        let mut add = |own: &Layout, of: &DMatrix<f64>| {
+            for (row, rows) in own.blocks() {
+                for (column, columns) in own.blocks() {
+                    let (Some(to_row), Some(to_column)) = (layout.block(row), layout.block(column)) else { continue };
+                    let size = (rows.len(), columns.len());
+                    let mut place = covariance.view_mut((to_row.start, to_column.start), size);
+                    place += of.view((rows.start, columns.start), size);
+                }
+            }
+        };
+        add(&robot.layout, &self.prior_covariance());
+        add(&registration.layout, &registration.covariance);
+        (state, layout, covariance)
     }
 
     /// The true state with the error of the initial estimate: for each learned joint three Euler angles, then for a
@@ -186,11 +231,9 @@ impl Scenario {
         briefing: &Briefing,
     ) -> Result<Experiment, ScenarioError> {
         let robot = &self.robot;
-        let layout = Arc::new(robot.layout.clone());
-        let learners = specs
-            .iter()
-            .map(|spec| self.learner(spec, seed, &layout, briefing))
-            .collect::<Result<Vec<_>, ScenarioError>>()?;
+        let layout = &briefing.layout;
+        let learners =
+            specs.iter().map(|spec| self.learner(spec, seed, briefing)).collect::<Result<Vec<_>, ScenarioError>>()?;
         let description = Description {
             scenario: self.name.clone(),
             title: self.title.clone(),
@@ -198,7 +241,7 @@ impl Scenario {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             joints: robot.joint_descriptions(),
             parameters: layout.dimension(),
-            movements_by_counting: movements_by_counting(&robot.state, &layout, &self.rig.assuming(1.0), &robot.limits),
+            movements_by_counting: movements_by_counting(&robot.state, layout, &self.rig.assuming(1.0), &robot.limits),
             learners: specs.iter().map(LearnerSpec::description).collect(),
             thresholds: self.thresholds,
             movements_available: briefing.actions.remaining(),

@@ -30,7 +30,7 @@ pub fn movements_by_counting(state: &State, layout: &Layout, rig: &Rig, limits: 
     }
     let greatest = rank(&stacked);
     let reaches = |count: &usize| rank(&stacked.rows(0, count * d).into_owned()) >= greatest;
-    (greatest.div_ceil(d)..many).find(reaches).unwrap_or(many)
+    (greatest.div_ceil(d).max(1)..many).find(reaches).unwrap_or(many)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
 use crate::{
     kinematics::{Joint, chart},
     model::{Block, Layout, State, jacobian},
-    sensing::{Observation, Rig},
+    sensing::{Observation, Refused, Rig},
 };
 
 /// What an estimator believes: a state, and the covariance of its learned parameters in the chart at that state.
@@ -65,6 +65,14 @@ impl Belief {
         }
     }
 
+    /// Whether an observation after a movement to `positions` (rad or m) can be taken in: it fits the rig, and how far it is
+    /// from what is believed can be computed.
+    pub fn accepts(&self, positions: &[f64], observation: &Observation) -> Result<(), Refused> {
+        observation.check(&self.rig, self.state.joints.len(), positions)?;
+        let squared = self.rig.squared_error(&self.state, positions, observation);
+        if squared.is_finite() { Ok(()) } else { Err(Refused::Absurd) }
+    }
+
     /// Normalised innovation squared `eᵀ S⁻¹ e`, `S = H P Hᵀ + I`, of an observation under the estimate, and its degrees
     /// of freedom, the equations seen; `None` without a covariance, without equations, and where it is no number.
     pub fn nis(&self, positions: &[f64], observation: &Observation) -> Option<(f64, usize)> {
@@ -74,7 +82,7 @@ impl Belief {
         if d == 0 {
             return None;
         }
-        let s = equations.rows.transpose() * covariance * &equations.rows + DMatrix::identity(d, d);
+        let (s, _) = innovation_covariance(covariance, &equations.rows);
         let nis = equations.residual.dot(&s.cholesky()?.solve(&equations.residual));
         nis.is_finite().then_some((nis, d))
     }

@@ -9,7 +9,8 @@
 //! ```
 //!
 //! with the quantile by Wilson and Hilferty (1931) at z standard deviations. So far out their approximation errs on the
-//! quiet side: chance exceeds it with a probability of 2.2·10⁻⁸ (k = 1) to 6.1·10⁻⁸ (k = 5), not 10⁻⁷.
+//! quiet side: with three equations a movement chance exceeds it with a probability of 2.2·10⁻⁸ (k = 1) to 6.1·10⁻⁸
+//! (k = 5), and never by more than the 10⁻⁷ that it stands for.
 //!
 //! A filter that assumes another noise than the sensor's, and is never at rest, has innovations of another scale and
 //! with heavier tails. For it the mean per degree of freedom of the last eight is compared with that of forty before:
@@ -41,7 +42,8 @@ pub struct ChangeDetector {
 }
 
 impl ChangeDetector {
-    /// For an estimator whose innovations are χ² distributed: at most one false alarm in 4.4 million movements.
+    /// For an estimator whose innovations are χ² distributed: at most one false alarm in two
+    /// million movements; with three equations a movement one in 4.4 million.
     pub fn honest() -> Self {
         Self { relative: false, deviations: DEVIATIONS, recent: VecDeque::new(), observed: 0 }
     }

@@ -35,14 +35,13 @@ pub trait Estimator: Send {
     fn belief(&self) -> &Belief;
 
     /// Takes in what was observed after moving to `positions` (rad or m, one per joint), which
-    /// [fits](Observation::check) the belief's rig. An estimator that diverges keeps the belief that it had.
+    /// the belief [accepts](Belief::accepts). An estimator that diverges keeps the belief that it had.
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError>;
 
     /// As [`correct`](Self::correct), for observations that nobody has looked at: what does not fit is refused, and
     /// nothing is changed by it.
     fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
-        let belief = self.belief();
-        observation.check(&belief.rig, belief.state.joints.len(), positions)?;
+        self.belief().accepts(positions, observation)?;
         self.correct(positions, observation)
     }
 }

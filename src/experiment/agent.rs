@@ -101,6 +101,11 @@ impl Agent {
         &self.actions
     }
 
+    /// The joint limits.
+    pub fn limits(&self) -> &JointBox {
+        &self.limits
+    }
+
     /// Why it has ended, if it has.
     pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
@@ -114,19 +119,13 @@ impl Agent {
     /// At least `count` pending proposals: those that there are, and new ones chosen given these. Asking again changes
     /// nothing until one is absorbed or withdrawn. An agent that has ended proposes nothing.
     ///
-    /// An error leaves the agent as it was, but for proposals made before it was met, and but for
-    /// [`NoFiniteCriterion`](SelectionError::NoFiniteCriterion), with which the agent ends: its belief has diverged.
+    /// An error leaves the agent as it was, but for proposals made before it was met: no choice ends an agent.
     pub fn propose(&mut self, count: usize) -> Result<&[Proposal], SelectionError> {
         while self.pending.len() < count && self.failure.is_none() {
             let start = Instant::now();
-            match self.select() {
-                Ok(selection) => {
-                    let selection_ms = start.elapsed().as_secs_f64() * 1e3;
-                    self.proposed(Proposal { id: self.proposals, selection, selection_ms });
-                }
-                Err(error @ SelectionError::NoFiniteCriterion) => self.failure = Some(error.to_string()),
-                Err(error) => return Err(error),
-            }
+            let selection = self.select()?;
+            let selection_ms = start.elapsed().as_secs_f64() * 1e3;
+            self.proposed(Proposal { id: self.proposals, selection, selection_ms });
         }
         Ok(&self.pending)
     }
@@ -138,8 +137,13 @@ impl Agent {
             return self.policy.select(&self.standpoint().situation(), &mut rng);
         }
         let mut standpoint = self.standpoint().to_owned();
+        standpoint.history.expect_movements();
         for Proposal { selection, .. } in &self.pending {
-            condition(&mut standpoint.belief, &selection.movement.configuration, |_| 1.0);
+            let configuration = &selection.movement.configuration;
+            // What is not expected to be seen is not expected to teach.
+            let appraisal = self.policy.appraise(&standpoint.borrowed().situation(), &self.limits, configuration);
+            let chance = appraisal.map_or(1.0, |appraisal| appraisal.chance);
+            condition(&mut standpoint.belief, configuration, |_| chance);
             standpoint.actions.use_up(&selection.movement);
         }
         self.policy.select(&standpoint.borrowed().situation(), &mut rng)
@@ -159,14 +163,13 @@ impl Agent {
     }
 
     /// Takes in movements that were executed, in order. If one does not fit, none is absorbed. Tells what each update
-    /// found; an update that ends the agent ends the list.
+    /// found; an update that ends the agent ends the list, and those before it count.
     pub fn absorb(&mut self, executed: &[Executed]) -> Result<Vec<Update>, AbsorbError> {
         if let Some(failure) = &self.failure {
             return Err(AbsorbError::Ended(failure.clone()));
         }
-        let belief = self.belief();
         for Executed { movement, observation, .. } in executed {
-            observation.check(&belief.rig, belief.state.joints.len(), &movement.configuration)?;
+            self.belief().accepts(&movement.configuration, observation)?;
         }
         executed.iter().map(|executed| self.absorb_one(executed)).collect()
     }
@@ -182,6 +185,7 @@ impl Agent {
             EstimationError::Refused(refused) => refused.into(),
             EstimationError::Diverged(_) => {
                 self.failure = Some(error.to_string());
+                self.pending.clear();
                 AbsorbError::Ended(error.to_string())
             }
         })
@@ -191,7 +195,11 @@ impl Agent {
     pub fn restore(&mut self, event: &Event) -> Result<(), AbsorbError> {
         match event {
             Event::Proposed(proposal) => self.proposed(proposal.clone()),
-            Event::Executed(executed) => drop(self.absorb(std::slice::from_ref(executed))?),
+            Event::Executed(executed) => match self.absorb(std::slice::from_ref(executed)) {
+                // The movement at which it ended, or one after that.
+                Ok(_) | Err(AbsorbError::Ended(_)) => {}
+                Err(refused) => return Err(refused),
+            },
             Event::Withdrawn(id) => drop(self.withdraw(*id)),
         }
         Ok(())
@@ -204,6 +212,9 @@ impl Agent {
 
     /// What a movement would teach it where it stood at `standpoint`, by what it chooses by.
     pub fn appraise(&self, standpoint: Standpoint<'_>, configuration: &[f64]) -> Result<Appraisal, SelectionError> {
+        if configuration.len() != self.limits.dimension() {
+            return Err(SelectionError::NoConfiguration(configuration.len()));
+        }
         self.policy.appraise(&standpoint.situation(), &self.limits, configuration)
     }
 

@@ -10,8 +10,11 @@
 //! where it predicts what it predicted before.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 
 use crate::{
+    kinematics::JointBox,
     model::{Layout, State},
     sensing::Rig,
 };
@@ -30,17 +33,24 @@ pub struct Gauge {
 /// millionth.
 const NEGLIGIBLE: f64 = 1e-12;
 const STEPS: usize = 30;
-const POSTURES: usize = 60;
 
 impl Gauge {
-    /// The gauge at `truth`, judged by the first of `postures` (rad or m).
-    pub fn new(truth: &State, layout: &Layout, rig: &Rig, postures: &[Vec<f64>]) -> Self {
-        let postures = postures.iter().take(POSTURES).cloned().collect();
-        // Noise may be none, or differ from channel to channel; what can be told does not depend on it.
+    /// The gauge at `truth`, judged by postures anywhere in the joint box, twice as many as there can be need of.
+    pub fn new(truth: &State, layout: &Layout, rig: &Rig, limits: &JointBox) -> Self {
+        let count = 2 * layout.dimension().div_ceil(rig.equations().max(1)) + 8;
+        // A fixed stream of its own: what is general needs no seed.
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let postures = (0..count).map(|_| limits.draw(&mut rng)).collect();
+        // Noise may be none: what can be told does not depend on it.
         let rig = if rig.sigma() > 0.0 { rig.clone() } else { rig.assuming(1.0) };
         let mut gauge = Self { layout: layout.clone(), rig, postures, undetermined: 0 };
-        gauge.undetermined = gauge.null_space(truth).ncols();
+        gauge.study(truth);
         gauge
+    }
+
+    /// Judges another truth.
+    pub fn study(&mut self, truth: &State) {
+        self.undetermined = self.null_space(truth).ncols();
     }
 
     /// How many directions of parameter space no measurement determines.
@@ -63,6 +73,9 @@ impl Gauge {
         }
         let scale = information.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 1.0 });
         let scaled = information.component_mul(&(&scale * scale.transpose()));
+        if !scaled.iter().all(|x| x.is_finite()) {
+            return DMatrix::zeros(m, 0);
+        }
         let eigen = SymmetricEigen::new(scaled);
         let greatest = eigen.eigenvalues.amax().max(f64::MIN_POSITIVE);
         let free: Vec<DVector<f64>> = (0..m)
@@ -75,24 +88,23 @@ impl Gauge {
         DMatrix::from_columns(&free).qr().q()
     }
 
-    /// The member of the truth's family that is nearest to `estimate`; the truth itself where all is determined, and where
-    /// the estimate is out of its chart.
+    /// The member of the truth's family that is nearest to `estimate`; the truth itself where all is determined, and as near
+    /// as it comes where the estimate is out of its chart.
     pub fn aligned(&self, truth: &State, estimate: &State) -> State {
         let mut moved = truth.clone();
         if self.undetermined == 0 {
             return moved;
         }
         for _ in 0..STEPS {
-            let Some(delta) = moved.slid_towards(estimate).local(&self.layout, estimate) else { return moved };
-            let moving = moved.slid_towards(estimate);
-            let free = self.null_space(&moving);
+            let Some(delta) = moved.local(&self.layout, estimate) else { break };
+            let free = self.null_space(&moved);
             let mut step = &free * free.tr_mul(&delta);
             let length = step.amax();
             if length < 1e-11 {
                 break;
             }
             step *= (0.3 / length).min(1.0);
-            moved = self.restored(moving.retract(&self.layout, &step), truth);
+            moved = self.restored(moved.retract(&self.layout, &step), truth);
         }
         moved
     }
@@ -121,11 +133,12 @@ impl Gauge {
     }
 
     /// Normalised estimation error squared in the determined subspace, `(Uᵀe)ᵀ (Uᵀ P U)⁻¹ Uᵀe` with U across the
-    /// undetermined directions at the estimate; `truth` is [aligned](Self::aligned). `None` out of the chart.
-    pub fn nees(&self, estimate: &State, covariance: &DMatrix<f64>, truth: &State) -> Option<f64> {
-        let error = estimate.local(&self.layout, &truth.slid_towards(estimate))?;
+    /// undetermined directions at the estimate, and its degrees of freedom, the columns of U; `truth` is
+    /// [aligned](Self::aligned). `None` out of the chart, and where nothing is determined.
+    pub fn nees(&self, estimate: &State, covariance: &DMatrix<f64>, truth: &State) -> Option<(f64, usize)> {
+        let error = estimate.local(&self.layout, truth)?;
         if self.undetermined == 0 {
-            return Some(error.dot(&covariance.clone().cholesky()?.solve(&error)));
+            return Some((error.dot(&covariance.clone().cholesky()?.solve(&error)), error.len()));
         }
         let free = self.null_space(estimate);
         let m = self.layout.dimension();
@@ -133,10 +146,13 @@ impl Gauge {
         let eigen = SymmetricEigen::new(across);
         let determined: Vec<DVector<f64>> =
             (0..m).filter(|k| eigen.eigenvalues[*k] > 0.5).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
+        if determined.is_empty() {
+            return None;
+        }
         let determined = DMatrix::from_columns(&determined);
         let error = determined.tr_mul(&error);
         let covariance = determined.transpose() * covariance * &determined;
-        Some(error.dot(&covariance.cholesky()?.solve(&error)))
+        Some((error.dot(&covariance.cholesky()?.solve(&error)), error.len()))
     }
 }
 
@@ -144,8 +160,7 @@ impl Gauge {
 mod tests {
     use std::sync::Arc;
 
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
+    use rand::RngExt;
     use rand_distr::StandardNormal;
 
     use super::*;
@@ -159,12 +174,16 @@ mod tests {
         (0..count).map(|_| (0..joints).map(|_| rng.random_range(-1.5..1.5)).collect()).collect()
     }
 
+    fn limits() -> JointBox {
+        JointBox::new(vec![(-1.5, 1.5); 4]).expect("limits")
+    }
+
     /// An arm whose axes and base are both free: six directions are a gauge.
     fn case(seed: u64) -> (State, Layout, Gauge, ChaCha8Rng) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let truth = random_arm(&mut rng, 4);
         let layout = Layout::new(&truth, (0..4).map(Block::Axis).chain([Block::Base, Block::Target(0)]));
-        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.01), &postures(&mut rng, 4, 40));
+        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.01), &limits());
         (truth, layout, gauge, rng)
     }
 
@@ -173,7 +192,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let truth = random_arm(&mut rng, 4);
         let layout = Layout::of_arm(&truth, &[], false);
-        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.0), &postures(&mut rng, 4, 40));
+        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.0), &limits());
         assert_eq!((gauge.undetermined(), gauge.rank()), (0, layout.dimension()));
         let estimate = truth.retract(&layout, &DVector::from_element(layout.dimension(), 0.1));
         assert_eq!(gauge.aligned(&truth, &estimate), truth);
@@ -226,8 +245,11 @@ mod tests {
             }
             let belief = smoother.belief();
             let aligned = gauge.aligned(&truth, &belief.state);
-            total += gauge.nees(&belief.state, belief.covariance.as_ref().expect("kept"), &aligned).expect("near");
-            freedom += gauge.rank();
+            let covariance = belief.covariance.as_ref().expect("kept");
+            let (nees, degrees) = gauge.nees(&belief.state, covariance, &aligned).expect("near");
+            assert_eq!(degrees, gauge.rank());
+            total += nees;
+            freedom += degrees;
         }
         let mean = total / freedom as f64;
         assert!((0.7..1.35).contains(&mean), "{mean} per degree of freedom");

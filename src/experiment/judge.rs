@@ -10,7 +10,7 @@ use super::{
     metrics::{self, Evaluation, Metrics},
     report::StepReport,
 };
-use crate::{design::Problem, estimation::Belief, model::State};
+use crate::{design::Problem, estimation::Belief, kinematics::JointBox, model::State};
 
 /// What beliefs and runs are judged by.
 pub struct Judge {
@@ -58,10 +58,9 @@ impl Judge {
     }
 
     /// Learns from a belief what measurements leave undetermined of a truth.
-    pub(super) fn study(&mut self, belief: &Belief, truth: &State) {
+    pub(super) fn study(&mut self, belief: &Belief, truth: &State, limits: &JointBox) {
         let Belief { layout, rig, .. } = belief;
-        let gauge = Gauge::new(truth, layout, rig, &self.evaluation.configurations());
-        self.gauge = Some(gauge);
+        self.gauge = Some(Gauge::new(truth, layout, rig, limits));
     }
 
     /// Also tells what the data of every learner allow.
@@ -73,6 +72,7 @@ impl Judge {
     /// The body is another from now on.
     pub(super) fn follow(&mut self, truth: &State) {
         self.evaluation.follow(truth);
+        self.gauge.iter_mut().for_each(|gauge| gauge.study(truth));
         if let Some(bounds) = &mut self.bounds {
             // What was measured before says nothing certain of the new body.
             bounds.problem.truth = truth.clone();
@@ -90,7 +90,7 @@ impl Judge {
         let prediction = self.evaluation.prediction_m(&belief.state);
         let nees = aligned.as_ref().and_then(|truth| {
             let (gauge, covariance) = (self.gauge.as_ref()?, belief.covariance.as_ref()?);
-            Some((gauge.nees(&belief.state, covariance, truth)?, gauge.rank()))
+            gauge.nees(&belief.state, covariance, truth)
         });
         let estimate = belief.state.measured();
         let truth = aligned.as_ref().map(|truth| truth.measured());

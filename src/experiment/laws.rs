@@ -164,6 +164,38 @@ fn random_numbers_are_keyed_by_the_ordinal() {
     }
 }
 
+/// Where a head watches, the first movement goes to the visible pose, and those proposed with it elsewhere.
+#[test]
+fn only_the_first_of_several_proposals_goes_to_the_visible_pose() {
+    let scenario = builtin("head-fov").expect("built in");
+    for name in ["rls:active", "smoother:active-planned"] {
+        let proposals = agent(&scenario, name, 1001).propose(3).expect("proposals").to_vec();
+        let movements: Vec<_> = proposals.iter().map(|proposal| &proposal.selection.movement).collect();
+        assert!(movements[0] != movements[1] && movements[1] != movements[2], "{name}: {movements:?}");
+    }
+}
+
+/// A reading beyond all numbers is refused by every estimator, and the next one is learned from.
+#[test]
+fn an_absurd_reading_ends_nobody() {
+    let scenario = builtin("arm-6dof").expect("built in");
+    for pair in pairs(&scenario).iter().filter(|pair| pair.ends_with(":random")) {
+        let mut agent = agent(&scenario, pair, 1001);
+        let before = belief_bits(&agent);
+        let configuration = vec![0.1; 6];
+        let good = scenario.rig.observe(&scenario.robot.state, &configuration, &[0.0; 3]);
+        let executed = |observation| {
+            let movement = Movement { configuration: configuration.clone(), row: None };
+            [Executed { proposal: None, movement, observation }]
+        };
+        let refused = agent.absorb(&executed(Observation::of([1e160, 0.0, 0.0])));
+        assert!(matches!(refused, Err(AbsorbError::Refused(_))), "{pair}: {refused:?}");
+        assert!(before == belief_bits(&agent));
+        agent.absorb(&executed(good)).expect("a measurement");
+        assert!(before != belief_bits(&agent), "{pair} learned nothing");
+    }
+}
+
 /// Two proposals at once are two movements.
 #[test]
 fn proposals_are_chosen_given_the_pending_ones() {

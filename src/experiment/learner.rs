@@ -37,6 +37,8 @@ pub struct Learner {
     before: OwnedStandpoint,
     /// What it proposed last.
     last: Option<Proposal>,
+    /// Why it proposes nothing any more, though its agent has not ended.
+    stopped: Option<SelectionError>,
     record: Record,
 }
 
@@ -60,7 +62,7 @@ impl Learner {
     ) -> Self {
         let before = agent.standpoint().to_owned();
         let record = Record::default();
-        Self { description, agent, weights, workspace, settled_below_m, before, last: None, record }
+        Self { description, agent, weights, workspace, settled_below_m, before, last: None, stopped: None, record }
     }
 
     /// What it believes.
@@ -68,14 +70,29 @@ impl Learner {
         self.agent.belief()
     }
 
+    /// The joint limits.
+    pub(super) fn limits(&self) -> &JointBox {
+        self.agent.limits()
+    }
+
     /// How many movements it can still make; `None` without an end.
     pub(super) fn remaining(&self) -> Option<usize> {
         self.agent.actions().remaining()
     }
 
-    /// Its next movement; `None` once it has ended.
+    /// Its next movement; `None` once it has ended, or found no finite criterion: nothing more can come of it then.
     pub(super) fn propose(&mut self) -> Result<Option<Proposal>, SelectionError> {
-        Ok(self.agent.propose(1)?.first().cloned())
+        if self.stopped.is_some() {
+            return Ok(None);
+        }
+        match self.agent.propose(1) {
+            Ok(proposals) => Ok(proposals.first().cloned()),
+            Err(error @ SelectionError::NoFiniteCriterion) => {
+                self.stopped = Some(error);
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
     }
 
     /// Takes in what was seen after a proposal was carried out.
@@ -176,7 +193,7 @@ impl Learner {
             movement,
             estimate: ModelReport::of_belief(belief, truth),
             metrics,
-            failure: self.agent.failure().map(str::to_owned),
+            failure: self.agent.failure().map(str::to_owned).or(self.stopped.as_ref().map(ToString::to_string)),
         }
     }
 }

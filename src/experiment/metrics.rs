@@ -132,11 +132,6 @@ impl Evaluation {
         }
     }
 
-    /// The joint positions.
-    pub fn configurations(&self) -> Vec<Vec<f64>> {
-        self.targets.iter().map(|(theta, _)| theta.clone()).collect()
-    }
-
     /// Joint positions and markers.
     pub fn targets(&self) -> &[(Vec<f64>, Point3<f64>)] {
         &self.targets

@@ -92,7 +92,7 @@ impl Experiment {
     ) -> Self {
         let mut judge = Judge::new(evaluation, learners.len(), description.thresholds, description.change_at);
         if let (Some(truth), Some(learner)) = (world.truth(), learners.first()) {
-            judge.study(learner.belief(), truth);
+            judge.study(learner.belief(), truth, learner.limits());
         }
         problem.into_iter().for_each(|problem| judge.bound(problem));
         let truth = world.truth();
@@ -148,8 +148,7 @@ impl Experiment {
             let movement = &proposal.selection.movement;
             let observation =
                 world.observe(movement, &draw).map_err(|source| ExperimentError::World { learner: name(), source })?;
-            let belief = learner.belief();
-            observation.check(&belief.rig, belief.state.joints.len(), &movement.configuration).map_err(|refused| {
+            learner.belief().accepts(&movement.configuration, &observation).map_err(|refused| {
                 ExperimentError::Absorb { learner: name(), source: AbsorbError::Refused(refused) }
             })?;
             observations.push(Some(observation));

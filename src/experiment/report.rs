@@ -128,7 +128,7 @@ pub struct LearnerDescription {
     pub name: String,
     /// Its estimator: `rls`, `gradient`, `smoother`, …
     pub estimator: String,
-    /// Its policy: `active`, `active-naive` or `random`.
+    /// Its policy: `active`, `active-planned`, `random`, …
     pub policy: String,
 }
 
@@ -180,7 +180,7 @@ pub struct MovementReport {
     pub true_skeleton_m: Option<Vec<[f64; 3]>>,
     /// The criterion C(θ) of the choice; null for a policy without one.
     pub criterion: Option<f64>,
-    /// tr(W P) − C(θ), the fall of the trace that was expected.
+    /// By how much the criterion was expected to fall: tr(W P) − C(θ), for criterion A.
     pub gain: Option<f64>,
     /// How many configurations were evaluated to choose this one.
     pub evaluations: usize,

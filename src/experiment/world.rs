@@ -129,6 +129,7 @@ impl World {
         match self {
             Self::Simulated { truth, rig, head, .. } => {
                 let theta = &movement.configuration;
+                Observation::missed(rig.channels().len()).check(rig, truth.joints.len(), theta)?;
                 let observation = match head {
                     Some(head) if !head.sees(&truth.marker_at(theta)) => Observation::missed(rig.channels().len()),
                     _ => rig.observe(truth, theta, noise),

@@ -57,7 +57,10 @@ impl Actions {
     /// Takes a movement of the pool out of it; a box stays as it is.
     pub fn use_up(&mut self, movement: &Movement) {
         if let Self::Pool(pool) = self {
-            pool.retain(|candidate| candidate.row != movement.row);
+            pool.retain(|candidate| match (candidate.row, movement.row) {
+                (Some(row), Some(used)) => row != used,
+                _ => candidate.configuration != movement.configuration,
+            });
         }
     }
 
@@ -135,6 +138,9 @@ pub enum SelectionError {
     /// The minimiser refused its settings.
     #[error("DIRECT: {0}")]
     Search(DirectError),
+    /// Not a position for every joint.
+    #[error("a configuration of {0} positions is none of this robot")]
+    NoConfiguration(usize),
     /// No configuration has a finite criterion.
     #[error("no configuration has a finite criterion: the belief has diverged")]
     NoFiniteCriterion,
@@ -147,7 +153,7 @@ pub trait Policy: Send {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError>;
 
     /// What a movement to `configuration` would teach, within `limits` (recorded movements have some too), by the criterion
-    /// that this policy chooses by.
+    /// that this policy chooses by; at the estimate, where it chooses by samples of the posterior.
     fn appraise(
         &self,
         situation: &Situation<'_>,

@@ -13,6 +13,8 @@
 //! is taken out of the plan (a downdate of low rank) and replaced by a better one, if there is one. The plan is made
 //! for what is believed now, and made anew after every movement, from where it stood.
 
+use std::sync::Arc;
+
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
 use super::{SelectionError, Weights};
@@ -24,6 +26,8 @@ use crate::{
 /// Movements that are planned and not yet made, with what the belief would be after all of them.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
+    /// The belief before it.
+    now: Arc<Belief>,
     /// The belief once the plan is carried out.
     pub after: Belief,
     /// The poses (rad or m), and by hypothesis how much of each is expected to be seen.
@@ -38,7 +42,7 @@ impl Plan {
     pub fn new(belief: &Belief, considered: usize) -> Self {
         let mut after = belief.clone();
         after.truncate(considered);
-        Self { after, poses: Vec::new(), told: Vec::new(), chances: Vec::new() }
+        Self { now: Arc::new(after.clone()), after, poses: Vec::new(), told: Vec::new(), chances: Vec::new() }
     }
 
     /// How many independent equations a movement brings, by the rank of its Jacobian at `posture` (rad or m); at least one.
@@ -52,6 +56,9 @@ impl Plan {
         let covariance = self.after.covariance.as_ref().ok_or(SelectionError::NoCovariance)?;
         let root = weights.roots();
         let weighted = covariance.component_mul(&(&root * root.transpose()));
+        if !weighted.iter().all(|x| x.is_finite()) {
+            return Err(SelectionError::NoFiniteCriterion);
+        }
         let eigenvalues = SymmetricEigen::new(weighted).eigenvalues;
         Ok(eigenvalues.iter().filter(|value| **value > unknown * unknown).count())
     }
@@ -68,7 +75,13 @@ impl Plan {
     pub fn remove(&mut self, index: usize) -> Vec<f64> {
         let (pose, chances) = (self.poses.remove(index), self.chances.remove(index));
         self.told.remove(index);
-        self.each(&pose, &chances, -1.0);
+        if !self.each(&pose, &chances, -1.0) {
+            // Too much would cancel: from the beginning, without it.
+            self.after = (*self.now).clone();
+            for (pose, chances) in self.poses.clone().iter().zip(self.chances.clone()) {
+                self.each(pose, &chances, 1.0);
+            }
+        }
         pose
     }
 
@@ -78,36 +91,47 @@ impl Plan {
         (0..pairs).map(|pair| self.told.iter().map(|told| told[pair]).sum()).collect()
     }
 
-    /// The update (sign 1) or downdate (sign −1) of every hypothesis' covariance by a pose.
-    fn each(&mut self, pose: &[f64], chances: &[f64], sign: f64) {
+    /// The update (sign 1) or downdate (sign −1) of every hypothesis' covariance by a pose; whether that was sound.
+    fn each(&mut self, pose: &[f64], chances: &[f64], sign: f64) -> bool {
         let chance = |index: usize| sign * chances.get(index).copied().unwrap_or(1.0);
-        condition(&mut self.after, pose, chance);
+        condition(&mut self.after, pose, chance)
     }
 }
 
 /// Changes the covariance of every hypothesis of `belief` as an observation after moving to `pose` would, counted `weight`
-/// times, by hypothesis; a negative weight takes it out again.
-pub(crate) fn condition(belief: &mut Belief, pose: &[f64], weight: impl Fn(usize) -> f64) {
+/// times, by hypothesis; a negative weight takes it out again. Whether that was sound.
+pub(crate) fn condition(belief: &mut Belief, pose: &[f64], weight: impl Fn(usize) -> f64) -> bool {
     let Belief { state, layout, rig, covariance, alternatives } = belief;
+    let mut sound = true;
     if let Some(covariance) = covariance {
-        update(covariance, &rig.jacobian(state, layout, pose), weight(0));
+        sound &= update(covariance, &rig.jacobian(state, layout, pose), weight(0));
     }
     for (index, Alternative { state, covariance, .. }) in alternatives.iter_mut().enumerate() {
-        update(covariance, &rig.jacobian(state, layout, pose), weight(index + 1));
+        sound &= update(covariance, &rig.jacobian(state, layout, pose), weight(index + 1));
     }
+    sound
 }
 
-/// P ← (P⁻¹ + c HᵀH)⁻¹ = P − P Hᵀ (I/c + H P Hᵀ)⁻¹ H P, for c < 0 a downdate; as it was, where c is nothing or a downdate
-/// would leave no covariance.
-fn update(covariance: &mut DMatrix<f64>, rows: &DMatrix<f64>, c: f64) {
+/// A downdate is sound while what is left of I/c − H P Hᵀ, by the squares of its Cholesky factor's diagonal, exceeds this:
+/// far above the rounding of H P Hᵀ, which the noise magnifies.
+const SOUND: f64 = 1e-6;
+
+/// P ← (P⁻¹ + c HᵀH)⁻¹ = P − P Hᵀ (I/c + H P Hᵀ)⁻¹ H P, for c < 0 a downdate; as it was, where c is nothing. False where a
+/// downdate would cancel what is known.
+fn update(covariance: &mut DMatrix<f64>, rows: &DMatrix<f64>, c: f64) -> bool {
     if c.abs() < 1e-9 {
-        return;
+        return true;
     }
     let numerator = &*covariance * rows;
     let spread = rows.tr_mul(&numerator);
     let identity = DMatrix::identity(rows.ncols(), rows.ncols());
     let middle = (identity / c + (&spread + spread.transpose()) * 0.5) * c.signum();
-    let Some(inverse) = Cholesky::new(middle).map(|s| s.inverse() * c.signum()) else { return };
+    let Some(cholesky) = Cholesky::new(middle) else { return false };
+    if c < 0.0 && cholesky.l_dirty().diagonal().iter().any(|x| x * x < SOUND) {
+        return false;
+    }
+    let inverse = cholesky.inverse() * c.signum();
     let change = &numerator * inverse * numerator.transpose();
     *covariance -= (&change + change.transpose()) * 0.5;
+    true
 }

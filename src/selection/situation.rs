@@ -52,6 +52,11 @@ impl History {
         }
     }
 
+    /// As if a movement had been made already: one is pending.
+    pub fn expect_movements(&mut self) {
+        self.has_moved = true;
+    }
+
     /// Whether any movement was made.
     pub fn has_moved(&self) -> bool {
         self.has_moved

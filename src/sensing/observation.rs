@@ -48,6 +48,9 @@ pub enum Refused {
         /// Numbers of its readings.
         wanted: usize,
     },
+    /// A reading so far from what is believed that the distance is no number.
+    #[error("the readings are farther from what is expected than numbers reach")]
+    Absurd,
     /// A reading that is no finite number.
     #[error("the reading of channel {channel} (counted from 0) is {value}, not a finite number")]
     Reading {

@@ -70,10 +70,11 @@ impl Rig {
 
     /// The same channels with σ of the first as `sigma`, and those of the others changed in proportion.
     pub fn assuming(&self, sigma: f64) -> Self {
-        let factor = sigma / self.sigma();
+        // Channels without noise are all alike.
+        let factor = if self.sigma() > 0.0 { sigma / self.sigma() } else { f64::INFINITY };
         let scaled = self.channels.iter().enumerate().map(|(index, channel)| {
             // Not by the factor: σ is to be `sigma` to the last bit, also where it was 0.
-            channel.with_sigma(if index == 0 { sigma } else { channel.sigma() * factor })
+            channel.with_sigma(if index == 0 || factor.is_infinite() { sigma } else { channel.sigma() * factor })
         });
         Self::new(scaled.collect())
     }

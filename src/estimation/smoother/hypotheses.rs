@@ -67,7 +67,7 @@ impl Hypotheses {
         }
     }
 
-    /// Merges, weighs, sorts and prunes; says whether the heaviest mode is another than before.
+    /// Merges, weighs, sorts and prunes.
     pub fn condense(&mut self, kept: usize, layout: &Layout) {
         // Evidence is finite: what has none is no mode.
         self.modes.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
@@ -94,7 +94,7 @@ impl Hypotheses {
     }
 }
 
-/// `state` with one to three of its learned blocks drawn anew, or with an axis turned round.
+/// `state` with one to three of its learned axes drawn anew or turned round; of other blocks, where no axis is learned.
 fn mutated(state: &State, drawn: &State, layout: &Layout, rng: &mut impl Rng) -> State {
     let mut mutated = state.clone();
     let learned: Vec<Block> = layout.blocks().map(|(block, _)| block).collect();

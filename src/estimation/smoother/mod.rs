@@ -22,6 +22,7 @@ mod posterior;
 
 use std::sync::Arc;
 
+use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 
 pub use hypotheses::HypothesisSettings;
@@ -121,12 +122,33 @@ impl Smoother {
             })
             .count();
         let recent = self.posterior.measurements.split_off(self.posterior.measurements.len() - surprising);
-        let covariance = self.posterior.prior.covariance() * 0.25;
+        let covariance = self.prior_here() * 0.25;
         let Ok(prior) = Prior::around(self.belief.state.clone(), &self.belief.layout, covariance) else { return };
         self.posterior = Posterior::new(prior, self.posterior.rig.clone());
         self.posterior.measurements = recent;
         self.hypotheses.calm = 0;
         self.changes.reset();
+    }
+
+    /// The prior's covariance in the chart at the estimate; without what correlates its parameters where the estimate has
+    /// left the guess's chart.
+    fn prior_here(&self) -> DMatrix<f64> {
+        let (prior, layout) = (&self.posterior.prior, &self.belief.layout);
+        let change = prior.guess().change_of_chart(layout, &self.belief.state).and_then(|change| change.try_inverse());
+        match change.filter(|_| !prior.is_vague()) {
+            Some(change) => {
+                let carried = &change * prior.covariance() * change.transpose();
+                (&carried + carried.transpose()) * 0.5
+            }
+            None => DMatrix::from_diagonal(&prior.covariance().diagonal()),
+        }
+    }
+
+    /// Whether there are as many independent equations as parameters; where some can never be determined, twice as many
+    /// equations must do.
+    fn is_determined(&self) -> bool {
+        let (m, equations) = (self.belief.layout.dimension(), self.posterior.equations());
+        equations >= 2 * m || (equations >= m && self.posterior.rank(&self.belief.state, &self.belief.layout) >= m)
     }
 
     /// Whether the data cost of the heaviest hypothesis is what noise alone explains, 2E ~ χ² with as many degrees of
@@ -147,6 +169,16 @@ impl Estimator for Smoother {
         if observation.is_miss() {
             return Ok(Update::default());
         }
+        // All or nothing: an observation that ends it leaves no trace.
+        let mut revised = self.clone();
+        let update = revised.absorb(positions, observation)?;
+        *self = revised;
+        Ok(update)
+    }
+}
+
+impl Smoother {
+    fn absorb(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let nis = self.belief.nis(positions, observation);
         let layout = self.belief.layout.clone();
         let measurement = Measurement { positions: positions.to_vec(), observation: observation.clone() };
@@ -157,7 +189,7 @@ impl Estimator for Smoother {
             self.forget();
         }
         self.hypotheses.follow(&self.posterior, &layout);
-        if !self.is_settled() {
+        if !self.is_settled() || self.hypotheses.modes.is_empty() {
             self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         }
         self.hypotheses.condense(self.settings.kept, &layout);
@@ -165,8 +197,7 @@ impl Estimator for Smoother {
             return Err(EstimationError::Diverged("no hypothesis explains the measurements"));
         }
         self.publish();
-        let determined = self.posterior.equations() >= layout.dimension();
-        if determined && self.belief.alternatives.is_empty() && self.explains() {
+        if self.is_determined() && self.belief.alternatives.is_empty() && self.explains() {
             self.hypotheses.calm += 1;
             if self.is_settled() && self.posterior.measurements.len() > KEPT {
                 self.posterior.settle(KEPT / 2, &self.belief.state, &layout);

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::{
-    model::{Layout, Pass, Prior, State},
+    model::{Layout, Pass, Prior, State, rank},
     sensing::{Observation, Rig},
 };
 
@@ -73,6 +73,12 @@ impl Posterior {
         kept + self.settled.as_ref().map_or(0, |settled| settled.equations)
     }
 
+    /// How many independent equations the measurements are that have not settled; all settled ones count as independent.
+    pub fn rank(&self, state: &State, layout: &Layout) -> usize {
+        let (rows, _) = self.stacked(state, layout, &self.measurements);
+        rank(&rows.transpose()) + self.settled.as_ref().map_or(0, |settled| settled.equations)
+    }
+
     /// E(x); infinite where x is too far from where settled measurements were linearised. Axes are written with their
     /// points nearest to the pins.
     pub fn cost(&self, state: &State, layout: &Layout) -> f64 {
@@ -113,6 +119,14 @@ impl Posterior {
         layout: &Layout,
         measurements: &[Measurement],
     ) -> (DMatrix<f64>, DVector<f64>, f64) {
+        let (stacked, residuals) = self.stacked(state, layout, measurements);
+        let information = &stacked * stacked.transpose();
+        let cost = 0.5 * residuals.norm_squared();
+        (information, stacked * residuals, cost)
+    }
+
+    /// Hᵀ and y − h of some measurements, one beside the other.
+    fn stacked(&self, state: &State, layout: &Layout, measurements: &[Measurement]) -> (DMatrix<f64>, DVector<f64>) {
         let m = layout.dimension();
         let equations = measurements.iter().map(|seen| seen.observation.equations()).sum();
         let mut stacked = DMatrix::zeros(m, equations);
@@ -126,9 +140,7 @@ impl Posterior {
             self.rig.linearise(&pass, &seen.observation, rows, &mut residuals.as_mut_slice()[at..at + d]);
             at += d;
         }
-        let information = &stacked * stacked.transpose();
-        let cost = 0.5 * residuals.norm_squared();
-        (information, stacked * residuals, cost)
+        (stacked, residuals)
     }
 
     /// Moves the oldest `count` measurements into the quadratic, linearised at `state`.
