@@ -276,7 +276,21 @@ impl Experiment {
 
 #[cfg(test)]
 mod tests {
-    use crate::{experiment::ChoiceError, scenario::builtin};
+    use crate::{
+        estimation::HypothesisSettings,
+        experiment::{ChoiceError, Experiment},
+        scenario::builtin,
+        selection::Criterion,
+    };
+
+    /// A learner that plans, with short searches.
+    fn planning(name: &str) -> Experiment {
+        let mut scenario = builtin(name).expect("built in");
+        scenario.selection.search.max_evaluations = 60;
+        scenario.selection.planning.sweeps = 1;
+        scenario.smoother.hypotheses = HypothesisSettings { kept: 8, spawned: 8 };
+        scenario.experiment(4, Some(&["global".to_owned()])).expect("starts")
+    }
 
     #[test]
     fn the_chosen_movement_is_the_best_of_its_search_and_of_its_appraisal() {
@@ -305,6 +319,51 @@ mod tests {
                 assert!(matches!(experiment.appraise("active", &wrong), Err(ChoiceError::Configuration(_))));
             }
             assert!(matches!(experiment.choice("nobody"), Err(ChoiceError::UnknownLearner { .. })));
+        }
+    }
+
+    /// Also of steps at which nothing was searched, as the plan was carried on.
+    #[test]
+    fn a_planner_answers_at_every_step() {
+        let mut experiment = planning("arm-6dof");
+        assert!(matches!(experiment.choice("global"), Err(ChoiceError::NotSearched(_))));
+        let mut carried_on = 0;
+        for _ in 0..16 {
+            let learner = &experiment.step().expect("a step").learners[0];
+            let movement = learner.movement.clone().expect("a movement");
+            carried_on += usize::from(movement.evaluations == 0);
+            let choice = experiment.choice("global").expect("explained");
+            assert_eq!(choice.chosen.configuration, movement.configuration);
+            let holder = &choice.boxes[choice.chosen.rectangle];
+            let levels = &holder.shapes.last().expect("a shape").levels;
+            for ((x, centre), level) in choice.chosen.point.iter().zip(&holder.centre).zip(levels) {
+                assert!((x - centre).abs() <= 0.5 * 3_f64.powi(-i32::from(*level)) + 1e-9, "step {}", choice.step);
+            }
+            let appraisal = experiment.appraise("global", &movement.configuration).expect("an appraisal");
+            let tolerance = 1e-9 * appraisal.trace;
+            assert!((appraisal.criterion - movement.criterion.expect("chosen by it")).abs() < tolerance);
+            assert!((appraisal.gain - movement.gain.expect("chosen by it")).abs() < tolerance);
+            assert!((choice.trace.expect("has one") - appraisal.trace).abs() < tolerance);
+        }
+        assert!((1..16).contains(&carried_on), "{carried_on} of 16");
+    }
+
+    /// Under several hypotheses a movement is worth more than what it teaches under the heaviest.
+    #[test]
+    fn a_planner_appraises_by_its_own_criterion() {
+        let mut experiment = planning("arm-6dof-no-prior");
+        let weights = builtin("arm-6dof-no-prior").expect("built in").weights();
+        for _ in 0..2 {
+            let belief = experiment.learners[0].belief().clone();
+            assert!(belief.weight() < 0.9, "rivals");
+            let learner = &experiment.step().expect("a step").learners[0];
+            let movement = learner.movement.clone().expect("a movement");
+            let found = experiment.appraise("global", &movement.configuration).expect("an appraisal");
+            assert!((found.criterion - movement.criterion.expect("chosen by it")).abs() < 1e-9 * found.trace);
+            let plain = Criterion::new(&belief, &weights).expect("a covariance");
+            let plain = plain.appraise(&movement.configuration).expect("an appraisal");
+            assert!((plain.criterion / found.criterion - 1.0).abs() > 0.01, "{} {}", plain.criterion, found.criterion);
+            assert!(found.trace > plain.before, "what is between hypotheses counts too");
         }
     }
 }

@@ -8,6 +8,8 @@ mod agent;
 mod choice;
 mod comparison;
 mod convergence;
+#[cfg(test)]
+mod failures;
 mod gauge;
 mod judge;
 #[cfg(test)]
