@@ -1,11 +1,13 @@
 //! What active selection promises.
 
 use nalgebra::DVector;
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 
 use super::{Case, JOINTS, PARAMETERS, apart, needs_a_covariance, search, takes_the_best_of_a_pool, watch};
 use crate::{
+    estimation::Belief,
     optimize::{Settings, Variant},
     selection::{Active, Criterion, Minimiser, Selection, SelectionError},
 };
@@ -70,23 +72,52 @@ fn other_minimisers_choose_the_best_of_what_they_evaluated() {
     assert_eq!(case.select(&none), Err(SelectionError::NoFiniteCriterion));
 }
 
-/// The mean over states drawn from the posterior is the value at the estimate where the posterior is narrow, and another
-/// where it is wide.
+/// What a selection says of the criterion before and of the gain.
+fn before_and_gain(selection: &Selection) -> (f64, f64) {
+    let (value, gain) = selection.criterion.zip(selection.gain).expect("chosen by it");
+    (value + gain, gain)
+}
+
+/// A belief with another deviation of every parameter, so that it matters which of them a movement shows.
+fn uneven(first: f64) -> Case {
+    Case::of(DVector::from_fn(PARAMETERS, |k, _| first / (1 + k) as f64))
+}
+
 #[test]
 fn monte_carlo_equals_the_plain_form_of_a_narrow_posterior() {
-    // Every parameter another, so that it matters which of them a movement shows.
-    let deviations = |first: f64| DVector::from_fn(PARAMETERS, |k, _| first / (1 + k) as f64);
-    for (first, agree) in [(3e-6, true), (1.0, false)] {
-        let case = Case::of(deviations(first));
-        let plain = case.select(&by_direct(&case)).expect("a selection");
-        let sampled = case.select(&by_direct(&case).sampled(16)).expect("a selection");
-        let parts = |selection: &Selection| selection.criterion.zip(selection.gain).expect("chosen by it");
-        let ((value, gain), (sampled_value, sampled_gain)) = (parts(&plain), parts(&sampled));
-        let (before, sampled_before) = (value + gain, sampled_value + sampled_gain);
-        assert!((sampled_before / before - 1.0).abs() < 1e-9, "before any movement they are one");
-        let difference = (sampled_gain / gain - 1.0).abs();
-        assert_eq!(difference < 5e-5, agree, "{first}: {difference:e}");
-    }
+    let case = uneven(3e-6);
+    let [plain, sampled] = [by_direct(&case), by_direct(&case).sampled(16)]
+        .map(|policy| before_and_gain(&case.select(&policy).expect("a selection")));
+    assert!((sampled.0 / plain.0 - 1.0).abs() < 1e-9, "before any movement they are one");
+    assert!((sampled.1 / plain.1 - 1.0).abs() < 1e-4, "{sampled:?} {plain:?}");
+}
+
+/// Against the mean over states that are drawn here, as many and others.
+#[test]
+fn monte_carlo_is_the_mean_over_the_posterior_where_that_is_wide() {
+    const SAMPLES: usize = 400;
+    let case = uneven(0.6);
+    let policy = active(&case, Minimiser::Direct(search(15))).sampled(SAMPLES);
+    let selection = case.select(&policy).expect("a selection");
+    let (before, gain) = before_and_gain(&selection);
+    let mut rng = ChaCha8Rng::seed_from_u64(31);
+    let deviations = case.belief.covariance.as_ref().expect("kept").diagonal().map(f64::sqrt);
+    let gains: Vec<f64> = (0..SAMPLES)
+        .map(|_| {
+            let delta = deviations.map(|sd| sd * rng.sample::<f64, _>(StandardNormal));
+            let state = case.belief.state.retract(&case.belief.layout, &delta);
+            let drawn = Belief { state, ..case.belief.clone() };
+            let criterion = Criterion::new(&drawn, &case.weights).expect("a covariance");
+            before - criterion.evaluate(&[&selection.movement.configuration])[0]
+        })
+        .collect();
+    let mean = gains.iter().sum::<f64>() / SAMPLES as f64;
+    let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / SAMPLES as f64;
+    // Five standard errors of the difference of two means.
+    let tolerance = 5.0 * (2.0 * variance / SAMPLES as f64).sqrt();
+    assert!((gain - mean).abs() < tolerance, "{gain} {mean} ± {tolerance}");
+    let plain = before - case.value(&policy, &selection.movement.configuration);
+    assert!((plain - mean).abs() > tolerance, "{plain} {mean} ± {tolerance}: the estimate alone does not do");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::{Case, JOINTS, PARAMETERS, apart, needs_a_covariance, search, takes_the_best_of_a_pool, watch};
-use crate::selection::{Planned, Planner, Planning, Policy, Selection, Situation, condition};
+use crate::selection::{CriterionUnits, Planned, Planner, Planning, Policy, Selection, Situation, Weights, condition};
 
 fn planner(case: &Case, planning: Planning) -> Planner {
     let short = Planning { sweeps: 1, ..planning };
@@ -39,6 +39,18 @@ fn plans_as_many_movements_as_are_still_needed() {
     // One equation per parameter, all of it committed.
     assert_eq!(planned(0, default), (8, 7));
     assert_eq!(planned(0, Planning { ahead: 1, ..default }), (1, 0));
+}
+
+/// In the units of the criterion: where a radian counts as 10 cm, 2 cm are as much as a fifth of one.
+#[test]
+fn what_is_unknown_is_told_by_the_weights_of_the_criterion() {
+    let mut case = Case::new(0.02);
+    assert_eq!(planned(&case.select(&planner(&case, Planning::default())).expect("a selection")).committed, 7);
+    let deviations = DVector::from_element(PARAMETERS, 0.02);
+    case.weights = Weights::new(CriterionUnits::CharacteristicLength(0.1), &case.belief.layout, &deviations);
+    let selection = case.select(&planner(&case, Planning::default())).expect("a selection");
+    // The two coordinates of each point.
+    assert_eq!((planned(&selection).poses.len(), planned(&selection).committed), (4, 0));
 }
 
 /// Takes a step of a plan that is carried on, and checks that it is one of its movements and the rest stays.
