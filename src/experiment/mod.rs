@@ -6,6 +6,8 @@
 
 mod agent;
 mod choice;
+#[cfg(test)]
+mod choices;
 mod comparison;
 mod convergence;
 #[cfg(test)]

@@ -67,7 +67,7 @@ impl Hypotheses {
         }
     }
 
-    /// Merges, weighs, sorts and prunes; says whether the heaviest mode is another than before.
+    /// Merges, weighs, sorts and prunes.
     pub fn condense(&mut self, kept: usize, layout: &Layout) {
         // Evidence is finite: what has none is no mode.
         self.modes.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
