@@ -96,13 +96,22 @@ fn while_something_is_unknown_a_plan_is_made_anew_after_every_batch() {
         let anew = case.select(&policy).expect("a selection");
         assert!(anew.evaluations > 0 && planned(&anew).poses.len() == 8, "{}", planned(&anew).poses.len());
     }
-    // A plan that was made when everything was known is dropped, once something is not: the body may have changed.
-    let mut case = Case::new(0.05);
-    let policy = planner(&case, Planning::default());
-    let selection = case.select(&policy).expect("a selection");
-    case.moved(&selection, true);
-    case.belief = Case::new(0.3).belief;
-    assert!(case.select(&policy).expect("a selection").evaluations > 0);
+}
+
+/// The body may have changed.
+#[test]
+fn a_plan_made_when_all_was_known_is_dropped_once_something_is_not() {
+    for batch in [1, 3] {
+        let mut case = Case::new(0.05);
+        let policy = planner(&case, Planning { batch, ..Planning::default() });
+        let selection = case.select(&policy).expect("a selection");
+        assert_eq!(planned(&selection).committed, 7);
+        case.moved(&selection, true);
+        case.belief = Case::new(0.3).belief;
+        let anew = case.select(&policy).expect("a selection");
+        assert!(anew.evaluations > 0, "in batches of {batch}");
+        assert_eq!(planned(&anew).committed, batch - 1);
+    }
 }
 
 /// By the criterion of one movement, which `appraise` tells, with a rival and without.
