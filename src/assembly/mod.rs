@@ -328,4 +328,30 @@ mod tests {
             assert_ne!(last[0], last_swapped[0], "{name}: the active learner must have seen another marker");
         }
     }
+
+    /// The marker is where it is told to be on the hand: as far from every axis of the initial estimate as of the robot's
+    /// description, though the rigid fit would put it elsewhere.
+    #[test]
+    fn a_marker_that_is_not_learned_stays_through_the_rigid_fit() {
+        let nominal = builtin("tiago-mocap").expect("built in");
+        let edits = [("learn_marker = true", "learn_marker = false"), ("[0.0, 0.0, 0.0]", "[0.15, -0.9, 0.65]")];
+        let text = edits.iter().fold(nominal.source.clone(), |text, (from, to)| text.replacen(from, to, 1));
+        let known = Scenario::parse("known-marker.toml", &text, &|file| nominal.data_file(file)).expect("still valid");
+        let given = known.robot.state.marker();
+        assert_eq!((given.x, given.y, given.z), (0.15, -0.9, 0.65));
+        let distances = |state: &State| -> Vec<f64> {
+            let lines = state.joints.iter().filter_map(Joint::line);
+            lines.map(|line| line.distance_to(&state.marker())).collect()
+        };
+        let (nominal_distances, initial) = (distances(&known.robot.state), known.draw(3).expect("a world").2.initial);
+        assert_eq!(nominal_distances.len(), 7);
+        for (found, wanted) in distances(&initial).iter().zip(&nominal_distances) {
+            assert!((found - wanted).abs() < 1e-9, "{found} m from an axis instead of {wanted} m");
+        }
+        // With the same text but for the marker that is to be learned, the fit moves it.
+        let learned = text.replacen(edits[0].1, edits[0].0, 1);
+        let learned = Scenario::parse("marker.toml", &learned, &|file| nominal.data_file(file)).expect("still valid");
+        let fitted = distances(&learned.draw(3).expect("a world").2.initial);
+        assert!(fitted.iter().zip(&nominal_distances).any(|(found, given)| (found - given).abs() > 0.01));
+    }
 }

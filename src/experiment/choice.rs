@@ -273,38 +273,3 @@ impl Experiment {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use crate::{experiment::ChoiceError, scenario::builtin};
-
-    #[test]
-    fn the_chosen_movement_is_the_best_of_its_search_and_of_its_appraisal() {
-        for (name, steps) in [("arm-6dof", 3), ("head-fov", 6)] {
-            let mut experiment = builtin(name).and_then(|s| s.experiment(4, None)).expect("starts");
-            assert!(matches!(experiment.choice("active"), Err(ChoiceError::NotSearched(_))));
-            for _ in 0..steps {
-                experiment.step().expect("a step");
-            }
-            let choice = experiment.choice("active").expect("searched by DIRECT");
-            let last = choice.iterations.last().expect("iterations");
-            assert_eq!((last.best_box, last.best), (Some(choice.chosen.rectangle), choice.chosen.criterion));
-            assert_eq!(choice.boxes.len(), choice.evaluations);
-            let same = experiment.appraise("active", &choice.chosen.configuration).expect("an appraisal");
-            let (found, chosen) = (same.criterion, choice.chosen.criterion.expect("a criterion"));
-            assert!((found - chosen).abs() < 1e-9 * same.trace, "{name}: {found} {chosen}");
-            let other = experiment.appraise("active", &vec![0.0; choice.joints.len()]).expect("an appraisal");
-            assert!(other.gain <= same.gain * (1.0 + 1e-9), "{name}: {} {}", other.gain, same.gain);
-            assert!(matches!(experiment.choice("random"), Err(ChoiceError::NotSearched(_))));
-            assert!(experiment.appraise("random", &choice.chosen.configuration).is_ok(), "it has a covariance too");
-            assert!(matches!(
-                experiment.appraise("gradient", &choice.chosen.configuration),
-                Err(ChoiceError::Selection(_))
-            ));
-            for wrong in [vec![0.0], vec![f64::NAN; choice.joints.len()], vec![9.0; choice.joints.len()]] {
-                assert!(matches!(experiment.appraise("active", &wrong), Err(ChoiceError::Configuration(_))));
-            }
-            assert!(matches!(experiment.choice("nobody"), Err(ChoiceError::UnknownLearner { .. })));
-        }
-    }
-}

@@ -6,8 +6,12 @@
 
 mod agent;
 mod choice;
+#[cfg(test)]
+mod choices;
 mod comparison;
 mod convergence;
+#[cfg(test)]
+mod failures;
 mod gauge;
 mod judge;
 #[cfg(test)]

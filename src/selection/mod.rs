@@ -12,6 +12,8 @@
 
 mod active;
 mod criterion;
+#[cfg(test)]
+mod laws;
 mod optimality;
 mod outlook;
 mod partition;

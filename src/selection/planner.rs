@@ -102,7 +102,8 @@ impl Planner {
         let before = situation.history.plan();
         let mut committed = before.map_or(0, |plan| plan.committed);
         let standing = before.map(|plan| plan.poses.clone()).unwrap_or_default();
-        let mut poses = if committed > 0 && (unknown == 0 || self.planning.batch > 1) && !standing.is_empty() {
+        // What was committed when nothing was unknown may be more than a batch.
+        let mut poses = if committed > 0 && (unknown == 0 || committed < self.planning.batch) && !standing.is_empty() {
             standing
         } else {
             let determined = unknown == 0 && self.planning.ahead > 1;

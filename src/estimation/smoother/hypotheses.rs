@@ -120,3 +120,140 @@ fn mutated(state: &State, drawn: &State, layout: &Layout, rng: &mut impl Rng) ->
     }
     mutated
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{f64::consts::PI, sync::Arc};
+
+    use nalgebra::{DMatrix, DVector, Point3, UnitVector3, Vector3};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::{super::posterior::Measurement, *};
+    use crate::{
+        model::{Prior, laws::random_arm},
+        sensing::{Observation, Rig},
+    };
+
+    /// A state, its layout, and the deviation of every parameter that its modes have here.
+    fn chain() -> (State, Layout, f64) {
+        let state = random_arm(&mut ChaCha8Rng::seed_from_u64(3), 3);
+        let layout = Layout::of_arm(&state, &[], false);
+        (state, layout, 0.01)
+    }
+
+    /// A mode `away` standard deviations from the chain along one parameter, with this evidence.
+    fn mode(away: f64, log_evidence: f64) -> Mode {
+        let (state, layout, deviation) = chain();
+        let m = layout.dimension();
+        let mut delta = DVector::zeros(m);
+        delta[0] = away * deviation;
+        let covariance = DMatrix::identity(m, m) * (deviation * deviation);
+        let information = DMatrix::identity(m, m) / (deviation * deviation);
+        let state = state.retract(&layout, &delta);
+        Mode { state, cost: -log_evidence, information, covariance, log_evidence, weight: 0.0 }
+    }
+
+    fn condensed(modes: &[(f64, f64)], kept: usize) -> Vec<Mode> {
+        let modes = modes.iter().map(|(away, log_evidence)| mode(*away, *log_evidence)).collect();
+        let mut hypotheses = Hypotheses { modes, calm: 0 };
+        hypotheses.condense(kept, &chain().1);
+        hypotheses.modes
+    }
+
+    fn evidence(modes: &[Mode]) -> Vec<f64> {
+        modes.iter().map(|mode| mode.log_evidence).collect()
+    }
+
+    #[test]
+    fn condensed_modes_are_distinct_and_weighted_by_their_evidence() {
+        // In no order; of two that are one the better stays, wherever it stood.
+        let modes = condensed(&[(5.0, -2.0), (0.1, -0.5), (0.0, 0.0), (5.2, -3.0), (10.0, 1.0)], 16);
+        assert_eq!(evidence(&modes), [1.0, 0.0, -2.0]);
+        let weights: Vec<f64> = modes.iter().map(|mode| mode.weight).collect();
+        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{weights:?}");
+        assert!((weights[0] / weights[1] - 1_f64.exp()).abs() < 1e-9, "{weights:?}");
+        assert!((weights[1] / weights[2] - 2_f64.exp()).abs() < 1e-9, "{weights:?}");
+        // What counts are differences of evidence, however small the evidence is.
+        let modes = condensed(&[(5.0, -1002.0), (0.0, -1000.0)], 16);
+        assert!((modes[0].weight / modes[1].weight - 2_f64.exp()).abs() < 1e-9);
+        assert!(condensed(&[], 16).is_empty());
+    }
+
+    #[test]
+    fn modes_without_a_share_are_dropped() {
+        // e⁻¹¹ is 1.7·10⁻⁵, e⁻¹² is 6·10⁻⁶, and a share of 10⁻⁵ counts.
+        let modes = condensed(&[(0.0, 0.0), (5.0, -11.0), (10.0, -12.0), (15.0, -100.0)], 16);
+        assert_eq!(evidence(&modes), [0.0, -11.0]);
+        assert!((modes.iter().map(|mode| mode.weight).sum::<f64>() - 1.0).abs() < 1e-5);
+        let many: Vec<(f64, f64)> = (0..20).map(|k| (5.0 * f64::from(k), 0.1 * f64::from(k))).collect();
+        assert_eq!(evidence(&condensed(&many, 4)), [19, 18, 17, 16].map(|k| 0.1 * f64::from(k)));
+    }
+
+    /// A joint of which nothing is known, behind one that is known: seen after half turns alone, which are those about its
+    /// axis turned round.
+    fn half_turns() -> (State, Layout, Posterior) {
+        let joint = |direction: Vector3<f64>, x: f64| {
+            let direction = UnitVector3::new_normalize(direction);
+            Joint::Revolute(Line { point: Point3::new(x, 0.0, 0.0), direction })
+        };
+        let joints = vec![joint(Vector3::new(0.2, -0.3, 1.0), 0.1), joint(Vector3::y(), 0.5)];
+        let truth = State::arm(joints, Point3::new(0.8, 0.0, 0.1));
+        let layout = Layout::of_arm(&truth, &[true, false], false);
+        let m = layout.dimension();
+        let within = |_| Some(1.0);
+        let prior = Prior::new(truth.clone(), &layout, DMatrix::identity(m, m), within).expect("a prior");
+        let mut posterior = Posterior::new(prior, Arc::new(Rig::tracker(0.01)));
+        for known in [-0.8, 0.2, 1.1] {
+            see(&mut posterior, &truth, &[PI, known]);
+        }
+        (truth, layout, posterior)
+    }
+
+    fn see(posterior: &mut Posterior, truth: &State, positions: &[f64]) {
+        let observation = Observation::seen(truth.marker_at(positions));
+        posterior.measurements.push(Measurement { positions: positions.to_vec(), observation });
+    }
+
+    #[test]
+    fn the_axis_turned_round_is_found_and_later_ruled_out() {
+        let (truth, layout, mut posterior) = half_turns();
+        let axis = truth.joints[0].direction();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut hypotheses = Hypotheses::default();
+        hypotheses.modes.extend(posterior.mode(&truth, &layout, WARM));
+        hypotheses.spawn(0, &posterior, &layout, &mut rng);
+        assert_eq!(hypotheses.modes.len(), 1, "none is searched for");
+        hypotheses.spawn(16, &posterior, &layout, &mut rng);
+        hypotheses.condense(16, &layout);
+        assert_eq!(hypotheses.modes.len(), 2, "found over and over, they are two");
+        let along = |mode: &Mode| mode.state.joints[0].direction().dot(&axis);
+        let (one, other) = (&hypotheses.modes[0], &hypotheses.modes[1]);
+        assert!((along(one) + along(other)).abs() < 1e-2 && along(one).abs() > 0.999);
+        for mode in [one, other] {
+            assert!(posterior.data_cost(&mode.state, &layout) < 0.5, "it explains what was seen");
+            assert!((mode.weight - 0.5).abs() < 0.01, "{}", mode.weight);
+        }
+        // A quarter turn tells them apart. Modes are searched anew given it.
+        see(&mut posterior, &truth, &[0.5 * PI, 0.0]);
+        hypotheses.follow(&posterior, &layout);
+        for mode in &hypotheses.modes {
+            let normal = posterior.normal(&mode.state, &layout).expect("in the chart");
+            assert!((normal.cost - mode.cost).abs() < 1e-9 * mode.cost.max(1.0), "of all measurements");
+            let step = &mode.covariance * &normal.descent;
+            assert!(step.dot(&normal.descent) < 1e-3, "at rest");
+        }
+        hypotheses.condense(16, &layout);
+        assert_eq!(hypotheses.modes.len(), 1);
+        assert!(along(&hypotheses.modes[0]) > 0.999 && hypotheses.modes[0].weight == 1.0);
+    }
+
+    #[test]
+    fn without_any_mode_the_prior_is_searched() {
+        let (_, layout, posterior) = half_turns();
+        let mut hypotheses = Hypotheses::default();
+        hypotheses.spawn(8, &posterior, &layout, &mut ChaCha8Rng::seed_from_u64(1));
+        hypotheses.condense(16, &layout);
+        assert!(posterior.data_cost(&hypotheses.modes[0].state, &layout) < 0.5);
+    }
+}

@@ -15,6 +15,8 @@
 //! Once only one hypothesis is left and the old measurements are as good as linear within its spread, they are
 //! compressed into a quadratic, so that a step costs the same whatever the number of movements.
 
+#[cfg(test)]
+mod changes;
 mod hypotheses;
 #[cfg(test)]
 mod laws;

@@ -1,0 +1,195 @@
+//! What the smoother promises over long runs: that old measurements are compressed without loss, that a change of the body
+//! is noticed and what no longer holds is dropped, and that a miss says nothing.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use super::{HypothesisSettings, KEPT, Smoother, posterior::Effort};
+use crate::{
+    estimation::{Estimator, Update},
+    kinematics::{Joint, Line},
+    model::{Layout, Prior, State, laws::random_arm},
+    sensing::{Observation, Rig},
+};
+
+const JOINTS: usize = 4;
+const SIGMA: f64 = 0.01;
+const THOROUGH: Effort = Effort { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY };
+
+/// A robot, and a smoother that began with a guess near it.
+struct Run {
+    truth: State,
+    smoother: Smoother,
+    rng: ChaCha8Rng,
+}
+
+impl Run {
+    fn new(seed: u64) -> Self {
+        Self::with(seed, None)
+    }
+
+    /// With a guess near the truth, or with none: axes anywhere `within` so many metres.
+    fn with(seed: u64, within: Option<f64>) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut truth = random_arm(&mut rng, JOINTS);
+        // Of which the last joint turns the marker by a lever of 30 cm.
+        let direction = truth.joints[JOINTS - 1].direction();
+        let across = direction.cross(&Vector3::new(0.3, 0.5, 0.8)).normalize();
+        let point = truth.marker() - across * 0.3;
+        truth.joints[JOINTS - 1] = Joint::Revolute(Line { point, direction });
+        let layout = Layout::of_arm(&truth, &[], false);
+        let guess = truth.retract(&layout, &DVector::from_fn(layout.dimension(), |_, _| rng.random_range(-0.1..0.1)));
+        let covariance = DMatrix::identity(layout.dimension(), layout.dimension()) * 0.04;
+        let prior = Prior::new(guess, &layout, covariance, |_| within).expect("a prior");
+        let count = if within.is_some() { 8 } else { 2 };
+        let settings = HypothesisSettings { kept: count, spawned: count };
+        let (rig, rng_of_search) = (Arc::new(Rig::tracker(SIGMA)), ChaCha8Rng::seed_from_u64(9));
+        Self { truth, smoother: Smoother::new(prior, Arc::new(layout), rig, settings, rng_of_search), rng }
+    }
+
+    fn posture(&mut self) -> Vec<f64> {
+        (0..JOINTS).map(|_| self.rng.random_range(-1.5..1.5)).collect()
+    }
+
+    /// A movement to `theta`, seen with noise.
+    fn to(&mut self, theta: &[f64]) -> Update {
+        let noise = Vector3::from_fn(|_, _| SIGMA * self.rng.sample::<f64, _>(StandardNormal));
+        let seen = Observation::seen(self.truth.marker_at(theta) + noise);
+        self.smoother.update(theta, &seen).expect("an update")
+    }
+
+    fn step(&mut self) -> Update {
+        let theta = self.posture();
+        self.to(&theta)
+    }
+
+    /// The greatest error of predicted markers over some postures, in expected errors.
+    fn error(&mut self) -> f64 {
+        let belief = self.smoother.belief().clone();
+        let relative = |theta: Vec<f64>| {
+            let error = (belief.state.marker_at(&theta) - self.truth.marker_at(&theta)).norm();
+            error / belief.marker_covariance(&theta).expect("kept").trace().sqrt()
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let postures = (0..20).map(|_| (0..JOINTS).map(|_| rng.random_range(-1.5..1.5)).collect());
+        postures.map(relative).fold(0.0, f64::max)
+    }
+
+    /// The last joint's axis tilts by `angle` radians about the marker's lever, which leaves the marker of a posture alone
+    /// in which that joint is at 0.
+    fn tilt(&mut self, angle: f64) {
+        let Joint::Revolute(line) = &mut self.truth.joints[JOINTS - 1] else { panic!("revolute") };
+        let lever = nalgebra::Unit::new_normalize(self.truth.targets[0].place.origin() - line.point);
+        line.direction = nalgebra::Rotation3::from_axis_angle(&lever, angle) * line.direction;
+    }
+}
+
+/// The mode of all measurements, none of them compressed, is where the smoother is that compressed half of them twice, with
+/// the same covariance.
+#[test]
+fn compression_keeps_the_answer() {
+    for seed in 0..3 {
+        let mut run = Run::new(seed);
+        let mut whole = run.smoother.posterior.clone();
+        for _ in 0..100 {
+            run.step();
+            whole.measurements.extend(run.smoother.posterior.measurements.last().cloned());
+        }
+        let posterior = &run.smoother.posterior;
+        assert_eq!((posterior.count(), whole.count()), (100, 100));
+        assert!(posterior.measurements.len() <= KEPT && posterior.settled.is_some(), "compressed");
+        let belief = run.smoother.belief();
+        let mode = whole.mode(&belief.state, &belief.layout, THOROUGH).expect("a mode");
+        let moved = mode.state.local(&belief.layout, &belief.state).expect("near");
+        // A fifth of a standard deviation.
+        assert!(moved.dot(&(&mode.information * &moved)) < 0.04, "seed {seed}");
+        let whitened: DMatrix<f64> = belief.covariance.as_ref().expect("kept") * &mode.information;
+        assert!((whitened.trace() / whitened.nrows() as f64 - 1.0).abs() < 0.02, "seed {seed}");
+        assert!(run.error() < 6.0, "seed {seed}: {}", run.error());
+    }
+}
+
+#[test]
+fn chance_alone_is_no_change() {
+    for seed in 0..3 {
+        let mut run = Run::new(seed);
+        assert!((0..150).all(|_| !run.step().change_noticed), "seed {seed}");
+        assert_eq!(run.smoother.posterior.count(), 150, "nothing was forgotten");
+    }
+}
+
+/// While the belief is not settled its innovations are large, and say nothing of the body.
+#[test]
+fn having_no_guess_is_no_change() {
+    for seed in 0..3 {
+        let mut run = Run::with(seed, Some(1.0));
+        assert!((0..25).all(|_| !run.step().change_noticed), "seed {seed}");
+    }
+}
+
+/// Within a few movements, and soon the estimate is as good again as it says that it is.
+#[test]
+fn a_change_of_the_body_is_noticed_and_learned() {
+    for seed in 0..3 {
+        // Before and after measurements were compressed.
+        for before in [40, 100] {
+            let mut run = Run::new(seed);
+            (0..before).for_each(|_| assert!(!run.step().change_noticed));
+            run.tilt(0.4);
+            assert!(run.error() > 6.0, "the old estimate does not do");
+            let noticed = (1..=5).find(|_| run.step().change_noticed);
+            let movements = noticed.unwrap_or_else(|| panic!("seed {seed}: not noticed"));
+            assert!(run.smoother.posterior.count() <= movements, "nothing of the old body is kept");
+            (0..25).for_each(|_| assert!(!run.step().change_noticed, "seed {seed}: once"));
+            assert!(run.error() < 6.0, "seed {seed}: {}", run.error());
+            let spread = run.smoother.belief().marker_covariance(&[0.5; JOINTS]).expect("kept").trace().sqrt();
+            assert!(spread < SIGMA, "{spread}");
+        }
+    }
+}
+
+/// Of the movements after the change those are dropped that the old body explains as well, and what came before them.
+#[test]
+fn what_the_old_body_explains_is_forgotten() {
+    let mut run = Run::new(1);
+    for _ in 0..40 {
+        run.step();
+    }
+    run.tilt(0.4);
+    let (mut hidden, mut shown) = (run.posture(), run.posture());
+    (hidden[JOINTS - 1], shown[JOINTS - 1]) = (0.0, 1.5);
+    assert!(!run.to(&hidden).change_noticed, "nothing is to be seen there");
+    assert!(run.to(&shown).change_noticed);
+    let kept = &run.smoother.posterior.measurements;
+    assert_eq!(kept.iter().map(|seen| &seen.positions).collect::<Vec<_>>(), [&shown]);
+    assert!(run.smoother.posterior.settled.is_none());
+}
+
+/// However often.
+#[test]
+fn a_miss_changes_nothing() {
+    for movements in [0, 5, 80] {
+        let (mut run, mut other) = (Run::new(2), Run::new(2));
+        for run in [&mut run, &mut other] {
+            for _ in 0..movements {
+                run.step();
+            }
+        }
+        for _ in 0..10 {
+            let update = run.smoother.update(&[0.3; JOINTS], &Observation::missed(1)).expect("an update");
+            assert_eq!(update, Update::default());
+        }
+        // Nor what is made of the movements that follow, and of a change.
+        for _ in 0..2 {
+            (0..3).for_each(|_| assert_eq!(run.step(), other.step()));
+            run.tilt(0.4);
+            other.tilt(0.4);
+        }
+        let [a, b] = [run, other].map(|run| run.smoother.belief().clone());
+        assert_eq!((a.state, a.covariance, a.alternatives.len()), (b.state, b.covariance, b.alternatives.len()));
+    }
+}
