@@ -177,7 +177,7 @@ fn eight_movements_planned_together_teach_more_than_eight_greedy_ones() {
     let poses = std::iter::once(&selection.movement.configuration).chain(&planned(&selection).poses);
     let poses: Vec<Vec<f64>> = poses.cloned().collect();
     assert_eq!(poses.len(), 8);
-    poses.iter().for_each(|pose| condition(&mut together.belief, pose, |_| 1.0));
+    poses.iter().for_each(|pose| assert!(condition(&mut together.belief, pose, |_| 1.0)));
     let mut one_by_one = Case::new(0.5);
     for _ in 0..8 {
         let selection = one_by_one.select(&greedy(&one_by_one)).expect("a selection");
