@@ -23,7 +23,7 @@ fn compare(scenario: &Scenario, learner: &str, seeds: &[u64], steps: u64) -> Lea
 /// Every scenario that promises is held to it. Steps beyond the promise confirm that a run stays converged.
 #[test]
 fn learners_keep_the_promises_of_their_scenarios() {
-    let seeds = [201, 202, 203, 204, 205, 206];
+    let seeds: Vec<u64> = (201..=220).collect();
     let mut promises = 0;
     for found in BUILTIN {
         let scenario = builtin(found.name).expect("built in");
@@ -32,8 +32,8 @@ fn learners_keep_the_promises_of_their_scenarios() {
             let outcome = compare(&scenario, learner, &seeds, promise + 60);
             let late: Vec<_> =
                 outcome.runs.iter().filter(|run| run.converged_at.is_none_or(|at| at > promise)).collect();
-            // A promise is 1.3 times the 90th percentile: one run in six may be the tenth that is later.
-            assert!(late.len() <= 1, "{} {learner} promised {promise}: {late:?}", found.name);
+            // A promise is 1.3 times the 90th percentile: fewer than one run in ten is later, three of twenty by bad luck.
+            assert!(late.len() <= 3, "{} {learner} promised {promise}: {late:?}", found.name);
         }
     }
     assert!(promises >= 4, "the scenarios promise something");
@@ -55,7 +55,7 @@ fn active_beats_random_and_the_gradient_does_not_converge() {
 }
 
 /// What the unscented filter is for: from a guess as good as arm-6dof's it needs fewer movements than the linearised
-/// one, 60.5 beside 93.5 over the seeds 1 to 20; the ratio here leaves room for the spread of 12.
+/// one, 75 beside 90 over the seeds 1 to 20; the ratio here leaves room for the spread of 12.
 #[test]
 fn the_unscented_filter_needs_fewer_movements_from_a_fair_guess() {
     let scenario = builtin("arm-6dof").expect("built in");
@@ -85,7 +85,8 @@ fn within_a_field_of_view_active_beats_random_and_seldom_misses() {
 #[test]
 fn a_real_robot_is_predicted_better_after_learning_and_sooner_when_chosen_actively() {
     let scenario = builtin("tiago-mocap").expect("built in");
-    let seeds: Vec<u64> = (1..=20).collect();
+    // So many, since 20 splits scatter by as much as the bar leaves: the ratio is 0.89 over the seeds 1001 to 1100.
+    let seeds: Vec<u64> = (1..=100).collect();
     let mean = |learner: &str| {
         let outcome = compare(&scenario, learner, &seeds, 27);
         [0, 12, 27].map(|movements: usize| {
