@@ -15,7 +15,7 @@ pub(super) const CHARTS_WITHOUT_TRUTH: [(&str, &str); 2] =
     [("Prediction error, mean (m)", "prediction_mean_m"), ("Trace of the covariance, tr(W P)", "trace")];
 
 /// The trace beside its limits, in a tab where the truth is known.
-pub(super) const TRACE: (&str, [&str; 2]) = ("Trace, and the least possible", ["trace", "bound_trace"]);
+pub(super) const TRACE: (&str, [&str; 2]) = ("Trace, and what data allow", ["trace", "bound_trace"]);
 
 /// Whether a metric has its curve in some arrangement.
 pub(super) fn shows(metric: &str) -> bool {

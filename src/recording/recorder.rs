@@ -201,7 +201,7 @@ impl Recorder {
             for (series, metric) in learner.metrics.iter().zip(metrics::NAMES) {
                 // Beside the trace itself, and paler.
                 let (name, colour, width) = match metric {
-                    "bound_trace" => (format!("{name}: least possible"), tint(colour, 0.45), 1.2),
+                    "bound_trace" => (format!("{name}: what its data allow"), tint(colour, 0.45), 1.2),
                     _ => (name.clone(), colour, 2.0),
                 };
                 let line = SeriesLines::new()

@@ -13,7 +13,7 @@ pub struct Row {
     pub prediction_m: Option<f64>,
     /// tr(W P).
     pub trace: Option<f64>,
-    /// Cramér–Rao bound on it, given the data collected.
+    /// What the data collected allow of it, linearised at the truth.
     pub bound: Option<f64>,
     /// Expected fall of the trace.
     pub gain: Option<f64>,

@@ -83,7 +83,8 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
             "Lines: medians over the seeds; bands: quartiles. Dashed grey: thresholds; ▾: median movement from which both \
              errors stay below them."
                 .to_owned(),
-            "⌈m/3⌉: as many equations as unknowns. Least possible: Cramér–Rao, for the movements made; best design: for any."
+            "Counting: as many independent equations as unknowns. What data allow: linearised at the truth; best design: of \
+             any data."
                 .to_owned(),
         ],
     };

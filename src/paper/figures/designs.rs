@@ -17,7 +17,7 @@ const BEST: Style = Style { colour: [0x33; 3], dashes: "6 2 1.5 2", marker: None
 /// What the lines of [`panel`] mean.
 pub fn legend() -> [(String, Style); 2] {
     [
-        ("least possible with its data".to_owned(), Style { colour: TRUTH_COLOR, dashes: BOUND, marker: None }),
+        ("what its data allow".to_owned(), Style { colour: TRUTH_COLOR, dashes: BOUND, marker: None }),
         ("best design".to_owned(), BEST),
     ]
 }
@@ -25,7 +25,7 @@ pub fn legend() -> [(String, Style); 2] {
 /// As many movements as there are equations to solve: a place on the horizontal axis.
 pub fn counting(comparison: &Comparison) -> Layer {
     let count = comparison.movements_by_counting;
-    Layer::Event { x: count as f64, label: format!("⌈m/3⌉ = {count}"), colour: TRUTH_COLOR, dashes: "1 3" }
+    Layer::Event { x: count as f64, label: format!("counting: {count}"), colour: TRUTH_COLOR, dashes: "1 3" }
 }
 
 /// The trace that every learner believes in, the least that its data allow, and the least that any data allow. `None`

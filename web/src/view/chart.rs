@@ -49,8 +49,8 @@ pub(super) const CHARTS: [Chart; 6] = [
     Chart {
         title: "Uncertainty",
         unit: "tr(W P)",
-        tip: "Trace of the weighted covariance: what the active learner makes as small as it can. Thin: the Cramér–Rao \
-              bound, below which nobody's error can fall with the same data",
+        tip: "Trace of the weighted covariance: what the active learner makes as small as it can. Thin: what the \
+              same data allow at the true arm, were the model linear",
         logarithmic: true,
         judged: false,
         value: |row| row.trace,
