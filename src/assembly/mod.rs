@@ -121,7 +121,7 @@ impl Scenario {
 
     /// What one measurement of the marker is worth, metres: of the tracker, or where none sees it of the first sensor.
     fn marker_sigma(&self) -> f64 {
-        self.rig.marker_channel().map_or(self.rig.sigma(), |channel| self.rig.channels()[channel].sigma())
+        self.rig.marker_channel().map_or(self.rig.sigma(), |_| self.rig.marker_sigma())
     }
 
     fn prior_covariance(&self) -> DMatrix<f64> {

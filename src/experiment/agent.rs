@@ -181,7 +181,8 @@ impl Agent {
         }
         self.history.moved(movement, &self.actions, observation);
         self.actions.use_up(movement);
-        self.estimator.update(&movement.configuration, observation).map_err(|error| match error {
+        // All of the list were accepted before the first of it was absorbed.
+        self.estimator.correct(&movement.configuration, observation).map_err(|error| match error {
             EstimationError::Refused(refused) => refused.into(),
             EstimationError::Diverged(_) => {
                 self.failure = Some(error.to_string());

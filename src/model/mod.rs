@@ -20,7 +20,7 @@ mod state;
 pub use block::Block;
 pub use element::{Displacement, Element};
 pub use layout::{Layout, Quantity};
-pub use pass::{Frame, Motion, Pass, Twist, jacobian};
+pub use pass::{Frame, Motion, Pass, jacobian};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
 pub use rank::rank;
 pub use state::{Correction, Device, Place, State, Target};

@@ -54,15 +54,15 @@ impl Motion {
 
 /// How one tangent coordinate moves all links from one on.
 #[derive(Clone, Copy, Debug)]
-pub struct Twist {
+struct Twist {
     /// Its place in the tangent vector.
-    pub coordinate: usize,
+    coordinate: usize,
     /// The first link that it moves; 0 is the base.
-    pub from: usize,
+    from: usize,
     /// Velocity of the point at the origin of the frame of the measurements, metres per unit of the coordinate.
-    pub linear: Vector3<f64>,
+    linear: Vector3<f64>,
     /// Angular velocity, radians per unit.
-    pub angular: Vector3<f64>,
+    angular: Vector3<f64>,
 }
 
 /// A frame that parameters move.
@@ -86,6 +86,7 @@ pub struct Pass<'a> {
     /// By joint: where its axis stands (usize::MAX if it is not learned), and its basis.
     axes: Vec<(usize, Matrix3x2<f64>)>,
     links: Vec<Motion>,
+    /// Of base, axes and corrections, those that move the links nearest to the base first.
     twists: Vec<Twist>,
 }
 
@@ -204,11 +205,6 @@ impl<'a> Pass<'a> {
     /// Where a link is: the motion from θ = 0 in the robot's frame into the frame of the measurements.
     pub fn link(&self, link: usize) -> &Motion {
         &self.links[link]
-    }
-
-    /// The twists of base, axes and corrections, those that move the links nearest to the base first.
-    pub fn twists(&self) -> &[Twist] {
-        &self.twists
     }
 
     /// Where a target is, metres.
