@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Briefing;
 use crate::{
     estimation::{Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls},
-    experiment::{Agent, Learner, Stream},
+    experiment::{Agent, Learner, LearnerDescription, Stream},
     model::{Block, Prior},
     optimize::{Settings, Variant},
     scenario::{
@@ -23,13 +23,23 @@ impl Scenario {
         let agent = self.agent_of(spec, seed, briefing)?;
         let workspace = briefing.workspace.clone();
         let weights = briefing.weights.clone();
-        Ok(Learner::new(spec.description(), agent, weights, workspace, self.settled_below_m))
+        Ok(Learner::new(self.learner_description(spec), agent, weights, workspace, self.settled_below_m))
     }
 
     pub(super) fn agent_of(&self, spec: &LearnerSpec, seed: u64, briefing: &Briefing) -> Result<Agent, ScenarioError> {
         let estimator = self.estimator(spec, seed, briefing)?;
         let (actions, limits) = (briefing.actions.clone(), self.robot.limits.clone());
         Ok(Agent::new(estimator, self.policy(spec, briefing), actions, limits, seed))
+    }
+
+    pub(super) fn learner_description(&self, spec: &LearnerSpec) -> LearnerDescription {
+        let noise = match spec.estimator {
+            EstimatorKind::Rls => self.filter.stabilising,
+            EstimatorKind::Unscented => self.unscented.stabilising,
+            // They show no covariance, or add nothing to it.
+            EstimatorKind::RlsSixNumbers | EstimatorKind::Smoother | EstimatorKind::Gradient => None,
+        };
+        LearnerDescription { stabilised: spec.stabilising && noise.is_some(), ..spec.description() }
     }
 
     fn estimator(

@@ -3,9 +3,10 @@
 use super::{
     agent::{AbsorbError, Agent, Executed, OwnedStandpoint, Proposal},
     choice::{AppraisalReport, Choice, ChoiceError},
+    head::GazeReport,
     judge::Judge,
     metrics::Metrics,
-    report::{GazeReport, LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
+    report::{LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
     world::World,
 };
 use crate::{

@@ -24,6 +24,7 @@ impl LearnerSpec {
             name: self.name.clone(),
             estimator: self.estimator.name().to_owned(),
             policy: self.policy.name().to_owned(),
+            stabilised: self.stabilising,
         }
     }
 }
