@@ -12,7 +12,7 @@ use crate::{
         ErrorDraw, EstimatorKind, Filter, InitialError, LearnerSpec, PolicyKind, Scenario, ScenarioError, SmootherSpec,
         WorldSpec,
     },
-    selection::{Active, Minimiser, Planner, Policy, Random},
+    selection::{Active, Human, Minimiser, Planner, Policy, Random},
 };
 
 /// States drawn from the posterior for one Monte Carlo evaluation of (7).
@@ -92,9 +92,11 @@ impl Scenario {
         let evaluations = settings.max_evaluations;
         let minimiser = match kind {
             PolicyKind::Random => return Box::new(Random::new(weights, watch)),
-            PolicyKind::Active | PolicyKind::ActivePlanned | PolicyKind::ActiveNaive | PolicyKind::ActiveMonteCarlo => {
-                Minimiser::Direct(settings)
-            }
+            PolicyKind::Active
+            | PolicyKind::ActivePlanned
+            | PolicyKind::ActiveNaive
+            | PolicyKind::ActiveMonteCarlo
+            | PolicyKind::Human => Minimiser::Direct(settings),
             PolicyKind::ActiveDirect => Minimiser::Direct(Settings { variant: Variant::Original, ..settings }),
             PolicyKind::ActiveRandomSearch => Minimiser::Random { evaluations },
             PolicyKind::ActiveBayesian => Minimiser::Bayesian { evaluations },
@@ -110,10 +112,11 @@ impl Scenario {
             });
         }
         let active = Active::new(weights, minimiser).sampled(samples);
-        Box::new(match watch {
+        let active = match watch {
             Some(watch) if kind == PolicyKind::ActiveNaive => active.watched_naively(watch),
             Some(watch) => active.watched(watch),
             None => active,
-        })
+        };
+        if kind == PolicyKind::Human { Box::new(Human::new(active)) } else { Box::new(active) }
     }
 }

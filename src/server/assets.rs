@@ -33,6 +33,9 @@ const COMPRESS_AT_ONCE_BYTES: usize = 1 << 20;
 const PANEL_SCRIPT: &str = "/panel/panel.js";
 const PANEL_WASM: &str = "/panel/panel_bg.wasm";
 
+/// The page itself, whose addresses of the other files are still without versions.
+pub(crate) const INDEX: &str = include_str!("../../web/page/index.html");
+
 /// A file of the page.
 macro_rules! embedded {
     ($name:literal) => {
@@ -55,7 +58,7 @@ struct Asset {
 
 /// The routes of all files.
 pub(super) fn routes() -> Router<Arc<App>> {
-    let page = ["/", "/page.css", "/page.js", "/session.js", "/seeds.js", "/viewer.js", "/icon.svg"];
+    let page = ["/", "/page.css", "/page.js", "/session.js", "/files.js", "/seeds.js", "/viewer.js", "/icon.svg"];
     let panel = [PANEL_SCRIPT, PANEL_WASM];
     let viewer = ["/viewer/re_viewer.js", "/viewer/re_viewer_bg.wasm"];
     let paths = page.into_iter().chain(panel).chain(viewer);
@@ -92,6 +95,7 @@ impl Assets {
             Asset::new("/page.css", "text/css; charset=utf-8", embedded!("page.css")),
             Asset::new("/page.js", JAVASCRIPT, embedded!("page.js")),
             Asset::new("/session.js", JAVASCRIPT, embedded!("session.js")),
+            Asset::new("/files.js", JAVASCRIPT, embedded!("files.js")),
             Asset::new("/seeds.js", JAVASCRIPT, embedded!("seeds.js")),
             Asset::new("/viewer.js", JAVASCRIPT, embedded!("viewer.js")),
             Asset::new("/icon.svg", "image/svg+xml", embedded!("icon.svg")),
@@ -100,7 +104,7 @@ impl Assets {
             Asset::new("/viewer/re_viewer.js", JAVASCRIPT, Bytes::copy_from_slice(viewer.viewer_js())),
             Asset::new("/viewer/re_viewer_bg.wasm", "application/wasm", viewer_wasm(viewer)),
         ];
-        let mut page = include_str!("../../web/page/index.html").to_owned();
+        let mut page = INDEX.to_owned();
         for asset in &assets {
             let Asset { path, version, .. } = asset;
             page = page.replace(&format!("\"{path}\""), &format!("\"{path}?v={version}\""));
@@ -119,6 +123,29 @@ fn viewer_wasm(viewer: WebViewerData) -> Bytes {
         }
     }
     Bytes::from_owner(Wasm(viewer))
+}
+
+/// A file of the page, for those who put it elsewhere.
+pub(crate) struct PageFile {
+    /// Its address on this server.
+    pub(crate) path: &'static str,
+    pub(crate) bytes: Bytes,
+    /// The same, compressed.
+    pub(crate) packed: Bytes,
+    /// Changes with the content.
+    pub(crate) version: String,
+}
+
+/// All files but the page itself, which is [`INDEX`].
+pub(crate) fn page_files(panel: Option<&Path>) -> Result<Vec<PageFile>, ServerError> {
+    let Assets(assets) = Assets::load(panel)?;
+    let files = assets.into_iter().filter(|asset| asset.path != "/").map(|asset| PageFile {
+        path: asset.path,
+        packed: asset.compressed.get_or_init(|| gzip(&asset.bytes)).clone().unwrap_or_default(),
+        bytes: asset.bytes,
+        version: asset.version,
+    });
+    Ok(files.collect())
 }
 
 impl Asset {

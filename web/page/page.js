@@ -1,8 +1,11 @@
 // The page: it opens connections, asks the server and moves the scene, as the panel tells it to. The panel decides.
 
-import { Follower, ask } from "./session.js";
 import { SeedRuns } from "./seeds.js";
 import { startViewer } from "./viewer.js";
+
+/** Where runs come from: a server, or files beside the page. */
+const source = await import(document.documentElement.dataset.source === "files" ? "./files.js" : "./session.js");
+const { ask, Follower } = source;
 
 /** Keys that mean something to the panel wherever on the page they are pressed. */
 const KEYS = [" ", "ArrowLeft", "ArrowRight", "Escape", "+", "=", "-", "?", "r", "s", "n", "t"];
@@ -14,12 +17,14 @@ let panel = null;
 let viewer = null;
 let follower = null;
 let session = null;
+/** The id of its recording. */
+let recording = null;
 /** Parts that came before the viewer was there, and the step to show then. */
 let waiting = [];
 let sought = null;
 
 const tell = (event) => panel.receive(JSON.stringify(event));
-const seeds = new SeedRuns(tell);
+const seeds = new SeedRuns(tell, ask);
 
 /** Asks the server and tells the panel what became of it. */
 async function request(asked, method, path, body, answer) {
@@ -83,7 +88,7 @@ const commands = {
   },
 
   async download({ path, name }) {
-    const link = Object.assign(document.createElement("a"), { href: path, download: name });
+    const link = Object.assign(document.createElement("a"), { href: source.place(path), download: name });
     if (path.startsWith("/v1/scenarios/")) {
       const scenario = await ask("GET", path);
       link.href = URL.createObjectURL(new Blob([scenario.source], { type: "application/toml" }));
@@ -105,10 +110,11 @@ const commands = {
 function follow(resource) {
   follower?.stop();
   session = resource.id;
+  recording = resource.recording ?? session;
   waiting = [];
   sought = null;
   tell({ is: "session", session: resource });
-  viewer?.open(session);
+  viewer?.open(recording);
   follower = new Follower(session, {
     part: (part) => (viewer === null ? waiting.push(part) : viewer.feed(part)),
     message: (text) => panel.receive(`{"is":"live","message":${text}}`),
@@ -142,7 +148,7 @@ async function openPanel() {
     if (document.createElement("canvas").getContext("webgl2") === null) throw new Error("WebGL 2 is not available here");
     const [module, response] = await Promise.all([
       import(element("panel-script").href),
-      fetch(element("panel-wasm").dataset.address),
+      source.wasm(element("panel-wasm").dataset.address),
     ]);
     await module.default({ module_or_path: response });
     const handle = new module.PanelHandle();
@@ -159,7 +165,8 @@ async function openPanel() {
       text.textContent = `The controls have crashed: ${failure} Reload the page: the run is kept.`;
       element("panel-cover").hidden = false;
     }, 1000);
-    tell({ is: "begin", query: location.search, known: kept(KNOWN, localStorage) !== null });
+    const query = await source.query(location.search);
+    tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server });
     return true;
   } catch (error) {
     document.querySelector("#panel-cover progress").hidden = true;
@@ -177,12 +184,12 @@ async function openViewer() {
   try {
     const opened = await startViewer(
       element("viewer"),
-      { script: element("viewer-script").href, wasm: element("viewer-wasm").dataset.address },
+      { script: element("viewer-script").href, wasm: () => source.wasm(element("viewer-wasm").dataset.address) },
       (fraction) => (fraction === null ? progress.removeAttribute("value") : (progress.value = fraction)),
       (step) => tell({ is: "scrubbed", step }),
     );
     viewer = opened;
-    if (session !== null) viewer.open(session);
+    if (session !== null) viewer.open(recording);
     waiting.splice(0).forEach((part) => viewer.feed(part));
     if (sought !== null) commands.seek({ step: sought });
     element("cover").hidden = true;

@@ -18,6 +18,18 @@ export class ProblemError extends Error {
   }
 }
 
+/** Runs are computed here and now. */
+export const server = true;
+
+/** The query to begin with: the page's own. @param {string} search */
+export const query = async (search) => search;
+
+/** A file of WebAssembly. @param {string} address */
+export const wasm = (address) => fetch(address);
+
+/** Where a file of a session is. @param {string} path */
+export const place = (path) => path;
+
 /**
  * Asks the server.
  * @param {string} method
