@@ -14,6 +14,7 @@
 mod api;
 mod assets;
 mod extract;
+mod gzip;
 mod guard;
 mod problem;
 mod session;
