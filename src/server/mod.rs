@@ -16,6 +16,7 @@ mod api;
 mod assets;
 mod extract;
 mod frame;
+mod gzip;
 mod guard;
 mod problem;
 mod session;

@@ -46,6 +46,15 @@ export async function ask(method, path, body) {
 }
 
 /**
+ * A session's resource.
+ * @param {string} id
+ * @returns {Promise<object | null | undefined>} null if it is gone, undefined if there is no answer
+ */
+export function sessionOf(id) {
+  return ask("GET", `/v1/sessions/${encodeURIComponent(id)}`).catch((error) => (error.status === 404 ? null : undefined));
+}
+
+/**
  * Follows a session until told otherwise, over broken connections too.
  *
  * Nothing is received twice: after a break it goes on with the next part and the next step.
@@ -109,20 +118,15 @@ export class Follower {
     this.#on.message(data);
   }
 
-  /** The session; null if it is gone, undefined if there is no answer. */
-  #resource() {
-    return ask("GET", `/v1/sessions/${this.#id}`).catch((error) => (error.status === 404 ? null : undefined));
-  }
-
   async #end() {
-    const resource = await this.#resource();
+    const resource = await sessionOf(this.#id);
     if (!this.#stopped) this.#on.ended(resource?.failure ?? null, false);
   }
 
   async #closed(code) {
     if (code === CLOSE_DELETED || code === CLOSE_FAILED) return this.#end();
     // A refused connection does not say why: a session that is gone is asked for in vain.
-    const resource = await this.#resource();
+    const resource = await sessionOf(this.#id);
     if (this.#stopped) return;
     if (resource === null) return this.#on.ended(null, true);
     const wait = BACK_OFF_MS[Math.min(this.#attempt++, BACK_OFF_MS.length - 1)];

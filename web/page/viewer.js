@@ -33,8 +33,7 @@ export async function startViewer(canvas, addresses, progress, scrubbed) {
     persist: false,
   });
   await handle.start(canvas);
-  for (const panel of ["top", "blueprint", "selection"]) handle.override_panel_state(panel, "hidden");
-  handle.override_panel_state("time", "collapsed");
+  for (const panel of ["top", "blueprint", "selection", "time"]) handle.override_panel_state(panel, "hidden");
   viewer = new Viewer(handle, scrubbed);
   return viewer;
 }

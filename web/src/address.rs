@@ -104,7 +104,8 @@ impl Settings {
         if self.stop != usual.stop {
             add("stop", named(self.stop));
         }
-        if self.tab != usual.tab {
+        // Whoever is given a link wants the view, not the place that it was copied at.
+        if self.tab != usual.tab && (with_session || self.tab != Tab::Share) {
             add("tab", Tab::ALL.iter().find(|(known, ..)| *known == self.tab).map_or("", |(_, name, _)| name));
         }
         if let Some(learner) = &self.learner {
@@ -176,6 +177,9 @@ mod tests {
         assert_eq!(Settings::parse(&settings.query(true)), (settings.clone(), Vec::new()));
         assert_eq!(Settings::parse(&format!("?{}", settings.query(false))).0.session, None);
         assert_eq!(Settings::parse(&Settings::default().query(true)), (Settings::default(), Vec::new()));
+        let sharing = Settings { tab: Tab::Share, ..Settings::default() };
+        assert_eq!(Settings::parse(&sharing.query(true)).0.tab, Tab::Share);
+        assert_eq!(Settings::parse(&sharing.query(false)).0.tab, Tab::Charts, "a link leads to what is shared");
     }
 
     #[test]

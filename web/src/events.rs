@@ -17,6 +17,7 @@ impl Panel {
     pub fn receive(&mut self, event: Event) {
         match event {
             Event::Begin { query, known } => self.begin(&query, known),
+            Event::Navigated { query } => self.navigate(&query),
             Event::Scenarios { scenarios } => self.take_scenarios(scenarios),
             Event::Session { session: Some(session) } => self.adopt(*session),
             Event::Session { session: None } => {
@@ -45,9 +46,9 @@ impl Panel {
             Event::Seeds { seed, reports, done } => {
                 self.seeds.iter_mut().for_each(|seeds| seeds.take(seed, &reports, done));
             }
-            Event::Copied { done } => {
-                let text = if done { "Copied." } else { "The browser does not allow copying." };
-                self.copied = Some(text.to_owned());
+            Event::Copied { done, note } => {
+                let usual = if done { "Copied." } else { "The browser does not allow copying." };
+                self.copied = Some(note.unwrap_or_else(|| usual.to_owned()));
             }
         }
     }
@@ -61,6 +62,24 @@ impl Panel {
             self.tour = Some(0);
         }
         self.ask(Command::Scenarios);
+    }
+
+    /// Shows what an earlier address showed: a step of this run, or another run.
+    fn navigate(&mut self, query: &str) {
+        let what = |settings: &Settings| (settings.scenario.clone(), settings.seed, settings.learners.clone());
+        let before = what(&self.settings);
+        let (mut settings, mut notices) = Settings::parse(query);
+        notices.extend(settings.validate(&self.scenarios));
+        // The session of that address may be gone, and the one that is shown needs no other.
+        settings.session = self.settings.session.take();
+        self.settings = settings;
+        self.seed_text = self.settings.seed.to_string();
+        notices.into_iter().for_each(|notice| self.notice(notice));
+        if self.is_ready() && what(&self.settings) == before {
+            self.scrub(self.settings.step);
+        } else {
+            self.open(self.settings.step);
+        }
     }
 
     fn take_scenarios(&mut self, scenarios: Vec<ScenarioSummary>) {

@@ -22,6 +22,11 @@ pub enum Event {
         /// The visitor has been here before, so that the tour need not be offered.
         known: bool,
     },
+    /// The visitor went back or forth to this address.
+    Navigated {
+        /// The address's query.
+        query: String,
+    },
     /// The scenarios there are.
     Scenarios {
         /// All of them.
@@ -105,6 +110,9 @@ pub enum Event {
     Copied {
         /// Whether it was.
         done: bool,
+        /// What there is to say about it, if it is not the usual.
+        #[serde(default)]
+        note: Option<String>,
     },
 }
 
@@ -200,6 +208,8 @@ pub enum Command {
         /// Its name.
         name: String,
     },
+    /// Show the whole scene again, as it was at first.
+    RestoreView,
     /// Remember that the visitor knows the tour.
     Known,
     /// Tell assistive technology; scripts read the rest.
@@ -209,8 +219,10 @@ pub enum Command {
 /// The panel's state in words and numbers, for those who do not see it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Mirror {
-    /// A sentence.
+    /// All of it in sentences.
     pub text: String,
+    /// What has just happened, to be read out.
+    pub news: String,
     /// What the panel is about: `loading`, `ready`, `playing`, `stopped`, `lost`, `expired`, `failed`.
     pub phase: String,
     /// The step that is shown.
@@ -221,4 +233,15 @@ pub struct Mirror {
     pub session: String,
     /// Whether the visitor is typing, so that keys are text.
     pub typing: bool,
+    /// What is shown, as the caption of a picture.
+    pub caption: Caption,
+}
+
+/// What stands under a picture of the scene.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Caption {
+    /// Scenario, seed and step.
+    pub title: String,
+    /// Each learner's name with its errors, and its colour.
+    pub learners: Vec<(String, [u8; 3])>,
 }

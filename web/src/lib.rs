@@ -8,8 +8,10 @@
 //! panel     the state: all of the above
 //! events    what happens, and what it does to the state  play       making steps and going through them
 //! bands     running other seeds                          explain    asking why, and why not
-//! mirror    the state in words                           keys       the keyboard
+//! mirror    the state in words                           news       what is read out when it happens
+//! keys      the keyboard
 //! view/     how all of it looks
+//! access    the same for those who do not see it
 //! shell     the WebAssembly that a browser runs (only there)
 //! ```
 //!
@@ -18,6 +20,7 @@
 //! Nothing but `shell` knows of a browser: the page opens connections, asks the server and moves Rerun's viewer; the
 //! panel decides. So tests drive it natively, by the labels that a visitor reads.
 
+pub mod access;
 mod address;
 mod bands;
 pub mod colours;
@@ -27,6 +30,7 @@ pub mod history;
 pub mod host;
 pub mod keys;
 mod mirror;
+mod news;
 pub mod panel;
 pub mod play;
 pub mod search;

@@ -3,8 +3,9 @@
 use body_schema::experiment::CONFIRMATION;
 
 use crate::{
+    colours,
     history::Verdict,
-    host::{Command, Mirror},
+    host::{Caption, Command, Mirror},
     panel::{Link, Panel},
 };
 
@@ -49,7 +50,25 @@ impl Panel {
         }
     }
 
-    fn phase(&self) -> &'static str {
+    /// What stands under a picture of the scene.
+    fn caption(&self) -> Caption {
+        let Some(description) = self.description() else { return Caption::default() };
+        let title = format!("{}, seed {}, step {}", description.scenario, description.seed, self.cursor);
+        let learners = description.learners.iter().enumerate().map(|(index, learner)| {
+            let row = self.history.row(self.cursor, index).copied().unwrap_or_default();
+            let errors = [
+                row.orientation_deg.map(|error| format!("{error:.1}°")),
+                row.location_m.map(|error| format!("{:.0} mm", error * 1e3)),
+                row.prediction_m.filter(|_| row.location_m.is_none()).map(|error| format!("{:.0} mm", error * 1e3)),
+            ];
+            let errors: Vec<String> = errors.into_iter().flatten().collect();
+            let [red, green, blue, _] = colours::learner(index).to_array();
+            (format!("{} {}", learner.name, errors.join(", ")), [red, green, blue])
+        });
+        Caption { title, learners: learners.collect() }
+    }
+
+    pub(crate) fn phase(&self) -> &'static str {
         match self.link {
             Link::Lost(_) => "lost",
             Link::Expired => "expired",
@@ -90,16 +109,21 @@ impl Panel {
         let (said_at, before) = &self.said;
         let mut mirror = Mirror {
             text: before.text.clone(),
+            news: before.news.clone(),
             phase: self.phase().to_owned(),
             step: self.cursor,
             latest: self.history.latest(),
             session: self.session.as_ref().map(|session| session.id.clone()).unwrap_or_default(),
             typing: before.typing,
+            caption: self.caption(),
         };
         let mut said_at = *said_at;
         if now - said_at >= SAY_EVERY {
             mirror.text = self.words();
             said_at = now;
+        }
+        if let Some(news) = self.news() {
+            mirror.news = news;
         }
         if mirror != self.said.1 {
             self.ask(Command::Say(Box::new(mirror.clone())));

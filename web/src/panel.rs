@@ -5,6 +5,7 @@ use body_schema::{experiment::Description, scenario::ScenarioSummary};
 use crate::{
     history::History,
     host::{Command, Mirror},
+    news::Told,
     seeds::SeedRuns,
     settings::Settings,
     why::Why,
@@ -85,6 +86,7 @@ pub struct Panel {
     pub(crate) pace: Pace,
     pub(crate) now: f64,
     pub(crate) said: (f64, Mirror),
+    pub(crate) told: Told,
     pub(crate) address: (f64, String),
     commands: Vec<Command>,
 }
@@ -118,6 +120,7 @@ impl Default for Panel {
             pace: Pace::default(),
             now: 0.0,
             said: (f64::NEG_INFINITY, Mirror::default()),
+            told: Told::default(),
             address: (f64::NEG_INFINITY, String::new()),
             commands: Vec::new(),
         }

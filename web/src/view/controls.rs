@@ -36,7 +36,7 @@ impl Panel {
             if ui.add_enabled(can_step, Button::new("Step")).on_hover_text(tip).clicked() {
                 self.forward();
             }
-            if ui.button("Reset").on_hover_text("The same run from its start (R)").clicked() {
+            if ui.button("Reset").on_hover_text("The same run from its start (Shift+R)").clicked() {
                 self.reset();
             }
             if self.link == Link::Expired {

@@ -44,6 +44,11 @@ impl Panel {
             Grid::new("learners").num_columns(6).spacing([spacing, 3.0]).min_col_width(30.0).striped(true).show(
                 ui,
                 |ui| {
+                    ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
+                        node.set_role(egui::Role::Table);
+                        node.set_label("Learners at the step that is shown");
+                        node.set_column_count(if misses { 6 } else { 5 });
+                    });
                     head(ui, "Learner", "Estimator × policy stands in the tooltip of the name");
                     head(
                         ui,
