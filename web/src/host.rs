@@ -9,7 +9,7 @@ use body_schema::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::wire::{Problem, Session};
+use crate::wire::{Evaluation, Problem, Session};
 
 /// What happened.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -21,6 +21,14 @@ pub enum Event {
         query: String,
         /// The visitor has been here before, so that the tour need not be offered.
         known: bool,
+        /// Whether a server is there; without one the page shows recorded runs.
+        #[serde(default = "usual")]
+        server: bool,
+    },
+    /// Where the scene is.
+    Layout {
+        /// Beneath the panel, not beside it.
+        below: bool,
     },
     /// The visitor went back or forth to this address.
     Navigated {
@@ -97,6 +105,13 @@ pub enum Event {
         /// The answer.
         evaluation: Box<AppraisalReport>,
     },
+    /// What the next movement of a learner whose movements the visitor chooses would teach.
+    Configured {
+        /// The learner.
+        learner: String,
+        /// The answer.
+        evaluation: Box<Evaluation>,
+    },
     /// A part of a run in the background.
     Seeds {
         /// Its seed.
@@ -114,6 +129,10 @@ pub enum Event {
         #[serde(default)]
         note: Option<String>,
     },
+}
+
+fn usual() -> bool {
+    true
 }
 
 /// A message of the session's WebSocket.
@@ -156,6 +175,8 @@ pub enum Command {
         count: u64,
         /// The step that the session must be at.
         expected_step: u64,
+        /// Postures to show on the way to each new one.
+        frames: u64,
     },
     /// Show this step in the scene.
     Seek {
@@ -178,6 +199,19 @@ pub enum Command {
         /// Rad or m per joint.
         configuration: Vec<f64>,
     },
+    /// Set the next movement of a learner whose movements the visitor chooses.
+    Configure {
+        /// The session.
+        session: String,
+        /// The learner.
+        learner: String,
+        /// Rad or m per joint.
+        configuration: Vec<f64>,
+    },
+    /// Put a picture of the scene on the clipboard.
+    Picture,
+    /// Show the scene as it was at first.
+    RestoreView,
     /// Run other seeds in the background.
     Seeds {
         /// The scenario's name.
@@ -188,6 +222,11 @@ pub enum Command {
         seeds: Vec<u64>,
         /// Steps of each.
         steps: u64,
+    },
+    /// Of this seed nothing more is needed.
+    EnoughSeed {
+        /// The seed.
+        seed: u64,
     },
     /// Stop running other seeds.
     CancelSeeds,
