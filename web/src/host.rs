@@ -247,8 +247,6 @@ pub enum Command {
         /// Its name.
         name: String,
     },
-    /// Show the whole scene again, as it was at first.
-    RestoreView,
     /// Remember that the visitor knows the tour.
     Known,
     /// Tell assistive technology; scripts read the rest.

@@ -23,7 +23,7 @@ pub fn about(learner: &LearnerDescription) -> &'static str {
 
 /// The same with the terms of the field.
 pub fn terms(learner: &LearnerDescription) -> String {
-    let LearnerDescription { name, estimator, policy } = learner;
+    let LearnerDescription { name, estimator, policy, .. } = learner;
     let about = about(learner);
     format!("{name}: {about}. Estimator: {estimator}; policy, by which it chooses its movements: {policy}.")
 }

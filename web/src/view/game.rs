@@ -116,7 +116,8 @@ impl Panel {
         }
         let (mut x, mut y) = self.game.axes;
         ui.horizontal(|ui| {
-            for (salt, axis, other) in [("slice across", &mut x, y), ("slice up", &mut y, x)] {
+            let taken = (y, x);
+            for (salt, axis, other) in [("slice across", &mut x, taken.0), ("slice up", &mut y, taken.1)] {
                 let combo = ComboBox::from_id_salt(salt).width(72.0).selected_text(&joints[*axis].name);
                 let response = combo.show_ui(ui, |ui| {
                     for (index, joint) in joints.iter().enumerate().filter(|(index, _)| *index != other) {
