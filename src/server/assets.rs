@@ -148,7 +148,7 @@ pub(crate) fn page_files(panel: Option<&Path>) -> Result<Vec<PageFile>, ServerEr
     let Assets(assets) = Assets::load(panel)?;
     let files = assets.into_iter().filter(|asset| asset.path != "/").map(|asset| PageFile {
         path: asset.path,
-        packed: asset.compressed.get_or_init(|| gzip(&asset.bytes)).clone().unwrap_or_default(),
+        packed: asset.compressed.of(&asset.bytes).unwrap_or_default(),
         bytes: asset.bytes,
         version: asset.version,
     });
