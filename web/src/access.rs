@@ -1,8 +1,8 @@
 //! The panel for those who do not see its canvas: AccessKit's tree in the reduced form from which the page builds real
 //! buttons, fields and tables, and what they ask for on its way back.
 //!
-//! A widget that is a table says so with [`Role::Table`] and its number of columns; its children are the cells, row by
-//! row, the first row being the head.
+//! What is a table says so by the roles of its parts: [`Role::Table`], [`Role::Row`], and [`Role::ColumnHeader`] or
+//! [`Role::Cell`].
 
 use std::collections::HashMap;
 
@@ -127,7 +127,9 @@ impl Tree<'_> {
                 return self.read_children(node, self.pane, elements);
             }
             Role::Table | Role::Grid => {
-                elements.push(self.table(id, node, pane));
+                let mut table = Element { kind: Kind::Table, name, pane, id: id.0.to_string(), ..Element::default() };
+                self.parts(node, pane, &mut table.children);
+                elements.push(table);
                 return;
             }
             Role::ListBox | Role::Menu | Role::Dialog | Role::Window => Kind::Group,
@@ -167,23 +169,26 @@ impl Tree<'_> {
         }
     }
 
-    fn table(&mut self, id: NodeId, node: &Node, pane: usize) -> Element {
-        let columns = node.column_count().unwrap_or(1).max(1);
-        let mut rows: Vec<Element> = Vec::new();
-        for (index, child) in node.children().iter().enumerate() {
-            let mut cell = Element { id: format!("{}-cell", child.0), kind: Kind::Cell, pane, ..Element::default() };
-            if index < columns {
-                cell.kind = Kind::Head;
+    /// The rows of a table, or the cells of a row, whatever holds them.
+    fn parts(&mut self, node: &Node, pane: usize, elements: &mut Vec<Element>) {
+        for id in node.children() {
+            let Some(child) = self.nodes.get(id).copied() else { continue };
+            let kind = match child.role() {
+                Role::Row => Kind::Row,
+                Role::Cell => Kind::Cell,
+                Role::ColumnHeader => Kind::Head,
+                _ => {
+                    self.parts(child, pane, elements);
+                    continue;
+                }
+            };
+            let mut part = Element { id: id.0.to_string(), kind, pane, ..Element::default() };
+            match kind {
+                Kind::Row => self.parts(child, pane, &mut part.children),
+                _ => self.read_children(child, pane, &mut part.children),
             }
-            self.read(*child, pane, &mut cell.children);
-            if index % columns == 0 {
-                let id = format!("{}-row{}", id.0, index / columns);
-                rows.push(Element { id, kind: Kind::Row, pane, ..Element::default() });
-            }
-            rows.last_mut().into_iter().for_each(|row| row.children.push(std::mem::take(&mut cell)));
+            elements.push(part);
         }
-        let name = node.label().unwrap_or_default().to_owned();
-        Element { id: id.0.to_string(), kind: Kind::Table, name, pane, children: rows, ..Element::default() }
     }
 
     /// What a node is called: by itself, by its label, or by what it says.
@@ -321,17 +326,16 @@ mod tests {
                     egui::ComboBox::from_id_salt("list").selected_text("one").show_ui(ui, |ui| {
                         ui.selectable_value(&mut self.choice, 2, "two");
                     });
-                    egui::Grid::new("table").show(ui, |ui| {
-                        ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
-                            node.set_role(Role::Table);
-                            node.set_label("Learners");
-                            node.set_column_count(2);
-                        });
-                        for row in [["Learner", "Error"], ["active", "3"], ["random", "20"]] {
-                            for text in row {
-                                ui.horizontal(|ui| ui.label(text));
-                            }
-                            ui.end_row();
+                    let part = |role| egui::UiBuilder::new().accessibility_role(role);
+                    ui.scope_builder(part(Role::Table).accessibility_label("Learners"), |ui| {
+                        for (row, texts) in [["Learner", "Error"], ["active", "3"], ["random", "20"]].iter().enumerate()
+                        {
+                            let cell = if row == 0 { Role::ColumnHeader } else { Role::Cell };
+                            ui.scope_builder(part(Role::Row).id_salt(row), |ui| {
+                                for text in texts {
+                                    ui.scope_builder(part(cell).id_salt(text), |ui| ui.label(*text));
+                                }
+                            });
                         }
                     });
                 });
