@@ -229,7 +229,7 @@ async function openViewer() {
   try {
     const opened = await startViewer(
       element("viewer"),
-      { script: element("viewer-script").href, wasm: () => source.wasm(element("viewer-wasm").dataset.address) },
+      { script: element("viewer-script").dataset.address, wasm: () => source.wasm(element("viewer-wasm").dataset.address) },
       (fraction) => (fraction === null ? progress.removeAttribute("value") : (progress.value = fraction)),
       (step) => tell({ is: "scrubbed", step }),
     );

@@ -247,7 +247,7 @@ enum Deed {
     Choose,
     /// It was given a number.
     Set { number: f64 },
-    /// It was given a text, and left.
+    /// It was given a text.
     Enter { text: String },
     /// It is to be scrolled into view.
     Show,
@@ -264,20 +264,15 @@ impl Act {
         match &self.deed {
             Deed::Click | Deed::Choose => vec![request(Action::Click, None)],
             Deed::Set { number } => vec![request(Action::SetValue, Some(ActionData::NumericValue(*number)))],
-            Deed::Enter { text } => vec![
-                request(Action::Focus, None),
-                request(Action::SetValue, Some(ActionData::Value(text.as_str().into()))),
-            ],
+            Deed::Enter { text } => vec![request(Action::SetValue, Some(ActionData::Value(text.as_str().into())))],
             Deed::Show => vec![request(Action::ScrollIntoView, None)],
         }
     }
 
-    /// What egui does only when a pointer or the focus leaves: called a frame after the events.
+    /// What egui does only when a pointer is released: called a frame after the events.
     pub fn finish(&self, ctx: &egui::Context) {
-        match self.deed {
-            Deed::Choose => egui::Popup::close_all(ctx),
-            Deed::Enter { .. } => release_focus(ctx),
-            Deed::Click | Deed::Set { .. } | Deed::Show => {}
+        if self.deed == Deed::Choose {
+            egui::Popup::close_all(ctx);
         }
     }
 }
@@ -300,7 +295,7 @@ mod tests {
         pressed: u32,
         share: f64,
         seed: String,
-        left: u32,
+        entered: u32,
         choice: u32,
     }
 
@@ -308,7 +303,7 @@ mod tests {
         fn new() -> Self {
             let ctx = egui::Context::default();
             ctx.enable_accesskit();
-            Self { ctx, pressed: 0, share: 0.5, seed: "1".to_owned(), left: 0, choice: 1 }
+            Self { ctx, pressed: 0, share: 0.5, seed: "1".to_owned(), entered: 0, choice: 1 }
         }
 
         fn run(&mut self, events: Vec<egui::Event>, finished: Option<&Act>) -> Vec<Element> {
@@ -322,7 +317,7 @@ mod tests {
                     ui.add(egui::Slider::new(&mut self.share, 0.0..=1.0).show_value(false)).labelled_by(label.id);
                     let label = ui.label("Seed");
                     let field = ui.text_edit_singleline(&mut self.seed).labelled_by(label.id);
-                    self.left += u32::from(field.lost_focus());
+                    self.entered += u32::from(field.changed() && !field.has_focus());
                     egui::ComboBox::from_id_salt("list").selected_text("one").show_ui(ui, |ui| {
                         ui.selectable_value(&mut self.choice, 2, "two");
                     });
@@ -373,7 +368,7 @@ mod tests {
         form.act(serde_json::json!({ "id": slider.id, "act": "set", "number": 0.25 }));
         form.act(serde_json::json!({ "id": seed.id, "act": "enter", "text": "7" }));
         assert_eq!((form.pressed, form.share, form.seed.as_str()), (1, 0.25, "7"));
-        assert!(form.left > 0, "a field is left, so that its text is taken in");
+        assert_eq!(form.entered, 1, "a text is taken in without the focus, so that the page keeps it");
         // An id of no widget, or of none that can be, changes nothing.
         form.act(serde_json::json!({ "id": "12", "act": "click" }));
         form.act(serde_json::json!({ "id": "no number", "act": "click" }));

@@ -49,7 +49,8 @@ impl Panel {
             let label = ui.label("Seed");
             let field = TextEdit::singleline(&mut self.seed_text).desired_width(70.0).char_limit(16);
             let field = ui.add(field).labelled_by(label.id);
-            if field.lost_focus() {
+            // Assistive technology sets the whole text at once, without the focus.
+            if field.lost_focus() || field.changed() && !field.has_focus() {
                 self.choose_seed();
             }
             field.on_hover_text("Initial error, noise and random movements all come from it");
