@@ -153,6 +153,12 @@ impl Browser {
     }
 
     pub async fn screenshot(&self) -> Vec<u8> {
+        // A busy machine may draw for longer than chromedriver waits.
+        for _ in 0..5 {
+            if let Ok(picture) = self.client.screenshot().await {
+                return picture;
+            }
+        }
         self.client.screenshot().await.expect("a picture")
     }
 

@@ -7,8 +7,8 @@ use crate::{
     visits::{ESCAPE, SHIFT, SPACE},
 };
 
-pub const TAB: char = '\u{e004}';
-pub const ENTER: char = '\u{e007}';
+const TAB: char = '\u{e004}';
+const ENTER: char = '\u{e007}';
 const F6: char = '\u{e036}';
 /// More presses of Tab than the panel has controls.
 const MANY: usize = 80;

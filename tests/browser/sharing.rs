@@ -3,8 +3,8 @@
 use crate::{
     Server,
     driver::Browser,
-    keyboard::{ENTER, tab_to},
-    visits::ESCAPE,
+    keyboard::tab_to,
+    visits::{ESCAPE, SPACE},
 };
 
 pub async fn visit(page: &Browser, server: Server) {
@@ -16,14 +16,14 @@ pub async fn visit(page: &Browser, server: Server) {
 
     // A link names no session, does not open the tab from which it was copied, and says whom it serves.
     tab_to(page, "Copy link").await;
-    page.press(ENTER).await;
+    page.press(SPACE).await;
     page.wait_for("a caution", "document.getElementById('controls').textContent.includes('Only this machine')").await;
     let link = page.evaluate_later("navigator.clipboard.readText()").await;
     assert_eq!(link, server.at("?v=1&scenario=arm-6dof&seed=3&learners=active,random&step=4"));
 
     // A picture of the scene is on the clipboard, or saved where there is none for pictures.
     tab_to(page, "Copy picture").await;
-    page.press(ENTER).await;
+    page.press(SPACE).await;
     page.wait_for(
         "the picture",
         "/picture (is on the clipboard|was saved)/.test(document.getElementById('controls').textContent)",
