@@ -71,8 +71,8 @@ const commands = {
   },
 
   // The reports come over the WebSocket.
-  step: ({ session: id, count, expected_step }) =>
-    request("step", "POST", `/v1/sessions/${id}/steps`, { count, expected_step, reports: false }, ({ step }) =>
+  step: ({ session: id, count, expected_step, frames }) =>
+    request("step", "POST", `/v1/sessions/${id}/steps`, { count, expected_step, frames, reports: false }, ({ step }) =>
       tell({ is: "stepped", session: id, step }),
     ),
 
@@ -92,7 +92,18 @@ const commands = {
       tell({ is: "evaluation", evaluation }),
     ),
 
+  configure: ({ session: id, learner, configuration }) =>
+    request("configure", "POST", `/v1/sessions/${id}/learners/${encodeURIComponent(learner)}/configuration`, { configuration }, (evaluation) =>
+      tell({ is: "configured", learner, evaluation }),
+    ),
+
+  // A card of a story speaks of something in the scene.
+  point({ at }) {
+    for (const line of element("legend").children) line.toggleAttribute("data-pointed", line.firstElementChild.className === at);
+  },
+
   seeds: (job) => seeds.run(job),
+  enough_seed: ({ seed }) => seeds.enough(seed),
   cancel_seeds: () => seeds.cancel(),
 
   address({ query }) {
@@ -158,6 +169,12 @@ function follow(resource) {
   });
 }
 
+/** Tells the panel on which side of it the scene is. */
+function layOut() {
+  const [panel, scene] = ["panel", "scene"].map((id) => element(id).getBoundingClientRect());
+  tell({ is: "layout", scene: scene.top < panel.top ? "above" : scene.left < panel.left ? "left" : "right" });
+}
+
 /** What the colours of the legend mean, for a picture. */
 function legend() {
   return [...element("legend").children]
@@ -215,6 +232,7 @@ async function openPanel() {
       text.textContent = `The controls have crashed: ${failure} Reload the page: the run is kept.`;
       element("panel-cover").hidden = false;
     }, 1000);
+    new ResizeObserver(layOut).observe(element("panel"));
     const query = await source.query(location.search);
     tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server });
     return true;

@@ -20,7 +20,7 @@ impl Panel {
                 self.server = server;
                 self.begin(&query, known);
             }
-            Event::Layout { below } => self.scene_below = below,
+            Event::Layout { scene } => self.scene = scene,
             Event::Navigated { query } => self.navigate(&query),
             Event::Scenarios { scenarios } => self.take_scenarios(scenarios),
             Event::Session { session: Some(session) } => self.adopt(*session),

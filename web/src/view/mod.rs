@@ -32,9 +32,11 @@ use crate::{
 pub(crate) use style::{alarm, good};
 
 /// Below this width words are shortened.
-pub(crate) const NARROW: f32 = 440.0;
+pub(crate) const NARROW: f32 = 560.0;
 /// Below this height, room is kept for what matters most.
 pub(crate) const LOW: f32 = 600.0;
+/// From this height on there is room to say what each learner does.
+pub(crate) const TALL: f32 = 720.0;
 
 impl Panel {
     /// Draws the panel and takes in what the visitor does.

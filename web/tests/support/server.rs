@@ -28,7 +28,7 @@ impl Server {
 
     /// What there is to choose from: as many scenarios as a test needs.
     pub fn scenarios() -> Value {
-        let summaries = ["arm-6dof", "head-fov"].map(|name| builtin(name).expect("a built-in scenario").summary());
+        let summaries = ["arm-6dof", "head-fov", "body-change", "tiago-mocap"].map(|name| builtin(name).expect("a built-in scenario").summary());
         json!({ "is": "scenarios", "scenarios": summaries })
     }
 
