@@ -6,6 +6,8 @@
 
 #[path = "browser/driver.rs"]
 mod driver;
+#[path = "browser/newcomer.rs"]
+mod newcomer;
 #[path = "browser/pixels.rs"]
 mod pixels;
 
@@ -80,6 +82,11 @@ async fn the_page_steps_and_shows() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn two_tabs_do_not_mix_and_late_visitors_see_everything() {
     in_browser(&[], |page, server| async move { visit_in_tabs(&page, server).await }).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_newcomer_is_told_the_first_story() {
+    in_browser(&[], |page, server| async move { newcomer::visit(&page, server).await }).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -9,7 +9,7 @@ use crate::{
     news::Told,
     seeds::SeedRuns,
     settings::{HUMAN, Settings, Tab},
-    stories::{STORIES, Spots},
+    stories::{STORIES, Spot, Spots},
     why::Why,
     wire::Session,
 };
@@ -92,6 +92,10 @@ pub struct Panel {
     pub(crate) spots: Spots,
     /// What is marked in the legend of the scene.
     pub(crate) pointed: Option<&'static str>,
+    /// The card that was drawn last, by its story and place.
+    pub(crate) card_shown: Option<(usize, usize)>,
+    /// What the card that has just been opened speaks of.
+    pub(crate) reveal: Option<Spot>,
     /// How high the open card is.
     pub(crate) card_height: f32,
     /// The ending was brought into view.
@@ -148,6 +152,8 @@ impl Default for Panel {
             copied: None,
             spots: Spots::default(),
             pointed: None,
+            card_shown: None,
+            reveal: None,
             card_height: 0.0,
             ending_seen: false,
             tab_shown: Tab::Charts,

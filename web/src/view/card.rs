@@ -2,8 +2,8 @@
 //! frame around what it speaks of.
 
 use egui::{
-    Align, Button, Color32, Context, Frame, LayerId, Layout, Order, Rect, RichText, ScrollArea, Shape, Stroke, StrokeKind,
-    TextStyle, Ui, vec2,
+    Align, Button, Color32, Context, Frame, LayerId, Layout, Order, Rect, RichText, ScrollArea, Shape, Stroke,
+    StrokeKind, TextStyle, Ui, vec2,
 };
 
 use super::style::accent;
@@ -16,11 +16,23 @@ use crate::{
 const MARGIN: f32 = 10.0;
 const BUTTONS: f32 = 28.0;
 const TITLE: f32 = 24.0;
+const NOT_YET: &str = "The run has not come to its end yet. Play it to the end: how it ended is told under the chart.";
 
 impl Panel {
     pub(super) fn card_panel(&mut self, ui: &mut Ui) {
         self.card_height = 0.0;
-        let Some((story, place, card)) = self.card() else { return };
+        let Some((story, place, card)) = self.card() else {
+            self.card_shown = None;
+            return;
+        };
+        if self.card_shown != Some((self.story, place)) {
+            (self.card_shown, self.reveal) = (Some((self.story, place)), Some(card.spot));
+        }
+        // What has not come yet cannot be spoken of.
+        let (text, acts) = match card.spot {
+            Spot::Ending if self.ending().is_none() => (NOT_YET, &[Act::PlayOn(10.0)][..]),
+            _ => (card.text, card.acts),
+        };
         let height = height(ui, story);
         self.card_height = height;
         let frame = Frame::new()
@@ -41,7 +53,7 @@ impl Panel {
             let room = (ui.available_height() - BUTTONS).max(20.0);
             ScrollArea::vertical().id_salt(place).max_height(room).min_scrolled_height(room).show(ui, |ui| {
                 ui.set_min_height(room - 4.0);
-                ui.add(egui::Label::new(card.text).wrap());
+                ui.add(egui::Label::new(text).wrap());
             });
             ui.horizontal(|ui| {
                 // From the right, so that they stand in the same place on every card.
@@ -53,7 +65,7 @@ impl Panel {
                     if ui.add_enabled(place > 0, Button::new("Previous")).clicked() {
                         self.tour = Some(place - 1);
                     }
-                    ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.acts(ui, card.acts));
+                    ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.acts(ui, acts));
                 });
             });
         });

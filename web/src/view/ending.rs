@@ -45,7 +45,7 @@ impl Panel {
             self.seeds_row(ui);
         });
         ui.add_space(8.0);
-        self.spots.set(Spot::Ending, card.response.rect);
+        self.show_spot(ui, Spot::Ending, &card.response);
         if !self.ending_seen {
             self.ending_seen = true;
             card.response.scroll_to_me(Some(egui::Align::TOP));

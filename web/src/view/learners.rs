@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use egui::{
-    Align, Galley, Layout, Rect, RichText, Shape, TextStyle, TextWrapMode, Ui, UiBuilder, Vec2, WidgetText, accesskit::Role,
-    pos2, vec2,
+    Align, Galley, Layout, Rect, RichText, Shape, TextStyle, TextWrapMode, Ui, UiBuilder, Vec2, WidgetText,
+    accesskit::Role, pos2, vec2,
 };
 use egui_plot::LineStyle;
 

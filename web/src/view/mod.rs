@@ -89,20 +89,31 @@ impl Panel {
             }
             self.game(ui);
             self.ending_card(ui);
-            let learners = ui.scope(|ui| self.learners(ui)).response.rect;
-            self.spots.set(Spot::Learners, learners);
+            let learners = ui.scope(|ui| self.learners(ui)).response;
+            self.show_spot(ui, Spot::Learners, &learners);
             ui.add_space(6.0);
             self.stories_row(ui);
             self.setup(ui);
             ui.add_space(6.0);
-            let tabs = ui.scope(|ui| self.tabs(ui)).response.rect;
-            self.spots.set(Spot::Tabs, tabs);
+            let tabs = ui.scope(|ui| self.tabs(ui)).response;
+            self.show_spot(ui, Spot::Tabs, &tabs);
             match self.settings.tab {
                 Tab::Charts => self.charts(ui),
                 Tab::Why => self.why(ui),
                 Tab::Share => self.share(ui),
             }
         });
+    }
+
+    /// Notes where something is, as far as it is in sight, and brings it there if a card has just begun to speak of it.
+    fn show_spot(&mut self, ui: &Ui, spot: Spot, response: &egui::Response) {
+        if self.reveal.take_if(|wanted| *wanted == spot).is_some() {
+            response.scroll_to_me(Some(egui::Align::TOP));
+        }
+        let seen = response.rect.intersect(ui.clip_rect());
+        if seen.is_positive() {
+            self.spots.set(spot, seen);
+        }
     }
 
     fn tabs(&mut self, ui: &mut Ui) {
