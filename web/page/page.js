@@ -2,7 +2,9 @@
 
 import { Controls } from "./controls.js";
 import { CUT, atScene } from "./scene.js";
+import { quiet } from "./quiet.js";
 import { passOn, picture } from "./picture.js";
+import { Legend } from "./legend.js";
 import { SeedRuns } from "./seeds.js";
 import { copied, identity } from "./links.js";
 import { startViewer } from "./viewer.js";
@@ -38,6 +40,7 @@ const ways = new Set();
 
 const tell = (event) => panel.receive(JSON.stringify(event));
 const seeds = new SeedRuns(tell, ask);
+const legend = new Legend(element("legend"));
 
 /** Asks the server and tells the panel what became of it. */
 async function request(asked, method, path, body, answer) {
@@ -103,7 +106,7 @@ const commands = {
 
   // A card of a story speaks of something in the scene.
   point({ at }) {
-    for (const line of element("legend").children) line.toggleAttribute("data-pointed", line.firstElementChild.className === at);
+    for (const line of element("legend").children) line.toggleAttribute("data-pointed", line.dataset.line === at);
   },
 
   seeds: (job) => seeds.run(job),
@@ -125,7 +128,7 @@ const commands = {
     try {
       if (viewer === null || said === null) throw new Error("there is no scene yet");
       const redraw = () => viewer.seek(sought ?? said.step);
-      const blob = picture(element("viewer"), CUT, said.caption, legend(), redraw);
+      const blob = picture(element("viewer"), CUT, said.caption, legend.lines(), redraw);
       // Both may refuse; that is told once.
       blob.catch(() => {});
       tell({ is: "copied", done: true, note: await passOn(blob, `${said.caption.title.replaceAll(/[^\w-]+/g, "-")}.png`) });
@@ -147,7 +150,8 @@ const commands = {
   known: () => keep(KNOWN, "yes", localStorage),
 
   say(state) {
-    const { text, news, phase, step, latest, session: id, typing } = (said = state);
+    const { text, news, phase, step, latest, session: id, typing, caption } = (said = state);
+    legend.show(caption);
     const mirror = element("mirror");
     Object.assign(mirror.dataset, { phase, step, latest, session: id, typing });
     if (mirror.textContent !== text) mirror.textContent = text;
@@ -184,17 +188,6 @@ function layOut() {
 function show() {
   const id = session;
   viewer?.open(recording, (view) => arrangement(id, view));
-}
-
-/** What the colours of the legend mean, for a picture. */
-function legend() {
-  return [...element("legend").children]
-    .filter((line) => line.firstChild.className !== "belief")
-    .map((line) => {
-      const { backgroundColor, backgroundImage } = getComputedStyle(line.firstChild);
-      const inImage = /rgba?\([^)]*\)/.exec(backgroundImage);
-      return [line.textContent, inImage === null ? backgroundColor : inImage[0]];
-    });
 }
 
 // ---- what is kept in the browser, where it lets us
@@ -272,7 +265,6 @@ async function openViewer() {
     element("viewer").tabIndex = 0;
     nameTextAgents();
     (before?.isConnected && before !== document.body ? before : element("controls")).focus();
-    element("legend").hidden = false;
     if (session !== null) show();
     waiting.splice(0).forEach((part) => viewer.feed(part));
     if (sought !== null) commands.seek({ step: sought });
@@ -348,7 +340,8 @@ addEventListener("popstate", () => {
   if (panel !== null) tell({ is: "navigated", query: location.search });
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => viewer?.restore());
-atScene(element("scene"));
+atScene(element("scene"), element("viewer"));
+quiet();
 if (new URLSearchParams(location.search).get("embed") === "1") document.documentElement.dataset.embed = "";
 
 if (await openPanel()) openViewer();

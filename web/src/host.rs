@@ -288,15 +288,28 @@ pub struct Mirror {
     pub session: String,
     /// Whether the visitor is typing, so that keys are text.
     pub typing: bool,
-    /// What is shown, as the caption of a picture.
+    /// What is shown in the scene.
     pub caption: Caption,
 }
 
-/// What stands under a picture of the scene.
+/// What the legend over the scene says, and what stands under a picture of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Caption {
     /// Scenario, seed and step.
     pub title: String,
-    /// Each learner's name with its errors, and its colour.
-    pub learners: Vec<(String, [u8; 3])>,
+    /// Every learner of the session.
+    pub learners: Vec<Captioned>,
+    /// What the translucent ellipsoids are.
+    pub ellipsoids: String,
+}
+
+/// A learner, as a caption names it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Captioned {
+    /// Its name.
+    pub name: String,
+    /// Its errors at the step that is shown, with their units.
+    pub errors: String,
+    /// Red, green, blue.
+    pub colour: [u8; 3],
 }

@@ -71,7 +71,7 @@ impl Panel {
 
     /// Marks what the open card speaks of in the legend of the scene.
     pub(crate) fn point_at_scene(&mut self) {
-        let at = self.card().filter(|(.., card)| card.spot == Spot::Ellipsoids).map(|_| "doubt");
+        let at = self.card().filter(|(.., card)| card.spot == Spot::Ellipsoids).map(|_| "ellipsoids");
         if self.pointed != at {
             self.pointed = at;
             self.ask(Command::Point { at });

@@ -77,7 +77,7 @@ fn a_card_marks_what_it_speaks_of_in_the_scene() {
     page.press(Key::T);
     page.commands();
     page.click("Next");
-    assert_eq!(page.commands(), [Command::Point { at: Some("doubt") }]);
+    assert_eq!(page.commands(), [Command::Point { at: Some("ellipsoids") }]);
     page.click("Next");
     assert_eq!(page.commands(), [Command::Point { at: None }]);
 }
