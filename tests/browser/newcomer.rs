@@ -42,7 +42,11 @@ pub async fn visit(page: &Browser, server: Server) {
     let next = place(page, "Next").await;
     page.click(next[0], next[1]).await;
     reads(page, "2 of 5").await;
-    page.wait_for("the mark in the legend", "document.querySelector('#legend [data-pointed][data-line=ellipsoids]') !== null").await;
+    page.wait_for(
+        "the mark in the legend",
+        "document.querySelector('#legend [data-pointed][data-line=ellipsoids]') !== null",
+    )
+    .await;
     click(page, "Show “Uncertainty”").await;
     reads(page, "The uncertainty of active and random stays above that on purpose").await;
 

@@ -91,13 +91,13 @@ fn slow_steps_and_single_ones_show_the_way() {
 
 #[test]
 fn playing_waits_until_the_scene_shows_the_step() {
-    let mut page = Page::with_session("speed=100");
+    let mut page = Page::with_session("speed=5");
     page.press(Key::Space);
     let (count, _) = steps(&page.commands()).expect("steps");
     page.server.step(count);
     page.catch_up();
     page.tell(json!({ "is": "stepped", "session": page.server.id(), "step": 1 + count }));
-    page.harness.run_steps(20);
+    page.harness.run_steps(4);
     let commands = page.commands();
     assert!(steps(&commands).is_none() && commands.contains(&Command::Seek { step: 1 + count }), "{commands:?}");
     page.tell(json!({ "is": "shown", "step": 1 + count }));
@@ -107,7 +107,7 @@ fn playing_waits_until_the_scene_shows_the_step() {
 
 #[test]
 fn the_change_of_the_body_is_marked_and_recovering_is_counted_from_there() {
-    let mut page = Page::with_session("scenario=body-change&learners=active,global&speed=100");
+    let mut page = Page::with_session("scenario=body-change&learners=active,random&speed=100");
     page.press(Key::Space);
     page.make_steps(1000);
     let result = page.server.experiment().result();

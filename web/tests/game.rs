@@ -32,7 +32,10 @@ fn ten_movements_of_your_own_against_active_and_random() {
         let mut values = page.harness.state().game.values.clone();
         values[round as usize % 6] += 0.2;
         page.harness.state_mut().pose(values.clone());
-        assert!(page.answer_posture() && page.harness.state().game.values == values);
+        assert!(page.answer_posture(), "round {round}: another posture");
+        // Sliders go by whole degrees.
+        let sent = &page.harness.state().game.values;
+        assert!(sent.iter().zip(&values).all(|(sent, value)| (sent - value).abs() < 0.01), "{sent:?} {values:?}");
         page.click("Make this movement");
         assert_eq!(page.make_steps(1), 1, "round {round}");
     }

@@ -132,7 +132,7 @@ fn the_panel_looks_as_it_should() {
     page.harness.ctx.set_theme(Theme::Dark);
     page.run();
     held(&mut page, "ending-luck-dark");
-    let mut page = run("scenario=body-change&learners=active,random,global&speed=100", WIDE, 1000);
+    let mut page = run("scenario=body-change&learners=active,random&speed=100", WIDE, 1000);
     held(&mut page, "recovered");
 
     let mut page = game(USUAL, 0);
