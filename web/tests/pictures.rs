@@ -121,12 +121,10 @@ fn the_panel_looks_as_it_should() {
 
     // The end of the first story, and ten more seeds.
     let mut page = run("speed=50", USUAL, 1000);
-    page.press(Key::Space);
-    page.make_steps(1000);
     held(&mut page, "ending");
     page.harness.state_mut().run_seeds();
-    for seed in 2..12 {
-        page.tell(page.server.other_seed(seed, 300));
+    for seed in 2..8 {
+        page.tell(page.server.other_seed(seed, 250));
     }
     held(&mut page, "ending-luck");
     page.harness.ctx.set_theme(Theme::Dark);

@@ -10,7 +10,7 @@ use body_schema_panel::{
 use egui::{Key, Pos2, vec2};
 use egui_kittest::kittest::Queryable;
 use serde_json::json;
-use support::Page;
+use support::{Page, Server};
 
 fn frames(commands: &[Command]) -> Option<u64> {
     commands.iter().find_map(|command| match command {
@@ -178,8 +178,12 @@ fn a_swipe_on_a_chart_scrolls_the_panel() {
 #[test]
 fn without_a_server_nothing_is_offered_that_needs_one() {
     let mut page = Page::open("");
-    page.tell(json!({ "is": "begin", "query": "", "known": true, "server": false }));
-    page.begin();
+    page.tell(json!({ "is": "begin", "query": "learners=random", "known": true, "server": false }));
+    page.tell(Server::scenarios());
+    let commands = page.commands();
+    assert!(matches!(commands.last(), Some(Command::Open { learners: None, .. })), "as recorded: {commands:?}");
+    page.server.open("arm-6dof", 1, None);
+    page.follow();
     for label in ["New seed", "Compare", "Luck?", "Beat the algorithm"] {
         assert!(!page.has(label), "{label}");
     }
@@ -202,4 +206,19 @@ fn within_another_page_there_are_transport_and_one_chart() {
     for label in ["Tour", "Try this", "Scenario", "Charts", "What is learned"] {
         assert!(!page.has(label), "{label}");
     }
+}
+
+#[test]
+fn the_search_that_a_card_shows_is_brought_into_view() {
+    let mut page = Page::of_size("speed=100&to=10&stop=never", vec2(400.0, 700.0));
+    page.begin();
+    page.press(Key::T);
+    (0..2).for_each(|_| page.click("Next"));
+    page.click("Show the search");
+    // The answer comes later than the room for it is needed.
+    page.harness.run_steps(30);
+    page.tell(page.server.selection("active"));
+    page.harness.run_steps(30);
+    let (tabs, chart) = (page.place("Share").top(), page.harness.get_by_label_contains("Prediction error at").rect());
+    assert!(tabs - chart.bottom() < 60.0, "the tabs at {tabs} stand below the chart that ends at {}", chart.bottom());
 }

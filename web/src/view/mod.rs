@@ -97,11 +97,15 @@ impl Panel {
             ui.add_space(6.0);
             let tabs = ui.scope(|ui| self.tabs(ui)).response;
             self.show_spot(ui, Spot::Tabs, &tabs);
-            match self.settings.tab {
-                Tab::Charts => self.charts(ui),
-                Tab::Why => self.why(ui),
-                Tab::Share => self.share(ui),
-            }
+            ui.scope(|ui| {
+                // Room to bring the tabs to the top, whatever they show or still wait for.
+                ui.set_min_height(ui.clip_rect().height() - tabs.rect.height());
+                match self.settings.tab {
+                    Tab::Charts => self.charts(ui),
+                    Tab::Why => self.why(ui),
+                    Tab::Share => self.share(ui),
+                }
+            });
         });
     }
 
