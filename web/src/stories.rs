@@ -132,7 +132,8 @@ pub const STORIES: [Story; 4] = [
                 title: "What the ellipsoids mean",
                 text: "Look at the scene: each translucent ellipsoid holds where a learner thinks a joint may be. Those \
                        of global shrink, since it weighs all movements together. Those of active and random stay large: \
-                       noise is added to them on purpose, so that they can still adapt.",
+                       noise is added to them on purpose, so that they can still adapt. The cores within them are \
+                       what their data allow.",
                 spot: Spot::Ellipsoids,
                 acts: &[Act::Chart("Uncertainty")],
             },
