@@ -131,7 +131,7 @@ async fn visit(page: &Browser, server: Server) {
     page.press(SPACE).await;
     page.wait_for_state("the pause", "state.phase === 'ready'").await;
     let words = page.evaluate("document.getElementById('mirror').textContent").await;
-    assert!(words.as_str().expect("text").contains("active: not accurate yet"), "{words}");
+    assert!(words.as_str().expect("text").contains("active: not converged"), "{words}");
 
     // Moving the scene's time moves the panel: a click on the left end of its timeline.
     let scene = "(({ left, bottom, width }) => [left, bottom, width])\
