@@ -12,6 +12,8 @@ mod devtools;
 mod driver;
 #[path = "browser/keyboard.rs"]
 mod keyboard;
+#[path = "browser/newcomer.rs"]
+mod newcomer;
 #[path = "browser/pixels.rs"]
 mod pixels;
 #[path = "browser/scene.rs"]
@@ -109,6 +111,11 @@ async fn links_and_pictures_are_copied_for_others() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn small_screens_and_fingers_have_all_that_matters() {
     in_browser(&[], |page, server| async move { screens::visit(&page, server).await }).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_newcomer_is_told_the_first_story() {
+    in_browser(&[], |page, server| async move { newcomer::visit(&page, server).await }).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -5,6 +5,7 @@
 //! | `description.json` | what stays the same from step to step |
 //! | `reports.ndjson.gz` | one report a line, from step 0 |
 //! | `scene.rrd` | the recording as the page's viewer takes it: a header of 12 bytes, then messages |
+//! | `blueprint-{light,dark}-{wide,tall}.rbl` | arrangements of its views, in the same form |
 //! | `selections/LEARNER/STEP.json.gz` | how each movement was chosen, where a search was made |
 //! | `recording.rrd`, `steps.csv`, `result.json` | to take away |
 
@@ -16,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::{ExportError, Plan, error::Doing, write, write_json};
 use crate::{
     experiment::Experiment,
-    recording::{LiveLog, Recorder, StepsCsv, Target},
+    recording::{LiveLog, Recorder, Shape, StepsCsv, Target, Theme},
 };
 
 /// What the page must know of a run before it opens it.
@@ -59,6 +60,13 @@ pub(super) fn record(plan: &Plan<'_>, seed: u64, folder: &Path, tick: &dyn Fn())
     write_packed(&folder.join("reports.ndjson.gz"), &reports)?;
     let messages = live.put_together(&live.scene_parts_from(1))?;
     write(&folder.join("scene.rrd"), &[live.header(), messages].concat())?;
+    for (theme, shade) in [(Theme::Light, "light"), (Theme::Dark, "dark")] {
+        for (shape, form) in [(Shape::Wide, "wide"), (Shape::Tall, "tall")] {
+            // There is one from step 0 on.
+            let blueprint = live.blueprint(theme, shape.aspect())?.unwrap_or_default();
+            write(&folder.join(format!("blueprint-{shade}-{form}.rbl")), &blueprint)?;
+        }
+    }
     write(&folder.join("recording.rrd"), &live.complete()?)?;
     write(&folder.join("steps.csv"), &table)?;
     write_json(&folder.join("result.json"), &experiment.result())?;

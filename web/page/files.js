@@ -66,6 +66,13 @@ export async function wasm(address) {
   return new Response(await content(await get(address)), { headers });
 }
 
+/** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */
+export async function arrangement(id, { theme, aspect }) {
+  const shape = aspect < 1 ? "tall" : "wide";
+  const response = await get(`${known(id).run.folder}/blueprint-${theme}-${shape}.rbl`);
+  return response.arrayBuffer();
+}
+
 /** Where a file of a session is. @param {string} path as on a server */
 export function place(path) {
   const [, , kind, id, file] = path.split("/");

@@ -9,7 +9,7 @@ use body_schema::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::wire::{Evaluation, Problem, Session};
+use crate::wire::{Problem, Session};
 
 /// What happened.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -27,8 +27,8 @@ pub enum Event {
     },
     /// Where the scene is.
     Layout {
-        /// Beneath the panel, not beside it.
-        below: bool,
+        /// Seen from the panel.
+        scene: Side,
     },
     /// The visitor went back or forth to this address.
     Navigated {
@@ -110,7 +110,7 @@ pub enum Event {
         /// The learner.
         learner: String,
         /// The answer.
-        evaluation: Box<Evaluation>,
+        evaluation: Box<AppraisalReport>,
     },
     /// A part of a run in the background.
     Seeds {
@@ -129,6 +129,19 @@ pub enum Event {
         #[serde(default)]
         note: Option<String>,
     },
+}
+
+/// Where something lies, seen from the panel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// Beside it, on the left.
+    Left,
+    /// Beside it, on the right.
+    #[default]
+    Right,
+    /// Above it.
+    Above,
 }
 
 fn usual() -> bool {
@@ -207,6 +220,11 @@ pub enum Command {
         learner: String,
         /// Rad or m per joint.
         configuration: Vec<f64>,
+    },
+    /// Point at the line of the scene's legend with this mark, and at no other.
+    Point {
+        /// The mark's name; null for none.
+        at: Option<&'static str>,
     },
     /// Put a picture of the scene on the clipboard.
     Picture,
