@@ -36,6 +36,20 @@ pub async fn drawn(page: &Browser, is_it: impl Fn(&Picture) -> bool) -> Picture 
     }
 }
 
+/// A picture of the scene at rest: one that the next does not differ from.
+pub async fn at_rest(page: &Browser) -> Picture {
+    let mut picture = drawn(page, |_| true).await;
+    for _ in 0..20 {
+        tokio::time::sleep(Duration::from_secs(1)).await;
+        let next = drawn(page, |_| true).await;
+        if !next.differs_from(&picture) {
+            return next;
+        }
+        picture = next;
+    }
+    panic!("the scene does not come to rest");
+}
+
 /// Does to the scene what would make the viewer speak of entities, select one, or open its palette; `before` is how it
 /// looked.
 pub async fn stays_as_it_is(page: &Browser, before: &Picture) {
@@ -45,9 +59,7 @@ pub async fn stays_as_it_is(page: &Browser, before: &Picture) {
     }
     page.click(left + 0.5 * width, top + 0.45 * height).await;
     page.press_with(CONTROL, 'p').await;
-    tokio::time::sleep(Duration::from_secs(1)).await;
-    let picture = drawn(page, |_| true).await;
-    assert!(!picture.differs_from(before), "pointing, clicking and typing leave the scene as it is");
+    assert!(!at_rest(page).await.differs_from(before), "pointing, clicking and typing leave the scene as it is");
 }
 
 const CONTROL: char = '\u{e009}';

@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::{
     Server,
     driver::Browser,
-    scene::{drawn, stays_as_it_is},
+    scene::{at_rest, drawn, stays_as_it_is},
 };
 
 pub const SPACE: char = ' ';
@@ -32,7 +32,7 @@ pub async fn steps(page: &Browser, server: Server) {
     page.wait_for_state("step 1", "state.phase === 'ready' && state.step === '1'").await;
     page.wait_for("the scene", "document.getElementById('cover').hidden").await;
     page.press(ESCAPE).await;
-    let first = drawn(page, |_| true).await;
+    let first = at_rest(page).await;
     let legend = page.evaluate("document.getElementById('legend').innerText").await;
     for words in ["active", "random", "global", "may be (1σ)", "true arm"] {
         assert!(legend.as_str().expect("text").contains(words), "{legend}");
