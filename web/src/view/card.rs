@@ -51,10 +51,13 @@ impl Panel {
                 });
             });
             let room = (ui.available_height() - BUTTONS).max(20.0);
-            ScrollArea::vertical().id_salt(place).max_height(room).min_scrolled_height(room).show(ui, |ui| {
-                ui.set_min_height(room - 4.0);
-                ui.add(egui::Label::new(text).wrap());
-            });
+            ScrollArea::vertical().id_salt(place).auto_shrink(false).max_height(room).min_scrolled_height(room).show(
+                ui,
+                |ui| {
+                    ui.set_min_height(room - 4.0);
+                    ui.add(egui::Label::new(text).wrap());
+                },
+            );
             ui.horizontal(|ui| {
                 // From the right, so that they stand in the same place on every card.
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {

@@ -99,7 +99,7 @@ impl Panel {
             self.show_spot(ui, Spot::Tabs, &tabs);
             ui.scope(|ui| {
                 // Room to bring the tabs to the top, whatever they show or still wait for.
-                ui.set_min_height(ui.clip_rect().height() - tabs.rect.height());
+                ui.set_min_height((ui.clip_rect().height() - tabs.rect.height()).max(0.0));
                 match self.settings.tab {
                     Tab::Charts => self.charts(ui),
                     Tab::Why => self.why(ui),

@@ -41,6 +41,10 @@ impl Server {
     }
 
     fn begin(&self, name: &str, seed: u64, learners: Option<&[String]>) -> Experiment {
+        if self.edits.is_empty() {
+            let scenario = builtin(name).expect("a built-in scenario");
+            return scenario.experiment(seed, learners).expect("an experiment");
+        }
         let text = edited(&builtin(name).expect("a built-in scenario").source, &self.edits).expect("paths that exist");
         let scenario = Scenario::parse(name, &text, &|file| Err(format!("{file} is not needed here")));
         scenario.and_then(|scenario| scenario.experiment(seed, learners)).expect("an experiment")
