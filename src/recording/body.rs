@@ -113,9 +113,16 @@ impl Figure {
             radius_m: radius * a,
             colour: [red, green, blue, 255],
         };
-        // A flat base of three rods side by side, and a column.
+        // A flat base of three rods side by side, and a column; where a joint lifts the arm, an inner column goes with it.
         let beam = |y: f64| rod([-0.2, y, -0.9], [0.2, y, -0.9], 0.1);
-        self.fixed = vec![beam(-0.14), beam(0.0), beam(0.14), rod([0.0, 0.0, -0.85], [0.0, 0.0, -0.12], 0.1)];
+        let column = |from: f64, to: f64, radius: f64| rod([0.0, 0.0, from], [0.0, 0.0, to], radius);
+        self.fixed = vec![beam(-0.14), beam(0.0), beam(0.14)];
+        if self.carried_by > 0 {
+            self.fixed.push(column(-0.85, -0.35, 0.1));
+            self.trunk = vec![column(-0.75, -0.04, 0.08)];
+        } else {
+            self.fixed.push(column(-0.85, -0.12, 0.1));
+        }
         self.ground_m = shoulder.z - 1.0 * a;
         self.name = shoulder + Vector3::z() * (0.5 * a);
         self

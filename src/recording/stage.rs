@@ -20,13 +20,13 @@ const MARGIN: f64 = 0.06;
 /// What the view takes in of each learner, from its shoulder, in lengths of the arm: where the arm mostly is. x is ahead,
 /// y to the left, z up.
 const TAKEN_IN: [[f64; 3]; 7] = [
-    [0.9, -0.1, 0.2],
+    [0.8, -0.1, 0.2],
     [0.6, -0.6, 0.4],
     [0.6, -0.6, -0.4],
     [0.3, 0.5, -0.6],
-    [0.0, -0.8, 0.0],
+    [0.0, -0.7, 0.0],
     [0.0, -0.3, -0.75],
-    [0.0, 0.7, -0.6],
+    [0.0, 0.55, -0.6],
 ];
 
 /// The figures of all learners, side by side.
