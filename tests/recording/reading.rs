@@ -95,7 +95,7 @@ impl Reading {
     }
 
     /// The times at which an entity has a row, in order.
-    pub fn times(&self, entity: &str, timeline: &str) -> Vec<i64> {
+    pub fn times(&self, entity: &str, timeline: &'static str) -> Vec<i64> {
         let chunks = self.chunks.get(entity).into_iter().flatten();
         let times = chunks.flat_map(|chunk| chunk.iter_indices(&timeline.into()).map(|(time, _)| time.as_i64()));
         let mut times: Vec<i64> = times.collect();
