@@ -30,6 +30,9 @@ pub struct Arguments {
     /// Write into a folder that holds other files
     #[arg(long)]
     force: bool,
+    /// Where the folder will be served, as https://example.org/demo/: previews of links to it then have a picture
+    #[arg(long, value_name = "URL", value_parser = address)]
+    address: Option<String>,
     /// Take the page's panel from DIR, which `cargo run -p body-schema-bundle -- DIR` built
     #[arg(long, value_name = "DIR", hide = true)]
     panel_dir: Option<PathBuf>,
@@ -62,6 +65,15 @@ impl FromStr for SeedRange {
     }
 }
 
+/// The address of a folder: with a slash at its end.
+fn address(text: &str) -> Result<String, String> {
+    let host = text.strip_prefix("https://").or_else(|| text.strip_prefix("http://"));
+    if host.is_none_or(|host| host.is_empty() || host.starts_with('/')) || text.contains(['?', '#', ' ', '"']) {
+        return Err("write the address of the folder, as https://example.org/demo/".to_owned());
+    }
+    Ok(format!("{}/", text.trim_end_matches('/')))
+}
+
 pub fn export(arguments: &Arguments) -> Result<()> {
     let scenarios = arguments.scenarios.iter().map(|name| load_scenario(name)).collect::<Result<Vec<Scenario>>>()?;
     let names: BTreeSet<&str> = scenarios.iter().map(|scenario| scenario.name.as_str()).collect();
@@ -77,6 +89,7 @@ pub fn export(arguments: &Arguments) -> Result<()> {
     let export = Export {
         plans: plans.collect::<Result<_>>()?,
         seeds: seeds.into_iter().collect(),
+        address: arguments.address.clone(),
         panel_dir: arguments.panel_dir.clone(),
     };
     let bar = progress::bar(export.steps(), "recording");
@@ -97,6 +110,16 @@ mod tests {
         assert_eq!((range("7"), range("1..5"), range("3..3")), (Ok((7, 7)), Ok((1, 5)), Ok((3, 3))));
         for text in ["", "x", "-1", "5..1", "1..", "1..1000", "0..18446744073709551615"] {
             assert!(range(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_address_is_that_of_a_folder() {
+        for text in ["https://example.org/demo", "https://example.org/demo/"] {
+            assert_eq!(address(text).as_deref(), Ok("https://example.org/demo/"));
+        }
+        for text in ["", "example.org", "ftp://example.org", "https://", "https:///a", "https://a/?b", "https://a b"] {
+            assert!(address(text).is_err(), "{text}");
         }
     }
 }

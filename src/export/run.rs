@@ -5,6 +5,7 @@
 //! | `description.json` | what stays the same from step to step |
 //! | `reports.ndjson.gz` | one report a line, from step 0 |
 //! | `scene.rrd` | the recording as the page's viewer takes it: a header of 12 bytes, then messages |
+//! | `blueprint-THEME-SHAPE.rbl` | the arrangements of views by which the page restores its own |
 //! | `selections/LEARNER/STEP.json.gz` | how each movement was chosen, where a search was made |
 //! | `recording.rrd`, `steps.csv`, `result.json` | to take away |
 
@@ -16,8 +17,18 @@ use serde::{Deserialize, Serialize};
 use super::{ExportError, Plan, error::Doing, write, write_json};
 use crate::{
     experiment::Experiment,
-    recording::{LiveLog, Recorder, StepsCsv, Target},
+    recording::{LiveLog, Recorder, Shape, StepsCsv, Target, Theme},
 };
+
+/// Postures on the way from each step to the next, in which the page moves while it plays slowly.
+const FRAMES: u64 = 6;
+/// The pages for which views are arranged, by the names under which they are asked for.
+const ARRANGEMENTS: [(&str, Theme, Shape); 4] = [
+    ("light-wide", Theme::Light, Shape::Wide),
+    ("light-tall", Theme::Light, Shape::Tall),
+    ("dark-wide", Theme::Dark, Shape::Wide),
+    ("dark-tall", Theme::Dark, Shape::Tall),
+];
 
 /// What the page must know of a run before it opens it.
 #[derive(Debug, Serialize, Deserialize)]
@@ -29,7 +40,12 @@ pub(super) struct Recorded {
 }
 
 /// Runs a plan with a seed and writes its files.
-pub(super) fn record(plan: &Plan<'_>, seed: u64, folder: &Path, tick: &dyn Fn()) -> Result<Recorded, ExportError> {
+pub(super) fn record(
+    plan: &Plan<'_>,
+    seed: u64,
+    folder: &Path,
+    tick: &(dyn Fn() + Sync),
+) -> Result<Recorded, ExportError> {
     let scenario = plan.scenario;
     let mut experiment = scenario.experiment(seed, Some(&plan.learners))?;
     let live = LiveLog::new();
@@ -45,7 +61,7 @@ pub(super) fn record(plan: &Plan<'_>, seed: u64, folder: &Path, tick: &dyn Fn())
             tick();
         }
         let report = experiment.latest();
-        recorder.log(report)?;
+        recorder.log_moving(report, FRAMES)?;
         csv.write(report)?;
         serde_json::to_writer(&mut reports, report)?;
         reports.push(b'\n');
@@ -59,6 +75,11 @@ pub(super) fn record(plan: &Plan<'_>, seed: u64, folder: &Path, tick: &dyn Fn())
     write_packed(&folder.join("reports.ndjson.gz"), &reports)?;
     let messages = live.put_together(&live.scene_parts_from(1))?;
     write(&folder.join("scene.rrd"), &[live.header(), messages].concat())?;
+    for (name, theme, shape) in ARRANGEMENTS {
+        if let Some(arrangement) = live.blueprint(theme, shape)? {
+            write(&folder.join(format!("blueprint-{name}.rbl")), &arrangement)?;
+        }
+    }
     write(&folder.join("recording.rrd"), &live.complete()?)?;
     write(&folder.join("steps.csv"), &table)?;
     write_json(&folder.join("result.json"), &experiment.result())?;

@@ -23,10 +23,16 @@ pub fn steps_of_recording(bytes: &[u8]) -> BTreeSet<i64> {
         let LogMsg::ArrowMsg(store, message) = message.expect("a message") else { continue };
         let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
         if store.is_recording() {
-            steps.extend(chunk.timelines().values().flat_map(|times| times.times_raw().iter().copied()));
+            steps.extend(times(&chunk, "step"));
         }
     }
     steps
+}
+
+/// The times of a chunk's rows on a timeline.
+pub fn times<'a>(chunk: &'a Chunk, timeline: &'a str) -> impl Iterator<Item = &'a i64> {
+    let columns = chunk.timelines().iter().filter(move |(name, _)| name.as_str() == timeline);
+    columns.flat_map(|(_, times)| times.times_raw())
 }
 
 /// The WebSocket of a session.

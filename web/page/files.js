@@ -14,6 +14,11 @@ export const server = false;
 const sessions = new Map();
 let opened = 0;
 
+/** What is to be used where the page cannot be shown. */
+export const instead = "the recordings in the folder runs open in Rerun's own viewer.";
+
+const sorted = (names) => [...names].sort().join(", ");
+
 const folder = new URL(".", document.baseURI);
 const at = (path) => new URL(path, folder);
 
@@ -47,30 +52,55 @@ const manifest = get("export.json").then((response) => response.json());
 // Who asks for it first hears of a failure.
 manifest.catch(() => {});
 
-/** The address of a query, completed by the first of the recorded runs. @param {string} search */
-export async function query(search) {
+/**
+ * The query to begin with: the page's own, or where that asks for what is not recorded, the nearest run that is.
+ * @param {string} search
+ * @returns {Promise<{query: string, note?: string}>}
+ */
+export async function begin(search) {
   const asked = new URLSearchParams(search);
   const { scenarios } = await manifest.catch(() => ({ scenarios: [] }));
   const scenario = scenarios.find(({ name }) => name === asked.get("scenario")) ?? scenarios[0];
-  if (scenario === undefined) return search;
-  if (!asked.has("scenario")) asked.set("scenario", scenario.name);
-  if (!asked.has("seed")) asked.set("seed", scenario.runs[0].seed);
-  return `?${asked}`;
+  if (scenario === undefined) return { query: search };
+  const run = scenario.runs.find(({ seed }) => String(seed) === asked.get("seed")) ?? scenario.runs[0];
+  const learners = sorted((asked.get("learners") ?? "").split(","));
+  const recorded = { scenario: scenario.name, seed: String(run.seed), learners: run.learners.join(",") };
+  const missing = Object.keys(recorded).filter((name) => {
+    const same = name === "learners" ? learners === sorted(run.learners) : asked.get(name) === recorded[name];
+    return asked.has(name) && !same;
+  });
+  Object.entries(recorded).forEach(([name, value]) => name !== "learners" && asked.set(name, value));
+  if (missing.includes("learners")) asked.delete("learners");
+  // Sessions are of this visit alone.
+  asked.delete("session");
+  const note = `${missing.map((name) => `${name}=${new URLSearchParams(search).get(name)}`).join(", ")} is not recorded here`;
+  return missing.length === 0 ? { query: `?${asked}` } : { query: `?${asked}`, note };
 }
+
+/** Files of WebAssembly that were asked for, and will be asked for again. */
+const again = new Map();
 
 /** A file of WebAssembly, as the browser takes it. @param {string} address */
 export async function wasm(address) {
   const path = address.split("?")[0];
   const length = (await manifest).unpacked[path] ?? 0;
   const headers = { "Content-Type": "application/wasm", "Uncompressed-Length": String(length) };
-  return new Response(await content(await get(address)), { headers });
+  // The viewer's is fetched to show how far it is, and then to be used: hosts that let nothing be kept send it once.
+  const [now, later] = again.get(address) ?? (await content(await get(address))).tee();
+  if (later === undefined) again.delete(address);
+  else again.set(address, [later]);
+  return new Response(now, { headers });
 }
 
 /** Where a file of a session is. @param {string} path as on a server */
 export function place(path) {
-  const [, , kind, id, file] = path.split("/");
+  const [address, asked] = path.split("?");
+  const [, , kind, id, file] = address.split("/");
   const session = kind === "sessions" ? sessions.get(id) : undefined;
-  return session === undefined ? path : at(`${session.run.folder}/${file}`).href;
+  if (session === undefined) return path;
+  const { theme = "light", shape = "wide" } = Object.fromEntries(new URLSearchParams(asked));
+  const name = file === "blueprint.rbl" ? `blueprint-${theme}-${shape}.rbl` : file;
+  return at(`${session.run.folder}/${name}`).href;
 }
 
 /**
@@ -141,7 +171,6 @@ async function open({ scenario: name, seed, learners }) {
     const seeds = scenario.runs.map(({ seed }) => seed).join(", ");
     throw problem(409, "Not recorded", `this page holds ${name} with the seeds ${seeds}, not ${seed}`, { field: "seed" });
   }
-  const sorted = (names) => [...names].sort().join(", ");
   if (learners != null && sorted(learners) !== sorted(run.learners)) {
     const detail = `this page holds ${name} with the learners ${run.learners.join(", ")}, recorded together`;
     throw problem(409, "Not recorded", detail, { field: "learners" });

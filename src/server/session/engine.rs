@@ -165,7 +165,7 @@ impl Engine<'_> {
                 drop(reply.send(self.experiment.appraise(&learner, &configuration).map_err(Problem::from)));
             }
             Command::SetConfiguration { learner, configuration, reply } => {
-                drop(reply.send(self.experiment.set_configuration(&learner, &configuration).map_err(Problem::from)));
+                drop(reply.send(self.set_configuration(&learner, &configuration, recorder)));
             }
             Command::Configuration { learner, reply } => {
                 let configuration = self.experiment.configuration(&learner).map_err(Problem::from);
@@ -176,6 +176,25 @@ impl Engine<'_> {
             #[cfg(test)]
             Command::Panic => panic!("as the test asked"),
         }
+    }
+
+    /// Sets a movement and draws its posture beside the arm.
+    fn set_configuration(
+        &mut self,
+        learner: &str,
+        configuration: &[f64],
+        recorder: &mut Recorder,
+    ) -> Result<AppraisalReport, Problem> {
+        // Every posture that is tried out is recorded.
+        self.has_no_room().map_or(Ok(()), Err)?;
+        let appraisal = self.experiment.set_configuration(learner, configuration)?;
+        let place = self.experiment.chosen_for().find(|(_, name)| *name == learner).map(|(place, _)| place);
+        if let Some(place) = place {
+            let step = self.experiment.latest().step;
+            recorder.log_ghost(step, place, Some(&appraisal.estimated_skeleton_m)).map_err(recording_failed)?;
+        }
+        self.shared.publish(Vec::new(), self.experiment.remaining());
+        Ok(appraisal)
     }
 
     fn flush(&self, recorder: &mut Recorder) -> Result<(), Problem> {
@@ -260,6 +279,10 @@ impl Engine<'_> {
             let detail = format!("a session makes at most {MAX_STEPS_PER_SESSION} steps: {left} are left, not {count}");
             return Some(few(left, detail));
         }
+        self.has_no_room()
+    }
+
+    fn has_no_room(&self) -> Option<Problem> {
         (!self.shared.budget.has_room()).then(|| {
             Problem::new(Kind::ServerFull, "the sessions together fill the server's memory; delete some and go on")
         })
