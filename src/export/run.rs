@@ -5,7 +5,7 @@
 //! | `description.json` | what stays the same from step to step |
 //! | `reports.ndjson.gz` | one report a line, from step 0 |
 //! | `scene.rrd` | the recording as the page's viewer takes it: a header of 12 bytes, then messages |
-//! | `blueprint-THEME-SHAPE.rbl` | the arrangements of views by which the page restores its own |
+//! | `blueprint-{light,dark}-{wide,tall}.rbl` | arrangements of its views, in the same form |
 //! | `selections/LEARNER/STEP.json.gz` | how each movement was chosen, where a search was made |
 //! | `recording.rrd`, `steps.csv`, `result.json` | to take away |
 
@@ -22,13 +22,6 @@ use crate::{
 
 /// Postures on the way from each step to the next, in which the page moves while it plays slowly.
 const FRAMES: u64 = 6;
-/// The pages for which views are arranged, by the names under which they are asked for.
-const ARRANGEMENTS: [(&str, Theme, Shape); 4] = [
-    ("light-wide", Theme::Light, Shape::Wide),
-    ("light-tall", Theme::Light, Shape::Tall),
-    ("dark-wide", Theme::Dark, Shape::Wide),
-    ("dark-tall", Theme::Dark, Shape::Tall),
-];
 
 /// What the page must know of a run before it opens it.
 #[derive(Debug, Serialize, Deserialize)]
@@ -75,9 +68,11 @@ pub(super) fn record(
     write_packed(&folder.join("reports.ndjson.gz"), &reports)?;
     let messages = live.put_together(&live.scene_parts_from(1))?;
     write(&folder.join("scene.rrd"), &[live.header(), messages].concat())?;
-    for (name, theme, shape) in ARRANGEMENTS {
-        if let Some(arrangement) = live.blueprint(theme, shape)? {
-            write(&folder.join(format!("blueprint-{name}.rbl")), &arrangement)?;
+    for (theme, shade) in [(Theme::Light, "light"), (Theme::Dark, "dark")] {
+        for (shape, form) in [(Shape::Wide, "wide"), (Shape::Tall, "tall")] {
+            // There is one from step 0 on.
+            let blueprint = live.blueprint(theme, shape.aspect())?.unwrap_or_default();
+            write(&folder.join(format!("blueprint-{shade}-{form}.rbl")), &blueprint)?;
         }
     }
     write(&folder.join("recording.rrd"), &live.complete()?)?;

@@ -174,14 +174,19 @@ impl LearnerEntities {
         }
         let links = links.map(|posture| posture.links).unwrap_or_default();
         let points = self.uncertainty.of_points(model, joints);
-        if let Some(points) = &points {
-            let drawn = Drawn::new(points, &links, self.colour, CLOUD);
-            rows.at(step, &self.entity("point_ellipsoids"), &drawn.parts());
-        }
         let allowed = self.uncertainty.of_allowed(model, joints);
-        if let Some(allowed) = &allowed {
-            let drawn = Drawn::new(allowed, &links, self.colour, ALLOWED);
-            rows.at(step, &self.entity("allowed_ellipsoids"), &drawn.parts());
+        let (had_points, had_allowed) = match &self.shown {
+            Some(shown) => (shown.points.is_some(), shown.allowed.is_some()),
+            None => (false, false),
+        };
+        for (clouds, had, name, alpha) in
+            [(&points, had_points, "point_ellipsoids", CLOUD), (&allowed, had_allowed, "allowed_ellipsoids", ALLOWED)]
+        {
+            // Those that are no more must not stay with a later arm.
+            if clouds.is_some() || had {
+                let clouds = clouds.as_deref().unwrap_or_default();
+                rows.at(step, &self.entity(name), &Drawn::new(clouds, &links, self.colour, alpha).parts());
+            }
         }
         self.shown = Some(Shown { step, configuration, estimate, points, allowed });
     }

@@ -46,7 +46,9 @@
 //!
 //! A [`LiveLog`] has a second timeline, `motion`, on which step k is at [`MOTION_PER_STEP`] k. Between two steps it may
 //! hold postures on the way from one to the next (`arm/…`, the ellipsoids and `body/trunk` moved, the markers empty), and
-//! after a step `/{learner}/arm/ghost`, a posture that is tried out. None of this is in files and downloads.
+//! after a step `/{learner}/arm/ghost`, a posture that is tried out. The timeline `complete` reaches k as soon as all rows
+//! of step k have come: a viewer that goes there earlier shows one learner's arm and another's last one. None of this is in
+//! files and downloads.
 //!
 //! # Compatibility
 //!
@@ -97,6 +99,9 @@ pub const TIMELINE: &str = "step";
 
 /// The timeline of a live recording on which there is something between two steps.
 pub const MOTION: &str = "motion";
+
+/// The timeline of a live recording, and the entity on it, that tells up to which step it is whole.
+pub const COMPLETE: &str = "complete";
 
 /// So many ticks of [`MOTION`] are from one step to the next.
 pub const MOTION_PER_STEP: u64 = 32;

@@ -6,7 +6,7 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::IntoResponse,
 };
-use serde::de::{DeserializeOwned, IgnoredAny};
+use serde::de::{DeserializeOwned, IgnoredAny, IntoDeserializer};
 
 use super::{
     MAX_BODY_BYTES,
@@ -77,6 +77,26 @@ pub(super) fn whole_numbers<const N: usize>(
     query: Option<&str>,
     known: [&'static str; N],
 ) -> Result<[Option<u64>; N], Problem> {
+    let mut numbers = [None; N];
+    for (number, (name, value)) in numbers.iter_mut().zip(known.into_iter().zip(parameters(query, known)?)) {
+        *number = value.map(|value| whole_number(name, value)).transpose()?;
+    }
+    Ok(numbers)
+}
+
+/// One of the words that `T` is written as, its default where the parameter is absent.
+pub(super) fn word<T: DeserializeOwned + Default>(name: &'static str, value: Option<&str>) -> Result<T, Problem> {
+    let Some(value) = value else { return Ok(T::default()) };
+    T::deserialize(value.into_deserializer()).map_err(|error: serde::de::value::Error| {
+        Problem::new(Kind::Malformed, format!("`{name}`: {error}")).field(name)
+    })
+}
+
+/// The parameters of a query as they are written, each of which must be among `known`.
+pub(super) fn parameters<'a, const N: usize>(
+    query: Option<&'a str>,
+    known: [&'static str; N],
+) -> Result<[Option<&'a str>; N], Problem> {
     let mut values = [None; N];
     for pair in query.unwrap_or_default().split('&').filter(|pair| !pair.is_empty()) {
         let (name, value) = pair.split_once('=').unwrap_or((pair, ""));
@@ -84,7 +104,7 @@ pub(super) fn whole_numbers<const N: usize>(
             let detail = format!("there is no parameter `{name}`; there is: {}", known.join(", "));
             return Err(Problem::new(Kind::Malformed, detail).field(name));
         };
-        values[index] = Some(whole_number(name, value)?);
+        values[index] = Some(value);
     }
     Ok(values)
 }

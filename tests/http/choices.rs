@@ -4,14 +4,9 @@ use body_schema::{
     experiment::{AppraisalReport, Choice},
     scenario::builtin,
 };
-use re_log_encoding::DecoderApp;
-use rerun::log::{Chunk, LogMsg};
 use serde_json::json;
 
-use crate::{
-    streams,
-    support::{Server, problem},
-};
+use crate::support::{Server, problem};
 
 #[tokio::test]
 async fn a_choice_can_be_looked_into_and_questioned() {
@@ -95,40 +90,4 @@ async fn a_person_sets_each_movement_before_its_step() {
     let recorded = json!({ "scenario": "tiago-mocap", "learners": ["human"] });
     problem(server.post("/v1/sessions", recorded).await, 422, Some("learners")).await;
     server.stop().await;
-}
-
-/// Each posture that is tried out is drawn beside the learner's arm until the next movement begins.
-#[tokio::test]
-async fn a_posture_that_is_tried_out_is_seen_by_those_who_watch() {
-    let server = Server::start().await;
-    let session = server.open(json!({ "scenario": "arm-6dof", "learners": ["human", "random"] })).await;
-    let live = server.get(&format!("{session}/live.rrd")).await;
-    for step in 0..2 {
-        for angle in [0.1, 0.2] {
-            let pose = json!({ "configuration": [angle, 0.2, -0.3, -1.0, 0.4, 0.5] });
-            assert_eq!(server.post(&format!("{session}/learners/human/configuration"), pose).await.status(), 200);
-        }
-        assert_eq!(server.step(&session, 1).await["step"], step + 1);
-    }
-    let file = server.get(&format!("{session}/recording.rrd")).await.bytes().await.expect("a recording");
-    server.delete(&session).await;
-    let live = live.bytes().await.expect("a recording");
-    assert_eq!(ghosts(&live), [0, 0, 1, 32, 32, 33], "two postures after each step, until the next movement begins");
-    assert_eq!(ghosts(&file), [] as [i64; 0], "what was only tried out is nothing to keep");
-    server.stop().await;
-}
-
-/// When postures that were tried out were drawn or cleared, on the timeline `motion`.
-fn ghosts(bytes: &[u8]) -> Vec<i64> {
-    let messages = DecoderApp::decode_eager(std::io::Cursor::new(bytes.to_vec())).expect("a recording");
-    let mut times = Vec::new();
-    for message in messages {
-        let LogMsg::ArrowMsg(_, message) = message.expect("a message") else { continue };
-        let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
-        if chunk.entity_path().to_string() == "/human/arm/ghost" {
-            times.extend(streams::times(&chunk, "motion"));
-        }
-    }
-    times.sort_unstable();
-    times
 }

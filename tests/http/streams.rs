@@ -22,17 +22,11 @@ pub fn steps_of_recording(bytes: &[u8]) -> BTreeSet<i64> {
     for message in messages {
         let LogMsg::ArrowMsg(store, message) = message.expect("a message") else { continue };
         let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
-        if store.is_recording() {
-            steps.extend(times(&chunk, "step"));
+        if store.is_recording() && !chunk.is_static() {
+            steps.extend(chunk.iter_indices(&"step".into()).map(|(step, _)| step.as_i64()));
         }
     }
     steps
-}
-
-/// The times of a chunk's rows on a timeline.
-pub fn times<'a>(chunk: &'a Chunk, timeline: &'a str) -> impl Iterator<Item = &'a i64> {
-    let columns = chunk.timelines().iter().filter(move |(name, _)| name.as_str() == timeline);
-    columns.flat_map(|(_, times)| times.times_raw())
 }
 
 /// The WebSocket of a session.

@@ -92,15 +92,18 @@ export async function wasm(address) {
   return new Response(now, { headers });
 }
 
+/** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */
+export async function arrangement(id, { theme, aspect }) {
+  const shape = aspect < 1 ? "tall" : "wide";
+  const response = await get(`${known(id).run.folder}/blueprint-${theme}-${shape}.rbl`);
+  return response.arrayBuffer();
+}
+
 /** Where a file of a session is. @param {string} path as on a server */
 export function place(path) {
-  const [address, asked] = path.split("?");
-  const [, , kind, id, file] = address.split("/");
+  const [, , kind, id, file] = path.split("/");
   const session = kind === "sessions" ? sessions.get(id) : undefined;
-  if (session === undefined) return path;
-  const { theme = "light", shape = "wide" } = Object.fromEntries(new URLSearchParams(asked));
-  const name = file === "blueprint.rbl" ? `blueprint-${theme}-${shape}.rbl` : file;
-  return at(`${session.run.folder}/${name}`).href;
+  return session === undefined ? path : at(`${session.run.folder}/${file}`).href;
 }
 
 /**

@@ -9,7 +9,7 @@ import { startViewer } from "./viewer.js";
 
 /** Where runs come from: a server, or files beside the page. */
 const source = await import(document.documentElement.dataset.source === "files" ? "./files.js" : "./session.js");
-const { ask, Follower, sessionOf } = source;
+const { arrangement, ask, Follower, sessionOf } = source;
 
 /** Keys that mean something to the panel wherever on the page they are pressed. */
 const KEYS = [" ", "ArrowLeft", "ArrowRight", "Escape", "+", "=", "-", "?", "r", "s", "n", "t"];
@@ -33,6 +33,8 @@ let arriving = true;
 /** Parts that came before the viewer was there, and the step to show then. */
 let waiting = [];
 let sought = null;
+/** The steps to which the recording holds postures on the way. */
+const ways = new Set();
 
 const tell = (event) => panel.receive(JSON.stringify(event));
 const seeds = new SeedRuns(tell, ask);
@@ -71,15 +73,17 @@ const commands = {
   },
 
   // The reports come over the WebSocket.
-  step: ({ session: id, count, expected_step }) =>
-    request("step", "POST", `/v1/sessions/${id}/steps`, { count, expected_step, reports: false }, ({ step }) =>
+  step({ session: id, count, expected_step, frames = 0 }) {
+    for (let step = expected_step + 1; frames > 0 && step <= expected_step + count; step++) ways.add(step);
+    return request("step", "POST", `/v1/sessions/${id}/steps`, { count, expected_step, frames, reports: false }, ({ step }) =>
       tell({ is: "stepped", session: id, step }),
-    ),
+    );
+  },
 
   seek({ step }) {
     sought = step;
     const id = session;
-    viewer?.seek(step).then(() => id === session && tell({ is: "shown", step }));
+    viewer?.seek(step, ways.has(step)).then(() => id === session && tell({ is: "shown", step }));
   },
 
   select: ({ session: id, learner }) =>
@@ -104,7 +108,7 @@ const commands = {
 
   copy: ({ text }) => copied(text).then((result) => tell({ is: "copied", ...result })),
 
-  restore_view: () => viewer?.restore?.(),
+  restore_view: () => viewer?.restore(),
 
   async picture() {
     try {
@@ -147,8 +151,9 @@ function follow(resource) {
   recording = resource.recording ?? session;
   waiting = [];
   sought = null;
+  ways.clear();
   tell({ is: "session", session: resource });
-  viewer?.open(recording);
+  show();
   follower = new Follower(session, {
     part: (part) => (viewer === null ? waiting.push(part) : viewer.feed(part)),
     message: (text) => panel.receive(`{"is":"live","message":${text}}`),
@@ -156,6 +161,12 @@ function follow(resource) {
     lost: (seconds) => tell({ is: "lost", seconds }),
     ended: (failure, unseen) => tell({ is: "ended", failure, unseen }),
   });
+}
+
+/** Opens the session's recording in the viewer, if it is there. */
+function show() {
+  const id = session;
+  viewer?.open(recording, (view) => arrangement(id, view));
 }
 
 /** What the colours of the legend mean, for a picture. */
@@ -239,14 +250,13 @@ async function openViewer() {
       element("viewer"),
       { script: element("viewer-script").href, wasm: () => source.wasm(element("viewer-wasm").dataset.address) },
       (fraction) => (fraction === null ? progress.removeAttribute("value") : (progress.value = fraction)),
-      (step) => tell({ is: "scrubbed", step }),
     );
     viewer = opened;
     element("viewer").tabIndex = 0;
     nameTextAgents();
     (before?.isConnected && before !== document.body ? before : element("controls")).focus();
     element("legend").hidden = false;
-    if (session !== null) viewer.open(recording);
+    if (session !== null) show();
     waiting.splice(0).forEach((part) => viewer.feed(part));
     if (sought !== null) commands.seek({ step: sought });
     element("cover").hidden = true;
@@ -320,7 +330,7 @@ addEventListener("popstate", () => {
   arriving = true;
   if (panel !== null) tell({ is: "navigated", query: location.search });
 });
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => viewer?.restore?.());
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => viewer?.restore());
 atScene(element("scene"));
 if (new URLSearchParams(location.search).get("embed") === "1") document.documentElement.dataset.embed = "";
 

@@ -30,6 +30,14 @@ export const begin = async (search) => ({ query: search });
 /** A file of WebAssembly. @param {string} address */
 export const wasm = (address) => fetch(address);
 
+/** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */
+export async function arrangement(id, { theme, aspect }) {
+  const query = new URLSearchParams({ theme, aspect: aspect.toFixed(3) });
+  const response = await fetch(`/v1/sessions/${encodeURIComponent(id)}/blueprint.rbl?${query}`);
+  if (!response.ok) throw new Error(`there is no arrangement (${response.status})`);
+  return response.arrayBuffer();
+}
+
 /** Where a file of a session is. @param {string} path */
 export const place = (path) => path;
 
