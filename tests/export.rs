@@ -83,7 +83,7 @@ fn a_folder_holds_the_page_and_the_runs_that_were_asked_for() {
             assert_eq!(json(&of_run, "result.json")["steps"], 3);
             let rows = std::fs::read_to_string(of_run.join("steps.csv")).expect("a table").lines().count();
             assert_eq!(rows, 1 + 2 * 4, "a header, and steps 0 to 3 of two learners");
-            for file in ["scene.rrd", "recording.rrd", "reports.ndjson.gz", "blueprint-dark-tall.rbl"] {
+            for file in ["scene.rrd", "recording.rrd", "reports.ndjson.gz", "blueprint-dark-0.7.rbl"] {
                 assert!(of_run.join(file).is_file(), "{file}");
             }
             assert_eq!(run["searched"], serde_json::json!(["active"]));
@@ -166,13 +166,10 @@ async fn a_folder_plays_to_its_end_below_any_address() {
     let size: u64 = files(folder.path()).iter().map(|(_, size)| size).sum();
     assert!(size < MOST_BYTES, "{size} bytes: {:#?}", files(folder.path()));
     in_browser(&folder, "/demo/", |page, address| async move {
-        page.open(&address).await;
+        page.open(&format!("{address}?speed=20&stop=never")).await;
         page.wait_for_state("step 1", "state.phase === 'ready' && state.step === '1'").await;
         page.wait_for("the scene", "document.getElementById('cover').hidden").await;
         page.press(ESCAPE).await;
-        for _ in 0..4 {
-            page.press('+').await;
-        }
         page.press(SPACE).await;
         page.wait_for_state("the end", "state.step === '60' && state.latest === '60' && state.phase !== 'playing'")
             .await;
@@ -181,7 +178,6 @@ async fn a_folder_plays_to_its_end_below_any_address() {
         page.wait_for("the address", "new URLSearchParams(location.search).get('step') === '59'").await;
         let query = page.evaluate("location.search").await;
         let query = query.as_str().expect("text");
-        assert!(!query.contains("session="), "sessions are of one visit alone: {query}");
 
         // Whoever gets the address sees the same; why a movement was chosen can be asked.
         page.open(&format!("{address}{query}&tab=why")).await;

@@ -47,6 +47,8 @@ struct SeedRange {
 
 /// More runs than this make a folder that nobody downloads.
 const MOST_SEEDS: usize = 200;
+/// Browsers read greater numbers as others.
+const MAX_SEED: u64 = (1 << 53) - 1;
 
 impl FromStr for SeedRange {
     type Err = String;
@@ -57,6 +59,9 @@ impl FromStr for SeedRange {
         let (first, last) = (number(first)?, number(last)?);
         if first > last {
             return Err(format!("the range is empty; write {last}..{first}"));
+        }
+        if last > MAX_SEED {
+            return Err(format!("a page takes seeds up to {MAX_SEED}"));
         }
         if (last - first) as usize >= MOST_SEEDS {
             return Err(format!("at most {MOST_SEEDS} seeds in one go"));
@@ -108,7 +113,7 @@ mod tests {
     fn seeds_are_numbers_and_ranges() {
         let range = |text: &str| text.parse::<SeedRange>().map(|range| (range.first, range.last));
         assert_eq!((range("7"), range("1..5"), range("3..3")), (Ok((7, 7)), Ok((1, 5)), Ok((3, 3))));
-        for text in ["", "x", "-1", "5..1", "1..", "1..1000", "0..18446744073709551615"] {
+        for text in ["", "x", "-1", "5..1", "1..", "1..1000", "0..18446744073709551615", "9007199254740992"] {
             assert!(range(text).is_err(), "{text}");
         }
     }

@@ -163,7 +163,7 @@ pub struct AppraisalReport {
     /// `gain` as a share of `best_gain`, from 0 to 1; null without one. DIRECT's best is not always the best there is: who
     /// finds a better movement has a share of 1.
     #[serde(default)]
-    pub share_of_best: Option<f64>,
+    pub share: Option<f64>,
     /// The criterion before: tr(W P), but for a policy that goes by more.
     pub trace: f64,
     /// The arm in this configuration as estimated: axis points in order, then the marker, metres.
@@ -185,7 +185,7 @@ impl AppraisalReport {
             criterion: appraisal.criterion,
             gain: appraisal.gain,
             best_gain,
-            share_of_best: best_gain.filter(|best| *best > 0.0).map(|best| (appraisal.gain / best).clamp(0.0, 1.0)),
+            share: best_gain.filter(|best| *best > 0.0).map(|best| (appraisal.gain / best).clamp(0.0, 1.0)),
             estimated_skeleton_m: arrays(&estimate.measured().skeleton(configuration)),
             trace: appraisal.before,
             predicted_marker_m: array(&appraisal.marker.coords),

@@ -137,12 +137,12 @@ fn a_posture_is_told_its_share_of_the_best_gain() {
         let joints = experiment.description().joints.len();
         for _ in 0..3 {
             let told = experiment.set_configuration("human", &vec![0.05; joints]).expect("an appraisal");
-            assert_eq!(told.share_of_best, Some((told.gain / told.best_gain.expect("searched")).clamp(0.0, 1.0)));
+            assert_eq!(told.share, Some((told.gain / told.best_gain.expect("searched")).clamp(0.0, 1.0)));
             experiment.step().expect("a step");
             let again = experiment.appraise("human", &vec![0.05; joints]).expect("an appraisal");
             assert_eq!(
-                (again.best_gain, again.share_of_best),
-                (told.best_gain, told.share_of_best),
+                (again.best_gain, again.share),
+                (told.best_gain, told.share),
                 "the same, looked back at"
             );
         }
@@ -151,10 +151,10 @@ fn a_posture_is_told_its_share_of_the_best_gain() {
         let (_, centre) = best.min_by(|a, b| a.0.total_cmp(&b.0)).expect("boxes");
         let limits = choice.joints.iter().map(|joint| joint.limits);
         let best: Vec<f64> = limits.zip(centre).map(|([lower, upper], x)| lower + x * (upper - lower)).collect();
-        let share = experiment.appraise("human", &best).expect("an appraisal").share_of_best.expect("searched");
+        let share = experiment.appraise("human", &best).expect("an appraisal").share.expect("searched");
         assert!(share > 1.0 - 1e-9, "{name}: {share}");
         let chosen = experiment.latest().learners[0].movement.clone().expect("a movement");
-        let share = experiment.appraise("active", &chosen.configuration).expect("an appraisal").share_of_best;
+        let share = experiment.appraise("active", &chosen.configuration).expect("an appraisal").share;
         assert!(share.expect("searched") > 1.0 - 1e-9, "{name}: {share:?}");
     }
 }

@@ -63,7 +63,7 @@ async fn a_person_sets_each_movement_before_its_step() {
 
     let answer = server.post(&of("human"), json!({ "configuration": pose })).await;
     let expected: AppraisalReport = answer.json().await.expect("an appraisal");
-    assert!((0.0..=1.0).contains(&expected.share_of_best.expect("DIRECT's best is known")), "{expected:?}");
+    assert!((0.0..=1.0).contains(&expected.share.expect("DIRECT's best is known")), "{expected:?}");
     let marker = expected.estimated_skeleton_m.last().expect("the marker");
     assert!(marker.iter().zip(expected.predicted_marker_m).all(|(drawn, told)| (drawn - told).abs() < 1e-12));
     assert_eq!(server.get_json(&of("human")).await, json!({ "configuration": pose }));

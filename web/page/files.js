@@ -55,26 +55,28 @@ manifest.catch(() => {});
 /**
  * The query to begin with: the page's own, or where that asks for what is not recorded, the nearest run that is.
  * @param {string} search
- * @returns {Promise<{query: string, note?: string}>}
+ * @returns {Promise<{query: string, seeds: number[], note?: string}>} with the seeds of all that is recorded
  */
 export async function begin(search) {
   const asked = new URLSearchParams(search);
   const { scenarios } = await manifest.catch(() => ({ scenarios: [] }));
   const scenario = scenarios.find(({ name }) => name === asked.get("scenario")) ?? scenarios[0];
-  if (scenario === undefined) return { query: search };
+  if (scenario === undefined) return { query: search, seeds: [] };
+  const seeds = scenario.runs.map(({ seed }) => seed);
   const run = scenario.runs.find(({ seed }) => String(seed) === asked.get("seed")) ?? scenario.runs[0];
-  const learners = sorted((asked.get("learners") ?? "").split(","));
-  const recorded = { scenario: scenario.name, seed: String(run.seed), learners: run.learners.join(",") };
-  const missing = Object.keys(recorded).filter((name) => {
-    const same = name === "learners" ? learners === sorted(run.learners) : asked.get(name) === recorded[name];
-    return asked.has(name) && !same;
-  });
-  Object.entries(recorded).forEach(([name, value]) => name !== "learners" && asked.set(name, value));
-  if (missing.includes("learners")) asked.delete("learners");
-  // Sessions are of this visit alone.
-  asked.delete("session");
-  const note = `${missing.map((name) => `${name}=${new URLSearchParams(search).get(name)}`).join(", ")} is not recorded here`;
-  return missing.length === 0 ? { query: `?${asked}` } : { query: `?${asked}`, note };
+  const isRecorded = {
+    scenario: (name) => name === scenario.name,
+    seed: (seed) => seed === String(run.seed),
+    learners: (names) => sorted(names.split(",")) === sorted(run.learners),
+  };
+  const missing = Object.keys(isRecorded).filter((name) => asked.has(name) && !isRecorded[name](asked.get(name)));
+  const inVain = missing.map((name) => `${name}=${asked.get(name)}`).join(", ");
+  // Sessions are of one visit alone.
+  for (const name of [...missing, "session"]) asked.delete(name);
+  asked.set("scenario", scenario.name);
+  asked.set("seed", run.seed);
+  const note = missing.length > 0 ? `${inVain} is not recorded here; the page shows what is.` : undefined;
+  return { query: `?${asked}`, seeds, note };
 }
 
 /** Files of WebAssembly that were asked for, and will be asked for again. */
@@ -94,9 +96,9 @@ export async function wasm(address) {
 
 /** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */
 export async function arrangement(id, { theme, aspect }) {
-  const shape = aspect < 1 ? "tall" : "wide";
-  const response = await get(`${known(id).run.folder}/blueprint-${theme}-${shape}.rbl`);
-  return response.arrayBuffer();
+  const { folder: place, aspects } = known(id).run;
+  const fitting = aspects.filter((one) => one <= aspect).at(-1) ?? aspects[0];
+  return (await get(`${place}/blueprint-${theme}-${fitting}.rbl`)).arrayBuffer();
 }
 
 /** Where a file of a session is. @param {string} path as on a server */

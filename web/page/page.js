@@ -226,8 +226,8 @@ async function openPanel() {
       text.textContent = `The controls have crashed: ${failure} Reload the page: the run is kept.`;
       element("panel-cover").hidden = false;
     }, 1000);
-    const { query, note } = await source.begin(location.search);
-    tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server });
+    const { query, seeds: recorded, note } = await source.begin(location.search);
+    tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server, seeds: recorded });
     if (note !== undefined) tell({ is: "refused", asked: "address", problem: { status: 404, detail: note } });
     return true;
   } catch (error) {

@@ -25,7 +25,7 @@ export const server = true;
 export const instead = "the HTTP interface at /v1/openapi.json and the command line do without.";
 
 /** The query to begin with: the page's own. @param {string} search */
-export const begin = async (search) => ({ query: search });
+export const begin = async (search) => ({ query: search, seeds: [] });
 
 /** A file of WebAssembly. @param {string} address */
 export const wasm = (address) => fetch(address);

@@ -323,3 +323,23 @@ fn everything_can_be_taken_away() {
     let Some(Command::Copy { text }) = commands.last() else { panic!("{commands:?}") };
     assert!(text.starts_with("?v=1") && !text.contains("session="), "{text}");
 }
+
+#[test]
+fn without_a_server_recorded_runs_are_offered_and_nothing_that_has_to_be_computed() {
+    let mut page = Page::open("");
+    page.tell(json!({ "is": "begin", "query": "?scenario=arm-6dof&seed=2&learners=active,random", "known": true,
+        "server": false, "seeds": [2, 4] }));
+    page.begin();
+    for absent in ["New seed", "Compare", "Run to", "Beat the algorithm", "The HTTP interface"] {
+        assert!(!page.has(absent), "{absent}");
+    }
+    page.commands();
+    page.click("Seed");
+    page.click("4");
+    let commands = page.commands();
+    let open = commands.iter().find_map(|command| match command {
+        Command::Open { scenario, seed, .. } => Some((scenario.as_str(), *seed)),
+        _ => None,
+    });
+    assert_eq!(open, Some(("arm-6dof", 4)), "{commands:?}");
+}
