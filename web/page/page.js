@@ -83,7 +83,7 @@ const commands = {
   seek({ step }) {
     sought = step;
     const id = session;
-    viewer?.seek(step, ways.has(step)).then(() => id === session && tell({ is: "shown", step }));
+    return viewer?.seek(step, ways.has(step)).then(() => id === session && tell({ is: "shown", step }));
   },
 
   select: ({ session: id, learner }) =>
@@ -258,8 +258,9 @@ async function openViewer() {
     element("legend").hidden = false;
     if (session !== null) show();
     waiting.splice(0).forEach((part) => viewer.feed(part));
-    if (sought !== null) commands.seek({ step: sought });
-    element("cover").hidden = true;
+    // Until a step is there in full, an arm or two would stand for all.
+    const shown = sought === null ? Promise.resolve() : commands.seek({ step: sought });
+    shown.then(() => (element("cover").hidden = true));
     const watch = setInterval(() => {
       const failure = viewer.failure();
       if (failure === null) return;
