@@ -9,7 +9,7 @@ use serde_json::json;
 use crate::support::{Server, problem, steps};
 
 /// The times of an entity's rows in a recording.
-fn times(recording: &[u8], entity: &str, timeline: &str) -> BTreeSet<i64> {
+fn times(recording: &[u8], entity: &str, timeline: &'static str) -> BTreeSet<i64> {
     let messages = DecoderApp::decode_eager(Cursor::new(recording)).expect("a stream");
     let mut times = BTreeSet::new();
     for message in messages {
