@@ -6,7 +6,7 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::IntoResponse,
 };
-use serde::de::{DeserializeOwned, IntoDeserializer};
+use serde::de::{DeserializeOwned, IgnoredAny, IntoDeserializer};
 
 use super::{
     MAX_BODY_BYTES,
@@ -47,12 +47,12 @@ fn is_json(headers: &HeaderMap) -> bool {
 
 fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     // Syntax first: a body that breaks off is not blamed on the field where it does.
-    let value: serde_json::Value = serde_json::from_slice(bytes)
+    serde_json::from_slice::<IgnoredAny>(bytes)
         .map_err(|error| Problem::new(Kind::Malformed, format!("the body is not JSON: {error}")))?;
-    if !value.is_object() {
+    if !bytes.trim_ascii_start().starts_with(b"{") {
         return Err(Problem::new(Kind::InvalidValue, "the body must be a JSON object"));
     }
-    // Then from the text again, which also finds repeated fields.
+    // Then what it says, which also finds repeated fields and numbers that are too large.
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
     serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
         let message = error.inner().to_string();
@@ -133,6 +133,9 @@ mod tests {
         #[serde(default)]
         #[allow(dead_code)]
         learners: Vec<String>,
+        #[serde(default)]
+        #[allow(dead_code)]
+        configuration: Vec<f64>,
     }
 
     #[test]
@@ -146,6 +149,9 @@ mod tests {
             (r#"{"scenario":"a","scenario":"b"}"#, 422, Some("scenario")),
             (r#"{"scenario":"a","learners":["b",2]}"#, 422, Some("learners[1]")),
             (r#"{"scenario":"a","learners":"b"}"#, 422, Some("learners")),
+            (r#"{"scenario":"a","configuration":[0,1e999]}"#, 422, Some("configuration[1]")),
+            (r#"{"scenario":"a","configuration":[NaN]}"#, 400, None),
+            (" 1", 422, None),
         ] {
             let problem = parse::<Body>(body.as_bytes()).expect_err(body);
             assert_eq!((problem.status, problem.field.as_deref()), (status, field), "{body}: {}", problem.detail);

@@ -237,14 +237,15 @@ async function openPanel() {
       element("panel-cover").hidden = false;
     }, 1000);
     new ResizeObserver(layOut).observe(element("panel"));
-    const query = await source.query(location.search);
-    tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server });
+    const { query, seeds: recorded, note } = await source.begin(location.search);
+    tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server, seeds: recorded });
+    if (note !== undefined) tell({ is: "refused", asked: "address", problem: { status: 404, detail: note } });
     return true;
   } catch (error) {
     document.querySelector("#panel-cover progress").hidden = true;
     text.textContent =
       `The controls cannot be shown: ${error.message ?? error}. They need a browser with WebGL 2 and WebAssembly; ` +
-      "the HTTP interface at /v1/openapi.json and the command line do without.";
+      source.instead;
     element("mirror").dataset.phase = "failed";
     cover("Without the controls there is nothing to show.");
     return false;

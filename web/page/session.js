@@ -21,8 +21,11 @@ export class ProblemError extends Error {
 /** Runs are computed here and now. */
 export const server = true;
 
+/** What is to be used where the page cannot be shown. */
+export const instead = "the HTTP interface at /v1/openapi.json and the command line do without.";
+
 /** The query to begin with: the page's own. @param {string} search */
-export const query = async (search) => search;
+export const begin = async (search) => ({ query: search, seeds: [] });
 
 /** A file of WebAssembly. @param {string} address */
 export const wasm = (address) => fetch(address);

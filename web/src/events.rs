@@ -16,8 +16,8 @@ impl Panel {
     /// Takes in what happened.
     pub fn receive(&mut self, event: Event) {
         match event {
-            Event::Begin { query, known, server } => {
-                self.server = server;
+            Event::Begin { query, known, server, seeds } => {
+                (self.server, self.recorded_seeds) = (server, seeds);
                 self.begin(&query, known);
             }
             Event::Layout { scene } => self.scene = scene,

@@ -24,6 +24,9 @@ pub enum Event {
         /// Whether a server is there; without one the page shows recorded runs.
         #[serde(default = "usual")]
         server: bool,
+        /// The seeds of the recorded runs, where there is no server.
+        #[serde(default)]
+        seeds: Vec<u64>,
     },
     /// Where the scene is.
     Layout {

@@ -81,6 +81,8 @@ pub struct Panel {
     pub game: Game,
     /// Whether there is a server; without one, recorded runs are shown and nothing new is computed.
     pub server: bool,
+    /// The seeds of the recorded runs, where there is no server.
+    pub recorded_seeds: Vec<u64>,
     /// The chart that is always in sight, by its title.
     pub chart: &'static str,
     /// Whether the help is open.
@@ -146,6 +148,7 @@ impl Default for Panel {
             story: 0,
             game: Game::default(),
             server: true,
+            recorded_seeds: Vec::new(),
             chart: PREDICTION,
             help: false,
             seed_text: "1".to_owned(),

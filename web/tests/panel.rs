@@ -311,3 +311,16 @@ fn everything_can_be_taken_away() {
     let Some(Command::Copy { text }) = commands.last() else { panic!("{commands:?}") };
     assert!(text.starts_with("?v=1") && !text.contains("session="), "{text}");
 }
+
+#[test]
+fn without_a_server_recorded_runs_are_offered_and_nothing_that_has_to_be_computed() {
+    let mut page = Page::open("");
+    page.tell(json!({ "is": "begin", "query": "?scenario=arm-6dof&seed=2&learners=active,random", "known": true,
+        "server": false, "seeds": [2, 4] }));
+    page.begin();
+    for absent in ["New seed", "Beat the algorithm", "The HTTP interface"] {
+        assert!(!page.has(absent), "{absent}");
+    }
+    assert_eq!(page.harness.state().recorded_seeds, [2, 4]);
+    assert!(page.has("Seed"));
+}

@@ -187,6 +187,8 @@ impl Engine<'_> {
         configuration: &[f64],
         recorder: &mut Recorder,
     ) -> Result<AppraisalReport, Problem> {
+        // Every posture that is tried out takes memory.
+        self.has_no_room().map_or(Ok(()), Err)?;
         let appraisal = self.experiment.set_configuration(learner, configuration)?;
         let learners = &self.experiment.description().learners;
         if let Some(index) = learners.iter().position(|described| described.name == learner) {
@@ -279,6 +281,10 @@ impl Engine<'_> {
             let detail = format!("a session makes at most {MAX_STEPS_PER_SESSION} steps: {left} are left, not {count}");
             return Some(few(left, detail));
         }
+        self.has_no_room()
+    }
+
+    fn has_no_room(&self) -> Option<Problem> {
         (!self.shared.budget.has_room()).then(|| {
             Problem::new(Kind::ServerFull, "the sessions together fill the server's memory; delete some and go on")
         })

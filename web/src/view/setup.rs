@@ -43,7 +43,7 @@ impl Panel {
                 self.choose_scenario(&chosen);
             }
             if !self.server {
-                ui.label(format!("Seed {}", self.settings.seed));
+                self.choose_recorded_seed(ui);
                 return;
             }
             let label = ui.label("Seed");
@@ -150,6 +150,30 @@ impl Panel {
             _ => self.notice(format!("A seed is a whole number from 0 to {MAX_SEED}.")),
         }
         self.seed_text = self.settings.seed.to_string();
+    }
+
+    /// One of the runs that there are.
+    fn choose_recorded_seed(&mut self, ui: &mut Ui) {
+        if self.recorded_seeds.len() < 2 {
+            ui.label(format!("Seed {}", self.settings.seed));
+            return;
+        }
+        let label = ui.label("Seed");
+        let mut chosen = self.settings.seed;
+        ComboBox::from_id_salt("recorded seed")
+            .selected_text(chosen.to_string())
+            .width(70.0)
+            .show_ui(ui, |ui| {
+                for seed in &self.recorded_seeds {
+                    ui.selectable_value(&mut chosen, *seed, seed.to_string());
+                }
+            })
+            .response
+            .labelled_by(label.id);
+        if chosen != self.settings.seed {
+            self.settings.seed = chosen;
+            self.open(1);
+        }
     }
 
     /// Another seed, and its run.
