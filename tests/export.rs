@@ -4,6 +4,9 @@
 //! `BODY_SCHEMA_REQUIRE_BROWSER=1`.
 #![cfg(feature = "app")]
 
+#[allow(dead_code, reason = "shared with the tests of the page")]
+#[path = "browser/devtools.rs"]
+mod devtools;
 #[path = "browser/driver.rs"]
 #[allow(dead_code, reason = "the tests of the page with a server use the rest")]
 mod driver;
@@ -151,7 +154,7 @@ async fn in_browser<Visit: Future<Output = ()> + Send + 'static>(
     let host = Host::start(folder.path(), below).await;
     // In a task of its own, so that the browser is closed whatever becomes of it.
     let outcome = tokio::spawn(visit(browser.clone(), format!("http://{}{below}", host.address))).await;
-    let (errors, hosts) = (browser.errors().await, browser.hosts().await);
+    let (errors, hosts) = (browser.console().await, browser.hosts().await);
     browser.stop().await;
     if let Err(panic) = outcome {
         eprintln!("errors in the console: {errors:#?}; not found: {:#?}", host.missed());

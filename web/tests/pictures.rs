@@ -58,7 +58,11 @@ fn game(size: Vec2, rounds: u64) -> Page {
     page.open_session();
     for round in 0..=rounds.min(ROUNDS - 1) {
         for tried in [0.9, 0.4] {
-            let values = (0..6).map(|joint| tried * f64::from(joint + round as i32 - 2).sin()).collect();
+            let limits = page.server.experiment().description().joints.iter().map(|joint| joint.limits);
+            let within = |(joint, [lower, upper]): (usize, [f64; 2])| {
+                0.5 * (lower + upper + (upper - lower) * tried * (joint as f64 + round as f64 - 2.0).sin())
+            };
+            let values = limits.enumerate().map(within).collect();
             page.harness.state_mut().pose(values);
             page.answer_posture();
         }
