@@ -40,8 +40,22 @@ impl Browser {
         self.mouse("mouseReleased", "left", [x, y]).await;
     }
 
+    /// Presses on a point of the page, moves the pointer so far and releases it.
+    pub async fn drag(&self, [x, y]: [f64; 2], [right, down]: [f64; 2]) {
+        const MOVES: u32 = 4;
+        self.point(x, y).await;
+        self.mouse("mousePressed", "left", [x, y]).await;
+        for step in 1..=MOVES {
+            let part = f64::from(step) / f64::from(MOVES);
+            self.mouse("mouseMoved", "left", [x + part * right, y + part * down]).await;
+        }
+        self.mouse("mouseReleased", "left", [x + right, y + down]).await;
+    }
+
     async fn mouse(&self, kind: &str, button: &str, [x, y]: [f64; 2]) {
-        let event = json!({ "type": kind, "x": x, "y": y, "button": button, "clickCount": 1 });
+        // What is held down during a movement has to be said once more.
+        let buttons = u8::from(kind != "mouseReleased" && button == "left");
+        let event = json!({ "type": kind, "x": x, "y": y, "button": button, "buttons": buttons, "clickCount": 1 });
         self.tell("Input.dispatchMouseEvent", event).await;
         // Canvases look at the pointer once a frame.
         tokio::time::sleep(Duration::from_millis(300)).await;

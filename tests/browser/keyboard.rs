@@ -8,7 +8,7 @@ use crate::{
 };
 
 const TAB: char = '\u{e004}';
-const ENTER: char = '\u{e007}';
+pub const ENTER: char = '\u{e007}';
 const F6: char = '\u{e036}';
 /// More presses of Tab than the panel has controls.
 const MANY: usize = 80;

@@ -62,4 +62,13 @@ pub async fn stays_as_it_is(page: &Browser, before: &Picture) {
     assert!(!at_rest(page).await.differs_from(before), "pointing, clicking and typing leave the scene as it is");
 }
 
+/// Turns the camera and has the view restored; `before` is how it looked.
+pub async fn turns_and_is_restored(page: &Browser, before: &Picture) {
+    let [left, top, width, height] = place(page, "document.getElementById('scene')").await;
+    page.drag([left + 0.5 * width, top + 0.45 * height], [0.15 * width, 0.05 * height]).await;
+    drawn(page, |picture| picture.differs_from(before)).await;
+    page.press('r').await;
+    drawn(page, |picture| !picture.differs_from(before)).await;
+}
+
 const CONTROL: char = '\u{e009}';

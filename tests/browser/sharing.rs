@@ -3,7 +3,7 @@
 use crate::{
     Server,
     driver::Browser,
-    keyboard::tab_to,
+    keyboard::{ENTER, tab_to},
     visits::{ESCAPE, SPACE},
 };
 
@@ -16,7 +16,7 @@ pub async fn visit(page: &Browser, server: Server) {
 
     // A link names no session, does not open the tab from which it was copied, and says whom it serves.
     tab_to(page, "Copy link").await;
-    page.press(SPACE).await;
+    page.press(ENTER).await;
     page.wait_for("a caution", "document.getElementById('controls').textContent.includes('Only this machine')").await;
     let link = page.evaluate_later("navigator.clipboard.readText()").await;
     assert_eq!(link, server.at("?v=1&scenario=arm-6dof&seed=3&learners=active,random&step=4"));

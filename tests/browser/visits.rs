@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::{
     Server,
     driver::Browser,
-    scene::{at_rest, drawn, stays_as_it_is},
+    scene::{at_rest, drawn, stays_as_it_is, turns_and_is_restored},
 };
 
 pub const SPACE: char = ' ';
@@ -38,6 +38,7 @@ pub async fn steps(page: &Browser, server: Server) {
         assert!(legend.as_str().expect("text").contains(words), "{legend}");
     }
     stays_as_it_is(page, &first).await;
+    turns_and_is_restored(page, &first).await;
 
     // Keys drive the server; going back makes nothing new.
     page.press('s').await;

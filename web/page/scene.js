@@ -2,8 +2,8 @@
 
 /** The height of the viewer's bar of tabs, which the page cuts off, CSS pixels; as in page.css. */
 export const CUT = 24;
-/** A press that has moved so far is no click to the viewer, CSS pixels. */
-const MORE_THAN_A_CLICK = 12;
+/** A press that has moved so far is a drag, to the viewer and to everybody, CSS pixels. */
+const DRAG = 8;
 /** So long after the wheel's last turn the viewer has zoomed, ms. */
 const WHEEL_RESTS_MS = 400;
 
@@ -34,18 +34,8 @@ function onlyTheCamera(scene, canvas) {
   const move = (clientX, clientY) =>
     canvas.dispatchEvent(new MouseEvent("mousemove", { clientX, clientY, buttons: 1, bubbles: true }));
   const leave = () => canvas.dispatchEvent(new MouseEvent("mouseleave"));
-  // There and back within one of the viewer's frames: the camera stays, and the press is a drag from its beginning.
-  const noClick = ({ clientX, clientY }) =>
-    setTimeout(() => {
-      move(clientX + MORE_THAN_A_CLICK, clientY);
-      move(clientX, clientY);
-    });
-  const capture = { capture: true };
-  const hover = (event) => event.isTrusted && event.buttons === 0 && event.stopPropagation();
-  scene.addEventListener("mousemove", hover, capture);
-  scene.addEventListener("pointerdown", (event) => event.pointerType === "mouse" && noClick(event), capture);
-  scene.addEventListener("touchstart", (event) => noClick(event.changedTouches[0]), { capture: true, passive: true });
-  addEventListener("pointerup", () => setTimeout(leave));
+  onlyDrags(scene, canvas, leave);
+  onlySwipes(scene, move);
   let rest = 0;
   const zoom = () => {
     // The viewer zooms what the pointer is over; in this corner there is nothing to speak of.
@@ -55,4 +45,53 @@ function onlyTheCamera(scene, canvas) {
     rest = setTimeout(leave, WHEEL_RESTS_MS);
   };
   scene.addEventListener("wheel", zoom, { capture: true, passive: true });
+}
+
+/** A press of the mouse comes to the viewer when it has become a drag: clicks, which select, never do. */
+function onlyDrags(scene, canvas, leave) {
+  /** The press that is held back. */
+  let pressed = null;
+  let drags = false;
+  const isMouse = ({ isTrusted, pointerType }) => isTrusted && pointerType !== "touch";
+  const capture = { capture: true };
+  scene.addEventListener(
+    "pointerdown",
+    (event) => {
+      if (!isMouse(event)) return;
+      if (!drags) pressed = event;
+      event.stopPropagation();
+    },
+    capture,
+  );
+  addEventListener(
+    "mousemove",
+    (event) => {
+      if (!event.isTrusted || drags) return;
+      if (pressed !== null && Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) >= DRAG) {
+        drags = true;
+        canvas.dispatchEvent(new PointerEvent("pointerdown", pressed));
+      } else if (pressed !== null || (event.buttons === 0 && scene.contains(event.target))) {
+        event.stopPropagation();
+      }
+    },
+    capture,
+  );
+  const end = (event) => {
+    if (!isMouse(event)) return;
+    if (pressed !== null && !drags) event.stopPropagation();
+    // A drag of the panel's may end here too.
+    else if (drags || scene.contains(event.target)) setTimeout(leave);
+    [pressed, drags] = [null, false];
+  };
+  for (const name of ["pointerup", "pointercancel"]) addEventListener(name, end, capture);
+}
+
+/** A finger's press is a drag to the viewer from its beginning: it moves there and back within one of its frames. */
+function onlySwipes(scene, move) {
+  const noClick = ({ changedTouches: [{ clientX, clientY }] }) =>
+    setTimeout(() => {
+      move(clientX + 1.5 * DRAG, clientY);
+      move(clientX, clientY);
+    });
+  scene.addEventListener("touchstart", noClick, { capture: true, passive: true });
 }

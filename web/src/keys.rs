@@ -1,6 +1,6 @@
 //! The keyboard.
 
-use egui::{Context, Key};
+use egui::{Context, Event, Key, Modifiers};
 
 use crate::{host::Command, panel::Panel};
 
@@ -32,12 +32,7 @@ impl Panel {
             return;
         }
         let has_focus = ctx.memory(|memory| memory.focused().is_some());
-        let pressed = |key: Key| {
-            ctx.input(|input| {
-                let held = input.modifiers.command || input.modifiers.ctrl || input.modifiers.alt;
-                input.key_pressed(key) && !held
-            })
-        };
+        let pressed = |key| press_of(ctx, key).is_some();
         // A button with the focus is pressed by Space, a slider moved by arrows.
         if !has_focus {
             if pressed(Key::Space) {
@@ -53,12 +48,10 @@ impl Panel {
         if pressed(Key::S) {
             self.make_step();
         }
-        if pressed(Key::R) {
-            if ctx.input(|input| input.modifiers.shift) {
-                self.reset();
-            } else {
-                self.ask(Command::RestoreView);
-            }
+        match press_of(ctx, Key::R) {
+            Some(held) if held.shift => self.reset(),
+            Some(_) => self.ask(Command::RestoreView),
+            None => {}
         }
         if pressed(Key::N) {
             self.reroll();
@@ -76,8 +69,22 @@ impl Panel {
                 self.tour = Some(0);
             }
         }
-        if pressed(Key::Questionmark) || (pressed(Key::Slash) && ctx.input(|input| input.modifiers.shift)) {
+        if pressed(Key::Questionmark) || press_of(ctx, Key::Slash).is_some_and(|held| held.shift) {
             self.help = !self.help;
         }
     }
+}
+
+/// What was held down with a key that has just been pressed; nothing if that makes it a shortcut of somebody else's.
+///
+/// This is read from the press itself: those elsewhere on the page are passed on without what is held down at the moment.
+fn press_of(ctx: &Context, wanted: Key) -> Option<Modifiers> {
+    ctx.input(|input| {
+        input.events.iter().find_map(|event| match event {
+            Event::Key { key, pressed: true, modifiers, .. } if *key == wanted => {
+                Some(*modifiers).filter(|held| !(held.command || held.ctrl || held.alt))
+            }
+            _ => None,
+        })
+    })
 }

@@ -59,3 +59,23 @@ fn everything_that_can_be_used_has_a_name() {
     page.tell(page.server.other_seed(2, 12));
     all_have_names(&page, "an ending");
 }
+
+#[test]
+fn what_has_the_focus_is_the_same_widget_whatever_comes_and_goes() {
+    let mut page = Page::with_session("tab=share&learners=active,random&speed=100&to=12&stop=never");
+    let names = ["Step", "New seed", "Share", "Copy link", "recording.rrd", "Copy command"];
+    let ids = |page: &Page| names.map(|name| page.harness.get_by_label(name).accesskit_node().id());
+    let before = ids(&page);
+    page.press(Key::T);
+    assert!(page.has("1 of 5"));
+    assert_eq!(ids(&page), before, "with a card");
+    page.press(Key::Escape);
+    page.tell(
+        serde_json::json!({ "is": "copied", "done": true, "note": "Copied. Only this machine can open this link." }),
+    );
+    assert_eq!(ids(&page), before, "with a notice");
+    page.press(Key::Space);
+    page.make_steps(12);
+    assert!(page.harness.state().ending().is_some());
+    assert_eq!(ids(&page), before, "with an ending");
+}

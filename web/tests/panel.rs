@@ -3,7 +3,7 @@
 mod support;
 
 use body_schema_panel::{Link, host::Command, settings::Tab};
-use egui::Key;
+use egui::{Event, Key, Modifiers};
 use serde_json::json;
 use support::{Page, Server};
 
@@ -71,6 +71,19 @@ fn keys_drive_the_server_but_not_while_typing() {
     page.press(Key::Space);
     page.press(Key::R);
     assert!(steps(&page.commands()).is_empty() && !page.harness.state().playing, "keys are text now");
+}
+
+#[test]
+fn keys_pressed_elsewhere_on_the_page_bring_what_is_held_with_them() {
+    let mut page = Page::with_session("");
+    let mut press = |modifiers| {
+        page.commands();
+        page.harness.event(Event::Key { key: Key::R, physical_key: None, pressed: true, repeat: false, modifiers });
+        page.commands()
+    };
+    assert_eq!(press(Modifiers::NONE), [Command::RestoreView]);
+    assert_eq!(press(Modifiers::CTRL), [], "the browser's own");
+    assert!(matches!(press(Modifiers::SHIFT)[..], [Command::Open { .. }]), "the run is reset, not the view");
 }
 
 #[test]

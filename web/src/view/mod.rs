@@ -22,7 +22,7 @@ mod stories;
 pub mod style;
 mod why;
 
-use egui::{CentralPanel, Frame, RichText, ScrollArea, Ui, vec2};
+use egui::{CentralPanel, Frame, Id, InnerResponse, RichText, ScrollArea, Ui, UiBuilder, vec2};
 
 use crate::{
     panel::{Link, Panel},
@@ -89,15 +89,15 @@ impl Panel {
             }
             self.game(ui);
             self.ending_card(ui);
-            let learners = ui.scope(|ui| self.learners(ui)).response;
+            let learners = part(ui, "learners", |ui| self.learners(ui)).response;
             self.show_spot(ui, Spot::Learners, &learners);
             ui.add_space(6.0);
-            self.stories_row(ui);
-            self.setup(ui);
+            part(ui, "stories", |ui| self.stories_row(ui));
+            part(ui, "setup", |ui| self.setup(ui));
             ui.add_space(6.0);
-            let tabs = ui.scope(|ui| self.tabs(ui)).response;
+            let tabs = part(ui, "tabs", |ui| self.tabs(ui)).response;
             self.show_spot(ui, Spot::Tabs, &tabs);
-            ui.scope(|ui| {
+            part(ui, "tab", |ui| {
                 // Room to bring the tabs to the top, whatever they show or still wait for.
                 ui.set_min_height((ui.clip_rect().height() - tabs.rect.height()).max(0.0));
                 match self.settings.tab {
@@ -151,6 +151,12 @@ impl Panel {
             }
         });
     }
+}
+
+/// A part of the panel whose widgets keep their ids, whatever comes and goes before it: by these the page's elements know
+/// what they stand for, and what has the focus keeps it.
+fn part<R>(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui) -> R) -> InnerResponse<R> {
+    ui.scope_builder(UiBuilder::new().scope_id(Id::unique(name)), add)
 }
 
 /// How far a finger that began in this rectangle has just moved up or down.

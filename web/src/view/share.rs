@@ -26,13 +26,15 @@ impl Panel {
         ui.label("It holds scenario, seed, learners, step and view. Whoever opens it sees the same numbers.");
         let link = format!("?{}", self.settings.link());
         ui.add(egui::Label::new(RichText::new(&link).monospace().small()).wrap().selectable(true));
-        ui.horizontal(|ui| {
-            if ui.button("Copy link").clicked() {
-                self.ask(Command::Copy { text: link });
-            }
-            if ui.button("Copy picture").on_hover_text("The scene as it is drawn, on the clipboard").clicked() {
-                self.ask(Command::Picture);
-            }
+        ui.vertical(|ui| {
+            ui.horizontal(|ui| {
+                if ui.button("Copy link").clicked() {
+                    self.ask(Command::Copy { text: link });
+                }
+                if ui.button("Copy picture").on_hover_text("The scene as it is drawn, on the clipboard").clicked() {
+                    self.ask(Command::Picture);
+                }
+            });
             if let Some(copied) = &self.copied {
                 ui.label(copied);
             }
