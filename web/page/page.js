@@ -127,8 +127,7 @@ const commands = {
   async picture() {
     try {
       if (viewer === null || said === null) throw new Error("there is no scene yet");
-      const redraw = () => viewer.seek(sought ?? said.step);
-      const blob = picture(element("viewer"), CUT, said.caption, legend.lines(), redraw);
+      const blob = picture(element("viewer"), CUT, said.caption, legend.lines(), () => viewer.redraw());
       // Both may refuse; that is told once.
       blob.catch(() => {});
       tell({ is: "copied", done: true, note: await passOn(blob, `${said.caption.title.replaceAll(/[^\w-]+/g, "-")}.png`) });

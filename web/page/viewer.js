@@ -266,6 +266,11 @@ export class Viewer {
     this.#waiting.splice(0).forEach((resolve) => resolve());
   }
 
+  /** Draws in the next frame, though nothing has changed: whatever happens to the pointer has the viewer do so. */
+  redraw() {
+    this.#canvas.dispatchEvent(new MouseEvent("mouseleave"));
+  }
+
   /** Why the viewer has crashed, or null. */
   failure() {
     return this.#handle.has_panicked() ? (this.#handle.panic_message() ?? "no message") : null;

@@ -12,6 +12,8 @@ use crate::{colours, panel::Panel, seeds::SeedRuns, stories::Spot, words};
 /// From this width on there are two charts beside each other.
 const TWO_COLUMNS: f32 = 640.0;
 const HEIGHT: f32 = 150.0;
+/// A lower chart tells nothing.
+const LEAST: f32 = 80.0;
 
 impl Panel {
     /// The charts of which there is something to see.
@@ -24,8 +26,8 @@ impl Panel {
         CHARTS.iter().filter(|chart| (known || !chart.judged) && (chart.title != "Misses" || missed)).collect()
     }
 
-    /// The chart that is always in sight, with the legend of all.
-    pub(super) fn pinned_chart(&mut self, ui: &mut Ui, height: f32) {
+    /// The chart that is always in sight, with the legend of all; without a height it takes the room that is left.
+    pub(super) fn pinned_chart(&mut self, ui: &mut Ui, height: Option<f32>) {
         if self.session.is_none() {
             return;
         }
@@ -49,11 +51,15 @@ impl Panel {
                 let wordy = ui.ctx().content_rect().height() >= TALL;
                 self.legend(ui, wordy);
             });
+            if !low && height.is_none() {
+                self.explained_curves(ui, chart);
+            }
+            let height = height.unwrap_or_else(|| ui.available_height().max(LEAST));
             self.curves(ui, chart, height)
         });
         self.spots.set(Spot::Chart, drawn.response.rect);
         self.go_to(drawn.inner);
-        if !low {
+        if !low && height.is_some() {
             self.explained_curves(ui, chart);
         }
     }

@@ -54,14 +54,13 @@ impl Panel {
         if self.settings.embed {
             CentralPanel::default().frame(frame).show(ui, |ui| {
                 self.controls(ui);
-                let height = (ui.available_height() - 30.0).max(80.0);
-                self.pinned_chart(ui, height);
+                self.pinned_chart(ui, None);
             });
         } else {
             let top = egui::Panel::top("controls").frame(frame).show(ui, |ui| {
                 self.controls(ui);
                 let height = (ctx.content_rect().height() * 0.2).clamp(88.0, 170.0);
-                self.pinned_chart(ui, height);
+                self.pinned_chart(ui, Some(height));
             });
             let above = top.response.rect;
             // A swipe that begins here moves what scrolls below, as one would expect.
