@@ -17,6 +17,8 @@ const TRUNK: [&str; 2] = ["torso", "chest"];
 pub(super) struct Figure {
     /// What stays where it is.
     pub(super) fixed: Vec<Capsule>,
+    /// What a pedestal stands on.
+    pub(super) base: Option<Capsule>,
     /// What moves with the true arm's trunk …
     pub(super) trunk: Vec<Capsule>,
     /// … after so many joints.
@@ -99,7 +101,8 @@ impl Figure {
             self.fixed.append(&mut self.trunk);
         }
         self.ground_m = hips.z - 1.3 * a;
-        self.name = at(head, 0.0, 0.0, 0.3);
+        // Before the thighs, where the hand does not reach: above the head it would lie over raised arms.
+        self.name = at(hips, 0.1, 0.0, -0.55);
         self
     }
 
@@ -113,18 +116,17 @@ impl Figure {
             radius_m: radius * a,
             colour: [red, green, blue, 255],
         };
-        // A flat base of three rods side by side, and a column; where a joint lifts the arm, an inner column goes with it.
-        let beam = |y: f64| rod([-0.2, y, -0.9], [0.2, y, -0.9], 0.1);
+        // Where a joint lifts the arm, an inner column goes with it.
         let column = |from: f64, to: f64, radius: f64| rod([0.0, 0.0, from], [0.0, 0.0, to], radius);
-        self.fixed = vec![beam(-0.14), beam(0.0), beam(0.14)];
+        self.base = Some(column(-1.0, -0.8, 0.3));
         if self.carried_by > 0 {
-            self.fixed.push(column(-0.85, -0.35, 0.1));
-            self.trunk = vec![column(-0.75, -0.04, 0.08)];
+            self.fixed = vec![column(-0.85, -0.4, 0.17)];
+            self.trunk = vec![column(-0.75, -0.12, 0.12)];
         } else {
-            self.fixed.push(column(-0.85, -0.12, 0.1));
+            self.fixed = vec![column(-0.85, -0.14, 0.12)];
         }
         self.ground_m = shoulder.z - 1.0 * a;
-        self.name = shoulder + Vector3::z() * (0.5 * a);
+        self.name = shoulder + Vector3::new(0.3, 0.0, -0.95) * a;
         self
     }
 }

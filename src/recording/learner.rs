@@ -13,7 +13,7 @@ use super::{
     partition::{self, Slice},
     posture::{ArmLook, Posture, bare},
     rows::Rows,
-    solid::{quaternion, single, solid},
+    solid::{drum, quaternion, single, solid},
     stage::Stage,
     uncertainty::{Drawn, Uncertainty},
 };
@@ -94,7 +94,7 @@ impl LearnerEntities {
 
     pub(super) fn arm_look(&self) -> ArmLook {
         let ([red, green, blue], (girth, alpha)) = (self.colour, ESTIMATE);
-        ArmLook { links: [red, green, blue, alpha], pins: [red, green, blue, 235], girth }
+        ArmLook { links: [red, green, blue, alpha], pins: [red, green, blue, 255], girth }
     }
 
     /// Logs what stays: the place of the learner at this place in the row, and its body.
@@ -102,6 +102,9 @@ impl LearnerEntities {
         let place = Transform3D::from_translation(single(stage.place(index).into()));
         rows.always(&self.root, &[&place]);
         rows.always(&self.entity("body"), &[&solid(&stage.figure.fixed)]);
+        if let Some(base) = &stage.figure.base {
+            rows.always(&self.entity("body/base"), &[&drum(base)]);
+        }
         if !stage.figure.trunk.is_empty() {
             rows.always(&self.entity("body/trunk"), &[&solid(&stage.figure.trunk)]);
         }

@@ -16,8 +16,9 @@
 //! | `/key` | Points3D, static | what the colours mean, in a sentence |
 //! | `/{learner}` | Transform3D, static | where the frame of its measurements stands in the row |
 //! | `/{learner}/body` | Capsules3D, static | a human figure around the arm, or a pedestal |
+//! | `/{learner}/body/base` | Cylinders3D, static | what a pedestal stands on |
 //! | `/{learner}/body/trunk` | Capsules3D, static; Transform3D | the part of figure or pedestal that joints of the chain carry; absent if they carry none |
-//! | `/{learner}/name` | Points3D, static; labels in time | its name above its head, and whether it has stopped |
+//! | `/{learner}/name` | Points3D, static; labels in time | its name before its thighs or its base, and whether it has stopped |
 //! | `/{learner}/arm/truth` | Capsules3D | the true arm as shown: links, and a pin along each axis; absent without a truth |
 //! | `/{learner}/arm/estimate` | Capsules3D | the estimated arm as shown, after the update |
 //! | `/{learner}/point_ellipsoids` | Ellipsoids3D | covariances of the axis points as shown, then of the marker if it is learned |

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use rerun::{
-    Capsules3D, Color, FillMode, Quaternion,
+    Capsules3D, Color, Cylinders3D, FillMode, Quaternion,
     components::{RotationQuat, Translation3D},
 };
 
@@ -57,6 +57,15 @@ pub(super) fn solid(capsules: &[Capsule]) -> Capsules3D {
     .with_quaternions(capsules.iter().map(Capsule::rotation))
     .with_colors(colours)
     .with_fill_mode(FillMode::Solid)
+}
+
+/// A rod with flat ends, which stands upright, as an entity.
+pub(super) fn drum(rod: &Capsule) -> Cylinders3D {
+    let Capsule { from, to, radius_m, colour: [red, green, blue, alpha] } = *rod;
+    Cylinders3D::from_lengths_and_radii([rod.length()], [radius_m as f32])
+        .with_centers([single(nalgebra::center(&from, &to).coords.into())])
+        .with_colors([Color::from_unmultiplied_rgba(red, green, blue, alpha)])
+        .with_fill_mode(FillMode::Solid)
 }
 
 /// The same capsules elsewhere: their poses alone.

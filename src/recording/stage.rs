@@ -12,17 +12,17 @@ const TALL: [f64; 2] = [-0.35, 0.5];
 /// Narrower views than this, in widths per height, are tall.
 const TALL_BELOW: f64 = 0.8;
 /// From one learner to the next, in lengths of the arm.
-const SPACING: f64 = 1.55;
+const SPACING: f64 = 1.3;
 /// The viewer's vertical field of view, radians.
 const FIELD_OF_VIEW: f64 = 0.96;
 /// What of it is left free at each edge, as a part of its half: labels need some pixels.
-const MARGIN: f64 = 0.06;
+const MARGIN: f64 = 0.04;
 /// What the view takes in of each learner, from its shoulder, in lengths of the arm: where the arm mostly is. x is ahead,
 /// y to the left, z up.
 const TAKEN_IN: [[f64; 3]; 7] = [
     [0.8, -0.1, 0.2],
-    [0.6, -0.6, 0.4],
-    [0.6, -0.6, -0.4],
+    [0.5, -0.55, 0.7],
+    [0.5, -0.55, -0.4],
     [0.3, 0.5, -0.6],
     [0.0, -0.7, 0.0],
     [0.0, -0.3, -0.75],

@@ -21,6 +21,10 @@ const UNSETTLED = 20;
 const RESHAPED = 1.25;
 /** How long the shape must have stayed, ms. */
 const RESHAPED_MS = 300;
+/** Without a graphics card, the scene is drawn at this part of the screen's resolution while it moves, … */
+const COARSE = 0.6;
+/** … which it does while one step follows the other within this time, ms. */
+const MOVES_MS = 1200;
 
 /**
  * Loads the viewer's WebAssembly and starts it on a canvas.
@@ -34,7 +38,8 @@ export async function startViewer(canvas, addresses, progress) {
   await Promise.all([loadScript(addresses.script), load(addresses.wasm, progress)]);
   // `wasm_bindgen` is what the script defines. Browsers keep what they have compiled only if they get the response as it
   // came, so it is asked for once more: from the browser's cache.
-  await wasm_bindgen({ module_or_path: addresses.wasm() });
+  const resolution = new Resolution(canvas);
+  await resolution.between(() => wasm_bindgen({ module_or_path: addresses.wasm() }));
   const handle = new wasm_bindgen.WebHandle({
     url: [],
     hide_welcome_screen: true,
@@ -44,7 +49,7 @@ export async function startViewer(canvas, addresses, progress) {
   });
   await handle.start(canvas);
   for (const panel of ["top", "blueprint", "selection", "time"]) handle.override_panel_state(panel, "hidden");
-  return new Viewer(handle, canvas);
+  return new Viewer(handle, canvas, resolution);
 }
 
 /**
@@ -89,10 +94,74 @@ async function load(fetched, progress) {
   }
 }
 
+/** The resolution of the scene: software draws a third of the pixels in less than half of the time. */
+class Resolution {
+  #canvas;
+  #scale = 1;
+  #resting = 0;
+  #isSlow;
+
+  /** @param {HTMLCanvasElement} canvas the viewer's */
+  constructor(canvas) {
+    this.#canvas = canvas;
+    this.#isSlow = drawsInSoftware();
+  }
+
+  /**
+   * Stands between the viewer and what it asks the browser of the screen, so that pixels can be larger for it alone.
+   * @param {() => Promise<unknown>} load instantiates the viewer
+   */
+  async between(load) {
+    if (!this.#isSlow) return load();
+    const { instantiateStreaming } = WebAssembly;
+    WebAssembly.instantiateStreaming = (source, modules) => {
+      for (const imports of Object.values(modules)) this.#scaleIn(imports);
+      return instantiateStreaming.call(WebAssembly, source, modules);
+    };
+    try {
+      return await load();
+    } finally {
+      WebAssembly.instantiateStreaming = instantiateStreaming;
+    }
+  }
+
+  /** The screen's pixels per CSS pixel, and the canvas's size in them. */
+  #scaleIn(imports) {
+    for (const [name, ask] of Object.entries(imports)) {
+      if (/^__wbg_(devicePixelRatio|inlineSize|blockSize)_/.test(name)) imports[name] = (of) => ask(of) * this.#scale;
+    }
+  }
+
+  /** The scene moves: coarse, until it rests. */
+  moving() {
+    if (!this.#isSlow) return;
+    clearTimeout(this.#resting);
+    this.#resting = setTimeout(() => this.#set(1), MOVES_MS);
+    this.#set(COARSE);
+  }
+
+  #set(scale) {
+    if (scale === this.#scale) return;
+    this.#scale = scale;
+    // The viewer looks at its size only when that changes: by one pixel, behind the lower edge.
+    this.#canvas.style.height = scale === 1 ? "" : `calc(100% + ${CUT + 1}px)`;
+  }
+}
+
+/** Whether there is no graphics card to draw with, as far as the browser tells. */
+function drawsInSoftware() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const names = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = names ? context.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
 /** A running viewer that shows one recording at a time. */
 export class Viewer {
   #handle;
   #canvas;
+  #resolution;
   #channel = null;
   #header = null;
   /** Parts that wait to be sent together, and whether they wait for the first step to be shown. */
@@ -102,6 +171,8 @@ export class Viewer {
   /** Asks for an arrangement of views; the shape for which the last one was made. */
   #arrange = null;
   #aspect = 1;
+  /** Whether that was sent behind the recording's own, which comes with the first step. */
+  #arranged = false;
   #reshaping = 0;
   /** The step to be at, and those who wait for it. */
   #step = 0;
@@ -113,9 +184,10 @@ export class Viewer {
   #moved = -Infinity;
   #glide = null;
 
-  constructor(handle, canvas) {
+  constructor(handle, canvas, resolution) {
     this.#handle = handle;
     this.#canvas = canvas;
+    this.#resolution = resolution;
     new ResizeObserver(() => this.#reshape()).observe(canvas);
   }
 
@@ -138,6 +210,7 @@ export class Viewer {
     if (this.#channel !== null) this.#handle.close_channel(this.#channel);
     this.#channel = this.#header = this.#arrange = this.#glide = null;
     [this.#parts, this.#timer, this.#held, this.#step, this.#tick] = [[], 0, true, 0, 0];
+    this.#arranged = false;
     this.#wake();
   }
 
@@ -219,6 +292,7 @@ export class Viewer {
     const duration = Math.min(Math.max(GLIDE.part * (now - this.#moved), GLIDE.least), GLIDE.most);
     const isNext = this.#tick === (step - 1) * TICKS;
     this.#glide = glides && isNext && !still ? { duration, began: null } : null;
+    if (step !== this.#step && now - this.#moved < MOVES_MS) this.#resolution.moving();
     [this.#step, this.#moved] = [step, now];
     this.#run();
     return new Promise((resolve) => this.#waiting.push(resolve));
@@ -236,6 +310,10 @@ export class Viewer {
     if (id === null) return this.#wake();
     const newest = this.#handle.get_timeline_time_range(id, COMPLETE)?.max;
     const isThere = newest >= this.#step;
+    if (newest !== undefined && !this.#arranged) {
+      this.#arranged = true;
+      this.restore();
+    }
     if (isThere) this.#show(this.#ticks(now));
     else if (newest !== undefined && this.#glide === null) this.#show(newest * TICKS);
     if (isThere && this.#glide === null) this.#wake();
