@@ -184,16 +184,28 @@ impl Rig {
 
     /// ‖L⁻¹ (y ⊖ h)‖² of an observation.
     pub fn squared_error(&self, state: &State, positions: &[f64], observation: &Observation) -> f64 {
-        let (mut sum, mut predicted, mut whitened) = (0.0, Scratch::default(), Scratch::default());
-        for (channel, reading) in self.channels.iter().zip(&observation.readings) {
+        let mut sum = 0.0;
+        self.squared_errors(state, positions, observation, |_, squared, _| sum += squared);
+        sum
+    }
+
+    /// Hands ‖L⁻¹ (y ⊖ h)‖² of every reading that there is to `each`, with its channel and its number of equations.
+    pub fn squared_errors(
+        &self,
+        state: &State,
+        positions: &[f64],
+        observation: &Observation,
+        mut each: impl FnMut(usize, f64, usize),
+    ) {
+        let (mut predicted, mut whitened) = (Scratch::default(), Scratch::default());
+        for (index, (channel, reading)) in self.channels.iter().zip(&observation.readings).enumerate() {
             let Some(reading) = reading else { continue };
             let (predicted, whitened) = (predicted.take(reading.len()), whitened.take(reading.len()));
             if channel.predict(state, positions, predicted) {
                 channel.difference(reading, predicted, whitened);
-                sum += whitened.iter().map(|x| x * x).sum::<f64>();
+                each(index, whitened.iter().map(|x| x * x).sum::<f64>(), reading.len());
             }
         }
-        sum
     }
 
     /// What is observed of a robot that is as `state` says: its readings at `positions`, with `v` (d standard normal

@@ -63,7 +63,7 @@ impl Hypotheses {
             } else {
                 mutated(&self.modes[rng.random_range(0..before)].state, &drawn, layout, rng)
             };
-            self.modes.extend(posterior.mode(&start, layout, effort));
+            self.modes.extend(posterior.mode_from_afar(&start, layout, effort));
         }
     }
 
@@ -231,7 +231,7 @@ mod tests {
         let (one, other) = (&hypotheses.modes[0], &hypotheses.modes[1]);
         assert!((along(one) + along(other)).abs() < 1e-2 && along(one).abs() > 0.999);
         for mode in [one, other] {
-            assert!(posterior.data_cost(&mode.state, &layout) < 0.5, "it explains what was seen");
+            assert!(posterior.misfit(&mode.state, &layout) < 0.5, "it explains what was seen");
             assert!((mode.weight - 0.5).abs() < 0.01, "{}", mode.weight);
         }
         // A quarter turn tells them apart. Modes are searched anew given it.
@@ -254,6 +254,6 @@ mod tests {
         let mut hypotheses = Hypotheses::default();
         hypotheses.spawn(8, &posterior, &layout, &mut ChaCha8Rng::seed_from_u64(1));
         hypotheses.condense(16, &layout);
-        assert!(posterior.data_cost(&hypotheses.modes[0].state, &layout) < 0.5);
+        assert!(posterior.misfit(&hypotheses.modes[0].state, &layout) < 0.5);
     }
 }

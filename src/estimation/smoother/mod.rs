@@ -149,15 +149,18 @@ impl Smoother {
     /// Whether there are as many independent equations as parameters; where some can never be determined, twice as many
     /// equations must do.
     fn is_determined(&self) -> bool {
-        let (m, equations) = (self.belief.layout.dimension(), self.posterior.equations());
-        equations >= 2 * m || (equations >= m && self.posterior.rank(&self.belief.state, &self.belief.layout) >= m)
+        let (state, layout) = (&self.belief.state, &self.belief.layout);
+        let m = layout.dimension();
+        let equations = self.posterior.equations(state, layout);
+        equations >= 2.0 * m as f64 || (equations >= m as f64 && self.posterior.rank(state, layout) >= m)
     }
 
     /// Whether the data cost of the heaviest hypothesis is what noise alone explains, 2E ~ χ² with as many degrees of
     /// freedom as equations at most: within five standard deviations.
     fn explains(&self) -> bool {
-        let degrees = self.posterior.equations() as f64;
-        let cost = 2.0 * self.posterior.data_cost(&self.belief.state, &self.belief.layout);
+        let (state, layout) = (&self.belief.state, &self.belief.layout);
+        let degrees = self.posterior.equations(state, layout);
+        let cost = 2.0 * self.posterior.misfit(state, layout);
         cost <= degrees + 5.0 * (2.0 * degrees).sqrt()
     }
 }
