@@ -12,7 +12,10 @@ use std::{fs, path::PathBuf};
 use body_schema::{
     design::best_designs,
     experiment::{Comparison, Description, StepReport, Trace},
-    recording::{EllipsoidSize, LiveLog, Recorder, RecordingError, StepsCsv, Target, comparison_csv, learner_color},
+    recording::{
+        EllipsoidSize, LiveLog, Recorder, RecordingError, StepsCsv, Target, comparison_csv, learner_color,
+        learner_slots,
+    },
     scenario::{Scenario, builtin},
 };
 use checks::check;
@@ -157,10 +160,11 @@ fn learners_keep_their_colours() {
     let live = LiveLog::new();
     record(&description, &reports, Target::live(live.clone()));
     let reading = Reading::of(&live.complete().unwrap());
-    for (index, learner) in description.learners.iter().enumerate() {
+    let slots = learner_slots(description.learners.iter().map(|learner| learner.name.as_str()));
+    for (learner, slot) in description.learners.iter().zip(slots) {
         let series = reading.colour(&format!("/{}/metrics/nees", learner.name), "SeriesLines:colors");
-        assert_eq!(series, learner_color(index));
-        assert_eq!(reading.colour(&format!("/{}/links", learner.name), "LineStrips3D:colors"), learner_color(index));
+        assert_eq!(series, learner_color(slot));
+        assert_eq!(reading.colour(&format!("/{}/links", learner.name), "LineStrips3D:colors"), learner_color(slot));
     }
 }
 

@@ -5,9 +5,9 @@
 #[path = "palette.rs"]
 mod palette;
 
-pub use palette::learner_color;
 use palette::mix;
 pub(super) use palette::viridis;
+pub use palette::{learner_color, learner_slots};
 
 /// The colour of the truth: grey.
 pub const TRUTH_COLOR: [u8; 3] = [0x80, 0x80, 0x80];
@@ -28,6 +28,6 @@ mod tests {
 
     #[test]
     fn colours_are_written_in_hexadecimal() {
-        assert_eq!(hex(learner_color(7)), "#0072b2");
+        assert_eq!(hex(learner_color(0)), "#0072b2");
     }
 }

@@ -6,9 +6,7 @@ use rerun::{
 };
 
 use super::{
-    EllipsoidSize, charts,
-    colours::learner_color,
-    head, metrics,
+    EllipsoidSize, charts, head, metrics,
     model::{self, Uncertainty},
     movement::Movement,
     partition::{self, Slice},
@@ -21,7 +19,7 @@ use crate::{
 
 /// The entities of one learner, and what they carry from step to step.
 pub(super) struct LearnerEntities {
-    colour: [u8; 3],
+    pub(super) colour: [u8; 3],
     pub(super) root: EntityPath,
     pub(super) metrics: Vec<EntityPath>,
     uncertainty: Uncertainty,
@@ -32,12 +30,12 @@ pub(super) struct LearnerEntities {
 }
 
 impl LearnerEntities {
-    /// Those of the learner at this place in the description.
-    pub(super) fn new(index: usize, name: &str, joints: usize, ellipsoids: EllipsoidSize) -> Self {
+    /// Those of a learner, in its colour.
+    pub(super) fn new(colour: [u8; 3], name: &str, joints: usize, ellipsoids: EllipsoidSize) -> Self {
         let root = EntityPath::new(vec![EntityPathPart::new(name)]);
         let metrics = root.join(&EntityPath::from("metrics"));
         Self {
-            colour: learner_color(index),
+            colour,
             metrics: metrics::NAMES.iter().map(|name| metrics.join(&EntityPath::from(*name))).collect(),
             root,
             uncertainty: Uncertainty::new(joints, ellipsoids),

@@ -62,7 +62,7 @@ mod scene;
 mod target;
 
 pub use self::{
-    colours::{TRUTH_COLOR, hex, learner_color},
+    colours::{TRUTH_COLOR, hex, learner_color, learner_slots},
     csv::{StepsCsv, comparison_csv},
     ellipsoid::EllipsoidSize,
     error::RecordingError,

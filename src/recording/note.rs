@@ -5,7 +5,10 @@ use std::fmt::Write as _;
 use clap::ValueEnum;
 use rerun::{MediaType, TextDocument};
 
-use super::{EllipsoidSize, TRUTH_COLOR, colours::hex, colours::learner_color};
+use super::{
+    EllipsoidSize, TRUTH_COLOR,
+    colours::{hex, learner_color, learner_slots},
+};
 use crate::{experiment::Description, kinematics::JointKind};
 
 const HEAD: &str = "- **Head** in pale grey: the cone of the lens at rest, and the square over which its axis can turn; in the \
@@ -37,8 +40,9 @@ fn markdown(description: &Description, ellipsoids: EllipsoidSize) -> String {
             .filter(|_| ellipsoids != EllipsoidSize::default())
             .map_or(String::new(), |size| format!(" --ellipsoids {}", size.get_name()))
     );
-    for (index, learner) in description.learners.iter().enumerate() {
-        let colour = hex(learner_color(index));
+    let slots = learner_slots(description.learners.iter().map(|learner| learner.name.as_str()));
+    for (learner, slot) in description.learners.iter().zip(slots) {
+        let colour = hex(learner_color(slot));
         let _ = writeln!(text, "| {} | {} | {} | `{colour}` |", learner.name, learner.estimator, learner.policy);
     }
     text.push_str("\n## What you see\n\n");

@@ -1,14 +1,23 @@
 //! The palette of recordings and page: the panel's crate takes this file in as it is.
 
-/// The Okabe–Ito palette, which the colour-blind can tell apart, in the order in which learners take it.
-const LEARNERS: [[u8; 3]; 7] = [
+/// The learners that scenarios have in common: each has the slot of its place here, in every comparison.
+const KNOWN: [&str; 7] = ["active", "random", "global", "gradient", "human", "unscented", "nominal"];
+
+/// The colours by slot: those of the known learners, then those that all others share. After Okabe and Ito, for the
+/// colour-blind, darkened or lightened until each has a contrast of 3:1 both on the light and on the dark ground.
+const LEARNERS: [[u8; 3]; 12] = [
     [0x00, 0x72, 0xB2], // blue
     [0xD5, 0x5E, 0x00], // vermillion
-    [0x00, 0x9E, 0x73], // bluish green
-    [0xCC, 0x79, 0xA7], // reddish purple
-    [0xE6, 0x9F, 0x00], // orange
-    [0x56, 0xB4, 0xE9], // sky blue
-    [0xF0, 0xE4, 0x42], // yellow
+    [0x00, 0x94, 0x6B], // bluish green
+    [0xB5, 0x58, 0x8F], // reddish purple
+    [0xA8, 0x79, 0x00], // ochre
+    [0x7B, 0x68, 0xC8], // violet
+    [0x8C, 0x6D, 0x46], // brown
+    [0x2A, 0x8A, 0x94], // teal
+    [0xC2, 0x45, 0x5E], // crimson
+    [0x6B, 0x8A, 0x1E], // olive
+    [0x5A, 0x7F, 0xC0], // steel blue
+    [0xB0, 0x70, 0x3C], // copper
 ];
 
 /// Stops of the viridis colour map, evenly spaced, dark to bright.
@@ -25,9 +34,34 @@ const VIRIDIS: [[u8; 3]; 10] = [
     [0xFD, 0xE7, 0x25],
 ];
 
-/// The colour (sRGB) of the learner at this place in the description; it repeats after seven.
-pub fn learner_color(index: usize) -> [u8; 3] {
-    LEARNERS[index % LEARNERS.len()]
+/// The slot of every learner of a comparison: what its colour, its line and its mark go by.
+///
+/// It depends on the name, not on the place: a learner looks the same in every comparison. Names that are not known
+/// take a slot by a hash of theirs; if it is taken, the next one that is free. Only more than twelve share slots.
+pub fn learner_slots<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<usize> {
+    let names: Vec<&str> = names.into_iter().collect();
+    let known = |name: &str| KNOWN.iter().position(|known| *known == name);
+    let mut taken: Vec<usize> = names.iter().filter_map(|name| known(name)).collect();
+    let mut of_another = |name: &str| {
+        let others = LEARNERS.len() - KNOWN.len();
+        let first = hash(name) as usize % others;
+        // All that are free, the others' before those of known learners that are not here.
+        let in_turn = (0..others).map(|place| KNOWN.len() + (first + place) % others).chain(0..KNOWN.len());
+        let slot = in_turn.clone().find(|slot| !taken.contains(slot)).unwrap_or(KNOWN.len() + first);
+        taken.push(slot);
+        slot
+    };
+    names.iter().map(|name| known(name).unwrap_or_else(|| of_another(name))).collect()
+}
+
+/// The hash FNV-1a: the same on every machine and in every version.
+fn hash(name: &str) -> u32 {
+    name.bytes().fold(0x811C_9DC5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+}
+
+/// The colour (sRGB) of a [slot](learner_slots); it repeats after twelve.
+pub fn learner_color(slot: usize) -> [u8; 3] {
+    LEARNERS[slot % LEARNERS.len()]
 }
 
 /// The viridis colour of `value` in 0..=1.
@@ -53,6 +87,45 @@ mod tests {
         assert_eq!(viridis(1.0), VIRIDIS[9]);
         assert_eq!(viridis(2.0), VIRIDIS[9]);
         assert_eq!(viridis(1.0 / 9.0), VIRIDIS[1]);
-        assert_eq!(learner_color(7), learner_color(0));
+    }
+
+    #[test]
+    fn a_learner_has_one_colour_wherever_it_stands() {
+        assert_eq!(learner_slots(["active", "random", "gradient"]), [0, 1, 3]);
+        assert_eq!(learner_slots(["global", "random"]), [2, 1]);
+        let alone = learner_slots(["active-direct"]);
+        assert!(alone[0] >= KNOWN.len());
+        assert_eq!(learner_slots(["random", "active-direct", "active"]), [1, alone[0], 0]);
+    }
+
+    #[test]
+    fn no_two_of_a_comparison_share_a_colour() {
+        let names = ["a", "b", "c", "d", "e", "f", "random"];
+        let mut slots = learner_slots(names);
+        assert_eq!(slots[6], 1);
+        slots.sort_unstable();
+        slots.dedup();
+        assert_eq!(slots.len(), names.len());
+        let many: Vec<String> = (0..20).map(|i| i.to_string()).collect();
+        assert!(learner_slots(many.iter().map(String::as_str)).into_iter().all(|slot| slot < LEARNERS.len()));
+    }
+
+    #[test]
+    fn every_colour_stands_out_from_light_and_dark_ground() {
+        // WCAG 2.1: relative luminance, and the contrast of graphical objects, at least 3:1.
+        let luminance = |colour: [u8; 3]| {
+            let linear = colour.map(|channel| {
+                let value = f64::from(channel) / 255.0;
+                if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+            });
+            0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+        };
+        for ground in [[0xF8; 3], [0x1B; 3]] {
+            for colour in LEARNERS {
+                let (a, b) = (luminance(ground), luminance(colour));
+                let contrast = (a.max(b) + 0.05) / (a.min(b) + 0.05);
+                assert!(contrast >= 3.0, "{colour:02X?} on {ground:02X?}: {contrast:.2}");
+            }
+        }
     }
 }

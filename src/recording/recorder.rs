@@ -11,7 +11,7 @@ use super::{
     EllipsoidSize, LiveLog, RecordingError, TRUTH_COLOR, Target,
     blueprint::{self, Arrangement},
     charts::BEST_DESIGN,
-    colours::{learner_color, tint},
+    colours::{learner_color, learner_slots, tint},
     file::RrdFile,
     head,
     learner::LearnerEntities,
@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     design::BestDesign,
-    experiment::{Description, ModelReport, StepReport},
+    experiment::{Description, LearnerDescription, ModelReport, StepReport},
 };
 
 /// So many steps are written at once unless somebody flushes earlier …
@@ -81,8 +81,10 @@ impl Recorder {
             rows: Rows::default(),
             file: file.as_deref().map(RrdFile::create).transpose()?,
             live,
-            learners: (names.iter().enumerate())
-                .map(|(index, name)| LearnerEntities::new(index, name, description.joints.len(), ellipsoids))
+            learners: (names.iter().zip(learner_slots(names.iter().copied())))
+                .map(|(name, slot)| {
+                    LearnerEntities::new(learner_color(slot), name, description.joints.len(), ellipsoids)
+                })
                 .collect(),
             arrow_m: None,
             waiting_steps: 0,
@@ -195,9 +197,8 @@ impl Recorder {
         rows.always(&EntityPath::properties(), &[&RecordingInfo::new().with_name(name)]);
         rows.always(&EntityPath::root(), &[&ViewCoordinates::RIGHT_HAND_Z_UP()]);
         rows.always(&EntityPath::from("note"), &[&note(description, ellipsoids)]);
-        for (index, learner) in self.learners.iter().enumerate() {
-            let colour = learner_color(index);
-            let name = &description.learners[index].name;
+        for (learner, LearnerDescription { name, .. }) in self.learners.iter().zip(&description.learners) {
+            let colour = learner.colour;
             for (series, metric) in learner.metrics.iter().zip(metrics::NAMES) {
                 // Beside the trace itself, and paler.
                 let (name, colour, width) = match metric {

@@ -2,9 +2,10 @@
 
 use std::io::Cursor;
 
-use body_schema::recording::learner_color;
+use body_schema::recording::{learner_color, learner_slots};
 
 const LEARNERS: usize = 3;
+const NAMES: [&str; LEARNERS] = ["active", "random", "gradient"];
 /// Three learners' views stand in two columns and two rows; DIRECT's partition is in the last place.
 const COLUMNS: usize = 2;
 const ROWS: usize = 2;
@@ -40,8 +41,9 @@ impl Picture {
 
     /// How many pixels of its own colour each learner's view has.
     pub fn counts(&self) -> [usize; LEARNERS] {
+        let slots = learner_slots(NAMES);
         std::array::from_fn(|learner| {
-            let colour = learner_color(learner);
+            let colour = learner_color(slots[learner]);
             let near = |pixel: &[u8; 3]| pixel.iter().zip(colour).all(|(a, b)| a.abs_diff(b) <= TOLERANCE);
             let in_view = |index: usize| self.learner(index) == Some(learner);
             self.pixels.iter().enumerate().filter(|(index, pixel)| in_view(*index) && near(pixel)).count()

@@ -3,26 +3,32 @@
 #[path = "../../src/recording/palette.rs"]
 mod palette;
 
+use body_schema::experiment::Description;
 use egui::Color32;
 use egui_plot::{LineStyle, MarkerShape};
 
-/// The colour of the learner at this place in the scenario's list.
-pub fn learner(index: usize) -> Color32 {
-    let [red, green, blue] = palette::learner_color(index);
+/// The slot of every learner, by its name: what its colour, line and mark go by.
+pub fn slots(description: &Description) -> Vec<usize> {
+    palette::learner_slots(description.learners.iter().map(|learner| learner.name.as_str()))
+}
+
+/// The colour of a slot.
+pub fn learner(slot: usize) -> Color32 {
+    let [red, green, blue] = palette::learner_color(slot);
     Color32::from_rgb(red, green, blue)
 }
 
-/// The line of that learner: told apart without colour too.
-pub fn line_style(index: usize) -> LineStyle {
-    match index % 3 {
+/// The line of a slot: told apart without colour too.
+pub fn line_style(slot: usize) -> LineStyle {
+    match slot % 3 {
         0 => LineStyle::Solid,
         1 => LineStyle::Dashed { length: 6.0 },
         _ => LineStyle::Dotted { spacing: 4.0 },
     }
 }
 
-/// The mark of that learner.
-pub fn marker(index: usize) -> MarkerShape {
+/// The mark of a slot.
+pub fn marker(slot: usize) -> MarkerShape {
     const SHAPES: [MarkerShape; 7] = [
         MarkerShape::Circle,
         MarkerShape::Diamond,
@@ -32,7 +38,7 @@ pub fn marker(index: usize) -> MarkerShape {
         MarkerShape::Cross,
         MarkerShape::Plus,
     ];
-    SHAPES[index % SHAPES.len()]
+    SHAPES[slot % SHAPES.len()]
 }
 
 /// The viridis colour of `value` in 0..=1; what is not finite is dark.

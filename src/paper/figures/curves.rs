@@ -4,7 +4,7 @@ use super::{Figure, Source, designs};
 use crate::{
     chart::{Axis, Chart, Layer, Panel, Style},
     experiment::{Curve, LearnerComparison, Quantiles},
-    recording::{TRUTH_COLOR, learner_color},
+    recording::{TRUTH_COLOR, learner_color, learner_slots},
     scenario::WorldSpec,
 };
 
@@ -50,7 +50,8 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
             events: true,
         },
     ];
-    let styles: Vec<Style> = (0..learners.len()).map(|index| Style::at(index, learner_color(index))).collect();
+    let slots = learner_slots(learners.iter().map(|learner| learner.name.as_str())).into_iter();
+    let styles: Vec<Style> = slots.map(|slot| Style::at(slot, learner_color(slot))).collect();
     let last = learners.first()?.curve.last()?.movements as f64;
     let change = match &source.scenario.world {
         WorldSpec::Simulated { change, .. } => change.as_ref().map(|change| change.step as f64),

@@ -4,7 +4,7 @@ use super::{Figure, Source};
 use crate::{
     chart::{Axis, Chart, Layer, Panel, Scale, Style},
     paper::experiments::Kind,
-    recording::learner_color,
+    recording::{learner_color, learner_slots},
 };
 
 pub fn figure(source: Source<'_>) -> Option<Figure> {
@@ -16,13 +16,8 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
     let least = values.iter().copied().filter(|value| *value > 0.0).fold(f64::INFINITY, f64::min);
     let place = |value: f64| if value > 0.0 { value } else { least / 10.0 };
     let zero = values.contains(&0.0);
-    let index = source
-        .scenario
-        .learners
-        .iter()
-        .position(|learner| source.experiment.learners.contains(&learner.name.as_str()))
-        .unwrap_or(0);
-    let style = Style { dashes: "", ..Style::at(index, learner_color(index)) };
+    let slot = learner_slots(source.experiment.learners.iter().copied()).first().copied().unwrap_or(0);
+    let style = Style { dashes: "", ..Style::at(slot, learner_color(slot)) };
     let learners: Vec<_> =
         trials.iter().filter_map(|trial| Some((place(trial.value?), trial.comparison.learners.first()?))).collect();
     let x = Axis::log(label, learners.iter().map(|(x, _)| *x));

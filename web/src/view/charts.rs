@@ -46,8 +46,8 @@ impl Panel {
     fn legend(&self, ui: &mut Ui) {
         let Some(description) = self.description() else { return };
         ui.horizontal_wrapped(|ui| {
-            for (index, learner) in description.learners.iter().enumerate() {
-                swatch(ui, index);
+            for (learner, slot) in description.learners.iter().zip(colours::slots(description)) {
+                swatch(ui, slot);
                 ui.label(&learner.name);
                 ui.add_space(6.0);
             }
@@ -105,11 +105,12 @@ impl Panel {
         }
         let cursor_colour = ui.visuals().weak_text_color();
         let threshold_colour = ui.visuals().text_color();
+        let slots = colours::slots(description);
         let response = plot.show(ui, |plot| {
-            for index in 0..description.learners.len() {
+            for (index, slot) in slots.iter().copied().enumerate() {
                 if let Some(band) = self.band(index, chart.value) {
                     let map = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| chart.y(*value)).collect() };
-                    let colour = colours::learner(index);
+                    let colour = colours::learner(slot);
                     let area = FilledArea::new("", &band.steps, &map(&band.low), &map(&band.high));
                     plot.add(area.fill_color(colour.gamma_multiply(0.18)).allow_hover(false));
                     let middle: Vec<[f64; 2]> =
@@ -126,8 +127,8 @@ impl Panel {
                 plot.vline(counted.width(1.0).style(LineStyle::Dotted { spacing: 4.0 }).allow_hover(false));
             }
             plot.vline(VLine::new("", self.cursor as f64).color(cursor_colour).width(1.0).allow_hover(false));
-            for (index, learner) in description.learners.iter().enumerate() {
-                let colour = colours::learner(index);
+            for (index, (learner, slot)) in description.learners.iter().zip(slots).enumerate() {
+                let colour = colours::learner(slot);
                 let curve: Vec<[f64; 2]> =
                     self.history.curve(index, chart.value).into_iter().map(|[x, y]| [x, chart.y(y)]).collect();
                 if let Some(bound) = chart.bound {
@@ -137,17 +138,17 @@ impl Panel {
                     plot.line(Line::new(name, bound).color(colour.gamma_multiply(0.6)).width(1.0));
                 }
                 let line = Line::new(&learner.name, PlotPoints::from(curve)).color(colour).width(1.8);
-                plot.line(line.style(colours::line_style(index)));
+                plot.line(line.style(colours::line_style(slot)));
                 let at = |step: u64| Some([step as f64, chart.y((chart.value)(self.history.row(step, index)?)?)]);
                 if let Some(point) = at(self.cursor).filter(|point| point[1].is_finite()) {
                     let here = Points::new(&learner.name, vec![point]).color(colour).radius(4.0);
-                    plot.points(here.shape(colours::marker(index)).filled(false).allow_hover(false));
+                    plot.points(here.shape(colours::marker(slot)).filled(false).allow_hover(false));
                 }
                 let converged = self.history.converged_at(self.cursor, index).filter(|_| chart.judged);
                 if let Some(point) = converged.and_then(at) {
                     let name = format!("{} converged", learner.name);
                     let mark = Points::new(name, vec![point]).color(colour).radius(6.0);
-                    plot.points(mark.shape(colours::marker(index)).filled(true));
+                    plot.points(mark.shape(colours::marker(slot)).filled(true));
                 }
             }
             plot.pointer_coordinate()

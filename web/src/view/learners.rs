@@ -13,13 +13,13 @@ fn fixed(value: Option<f64>, scale: f64, digits: usize) -> String {
 }
 
 /// A learner's colour and line, as the charts draw it.
-pub(super) fn swatch(ui: &mut Ui, index: usize) {
+pub(super) fn swatch(ui: &mut Ui, slot: usize) {
     let (rect, _) = ui.allocate_exact_size(vec2(22.0, 12.0), egui::Sense::hover());
-    let stroke = egui::Stroke::new(2.5, colours::learner(index));
+    let stroke = egui::Stroke::new(2.5, colours::learner(slot));
     // Round dots and thick ends stay within.
     let rect = rect.shrink2(vec2(1.5, 0.0));
     let line = [rect.left_center(), rect.right_center()];
-    match colours::line_style(index) {
+    match colours::line_style(slot) {
         LineStyle::Solid => ui.painter().add(Shape::line_segment(line, stroke)),
         LineStyle::Dashed { length } => {
             ui.painter().add(Shape::Vec(Shape::dashed_line(&line, stroke, length, length / 2.0)))
@@ -69,9 +69,10 @@ impl Panel {
                         "Converged: both errors stay within the thresholds, confirmed by 20 more movements",
                     );
                     ui.end_row();
-                    for (index, learner) in description.learners.iter().enumerate() {
+                    let slots = colours::slots(description);
+                    for (index, (learner, slot)) in description.learners.iter().zip(slots).enumerate() {
                         ui.horizontal(|ui| {
-                            swatch(ui, index);
+                            swatch(ui, slot);
                             let tip = format!("Estimator {}, policy {}", learner.estimator, learner.policy);
                             ui.label(RichText::new(&learner.name).strong()).on_hover_text(tip);
                         });
