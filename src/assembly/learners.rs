@@ -12,6 +12,7 @@ use crate::{
         ErrorDraw, EstimatorKind, Filter, InitialError, LearnerSpec, PolicyKind, Scenario, ScenarioError, SmootherSpec,
         WorldSpec,
     },
+    sensing::Loss,
     selection::{Active, Minimiser, Planner, Policy, Random},
 };
 
@@ -56,7 +57,7 @@ impl Scenario {
                 Box::new(SixNumbers::new(belief(self.filter.sigma()), direction, point, stabilising(self.filter)))
             }
             EstimatorKind::Smoother => {
-                let SmootherSpec { sigma, hypotheses } = self.smoother;
+                let SmootherSpec { sigma, hypotheses, loss } = self.smoother;
                 let bound = match &self.world {
                     WorldSpec::Simulated {
                         initial_error: InitialError { draw: ErrorDraw::Anywhere, point_m, .. },
@@ -69,7 +70,11 @@ impl Scenario {
                 let prior = Prior::new(briefing.initial.clone(), layout, covariance, within)
                     .map_err(|source| ScenarioError::Prior { scenario: self.name.clone(), source })?;
                 let (rig, rng) = (Arc::new(self.rig.assuming(sigma)), Stream::Hypotheses.rng(seed));
-                Box::new(Smoother::new(prior, layout.clone(), rig, hypotheses, rng))
+                let smoother = Smoother::new(prior, layout.clone(), rig, hypotheses, rng)
+                    .with_loss(if spec.robust { loss } else { Loss::None });
+                // Recorded bodies do not change: what looks like it is an outlier or a model that does not hold.
+                let changes = matches!(self.world, WorldSpec::Simulated { .. });
+                Box::new(if changes { smoother } else { smoother.never_forgetting() })
             }
             EstimatorKind::Gradient => Box::new(Gradient::new(belief(1.0), self.gradient_rate)),
         })

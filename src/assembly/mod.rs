@@ -87,7 +87,7 @@ impl Scenario {
 
     fn draw(&self, seed: u64) -> Result<(World, Evaluation, Briefing), ScenarioError> {
         match &self.world {
-            WorldSpec::Simulated { initial_error, watch, change } => {
+            WorldSpec::Simulated { initial_error, watch, change, outliers } => {
                 let truth = self.robot.state.clone();
                 let limits = &self.robot.limits;
                 let briefing = Briefing {
@@ -110,7 +110,7 @@ impl Scenario {
                 let change = change.as_ref();
                 let change = change.map(|change| Box::new(Change { step: change.step, truth: change.truth.clone() }));
                 Ok((
-                    World::Simulated { truth: Box::new(truth), rig: self.rig.clone(), head, change },
+                    World::Simulated { truth: Box::new(truth), rig: self.rig.clone(), head, change, outliers: *outliers },
                     evaluation,
                     briefing,
                 ))

@@ -9,7 +9,7 @@ use super::{
     world::World,
 };
 use crate::{
-    estimation::{Belief, Update},
+    estimation::{Belief, ReadingReport, Update},
     kinematics::JointBox,
     model::State,
     selection::{SelectionError, Weights},
@@ -68,6 +68,11 @@ impl Learner {
     /// What it believes.
     pub fn belief(&self) -> &Belief {
         self.agent.belief()
+    }
+
+    /// What it makes of every reading so far, where it weighs them.
+    pub(super) fn readings(&self) -> Vec<ReadingReport> {
+        self.agent.readings()
     }
 
     /// The joint limits.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{Experiment, convergence::Thresholds, metrics::Metrics, report::array};
 use crate::{
     design::BestDesign,
-    estimation::Belief,
+    estimation::{Belief, ReadingReport},
     kinematics::{JointKind, chart},
 };
 
@@ -30,8 +30,21 @@ pub struct RunResult {
     /// truth is known.
     #[serde(default)]
     pub best_designs: Vec<BestDesign>,
+    /// The readings that had nothing to do with the robot, where the world is simulated and has such.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outliers: Vec<OutlierReading>,
     /// The learners.
     pub learners: Vec<LearnerResult>,
+}
+
+/// A reading that had nothing to do with the robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct OutlierReading {
+    /// The movement, counted from 1.
+    pub movement: u64,
+    /// The channel, counted from 0.
+    pub channel: usize,
 }
 
 /// The outcome of one learner.
@@ -65,6 +78,9 @@ pub struct LearnerResult {
     pub efficiency: Option<f64>,
     /// The metrics at the end.
     pub metrics: Metrics,
+    /// What it makes of every reading, for a learner with a robust loss.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub readings: Vec<ReadingReport>,
     /// The learned model.
     pub model: Model,
 }
@@ -183,6 +199,7 @@ impl Experiment {
                 failure: report.failure.clone(),
                 efficiency: None,
                 metrics: report.metrics.clone(),
+                readings: learner.readings(),
                 model: Model::new(learner.belief(), &names),
             })
             .collect();
@@ -194,6 +211,7 @@ impl Experiment {
             thresholds: description.thresholds,
             movements_by_counting: description.movements_by_counting,
             best_designs: Vec::new(),
+            outliers: self.outliers.clone(),
             learners,
         }
     }

@@ -26,12 +26,12 @@ pub use summary::{ScenarioSummary, WorldKind};
 
 use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
-    experiment::Thresholds,
+    experiment::{Outliers, Thresholds},
     kinematics::JointBox,
     model::{Block, Layout, Quantity, State},
     optimize::Settings,
     selection::{CriterionUnits, Planning, Watch, Weights},
-    sensing::Rig,
+    sensing::{Loss, Rig},
 };
 
 /// A validated scenario.
@@ -123,6 +123,8 @@ pub enum WorldSpec {
         watch: Option<Watch>,
         /// How the body changes during a run, if it does.
         change: Option<Box<ChangeSpec>>,
+        /// Readings that have nothing to do with the robot, if there are any.
+        outliers: Option<Outliers>,
     },
     /// A recorded data set is replayed; the initial estimate is the nominal robot, registered to the training rows.
     Measured {
@@ -219,6 +221,8 @@ pub struct SmootherSpec {
     pub sigma: f64,
     /// How many hypotheses it keeps and searches.
     pub hypotheses: HypothesisSettings,
+    /// What a reading costs that is far from its prediction.
+    pub loss: Loss,
 }
 
 /// How movements are chosen actively.

@@ -51,12 +51,18 @@ impl Hypotheses {
         self.modes = self.modes.iter().filter_map(|mode| posterior.mode(&mode.state, layout, WARM)).collect();
     }
 
-    /// Searches new modes, half of them from the prior, half of them from the modes there are.
+    /// Searches new modes, half of them from the prior, half of them from the modes there are. Where readings may be outliers,
+    /// half of these suspect some of the readings: they begin where all others are explained.
     pub fn spawn(&mut self, count: usize, posterior: &Posterior, layout: &Layout, rng: &mut impl Rng) {
         let best = self.modes.iter().map(|mode| mode.cost).fold(f64::INFINITY, f64::min);
         let effort = Effort { hopeless: (best + HOPELESS) * 10.0 + 1e3, ..COLD };
         let before = self.modes.len();
         for index in 0..count {
+            if posterior.loss.is_robust() && index % 4 == 1 && before > 0 {
+                let start = &self.modes[rng.random_range(0..before)].state;
+                self.modes.extend(posterior.mode_suspecting(start, layout, effort, rng));
+                continue;
+            }
             let drawn = posterior.prior.draw(layout, rng);
             let start = if index % 2 == 0 || before == 0 {
                 drawn
@@ -212,7 +218,7 @@ mod tests {
 
     fn see(posterior: &mut Posterior, truth: &State, positions: &[f64]) {
         let observation = Observation::seen(truth.marker_at(positions));
-        posterior.measurements.push(Measurement { positions: positions.to_vec(), observation });
+        posterior.measurements.push(Measurement { positions: positions.to_vec(), observation, movement: 0 });
     }
 
     #[test]

@@ -30,12 +30,14 @@ use rand_chacha::ChaCha8Rng;
 pub use hypotheses::HypothesisSettings;
 
 use hypotheses::Hypotheses;
-use posterior::{Measurement, Posterior};
+use posterior::{Effort, Measurement, Posterior};
 
-use super::{Alternative, Belief, ChangeDetector, EstimationError, Estimator, Update, change::quantile};
+use super::{
+    Alternative, Belief, ChangeDetector, EstimationError, Estimator, ReadingReport, Update, change::quantile,
+};
 use crate::{
     model::{Layout, Prior},
-    sensing::{Observation, Rig},
+    sensing::{Loss, Observation, Rig},
 };
 
 /// The maximum a posteriori state given everything that was seen, with its rivals.
@@ -47,6 +49,12 @@ pub struct Smoother {
     settings: HypothesisSettings,
     rng: ChaCha8Rng,
     changes: ChangeDetector,
+    /// Whether it drops what was measured before the body changed.
+    forgets: bool,
+    /// Movements absorbed so far, misses among them.
+    movements: u64,
+    /// What was made of readings that are no longer looked at one by one.
+    past: Vec<ReadingReport>,
 }
 
 /// Steps without a new hypothesis after which none are searched for any more.
@@ -54,6 +62,10 @@ const CALM: usize = 6;
 /// Standard deviations of a normalised innovation squared (by Wilson and Hilferty) that the old body hardly explains: 99 %
 /// of what it does explain is below.
 const SURPRISING: f64 = 2.326;
+/// The search for another body that explains what is surprising.
+const THOROUGH: Effort = Effort { steps: 60, tolerance: 1e-6, hopeless: f64::INFINITY };
+/// Equations beyond the number of parameters that must agree on another body.
+const AGREEING: usize = 6;
 /// Measurements that are kept as they are; beyond these the older half is compressed.
 const KEPT: usize = 60;
 
@@ -74,16 +86,32 @@ impl Smoother {
             settings,
             rng,
             changes: ChangeDetector::honest(),
+            forgets: true,
+            movements: 0,
+            past: Vec::new(),
         };
         smoother.begin();
         smoother.publish();
         smoother
     }
 
+    /// The same with another loss than least squares. With a robust one a surprising reading is taken for an outlier; only
+    /// several in a row that agree with each other are a changed body.
+    pub fn with_loss(mut self, loss: Loss) -> Self {
+        self.posterior.loss = loss;
+        self.changes = ChangeDetector::for_loss(loss);
+        self
+    }
+
+    /// The same for a body that never changes: an alarm is raised as ever, but nothing is dropped.
+    pub fn never_forgetting(self) -> Self {
+        Self { forgets: false, ..self }
+    }
+
     /// The modes before any measurement: the guess, or without one draws of the prior.
     fn begin(&mut self) {
         let layout = self.belief.layout.clone();
-        let once = posterior::Effort { steps: 0, tolerance: 0.0, hopeless: f64::INFINITY };
+        let once = Effort { steps: 0, tolerance: 0.0, hopeless: f64::INFINITY };
         let prior = &self.posterior.prior;
         let starts = if prior.is_vague() {
             (0..self.settings.kept.max(1)).map(|_| prior.draw(&layout, &mut self.rng)).collect()
@@ -114,22 +142,57 @@ impl Smoother {
         self.hypotheses.calm >= CALM
     }
 
+    /// Whether the body has changed: its innovations say so, and where readings may be outliers, another body near this one
+    /// explains what is surprising, so that it agrees with itself.
+    fn notices_change(&mut self, nis: Option<(f64, usize)>) -> bool {
+        // Before the belief is settled its innovations say little about the body.
+        if !self.is_settled() || !nis.is_some_and(|(nis, degrees)| self.changes.observe(nis, degrees)) {
+            return false;
+        }
+        if !self.posterior.loss.is_robust() {
+            return true;
+        }
+        let layout = self.belief.layout.clone();
+        let Some(changed) = self.since_change() else { return false };
+        // As many equations as parameters, whatever they say, some body explains.
+        let equations: usize = changed.measurements.iter().map(|seen| seen.observation.equations()).sum();
+        if equations < layout.dimension() + AGREEING {
+            return false;
+        }
+        let mode = changed.mode_from_afar(&self.belief.state, &layout, THOROUGH);
+        let explains = mode.is_some_and(|mode| changed.readings(&mode.state).all(|reading| reading.weight > 0.5));
+        if explains && !self.forgets {
+            self.changes.reset();
+        }
+        explains
+    }
+
     /// Drops what was measured before the body changed. The estimate stays as a guess, with half the deviations that
     /// the prior had; of the measurements the latest stay, those that the old body does not explain.
     fn forget(&mut self) {
+        let Some(changed) = self.since_change() else { return };
+        let first = changed.measurements.first().map_or(u64::MAX, |seen| seen.movement);
+        let dropped = self.posterior.readings(&self.belief.state).take_while(|reading| reading.movement < first);
+        self.past.extend(dropped.collect::<Vec<_>>());
+        self.posterior = changed;
+        self.hypotheses.calm = 0;
+        self.changes.reset();
+    }
+
+    /// What is known if the body has changed: the estimate as a guess, and the latest measurements that it does not explain;
+    /// where readings may be outliers, all since the alarm began to rise.
+    fn since_change(&self) -> Option<Posterior> {
         let explained = |(nis, degrees): (f64, usize)| nis <= quantile(degrees as f64, SURPRISING);
-        let surprising = (self.posterior.measurements.iter().rev())
+        let measurements = &self.posterior.measurements;
+        let surprising = (measurements.iter().rev())
             .take_while(|seen| {
                 self.belief.nis(&seen.positions, &seen.observation).is_some_and(|found| !explained(found))
             })
             .count();
-        let recent = self.posterior.measurements.split_off(self.posterior.measurements.len() - surprising);
+        let surprising = self.changes.since().unwrap_or(surprising).min(measurements.len());
         let covariance = self.prior_here() * 0.25;
-        let Ok(prior) = Prior::around(self.belief.state.clone(), &self.belief.layout, covariance) else { return };
-        self.posterior = Posterior::new(prior, self.posterior.rig.clone());
-        self.posterior.measurements = recent;
-        self.hypotheses.calm = 0;
-        self.changes.reset();
+        let prior = Prior::around(self.belief.state.clone(), &self.belief.layout, covariance).ok()?;
+        Some(self.posterior.anew(prior, measurements[measurements.len() - surprising..].to_vec()))
     }
 
     /// The prior's covariance in the chart at the estimate; without what correlates its parameters where the estimate has
@@ -172,6 +235,7 @@ impl Estimator for Smoother {
 
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         if observation.is_miss() {
+            self.movements += 1;
             return Ok(Update::default());
         }
         // All or nothing: an observation that ends it leaves no trace.
@@ -180,17 +244,24 @@ impl Estimator for Smoother {
         *self = revised;
         Ok(update)
     }
+
+    fn readings(&self) -> Vec<ReadingReport> {
+        if !self.posterior.loss.is_robust() {
+            return Vec::new();
+        }
+        self.past.iter().copied().chain(self.posterior.readings(&self.belief.state)).collect()
+    }
 }
 
 impl Smoother {
     fn absorb(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let nis = self.belief.nis(positions, observation);
         let layout = self.belief.layout.clone();
-        let measurement = Measurement { positions: positions.to_vec(), observation: observation.clone() };
-        self.posterior.measurements.push(measurement);
-        // Before the belief is settled its innovations say little about the body.
-        let change_noticed = self.is_settled() && nis.is_some_and(|(nis, degrees)| self.changes.observe(nis, degrees));
-        if change_noticed {
+        self.movements += 1;
+        let (positions, observation) = (positions.to_vec(), observation.clone());
+        self.posterior.measurements.push(Measurement { positions, observation, movement: self.movements });
+        let change_noticed = self.notices_change(nis);
+        if change_noticed && self.forgets {
             self.forget();
         }
         self.hypotheses.follow(&self.posterior, &layout);
@@ -205,6 +276,9 @@ impl Smoother {
         if self.is_determined() && self.belief.alternatives.is_empty() && self.explains() {
             self.hypotheses.calm += 1;
             if self.is_settled() && self.posterior.measurements.len() > KEPT {
+                let first = self.posterior.measurements[KEPT / 2].movement;
+                let settling = self.posterior.readings(&self.belief.state).take_while(|it| it.movement < first);
+                self.past.extend(settling.collect::<Vec<_>>());
                 self.posterior.settle(KEPT / 2, &self.belief.state, &layout);
             }
         } else {

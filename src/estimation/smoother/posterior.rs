@@ -12,8 +12,10 @@
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use rand::{Rng, RngExt};
 
 use crate::{
+    estimation::ReadingReport,
     model::{Layout, Pass, Prior, Quantity, State, rank},
     sensing::{Graduated, Loss, Observation, Rig},
 };
@@ -23,6 +25,8 @@ use crate::{
 pub(super) struct Measurement {
     pub positions: Vec<f64>,
     pub observation: Observation,
+    /// Its number among all movements, from 1.
+    pub movement: u64,
 }
 
 /// Measurements as a quadratic in the chart at `state`.
@@ -95,6 +99,32 @@ impl Posterior {
     pub fn new(prior: Prior, rig: Arc<Rig>) -> Self {
         let scales = vec![1.0; rig.channels().len()];
         Self { pins: prior.pins(), prior, rig, loss: Loss::None, scales, measurements: Vec::new(), settled: None }
+    }
+
+    /// The same rig and likelihood with another prior, and of the measurements only these.
+    pub fn anew(&self, prior: Prior, measurements: Vec<Measurement>) -> Self {
+        let (loss, scales) = (self.loss, self.scales.clone());
+        Self { loss, scales, measurements, ..Self::new(prior, self.rig.clone()) }
+    }
+
+    /// What is made of every reading at `state`, but for those that have settled.
+    pub fn readings(&self, state: &State) -> impl Iterator<Item = ReadingReport> {
+        let of = move |seen: &Measurement| {
+            let mut reports = Vec::new();
+            self.rig.squared_errors(state, &seen.positions, &seen.observation, |channel, squared, d| {
+                let squared = squared / self.scales[channel].powi(2);
+                reports.push(ReadingReport {
+                    movement: seen.movement,
+                    channel,
+                    equations: d,
+                    residual_sigmas: squared.sqrt(),
+                    weight: self.loss.weight(squared, d),
+                    outlier_probability: self.loss.outlier(squared, d),
+                });
+            });
+            reports
+        };
+        self.measurements.iter().flat_map(of)
     }
 
     /// How many measurements there were.
@@ -334,7 +364,7 @@ impl Measurement {
     fn only(&self, channel: usize) -> Option<Self> {
         let mut readings = vec![None; self.observation.readings.len()];
         readings[channel] = Some(self.observation.readings.get(channel)?.clone()?);
-        Some(Self { positions: self.positions.clone(), observation: Observation { readings } })
+        Some(Self { observation: Observation { readings }, positions: self.positions.clone(), movement: self.movement })
     }
 }
 
@@ -431,6 +461,17 @@ impl Posterior {
             let steps = if width.is_infinite() { Effort { steps: effort.steps, ..coarse } } else { coarse };
             state = self.descend(Graduated { loss: self.loss, width }, &state, layout, steps)?.0;
         }
+        self.mode(&state, layout, effort)
+    }
+
+    /// The same from where all measurements but one to three are explained by least squares.
+    pub fn mode_suspecting(&self, start: &State, layout: &Layout, effort: Effort, rng: &mut impl Rng) -> Option<Mode> {
+        let mut others = self.clone();
+        for _ in 0..rng.random_range(1..=3).min(others.measurements.len()) {
+            others.measurements.swap_remove(rng.random_range(0..others.measurements.len()));
+        }
+        let least_squares = Graduated { loss: self.loss, width: f64::INFINITY };
+        let (state, _) = others.descend(least_squares, start, layout, effort)?;
         self.mode(&state, layout, effort)
     }
 

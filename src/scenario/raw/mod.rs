@@ -28,6 +28,7 @@ pub struct Scenario {
     pub measurements: Option<Spanned<Measurements>>,
     pub head: Option<Spanned<Head>>,
     pub change: Option<Spanned<Change>>,
+    pub outliers: Option<Spanned<Outliers>>,
     pub prior: Spanned<Prior>,
     pub filter: Filter,
     pub unscented: Option<Filter>,
@@ -123,6 +124,13 @@ pub struct Shift {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
+pub struct Outliers {
+    pub fraction: Spanned<f64>,
+    pub box_m: Spanned<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Prior {
     pub direction_rad: Spanned<f64>,
     pub point_m: Spanned<f64>,
@@ -142,6 +150,17 @@ pub struct Smoother {
     pub measurement_variance_m2: Option<Spanned<f64>>,
     pub hypotheses: Option<Spanned<u64>>,
     pub spawned: Option<Spanned<u64>>,
+    pub loss: Option<Loss>,
+    pub outlier_fraction: Option<Spanned<f64>>,
+    pub outlier_spread: Option<Spanned<f64>>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Loss {
+    None,
+    Huber,
+    Mixture,
 }
 
 #[derive(Debug, Deserialize)]
@@ -206,6 +225,7 @@ pub struct Learner {
     pub estimator: EstimatorKind,
     pub policy: Spanned<PolicyKind>,
     pub stabilising_noise: Option<Spanned<bool>>,
+    pub robust: Option<Spanned<bool>>,
     #[serde(default = "yes")]
     pub by_default: bool,
 }

@@ -21,7 +21,7 @@ use crate::{
     experiment::Thresholds,
     optimize::{Settings, Variant},
     selection::{CriterionUnits, Planning},
-    sensing::Rig,
+    sensing::{Loss, Rig},
 };
 
 /// How far from 1 the length of an axis may be: what is lost by writing six digits.
@@ -190,7 +190,31 @@ impl Check<'_> {
             kept: count("smoother.hypotheses", given.and_then(|given| given.hypotheses.as_ref()), default.kept),
             spawned: count("smoother.spawned", given.and_then(|given| given.spawned.as_ref()), default.spawned),
         };
-        SmootherSpec { sigma, hypotheses }
+        SmootherSpec { sigma, hypotheses, loss: self.loss(given) }
+    }
+
+    fn loss(&mut self, given: Option<&raw::Smoother>) -> Loss {
+        let Some(given) = given else { return Loss::None };
+        let keys = [("fraction", &given.outlier_fraction), ("spread", &given.outlier_spread)];
+        let loss = given.loss.unwrap_or(raw::Loss::None);
+        let Loss::Mixture { mut fraction, mut spread } = Loss::MIXTURE else { return Loss::None };
+        for (key, value) in keys {
+            let Some(value) = value else { continue };
+            let key = format!("smoother.outlier_{key}");
+            if loss != raw::Loss::Mixture {
+                let mend = "remove it, or write `loss = \"mixture\"`";
+                self.problem(value.span(), key, "only a mixture of noise and outliers has one", mend);
+            } else if key.ends_with("fraction") {
+                fraction = self.number(&key, value, |x| x > 0.0 && x < 0.5, "a share above 0 and below 0.5");
+            } else {
+                spread = self.number(&key, value, |x| x > 1.0, "a number above 1, in standard deviations of the noise");
+            }
+        }
+        match loss {
+            raw::Loss::None => Loss::None,
+            raw::Loss::Huber => Loss::Huber,
+            raw::Loss::Mixture => Loss::Mixture { fraction, spread },
+        }
     }
 
     /// The rate of the gradient. A file that has learn by it says which; others leave it to a default.
@@ -288,9 +312,14 @@ impl Check<'_> {
                 let what = "a gradient has no covariance to add noise to";
                 self.problem(key_span.span(), format!("{key}.stabilising_noise"), what, mend);
             }
+            if let (Some(given), true) = (&learner.robust, learner.estimator != EstimatorKind::Smoother) {
+                let mend = "remove it; only a `smoother` has a loss that can be robust";
+                self.problem(given.span(), format!("{key}.robust"), "this estimator knows least squares alone", mend);
+            }
             let stabilising = learner.stabilising_noise.as_ref().is_none_or(|given| *given.get_ref());
+            let robust = learner.robust.as_ref().is_none_or(|given| *given.get_ref());
             let (name, by_default) = (name.clone(), learner.by_default);
-            learners.push(LearnerSpec { name, estimator: learner.estimator, policy, stabilising, by_default });
+            learners.push(LearnerSpec { name, estimator: learner.estimator, policy, stabilising, robust, by_default });
         }
         if learners.is_empty() {
             self.problem(raw.span(), "learner", "there is no learner", "add a [[learner]]");

@@ -6,6 +6,7 @@ use super::{Check, raw};
 use std::sync::Arc;
 
 use crate::{
+    experiment::Outliers,
     scenario::{DataError, InitialError, Measurements, Robot, WorldSpec},
     sensing::Rig,
 };
@@ -42,14 +43,16 @@ impl Check<'_> {
                     },
                     watch: watch.flatten(),
                     change: change.flatten().map(Box::new),
+                    outliers: raw.outliers.as_ref().map(|outliers| self.outliers(outliers.get_ref())),
                 })
             }
             (None, None, Some(measurements)) => {
                 let head = raw.head.as_ref().map(|head| ("head", head.span()));
                 let change = raw.change.as_ref().map(|change| ("change", change.span()));
-                for (key, span) in head.into_iter().chain(change) {
+                let outliers = raw.outliers.as_ref().map(|outliers| ("outliers", outliers.span()));
+                for (key, span) in head.into_iter().chain(change).chain(outliers) {
                     let mend = "remove it; it belongs to a simulated world";
-                    self.problem(span, key, "recorded measurements cannot be watched or changed", mend);
+                    self.problem(span, key, "recorded measurements cannot be watched, changed or spoilt", mend);
                 }
                 self.measured(raw, measurements.get_ref(), open)
             }
@@ -65,6 +68,14 @@ impl Check<'_> {
                 self.problem(span.unwrap_or(0..0), "sensor, initial_error, measurements", what, mend);
                 None
             }
+        }
+    }
+
+    fn outliers(&mut self, raw: &raw::Outliers) -> Outliers {
+        let mend = "a share of readings, from 0 to 1";
+        Outliers {
+            fraction: self.number("outliers.fraction", &raw.fraction, |share| (0.0..=1.0).contains(&share), mend),
+            box_m: self.positive("outliers.box_m", &raw.box_m),
         }
     }
 
@@ -97,6 +108,10 @@ impl Check<'_> {
         if let Some(head) = raw.head.as_ref().filter(|_| channels.iter().any(|channel| channel.target() != Some(0))) {
             let mend = "leave [head] out, or use sensors of the marker's position alone";
             self.problem(head.span(), "head", "a head watches the marker, and not what another sensor measures", mend);
+        }
+        if let Some(outliers) = raw.outliers.as_ref().filter(|_| channels.iter().any(|channel| channel.target().is_none())) {
+            let mend = "leave [outliers] out, or use sensors of positions alone";
+            self.problem(outliers.span(), "outliers", "they replace positions, and another sensor measures something else", mend);
         }
         (channels.len() == given.0.len() && !channels.is_empty()).then(|| Arc::new(Rig::new(channels)))
     }
