@@ -26,7 +26,7 @@
 //! These do no input or output, know no threads but those of the feature `parallel`, and build without default
 //! features for `wasm32-unknown-unknown`. With the feature `app` (on by default) come `recording` (Rerun and CSV
 //! files), `chart` (panels of curves for print, as SVG and PNG; private), `paper` (the paper's experiments beside its
-//! numbers, drawn as charts), `server` (HTTP and the page) and the command line.
+//! numbers, drawn as charts), `server` (HTTP and the page), `export` (the page without a server) and the command line.
 //!
 //! # Notation, frames and units
 //!
@@ -61,6 +61,8 @@ mod chart;
 pub mod design;
 pub mod estimation;
 pub mod experiment;
+#[cfg(feature = "app")]
+pub mod export;
 pub mod kinematics;
 pub mod model;
 pub mod optimize;

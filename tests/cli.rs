@@ -309,3 +309,15 @@ fn a_sweep_ranks_by_the_learners_own_median() {
     assert!(late(&trials[0]) <= late(&trials[1]), "{trials:?}");
     assert_eq!(trials[0]["values"][0][1], "0.003");
 }
+
+#[test]
+fn a_person_cannot_choose_on_the_command_line() {
+    for command in
+        [&["run"][..], &["compare", "--seeds", "2"], &["sweep", "--set=filter.measurement_variance_m2=0.001"]]
+    {
+        let arguments = [command, &["arm-6dof", "--learner", "smoother:human"]].concat();
+        let (code, error) = failure(&arguments);
+        assert_eq!(code, 2, "{error}");
+        assert!(error.contains("a person chooses") && error.contains("body-schema serve"), "{error}");
+    }
+}

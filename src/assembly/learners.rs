@@ -5,15 +5,15 @@ use std::sync::Arc;
 use super::Briefing;
 use crate::{
     estimation::{Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls},
-    experiment::{Agent, Learner, Stream},
+    experiment::{Agent, Learner, LearnerDescription, Stream},
     model::{Block, Prior},
     optimize::{Settings, Variant},
     scenario::{
         ErrorDraw, EstimatorKind, Filter, InitialError, LearnerSpec, PolicyKind, Scenario, ScenarioError, SmootherSpec,
         WorldSpec,
     },
+    selection::{Active, Human, Minimiser, Planner, Policy, Random},
     sensing::Loss,
-    selection::{Active, Minimiser, Planner, Policy, Random},
 };
 
 /// States drawn from the posterior for one Monte Carlo evaluation of (7).
@@ -24,13 +24,23 @@ impl Scenario {
         let agent = self.agent_of(spec, seed, briefing)?;
         let workspace = briefing.workspace.clone();
         let weights = briefing.weights.clone();
-        Ok(Learner::new(spec.description(), agent, weights, workspace, self.settled_below_m))
+        Ok(Learner::new(self.learner_description(spec), agent, weights, workspace, self.settled_below_m))
     }
 
     pub(super) fn agent_of(&self, spec: &LearnerSpec, seed: u64, briefing: &Briefing) -> Result<Agent, ScenarioError> {
         let estimator = self.estimator(spec, seed, briefing)?;
         let (actions, limits) = (briefing.actions.clone(), self.robot.limits.clone());
         Ok(Agent::new(estimator, self.policy(spec, briefing), actions, limits, seed))
+    }
+
+    pub(super) fn learner_description(&self, spec: &LearnerSpec) -> LearnerDescription {
+        let noise = match spec.estimator {
+            EstimatorKind::Rls => self.filter.stabilising,
+            EstimatorKind::Unscented => self.unscented.stabilising,
+            // They show no covariance, or add nothing to it.
+            EstimatorKind::RlsSixNumbers | EstimatorKind::Smoother | EstimatorKind::Gradient => None,
+        };
+        LearnerDescription { stabilised: spec.stabilising && noise.is_some(), ..spec.description() }
     }
 
     fn estimator(
@@ -87,9 +97,11 @@ impl Scenario {
         let evaluations = settings.max_evaluations;
         let minimiser = match kind {
             PolicyKind::Random => return Box::new(Random::new(weights, watch)),
-            PolicyKind::Active | PolicyKind::ActivePlanned | PolicyKind::ActiveNaive | PolicyKind::ActiveMonteCarlo => {
-                Minimiser::Direct(settings)
-            }
+            PolicyKind::Active
+            | PolicyKind::ActivePlanned
+            | PolicyKind::ActiveNaive
+            | PolicyKind::ActiveMonteCarlo
+            | PolicyKind::Human => Minimiser::Direct(settings),
             PolicyKind::ActiveDirect => Minimiser::Direct(Settings { variant: Variant::Original, ..settings }),
             PolicyKind::ActiveRandomSearch => Minimiser::Random { evaluations },
             PolicyKind::ActiveBayesian => Minimiser::Bayesian { evaluations },
@@ -105,10 +117,11 @@ impl Scenario {
             });
         }
         let active = Active::new(weights, minimiser).sampled(samples);
-        Box::new(match watch {
+        let active = match watch {
             Some(watch) if kind == PolicyKind::ActiveNaive => active.watched_naively(watch),
             Some(watch) => active.watched(watch),
             None => active,
-        })
+        };
+        if kind == PolicyKind::Human { Box::new(Human::new(active)) } else { Box::new(active) }
     }
 }

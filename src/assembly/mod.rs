@@ -242,12 +242,13 @@ impl Scenario {
             joints: robot.joint_descriptions(),
             parameters: layout.dimension(),
             movements_by_counting: movements_by_counting(&robot.state, layout, &self.rig.assuming(1.0), &robot.limits),
-            learners: specs.iter().map(LearnerSpec::description).collect(),
+            learners: specs.iter().map(|spec| self.learner_description(spec)).collect(),
             thresholds: self.thresholds,
             movements_available: briefing.actions.remaining(),
             truth: world.truth().map(ModelReport::of_state),
             change_at: world.change().map(|change| change.step),
             head: briefing.watch.as_ref().map(|watch| HeadDescription::of(&watch.head)),
+            body: robot.body,
         };
         Ok(Experiment::new(description, world, learners, evaluation, self.design_problem()))
     }

@@ -2,6 +2,7 @@
 
 mod compare;
 mod designs;
+mod export;
 mod input;
 mod output;
 mod paper;
@@ -15,8 +16,9 @@ mod until;
 
 use anyhow::{Context, Result};
 use body_schema::{
+    export::ExportError,
     paper::PaperError,
-    scenario::{Scenario, ScenarioError},
+    scenario::{LearnerSpec, PolicyKind, Scenario, ScenarioError},
 };
 use clap::{Parser, Subcommand};
 
@@ -45,6 +47,8 @@ enum Command {
     Sweep(sweep::Arguments),
     /// Rerun the paper's experiments, and set the outcome beside its figures and numbers
     Paper(paper::Arguments),
+    /// Write the page with recorded runs to a folder that any static host serves
+    Export(export::Arguments),
     /// List the built-in scenarios
     Scenarios(scenarios::ListArguments),
     /// Say whether a scenario file is valid, and if not, what to mend
@@ -68,9 +72,22 @@ impl ScenarioArguments {
     fn load(&self) -> Result<(Scenario, Option<&[String]>)> {
         let scenario = load_scenario(&self.scenario)?;
         let learners = (!self.learners.is_empty()).then_some(self.learners.as_slice());
-        scenario.chosen(learners)?;
+        let chosen = scenario.chosen(learners)?;
+        no_person(&chosen)?;
         Ok((scenario, learners))
     }
+}
+
+/// Refuses learners for which a person chooses: on the command line nobody does.
+fn no_person(learners: &[LearnerSpec]) -> Result<()> {
+    let Some(LearnerSpec { name, .. }) = learners.iter().find(|spec| spec.policy == PolicyKind::Human) else {
+        return Ok(());
+    };
+    Err(BadInput(format!(
+        "a person chooses every movement of `{name}`, and here nobody can; open the explorer with `body-schema serve`, or \
+         set its movements over HTTP (POST /v1/sessions/{{id}}/learners/{name}/configuration)"
+    ))
+    .into())
 }
 
 /// Carries out a command.
@@ -82,6 +99,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Some(Command::Compare(arguments)) => compare::compare(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Paper(arguments)) => paper::paper(&arguments),
+        Some(Command::Export(arguments)) => export::export(&arguments),
         Some(Command::Scenarios(arguments)) => scenarios::list(&arguments),
         Some(Command::Check(arguments)) => scenarios::check(&arguments),
     }
@@ -108,6 +126,7 @@ struct BadInput(String);
 pub fn is_bad_input(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.is::<BadInput>()
+            || cause.downcast_ref::<ExportError>().is_some_and(ExportError::is_bad_input)
             || cause.downcast_ref::<PaperError>().is_some_and(PaperError::is_bad_input)
             || cause.downcast_ref::<ScenarioError>().is_some_and(|error| !matches!(error, ScenarioError::Experiment(_)))
     })

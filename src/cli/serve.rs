@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use body_schema::server::{self, Options};
+use body_schema::server::{self, FrameAncestor, Options};
 use tokio_util::sync::CancellationToken;
 
 #[derive(Debug, clap::Args)]
@@ -18,6 +18,10 @@ pub struct Arguments {
     /// Also keep every session's recording as a file in DIR [default: in memory only, to be downloaded]
     #[arg(long, value_name = "DIR")]
     data_dir: Option<PathBuf>,
+    /// Let pages of ORIGIN show the explorer in a frame, as https://example.org, or `self`; repeat or separate by commas for
+    /// several [default: nobody]
+    #[arg(long, value_name = "ORIGIN", value_delimiter = ',', num_args = 1)]
+    frame_ancestors: Vec<FrameAncestor>,
     /// Show the page with the panel in DIR, which `cargo run -p body-schema-bundle -- DIR` built
     #[arg(long, value_name = "DIR", hide = true)]
     panel_dir: Option<PathBuf>,
@@ -27,7 +31,7 @@ const DEFAULT_ADDRESS: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Add
 
 impl Default for Arguments {
     fn default() -> Self {
-        Self { bind: DEFAULT_ADDRESS, data_dir: None, panel_dir: None }
+        Self { bind: DEFAULT_ADDRESS, data_dir: None, frame_ancestors: Vec::new(), panel_dir: None }
     }
 }
 
@@ -49,7 +53,11 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
             writeln!(out, "recordings are kept in {}", folder.display())?;
         }
         out.flush()?;
-        let options = Options { data_dir: arguments.data_dir.clone(), panel_dir: arguments.panel_dir.clone() };
+        let options = Options {
+            data_dir: arguments.data_dir.clone(),
+            panel_dir: arguments.panel_dir.clone(),
+            frame_ancestors: arguments.frame_ancestors.clone(),
+        };
         server::serve(listener, options, shutdown).await?;
         writeln!(out, "ended; every recording is complete")?;
         Ok(())

@@ -34,6 +34,7 @@ use std::sync::Arc;
 use nalgebra::{Cholesky, DMatrix};
 
 use crate::{
+    estimation::Belief,
     kinematics::JointBox,
     model::{Layout, State},
     selection::Weights,
@@ -76,8 +77,10 @@ impl Problem {
         Some(self.rig.jacobian(&self.truth, &self.layout, configuration))
     }
 
-    /// tr(W F⁻¹), what the information F allows; `None` if it is singular.
-    pub fn bound(&self, information: &DMatrix<f64>) -> Option<f64> {
-        Some(self.weights.trace(&Cholesky::new(information.clone())?.inverse()))
+    /// The covariance F⁻¹ that the information F allows, in the chart at the truth; `None` if F is singular.
+    pub fn allowed(&self, information: &DMatrix<f64>) -> Option<Belief> {
+        let covariance = Cholesky::new(information.clone())?.inverse();
+        let at_truth = Belief::new(self.truth.clone(), Arc::new(self.layout.clone()), self.rig.clone());
+        Some(at_truth.with_covariance(covariance))
     }
 }

@@ -160,6 +160,27 @@ impl Agent {
         self.pending.push(proposal);
     }
 
+    /// Whether its movements are chosen outside, by [`set`](Self::set) alone.
+    pub fn is_set_from_outside(&self) -> bool {
+        self.policy.is_set_from_outside()
+    }
+
+    /// Proposes this movement in place of all that are pending, whatever its policy would choose. It is a proposal as any
+    /// other: stored with the events, and restored with them. An agent that has ended proposes nothing.
+    pub fn set(&mut self, configuration: &[f64]) -> Result<Appraisal, SelectionError> {
+        let appraisal = self.appraise(self.standpoint(), configuration)?;
+        let selection = Selection {
+            criterion: Some(appraisal.criterion),
+            gain: Some(appraisal.gain),
+            ..Selection::plain(configuration.to_vec())
+        };
+        if self.failure.is_none() {
+            self.pending.clear();
+            self.proposed(Proposal { id: self.proposals, selection, selection_ms: 0.0 });
+        }
+        Ok(appraisal)
+    }
+
     /// Takes a proposal back; false if it is not pending.
     pub fn withdraw(&mut self, id: u64) -> bool {
         let before = self.pending.len();

@@ -5,10 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Experiment,
-    report::{LearnerReport, MovementReport, array},
+    report::{LearnerReport, MovementReport, array, arrays},
 };
 use crate::{
     kinematics::JointBox,
+    model::State,
     optimize::{DirectError, History},
     selection::{Appraisal, Search, SelectionError},
 };
@@ -27,6 +28,17 @@ pub enum ChoiceError {
     /// The last movement was not found by DIRECT.
     #[error("the last movement of `{0}` was not chosen by DIRECT: it has not moved yet, or its policy is another")]
     NotSearched(String),
+    /// The learner chooses its movements itself.
+    #[error("`{0}` chooses its movements itself; only a learner whose policy is `human` takes a configuration")]
+    ChoosesItself(String),
+    /// The learner makes no movement any more.
+    #[error("`{name}` makes no movement any more: {why}")]
+    Ended {
+        /// Its name.
+        name: String,
+        /// Why.
+        why: String,
+    },
     /// A configuration that this robot does not have.
     #[error("`configuration` {0}")]
     Configuration(String),
@@ -135,18 +147,28 @@ pub struct IterationReport {
     pub lower_right_hull: Vec<usize>,
 }
 
-/// What a movement would have taught instead of the last one.
+/// What a movement would have taught instead of the last one, or is expected to teach as the next one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
 pub struct AppraisalReport {
     /// The configuration, rad or m per joint.
     pub configuration: Vec<f64>,
-    /// C(θ) under the belief before the last movement.
+    /// C(θ) under the belief before that movement.
     pub criterion: f64,
     /// By how much that is less than before.
     pub gain: f64,
+    /// The gain of the best movement that DIRECT finds under the same belief; null for a policy that does not go by one.
+    #[serde(default)]
+    pub best_gain: Option<f64>,
+    /// `gain` as a share of `best_gain`, from 0 to 1; null without one. DIRECT's best is not always the best there is: who
+    /// finds a better movement has a share of 1.
+    #[serde(default)]
+    pub share: Option<f64>,
     /// The criterion before: tr(W P), but for a policy that goes by more.
     pub trace: f64,
+    /// The arm in this configuration as estimated: axis points in order, then the marker, metres.
+    #[serde(default)]
+    pub estimated_skeleton_m: Vec<[f64; 3]>,
     /// The predicted marker, metres.
     pub predicted_marker_m: [f64; 3],
     /// Its covariance, m², row by row.
@@ -156,12 +178,15 @@ pub struct AppraisalReport {
 }
 
 impl AppraisalReport {
-    pub(super) fn of(configuration: &[f64], appraisal: &Appraisal) -> Self {
+    pub(super) fn of(configuration: &[f64], appraisal: &Appraisal, estimate: &State, best_gain: Option<f64>) -> Self {
         let rows = |matrix: &Matrix3<f64>| [0, 1, 2].map(|row| [0, 1, 2].map(|column| matrix[(row, column)]));
         Self {
             configuration: configuration.to_vec(),
             criterion: appraisal.criterion,
             gain: appraisal.gain,
+            best_gain,
+            share: best_gain.filter(|best| *best > 0.0).map(|best| (appraisal.gain / best).clamp(0.0, 1.0)),
+            estimated_skeleton_m: arrays(&estimate.measured().skeleton(configuration)),
             trace: appraisal.before,
             predicted_marker_m: array(&appraisal.marker.coords),
             marker_covariance_m2: rows(&appraisal.marker_covariance),
@@ -245,6 +270,31 @@ impl Experiment {
     /// before the first movement, what it would teach now.
     pub fn appraise(&self, learner: &str, configuration: &[f64]) -> Result<AppraisalReport, ChoiceError> {
         let index = self.index_of(learner)?;
+        self.check_configuration(configuration)?;
+        self.learners[index].appraise(configuration)
+    }
+
+    /// Sets the next movement of a learner for which a person chooses, to `configuration` (rad or m per joint), and tells
+    /// what it is expected to teach. It may be set anew until the next step.
+    pub fn set_configuration(&mut self, learner: &str, configuration: &[f64]) -> Result<AppraisalReport, ChoiceError> {
+        let index = self.index_of(learner)?;
+        self.check_configuration(configuration)?;
+        self.learners[index].set(configuration)
+    }
+
+    /// The movement that is set for the next step of a learner for which a person chooses.
+    pub fn configuration(&self, learner: &str) -> Result<Option<&[f64]>, ChoiceError> {
+        let index = self.index_of(learner)?;
+        Ok(self.learners[index].configuration())
+    }
+
+    /// The learners for which a person chooses, as long as they learn, by name and place.
+    pub fn chosen_for(&self) -> impl Iterator<Item = (usize, &str)> {
+        let learners = self.learners.iter().enumerate().filter(|(_, learner)| learner.takes_configurations());
+        learners.map(|(index, learner)| (index, learner.description.name.as_str()))
+    }
+
+    fn check_configuration(&self, configuration: &[f64]) -> Result<(), ChoiceError> {
         let limits = self.joint_box()?;
         if configuration.len() != limits.dimension() {
             let (found, wanted) = (configuration.len(), limits.dimension());
@@ -258,7 +308,7 @@ impl Experiment {
                 return Err(ChoiceError::Configuration(said));
             }
         }
-        self.learners[index].appraise(configuration)
+        Ok(())
     }
 
     fn joint_box(&self) -> Result<JointBox, ChoiceError> {

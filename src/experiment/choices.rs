@@ -97,3 +97,73 @@ fn a_planner_appraises_by_its_own_criterion() {
         assert!(found.trace > plain.before, "what is between hypotheses counts too");
     }
 }
+
+/// The person's learner goes first, and the active one has chosen before it is found to be waiting.
+#[test]
+fn a_person_chooses_and_until_then_no_learner_moves() {
+    let names = ["active", "human", "random"].map(str::to_owned);
+    let open = || builtin("arm-6dof").and_then(|s| s.experiment(6, Some(&names))).expect("starts");
+    let (mut experiment, mut patient) = (open(), open());
+    let pose = |step: usize| vec![0.3, -0.2 * step as f64, 0.5, -0.4, 0.1 * step as f64, 0.2];
+    for step in 0..4 {
+        let before = experiment.latest().clone();
+        for _ in 0..2 {
+            let refused = experiment.step().expect_err("nobody has chosen").to_string();
+            assert!(refused.contains("`human`") && refused.contains("set a configuration"), "{refused}");
+        }
+        assert_eq!((experiment.latest(), experiment.configuration("human").expect("known")), (&before, None));
+        experiment.set_configuration("human", &[0.0; 6]).expect("a first thought");
+        let expected = experiment.set_configuration("human", &pose(step)).expect("a second one, which counts");
+        assert_eq!(experiment.configuration("human").expect("known"), Some(pose(step).as_slice()));
+        let made = experiment.step().expect("a step").learners[1].movement.clone().expect("a movement");
+        assert_eq!((made.configuration, made.gain), (pose(step), Some(expected.gain)));
+        let pairs = made.predicted_marker_m.iter().zip(expected.predicted_marker_m);
+        assert!(pairs.into_iter().all(|(made, expected)| (made - expected).abs() < 1e-12));
+        // What was refused has left no trace in anybody.
+        patient.set_configuration("human", &pose(step)).expect("set");
+        patient.step().expect("a step");
+        for (one, other) in experiment.latest().learners.iter().zip(&patient.latest().learners) {
+            assert_eq!(one.estimate, other.estimate);
+        }
+    }
+}
+
+/// The best there is at hand has the whole share, a movement made twice next to none.
+#[test]
+fn a_posture_is_told_its_share_of_the_best_gain() {
+    for name in ["arm-6dof", "head-fov"] {
+        let names = ["active", "human"].map(str::to_owned);
+        let mut experiment = builtin(name).and_then(|s| s.experiment(2, Some(&names))).expect("starts");
+        let joints = experiment.description().joints.len();
+        for _ in 0..3 {
+            let told = experiment.set_configuration("human", &vec![0.05; joints]).expect("an appraisal");
+            assert_eq!(told.share, Some((told.gain / told.best_gain.expect("searched")).clamp(0.0, 1.0)));
+            experiment.step().expect("a step");
+            let again = experiment.appraise("human", &vec![0.05; joints]).expect("an appraisal");
+            assert_eq!((again.best_gain, again.share), (told.best_gain, told.share), "the same, looked back at");
+        }
+        let choice = experiment.choice("human").expect("what DIRECT would have found");
+        let best = choice.boxes.iter().filter_map(|found| Some((found.value?, &found.centre)));
+        let (_, centre) = best.min_by(|a, b| a.0.total_cmp(&b.0)).expect("boxes");
+        let limits = choice.joints.iter().map(|joint| joint.limits);
+        let best: Vec<f64> = limits.zip(centre).map(|([lower, upper], x)| lower + x * (upper - lower)).collect();
+        let share = experiment.appraise("human", &best).expect("an appraisal").share.expect("searched");
+        assert!(share > 1.0 - 1e-9, "{name}: {share}");
+        let chosen = experiment.latest().learners[0].movement.clone().expect("a movement");
+        let share = experiment.appraise("active", &chosen.configuration).expect("an appraisal").share;
+        assert!(share.expect("searched") > 1.0 - 1e-9, "{name}: {share:?}");
+    }
+}
+
+#[test]
+fn only_a_person_is_told_where_to_move_and_only_within_the_limits() {
+    let names = ["active", "human"].map(str::to_owned);
+    let mut experiment = builtin("arm-6dof").and_then(|s| s.experiment(6, Some(&names))).expect("starts");
+    let mut set = |learner: &str, pose: &[f64]| experiment.set_configuration(learner, pose).expect_err("refused");
+    assert!(matches!(set("active", &[0.0; 6]), ChoiceError::ChoosesItself(name) if name == "active"));
+    assert!(matches!(set("nobody", &[0.0; 6]), ChoiceError::UnknownLearner { .. }));
+    for wrong in [&[0.0; 5][..], &[9.0; 6], &[f64::NAN; 6]] {
+        assert!(matches!(set("human", wrong), ChoiceError::Configuration(_)), "{wrong:?}");
+    }
+    assert_eq!(experiment.configuration("human").expect("known"), None);
+}

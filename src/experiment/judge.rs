@@ -120,7 +120,10 @@ impl Judge {
                 if let Some(movement) = learner.movement.as_ref().filter(|it| it.seen) {
                     *information += problem.information(&movement.configuration);
                 }
-                learner.metrics.bound_trace = problem.bound(information);
+                if let Some(allowed) = problem.allowed(information) {
+                    learner.metrics.bound_trace = allowed.covariance.as_ref().map(|p| problem.weights.trace(p));
+                    learner.estimate.allow(&allowed);
+                }
             }
         }
         for (verdict, learner) in self.verdicts.iter_mut().zip(&report.learners) {

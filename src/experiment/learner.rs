@@ -1,11 +1,14 @@
 //! One learner of a comparison: an agent, and how it has fared.
 
+use std::{mem::take, sync::OnceLock};
+
 use super::{
-    agent::{AbsorbError, Agent, Executed, OwnedStandpoint, Proposal},
+    agent::{AbsorbError, Agent, Executed, OwnedStandpoint, Proposal, Standpoint},
     choice::{AppraisalReport, Choice, ChoiceError},
+    head::GazeReport,
     judge::Judge,
     metrics::Metrics,
-    report::{GazeReport, LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
+    report::{LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
     world::World,
 };
 use crate::{
@@ -35,6 +38,10 @@ pub struct Learner {
     settled_below_m: f64,
     /// Where it stood before its last movement; at the start, where it stands.
     before: OwnedStandpoint,
+    /// The gain of the best movement that DIRECT finds, once asked for, at the standpoint before and at the present one;
+    /// `None` where its policy does not search.
+    best_gain_before: OnceLock<Option<f64>>,
+    best_gain: OnceLock<Option<f64>>,
     /// What it proposed last.
     last: Option<Proposal>,
     /// Why it proposes nothing any more, though its agent has not ended.
@@ -61,8 +68,19 @@ impl Learner {
         settled_below_m: f64,
     ) -> Self {
         let before = agent.standpoint().to_owned();
-        let record = Record::default();
-        Self { description, agent, weights, workspace, settled_below_m, before, last: None, stopped: None, record }
+        Self {
+            description,
+            agent,
+            weights,
+            workspace,
+            settled_below_m,
+            before,
+            best_gain_before: OnceLock::new(),
+            best_gain: OnceLock::new(),
+            last: None,
+            stopped: None,
+            record: Record::default(),
+        }
     }
 
     /// What it believes.
@@ -100,6 +118,43 @@ impl Learner {
         }
     }
 
+    /// Whether a person chooses its movements, and may still do so.
+    pub(super) fn takes_configurations(&self) -> bool {
+        self.agent.is_set_from_outside() && self.end().is_none()
+    }
+
+    /// The movement that was set for the next step, rad or m per joint.
+    pub(super) fn configuration(&self) -> Option<&[f64]> {
+        let proposal = self.agent.pending().first().filter(|_| self.agent.is_set_from_outside())?;
+        Some(&proposal.selection.movement.configuration)
+    }
+
+    /// Sets its next movement, and tells what that is expected to teach.
+    pub(super) fn set(&mut self, configuration: &[f64]) -> Result<AppraisalReport, ChoiceError> {
+        if !self.agent.is_set_from_outside() {
+            return Err(ChoiceError::ChoosesItself(self.description.name.clone()));
+        }
+        if let Some(why) = self.end() {
+            return Err(ChoiceError::Ended { name: self.description.name.clone(), why });
+        }
+        let appraisal = self.agent.set(configuration)?;
+        let best = *self.best_gain.get_or_init(|| self.searched_gain(self.agent.standpoint()));
+        Ok(AppraisalReport::of(configuration, &appraisal, &self.belief().state, best))
+    }
+
+    /// Why it proposes nothing any more, if it does not.
+    fn end(&self) -> Option<String> {
+        self.agent.failure().map(str::to_owned).or(self.stopped.as_ref().map(ToString::to_string))
+    }
+
+    /// The gain of the best movement that DIRECT finds at a standpoint, for a policy that explains itself by one.
+    fn searched_gain(&self, standpoint: Standpoint<'_>) -> Option<f64> {
+        let partition = self.agent.explain(standpoint).ok()??.partition;
+        let best = partition.leaves.iter().filter_map(|leaf| leaf.value).min_by(f64::total_cmp)?;
+        let centre = self.limits().from_unit(&partition.leaves.first()?.centre);
+        Some(self.agent.appraise(standpoint, &centre).ok()?.before - best)
+    }
+
     /// Takes in what was seen after a proposal was carried out.
     pub(super) fn learn(
         &mut self,
@@ -121,6 +176,7 @@ impl Learner {
             Err(refused) => return Err(refused),
         };
         self.before = before;
+        self.best_gain_before = take(&mut self.best_gain);
         self.record.movements += 1;
         self.record.misses += u64::from(!seen);
         self.record.changes_noticed += u64::from(update.change_noticed);
@@ -153,8 +209,7 @@ impl Learner {
         let (before, after) = (self.before.borrowed(), self.agent.standpoint());
         let search = match (&selection.plan, &selection.search) {
             (None, Some(search)) => search.clone(),
-            (None, None) => return Err(not_searched()),
-            (Some(_), _) => self.agent.explain(before)?.ok_or_else(not_searched)?,
+            _ => self.agent.explain(before)?.ok_or_else(not_searched)?,
         };
         let value = |standpoint| self.agent.appraise(standpoint, &movement.configuration).map(|it| it.before).ok();
         Choice::of(step, report, movement, search, limits, [value(before), value(after)])
@@ -162,8 +217,15 @@ impl Learner {
 
     /// What another movement would have taught instead of the last one, by what this learner chooses by.
     pub(super) fn appraise(&self, configuration: &[f64]) -> Result<AppraisalReport, ChoiceError> {
-        let appraisal = self.agent.appraise(self.before.borrowed(), configuration)?;
-        Ok(AppraisalReport::of(configuration, &appraisal))
+        let before = self.before.borrowed();
+        let appraisal = self.agent.appraise(before, configuration)?;
+        let searched =
+            self.last.as_ref().filter(|last| last.selection.search.is_some() && last.selection.plan.is_none());
+        let best = match searched {
+            Some(last) => last.selection.gain,
+            None => *self.best_gain_before.get_or_init(|| self.searched_gain(before)),
+        };
+        Ok(AppraisalReport::of(configuration, &appraisal, &self.before.belief.state, best))
     }
 
     /// The learner as it stands, judged against the truth where one is known.
@@ -198,7 +260,7 @@ impl Learner {
             movement,
             estimate: ModelReport::of_belief(belief, truth),
             metrics,
-            failure: self.agent.failure().map(str::to_owned).or(self.stopped.as_ref().map(ToString::to_string)),
+            failure: self.end(),
         }
     }
 }

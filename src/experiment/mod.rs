@@ -13,6 +13,7 @@ mod convergence;
 #[cfg(test)]
 mod failures;
 mod gauge;
+mod head;
 mod judge;
 #[cfg(test)]
 mod laws;
@@ -32,12 +33,13 @@ pub use comparison::{
 };
 pub use convergence::{CONFIRMATION, Convergence, Thresholds};
 pub use gauge::Gauge;
+pub use head::{GazeReport, HeadDescription};
 pub use judge::{Judge, Verdict};
 pub use learner::{Learner, SETTLING_STEPS};
 pub use metrics::{Evaluation, JointMetrics, Metrics, axis_deg, location_m, orientation_deg};
 pub use report::{
-    Description, GazeReport, HeadDescription, JointDescription, JointReport, LearnerDescription, LearnerReport,
-    ModelReport, MovementReport, StepReport,
+    Body, Description, JointDescription, JointReport, LearnerDescription, LearnerReport, ModelReport, MovementReport,
+    StepReport,
 };
 pub use result::{OutlierReading, JointModel, LearnerResult, MarkerModel, Model, RunResult};
 pub use streams::Stream;

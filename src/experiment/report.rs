@@ -3,16 +3,19 @@
 //! Everything that shows or stores (recordings, tables, HTTP, the page) reads these and nothing else. Lengths are in
 //! metres, angles in radians unless a name says otherwise, all positions in the frame of the measurements.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{convergence::Thresholds, metrics::Metrics};
+use super::{
+    convergence::Thresholds,
+    head::{GazeReport, HeadDescription},
+    metrics::Metrics,
+};
 use crate::{
     estimation::Belief,
-    kinematics::JointKind,
+    kinematics::{Joint, JointKind, Line},
     model::State,
     selection::Partition,
-    sensing::{Gaze, Head},
 };
 
 /// What stays the same from step to step.
@@ -46,64 +49,19 @@ pub struct Description {
     pub change_at: Option<u64>,
     /// The head that watches; null if the marker is always seen.
     pub head: Option<HeadDescription>,
+    /// What the robot is drawn as; null for one that is drawn as its own joints and links.
+    #[serde(default)]
+    pub body: Option<Body>,
 }
 
-/// A camera head with pan and tilt.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// What a robot is drawn as, around the arm that is learned. It has no bearing on anything that is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
-pub struct HeadDescription {
-    /// Where it is, metres.
-    pub position_m: [f64; 3],
-    /// Unit look direction at rest.
-    pub look: [f64; 3],
-    /// Unit direction that is upright for the head at rest.
-    pub up: [f64; 3],
-    /// Limit of pan to either side, radians.
-    pub pan_limit_rad: f64,
-    /// Limit of tilt up and down, radians.
-    pub tilt_limit_rad: f64,
-    /// Half-angle of the cone that an eye sees, radians.
-    pub lens_half_angle_rad: f64,
-    /// Distance between two eyes, metres; null for one eye.
-    pub eye_baseline_m: Option<f64>,
-}
-
-/// Where a head looks, after it has followed the marker.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
-pub struct GazeReport {
-    /// Pan, positive to the left, radians.
-    pub pan_rad: f64,
-    /// Tilt, positive upwards, radians.
-    pub tilt_rad: f64,
-    /// Unit look direction.
-    pub direction: [f64; 3],
-    /// The eyes, metres: one, or the left one and the right one.
-    pub eyes_m: Vec<[f64; 3]>,
-}
-
-impl HeadDescription {
-    /// Of a head.
-    pub fn of(head: &Head) -> Self {
-        Self {
-            position_m: array(&head.position.coords),
-            look: array(&head.look),
-            up: array(&head.axes().0),
-            pan_limit_rad: head.pan_limit,
-            tilt_limit_rad: head.tilt_limit,
-            lens_half_angle_rad: head.lens_half_angle,
-            eye_baseline_m: head.baseline,
-        }
-    }
-}
-
-impl GazeReport {
-    /// Of a head and where it looks.
-    pub fn of(head: &Head, gaze: &Gaze) -> Self {
-        let eyes: Vec<_> = head.eyes(gaze).collect();
-        let direction = array(&gaze.direction);
-        Self { pan_rad: gaze.pan, tilt_rad: gaze.tilt, direction, eyes_m: arrays(&eyes) }
-    }
+#[serde(rename_all = "lowercase")]
+pub enum Body {
+    /// A human figure of the arm's proportions, whose right arm it is: x ahead, y to the left, z up. Joints whose names
+    /// begin with `torso` or `chest` carry its trunk.
+    Humanoid,
 }
 
 /// A joint as the scenario describes it.
@@ -130,6 +88,9 @@ pub struct LearnerDescription {
     pub estimator: String,
     /// Its policy: `active`, `active-planned`, `random`, …
     pub policy: String,
+    /// Whether stabilising noise, added to its covariance step by step, keeps that larger than its data allow.
+    #[serde(default)]
+    pub stabilised: bool,
 }
 
 /// All learners after one step. Step 0 is the start: no movement yet, the initial estimate.
@@ -217,6 +178,10 @@ pub struct JointReport {
     pub point_m: Option<[f64; 3]>,
     /// Covariance of that point, m², row by row: rank 2, flat along the axis.
     pub point_covariance_m2: Option<[[f64; 3]; 3]>,
+    /// The covariance that its prior and its data allow of that point, linearised at the truth: m², row by row, as
+    /// `bound_trace` among the metrics. Null where no truth is known, or the learner keeps no covariance to compare.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub allowed_point_covariance_m2: Option<[[f64; 3]; 3]>,
     /// Covariance of the direction, rad², row by row: rank 2, flat along the axis.
     pub direction_covariance_rad2: Option<[[f64; 3]; 3]>,
 }
@@ -232,6 +197,7 @@ impl ModelReport {
                 axis: array(&joint.direction()),
                 point_m: joint.line().map(|line| array(&line.point.coords)),
                 point_covariance_m2: None,
+                allowed_point_covariance_m2: None,
                 direction_covariance_rad2: None,
             })
             .collect();
@@ -252,6 +218,30 @@ impl ModelReport {
         }
         model.marker_covariance_m2 = belief.hand_marker_covariance().map(|p| rows(&p));
         model
+    }
+
+    /// Adds what data allow of every point whose covariance is known; `allowed` is the belief at the truth.
+    pub(super) fn allow(&mut self, allowed: &Belief) {
+        for (index, joint) in
+            self.joints.iter_mut().enumerate().filter(|(_, joint)| joint.point_covariance_m2.is_some())
+        {
+            joint.allowed_point_covariance_m2 = allowed.point_covariance(index, 0.0).map(|p| rows(&p));
+        }
+    }
+
+    /// The chain that it describes, in the frame of the measurements; `None` if a number in it is not finite.
+    pub fn state(&self) -> Option<State> {
+        let finite = |vector: &[f64; 3]| vector.iter().all(|x| x.is_finite());
+        let joint = |joint: &JointReport| {
+            let direction = UnitVector3::try_new(Vector3::from(joint.axis), 0.0).filter(|_| finite(&joint.axis))?;
+            match joint.point_m {
+                Some(point) if finite(&point) => Some(Joint::Revolute(Line { point: point.into(), direction })),
+                Some(_) => None,
+                None => Some(Joint::Prismatic(direction)),
+            }
+        };
+        let joints = self.joints.iter().map(joint).collect::<Option<Vec<_>>>()?;
+        finite(&self.marker_m).then(|| State::arm(joints, self.marker_m.into()))
     }
 
     /// The arm at θ = 0: axis points in order, then the marker, metres.

@@ -2,112 +2,152 @@
 
 use rerun::{
     blueprint::components::{BackgroundKind, Corner2D, VisualBounds2D},
-    datatypes::Range2D,
+    components::Plane3D,
+    datatypes::{Plane3D as Plane, Range2D},
     external::{
         re_log_types::{ApplicationId, EntityPath, LogMsg},
         re_sdk_types::blueprint::archetypes::{
-            Background, EyeControls3D, LineGrid3D, PlotLegend, VisualBounds2D as Bounds,
+            Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, VisualBounds2D as Bounds,
         },
     },
 };
+use serde::{Deserialize, Serialize};
 
 use super::{
     RecordingError,
     charts::{BEST_DESIGN, CHARTS, CHARTS_WITHOUT_TRUTH, TRACE},
-    layout::{Container, Part, View},
-    model::single,
-    scene::Scene,
+    layout::{Container, Part, Time, View},
+    solid::single,
+    stage::Stage,
 };
-use crate::experiment::Description;
+use crate::experiment::{Description, LearnerDescription};
 
-/// Where the camera stands, as seen from the scene's centre, in sizes of the arm: aside, a little ahead and above.
-const CAMERA: [f64; 3] = [0.6, -2.0, 1.05];
-
-/// The ground of the arms, the same in light and dark viewers: colours must stand out from it.
-const BACKGROUND: [u8; 3] = [0x14, 0x16, 0x1A];
-
-/// What is arranged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Arrangement {
-    /// The learners side by side above; below, the curves, DIRECT's partition and the note.
-    Whole,
-    /// The learners alone, for a page that has curves of its own. DIRECT's partition and the note fill a gap.
-    Scene,
+/// The colours around a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Theme {
+    /// Dark on light ground.
+    #[default]
+    Light,
+    /// Light on dark ground.
+    Dark,
 }
 
-/// An arrangement as messages.
-pub(super) fn messages(
-    description: &Description,
-    learners: &[&EntityPath],
-    scene: &Scene,
-    arrangement: Arrangement,
-    application: ApplicationId,
-) -> Result<Vec<LogMsg>, RecordingError> {
-    let arms = arms(description, learners, scene);
-    let partitions = partitions(description, learners);
-    let note = View::new("TextDocument", "Note", &EntityPath::from("note")).into();
-    let root = match arrangement {
-        Arrangement::Whole => {
-            let columns = arms.len().clamp(1, 3) as u32;
-            let mut below = charts(description, learners);
-            let limits = limits(description, learners);
-            below.push(Container::tabs(partitions.into_iter().chain(limits).chain([note])).into());
-            Container::vertical(
-                [Container::grid(arms, columns).into(), Container::horizontal(below).into()],
-                [3.0, 2.0],
-            )
-        }
-        Arrangement::Scene => {
-            // Two stand one above the other: an arm is rather wide than high, and so is a view of half the height.
-            let columns = if arms.len() > 2 { 2 } else { 1 };
-            let mut views = arms;
-            if !views.len().is_multiple_of(columns) {
-                views.push(Container::tabs(partitions.into_iter().chain([note])).into());
-            }
-            Container::grid(views, columns as u32)
-        }
-    };
-    root.messages(application)
+/// The shape of the view in which a scene is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Shape {
+    /// Rather wide than high: the learners stand beside one another.
+    #[default]
+    Wide,
+    /// Rather high than wide: they stand behind one another, seen from above.
+    Tall,
 }
 
-/// A view of each learner's estimate beside the truth.
-fn arms(description: &Description, learners: &[&EntityPath], scene: &Scene) -> Vec<Part> {
-    let eye = EyeControls3D::new()
-        .with_position(single(std::array::from_fn(|i| scene.centre_m[i] + CAMERA[i] * scene.size_m)))
-        .with_look_target(single(scene.centre_m));
-    let views = learners.iter().zip(&description.learners).map(|(root, learner)| {
-        let title = format!("{} ({} × {})", learner.name, learner.estimator, learner.policy);
-        let contents = [
-            "+ /world/truth/**".to_owned(),
-            "+ /world/head/**".to_owned(),
-            format!("+ {root}/**"),
-            format!("- {root}/direct/**"),
-            format!("- {root}/metrics/**"),
-        ];
-        View::new("3D", &title, &EntityPath::root())
+impl Theme {
+    /// The background, and the lines of the ground.
+    fn colours(self) -> [[u8; 3]; 2] {
+        match self {
+            Self::Light => [[0xF4, 0xF5, 0xF7], [0xC6, 0xCA, 0xD2]],
+            Self::Dark => [[0x1B, 0x1C, 0x1F], [0x3E, 0x42, 0x4A]],
+        }
+    }
+}
+
+/// Arranges the views of one recording.
+pub(super) struct Arranger {
+    pub(super) description: Description,
+    /// The roots of the learners.
+    pub(super) roots: Vec<EntityPath>,
+    pub(super) stage: Stage,
+    /// That of the recording.
+    pub(super) application: ApplicationId,
+}
+
+impl Arranger {
+    /// For a file: the scene above; below, the curves, DIRECT's partition and the note.
+    pub(super) fn whole(&self) -> Result<Vec<LogMsg>, RecordingError> {
+        let scene = self.view(Theme::default(), Shape::default(), true).into();
+        let mut below = self.charts();
+        let note = View::new("TextDocument", "Note", &EntityPath::from("note")).into();
+        let tabs = self.partitions().into_iter().chain(self.limits()).chain([note]);
+        below.push(Container::tabs(tabs).into());
+        let root = Container::vertical([scene, Container::horizontal(below).into()], [3.0, 1.0]);
+        root.messages(self.application.clone(), Time::Shown)
+    }
+
+    /// For a page that has controls and curves of its own: the scene alone, to look at and to turn.
+    pub(super) fn scene(&self, theme: Theme, shape: Shape) -> Result<Vec<LogMsg>, RecordingError> {
+        let scene: Part = self.view(theme, shape, false).into();
+        Container::tabs([scene]).messages(self.application.clone(), Time::Led)
+    }
+
+    /// All learners in one view. With `details` it can be asked what is what, there is a key to the colours, and the arms
+    /// at θ = 0 can be switched on.
+    fn view(&self, theme: Theme, shape: Shape, details: bool) -> View {
+        let [target, eye] = self.stage.camera(shape).map(|point| single(point.coords.into()));
+        let [ground, lines] = theme.colours();
+        let figure = &self.stage.figure;
+        let mut contents = Vec::new();
+        for root in &self.roots {
+            contents.push(format!("+ {root}/**"));
+            contents.extend(["direct", "metrics", "failure"].map(|hidden| format!("- {root}/{hidden}/**")));
+            contents.extend((!details).then(|| format!("- {root}/zero/**")));
+        }
+        contents.extend(details.then(|| "+ /key".to_owned()));
+        let plane = Plane3D(Plane::new([0.0, 0.0, 1.0], figure.ground_m as f32));
+        let mut view = View::new("3D", "Scene", &EntityPath::root())
             .with_contents(contents)
-            .with(&eye)
-            .with(&Background::new(BackgroundKind::SolidColor).with_color(BACKGROUND))
-            .with(&LineGrid3D::new().with_visible(false))
-            .into()
-    });
-    views.collect()
-}
+            .with(&EyeControls3D::new().with_position(eye).with_look_target(target).with_eye_up([0.0, 0.0, 1.0]))
+            .with(&Background::new(BackgroundKind::SolidColor).with_color(ground))
+            .with(
+                &LineGrid3D::new()
+                    .with_visible(true)
+                    .with_spacing((0.5 * figure.reach_m) as f32)
+                    .with_plane(plane)
+                    .with_stroke_width(1.0)
+                    .with_color(lines),
+            );
+        for root in &self.roots {
+            if details {
+                let zero = root.join(&EntityPath::from("zero"));
+                view = view.with_behavior(&zero, &EntityBehavior::new().with_visible(false));
+            } else {
+                view = view.with_behavior(root, &EntityBehavior::new().with_interactive(false));
+            }
+        }
+        view
+    }
 
-/// The curves of all learners, metric by metric.
-fn charts(description: &Description, learners: &[&EntityPath]) -> Vec<Part> {
-    let charts: &[(&str, &str)] = if description.truth.is_some() { &CHARTS } else { &CHARTS_WITHOUT_TRUTH };
-    let views = charts
-        .iter()
-        .map(|(title, metric)| chart(title, learners.iter().map(|root| format!("+ {root}/metrics/{metric}"))));
-    views.collect()
-}
+    /// The curves of all learners, metric by metric.
+    fn charts(&self) -> Vec<Part> {
+        let charts: &[(&str, &str)] = if self.description.truth.is_some() { &CHARTS } else { &CHARTS_WITHOUT_TRUTH };
+        let views = charts
+            .iter()
+            .map(|(title, metric)| chart(title, self.roots.iter().map(|root| format!("+ {root}/metrics/{metric}"))));
+        views.collect()
+    }
 
-/// The traces of all learners beside their limits, where the truth is known.
-fn limits(description: &Description, learners: &[&EntityPath]) -> Option<Part> {
-    description.truth.as_ref()?;
-    let of_learner = |root: &&EntityPath| TRACE.1.map(|metric| format!("+ {root}/metrics/{metric}"));
-    Some(chart(TRACE.0, learners.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")])))
+    /// The traces of all learners beside their limits, where the truth is known.
+    fn limits(&self) -> Option<Part> {
+        self.description.truth.as_ref()?;
+        let of_learner = |root: &EntityPath| TRACE.1.map(|metric| format!("+ {root}/metrics/{metric}"));
+        Some(chart(TRACE.0, self.roots.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")])))
+    }
+
+    /// The partitions of those who have any: the joint box is divided by DIRECT, recorded movements are tried one by one.
+    fn partitions(&self) -> Vec<Part> {
+        let is_box = self.description.movements_available.is_none();
+        let divides = |learner: &LearnerDescription| is_box && learner.policy.starts_with("active");
+        let views = self.roots.iter().zip(&self.description.learners).filter(|(_, learner)| divides(learner));
+        let views = views.map(|(root, LearnerDescription { name, .. })| {
+            let bounds = Range2D { x_range: [-0.08, 1.08].into(), y_range: [-0.16, 1.16].into() };
+            View::new("2D", &format!("DIRECT, {name}"), &root.join(&EntityPath::from("direct")))
+                .with(&Bounds::new(VisualBounds2D(bounds)))
+                .into()
+        });
+        views.collect()
+    }
 }
 
 fn chart(title: &str, contents: impl IntoIterator<Item = String>) -> Part {
@@ -115,18 +155,4 @@ fn chart(title: &str, contents: impl IntoIterator<Item = String>) -> Part {
         .with_contents(contents)
         .with(&PlotLegend::new().with_corner(Corner2D::RightTop))
         .into()
-}
-
-/// The partitions of those who have any: the joint box is divided by DIRECT, recorded movements are tried one by one.
-fn partitions(description: &Description, learners: &[&EntityPath]) -> Vec<Part> {
-    let divides = |policy: &str| policy.starts_with("active") && description.movements_available.is_none();
-    let views = learners.iter().zip(&description.learners).filter(|(_, learner)| divides(&learner.policy));
-    let views = views.map(|(root, _)| {
-        let name = root.last().map(|part| part.ui_string()).unwrap_or_default();
-        let bounds = Range2D { x_range: [-0.08, 1.08].into(), y_range: [-0.16, 1.16].into() };
-        View::new("2D", &format!("DIRECT, {name}"), &root.join(&EntityPath::from("direct")))
-            .with(&Bounds::new(VisualBounds2D(bounds)))
-            .into()
-    });
-    views.collect()
 }

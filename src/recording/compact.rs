@@ -8,18 +8,33 @@ use rerun::{
     log::{Chunk, LogMsg},
 };
 
-use super::{RecordingError, message};
+use super::{RecordingError, message, rows::by_steps};
+
+/// What of a live recording is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Keep {
+    /// All of it.
+    Motion,
+    /// What a recording in a file has: the steps.
+    Steps,
+}
 
 /// The messages of a stream, with the chunks of each entity put together; what is static comes first.
-pub(super) fn put_together(stream: Vec<u8>) -> Result<Vec<LogMsg>, RecordingError> {
+pub(super) fn put_together(stream: Vec<u8>, keep: Keep) -> Result<Vec<LogMsg>, RecordingError> {
     let decoded = |source: re_log_encoding::DecodeError| RecordingError::Encode(source.to_string());
     let mut messages = Vec::new();
-    let mut chunks: BTreeMap<(bool, EntityPath), (StoreId, Vec<Chunk>)> = BTreeMap::new();
+    // What is between steps cannot be put together with what is at them.
+    let mut chunks: BTreeMap<(bool, bool, EntityPath), (StoreId, Vec<Chunk>)> = BTreeMap::new();
     for message in DecoderApp::decode_eager(Cursor::new(stream)).map_err(decoded)? {
         match message.map_err(decoded)? {
             LogMsg::ArrowMsg(store, message) if store.is_recording() => {
                 let chunk = Chunk::from_arrow_msg(&message)?;
-                let key = (!chunk.is_static(), chunk.entity_path().clone());
+                let (chunk, is_between) = match by_steps(&chunk) {
+                    Some(steps) if keep == Keep::Steps => (steps, false),
+                    None if keep == Keep::Steps => continue,
+                    steps => (chunk, steps.is_none()),
+                };
+                let key = (!chunk.is_static(), is_between, chunk.entity_path().clone());
                 chunks.entry(key).or_insert_with(|| (store, Vec::new())).1.push(chunk);
             }
             other => messages.push(other),

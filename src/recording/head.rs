@@ -3,7 +3,7 @@
 use nalgebra::{Point3, UnitVector3, Vector3};
 use rerun::{Color, LineStrips3D, Radius};
 
-use super::{colours::tint, model::single};
+use super::{colours::tint, solid::single};
 use crate::{
     experiment::{GazeReport, HeadDescription},
     sensing::Head,

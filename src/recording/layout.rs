@@ -9,7 +9,8 @@ use rerun::{
         re_log_types::{ApplicationId, BlueprintActivationCommand, EntityPath, LogMsg, StoreId},
         re_sdk_types::blueprint::{
             archetypes::{
-                ContainerBlueprint, PanelBlueprint, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
+                ContainerBlueprint, EntityBehavior, PanelBlueprint, TimePanelBlueprint, ViewBlueprint, ViewContents,
+                ViewportBlueprint,
             },
             components::{ContainerKind, PanelState, PlayState, RootContainer},
         },
@@ -18,7 +19,16 @@ use rerun::{
 };
 use uuid::Uuid;
 
-use super::{RecordingError, TIMELINE, message};
+use super::{MOTION, RecordingError, TIMELINE, message};
+
+/// Who moves the time.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Time {
+    /// The visitor, from step to step; at first it follows what comes.
+    Shown,
+    /// The page, which has controls of its own.
+    Led,
+}
 
 /// A view, or a container of others.
 pub(super) enum Part {
@@ -31,7 +41,7 @@ pub(super) struct View {
     path: EntityPath,
     archetype: ViewBlueprint,
     contents: Vec<String>,
-    properties: Vec<(&'static str, Vec<SerializedComponentBatch>)>,
+    properties: Vec<(EntityPath, Vec<SerializedComponentBatch>)>,
 }
 
 impl View {
@@ -53,7 +63,14 @@ impl View {
 
     /// Sets a property, by the name of its archetype.
     pub(super) fn with<A: Archetype + AsComponents>(mut self, property: &A) -> Self {
-        self.properties.push((A::name().short_name(), property.as_serialized_batches()));
+        self.properties.push((EntityPath::from(A::name().short_name()), property.as_serialized_batches()));
+        self
+    }
+
+    /// Sets how an entity behaves in this view, and all below it.
+    pub(super) fn with_behavior(mut self, entity: &EntityPath, behavior: &EntityBehavior) -> Self {
+        let place = EntityPath::from("ViewContents/overrides").join(entity);
+        self.properties.push((place, behavior.as_serialized_batches()));
         self
     }
 }
@@ -88,27 +105,25 @@ impl Container {
         Self::new(ContainerKind::Tabs, contents)
     }
 
-    pub(super) fn grid(contents: impl IntoIterator<Item = Part>, columns: u32) -> Self {
-        let mut container = Self::new(ContainerKind::Grid, contents);
-        container.archetype = container.archetype.with_grid_columns(columns);
-        container
-    }
-
     fn path(&self) -> EntityPath {
         format!("container/{}", self.id).into()
     }
 
     /// The messages of a blueprint of this container alone, with all panels out of the way: those of the blueprint's
     /// store, the command that activates it last. `application` is that of the recording.
-    pub(super) fn messages(self, application: ApplicationId) -> Result<Vec<LogMsg>, RecordingError> {
+    pub(super) fn messages(self, application: ApplicationId, time: Time) -> Result<Vec<LogMsg>, RecordingError> {
         let store = StoreId::random(StoreKind::Blueprint, application);
         let mut blueprint = Blueprint { messages: vec![message::store_info(&store)], store };
         let viewport = ViewportBlueprint::new().with_root_container(RootContainer(self.id.into()));
         blueprint.add("viewport", &viewport.with_auto_layout(false).with_auto_views(false))?;
         blueprint.add("blueprint_panel", &PanelBlueprint::new().with_state(PanelState::Hidden))?;
         blueprint.add("selection_panel", &PanelBlueprint::new().with_state(PanelState::Hidden))?;
-        let time = TimePanelBlueprint::new().with_state(PanelState::Collapsed);
-        blueprint.add("time_panel", &time.with_timeline(TIMELINE).with_play_state(PlayState::Following))?;
+        let time = match time {
+            Time::Shown => (PanelState::Collapsed, TIMELINE, PlayState::Following),
+            Time::Led => (PanelState::Hidden, MOTION, PlayState::Paused),
+        };
+        let panel = TimePanelBlueprint::new().with_state(time.0).with_timeline(time.1).with_play_state(time.2);
+        blueprint.add("time_panel", &panel)?;
         blueprint.add_part(&self.into())?;
         Ok(blueprint.activated())
     }
@@ -148,7 +163,7 @@ impl Blueprint {
                 let below = |name: &str| view.path.join(&EntityPath::from(name));
                 self.add(view.path.clone(), &view.archetype)?;
                 self.add(below("ViewContents"), &ViewContents::new(view.contents.iter().map(String::as_str)))?;
-                view.properties.iter().try_for_each(|(name, property)| self.add(below(name), property))
+                view.properties.iter().try_for_each(|(place, property)| self.add(view.path.join(place), property))
             }
             Part::Container(container) => {
                 self.add(container.path(), &container.archetype)?;

@@ -1,21 +1,50 @@
 //! What one learner's reports become.
 
 use rerun::{
-    Scalars, TextLog,
+    Points3D, Scalars, TextLog, Transform3D,
     external::re_log_types::{EntityPath, EntityPathPart},
 };
 
 use super::{
-    EllipsoidSize, charts, head, metrics,
-    model::{self, Uncertainty},
+    EllipsoidSize, charts,
+    frames::Shown,
+    head, metrics, model,
     movement::Movement,
     partition::{self, Slice},
+    posture::{ArmLook, Posture, bare},
     rows::Rows,
+    solid::{quaternion, single, solid},
+    stage::Stage,
+    uncertainty::{Drawn, Uncertainty},
 };
 use crate::{
-    experiment::{Description, LearnerReport},
+    experiment::{Description, LearnerReport, MovementReport},
+    model::State,
     optimize::Plane,
 };
+
+/// The true arm: grey.
+pub(super) const TRUE_ARM: ArmLook =
+    ArmLook { links: [0x84, 0x88, 0x90, 255], pins: [0x5C, 0x60, 0x68, 255], girth: 1.0 };
+/// A posture that is tried out: amber.
+const GHOST: [u8; 4] = [0xE6, 0xA1, 0x22, 110];
+/// How much thicker the estimated arm is than the true one, which is to be seen within it, and its opacity.
+const ESTIMATE: (f64, u8) = (1.22, 150);
+/// Opacities of what a learner believes of its uncertainty, and of what its data allow.
+const CLOUD: u8 = 50;
+const ALLOWED: u8 = 150;
+
+/// What all learners are drawn with.
+pub(super) struct Scenery<'a> {
+    pub(super) description: &'a Description,
+    pub(super) stage: &'a Stage,
+    /// The true arm, where it is known.
+    pub(super) truth: Option<&'a State>,
+    /// Length of the arrows at θ = 0.
+    pub(super) arrow_m: f64,
+    /// So many postures between two steps.
+    pub(super) frames: u64,
+}
 
 /// The entities of one learner, and what they carry from step to step.
 pub(super) struct LearnerEntities {
@@ -25,7 +54,11 @@ pub(super) struct LearnerEntities {
     uncertainty: Uncertainty,
     /// What slices show: chosen at the first partition and kept, so that the picture does not jump from step to step.
     plane: Option<Plane>,
-    moved: bool,
+    /// What the last step left to see.
+    shown: Option<Shown>,
+    /// Whether a posture that was tried out is drawn.
+    has_ghost: bool,
+    stopped: bool,
     failed: bool,
 }
 
@@ -40,7 +73,9 @@ impl LearnerEntities {
             root,
             uncertainty: Uncertainty::new(joints, ellipsoids),
             plane: None,
-            moved: false,
+            shown: None,
+            has_ghost: false,
+            stopped: false,
             failed: false,
         }
     }
@@ -48,33 +83,46 @@ impl LearnerEntities {
     /// What no view of the arrangement shows.
     pub(super) fn hidden(&self) -> impl Iterator<Item = EntityPath> {
         let series = self.metrics.iter().zip(metrics::NAMES).filter(|(_, name)| !charts::shows(name));
-        series.map(|(series, _)| series.clone()).chain([self.entity("direct/leaves")])
+        let others = ["direct/leaves", "zero/links", "zero/axes", "zero/directions"];
+        series.map(|(series, _)| series.clone()).chain(others.map(|path| self.entity(path)))
     }
 
-    fn entity(&self, path: &str) -> EntityPath {
+    pub(super) fn entity(&self, path: &str) -> EntityPath {
         self.root.join(&EntityPath::from(path))
     }
 
-    /// Logs what a report says of the learner; the arrows are `arrow_m` long.
-    pub(super) fn log(
-        &mut self,
-        rows: &mut Rows,
-        step: u64,
-        report: &LearnerReport,
-        description: &Description,
-        arrow_m: f64,
-    ) {
-        let (colour, joints) = (self.colour, description.joints.as_slice());
-        let model = &report.estimate;
-        rows.at(step, &self.entity("links"), &[&model::links(&model.skeleton_m(), colour, 2.0)]);
-        rows.at(step, &self.entity("axes"), &[&model::axes(model, joints, arrow_m, colour)]);
-        if let Some(points) = self.uncertainty.of_points(model, joints, colour) {
-            rows.at(step, &self.entity("point_ellipsoids"), &points.parts());
+    pub(super) fn arm_look(&self) -> ArmLook {
+        let ([red, green, blue], (girth, alpha)) = (self.colour, ESTIMATE);
+        ArmLook { links: [red, green, blue, alpha], pins: [red, green, blue, 235], girth }
+    }
+
+    /// Logs what stays: the place of the learner at this place in the row, and its body.
+    pub(super) fn begin(&self, rows: &mut Rows, index: usize, stage: &Stage, description: &Description) {
+        let place = Transform3D::from_translation(single(stage.place(index).into()));
+        rows.always(&self.root, &[&place]);
+        rows.always(&self.entity("body"), &[&solid(&stage.figure.fixed)]);
+        if !stage.figure.trunk.is_empty() {
+            rows.always(&self.entity("body/trunk"), &[&solid(&stage.figure.trunk)]);
         }
-        if let Some(directions) = self.uncertainty.of_directions(model, joints, arrow_m, colour) {
-            rows.at(step, &self.entity("direction_uncertainty"), &directions.parts());
+        let name = Points3D::new([single(stage.figure.name.coords.into())])
+            .with_colors([rerun::Color::from(self.colour)])
+            .with_radii([rerun::Radius::new_scene_units(1e-3)])
+            .with_show_labels(true);
+        rows.always(&self.entity("name"), &[&name]);
+        if let Some(head) = &description.head {
+            rows.always(&self.entity("head/frustum"), &[&head::frustum(head)]);
         }
-        self.log_movement(rows, step, report, description);
+    }
+
+    /// Logs what a report says of the learner.
+    pub(super) fn log(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
+        if std::mem::take(&mut self.has_ghost) {
+            rows.after(step - 1, 1, &self.entity("arm/ghost"), &[&solid(&[])]);
+        }
+        self.log_between(rows, step, report.movement.as_ref(), scenery);
+        self.log_at_zero(rows, step, report, scenery);
+        self.log_arms(rows, step, report, scenery);
+        self.log_movement(rows, step, report, scenery);
         for (series, value) in self.metrics.iter().zip(metrics::values(report)) {
             if let Some(value) = value {
                 rows.at(step, series, &[&Scalars::new([value])]);
@@ -86,21 +134,95 @@ impl LearnerEntities {
         }
     }
 
-    fn log_movement(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, description: &Description) {
-        let (has_truth, joints) = (description.truth.is_some(), description.joints.as_slice());
-        let report = report.movement.as_ref();
-        if report.is_none() && !self.moved {
+    /// The way from the last step to this one, as it was believed and as it was.
+    fn log_between(&self, rows: &mut Rows, step: u64, movement: Option<&MovementReport>, scenery: &Scenery<'_>) {
+        let (Some(shown), Some(movement)) = (&self.shown, movement) else { return };
+        shown.log_way(rows, step, &movement.configuration, scenery, self);
+    }
+
+    /// The arm at θ = 0.
+    fn log_at_zero(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
+        let (colour, joints, arrow_m) = (self.colour, scenery.description.joints.as_slice(), scenery.arrow_m);
+        let model = &report.estimate;
+        rows.at(step, &self.entity("zero/links"), &[&model::links(&model.skeleton_m(), colour, 2.0)]);
+        rows.at(step, &self.entity("zero/axes"), &[&model::axes(model, joints, arrow_m, colour)]);
+        if let Some(directions) = self.uncertainty.of_directions(model, joints, arrow_m) {
+            rows.at(step, &self.entity("zero/directions"), &Drawn::new(&directions, &[], colour, CLOUD).parts());
+        }
+    }
+
+    /// The true and the estimated arm in the configuration of the movement, and how uncertain the estimate is there.
+    fn log_arms(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
+        let (joints, reach_m) = (scenery.description.joints.as_slice(), scenery.stage.figure.reach_m);
+        let model = &report.estimate;
+        let configuration = match (&report.movement, &self.shown) {
+            (Some(movement), _) => movement.configuration.clone(),
+            (None, Some(shown)) => shown.configuration.clone(),
+            // Before the first movement: as near to θ = 0 as the limits allow.
+            (None, None) => joints.iter().map(|joint| 0_f64.clamp(joint.limits[0], joint.limits[1])).collect(),
+        };
+        let estimate = model.state();
+        let links = estimate.as_ref().map(|arm| Posture::of(arm, &configuration));
+        let estimated = links.as_ref().map(|posture| posture.capsules(reach_m, self.arm_look())).unwrap_or_default();
+        rows.at(step, &self.entity("arm/estimate"), &[&solid(&estimated)]);
+        let truth = scenery.truth.map(|truth| Posture::of(truth, &configuration));
+        if let Some(truth) = &truth {
+            rows.at(step, &self.entity("arm/truth"), &[&solid(&truth.capsules(reach_m, TRUE_ARM))]);
+        }
+        if let Some(posture) = truth.as_ref().or(links.as_ref()) {
+            self.log_trunk(rows, step, 0, posture, scenery.stage);
+        }
+        let links = links.map(|posture| posture.links).unwrap_or_default();
+        let points = self.uncertainty.of_points(model, joints);
+        if let Some(points) = &points {
+            let drawn = Drawn::new(points, &links, self.colour, CLOUD);
+            rows.at(step, &self.entity("point_ellipsoids"), &drawn.parts());
+        }
+        let allowed = self.uncertainty.of_allowed(model, joints);
+        if let Some(allowed) = &allowed {
+            let drawn = Drawn::new(allowed, &links, self.colour, ALLOWED);
+            rows.at(step, &self.entity("allowed_ellipsoids"), &drawn.parts());
+        }
+        self.shown = Some(Shown { step, configuration, estimate, points, allowed });
+    }
+
+    /// The trunk, if joints of the chain carry it; so many ticks after the step.
+    pub(super) fn log_trunk(&self, rows: &mut Rows, step: u64, ticks: u64, posture: &Posture, stage: &Stage) {
+        let Some(link) = posture.links.get(stage.figure.carried_by).filter(|_| !stage.figure.trunk.is_empty()) else {
+            return;
+        };
+        let pose = Transform3D::update_fields()
+            .with_translation(single(link.translation.vector.into()))
+            .with_quaternion(quaternion(&link.rotation));
+        if ticks == 0 {
+            rows.at(step, &self.entity("body/trunk"), &[&pose]);
+        } else {
+            rows.after(step, ticks, &self.entity("body/trunk"), &[&pose]);
+        }
+    }
+
+    /// Draws a posture that is tried out, or nothing.
+    pub(super) fn log_ghost(&mut self, rows: &mut Rows, step: u64, skeleton_m: Option<&[[f64; 3]]>, reach_m: f64) {
+        let capsules = skeleton_m.map(|points| bare(points, reach_m, GHOST)).unwrap_or_default();
+        rows.after(step, 0, &self.entity("arm/ghost"), &[&solid(&capsules)]);
+        self.has_ghost = skeleton_m.is_some();
+    }
+
+    fn log_movement(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
+        let Scenery { description, stage, .. } = scenery;
+        let joints = description.joints.as_slice();
+        let (name, failure, report) = (&report.name, &report.failure, report.movement.as_ref());
+        if self.stopped {
             return;
         }
-        // Once more after the last movement of a learner that has stopped, to clear it.
-        self.moved = report.is_some();
-        let movement = Movement::of(report, has_truth, self.colour);
-        rows.at(step, &self.entity("movement/links"), &[&movement.links]);
-        if let Some(truth) = &movement.truth {
-            rows.at(step, &self.entity("movement/truth"), &[truth]);
-        }
+        self.stopped = failure.is_some() && report.is_none();
+        let label = if self.stopped { format!("{name} · has stopped") } else { format!("{name} · movement {step}") };
+        rows.at(step, &self.entity("name"), &[&Points3D::update_fields().with_labels([label])]);
+        // Of a learner that has stopped they are cleared.
+        let movement = Movement::of(report, self.colour, stage.figure.reach_m);
         rows.at(step, &self.entity("marker/predicted"), &[&movement.predicted]);
         rows.at(step, &self.entity("marker/measured"), &[&movement.measured]);
+        rows.at(step, &self.entity("marker/error"), &[&movement.error]);
         if let Some(head) = &description.head {
             let gaze = report.and_then(|report| report.gaze.as_ref());
             rows.at(step, &self.entity("head/gaze"), &[&head::gaze(head, gaze, self.colour)]);

@@ -14,7 +14,11 @@ use rerun::{
 };
 use tokio::sync::watch;
 
-use super::{RecordingError, compact::put_together};
+use super::{
+    RecordingError, Shape, Theme,
+    blueprint::Arranger,
+    compact::{Keep, put_together},
+};
 
 /// A growing log of encoded parts, in memory, for any number of readers at any speed. Clones share one log.
 ///
@@ -53,6 +57,8 @@ struct State {
     parts: Vec<Bytes>,
     /// The arrangement of views: its part, and what a page that has curves of its own takes in its place.
     scene: Option<(usize, Bytes)>,
+    /// What arranges the views of a page anew.
+    arranger: Option<Arc<Arranger>>,
     bytes: usize,
     closed: bool,
 }
@@ -129,11 +135,21 @@ impl LiveLog {
         Ok(())
     }
 
-    /// Appends an arrangement of views, as one part: the whole one, and that of the scene alone.
-    pub(super) fn append_arrangement(&self, whole: &[LogMsg], scene: &[LogMsg]) -> Result<(), RecordingError> {
-        let (whole, scene) = (encode_all(whole)?, encode_all(scene)?);
+    /// Appends the arrangement of views, as one part: the whole one, and that of the scene alone.
+    pub(super) fn append_arrangement(&self, whole: &[LogMsg], arranger: Arranger) -> Result<(), RecordingError> {
+        let (whole, scene) = (encode_all(whole)?, encode_all(&arranger.scene(Theme::Light, Shape::Wide)?)?);
+        self.state().arranger = Some(Arc::new(arranger));
         self.push(vec![whole], Some(scene));
         Ok(())
+    }
+
+    /// An arrangement of views for a page: the scene alone, in light or dark, for a wide or a tall view. A stream of its
+    /// own, which a viewer that has the recording takes up whatever became of its last one. `None` before step 0.
+    pub fn blueprint(&self, theme: Theme, shape: Shape) -> Result<Option<Bytes>, RecordingError> {
+        let arranger = self.state().arranger.clone();
+        let Some(arranger) = arranger else { return Ok(None) };
+        let messages = encode_all(&arranger.scene(theme, shape)?)?;
+        Ok(Some([self.header(), messages].concat().into()))
     }
 
     /// Appends parts, the first of which a page may take otherwise. A closed log ignores them.
@@ -151,11 +167,12 @@ impl LiveLog {
         self.shared.length.send_replace(state.parts.len());
     }
 
-    /// Everything so far as a finished .rrd file: the many small chunks of a live session put together, with a footer.
+    /// Everything so far as a finished .rrd file: the many small chunks of a live session put together, the steps alone,
+    /// with a footer.
     ///
     /// Takes about as long as it took to encode the session: run it where it may block.
     pub fn complete(&self) -> Result<Vec<u8>, RecordingError> {
-        let messages = put_together(self.parts_from(0).concat())?;
+        let messages = put_together(self.parts_from(0).concat(), Keep::Steps)?;
         Ok(Encoder::encode(messages.into_iter().map(Ok))?)
     }
 
@@ -164,7 +181,7 @@ impl LiveLog {
     ///
     /// Takes about as long as it took to encode the parts: run it where it may block.
     pub fn put_together(&self, parts: &[Bytes]) -> Result<Bytes, RecordingError> {
-        encode_all(&put_together([&[self.header()], parts].concat().concat())?)
+        encode_all(&put_together([&[self.header()], parts].concat().concat(), Keep::Motion)?)
     }
 
     fn state(&self) -> MutexGuard<'_, State> {

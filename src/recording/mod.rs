@@ -6,21 +6,30 @@
 //!
 //! # Entities
 //!
-//! All on the timeline `step`, a sequence. Positions are in metres in the frame of the measurements (f32); scalars are
-//! f64. `{learner}` is the learner's name in the scenario.
+//! All on the timeline `step`, a sequence. Positions are in metres (f32), below `/{learner}` in the frame of the
+//! measurements, which stands beside those of the others; scalars are f64. `{learner}` is the learner's name in the
+//! scenario. "As shown" means in the configuration of the step's movement; at step 0, as near to θ = 0 as limits allow.
 //!
 //! | entity | archetype | what |
 //! |---|---|---|
 //! | `/note` | TextDocument, static | scenario, seed, version, learners, units, how to read and reproduce it |
-//! | `/world/truth/links`, `…/axes` | LineStrips3D, Arrows3D, static | the true arm at θ = 0; absent without a truth; in time if the body changes |
-//! | `/world/head/frustum` | LineStrips3D, static | the cone of the lens at rest, and the range over which it can turn; absent without a head |
-//! | `/{learner}/head/gaze` | LineStrips3D | the cones of the eyes after the head has followed the marker |
-//! | `/{learner}/links`, `…/axes` | LineStrips3D, Arrows3D | the estimate at θ = 0, after the update |
-//! | `/{learner}/point_ellipsoids` | Ellipsoids3D | covariances of the axis points, then of the marker if it is learned |
-//! | `/{learner}/direction_uncertainty` | Ellipsoids3D | covariances of the directions, at the tips of the arrows |
-//! | `/{learner}/movement/links`, `…/truth` | LineStrips3D | estimated and true arm in the step's configuration |
+//! | `/key` | Points3D, static | what the colours mean, in a sentence |
+//! | `/{learner}` | Transform3D, static | where the frame of its measurements stands in the row |
+//! | `/{learner}/body` | Capsules3D, static | a human figure around the arm, or a pedestal |
+//! | `/{learner}/body/trunk` | Capsules3D, static; Transform3D | the part of the figure that joints of the chain carry; absent if they carry none |
+//! | `/{learner}/name` | Points3D, static; labels in time | name and movement, above its head |
+//! | `/{learner}/arm/truth` | Capsules3D | the true arm as shown: links, and a pin along each axis; absent without a truth |
+//! | `/{learner}/arm/estimate` | Capsules3D | the estimated arm as shown, after the update |
+//! | `/{learner}/point_ellipsoids` | Ellipsoids3D | covariances of the axis points as shown, then of the marker if it is learned |
+//! | `/{learner}/allowed_ellipsoids` | Ellipsoids3D | what its data allow of them, where its own standard deviations are 1.5 times as large; absent without a truth |
 //! | `/{learner}/marker/predicted`, `…/measured` | Points3D | the marker before the update; measured is empty after a miss |
+//! | `/{learner}/marker/error` | LineStrips3D | from the one to the other, labelled with its length; empty after a miss |
 //! | `/{learner}/marker/missed` | Points3D | the true marker after a miss, otherwise empty; absent without a head |
+//! | `/{learner}/head/frustum` | LineStrips3D, static | the cone of the lens at rest, and the range over which it can turn; absent without a head |
+//! | `/{learner}/head/gaze` | LineStrips3D | the cones of the eyes after the head has followed the marker |
+//! | `/{learner}/zero/links`, `…/axes` | LineStrips3D, Arrows3D | the estimate at θ = 0, after the update; hidden at first, as all of `zero` |
+//! | `/{learner}/zero/directions` | Ellipsoids3D | covariances of the directions, at the tips of those arrows |
+//! | `/{learner}/zero/truth/links`, `…/axes` | LineStrips3D, Arrows3D, static | the true arm at θ = 0; absent without a truth; in time if the body changes |
 //! | `/{learner}/direct/criterion` | Image, Transform3D | the criterion over a slice of DIRECT's partition |
 //! | `/{learner}/direct/boxes`, `…/centres`, `…/chosen` | Boxes2D, Points2D | the rectangles of the slice, the centres of the others, the choice |
 //! | `/{learner}/direct/axes` | LineStrips2D, Points2D, static | frame and labels of the slice: joints and limits |
@@ -29,9 +38,15 @@
 //! | `/limits/best_design_trace` | Scalars, SeriesLines | the best designs of 5, 10, 20, … movements, beside the traces; only with `run --limits` |
 //! | `/{learner}/failure` | TextLog | why the learner stopped, once, if it did |
 //!
-//! The two ellipsoid entities also carry the covariances themselves as `covariances`: nine f64 per instance, row by
-//! row. Where a report holds null nothing is logged. `/` holds the view coordinates, `/__properties` the name of the
-//! recording.
+//! The ellipsoid entities also carry the covariances themselves as `covariances`: nine f64 per instance, row by row, as
+//! shown (those of directions at θ = 0). Where a report holds null nothing is logged. `/` holds the view coordinates,
+//! `/__properties` the name of the recording.
+//!
+//! # Live
+//!
+//! A [`LiveLog`] has a second timeline, `motion`, on which step k is at [`MOTION_PER_STEP`] k. Between two steps it may
+//! hold postures on the way from one to the next (`arm/…`, the ellipsoids and `body/trunk` moved, the markers empty), and
+//! after a step `/{learner}/arm/ghost`, a posture that is tried out. None of this is in files and downloads.
 //!
 //! # Compatibility
 //!
@@ -39,6 +54,7 @@
 //! lasts. Two recordings of one seed hold the same data but for `selection_ms`, the wall time, and Rerun's random ids.
 
 mod blueprint;
+mod body;
 mod charts;
 mod colours;
 mod compact;
@@ -46,6 +62,7 @@ mod csv;
 mod ellipsoid;
 mod error;
 mod file;
+mod frames;
 mod head;
 mod layout;
 mod learner;
@@ -56,12 +73,16 @@ mod model;
 mod movement;
 mod note;
 mod partition;
+mod posture;
 mod recorder;
 mod rows;
-mod scene;
+mod solid;
+mod stage;
 mod target;
+mod uncertainty;
 
 pub use self::{
+    blueprint::{Shape, Theme},
     colours::{TRUTH_COLOR, hex, learner_color, learner_slots},
     csv::{StepsCsv, comparison_csv},
     ellipsoid::EllipsoidSize,
@@ -73,3 +94,12 @@ pub use self::{
 
 /// The timeline of a recording: the step of the experiment, counted from 0.
 pub const TIMELINE: &str = "step";
+
+/// The timeline of a live recording on which there is something between two steps.
+pub const MOTION: &str = "motion";
+
+/// So many ticks of [`MOTION`] are from one step to the next.
+pub const MOTION_PER_STEP: u64 = 32;
+
+/// At most so many postures are drawn between two steps.
+pub const MOST_FRAMES: u64 = 30;

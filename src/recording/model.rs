@@ -1,25 +1,9 @@
-//! An arm at θ = 0: its links, its axes, and how uncertain they are.
+//! An arm at θ = 0, as lines: its links and its axes.
 
-use std::sync::Arc;
+use rerun::{Arrows3D, Color, LineStrips3D, Radius};
 
-use rerun::{
-    Arrows3D, AsComponents, Color, DynamicArchetype, Ellipsoids3D, FillMode, LineStrips3D, Quaternion, Radius,
-    external::arrow::array::Float64Array,
-};
-
-use super::{
-    colours::tint,
-    ellipsoid::{Axes, Ellipsoid, EllipsoidSize},
-};
+use super::solid::single;
 use crate::experiment::{JointDescription, ModelReport};
-
-/// Opacity of ellipsoids, of 255: what they surround stays visible.
-const ALPHA: u8 = 90;
-
-/// A point as Rerun takes it.
-pub(super) fn single([x, y, z]: [f64; 3]) -> [f32; 3] {
-    [x as f32, y as f32, z as f32]
-}
 
 /// An arm as one line through its points, `width` in points of the screen.
 pub(super) fn links(points_m: &[[f64; 3]], colour: [u8; 3], width: f32) -> LineStrips3D {
@@ -52,114 +36,6 @@ pub(super) fn origins(model: &ModelReport) -> Vec<[f64; 3]> {
     origins
 }
 
-/// The ellipsoids of one learner, continuous from step to step.
-pub(super) struct Uncertainty {
-    size: EllipsoidSize,
-    points: Vec<Axes>,
-    marker: Axes,
-    directions: Vec<Axes>,
-}
-
-/// One covariance and where it is drawn.
-struct Instance {
-    centre: [f64; 3],
-    label: String,
-    covariance: [[f64; 3]; 3],
-    ellipsoid: Ellipsoid,
-}
-
-impl Uncertainty {
-    /// For an arm of so many joints.
-    pub(super) fn new(joints: usize, size: EllipsoidSize) -> Self {
-        let axes = vec![Axes::default(); joints];
-        Self { size, points: axes.clone(), marker: Axes::default(), directions: axes }
-    }
-
-    /// The points on the axes, then the marker. `None` if the learner keeps no covariance of any.
-    pub(super) fn of_points(
-        &mut self,
-        model: &ModelReport,
-        joints: &[JointDescription],
-        colour: [u8; 3],
-    ) -> Option<Instances> {
-        let points =
-            model.joints.iter().zip(&mut self.points).zip(joints).filter_map(|((joint, axes), description)| {
-                Some((joint.point_m?, joint.point_covariance_m2?, axes, description.name.as_str()))
-            });
-        let marker =
-            model.marker_covariance_m2.map(|covariance| (model.marker_m, covariance, &mut self.marker, "marker"));
-        Instances::new(points.chain(marker), self.size, 1.0, colour)
-    }
-
-    /// The directions, at the tips of arrows `length_m` long. `None` if the learner keeps no covariance of any.
-    pub(super) fn of_directions(
-        &mut self,
-        model: &ModelReport,
-        joints: &[JointDescription],
-        length_m: f64,
-        colour: [u8; 3],
-    ) -> Option<Instances> {
-        let origins = origins(model);
-        let tips = (model.joints.iter().zip(origins).zip(&mut self.directions).zip(joints)).filter_map(
-            |(((joint, origin), axes), description)| {
-                let tip = std::array::from_fn(|i| origin[i] + length_m * joint.axis[i]);
-                Some((tip, joint.direction_covariance_rad2?, axes, description.name.as_str()))
-            },
-        );
-        Instances::new(tips, self.size, length_m, tint(colour, 0.5))
-    }
-}
-
-/// Ellipsoids, and the covariances they are drawn from.
-pub(super) struct Instances {
-    ellipsoids: Ellipsoids3D,
-    covariances: DynamicArchetype,
-}
-
-impl Instances {
-    fn new<'a>(
-        covariances: impl Iterator<Item = ([f64; 3], [[f64; 3]; 3], &'a mut Axes, &'a str)>,
-        size: EllipsoidSize,
-        scale: f64,
-        colour: [u8; 3],
-    ) -> Option<Self> {
-        let mut any = false;
-        let instances: Vec<Instance> = covariances
-            .filter_map(|(centre, covariance, axes, name)| {
-                any = true;
-                let label = format!("{name} ({})", size.label());
-                Some(Instance { centre, label, covariance, ellipsoid: axes.ellipsoid(&covariance, size, scale)? })
-            })
-            .collect();
-        any.then(|| Self {
-            ellipsoids: Ellipsoids3D::from_centers_and_half_sizes(
-                instances.iter().map(|instance| single(instance.centre)),
-                instances.iter().map(|instance| single(instance.ellipsoid.half_sizes)),
-            )
-            .with_quaternions(instances.iter().map(|instance| {
-                let [x, y, z, w]: [f64; 4] = instance.ellipsoid.rotation.coords.into();
-                Quaternion::from_xyzw([x as f32, y as f32, z as f32, w as f32])
-            }))
-            .with_colors([Color::from_unmultiplied_rgba(colour[0], colour[1], colour[2], ALPHA)])
-            .with_line_radii([Radius::new_ui_points(0.5)])
-            .with_fill_mode(FillMode::TransparentFillMajorWireframe)
-            .with_labels(instances.iter().map(|instance| instance.label.clone()))
-            .with_show_labels(false),
-            covariances: DynamicArchetype::new_without_archetype().with_component_from_data(
-                "covariances",
-                Arc::new(Float64Array::from_iter_values(
-                    instances.iter().flat_map(|instance| instance.covariance.into_iter().flatten()),
-                )),
-            ),
-        })
-    }
-
-    /// Both parts, to be logged in one row.
-    pub(super) fn parts(&self) -> [&dyn AsComponents; 2] {
-        [&self.ellipsoids, &self.covariances]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -171,6 +47,7 @@ mod tests {
             axis: [0.0, 0.0, 1.0],
             point_m,
             point_covariance_m2: None,
+            allowed_point_covariance_m2: None,
             direction_covariance_rad2: None,
         };
         let (a, b, marker_m) = ([1.0; 3], [2.0; 3], [3.0; 3]);

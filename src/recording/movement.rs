@@ -1,59 +1,70 @@
-//! What a step did: the arm where it moved, and the marker as predicted and as seen.
+//! What a step showed: the marker as predicted, as seen, and how far apart.
 
 use rerun::{Color, LineStrips3D, Points3D, Radius};
 
-use super::{
-    colours::{TRUTH_COLOR, tint},
-    model::{links, single},
-};
+use super::solid::single;
 use crate::experiment::MovementReport;
 
 /// The colour of a measurement; no learner's, and it shows on dark and on light ground.
 const MEASURED: [u8; 3] = [0xE6, 0xB4, 0x22];
-
-/// The colour of a marker that was not seen.
-const MISSED: [u8; 3] = [0xD6, 0x3B, 0x3B];
+/// The colour of an error, and of a marker that was not seen.
+const ERROR: [u8; 3] = [0xD6, 0x3B, 0x3B];
+/// Radius of a marker and of the line of an error, as parts of the arm's reach.
+const MARKER: f64 = 0.048;
+const LINE: f64 = 0.011;
 
 /// The entities of a movement, all of them at each step: what a step does not have is empty, not the last step's.
 pub(super) struct Movement {
-    pub(super) links: LineStrips3D,
-    pub(super) truth: Option<LineStrips3D>,
     pub(super) predicted: Points3D,
     pub(super) measured: Points3D,
+    /// From the one to the other, labelled with its length.
+    pub(super) error: LineStrips3D,
     /// The true marker after a miss.
     pub(super) missed: Points3D,
 }
 
 impl Movement {
-    /// Of a report; `None` for a learner that has stopped.
-    pub(super) fn of(report: Option<&MovementReport>, has_truth: bool, colour: [u8; 3]) -> Self {
-        let Some(report) = report else {
-            let nothing = || LineStrips3D::new([[[0.0_f32; 3]; 0]; 0]);
-            let nowhere = || Points3D::new([[0.0_f32; 3]; 0]);
-            return Self {
-                links: nothing(),
-                truth: has_truth.then(nothing),
-                predicted: nowhere(),
-                measured: nowhere(),
-                missed: nowhere(),
-            };
+    /// Of a report; `None` for a learner that has stopped, or whose arm is on its way.
+    pub(super) fn of(report: Option<&MovementReport>, colour: [u8; 3], reach_m: f64) -> Self {
+        let predicted = report.map(|report| report.predicted_marker_m).filter(finite);
+        let measured = report.and_then(|report| report.measured_marker_m);
+        let truth = report.and_then(|report| report.true_skeleton_m.as_ref()?.last().copied());
+        let missed = truth.filter(|_| measured.is_none());
+        let ends = predicted.zip(measured);
+        let label = ends.map(|(from, to)| off((0..3).map(|i| (to[i] - from[i]).powi(2)).sum::<f64>().sqrt()));
+        let marker = |place: Option<[f64; 3]>, colour: [u8; 3], label: &'static str| {
+            Points3D::new(place.map(single))
+                .with_colors([Color::from(colour)])
+                .with_radii([Radius::new_scene_units((MARKER * reach_m) as f32)])
+                .with_labels([label])
         };
-        let truth = report.true_skeleton_m.as_deref();
-        let unseen = truth.filter(|_| report.measured_marker_m.is_none()).and_then(|points| points.last().copied());
         Self {
-            links: links(&report.estimated_skeleton_m, tint(colour, 0.5), 1.0),
-            truth: truth.map(|points| links(points, tint(TRUTH_COLOR, 0.4), 1.0)),
-            predicted: points(Some(report.predicted_marker_m), tint(colour, 0.5), 4.0, "predicted"),
-            measured: points(report.measured_marker_m, MEASURED, 4.0, "measured"),
-            missed: points(unseen, MISSED, 4.0, "missed"),
+            predicted: marker(predicted, colour, "predicted").with_show_labels(false),
+            measured: marker(measured, MEASURED, "seen").with_show_labels(false),
+            error: LineStrips3D::new(ends.map(|(from, to)| [from, to].map(single)))
+                .with_colors([Color::from(ERROR)])
+                .with_radii([Radius::new_scene_units((LINE * reach_m) as f32)])
+                .with_labels(label)
+                .with_show_labels(true),
+            missed: marker(missed, ERROR, "not seen").with_show_labels(true),
         }
     }
 }
 
-fn points(marker_m: Option<[f64; 3]>, colour: [u8; 3], size: f32, label: &str) -> Points3D {
-    Points3D::new(marker_m.map(single))
-        .with_colors([Color::from(colour)])
-        .with_radii([Radius::new_ui_points(size)])
-        .with_labels([label])
-        .with_show_labels(false)
+fn finite(point: &[f64; 3]) -> bool {
+    point.iter().all(|x| x.is_finite())
+}
+
+/// A distance as people say it.
+fn off(distance_m: f64) -> String {
+    if distance_m < 1.0 { format!("{:.0} mm off", distance_m * 1e3) } else { format!("{distance_m:.1} m off") }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn distances_are_said_in_words() {
+        assert_eq!(super::off(0.0187), "19 mm off");
+        assert_eq!(super::off(1.25), "1.2 m off");
+    }
 }

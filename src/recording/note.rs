@@ -3,20 +3,37 @@
 use std::fmt::Write as _;
 
 use clap::ValueEnum;
-use rerun::{MediaType, TextDocument};
+use nalgebra::Point3;
+use rerun::{Color, MediaType, Points3D, Radius, TextDocument};
 
 use super::{
     EllipsoidSize, TRUTH_COLOR,
     colours::{hex, learner_color, learner_slots},
+    solid::single,
 };
 use crate::{experiment::Description, kinematics::JointKind};
 
-const HEAD: &str = "- **Head** in pale grey: the cone of the lens at rest, and the square over which its axis can turn; in the \
+const HEAD: &str = "- **Head**: in pale grey the cone of the lens at rest, and the square over which its axis can turn; in the \
                     learner's pale colour the cone after the head has followed the marker. A marker outside it is missed: red, where \
                     it truly was.\n";
 
 const LIMITS: &str = "- **Limits** beside the trace: `bound_trace`, pale, is the least that a learner's data allow; the best design, grey, \
                       the least that any so many movements allow, if it was computed (`run --limits`).\n";
+
+const ALLOWED: &str = "- **Small, more solid clouds** within the pale ones: what the data allow. The learner's own covariance is \
+                       kept larger by its stabilising noise.\n";
+
+/// What the colours mean, as a label in the scene.
+pub(super) fn key(description: &Description, place: Point3<f64>) -> Points3D {
+    let truth = description.truth.as_ref().map(|_| "grey: the true arm");
+    let learners = ["colour: the arm as believed", "cloud: how unsure", "yellow: the hand as seen"];
+    let text = truth.into_iter().chain(learners).collect::<Vec<_>>().join("  ·  ");
+    Points3D::new([single(place.coords.into())])
+        .with_colors([Color::from(TRUTH_COLOR)])
+        .with_radii([Radius::new_scene_units(1e-3)])
+        .with_labels([text])
+        .with_show_labels(true)
+}
 
 /// The note, in markdown.
 pub(super) fn note(description: &Description, ellipsoids: EllipsoidSize) -> TextDocument {
@@ -47,19 +64,26 @@ fn markdown(description: &Description, ellipsoids: EllipsoidSize) -> String {
     }
     text.push_str("\n## What you see\n\n");
     if description.truth.is_some() {
-        let _ = writeln!(text, "- **Truth** in grey (`{}`): the arm at θ = 0 and its axes.", hex(TRUTH_COLOR));
+        text.push_str(
+            "- **True arm** in grey, as it stood in the step's movement, with a pin along each joint's axis.\n",
+        );
     } else {
         text.push_str("- The truth is not known: errors that need it are absent; prediction is judged over held-out measurements.\n");
+    }
+    if description.truth.is_some() && description.learners.iter().any(|learner| learner.stabilised) {
+        text.push_str(ALLOWED);
     }
     let limits = description.truth.as_ref().map_or("", |_| LIMITS);
     let _ = write!(
         text,
-        "{}- **Estimate** in the learner's colour: thick the arm at θ = 0, with one arrow per joint axis (a sliding \
-         joint's stands at the next joint); thin and pale the arm in the configuration of the step's movement, beside \
-         the true one.\n\
-         - **Ellipsoids** {}: of the points on the axes (flat along the axis, \
-         where a point means nothing), and, paler, at the tips of the arrows those of the directions, as the tips would move.\n\
-         - **Marker**: pale as predicted before the measurement, yellow as measured; no yellow point after a miss.\n\
+        "{}- **Estimated arm** in the learner's colour around it, as believed after the step's measurement.\n\
+         - **Clouds** {}: where the points on the joints' axes may be (flat along the axis, where a point means \
+         nothing).\n\
+         - **Marker**: in the learner's colour as predicted before the measurement, yellow as measured, a red line from \
+         the one to the other with its length; red alone after a miss.\n\
+         - **At θ = 0**, switched off at first (`zero` in the list of entities): the estimate as a line with one arrow per \
+         axis (a sliding joint's stands at the next joint) and at the tips of the arrows how unsure the directions are; \
+         the truth in grey.\n\
          - **Partition**: how DIRECT divided the joint box to choose the movement, as the slice through the chosen \
          configuration (vermillion) along two joints, each from limit to limit. Brighter is a lower criterion, so \
          better; thick outlines are what would be divided next; dots are centres outside the slice.\n\

@@ -5,24 +5,26 @@ use std::collections::BTreeSet;
 use rerun::{
     RecordingInfo, Scalars, SeriesLines, ViewCoordinates,
     external::re_log_types::{ApplicationId, EntityPath, LogMsg, StoreId},
+    log::Chunk,
 };
 
 use super::{
-    EllipsoidSize, LiveLog, RecordingError, TRUTH_COLOR, Target,
-    blueprint::{self, Arrangement},
+    EllipsoidSize, LiveLog, MOST_FRAMES, RecordingError, TRUTH_COLOR, Target,
+    blueprint::Arranger,
+    body::Figure,
     charts::BEST_DESIGN,
     colours::{learner_color, learner_slots, tint},
     file::RrdFile,
-    head,
-    learner::LearnerEntities,
+    learner::{LearnerEntities, Scenery},
     message, metrics, model,
-    note::note,
-    rows::Rows,
-    scene::Scene,
+    note::{key, note},
+    rows::{Rows, by_steps},
+    stage::Stage,
 };
 use crate::{
     design::BestDesign,
     experiment::{Description, LearnerDescription, ModelReport, StepReport},
+    model::State,
 };
 
 /// So many steps are written at once unless somebody flushes earlier …
@@ -31,7 +33,7 @@ const BATCH_STEPS: usize = 64;
 /// … or so many rectangles of partitions, some tens of megabytes.
 const BATCH_RECTANGLES: usize = 200_000;
 
-/// Length of the arrows, as a part of the size of the arm.
+/// Length of the arrows at θ = 0, as a part of the reach of the arm.
 const ARROW: f64 = 0.22;
 
 /// Records an experiment, as the module's documentation lists it.
@@ -60,8 +62,10 @@ pub struct Recorder {
     file: Option<RrdFile>,
     live: Option<LiveLog>,
     learners: Vec<LearnerEntities>,
-    /// Known from the first report on.
-    arrow_m: Option<f64>,
+    /// Where all stand; known from the first report on.
+    stage: Option<Stage>,
+    /// The true arm, where it is known.
+    truth: Option<State>,
     waiting_steps: usize,
     waiting_rectangles: usize,
     finished: bool,
@@ -86,7 +90,8 @@ impl Recorder {
                     LearnerEntities::new(learner_color(slot), name, description.joints.len(), ellipsoids)
                 })
                 .collect(),
-            arrow_m: None,
+            stage: None,
+            truth: description.truth.as_ref().and_then(ModelReport::state),
             waiting_steps: 0,
             waiting_rectangles: 0,
             finished: false,
@@ -107,25 +112,49 @@ impl Recorder {
 
     /// Records a step. Steps come in order; the first one is step 0.
     pub fn log(&mut self, report: &StepReport) -> Result<(), RecordingError> {
-        let arrow_m = match self.arrow_m {
-            Some(arrow_m) => arrow_m,
+        self.log_moving(report, 0)
+    }
+
+    /// Records a step, and for those who watch live so many postures on the way to it (at most [`MOST_FRAMES`]).
+    pub fn log_moving(&mut self, report: &StepReport, frames: u64) -> Result<(), RecordingError> {
+        let stage = match self.stage.take() {
+            Some(stage) => stage,
             None => self.arrange(report)?,
         };
+        let arrow_m = ARROW * stage.figure.reach_m;
         if let Some(truth) = &report.truth {
+            self.truth = truth.state();
             self.log_truth(Some(report.step), truth, arrow_m);
         }
-        let Self { description, learners, rows, .. } = self;
+        let Self { description, learners, rows, live, truth, .. } = self;
+        let frames = if live.is_some() { frames.min(MOST_FRAMES) } else { 0 };
+        let scenery = Scenery { description, stage: &stage, truth: truth.as_ref(), arrow_m, frames };
         for (entities, learner) in learners.iter_mut().zip(&report.learners) {
-            entities.log(rows, report.step, learner, description, arrow_m);
+            entities.log(rows, report.step, learner, &scenery);
             let partition = learner.movement.as_ref().and_then(|movement| movement.partition.as_ref());
             self.waiting_rectangles += partition.map_or(0, |partition| partition.leaves.len());
         }
+        self.stage = Some(stage);
         self.waiting_steps += 1;
         if self.waiting_steps >= BATCH_STEPS || self.waiting_rectangles >= BATCH_RECTANGLES {
             self.flush()
         } else {
             Ok(())
         }
+    }
+
+    /// Draws an arm through these points (axis points in order, then the marker, metres) beside the learner's, for those
+    /// who watch live: a posture that is tried out after `step`. `None` clears it, and so does the learner's next step.
+    pub fn log_ghost(
+        &mut self,
+        step: u64,
+        learner: usize,
+        skeleton_m: Option<&[[f64; 3]]>,
+    ) -> Result<(), RecordingError> {
+        if let (Some(entities), Some(stage), Some(_)) = (self.learners.get_mut(learner), &self.stage, &self.live) {
+            entities.log_ghost(&mut self.rows, step, skeleton_m, stage.figure.reach_m);
+        }
+        self.flush_shown()
     }
 
     /// Records the best designs of several lengths, each at the step at which as many movements are made. At any time
@@ -160,11 +189,18 @@ impl Recorder {
         self.write(|entity| !hidden.contains(entity))
     }
 
+    /// To both targets, whatever happens to the other.
     fn write(&mut self, wanted: impl Fn(&EntityPath) -> bool) -> Result<(), RecordingError> {
         let chunks = self.rows.drain(wanted)?;
-        let messages: Vec<LogMsg> =
-            chunks.iter().map(|chunk| message::data(&self.store, chunk)).collect::<Result<_, _>>()?;
-        self.send(&messages)
+        let messages = |chunks: &mut dyn Iterator<Item = Chunk>| -> Result<Vec<LogMsg>, RecordingError> {
+            chunks.map(|chunk| message::data(&self.store, &chunk)).collect()
+        };
+        let live = self.live.as_ref().map_or(Ok(()), |live| live.append(&messages(&mut chunks.iter().cloned())?));
+        let file = match &mut self.file {
+            Some(file) => messages(&mut chunks.iter().filter_map(by_steps)).and_then(|steps| file.append(&steps)),
+            None => Ok(()),
+        };
+        file.and(live)
     }
 
     /// Writes what is left, ends the file with its footer, and closes the log.
@@ -215,47 +251,50 @@ impl Recorder {
         Ok(())
     }
 
-    /// The true arm from a step on; at all times without a step.
+    /// The true arm at θ = 0 from a step on; at all times without a step.
     fn log_truth(&mut self, step: Option<u64>, truth: &ModelReport, arrow_m: f64) {
         let links = model::links(&truth.skeleton_m(), TRUTH_COLOR, 2.0);
         let axes = model::axes(truth, &self.description.joints, arrow_m, TRUTH_COLOR);
-        let (links_at, axes_at) = (EntityPath::from("world/truth/links"), EntityPath::from("world/truth/axes"));
-        match step {
-            Some(step) => {
-                self.rows.at(step, &links_at, &[&links]);
-                self.rows.at(step, &axes_at, &[&axes]);
-            }
-            None => {
-                self.rows.always(&links_at, &[&links]);
-                self.rows.always(&axes_at, &[&axes]);
+        for learner in &self.learners {
+            let (links_at, axes_at) = (learner.entity("zero/truth/links"), learner.entity("zero/truth/axes"));
+            match step {
+                Some(step) => {
+                    self.rows.at(step, &links_at, &[&links]);
+                    self.rows.at(step, &axes_at, &[&axes]);
+                }
+                None => {
+                    self.rows.always(&links_at, &[&links]);
+                    self.rows.always(&axes_at, &[&axes]);
+                }
             }
         }
     }
 
-    /// What needs the size of the arm: the truth's arrows and the cameras. Returns the length of all arrows.
-    fn arrange(&mut self, first: &StepReport) -> Result<f64, RecordingError> {
-        let model = self.description.truth.as_ref().or_else(|| first.learners.first().map(|learner| &learner.estimate));
-        let scene = model.map(|model| Scene::around(&model.skeleton_m())).unwrap_or_default();
-        let arrow_m = ARROW * scene.size_m;
-        self.arrow_m = Some(arrow_m);
+    /// What needs the size of the arm: places, bodies, the truth's arrows and the cameras.
+    fn arrange(&mut self, first: &StepReport) -> Result<Stage, RecordingError> {
+        let believed = || first.learners.first().and_then(|learner| learner.estimate.state());
+        let figure = self.truth.clone().or_else(believed).map(|arm| Figure::of(&self.description, &arm));
+        let stage = Stage::new(figure.unwrap_or_default(), self.learners.len());
+        for (index, learner) in self.learners.iter().enumerate() {
+            learner.begin(&mut self.rows, index, &stage, &self.description);
+        }
+        self.rows.always(&EntityPath::from("key"), &[&key(&self.description, stage.key())]);
         if let Some(truth) = self.description.truth.clone() {
             // What is static cannot change later.
-            self.log_truth(self.description.change_at.map(|_| first.step), &truth, arrow_m);
+            let step = self.description.change_at.map(|_| first.step);
+            self.log_truth(step, &truth, ARROW * stage.figure.reach_m);
         }
-        if let Some(head) = &self.description.head {
-            self.rows.always(&EntityPath::from("world/head/frustum"), &[&head::frustum(head)]);
-        }
-        let learners: Vec<&EntityPath> = self.learners.iter().map(|learner| &learner.root).collect();
-        let arrange = |arrangement| {
-            let application = self.store.application_id().clone();
-            blueprint::messages(&self.description, &learners, &scene, arrangement, application)
+        let arranger = Arranger {
+            description: self.description.clone(),
+            roots: self.learners.iter().map(|learner| learner.root.clone()).collect(),
+            stage: stage.clone(),
+            application: self.store.application_id().clone(),
         };
-        let whole = arrange(Arrangement::Whole)?;
-        let scene = arrange(Arrangement::Scene)?;
+        let whole = arranger.whole()?;
         // To both targets, whatever happens to the other.
-        let live = self.live.as_ref().map_or(Ok(()), |live| live.append_arrangement(&whole, &scene));
+        let live = self.live.as_ref().map_or(Ok(()), |live| live.append_arrangement(&whole, arranger));
         self.file.as_mut().map_or(Ok(()), |file| file.append(&whole)).and(live)?;
-        Ok(arrow_m)
+        Ok(stage)
     }
 }
 

@@ -12,12 +12,12 @@ use rerun::{
     time::TimePoint,
 };
 
-use super::TIMELINE;
+use super::{MOTION, MOTION_PER_STEP, TIMELINE};
 
 /// Rows by entity, in the order of their logging.
 #[derive(Default)]
 pub(super) struct Rows {
-    // An entity's static rows and those in time cannot share a chunk.
+    // Rows of different timelines cannot share a chunk.
     rows: BTreeMap<(EntityPath, When), Vec<Row>>,
     /// How entities look since their last row that said so.
     looks: BTreeMap<(EntityPath, ComponentIdentifier), ArrayRef>,
@@ -25,12 +25,18 @@ pub(super) struct Rows {
 
 /// Components that say how something looks. They hold until they are logged again, and each costs some 300 bytes in
 /// every message: rows repeat them only when they change.
-const LOOKS: [&str; 7] = ["colors", "draw_order", "fill_mode", "labels", "line_radii", "radii", "show_labels"];
+const LOOKS: [&str; 8] =
+    ["colors", "draw_order", "fill_mode", "labels", "lengths", "line_radii", "radii", "show_labels"];
 
+/// On which timelines rows stand.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum When {
+    /// On none: they hold at all times.
     Always,
-    InTime,
+    /// At a step.
+    Step,
+    /// Between two steps.
+    Between,
 }
 
 struct Row {
@@ -47,22 +53,26 @@ impl Rows {
 
     /// What holds from a step on, until the entity's next row.
     pub(super) fn at(&mut self, step: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
-        let step = i64::try_from(step).unwrap_or(i64::MAX);
-        let time = TimePoint::from([(Timeline::new_sequence(TIMELINE), step)]);
+        let time = TimePoint::from([(Timeline::new_sequence(TIMELINE), sequence(step)), motion(step, 0)]);
         let mut components = batches(what);
         components.retain(|batch| {
             let component = batch.descriptor.component;
             let is_look = component.as_str().split_once(':').is_some_and(|(_, field)| LOOKS.contains(&field));
             !is_look || self.looks.insert((entity.clone(), component), batch.array.clone()) != Some(batch.array.clone())
         });
-        self.push(entity, When::InTime, time, components);
+        self.push(entity, When::Step, time, components);
+    }
+
+    /// What holds so many ticks after a step, until the entity's next row. Whoever sees steps alone does not see it.
+    pub(super) fn after(&mut self, step: u64, ticks: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
+        self.push(entity, When::Between, TimePoint::from([motion(step, ticks)]), batches(what));
     }
 
     fn push(&mut self, entity: &EntityPath, when: When, time: TimePoint, components: Vec<SerializedComponentBatch>) {
         self.rows.entry((entity.clone(), when)).or_default().push(Row { id: RowId::new(), time, components });
     }
 
-    /// Takes out what `wanted` says, one chunk per entity, and another for its static rows.
+    /// Takes out what `wanted` says, one chunk per entity and kind of time.
     pub(super) fn drain(&mut self, wanted: impl Fn(&EntityPath) -> bool) -> Result<Vec<Chunk>, ChunkError> {
         self.rows
             .extract_if(.., |(entity, _), _| wanted(entity))
@@ -75,6 +85,21 @@ impl Rows {
             })
             .collect()
     }
+}
+
+/// What a recording in a file has of a chunk; `None` if it is between steps.
+pub(super) fn by_steps(chunk: &Chunk) -> Option<Chunk> {
+    let step = TIMELINE.into();
+    let is_wanted = chunk.is_static() || chunk.timelines().contains_key(&step);
+    is_wanted.then(|| chunk.timeline_sliced(step))
+}
+
+fn motion(step: u64, ticks: u64) -> (Timeline, i64) {
+    (Timeline::new_sequence(MOTION), sequence(step.saturating_mul(MOTION_PER_STEP).saturating_add(ticks)))
+}
+
+fn sequence(number: u64) -> i64 {
+    i64::try_from(number).unwrap_or(i64::MAX)
 }
 
 fn batches(what: &[&dyn AsComponents]) -> Vec<SerializedComponentBatch> {

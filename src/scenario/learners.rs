@@ -26,6 +26,7 @@ impl LearnerSpec {
             name: self.name.clone(),
             estimator: self.estimator.name().to_owned(),
             policy: self.policy.name().to_owned(),
+            stabilised: self.stabilising,
         }
     }
 }
@@ -87,11 +88,13 @@ pub enum PolicyKind {
     ActiveMonteCarlo,
     /// Draws uniformly.
     Random,
+    /// Waits for a person to choose. No file names it: it is offered in every simulated scenario.
+    Human,
 }
 
 impl PolicyKind {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Active,
         Self::ActiveNaive,
         Self::ActivePlanned,
@@ -100,6 +103,7 @@ impl PolicyKind {
         Self::ActiveBayesian,
         Self::ActiveMonteCarlo,
         Self::Random,
+        Self::Human,
     ];
 
     /// Its name in files and reports.
@@ -113,6 +117,7 @@ impl PolicyKind {
             Self::ActiveBayesian => "active-bayesian",
             Self::ActiveMonteCarlo => "active-monte-carlo",
             Self::Random => "random",
+            Self::Human => "human",
         }
     }
 
@@ -132,11 +137,14 @@ impl PolicyKind {
 /// Stands between estimator and policy in the name of a composed learner.
 const SEPARATOR: char = ':';
 
+/// The learner for which a person chooses, unless another estimator is named.
+pub(super) const HUMAN: &str = "human";
+
 impl Scenario {
     /// The learners of these names, in this order; without names those that run by default.
     ///
     /// A name is one of the scenario's, or an estimator and a policy, as in `smoother:random`: with the settings of the
-    /// scenario, and the stabilising noise if it has any.
+    /// scenario, and the stabilising noise if it has any. `human` is `rls:human`.
     pub fn chosen(&self, names: Option<&[String]>) -> Result<Vec<LearnerSpec>, ScenarioError> {
         let Some(names) = names else {
             return Ok(self.learners.iter().filter(|spec| spec.by_default).cloned().collect());
@@ -180,7 +188,8 @@ impl Scenario {
             suggested: self.similar_learner(name),
             known: self.learners.iter().map(|spec| spec.name.clone()).collect(),
         };
-        let (estimator, policy) = name.split_once(SEPARATOR).ok_or_else(unknown)?;
+        let pair = if name == HUMAN { "rls:human" } else { name };
+        let (estimator, policy) = pair.split_once(SEPARATOR).ok_or_else(unknown)?;
         let estimator = EstimatorKind::ALL.into_iter().find(|kind| kind.name() == estimator).ok_or_else(unknown)?;
         let policy = PolicyKind::ALL.into_iter().find(|kind| kind.name() == policy).ok_or_else(unknown)?;
         match misfit(estimator, policy, self.setting()) {
@@ -224,6 +233,9 @@ impl Scenario {
 }
 
 fn composed(estimator: EstimatorKind, policy: PolicyKind) -> String {
+    if (estimator, policy) == (EstimatorKind::Rls, PolicyKind::Human) {
+        return HUMAN.to_owned();
+    }
     format!("{}{SEPARATOR}{}", estimator.name(), policy.name())
 }
 
@@ -267,6 +279,10 @@ pub(super) fn misfit(estimator: EstimatorKind, policy: PolicyKind, setting: Sett
     if estimator == EstimatorKind::RlsSixNumbers && !setting.sees_markers_alone {
         let what = "six numbers per joint read nothing but the marker's position".to_owned();
         return Some(Misfit { fault: Fault::Estimator, what, instead: (EstimatorKind::Rls, policy) });
+    }
+    if setting.is_measured && policy == PolicyKind::Human {
+        let what = "nobody moves a robot of which there are only recorded rows".to_owned();
+        return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
     }
     if setting.is_measured && policy.varies_the_search() {
         let what = format!("over recorded rows `{}` has nothing to search: every row is tried", policy.name());
@@ -332,6 +348,26 @@ mod tests {
         // What is suggested fits in every respect.
         let message = chosen(&measured, "rls-six-numbers:active-direct").unwrap_err().to_string();
         assert!(message.ends_with("write `rls:random`"), "{message}");
+    }
+
+    #[test]
+    fn a_person_is_offered_where_a_robot_can_be_moved_and_never_by_default() {
+        for known in BUILTIN {
+            let scenario = builtin(known.name).unwrap();
+            let is_simulated = matches!(scenario.world, WorldSpec::Simulated { .. });
+            let offered: Vec<String> = scenario.compositions().into_iter().map(|spec| spec.name).collect();
+            for name in ["human", "smoother:human"] {
+                assert_eq!(offered.iter().any(|known| known == name), is_simulated, "{name} in {}", known.name);
+                assert_eq!(scenario.chosen(Some(&[name.to_owned()])).is_ok(), is_simulated);
+            }
+            let by_default = scenario.chosen(None).unwrap();
+            assert!(by_default.iter().all(|spec| spec.policy != PolicyKind::Human));
+        }
+        let human = &builtin("arm-6dof").unwrap().chosen(Some(&["human".to_owned()])).unwrap()[0];
+        assert_eq!(
+            (human.name.as_str(), human.estimator, human.policy),
+            ("human", EstimatorKind::Rls, PolicyKind::Human)
+        );
     }
 
     #[test]

@@ -26,7 +26,7 @@ pub use summary::{ScenarioSummary, WorldKind};
 
 use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
-    experiment::{Outliers, Thresholds},
+    experiment::{Body, Outliers, Thresholds},
     kinematics::JointBox,
     model::{Block, Layout, Quantity, State},
     optimize::Settings,
@@ -110,6 +110,8 @@ pub struct Robot {
     pub layout: Layout,
     /// Joint limits.
     pub limits: JointBox,
+    /// What it is drawn as.
+    pub body: Option<Body>,
 }
 
 /// The world of a scenario.

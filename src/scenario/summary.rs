@@ -25,6 +25,9 @@ pub struct ScenarioSummary {
     pub learners: Vec<LearnerDescription>,
     /// What else can be compared: every estimator with every policy that fits it, by names such as `smoother:random`.
     pub compositions: Vec<LearnerDescription>,
+    /// The learners that a page compares unless told otherwise: those of `active`, `random` and `global` that it has, or where
+    /// it has none of them its defaults.
+    pub explorer: Vec<String>,
     /// The thresholds of `converged_at`.
     pub thresholds: Thresholds,
 }
@@ -39,6 +42,9 @@ pub enum WorldKind {
     /// A recorded data set without a known truth.
     Measured,
 }
+
+/// The learners that tell most beside each other, in the order in which a page shows them.
+const SHOWN: [&str; 3] = ["active", "random", "global"];
 
 impl ScenarioSummary {
     /// Every learner that can be compared, the scenario's own first.
@@ -62,8 +68,19 @@ impl Scenario {
             steps: self.steps,
             learners: self.learners.iter().map(super::LearnerSpec::description).collect(),
             compositions: self.compositions().iter().map(super::LearnerSpec::description).collect(),
+            explorer: self.explorer(),
             thresholds: self.thresholds,
         }
+    }
+
+    /// See [`ScenarioSummary::explorer`].
+    fn explorer(&self) -> Vec<String> {
+        let named = |name: &&str| self.learners.iter().any(|spec| spec.name == **name);
+        let shown: Vec<String> = SHOWN.iter().filter(|name| named(name)).map(|name| (*name).to_owned()).collect();
+        if !shown.is_empty() {
+            return shown;
+        }
+        self.learners.iter().filter(|spec| spec.by_default).map(|spec| spec.name.clone()).collect()
     }
 }
 
@@ -77,5 +94,27 @@ impl super::Robot {
                 limits: [lower, upper],
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::{Scenario, builtin};
+
+    #[test]
+    fn a_page_compares_what_tells_most() {
+        for (name, shown) in
+            [("arm-6dof", &["active", "random", "global"][..]), ("arm-6dof-selectors", &["active", "random"])]
+        {
+            assert_eq!(builtin(name).unwrap().summary().explorer, shown, "{name}");
+        }
+        // Under other names the defaults are all there is to go by.
+        let renamed = builtin("arm-6dof").unwrap();
+        let text = ["active", "random", "global"].iter().fold(renamed.source, |text, name| {
+            text.replace(&format!("name = \"{name}\""), &format!("name = \"my-{name}\""))
+        });
+        let text = text.split("[promises]").next().unwrap();
+        let scenario = Scenario::parse("renamed.toml", text, &|_| Err("has no data".to_owned())).unwrap();
+        assert_eq!(scenario.summary().explorer, ["my-active", "my-random", "gradient"]);
     }
 }

@@ -97,6 +97,20 @@ impl Active {
         Ok(criterion.watched(sight))
     }
 
+    /// How DIRECT would search the joint box now; `None` with another minimiser.
+    pub(super) fn search(
+        &self,
+        situation: &Situation<'_>,
+        limits: &JointBox,
+    ) -> Result<Option<Search>, SelectionError> {
+        let Minimiser::Direct(settings) = self.minimiser else { return Ok(None) };
+        let criterion = self.criterion(situation.belief, situation, limits)?;
+        let at = |points: &[Vec<f64>]| {
+            criterion.evaluate(&points.iter().map(|point| limits.from_unit(point)).collect::<Vec<Vec<f64>>>())
+        };
+        Ok(Some(Search { settings, partition: direct(limits.dimension(), settings, at)? }))
+    }
+
     fn search_box(
         &self,
         situation: &Situation<'_>,

@@ -7,11 +7,13 @@
 //! * [`Planner`]: plans the movements that are still needed together, under all hypotheses.
 //! * [`Visibility`]: where a head watches, the chance that the marker is seen, which weighs the gain.
 //! * [`Random`]: draws uniformly, the paper's comparison.
+//! * [`Human`]: waits for a person, and tells how good their choices are.
 //!
 //! A policy chooses, explains and appraises, each time from the situation alone: it remembers nothing.
 
 mod active;
 mod criterion;
+mod human;
 #[cfg(test)]
 mod laws;
 mod optimality;
@@ -30,6 +32,7 @@ use rand_chacha::ChaCha8Rng;
 
 pub use active::{Active, Minimiser};
 pub use criterion::{Appraisal, Criterion, Sight};
+pub use human::Human;
 pub use optimality::Optimality;
 pub use outlook::Outlook;
 pub use partition::{Leaf, Partition};
@@ -143,6 +146,9 @@ pub enum SelectionError {
     /// Not a position for every joint.
     #[error("a configuration of {0} positions is none of this robot")]
     NoConfiguration(usize),
+    /// A person chooses, and has not chosen yet.
+    #[error("a person chooses it, and has not chosen yet; set a configuration first, then step")]
+    Unset,
     /// No configuration has a finite criterion.
     #[error("no configuration has a finite criterion: the belief has diverged")]
     NoFiniteCriterion,
@@ -167,5 +173,10 @@ pub trait Policy: Send {
     /// else: a search of it by DIRECT.
     fn explain(&self, _situation: &Situation<'_>, _limits: &JointBox) -> Result<Option<Search>, SelectionError> {
         Ok(None)
+    }
+
+    /// Whether movements are never chosen here, but by somebody outside.
+    fn is_set_from_outside(&self) -> bool {
+        false
     }
 }

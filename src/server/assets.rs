@@ -3,12 +3,8 @@
 use std::{
     borrow::Cow,
     hash::{DefaultHasher, Hasher},
-    io::{Read, Write},
     path::Path,
-    sync::{
-        Arc, OnceLock,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, LazyLock},
 };
 
 use axum::{
@@ -19,19 +15,25 @@ use axum::{
     response::{IntoResponse, Response},
     routing::get,
 };
-use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 use re_web_viewer_server::WebViewerData;
 
 use super::{
     App, ServerError,
+    gzip::{self, Compressed},
     problem::{Kind, Problem},
 };
 
-/// Files larger than this are compressed in the background while they are first sent as they are.
-const COMPRESS_AT_ONCE_BYTES: usize = 1 << 20;
+/// The viewer's WebAssembly is the same for all servers of a program.
+static VIEWER_WASM: LazyLock<Compressed> = LazyLock::new(Compressed::default);
+
+/// What the page says of its picture, which previews take from a whole address only.
+const PREVIEW: &str = "\"og:image\" content=\"";
 
 const PANEL_SCRIPT: &str = "/panel/panel.js";
 const PANEL_WASM: &str = "/panel/panel_bg.wasm";
+
+/// The page itself, whose addresses of the other files are still without versions.
+pub(crate) const INDEX: &str = include_str!("../../web/page/index.html");
 
 /// A file of the page.
 macro_rules! embedded {
@@ -49,13 +51,15 @@ struct Asset {
     bytes: Bytes,
     /// Changes with the content: the entity tag, and `?v=` in the addresses under which it may be kept for ever.
     version: String,
-    compressed: Arc<OnceLock<Option<Bytes>>>,
-    compressing: AtomicBool,
+    compressed: Compressed,
 }
 
 /// The routes of all files.
 pub(super) fn routes() -> Router<Arc<App>> {
-    let page = ["/", "/page.css", "/page.js", "/session.js", "/seeds.js", "/viewer.js", "/icon.svg"];
+    let page = [
+        "/", "/page.css", "/page.js", "/controls.js", "/links.js", "/picture.js", "/scene.js", "/session.js", "/files.js", "/seeds.js",
+        "/viewer.js", "/icon.svg", "/preview.png",
+    ];
     let panel = [PANEL_SCRIPT, PANEL_WASM];
     let viewer = ["/viewer/re_viewer.js", "/viewer/re_viewer_bg.wasm"];
     let paths = page.into_iter().chain(panel).chain(viewer);
@@ -64,7 +68,8 @@ pub(super) fn routes() -> Router<Arc<App>> {
 
 async fn file(State(app): State<Arc<App>>, uri: Uri, headers: HeaderMap) -> Response {
     match app.assets.0.iter().find(|asset| asset.path == uri.path()) {
-        Some(asset) => asset.response(&headers, uri.query()),
+        Some(asset) if asset.path == "/" => asset.at(&headers).response(&headers, uri.query()).await,
+        Some(asset) => asset.response(&headers, uri.query()).await,
         None => Problem::new(Kind::UnknownRoute, format!("there is no file `{}`", uri.path())).into_response(),
     }
 }
@@ -91,16 +96,22 @@ impl Assets {
         let mut assets = vec![
             Asset::new("/page.css", "text/css; charset=utf-8", embedded!("page.css")),
             Asset::new("/page.js", JAVASCRIPT, embedded!("page.js")),
+            Asset::new("/controls.js", JAVASCRIPT, embedded!("controls.js")),
+            Asset::new("/links.js", JAVASCRIPT, embedded!("links.js")),
+            Asset::new("/picture.js", JAVASCRIPT, embedded!("picture.js")),
+            Asset::new("/scene.js", JAVASCRIPT, embedded!("scene.js")),
             Asset::new("/session.js", JAVASCRIPT, embedded!("session.js")),
+            Asset::new("/files.js", JAVASCRIPT, embedded!("files.js")),
             Asset::new("/seeds.js", JAVASCRIPT, embedded!("seeds.js")),
             Asset::new("/viewer.js", JAVASCRIPT, embedded!("viewer.js")),
             Asset::new("/icon.svg", "image/svg+xml", embedded!("icon.svg")),
+            Asset::new("/preview.png", "image/png", embedded!("preview.png")),
             Asset::new(PANEL_SCRIPT, JAVASCRIPT, panel_script),
             Asset::compressed_already(PANEL_WASM, "application/wasm", panel_wasm),
             Asset::new("/viewer/re_viewer.js", JAVASCRIPT, Bytes::copy_from_slice(viewer.viewer_js())),
-            Asset::new("/viewer/re_viewer_bg.wasm", "application/wasm", viewer_wasm(viewer)),
+            Asset::viewer("/viewer/re_viewer_bg.wasm", viewer_wasm(viewer)),
         ];
-        let mut page = include_str!("../../web/page/index.html").to_owned();
+        let mut page = INDEX.to_owned();
         for asset in &assets {
             let Asset { path, version, .. } = asset;
             page = page.replace(&format!("\"{path}\""), &format!("\"{path}?v={version}\""));
@@ -121,27 +132,71 @@ fn viewer_wasm(viewer: WebViewerData) -> Bytes {
     Bytes::from_owner(Wasm(viewer))
 }
 
+/// A file of the page, for those who put it elsewhere.
+pub(crate) struct PageFile {
+    /// Its address on this server.
+    pub(crate) path: &'static str,
+    pub(crate) bytes: Bytes,
+    /// The same, compressed.
+    pub(crate) packed: Bytes,
+    /// Changes with the content.
+    pub(crate) version: String,
+}
+
+/// All files but the page itself, which is [`INDEX`].
+pub(crate) fn page_files(panel: Option<&Path>) -> Result<Vec<PageFile>, ServerError> {
+    let Assets(assets) = Assets::load(panel)?;
+    let files = assets.into_iter().filter(|asset| asset.path != "/").map(|asset| PageFile {
+        path: asset.path,
+        packed: asset.compressed.of(&asset.bytes).unwrap_or_default(),
+        bytes: asset.bytes,
+        version: asset.version,
+    });
+    Ok(files.collect())
+}
+
 impl Asset {
     fn new(path: &'static str, content_type: &'static str, bytes: Bytes) -> Self {
         let mut hasher = DefaultHasher::new();
         hasher.write(&bytes);
         let version = format!("{:016x}", hasher.finish());
-        Self { path, content_type, bytes, version, compressed: Arc::default(), compressing: false.into() }
+        Self { path, content_type, bytes, version, compressed: Compressed::default() }
+    }
+
+    /// The viewer's 42 MB: compressed from the start of the program on, so that the first visitor too gets 14 MB.
+    fn viewer(path: &'static str, bytes: Bytes) -> Self {
+        VIEWER_WASM.begin(bytes.clone());
+        Self { compressed: VIEWER_WASM.clone(), ..Self::new(path, "application/wasm", bytes) }
     }
 
     /// A file that was compressed when it was built; who does not take it so gets it unpacked.
     fn compressed_already(path: &'static str, content_type: &'static str, compressed: Bytes) -> Self {
-        let mut plain = Vec::new();
-        // What does not unpack stays empty, and the browser says so.
-        drop(GzDecoder::new(compressed.as_ref()).read_to_end(&mut plain));
-        let asset = Self::new(path, content_type, plain.into());
-        drop(asset.compressed.set(Some(compressed)));
-        asset
+        let asset = Self::new(path, content_type, gzip::unpack(&compressed));
+        Self { compressed: Compressed::ready(compressed), ..asset }
     }
 
-    fn response(&self, headers: &HeaderMap, query: Option<&str>) -> Response {
+    /// The page as it is under the address by which it was asked for.
+    fn at(&self, headers: &HeaderMap) -> Self {
+        let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default();
+        let host = text("host");
+        // A host is written into the page only if it can be nothing else.
+        let is_plain = !host.is_empty() && host.bytes().all(|byte| byte.is_ascii_alphanumeric() || b".:-[]".contains(&byte));
+        let page = String::from_utf8_lossy(&self.bytes);
+        let page = if is_plain {
+            let scheme = if text("x-forwarded-proto") == "https" { "https" } else { "http" };
+            page.replace(PREVIEW, &format!("{PREVIEW}{scheme}://{host}"))
+        } else {
+            page.into_owned()
+        };
+        Self::new(self.path, self.content_type, page.into())
+    }
+
+    async fn response(&self, headers: &HeaderMap, query: Option<&str>) -> Response {
         let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default();
-        let compressed = accepts_gzip(text(header::ACCEPT_ENCODING)).then(|| self.compressed()).flatten();
+        let compressed = match gzip::is_accepted(text(header::ACCEPT_ENCODING)) {
+            true => self.compressed.of_large(self.bytes.clone()).await,
+            false => None,
+        };
         let tag = match &compressed {
             Some(_) => Cow::from(format!("\"{}-gzip\"", self.version)),
             None => Cow::from(format!("\"{}\"", self.version)),
@@ -165,49 +220,5 @@ impl Asset {
         // The length of what comes out of the decompression, for the page's progress.
         headers.insert("uncompressed-length", HeaderValue::from(self.bytes.len()));
         response
-    }
-
-    /// The compressed content, if it is ready. A large file begins to be compressed when it is first asked for.
-    fn compressed(&self) -> Option<Bytes> {
-        if let Some(done) = self.compressed.get() {
-            return done.clone();
-        }
-        if self.bytes.len() <= COMPRESS_AT_ONCE_BYTES {
-            return self.compressed.get_or_init(|| gzip(&self.bytes)).clone();
-        }
-        // In a debug build it would take minutes.
-        if !cfg!(debug_assertions) && !self.compressing.swap(true, Ordering::Relaxed) {
-            let (bytes, compressed) = (self.bytes.clone(), self.compressed.clone());
-            let work = move || drop(compressed.set(gzip(&bytes)));
-            // Without a thread it stays as it is.
-            drop(std::thread::Builder::new().name("gzip".to_owned()).spawn(work));
-        }
-        None
-    }
-}
-
-fn gzip(bytes: &[u8]) -> Option<Bytes> {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::new(6));
-    encoder.write_all(bytes).ok()?;
-    encoder.finish().ok().map(Bytes::from)
-}
-
-/// Whether `Accept-Encoding` names gzip and does not refuse it.
-fn accepts_gzip(accepted: &str) -> bool {
-    accepted.split(',').any(|coding| {
-        let mut parts = coding.split(';').map(str::trim);
-        let is_gzip = parts.next().is_some_and(|name| name.eq_ignore_ascii_case("gzip"));
-        is_gzip && !parts.any(|weight| matches!(weight, "q=0" | "q=0.0" | "q=0.00" | "q=0.000"))
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::accepts_gzip;
-
-    #[test]
-    fn gzip_is_sent_to_those_who_ask_for_it() {
-        assert!(accepts_gzip("gzip, deflate, br") && accepts_gzip("br;q=1, GZIP;q=0.5"));
-        assert!(!accepts_gzip("") && !accepts_gzip("br") && !accepts_gzip("gzip;q=0, br"));
     }
 }

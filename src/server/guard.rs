@@ -12,17 +12,46 @@ use axum::{
 };
 
 use super::{
-    App, MAX_BODY_BYTES,
+    App, FrameAncestor, MAX_BODY_BYTES,
     problem::{Kind, PROBLEM_JSON, Problem},
 };
 
 /// Scripts, styles, images and connections from here and from nowhere else; the viewer is WebAssembly. It also keeps
 /// the viewer from calling its makers' telemetry and from loading fonts.
-const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; \
-     img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+pub(crate) const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
+     style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'";
+
+/// The headers of every response.
+#[derive(Clone)]
+pub(super) struct Headers(Arc<[(HeaderName, HeaderValue)]>);
+
+impl Headers {
+    /// With these origins allowed to show the page in a frame.
+    pub(super) fn new(frame_ancestors: &[FrameAncestor]) -> Self {
+        let policy = match frame_ancestors {
+            [] => format!("{CONTENT_SECURITY_POLICY}; frame-ancestors 'none'"),
+            origins => {
+                let origins: Vec<&str> = origins.iter().map(FrameAncestor::as_str).collect();
+                format!("{CONTENT_SECURITY_POLICY}; frame-ancestors {}", origins.join(" "))
+            }
+        };
+        // Origins are of visible characters.
+        let policy = HeaderValue::from_str(&policy).unwrap_or(HeaderValue::from_static(CONTENT_SECURITY_POLICY));
+        // For browsers that do not read `frame-ancestors`; it knows no list of origins.
+        let old = frame_ancestors.is_empty().then_some((header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY")));
+        let headers = [
+            (header::CONTENT_SECURITY_POLICY, policy),
+            (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
+            (header::REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
+            (HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static("same-origin")),
+            (HeaderName::from_static("cross-origin-opener-policy"), HeaderValue::from_static("same-origin")),
+        ];
+        Self(headers.into_iter().chain(old).collect())
+    }
+}
 
 /// The routes with all that holds for every one of them.
-pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>) -> Router {
+pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>, always: Headers) -> Router {
     let router = router
         .fallback(async |uri: Uri| {
             Problem::new(Kind::UnknownRoute, format!("there is nothing at `{}`; see /v1/openapi.json", uri.path()))
@@ -33,7 +62,7 @@ pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>) -> Router {
         .fallback_service(router.with_state(app.clone()))
         .layer(from_fn_with_state(app.clone(), refuse_strangers))
         .layer(map_response(as_problem))
-        .layer(map_response(with_headers))
+        .layer(map_response(move |response| with_headers(always.clone(), response)))
 }
 
 /// A page of another origin must neither change anything nor open a WebSocket, and on a loopback address a foreign host
@@ -97,16 +126,10 @@ async fn as_problem(response: Response) -> Response {
     Response::from_parts(parts, body)
 }
 
-async fn with_headers(mut response: Response) -> Response {
+async fn with_headers(always: Headers, mut response: Response) -> Response {
     let headers = response.headers_mut();
-    for (name, value) in [
-        (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY),
-        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::REFERRER_POLICY, "no-referrer"),
-        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
-        (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
-    ] {
-        headers.insert(name, HeaderValue::from_static(value));
+    for (name, value) in always.0.iter() {
+        headers.insert(name, value.clone());
     }
     // What sessions say changes from step to step; assets have said themselves how long they hold.
     headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));

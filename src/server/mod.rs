@@ -5,6 +5,7 @@
 //! session/  experiments on threads of their own, and what they leave to read
 //! extract   requests, read        problem  errors, as RFC 9457 problem details
 //! guard     foreign pages, headers, stray errors        assets   the page and Rerun's viewer
+//! frame     who may embed the page
 //! ```
 //!
 //! Every session's engine computes on its own thread; the runtime's workers only carry messages and bytes. Memory is
@@ -14,6 +15,8 @@
 mod api;
 mod assets;
 mod extract;
+mod frame;
+mod gzip;
 mod guard;
 mod problem;
 mod session;
@@ -25,6 +28,9 @@ use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
 pub use api::{Health, Liveness, MadeSteps, ScenarioList, ScenarioResource, SessionList, StepRequest};
+pub(crate) use assets::{INDEX, PageFile, page_files};
+pub use frame::{FrameAncestor, NoOrigin};
+pub(crate) use guard::CONTENT_SECURITY_POLICY;
 pub use problem::{PROBLEM_JSON, Problem};
 use session::{Budget, Sessions};
 pub use session::{NewSession, SessionResource};
@@ -53,6 +59,8 @@ pub struct Options {
     /// A folder with another build of the page's panel than the one that is part of this program, for those who work
     /// on it.
     pub panel_dir: Option<PathBuf>,
+    /// Who may show the page in a frame; nobody if empty.
+    pub frame_ancestors: Vec<FrameAncestor>,
 }
 
 /// Why a server could not run.
@@ -108,7 +116,7 @@ pub async fn serve(listener: TcpListener, options: Options, shutdown: Cancellati
         loopback,
     });
     let router = Router::new().merge(routes).merge(assets::routes());
-    let router = guard::layered(router, &app);
+    let router = guard::layered(router, &app, guard::Headers::new(&options.frame_ancestors));
     let serving = axum::serve(listener, router).with_graceful_shutdown(shutdown.clone().cancelled_owned());
     let ending = async {
         shutdown.cancelled().await;

@@ -48,6 +48,8 @@ pub(super) enum Kind {
     MethodNotAllowed,
     StepMismatch,
     NothingToShow,
+    NoConfiguration,
+    ChoosesItself,
     BodyTooLarge,
     UnsupportedMediaType,
     InvalidValue,
@@ -76,6 +78,8 @@ impl Kind {
             Self::MethodNotAllowed => (405, urn!("method-not-allowed"), "This method is not allowed here"),
             Self::StepMismatch => (409, urn!("step-mismatch"), "The session is at another step"),
             Self::NothingToShow => (409, urn!("nothing-to-show"), "There is nothing to show yet"),
+            Self::NoConfiguration => (409, urn!("no-configuration"), "A person has not chosen the next movement"),
+            Self::ChoosesItself => (409, urn!("chooses-itself"), "The learner chooses its movements itself"),
             Self::BodyTooLarge => (413, urn!("body-too-large"), "The body is too large"),
             Self::UnsupportedMediaType => (415, urn!("unsupported-media-type"), "The body is not JSON"),
             Self::InvalidValue => (422, urn!("invalid-value"), "A value is not valid"),
@@ -136,7 +140,10 @@ impl From<ChoiceError> for Problem {
         let (kind, field) = match &error {
             ChoiceError::UnknownLearner { .. } => (Kind::UnknownLearner, Some("name")),
             ChoiceError::Configuration(_) => (Kind::InvalidValue, Some("configuration")),
-            ChoiceError::NotSearched(_) | ChoiceError::Selection(_) => (Kind::NothingToShow, None),
+            ChoiceError::ChoosesItself(_) => (Kind::ChoosesItself, Some("name")),
+            ChoiceError::NotSearched(_) | ChoiceError::Selection(_) | ChoiceError::Ended { .. } => {
+                (Kind::NothingToShow, None)
+            }
             ChoiceError::Search(_) => (Kind::Internal, None),
         };
         let problem = Self::new(kind, error.to_string());

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::support::{Server, timeless};
 
-const ROUTES: [(&str, &str); 17] = [
+const ROUTES: [(&str, &str); 19] = [
     ("get", "/v1/scenarios"),
     ("get", "/v1/scenarios/{name}"),
     ("get", "/v1/sessions"),
@@ -15,6 +15,8 @@ const ROUTES: [(&str, &str); 17] = [
     ("post", "/v1/sessions/{id}/steps"),
     ("get", "/v1/sessions/{id}/learners/{name}/selection"),
     ("post", "/v1/sessions/{id}/learners/{name}/evaluations"),
+    ("get", "/v1/sessions/{id}/learners/{name}/configuration"),
+    ("post", "/v1/sessions/{id}/learners/{name}/configuration"),
     ("get", "/v1/sessions/{id}/events"),
     ("get", "/v1/sessions/{id}/live"),
     ("get", "/v1/sessions/{id}/live.rrd"),
@@ -107,6 +109,14 @@ async fn responses_are_as_described() {
         let stale = server.post(&format!("{session}/steps"), json!({ "expected_step": 9 })).await;
         check(("post", "/v1/sessions/{id}/steps"), 409, stale.json().await.expect("JSON"));
     }
+    let names = json!(["human", "random"]);
+    let session = server.open(json!({ "scenario": "arm-6dof", "learners": names })).await;
+    let path = format!("{session}/learners/human/configuration");
+    let route = "/v1/sessions/{id}/learners/{name}/configuration";
+    check(("get", route), 200, server.get_json(&path).await);
+    let set = server.post(&path, json!({ "configuration": [0.1, 0.2, -0.3, -1.0, 0.4, 0.5] })).await;
+    check(("post", route), 200, set.json().await.expect("JSON"));
+    check(("get", route), 200, server.get_json(&path).await);
     let gone = server.request(Method::DELETE, "/v1/sessions/x").send().await.expect("an answer");
     check(("delete", "/v1/sessions/{id}"), 404, gone.json().await.expect("JSON"));
     server.stop().await;

@@ -2,6 +2,7 @@
 
 use std::io::Read;
 
+use body_schema::server::Options;
 use reqwest::{Method, StatusCode};
 
 use crate::support::Server;
@@ -77,4 +78,23 @@ async fn health() {
     let health = server.get_json("/healthz").await;
     assert_eq!((health["status"].as_str(), health["version"].as_str()), (Some("ok"), Some(env!("CARGO_PKG_VERSION"))));
     server.stop().await;
+}
+
+/// Clickjacking: the policy and its forerunner say the same.
+#[tokio::test]
+async fn nobody_shows_the_page_in_a_frame_but_who_was_allowed_to() {
+    for (allowed, ancestors, old) in [
+        (&[][..], "frame-ancestors 'none'", Some("DENY")),
+        (&["https://example.org", "self"], "frame-ancestors https://example.org 'self'", None),
+    ] {
+        let frame_ancestors = allowed.iter().map(|origin| origin.parse().expect("an origin")).collect();
+        let server = Server::with(Options { frame_ancestors, ..Options::default() }).await;
+        for path in ["/", "/v1/scenarios"] {
+            let headers = server.get(path).await.headers().clone();
+            let policy = headers["content-security-policy"].to_str().expect("text");
+            assert!(policy.starts_with("default-src 'none'") && policy.ends_with(ancestors), "{policy}");
+            assert_eq!(headers.get("x-frame-options").map(|value| value.to_str().expect("text")), old);
+        }
+        server.stop().await;
+    }
 }

@@ -24,10 +24,14 @@ impl Server {
     }
 
     pub async fn with_data_dir(data_dir: Option<PathBuf>) -> Self {
+        Self::with(Options { data_dir, ..Options::default() }).await
+    }
+
+    pub async fn with(options: Options) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("an address");
         let shutdown = CancellationToken::new();
-        let serving = tokio::spawn(serve(listener, Options { data_dir, ..Options::default() }, shutdown.clone()));
+        let serving = tokio::spawn(serve(listener, options, shutdown.clone()));
         Self { api: Api::at(address), shutdown, serving }
     }
 

@@ -1,11 +1,20 @@
 // The page: it opens connections, asks the server and moves the scene, as the panel tells it to. The panel decides.
 
-import { Follower, ask } from "./session.js";
+import { Controls } from "./controls.js";
+import { CUT, atScene } from "./scene.js";
+import { passOn, picture } from "./picture.js";
 import { SeedRuns } from "./seeds.js";
+import { copied, identity } from "./links.js";
 import { startViewer } from "./viewer.js";
+
+/** Where runs come from: a server, or files beside the page. */
+const source = await import(document.documentElement.dataset.source === "files" ? "./files.js" : "./session.js");
+const { ask, Follower, sessionOf } = source;
 
 /** Keys that mean something to the panel wherever on the page they are pressed. */
 const KEYS = [" ", "ArrowLeft", "ArrowRight", "Escape", "+", "=", "-", "?", "r", "s", "n", "t"];
+/** These are used by controls themselves. */
+const KEYS_OF_CONTROLS = [" ", "ArrowLeft", "ArrowRight"];
 const KNOWN = "body-schema-known";
 const OWN = "body-schema-own-session";
 
@@ -14,12 +23,19 @@ let panel = null;
 let viewer = null;
 let follower = null;
 let session = null;
+/** The id of its recording. */
+let recording = null;
+let controls = null;
+/** What the panel said of itself last. */
+let said = null;
+/** The next address is that of what is opened at the moment: no step of the visitor's. */
+let arriving = true;
 /** Parts that came before the viewer was there, and the step to show then. */
 let waiting = [];
 let sought = null;
 
 const tell = (event) => panel.receive(JSON.stringify(event));
-const seeds = new SeedRuns(tell);
+const seeds = new SeedRuns(tell, ask);
 
 /** Asks the server and tells the panel what became of it. */
 async function request(asked, method, path, body, answer) {
@@ -36,8 +52,13 @@ async function request(asked, method, path, body, answer) {
 const commands = {
   scenarios: () => request("scenarios", "GET", "/v1/scenarios", undefined, (list) => tell({ is: "scenarios", ...list })),
 
-  find: ({ session: id }) =>
-    request("find", "GET", `/v1/sessions/${encodeURIComponent(id)}`, undefined, follow).catch(() => {}),
+  async find({ session: id }) {
+    // A session that is gone is no error: its address says how to run it again.
+    const resource = await sessionOf(id);
+    if (resource === null) tell({ is: "session", session: null });
+    else if (resource === undefined) tell({ is: "refused", asked: "find", problem: { status: 0 } });
+    else follow(resource);
+  },
 
   open({ scenario, seed, learners, ellipsoids }) {
     const before = session;
@@ -74,16 +95,32 @@ const commands = {
   seeds: (job) => seeds.run(job),
   cancel_seeds: () => seeds.cancel(),
 
-  address: ({ query }) => history.replaceState(null, "", `?${query}`),
+  address({ query }) {
+    // Another run is a page of the visitor's history; another step of it is not.
+    const same = identity(query) === identity(location.search);
+    history[arriving || same ? "replaceState" : "pushState"](null, "", `?${query}`);
+    arriving = false;
+  },
 
-  async copy({ text }) {
-    const whole = text.startsWith("?") ? location.origin + location.pathname + text : text;
-    const done = await (navigator.clipboard?.writeText(whole) ?? Promise.reject()).then(() => true, () => false);
-    tell({ is: "copied", done });
+  copy: ({ text }) => copied(text).then((result) => tell({ is: "copied", ...result })),
+
+  restore_view: () => viewer?.restore?.(),
+
+  async picture() {
+    try {
+      if (viewer === null || said === null) throw new Error("there is no scene yet");
+      const redraw = () => viewer.seek(sought ?? said.step);
+      const blob = picture(element("viewer"), CUT, said.caption, legend(), redraw);
+      // Both may refuse; that is told once.
+      blob.catch(() => {});
+      tell({ is: "copied", done: true, note: await passOn(blob, `${said.caption.title.replaceAll(/[^\w-]+/g, "-")}.png`) });
+    } catch (error) {
+      tell({ is: "copied", done: false, note: `There is no picture: ${error.message}.` });
+    }
   },
 
   async download({ path, name }) {
-    const link = Object.assign(document.createElement("a"), { href: path, download: name });
+    const link = Object.assign(document.createElement("a"), { href: source.place(path), download: name });
     if (path.startsWith("/v1/scenarios/")) {
       const scenario = await ask("GET", path);
       link.href = URL.createObjectURL(new Blob([scenario.source], { type: "application/toml" }));
@@ -94,10 +131,12 @@ const commands = {
 
   known: () => keep(KNOWN, "yes", localStorage),
 
-  say({ text, phase, step, latest, session: id, typing }) {
+  say(state) {
+    const { text, news, phase, step, latest, session: id, typing } = (said = state);
     const mirror = element("mirror");
     Object.assign(mirror.dataset, { phase, step, latest, session: id, typing });
     if (mirror.textContent !== text) mirror.textContent = text;
+    if (element("news").textContent !== news) element("news").textContent = news;
   },
 };
 
@@ -105,10 +144,11 @@ const commands = {
 function follow(resource) {
   follower?.stop();
   session = resource.id;
+  recording = resource.recording ?? session;
   waiting = [];
   sought = null;
   tell({ is: "session", session: resource });
-  viewer?.open(session);
+  viewer?.open(recording);
   follower = new Follower(session, {
     part: (part) => (viewer === null ? waiting.push(part) : viewer.feed(part)),
     message: (text) => panel.receive(`{"is":"live","message":${text}}`),
@@ -116,6 +156,17 @@ function follow(resource) {
     lost: (seconds) => tell({ is: "lost", seconds }),
     ended: (failure, unseen) => tell({ is: "ended", failure, unseen }),
   });
+}
+
+/** What the colours of the legend mean, for a picture. */
+function legend() {
+  return [...element("legend").children]
+    .filter((line) => line.firstChild.className !== "belief")
+    .map((line) => {
+      const { backgroundColor, backgroundImage } = getComputedStyle(line.firstChild);
+      const inImage = /rgba?\([^)]*\)/.exec(backgroundImage);
+      return [line.textContent, inImage === null ? backgroundColor : inImage[0]];
+    });
 }
 
 // ---- what is kept in the browser, where it lets us
@@ -142,7 +193,7 @@ async function openPanel() {
     if (document.createElement("canvas").getContext("webgl2") === null) throw new Error("WebGL 2 is not available here");
     const [module, response] = await Promise.all([
       import(element("panel-script").href),
-      fetch(element("panel-wasm").dataset.address),
+      source.wasm(element("panel-wasm").dataset.address),
     ]);
     await module.default({ module_or_path: response });
     const handle = new module.PanelHandle();
@@ -152,6 +203,11 @@ async function openPanel() {
     });
     panel = handle;
     element("panel-cover").hidden = true;
+    // The canvas cannot be left by keys; the controls that lie over it can.
+    element("panel-canvas").tabIndex = -1;
+    nameTextAgents();
+    controls = new Controls(element("controls"), handle);
+    controls.focus();
     const watch = setInterval(() => {
       const failure = panel.failure();
       if (failure === undefined) return;
@@ -159,7 +215,8 @@ async function openPanel() {
       text.textContent = `The controls have crashed: ${failure} Reload the page: the run is kept.`;
       element("panel-cover").hidden = false;
     }, 1000);
-    tell({ is: "begin", query: location.search, known: kept(KNOWN, localStorage) !== null });
+    const query = await source.query(location.search);
+    tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server });
     return true;
   } catch (error) {
     document.querySelector("#panel-cover progress").hidden = true;
@@ -174,15 +231,21 @@ async function openPanel() {
 
 async function openViewer() {
   const progress = element("progress");
+  // The viewer takes the focus when it starts.
+  const before = document.activeElement;
   try {
     const opened = await startViewer(
       element("viewer"),
-      { script: element("viewer-script").href, wasm: element("viewer-wasm").dataset.address },
+      { script: element("viewer-script").href, wasm: () => source.wasm(element("viewer-wasm").dataset.address) },
       (fraction) => (fraction === null ? progress.removeAttribute("value") : (progress.value = fraction)),
       (step) => tell({ is: "scrubbed", step }),
     );
     viewer = opened;
-    if (session !== null) viewer.open(session);
+    element("viewer").tabIndex = 0;
+    nameTextAgents();
+    (before?.isConnected && before !== document.body ? before : element("controls")).focus();
+    element("legend").hidden = false;
+    if (session !== null) viewer.open(recording);
     waiting.splice(0).forEach((part) => viewer.feed(part));
     if (sought !== null) commands.seek({ step: sought });
     element("cover").hidden = true;
@@ -208,18 +271,56 @@ function cover(text) {
   element("cover").hidden = false;
 }
 
-// Keys pressed in the panel are its own; all others that mean something to it are passed on before the scene sees them.
-document.addEventListener(
-  "keydown",
-  (event) => {
-    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-    const own = element("panel").contains(event.target);
-    if (panel === null || own || event.ctrlKey || event.metaKey || event.altKey || !KEYS.includes(key)) return;
+/** Canvases keep a field each for what is typed: not to be reached by Tab, and with a name. */
+function nameTextAgents() {
+  for (const field of document.querySelectorAll("input:not([data-id])")) {
+    field.tabIndex = -1;
+    field.setAttribute("aria-label", "What is typed");
+    field.autocomplete = "off";
+  }
+}
+
+// Keys pressed in the panel's canvas are its own; all others that mean something to it are passed on, and the viewer gets
+// none: each of them would take the scene apart.
+function onKey(event) {
+  const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  const { target } = event;
+  const scene = element("scene").contains(target);
+  const onCanvas = element("panel").contains(target) && !element("controls").contains(target);
+  const held = event.ctrlKey || event.metaKey || event.altKey;
+  if (scene) event.stopImmediatePropagation();
+  if (panel === null || event.type !== "keydown" || held) return;
+  if (key === "F6" || (scene && key === "Escape")) {
+    if (scene) controls.focus();
+    else element("viewer").focus();
+    event.preventDefault();
+    event.stopImmediatePropagation();
+  } else if (key === "Tab" && onCanvas) {
+    // From where the focus is put now, the browser goes on by itself.
+    event.stopImmediatePropagation();
+    controls.focus();
+  } else if (!onCanvas && KEYS.includes(key) && !takes(target, key)) {
     panel.press(key.length === 1 ? key.toUpperCase() : key, event.shiftKey);
     event.preventDefault();
-    event.stopPropagation();
-  },
-  { capture: true },
-);
+    event.stopImmediatePropagation();
+  }
+}
+
+/** Whether an element of the page has a use of its own for a key. */
+function takes(target, key) {
+  if (key === "Escape" || target === element("controls") || !element("controls").contains(target)) return false;
+  return Controls.isTyping(target) || KEYS_OF_CONTROLS.includes(key);
+}
+
+addEventListener("keydown", onKey, { capture: true });
+addEventListener("keyup", onKey, { capture: true });
+// The visitor goes back or forth.
+addEventListener("popstate", () => {
+  arriving = true;
+  if (panel !== null) tell({ is: "navigated", query: location.search });
+});
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => viewer?.restore?.());
+atScene(element("scene"));
+if (new URLSearchParams(location.search).get("embed") === "1") document.documentElement.dataset.embed = "";
 
 if (await openPanel()) openViewer();

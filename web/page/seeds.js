@@ -1,18 +1,21 @@
 // Other seeds of the same comparison, run in the background, one after the other.
 
-import { ask } from "./session.js";
-
 /** Steps of one request: few, so that cancelling is quick and the session that is watched does not wait. */
 const AT_ONCE = 25;
 
 export class SeedRuns {
   #tell;
+  #ask;
   /** Counts jobs: one that is not the latest ends. */
   #job = 0;
 
-  /** @param {(event: object) => void} tell */
-  constructor(tell) {
+  /**
+   * @param {(event: object) => void} tell
+   * @param {(method: string, path: string, body?: object) => Promise<any>} ask as in session.js
+   */
+  constructor(tell, ask) {
     this.#tell = tell;
+    this.#ask = ask;
   }
 
   cancel() {
@@ -22,6 +25,7 @@ export class SeedRuns {
   /** @param {{scenario: string, learners: string[], seeds: number[], steps: number}} job */
   async run({ scenario, learners, seeds, steps }) {
     const job = ++this.#job;
+    const ask = this.#ask;
     for (const seed of seeds) {
       let id = null;
       try {

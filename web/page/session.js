@@ -18,6 +18,18 @@ export class ProblemError extends Error {
   }
 }
 
+/** Runs are computed here and now. */
+export const server = true;
+
+/** The query to begin with: the page's own. @param {string} search */
+export const query = async (search) => search;
+
+/** A file of WebAssembly. @param {string} address */
+export const wasm = (address) => fetch(address);
+
+/** Where a file of a session is. @param {string} path */
+export const place = (path) => path;
+
 /**
  * Asks the server.
  * @param {string} method
@@ -31,6 +43,15 @@ export async function ask(method, path, body) {
   if (response.ok) return response.status === 204 ? null : response.json();
   const problem = await response.json().catch(() => ({ title: response.statusText }));
   throw new ProblemError({ ...problem, status: response.status });
+}
+
+/**
+ * A session's resource.
+ * @param {string} id
+ * @returns {Promise<object | null | undefined>} null if it is gone, undefined if there is no answer
+ */
+export function sessionOf(id) {
+  return ask("GET", `/v1/sessions/${encodeURIComponent(id)}`).catch((error) => (error.status === 404 ? null : undefined));
 }
 
 /**
@@ -97,20 +118,15 @@ export class Follower {
     this.#on.message(data);
   }
 
-  /** The session; null if it is gone, undefined if there is no answer. */
-  #resource() {
-    return ask("GET", `/v1/sessions/${this.#id}`).catch((error) => (error.status === 404 ? null : undefined));
-  }
-
   async #end() {
-    const resource = await this.#resource();
+    const resource = await sessionOf(this.#id);
     if (!this.#stopped) this.#on.ended(resource?.failure ?? null, false);
   }
 
   async #closed(code) {
     if (code === CLOSE_DELETED || code === CLOSE_FAILED) return this.#end();
     // A refused connection does not say why: a session that is gone is asked for in vain.
-    const resource = await this.#resource();
+    const resource = await sessionOf(this.#id);
     if (this.#stopped) return;
     if (resource === null) return this.#on.ended(null, true);
     const wait = BACK_OFF_MS[Math.min(this.#attempt++, BACK_OFF_MS.length - 1)];

@@ -12,7 +12,7 @@ const ECHO_MS = 3000;
 /**
  * Loads the viewer's WebAssembly and starts it on a canvas.
  * @param {HTMLCanvasElement} canvas
- * @param {{script: string, wasm: string}} addresses
+ * @param {{script: string, wasm: () => Promise<Response>}} addresses the script's, and what fetches the WebAssembly
  * @param {(fraction: number | null) => void} progress null where the size is not known
  * @param {(step: number) => void} scrubbed hears where the visitor moves the time to
  * @returns {Promise<Viewer>}
@@ -22,7 +22,7 @@ export async function startViewer(canvas, addresses, progress, scrubbed) {
   await Promise.all([loadScript(addresses.script), load(addresses.wasm, progress)]);
   // `wasm_bindgen` is what the script defines. Browsers keep what they have compiled only if they get the response as it
   // came, so it is asked for once more: from the browser's cache.
-  await wasm_bindgen({ module_or_path: fetch(addresses.wasm) });
+  await wasm_bindgen({ module_or_path: addresses.wasm() });
   let viewer = null;
   const handle = new wasm_bindgen.WebHandle({
     on_viewer_event: (json) => viewer?.hear(JSON.parse(json)),
@@ -33,8 +33,7 @@ export async function startViewer(canvas, addresses, progress, scrubbed) {
     persist: false,
   });
   await handle.start(canvas);
-  for (const panel of ["top", "blueprint", "selection"]) handle.override_panel_state(panel, "hidden");
-  handle.override_panel_state("time", "collapsed");
+  for (const panel of ["top", "blueprint", "selection", "time"]) handle.override_panel_state(panel, "hidden");
   viewer = new Viewer(handle, scrubbed);
   return viewer;
 }
@@ -65,11 +64,11 @@ function loadScript(address) {
 
 /**
  * Brings a file into the browser's cache.
- * @param {string} address
+ * @param {() => Promise<Response>} fetched
  * @param {(fraction: number | null) => void} progress
  */
-async function load(address, progress) {
-  const response = await fetch(address);
+async function load(fetched, progress) {
+  const response = await fetched();
   if (!response.ok) throw new Error(`the viewer could not be loaded (${response.status})`);
   const total = Number(response.headers.get("uncompressed-length"));
   let loaded = 0;

@@ -4,7 +4,7 @@
 //! with a notice, and nothing is ever refused as a whole.
 
 use crate::settings::{
-    ELLIPSOIDS, MAX_RESTORED, MAX_RUN, MAX_SEED, MAX_SPEED, MIN_SPEED, Settings, StopWhen, Tab, short,
+    ELLIPSOIDS, HUMAN, MAX_RESTORED, MAX_RUN, MAX_SEED, MAX_SPEED, MIN_SPEED, Settings, StopWhen, Tab, short,
 };
 
 /// The version of the address; raised when a name changes its meaning.
@@ -58,7 +58,7 @@ impl Settings {
             }
             "stop" => {
                 let found = StopWhen::ALL.iter().find(|(_, name, _)| *name == value);
-                self.stop = found.ok_or_else(|| wrong("never, first or all", "all".to_owned()))?.0;
+                self.stop = found.ok_or_else(|| wrong("told, never, first or all", "told".to_owned()))?.0;
             }
             "tab" => {
                 let found = Tab::ALL.iter().find(|(_, name, _)| *name == value);
@@ -77,6 +77,9 @@ impl Settings {
                     .0
                     .clone_into(&mut self.ellipsoids);
             }
+            "embed" => self.embed = yes(value).ok_or_else(|| wrong("0 or 1", "0".to_owned()))?,
+            "play" if value == HUMAN => self.play = true,
+            "play" => return Err(wrong(HUMAN, "no game".to_owned())),
             "session" => self.session = Some(value.to_owned()),
             // Browsers and those who pass links on add what they like.
             _ if name.starts_with("utm_") => {}
@@ -85,8 +88,33 @@ impl Settings {
         Ok(())
     }
 
-    /// The query of this choice, without a question mark. A link to give away names no session.
-    pub fn query(&self, with_session: bool) -> String {
+    /// The query of this choice as the page's own address, without a question mark.
+    pub fn query(&self) -> String {
+        let mut query = self.choice();
+        let mut add = |name: &str, value: &str| query += &format!("&{name}={}", encode(value));
+        if self.tab == Tab::Share {
+            add("tab", "share");
+        }
+        if self.embed {
+            add("embed", "1");
+        }
+        if let Some(session) = &self.session {
+            add("session", session);
+        }
+        query
+    }
+
+    /// The query of a link to give away: it names no session, and what is shared rather than how to share it.
+    pub fn link(&self) -> String {
+        self.choice()
+    }
+
+    /// The query of a link to a game on the same seed.
+    pub fn challenge(&self) -> String {
+        format!("v={VERSION}&scenario={}&seed={}&play={HUMAN}", encode(&self.scenario), self.seed)
+    }
+
+    fn choice(&self) -> String {
         let usual = Self::default();
         let mut query = format!("v={VERSION}&scenario={}&seed={}", encode(&self.scenario), self.seed);
         let mut add = |name: &str, value: &str| query += &format!("&{name}={}", encode(value));
@@ -104,7 +132,7 @@ impl Settings {
         if self.stop != usual.stop {
             add("stop", named(self.stop));
         }
-        if self.tab != usual.tab {
+        if self.tab != usual.tab && self.tab != Tab::Share {
             add("tab", Tab::ALL.iter().find(|(known, ..)| *known == self.tab).map_or("", |(_, name, _)| name));
         }
         if let Some(learner) = &self.learner {
@@ -116,10 +144,15 @@ impl Settings {
         if self.ellipsoids != usual.ellipsoids {
             add("ellipsoids", &self.ellipsoids);
         }
-        if let Some(session) = self.session.as_ref().filter(|_| with_session) {
-            add("session", session);
-        }
         query
+    }
+}
+
+fn yes(value: &str) -> Option<bool> {
+    match value {
+        "1" => Some(true),
+        "0" => Some(false),
+        _ => None,
     }
 }
 
@@ -172,10 +205,21 @@ mod tests {
             joints: Some((0, 3)),
             ellipsoids: "95-percent".to_owned(),
             session: Some("3f2a".to_owned()),
+            embed: true,
+            play: false,
         };
-        assert_eq!(Settings::parse(&settings.query(true)), (settings.clone(), Vec::new()));
-        assert_eq!(Settings::parse(&format!("?{}", settings.query(false))).0.session, None);
-        assert_eq!(Settings::parse(&Settings::default().query(true)), (Settings::default(), Vec::new()));
+        assert_eq!(Settings::parse(&settings.query()), (settings.clone(), Vec::new()));
+        assert_eq!(Settings::parse(&Settings::default().query()), (Settings::default(), Vec::new()));
+    }
+
+    #[test]
+    fn a_link_to_give_away_says_nothing_of_the_session_or_of_sharing() {
+        let settings = Settings { tab: Tab::Share, session: Some("3f2a".to_owned()), ..Settings::default() };
+        assert!(settings.query().contains("&tab=share&session=3f2a"));
+        let (read, notices) = Settings::parse(&format!("?{}", settings.link()));
+        assert_eq!((read, notices.len()), (Settings::default(), 0));
+        let (read, notices) = Settings::parse(&settings.challenge());
+        assert!(read.play && notices.is_empty());
     }
 
     #[test]
@@ -195,6 +239,8 @@ mod tests {
             "joints=2,2",
             "joints=a,b",
             "ellipsoids=3",
+            "embed=yes",
+            "play=robot",
             "v=2",
             "v=",
             "colour=blue",

@@ -1,5 +1,7 @@
 //! Running other seeds of what is shown, for the bands behind its curves.
 
+use body_schema::experiment::StepReport;
+
 use crate::{
     history::Row,
     host::Command,
@@ -8,14 +10,10 @@ use crate::{
     settings::MAX_SEED,
 };
 
-/// How far each is run at most.
-const STEPS: u64 = 300;
-
 impl Panel {
     /// The band of a learner, if other seeds of what is shown were run.
     pub fn band(&self, learner: usize, value: impl Fn(&Row) -> Option<f64>) -> Option<Band> {
-        let description = self.description()?;
-        self.seeds.as_ref().filter(|seeds| seeds.is_of(description))?.band(learner, value)
+        self.other_seeds()?.band(learner, value)
     }
 
     /// Runs other seeds of what is shown.
@@ -24,8 +22,7 @@ impl Panel {
         let first = description.seed;
         let steps = self
             .run_to()
-            .min(STEPS)
-            .min(self.session.as_ref().and_then(|one| one.remaining.map(|left| left + one.step)).unwrap_or(STEPS));
+            .min(self.session.as_ref().and_then(|one| one.remaining.map(|left| left + one.step)).unwrap_or(u64::MAX));
         self.ask(Command::Seeds {
             scenario: description.scenario.clone(),
             learners: description.learners.iter().map(|learner| learner.name.clone()).collect(),
@@ -33,6 +30,19 @@ impl Panel {
             steps,
         });
         self.seeds = Some(SeedRuns::new(description, steps));
+    }
+
+    /// Takes a part of one of them in.
+    pub(crate) fn take_seed(&mut self, seed: u64, reports: &[StepReport], done: bool) {
+        if self.seeds.as_mut().is_some_and(|seeds| seeds.take(seed, reports, done)) {
+            self.ask(Command::EnoughSeed { seed });
+        }
+    }
+
+    /// The runs of other seeds, if they are of what is shown.
+    pub fn other_seeds(&self) -> Option<&SeedRuns> {
+        let description = self.description()?;
+        self.seeds.as_ref().filter(|seeds| seeds.is_of(description))
     }
 
     /// Stops running other seeds; what they have done stays.

@@ -5,9 +5,9 @@ use body_schema::{experiment::StepReport, scenario::ScenarioSummary};
 use crate::{
     history::History,
     host::{Command, Event, Live},
-    panel::{Link, Panel},
+    panel::{Link, PREDICTION, Pace, Panel},
     seeds::SeedRuns,
-    settings::{MAX_RESTORED, Settings},
+    settings::{HUMAN, MAX_RESTORED, Settings},
     why::Why,
     wire::{Problem, Session},
 };
@@ -16,7 +16,12 @@ impl Panel {
     /// Takes in what happened.
     pub fn receive(&mut self, event: Event) {
         match event {
-            Event::Begin { query, known } => self.begin(&query, known),
+            Event::Begin { query, known, server } => {
+                self.server = server;
+                self.begin(&query, known);
+            }
+            Event::Layout { below } => self.scene_below = below,
+            Event::Navigated { query } => self.navigate(&query),
             Event::Scenarios { scenarios } => self.take_scenarios(scenarios),
             Event::Session { session: Some(session) } => self.adopt(*session),
             Event::Session { session: None } => {
@@ -42,12 +47,11 @@ impl Panel {
             Event::NoScene { reason } => self.no_scene = Some(reason),
             Event::Selection { learner, selection } => self.why.answered(&learner, selection.map(|answer| *answer)),
             Event::Evaluation { evaluation } => self.why.appraised(*evaluation),
-            Event::Seeds { seed, reports, done } => {
-                self.seeds.iter_mut().for_each(|seeds| seeds.take(seed, &reports, done));
-            }
-            Event::Copied { done } => {
-                let text = if done { "Copied." } else { "The browser does not allow copying." };
-                self.copied = Some(text.to_owned());
+            Event::Configured { learner, evaluation } => self.take_evaluation(&learner, *evaluation),
+            Event::Seeds { seed, reports, done } => self.take_seed(seed, &reports, done),
+            Event::Copied { done, note } => {
+                let usual = if done { "Copied." } else { "The browser does not allow copying." };
+                self.copied = Some(note.unwrap_or_else(|| usual.to_owned()));
             }
         }
     }
@@ -57,16 +61,38 @@ impl Panel {
         self.settings = settings;
         self.seed_text = self.settings.seed.to_string();
         notices.into_iter().for_each(|notice| self.notice(notice));
-        if !known {
-            self.tour = Some(0);
-        }
+        self.tour = Some(0).filter(|_| !known && !self.settings.embed);
         self.ask(Command::Scenarios);
+    }
+
+    /// Shows what an earlier address showed: a step of this run, or another run.
+    fn navigate(&mut self, query: &str) {
+        let what = |settings: &Settings| (settings.scenario.clone(), settings.seed, settings.learners.clone());
+        let before = what(&self.settings);
+        let (mut settings, mut notices) = Settings::parse(query);
+        notices.extend(settings.validate(&self.scenarios));
+        // The session of that address may be gone, and the one that is shown needs no other.
+        settings.session = self.settings.session.take();
+        self.settings = settings;
+        self.seed_text = self.settings.seed.to_string();
+        notices.into_iter().for_each(|notice| self.notice(notice));
+        if self.is_ready() && what(&self.settings) == before {
+            self.scrub(self.settings.step);
+        } else {
+            self.open(self.settings.step);
+        }
     }
 
     fn take_scenarios(&mut self, scenarios: Vec<ScenarioSummary>) {
         self.scenarios = scenarios;
         let notices = self.settings.validate(&self.scenarios);
         notices.into_iter().for_each(|notice| self.notice(notice));
+        self.choose_usual_learners();
+        match self.story_of_scenario() {
+            Some(story) => self.story = story,
+            // The cards speak of another scenario.
+            None => self.tour = None,
+        }
         match self.settings.session.clone() {
             Some(session) => {
                 self.wanted = Some(self.settings.step);
@@ -77,10 +103,22 @@ impl Panel {
         }
     }
 
+    /// The learners that tell most beside each other, unless the visitor chose some.
+    pub(crate) fn choose_usual_learners(&mut self) {
+        if self.settings.learners.is_empty()
+            && let Some(scenario) = self.scenario()
+        {
+            self.settings.learners = scenario.explorer.clone();
+        }
+    }
+
     /// Leaves the session and opens that of the settings, at this step.
     pub(crate) fn open(&mut self, step: u64) {
         self.pause();
         self.opening = true;
+        // Movements that the visitor chose cannot be computed again.
+        let is_game = self.settings.learners.iter().any(|name| name == HUMAN);
+        let step = if is_game { 0 } else { step };
         self.restoring = (step > 0).then(|| step.min(MAX_RESTORED));
         self.wanted = self.restoring;
         let Settings { scenario, seed, learners, ellipsoids, .. } = self.settings.clone();
@@ -97,6 +135,8 @@ impl Panel {
         self.settings.session = Some(session.id.clone());
         self.history = History::new(description);
         self.why = Why::default();
+        self.pace = Pace::default();
+        self.chart = if description.truth.is_some() { self.chart } else { PREDICTION };
         (self.cursor, self.shown, self.sought, self.awaited) = (0, 0, None, None);
         (self.opening, self.busy, self.stopped) = (false, false, None);
         self.link = Link::Loading;
@@ -104,6 +144,7 @@ impl Panel {
             self.wanted = self.wanted.map(|wanted| wanted.min(session.step));
         }
         self.session = Some(session);
+        self.begin_game();
     }
 
     fn refused(&mut self, asked: &str, problem: &Problem) {
@@ -136,6 +177,7 @@ impl Panel {
                     }
                 }
             }
+            "configure" => self.game_refused(&sentence),
             "select" => self.why.refused(problem),
             "evaluate" => {
                 self.why.evaluating = false;

@@ -9,7 +9,7 @@ use body_schema::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::wire::{Problem, Session};
+use crate::wire::{Evaluation, Problem, Session};
 
 /// What happened.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -21,6 +21,19 @@ pub enum Event {
         query: String,
         /// The visitor has been here before, so that the tour need not be offered.
         known: bool,
+        /// Whether a server is there; without one the page shows recorded runs.
+        #[serde(default = "usual")]
+        server: bool,
+    },
+    /// Where the scene is.
+    Layout {
+        /// Beneath the panel, not beside it.
+        below: bool,
+    },
+    /// The visitor went back or forth to this address.
+    Navigated {
+        /// The address's query.
+        query: String,
     },
     /// The scenarios there are.
     Scenarios {
@@ -92,6 +105,13 @@ pub enum Event {
         /// The answer.
         evaluation: Box<AppraisalReport>,
     },
+    /// What the next movement of a learner whose movements the visitor chooses would teach.
+    Configured {
+        /// The learner.
+        learner: String,
+        /// The answer.
+        evaluation: Box<Evaluation>,
+    },
     /// A part of a run in the background.
     Seeds {
         /// Its seed.
@@ -105,7 +125,14 @@ pub enum Event {
     Copied {
         /// Whether it was.
         done: bool,
+        /// What there is to say about it, if it is not the usual.
+        #[serde(default)]
+        note: Option<String>,
     },
+}
+
+fn usual() -> bool {
+    true
 }
 
 /// A message of the session's WebSocket.
@@ -148,6 +175,8 @@ pub enum Command {
         count: u64,
         /// The step that the session must be at.
         expected_step: u64,
+        /// Postures to show on the way to each new one.
+        frames: u64,
     },
     /// Show this step in the scene.
     Seek {
@@ -170,6 +199,19 @@ pub enum Command {
         /// Rad or m per joint.
         configuration: Vec<f64>,
     },
+    /// Set the next movement of a learner whose movements the visitor chooses.
+    Configure {
+        /// The session.
+        session: String,
+        /// The learner.
+        learner: String,
+        /// Rad or m per joint.
+        configuration: Vec<f64>,
+    },
+    /// Put a picture of the scene on the clipboard.
+    Picture,
+    /// Show the scene as it was at first.
+    RestoreView,
     /// Run other seeds in the background.
     Seeds {
         /// The scenario's name.
@@ -180,6 +222,11 @@ pub enum Command {
         seeds: Vec<u64>,
         /// Steps of each.
         steps: u64,
+    },
+    /// Of this seed nothing more is needed.
+    EnoughSeed {
+        /// The seed.
+        seed: u64,
     },
     /// Stop running other seeds.
     CancelSeeds,
@@ -209,8 +256,10 @@ pub enum Command {
 /// The panel's state in words and numbers, for those who do not see it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Mirror {
-    /// A sentence.
+    /// All of it in sentences.
     pub text: String,
+    /// What has just happened, to be read out.
+    pub news: String,
     /// What the panel is about: `loading`, `ready`, `playing`, `stopped`, `lost`, `expired`, `failed`.
     pub phase: String,
     /// The step that is shown.
@@ -221,4 +270,15 @@ pub struct Mirror {
     pub session: String,
     /// Whether the visitor is typing, so that keys are text.
     pub typing: bool,
+    /// What is shown, as the caption of a picture.
+    pub caption: Caption,
+}
+
+/// What stands under a picture of the scene.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Caption {
+    /// Scenario, seed and step.
+    pub title: String,
+    /// Each learner's name with its errors, and its colour.
+    pub learners: Vec<(String, [u8; 3])>,
 }

@@ -2,18 +2,20 @@
 
 use egui::{Context, Key};
 
-use crate::panel::Panel;
+use crate::{host::Command, panel::Panel};
 
 /// Every shortcut: its keys as they are written, and what it does.
-pub const SHORTCUTS: [(&str, &str); 9] = [
+pub const SHORTCUTS: [(&str, &str); 11] = [
     ("Space", "play or pause"),
     ("Right", "next step; at the end, make one"),
     ("Left", "step back"),
     ("S", "make a step"),
-    ("R", "reset: the same run from its start"),
+    ("R", "reset the view of the scene"),
+    ("Shift R", "reset the run: the same from its start"),
     ("N", "a new seed"),
     ("+  -", "faster, slower"),
     ("T", "the tour"),
+    ("F6", "from the controls to the scene and back"),
     ("?", "this help; Esc closes it"),
 ];
 
@@ -52,7 +54,11 @@ impl Panel {
             self.make_step();
         }
         if pressed(Key::R) {
-            self.reset();
+            if ctx.input(|input| input.modifiers.shift) {
+                self.reset();
+            } else {
+                self.ask(Command::RestoreView);
+            }
         }
         if pressed(Key::N) {
             self.reroll();

@@ -5,11 +5,16 @@
 //! settings  the visitor's choice                         address    the choice as it stands in the page's address
 //! history   the numbers of every step, verdicts          seeds      the runs of other seeds
 //! search    DIRECT's search, ready to be drawn           why        what was asked and answered about it
-//! panel     the state: all of the above
+//! stories   what can be told, as data                    game       the movements that the visitor chooses
+//! panel     the state: all of the above                  words      plain words for the terms of the field
+//! tour      going through a story, what its cards do     contest    playing the game
+//! ending    how a run ended, in a sentence               status     what goes on, in a sentence
 //! events    what happens, and what it does to the state  play       making steps and going through them
 //! bands     running other seeds                          explain    asking why, and why not
-//! mirror    the state in words                           keys       the keyboard
+//! mirror    the state in words                           news       what is read out when it happens
+//! keys      the keyboard
 //! view/     how all of it looks
+//! access    the same for those who do not see it
 //! shell     the WebAssembly that a browser runs (only there)
 //! ```
 //!
@@ -18,24 +23,33 @@
 //! Nothing but `shell` knows of a browser: the page opens connections, asks the server and moves Rerun's viewer; the
 //! panel decides. So tests drive it natively, by the labels that a visitor reads.
 
+pub mod access;
 mod address;
 mod bands;
 pub mod colours;
+mod contest;
+pub mod ending;
 mod events;
 mod explain;
+pub mod game;
 pub mod history;
 pub mod host;
 pub mod keys;
 mod mirror;
+mod news;
 pub mod panel;
 pub mod play;
 pub mod search;
 pub mod seeds;
 pub mod settings;
+mod status;
+pub mod stories;
+mod tour;
 #[cfg(target_arch = "wasm32")]
 pub mod shell;
 pub mod view;
 pub mod why;
 pub mod wire;
+pub mod words;
 
 pub use panel::{Link, Panel};

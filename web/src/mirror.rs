@@ -1,10 +1,8 @@
 //! The panel in words, for those who hear it and for scripts.
 
-use body_schema::experiment::CONFIRMATION;
-
 use crate::{
-    history::Verdict,
-    host::{Command, Mirror},
+    colours,
+    host::{Caption, Command, Mirror},
     panel::{Link, Panel},
 };
 
@@ -12,44 +10,26 @@ use crate::{
 const SAY_EVERY: f64 = 1.0;
 
 impl Panel {
-    /// What stands above the controls: what goes on, or what to do.
-    pub fn status(&self) -> String {
-        let latest = self.history.latest();
-        match &self.link {
-            Link::Unreachable(why) => format!("The server cannot be used: {why}. Reset tries again."),
-            Link::Lost(seconds) => format!("The connection is lost; trying again in {seconds} s. The run is kept."),
-            Link::Expired => "This session has expired. Restore computes it again; Reset begins anew.".to_owned(),
-            Link::Failed(why) => format!("The engine has failed: {why}. Reset begins anew."),
-            _ if self.opening => "Opening a session…".to_owned(),
-            Link::Loading => "Loading…".to_owned(),
-            Link::Connected if self.restoring.is_some_and(|target| target > 1) => {
-                format!("Computing the run up to step {}…", self.restoring.unwrap_or_default())
-            }
-            Link::Connected if self.playing => {
-                format!("Running, {} steps a second, to step {}.", self.settings.speed, self.run_to())
-            }
-            Link::Connected => match &self.stopped {
-                Some(reason) => reason.clone(),
-                None if self.cursor < latest => format!("Step {} of {latest}.", self.cursor),
-                None => "Press Space to play.".to_owned(),
-            },
-        }
+    /// What stands under a picture of the scene.
+    fn caption(&self) -> Caption {
+        let Some(description) = self.description() else { return Caption::default() };
+        let title = format!("{}, seed {}, step {}", description.scenario, description.seed, self.cursor);
+        let slots = colours::slots(description);
+        let learners = description.learners.iter().zip(slots).enumerate().map(|(index, (learner, slot))| {
+            let row = self.history.row(self.cursor, index).copied().unwrap_or_default();
+            let errors = [
+                row.orientation_deg.map(|error| format!("{error:.1}°")),
+                row.location_m.map(|error| format!("{:.0} mm", error * 1e3)),
+                row.prediction_m.filter(|_| row.location_m.is_none()).map(|error| format!("{:.0} mm", error * 1e3)),
+            ];
+            let errors: Vec<String> = errors.into_iter().flatten().collect();
+            let [red, green, blue, _] = colours::learner(slot).to_array();
+            (format!("{} {}", learner.name, errors.join(", ")), [red, green, blue])
+        });
+        Caption { title, learners: learners.collect() }
     }
 
-    /// What has become of a learner at the step that is shown.
-    pub fn verdict(&self, learner: usize) -> String {
-        match self.history.verdict(self.cursor, learner) {
-            Verdict::Waiting => "not moved yet".to_owned(),
-            Verdict::Diverged => "diverged".to_owned(),
-            Verdict::Learning => "learning".to_owned(),
-            Verdict::Settled => "settled".to_owned(),
-            Verdict::Outside => "not converged".to_owned(),
-            Verdict::Within(first, confirmed) => format!("within since {first} ({confirmed}/{CONFIRMATION})"),
-            Verdict::Converged(first) => format!("converged at {first}"),
-        }
-    }
-
-    fn phase(&self) -> &'static str {
+    pub(crate) fn phase(&self) -> &'static str {
         match self.link {
             Link::Lost(_) => "lost",
             Link::Expired => "expired",
@@ -90,16 +70,21 @@ impl Panel {
         let (said_at, before) = &self.said;
         let mut mirror = Mirror {
             text: before.text.clone(),
+            news: before.news.clone(),
             phase: self.phase().to_owned(),
             step: self.cursor,
             latest: self.history.latest(),
             session: self.session.as_ref().map(|session| session.id.clone()).unwrap_or_default(),
             typing: before.typing,
+            caption: self.caption(),
         };
         let mut said_at = *said_at;
         if now - said_at >= SAY_EVERY {
             mirror.text = self.words();
             said_at = now;
+        }
+        if let Some(news) = self.news() {
+            mirror.news = news;
         }
         if mirror != self.said.1 {
             self.ask(Command::Say(Box::new(mirror.clone())));

@@ -3,10 +3,13 @@
 use body_schema::{experiment::Description, scenario::ScenarioSummary};
 
 use crate::{
+    game::Game,
     history::History,
     host::{Command, Mirror},
+    news::Told,
     seeds::SeedRuns,
-    settings::Settings,
+    settings::{HUMAN, Settings, Tab},
+    stories::{STORIES, Spots},
     why::Why,
     wire::Session,
 };
@@ -28,6 +31,9 @@ pub enum Link {
     Failed(String),
 }
 
+/// The chart that is in sight unless the visitor chose another.
+pub(crate) const PREDICTION: &str = "Prediction error";
+
 /// How fast steps are made.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pace {
@@ -35,6 +41,10 @@ pub(crate) struct Pace {
     pub(crate) asked_at: f64,
     /// Learners that had settled when playing began.
     pub(crate) settled: usize,
+    /// The story was told already when playing began.
+    pub(crate) told: bool,
+    /// Play no further than this step.
+    pub(crate) until: Option<u64>,
 }
 
 /// The panel.
@@ -63,14 +73,35 @@ pub struct Panel {
     pub why: Why,
     /// Other seeds, in the background, once they were asked for.
     pub seeds: Option<SeedRuns>,
-    /// The card of the tour that is open.
+    /// The card of the story that is open.
     pub tour: Option<usize>,
+    /// The story that the cards tell, one of [`STORIES`].
+    pub story: usize,
+    /// The movements that the visitor chooses.
+    pub game: Game,
+    /// Whether there is a server; without one, recorded runs are shown and nothing new is computed.
+    pub server: bool,
+    /// The chart that is always in sight, by its title.
+    pub chart: &'static str,
     /// Whether the help is open.
     pub help: bool,
     /// The seed as it is being typed.
     pub seed_text: String,
     /// The answer to the last copying.
     pub copied: Option<String>,
+    pub(crate) spots: Spots,
+    /// How high the open card is.
+    pub(crate) card_height: f32,
+    /// The ending was brought into view.
+    pub(crate) ending_seen: bool,
+    /// The tab that was drawn last.
+    pub(crate) tab_shown: Tab,
+    /// The visitor touches the screen.
+    pub(crate) touch: bool,
+    /// The scene is beneath the panel, not beside it.
+    pub(crate) scene_below: bool,
+    /// By how much a swipe over what stays in place has moved what scrolls.
+    pub(crate) swiped: f32,
     pub(crate) opening: bool,
     /// A request for steps is under way.
     pub(crate) busy: bool,
@@ -85,6 +116,7 @@ pub struct Panel {
     pub(crate) pace: Pace,
     pub(crate) now: f64,
     pub(crate) said: (f64, Mirror),
+    pub(crate) told: Told,
     pub(crate) address: (f64, String),
     commands: Vec<Command>,
 }
@@ -105,9 +137,20 @@ impl Default for Panel {
             why: Why::default(),
             seeds: None,
             tour: None,
+            story: 0,
+            game: Game::default(),
+            server: true,
+            chart: PREDICTION,
             help: false,
             seed_text: "1".to_owned(),
             copied: None,
+            spots: Spots::default(),
+            card_height: 0.0,
+            ending_seen: false,
+            tab_shown: Tab::Charts,
+            touch: false,
+            scene_below: false,
+            swiped: 0.0,
             opening: false,
             busy: false,
             awaited: None,
@@ -118,6 +161,7 @@ impl Default for Panel {
             pace: Pace::default(),
             now: 0.0,
             said: (f64::NEG_INFINITY, Mirror::default()),
+            told: Told::default(),
             address: (f64::NEG_INFINITY, String::new()),
             commands: Vec::new(),
         }
@@ -158,6 +202,16 @@ impl Panel {
     /// The chosen scenario.
     pub fn scenario(&self) -> Option<&ScenarioSummary> {
         self.scenarios.iter().find(|scenario| scenario.name == self.settings.scenario)
+    }
+
+    /// The place of the learner whose movements the visitor chooses.
+    pub fn human(&self) -> Option<usize> {
+        self.description()?.learners.iter().position(|learner| learner.policy == HUMAN)
+    }
+
+    /// The story of the chosen scenario, if there is one.
+    pub(crate) fn story_of_scenario(&self) -> Option<usize> {
+        STORIES.iter().position(|story| story.scenario == self.settings.scenario)
     }
 
     /// Whether steps can be made.

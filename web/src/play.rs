@@ -1,5 +1,7 @@
 //! Making steps and going through those that were made.
 
+use body_schema::experiment::CONFIRMATION;
+
 use crate::{
     history::Row,
     host::Command,
@@ -13,8 +15,13 @@ pub const SPEEDS: [f64; 8] = [MIN_SPEED, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, MAX_SP
 const MOST_AT_ONCE: u64 = 25;
 /// So many are made at once to restore a run.
 const RESTORED_AT_ONCE: u64 = 50;
+/// So many movements before the body changes, a run that was fast-forwarded is slow again.
+const BEFORE_CHANGE: u64 = 5;
 /// How long playing waits for a step to be shown, s.
 const SHOWN_WITHIN: f64 = 2.0;
+/// At this speed and below, steps/s, and for single steps, the scene shows postures between steps: so many.
+const SLOW: f64 = 4.0;
+pub(crate) const FRAMES: u64 = 12;
 /// How often the address follows, s: browsers allow some hundred changes a minute.
 const ADDRESS_EVERY: f64 = 1.0;
 
@@ -38,15 +45,30 @@ impl Panel {
     /// Stops making steps.
     pub fn pause(&mut self) {
         self.playing = false;
+        self.pace.until = None;
     }
 
-    fn play(&mut self) {
-        if !self.is_ready() || self.restoring.is_some() {
+    /// Plays up to a step, then pauses.
+    pub fn play_to(&mut self, step: u64) {
+        self.play();
+        self.pace.until = Some(step);
+        self.stop_if_due();
+    }
+
+    /// Plays until something stops it.
+    pub fn play(&mut self) {
+        // Who chooses the movements makes them one by one.
+        if !self.is_ready() || self.restoring.is_some() || self.human().is_some() {
             return;
         }
         (self.stopped, self.wanted) = (None, None);
         self.cursor = self.history.latest();
-        self.pace = Pace { asked_at: self.now - 1.0 / self.settings.speed, settled: self.settled().0 };
+        self.pace = Pace {
+            asked_at: self.now - 1.0 / self.settings.speed,
+            settled: self.settled().0,
+            told: self.is_told(),
+            until: None,
+        };
         self.playing = true;
         self.stop_if_due();
     }
@@ -59,23 +81,55 @@ impl Panel {
         (judging.iter().filter(|row| row.settled).count(), judging.len())
     }
 
+    /// What playing fast-forwards to, since until then nothing is to be seen that was not seen before: the last
+    /// learner that has not learned the arm, or the change of the body.
+    pub fn fast_forward(&self) -> Option<String> {
+        /// So many movements without news are enough.
+        const QUIET: u64 = 100;
+        let due = self.playing && self.settings.stop == StopWhen::Told && !self.pace.told && self.pace.until.is_none();
+        let description = self.description().filter(|description| due && description.truth.is_some())?;
+        let latest = self.history.latest();
+        let change = description.change_at;
+        let begin = change.filter(|change| latest > *change).unwrap_or(0);
+        let news = (0..description.learners.len()).filter_map(|learner| self.history.converged_at(latest, learner));
+        let is_quiet = latest >= news.max().unwrap_or(begin) + CONFIRMATION + QUIET;
+        let waiting: Vec<&str> = (description.learners.iter().enumerate())
+            .filter(|(index, _)| !self.is_done(*index))
+            .map(|(_, learner)| learner.name.as_str())
+            .collect();
+        let only_one = waiting.len() == 1 && description.learners.len() > 1;
+        match change.filter(|change| latest <= *change) {
+            Some(change) if latest + BEFORE_CHANGE >= change => None,
+            Some(change) if only_one || is_quiet || waiting.is_empty() => {
+                Some(format!("to movement {change}, at which the body changes"))
+            }
+            None if only_one || is_quiet => Some(format!("waiting for {}", waiting.join(" and "))),
+            _ => None,
+        }
+    }
+
     fn stop_if_due(&mut self) {
         let latest = self.history.latest();
         let (settled, judging) = self.settled();
         let newly = settled > self.pace.settled;
-        let reason = if self.remaining() == Some(0) {
+        let told = self.settings.stop == StopWhen::Told && !self.pace.told && self.is_told();
+        let reason = if self.pace.until.is_some_and(|until| latest >= until) {
+            format!("Paused after movement {latest}.")
+        } else if self.remaining() == Some(0) {
             "The end of the recorded data: every movement has been used.".to_owned()
         } else if latest >= self.run_to() {
             format!("Stopped at step {latest}, the last of this run. Raise “Run to” to go on.")
-        } else if newly && settled == judging && self.settings.stop != StopWhen::Never {
-            format!("Stopped at step {latest}: every learner that judges itself has settled. Play goes on.")
+        } else if told {
+            format!("The end, at step {latest}: all that is to be learned is learned. Play goes on.")
+        } else if newly && settled == judging && matches!(self.settings.stop, StopWhen::First | StopWhen::All) {
+            format!("Stopped at step {latest}: every learner that judges itself is sure of itself. Play goes on.")
         } else if newly && self.settings.stop == StopWhen::First {
             let name = self.newly_settled().unwrap_or_default();
-            format!("Stopped at step {latest}: {name} has settled, by its own judgement. Play goes on.")
+            format!("Stopped at step {latest}: {name} is sure of itself. Play goes on.")
         } else {
             return;
         };
-        self.playing = false;
+        self.pause();
         self.stopped = Some(reason);
     }
 
@@ -118,15 +172,18 @@ impl Panel {
         self.stopped = None;
         if self.remaining() == Some(0) {
             self.stop_if_due();
+        } else if self.human().is_some() {
+            self.make_movement();
         } else if self.is_ready() && !self.busy && self.restoring.is_none() {
             self.cursor = self.history.latest();
-            self.request(1);
+            self.request(1, FRAMES);
         }
     }
 
-    fn request(&mut self, count: u64) {
+    /// Makes so many steps, with so many postures shown on the way to each.
+    pub(crate) fn request(&mut self, count: u64, frames: u64) {
         let Some(session) = &self.session else { return };
-        let command = Command::Step { session: session.id.clone(), count, expected_step: self.history.latest() };
+        let command = Command::Step { session: session.id.clone(), count, expected_step: self.history.latest(), frames };
         self.busy = true;
         self.pace.asked_at = self.now;
         self.ask(command);
@@ -161,7 +218,7 @@ impl Panel {
             if let Some(target) = self.restoring {
                 let latest = self.history.latest();
                 if latest < target && self.remaining() != Some(0) {
-                    self.request((target - latest).min(RESTORED_AT_ONCE).min(self.remaining().unwrap_or(u64::MAX)));
+                    self.request((target - latest).min(RESTORED_AT_ONCE).min(self.remaining().unwrap_or(u64::MAX)), 0);
                 } else {
                     self.restoring = None;
                     if let Some(wanted) = self.wanted.take() {
@@ -173,6 +230,7 @@ impl Panel {
                 again = self.keep_playing();
             }
         }
+        again = [again, self.play_game(now)].into_iter().flatten().reduce(f64::min);
         self.explain(now);
         // The scene follows once, whatever moved the cursor how often.
         if self.is_ready() && self.sought != Some(self.cursor) {
@@ -189,19 +247,27 @@ impl Panel {
             return None;
         }
         let elapsed = self.now - self.pace.asked_at;
+        let fast = self.fast_forward().is_some();
+        let speed = if fast { MAX_SPEED } else { self.settings.speed };
         // A run goes no faster than it can be drawn; where there is no scene, or a slow one, it does not wait for ever.
         let drawn = self.no_scene.is_some() || self.shown >= self.history.latest() || elapsed > SHOWN_WITHIN;
-        let due = (elapsed * self.settings.speed + 1e-6) as u64;
+        let due = (elapsed * speed + 1e-6) as u64;
         if !drawn {
             return Some(SHOWN_WITHIN - elapsed);
         }
         if due == 0 {
-            return Some(1.0 / self.settings.speed - elapsed);
+            return Some(1.0 / speed - elapsed);
         }
+        let latest = self.history.latest();
+        let change = self.description().and_then(|description| description.change_at);
+        let ahead = change.filter(|change| fast && latest <= *change);
+        let before_change = ahead.map_or(u64::MAX, |change| change.saturating_sub(latest + BEFORE_CHANGE).max(1));
+        let until = self.pace.until.map_or(u64::MAX, |until| until.saturating_sub(self.history.latest()));
         let left = self.run_to().saturating_sub(self.history.latest()).min(self.remaining().unwrap_or(u64::MAX));
-        self.request(due.clamp(1, MOST_AT_ONCE).min(left.max(1)));
+        let frames = if speed <= SLOW { FRAMES } else { 0 };
+        self.request(due.clamp(1, MOST_AT_ONCE).min(left.max(1)).min(until.max(1)).min(before_change), frames);
         // The part of a step that is due already counts for the next, or every step would come a little late.
-        self.pace.asked_at -= elapsed - due as f64 / self.settings.speed;
+        self.pace.asked_at -= elapsed - due as f64 / speed;
         None
     }
 
@@ -211,7 +277,7 @@ impl Panel {
             return None;
         }
         self.settings.step = self.cursor;
-        let query = self.settings.query(true);
+        let query = self.settings.query();
         if self.address.1 == query {
             return None;
         }

@@ -1,10 +1,10 @@
 //! Many seeds of the same comparison, run in the background: is what is seen luck?
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use body_schema::experiment::{Description, StepReport};
 
-use crate::history::{History, Row};
+use crate::history::{History, Row, Verdict};
 
 /// How many further seeds are run.
 pub const SEEDS: u64 = 10;
@@ -18,7 +18,7 @@ pub struct SeedRuns {
     pub running: bool,
     description: Description,
     steps: u64,
-    done: u64,
+    done: BTreeSet<u64>,
     runs: BTreeMap<u64, History>,
 }
 
@@ -38,30 +38,65 @@ pub struct Band {
 impl SeedRuns {
     /// Runs of so many steps that have just been asked for.
     pub(crate) fn new(description: Description, steps: u64) -> Self {
-        Self { running: true, description, steps, done: 0, runs: BTreeMap::new() }
+        Self { running: true, description, steps, done: BTreeSet::new(), runs: BTreeMap::new() }
     }
 
     /// How much is done, 0 to 1.
     pub fn progress(&self) -> f32 {
-        let made: u64 = self.runs.values().map(|run| run.latest()).sum();
-        made as f32 / (SEEDS * self.steps).max(1) as f32
+        let under_way = self.runs.iter().filter(|(seed, _)| !self.done.contains(seed));
+        let made: u64 = under_way.map(|(_, run)| run.latest()).sum();
+        (self.done() as f32 + made as f32 / self.steps.max(1) as f32) / SEEDS as f32
     }
 
     /// How many seeds are done.
     pub fn done(&self) -> u64 {
-        self.done
+        self.done.len() as u64
     }
 
-    pub(crate) fn take(&mut self, seed: u64, reports: &[StepReport], done: bool) {
-        if !self.running {
-            return;
+    /// How far each is run at most.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Movements until accurate, a learner's, over the seeds that are done, counted from the change of the body if it
+    /// changes; `None` for a seed on which they were not enough.
+    pub fn finishes(&self, learner: usize) -> Vec<Option<u64>> {
+        let runs = self.runs.iter().filter(|(seed, _)| self.done.contains(seed)).map(|(_, run)| run);
+        runs.map(|run| match run.verdict(run.latest(), learner) {
+            Verdict::Converged(first) => Some(first - self.begin(run)),
+            _ => None,
+        })
+        .collect()
+    }
+
+    fn begin(&self, run: &History) -> u64 {
+        self.description.change_at.filter(|change| run.latest() > *change).unwrap_or(0)
+    }
+
+    /// Whether this run has nothing more to tell.
+    fn is_told(&self, run: &History) -> bool {
+        let latest = run.latest();
+        let done = |learner| matches!(run.verdict(latest, learner), Verdict::Converged(_) | Verdict::Diverged);
+        self.description.change_at.is_none_or(|change| latest > change)
+            && (0..self.description.learners.len()).all(done)
+    }
+
+    /// Takes a part of a run in; whether it is the one that tells that this seed needs no more.
+    pub(crate) fn take(&mut self, seed: u64, reports: &[StepReport], done: bool) -> bool {
+        // What was under way when enough was known changes nothing.
+        if !self.running || self.done.contains(&seed) {
+            return false;
         }
         let run = self.runs.entry(seed).or_insert_with(|| History::new(&self.description));
         for report in reports {
             run.take(report);
         }
-        self.done += u64::from(done);
-        self.running = self.done < SEEDS;
+        let told = self.runs.get(&seed).is_some_and(|run| self.is_told(run));
+        if done || told {
+            self.done.insert(seed);
+        }
+        self.running = self.done() < SEEDS;
+        told && !done
     }
 
     pub(crate) fn cancel(&mut self) {
@@ -92,5 +127,29 @@ impl SeedRuns {
     /// Whether these runs are of what is shown.
     pub(crate) fn is_of(&self, description: &Description) -> bool {
         self.description.scenario == description.scenario && self.description.learners == description.learners
+    }
+}
+
+/// The middle of several numbers of movements, those that were not enough being the largest; `None` if it is one of
+/// these.
+pub fn median(finishes: &[Option<u64>]) -> Option<f64> {
+    let mut sorted: Vec<f64> = finishes.iter().map(|one| one.map_or(f64::INFINITY, |one| one as f64)).collect();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len().checked_sub(1)?;
+    let value = (sorted[middle / 2] + sorted[middle.div_ceil(2)]) / 2.0;
+    value.is_finite().then_some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::median;
+
+    #[test]
+    fn a_median_counts_runs_that_did_not_finish() {
+        assert_eq!(median(&[]), None);
+        assert_eq!(median(&[Some(3), None, Some(1)]), Some(3.0));
+        assert_eq!(median(&[Some(3), Some(4)]), Some(3.5));
+        assert_eq!(median(&[Some(3), None]), None);
+        assert_eq!(median(&[None, Some(3), None]), None);
     }
 }

@@ -16,6 +16,8 @@ pub const MAX_SEED: u64 = (1 << 53) - 1;
 /// When a run stops before its last step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopWhen {
+    /// When every learner has learned the arm, as judged with hindsight and the truth, or has run away.
+    Told,
     /// It does not.
     Never,
     /// When one learner says that it knows enough.
@@ -26,10 +28,11 @@ pub enum StopWhen {
 
 impl StopWhen {
     /// All, in the order in which they are offered, with their names in the address and for people.
-    pub const ALL: [(Self, &str, &str); 3] = [
+    pub const ALL: [(Self, &str, &str); 4] = [
+        (Self::Told, "told", "when the story is told"),
         (Self::Never, "never", "only at the last step"),
-        (Self::First, "first", "when one learner has settled"),
-        (Self::All, "all", "when all have settled"),
+        (Self::First, "first", "when one learner is sure of itself"),
+        (Self::All, "all", "when all are sure of themselves"),
     ];
 }
 
@@ -80,6 +83,10 @@ pub struct Settings {
     pub ellipsoids: String,
     /// The session, which only this server knows.
     pub session: Option<String>,
+    /// The page stands in another one: transport and one chart only.
+    pub embed: bool,
+    /// The address asks for a game; taken by [`Settings::validate`], which makes it a choice of learners.
+    pub play: bool,
 }
 
 impl Default for Settings {
@@ -91,12 +98,14 @@ impl Default for Settings {
             step: 1,
             speed: 10.0,
             run_to: None,
-            stop: StopWhen::All,
+            stop: StopWhen::Told,
             tab: Tab::Charts,
             learner: None,
             joints: None,
             ellipsoids: ELLIPSOIDS[0].0.to_owned(),
             session: None,
+            embed: false,
+            play: false,
         }
     }
 }
@@ -112,6 +121,10 @@ impl Settings {
             first
         });
         scenario.name.clone_into(&mut self.scenario);
+        if std::mem::take(&mut self.play) {
+            self.learners = GAME.map(str::to_owned).to_vec();
+            self.step = 0;
+        }
         let offered = |name: &String| scenario.offered().any(|learner| learner.name == *name);
         for name in self.learners.iter().filter(|name| !offered(name)) {
             notices.push(format!("{} has no learner “{}”; it is left out.", scenario.name, short(name)));
@@ -132,6 +145,11 @@ impl Settings {
         notices
     }
 }
+
+/// The learners of a game: the visitor, and whom to beat.
+pub const GAME: [&str; 3] = ["active", "random", HUMAN];
+/// The learner whose movements the visitor chooses.
+pub const HUMAN: &str = "human";
 
 /// As much of a text as a notice can hold.
 pub(crate) fn short(text: &str) -> String {

@@ -1,29 +1,63 @@
 //! The WebAssembly that a browser runs: a canvas, and two doors to the page.
 
-use std::{cell::RefCell, rc::Rc};
+use std::{
+    cell::RefCell,
+    rc::Rc,
+    sync::{Arc, Mutex},
+};
 
+use egui::accesskit::TreeUpdate;
 use wasm_bindgen::prelude::*;
 
-use crate::{host::Event, panel::Panel};
+use crate::{
+    access::{self, Act, Element},
+    host::Event,
+    panel::Panel,
+};
 
 /// The panel on its canvas.
 #[wasm_bindgen]
 pub struct PanelHandle {
     runner: eframe::WebRunner,
     inbox: Rc<RefCell<Inbox>>,
+    tree: Tree,
+    /// The elements that the page has.
+    elements: RefCell<Vec<Element>>,
 }
 
 #[derive(Default)]
 struct Inbox {
     events: Vec<Event>,
-    keys: Vec<egui::Event>,
+    input: Vec<egui::Event>,
+    /// What was done to the page's elements; finished a frame after its events.
+    acts: Vec<Act>,
+    /// The focus is elsewhere on the page.
+    released: bool,
     context: Option<egui::Context>,
+}
+
+/// The latest accessibility tree, until the page takes it.
+#[derive(Clone, Default)]
+struct Tree(Arc<Mutex<Option<TreeUpdate>>>);
+
+impl egui::Plugin for Tree {
+    fn debug_name(&self) -> &'static str {
+        "accessibility tree"
+    }
+
+    fn output_hook(&mut self, _: &egui::Context, output: &mut egui::FullOutput) {
+        if let (Some(update), Ok(mut latest)) = (output.platform_output.accesskit_update.take(), self.0.lock()) {
+            *latest = Some(update);
+        }
+    }
 }
 
 struct Shell {
     panel: Panel,
     inbox: Rc<RefCell<Inbox>>,
     command: js_sys::Function,
+    /// Acts whose events egui has, and which it has not finished.
+    acts: Vec<Act>,
 }
 
 #[wasm_bindgen]
@@ -32,16 +66,23 @@ impl PanelHandle {
     #[wasm_bindgen(constructor)]
     #[allow(clippy::new_without_default)]
     pub fn new() -> Self {
-        Self { runner: eframe::WebRunner::new(), inbox: Rc::default() }
+        Self {
+            runner: eframe::WebRunner::new(),
+            inbox: Rc::default(),
+            tree: Tree::default(),
+            elements: RefCell::default(),
+        }
     }
 
     /// Draws on a canvas from now on.
     pub async fn start(&self, canvas: web_sys::HtmlCanvasElement, command: js_sys::Function) -> Result<(), JsValue> {
-        let inbox = self.inbox.clone();
+        let (inbox, tree) = (self.inbox.clone(), self.tree.clone());
         let create: eframe::AppCreator<'static> = Box::new(move |creation| {
             inbox.borrow_mut().context = Some(creation.egui_ctx.clone());
             creation.egui_ctx.set_theme(egui::ThemePreference::System);
-            Ok(Box::new(Shell { panel: Panel::default(), inbox, command }))
+            creation.egui_ctx.enable_accesskit();
+            creation.egui_ctx.add_plugin(tree);
+            Ok(Box::new(Shell { panel: Panel::default(), inbox, command, acts: Vec::new() }))
         });
         self.runner.start(canvas, eframe::WebOptions::default(), create).await
     }
@@ -60,10 +101,38 @@ impl PanelHandle {
         let modifiers = egui::Modifiers { shift, ..egui::Modifiers::NONE };
         self.push(|inbox| {
             for pressed in [true, false] {
-                inbox.keys.push(egui::Event::Key { key, physical_key: None, pressed, repeat: false, modifiers });
+                inbox.input.push(egui::Event::Key { key, physical_key: None, pressed, repeat: false, modifiers });
             }
         });
         true
+    }
+
+    /// The elements that the page is to have, as JSON; nothing if they are those that it was given last.
+    pub fn elements(&self) -> Option<String> {
+        let update = self.tree.0.lock().ok()?.take()?;
+        let elements = access::elements(&update);
+        let mut known = self.elements.borrow_mut();
+        if *known == elements {
+            return None;
+        }
+        let json = serde_json::to_string(&elements).ok();
+        *known = elements;
+        json
+    }
+
+    /// Does what was done to an element, told as JSON.
+    pub fn act(&self, act: &str) -> Result<(), JsValue> {
+        let act: Act = serde_json::from_str(act).map_err(|error| JsValue::from_str(&error.to_string()))?;
+        self.push(|inbox| {
+            inbox.input.extend(act.events());
+            inbox.acts.push(act);
+        });
+        Ok(())
+    }
+
+    /// Takes the focus from the widget that has it: it is elsewhere on the page now.
+    pub fn release(&self) {
+        self.push(|inbox| inbox.released = true);
     }
 
     /// Why the panel has crashed, if it has.
@@ -82,11 +151,22 @@ impl PanelHandle {
 
 impl eframe::App for Shell {
     fn raw_input_hook(&mut self, _: &egui::Context, input: &mut egui::RawInput) {
-        input.events.append(&mut self.inbox.borrow_mut().keys);
+        input.events.append(&mut self.inbox.borrow_mut().input);
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
-        let events = std::mem::take(&mut self.inbox.borrow_mut().events);
+        let ctx = ui.ctx().clone();
+        let mut inbox = self.inbox.borrow_mut();
+        let (events, acts) = (std::mem::take(&mut inbox.events), std::mem::take(&mut inbox.acts));
+        let released = std::mem::take(&mut inbox.released);
+        drop(inbox);
+        if released {
+            access::release_focus(&ctx);
+        }
+        std::mem::replace(&mut self.acts, acts).iter().for_each(|act| act.finish(&ctx));
+        if !self.acts.is_empty() {
+            ctx.request_repaint();
+        }
         events.into_iter().for_each(|event| self.panel.receive(event));
         self.panel.ui(ui);
         for command in self.panel.take_commands() {

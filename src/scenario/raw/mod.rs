@@ -10,7 +10,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{ErrorDraw, EstimatorKind, PolicyKind};
-use crate::{kinematics::JointKind, selection::Optimality};
+use crate::{experiment::Body, kinematics::JointKind, selection::Optimality};
 
 pub use exactly::Exactly;
 pub use read::{key_in, line_of, read};
@@ -48,6 +48,7 @@ pub struct Scenario {
 pub struct Robot {
     pub marker_m: Spanned<Exactly<f64, 3>>,
     pub learn_marker: bool,
+    pub body: Option<Body>,
     #[serde(rename = "joint")]
     pub joints: Spanned<Vec<Spanned<Joint>>>,
 }

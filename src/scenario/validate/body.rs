@@ -41,7 +41,7 @@ impl Check<'_> {
             self.problem(raw.joints.span(), "robot.joint", error.to_string(), "write limits that a robot can have");
         });
         let limits = limits.ok().filter(|_| complete)?;
-        Some(Robot { names, state, layout, limits })
+        Some(Robot { names, state, layout, limits, body: raw.body })
     }
 
     fn joint(&mut self, raw: &raw::Joint, span: Range<usize>, key: &dyn Fn(&str) -> String) -> Option<Joint> {

@@ -11,9 +11,9 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use toml::Spanned;
 
 use super::{
-    EstimatorKind, Filter, LearnerSpec, Prior, Scenario, SelectionSpec, SmootherSpec,
+    EstimatorKind, Filter, LearnerSpec, PolicyKind, Prior, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError, similar},
-    learners::{Fault, Misfit, Setting, misfit},
+    learners::{Fault, HUMAN, Misfit, Setting, misfit},
     raw,
 };
 use crate::{
@@ -296,6 +296,12 @@ impl Check<'_> {
                 let mend = "give each learner a name of its own, of letters, digits, '-' and '_'";
                 self.problem(learner.name.span(), format!("{key}.name"), what, mend);
             }
+            if policy == PolicyKind::Human {
+                let what = "a person is offered in every simulated scenario, by the name `human`";
+                let mend = "remove this learner, or write another policy";
+                self.problem(learner.policy.span(), format!("{key}.policy"), what, mend);
+                continue;
+            }
             match misfit(learner.estimator, policy, setting) {
                 Some(Misfit { fault: Fault::Policy, what, instead: (_, policy) }) => {
                     let mend = format!("write `policy = \"{}\"`", policy.name());
@@ -349,8 +355,8 @@ impl Check<'_> {
     }
 }
 
-/// Names that recordings use for something else.
-const RESERVED: [&str; 1] = ["world"];
+/// Names that mean something else: to recordings, and to those who compare learners.
+const RESERVED: [&str; 2] = ["world", HUMAN];
 
 fn is_plain(name: &str) -> bool {
     !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c))

@@ -23,6 +23,13 @@ pub struct EvaluationRequest {
     pub configuration: Vec<f64>,
 }
 
+/// The movement that a person has chosen.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct Configuration {
+    /// One position per joint, rad (revolute) or m (prismatic); null if none is set for the next step.
+    pub configuration: Option<Vec<f64>>,
+}
+
 /// How DIRECT chose a learner's last movement: every rectangle and every iteration.
 #[utoipa::path(get, path = "/v1/sessions/{id}/learners/{name}/selection", tag = "sessions",
     operation_id = "getSelection",
@@ -53,8 +60,8 @@ pub(super) async fn selection(
     ),
     request_body = EvaluationRequest,
     responses(
-        (status = 200, description = "The criterion there, the marker predicted there and the chance of seeing it, \
-            under the belief before the last movement", body = AppraisalReport),
+        (status = 200, description = "The criterion there beside the best that DIRECT finds, the marker predicted there \
+            and the chance of seeing it, under the belief before the last movement", body = AppraisalReport),
         (status = 400, description = "The body is not JSON", body = Problem),
         (status = 403, description = "The request comes from a foreign page", body = Problem),
         (status = 404, description = "There is no such session or learner", body = Problem),
@@ -71,4 +78,53 @@ pub(super) async fn evaluate(
     JsonBody(request): JsonBody<EvaluationRequest>,
 ) -> Result<Response, Problem> {
     json(app.sessions.get(&id)?.appraise(name, request.configuration).await?).await
+}
+
+/// The next movement of a learner for which a person chooses (policy `human`), as it is set so far.
+#[utoipa::path(get, path = "/v1/sessions/{id}/learners/{name}/configuration", tag = "sessions",
+    operation_id = "getConfiguration",
+    params(
+        ("id" = String, Path, description = "The session's id", format = "uuid"),
+        ("name" = String, Path, description = "The learner's name"),
+    ),
+    responses(
+        (status = 200, description = "What is set for the next step", body = Configuration),
+        (status = 404, description = "There is no such session or learner", body = Problem),
+        (status = 500, description = "The session's engine has failed", body = Problem),
+    )
+)]
+pub(super) async fn configuration(
+    State(app): State<Arc<App>>,
+    Path((id, name)): Path<(String, String)>,
+) -> Result<Response, Problem> {
+    json(Configuration { configuration: app.sessions.get(&id)?.configuration(name).await? }).await
+}
+
+/// Set the next movement of a learner for which a person chooses (policy `human`). It may be set anew until the next step.
+#[utoipa::path(post, path = "/v1/sessions/{id}/learners/{name}/configuration", tag = "sessions",
+    operation_id = "setConfiguration",
+    params(
+        ("id" = String, Path, description = "The session's id", format = "uuid"),
+        ("name" = String, Path, description = "The learner's name"),
+    ),
+    request_body = EvaluationRequest,
+    responses(
+        (status = 200, description = "It is set. What it is expected to teach, beside the best that DIRECT finds, under \
+            the present belief", body = AppraisalReport),
+        (status = 400, description = "The body is not JSON", body = Problem),
+        (status = 403, description = "The request comes from a foreign page", body = Problem),
+        (status = 404, description = "There is no such session or learner", body = Problem),
+        (status = 409, description = "The learner chooses its movements itself, or makes no movement any more", body = Problem),
+        (status = 413, description = "The body is too large", body = Problem),
+        (status = 415, description = "The body is not said to be JSON", body = Problem),
+        (status = 422, description = "A value is not valid; `field` names it", body = Problem),
+        (status = 500, description = "The session's engine has failed", body = Problem),
+    )
+)]
+pub(super) async fn set_configuration(
+    State(app): State<Arc<App>>,
+    Path((id, name)): Path<(String, String)>,
+    JsonBody(request): JsonBody<EvaluationRequest>,
+) -> Result<Response, Problem> {
+    json(app.sessions.get(&id)?.set_configuration(name, request.configuration).await?).await
 }

@@ -79,6 +79,7 @@ pub(super) fn routes() -> (Router<Arc<App>>, Bytes) {
         .routes(routes!(sessions::step))
         .routes(routes!(choices::selection))
         .routes(routes!(choices::evaluate))
+        .routes(routes!(choices::configuration, choices::set_configuration))
         .routes(routes!(streams::events))
         .routes(routes!(streams::live))
         .routes(routes!(streams::live_recording))

@@ -142,7 +142,8 @@ pub(super) async fn delete(State(app): State<Arc<App>>, Path(id): Path<String>) 
         (status = 400, description = "The body is not JSON", body = Problem),
         (status = 403, description = "The request comes from a foreign page", body = Problem),
         (status = 404, description = "There is no such session", body = Problem),
-        (status = 409, description = "The session is not at `expected_step` but at `step`; nothing was stepped", body = Problem),
+        (status = 409, description = "The session is not at `expected_step` but at `step`, or a person has not chosen \
+            a movement yet (problem type `no-configuration`); nothing was stepped", body = Problem),
         (status = 413, description = "The body is too large", body = Problem),
         (status = 415, description = "The body is not said to be JSON", body = Problem),
         (status = 422, description = "A value is not valid, or only `remaining` steps are left; nothing was stepped", body = Problem),

@@ -67,6 +67,17 @@ pub(super) enum Command {
         configuration: Vec<f64>,
         reply: Reply<AppraisalReport>,
     },
+    /// Sets the next movement of a learner for which a person chooses, and tells what it is expected to teach.
+    SetConfiguration {
+        learner: String,
+        configuration: Vec<f64>,
+        reply: Reply<AppraisalReport>,
+    },
+    /// The movement that was set for the next step.
+    Configuration {
+        learner: String,
+        reply: Reply<Option<Vec<f64>>>,
+    },
     /// Completes the recording so far.
     Flush {
         reply: Reply<()>,
@@ -153,6 +164,13 @@ impl Engine<'_> {
             Command::Appraise { learner, configuration, reply } => {
                 drop(reply.send(self.experiment.appraise(&learner, &configuration).map_err(Problem::from)));
             }
+            Command::SetConfiguration { learner, configuration, reply } => {
+                drop(reply.send(self.experiment.set_configuration(&learner, &configuration).map_err(Problem::from)));
+            }
+            Command::Configuration { learner, reply } => {
+                let configuration = self.experiment.configuration(&learner).map_err(Problem::from);
+                drop(reply.send(configuration.map(|set| set.map(<[f64]>::to_vec))));
+            }
             Command::Flush { reply } => drop(reply.send(self.flush(recorder))),
             Command::Wake => {}
             #[cfg(test)]
@@ -178,7 +196,7 @@ impl Engine<'_> {
             let detail = format!("the session is at step {step}, not {expected}; nothing was stepped");
             return Err(Problem::new(Kind::StepMismatch, detail).field("expected_step").step(step));
         }
-        if let Some(problem) = self.too_many(count, step) {
+        if let Some(problem) = self.too_many(count, step).or_else(|| self.waits_for_a_person(count)) {
             return Err(problem.step(step));
         }
         let mut batch = Batch { made: Vec::new(), published: 0, last: Instant::now() };
@@ -212,6 +230,23 @@ impl Engine<'_> {
         self.shared.publish(batch.made[batch.published..].to_vec(), self.experiment.remaining());
         (batch.published, batch.last) = (batch.made.len(), Instant::now());
         flushed
+    }
+
+    /// What a learner lacks for which a person chooses: before any step is made, so that a request makes all or none.
+    fn waits_for_a_person(&self, count: u64) -> Option<Problem> {
+        let mut chosen_for = self.experiment.chosen_for();
+        if count > 1 {
+            let (_, name) = chosen_for.next()?;
+            let detail = format!("a person chooses each movement of `{name}`: make one step at a time, not {count}");
+            return Some(Problem::new(Kind::InvalidValue, detail).field("count"));
+        }
+        let unset = |name: &&str| matches!(self.experiment.configuration(name), Ok(None));
+        let name = chosen_for.map(|(_, name)| name).find(unset)?;
+        let detail = format!(
+            "`{name}` waits for a person to choose its movement; post {{\"configuration\": […]}}, one position per joint \
+             in rad or m, to /v1/sessions/{{id}}/learners/{name}/configuration, then step"
+        );
+        Some(Problem::new(Kind::NoConfiguration, detail))
     }
 
     fn too_many(&self, count: u64, step: u64) -> Option<Problem> {

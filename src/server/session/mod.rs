@@ -201,6 +201,20 @@ impl Session {
         self.ask(|reply| Command::Appraise { learner, configuration, reply }).await
     }
 
+    /// Sets the next movement of a learner for which a person chooses, after whatever the session is busy with.
+    pub(super) async fn set_configuration(
+        &self,
+        learner: String,
+        configuration: Vec<f64>,
+    ) -> Result<AppraisalReport, Problem> {
+        self.ask(|reply| Command::SetConfiguration { learner, configuration, reply }).await
+    }
+
+    /// The movement that was set for the next step, after whatever the session is busy with.
+    pub(super) async fn configuration(&self, learner: String) -> Result<Option<Vec<f64>>, Problem> {
+        self.ask(|reply| Command::Configuration { learner, reply }).await
+    }
+
     /// Completes the recording so far, after whatever the session is busy with. That of a failed engine is complete.
     pub(super) async fn flush(&self) -> Result<(), Problem> {
         let flushed = self.ask(|reply| Command::Flush { reply }).await;

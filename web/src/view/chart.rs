@@ -13,8 +13,10 @@ pub(super) struct Chart {
     pub(super) logarithmic: bool,
     /// Whether convergence is marked on it.
     pub(super) judged: bool,
+    /// Whether it is an error, on which it is marked where a learner has learned the arm.
+    pub(super) is_error: bool,
     pub(super) value: fn(&Row) -> Option<f64>,
-    /// What it cannot fall below.
+    /// What the data collected allow of it.
     pub(super) bound: Option<fn(&Row) -> Option<f64>>,
 }
 
@@ -25,6 +27,7 @@ pub(super) const CHARTS: [Chart; 6] = [
         tip: "Mean error of the angles between the joints' axes; dashed: the threshold of convergence",
         logarithmic: true,
         judged: true,
+        is_error: true,
         value: |row| row.orientation_deg,
         bound: None,
     },
@@ -34,6 +37,7 @@ pub(super) const CHARTS: [Chart; 6] = [
         tip: "Mean distance of the true axis points from the estimated axes; dashed: the threshold of convergence",
         logarithmic: true,
         judged: true,
+        is_error: true,
         value: |row| Some(row.location_m? * 1e3),
         bound: None,
     },
@@ -43,16 +47,18 @@ pub(super) const CHARTS: [Chart; 6] = [
         tip: "Mean distance between the predicted and the true marker over postures never seen",
         logarithmic: true,
         judged: false,
+        is_error: true,
         value: |row| Some(row.prediction_m? * 1e3),
         bound: None,
     },
     Chart {
         title: "Uncertainty",
-        unit: "tr(W P)",
-        tip: "Trace of the weighted covariance: what the active learner makes as small as it can. Thin: what the \
-              same data allow at the true arm, were the model linear",
+        unit: "",
+        tip: "How unsure each learner is by its own account, which the active ones make as small as they can: the trace \
+              of the weighted covariance, tr(W P)",
         logarithmic: true,
         judged: false,
+        is_error: false,
         value: |row| row.trace,
         bound: Some(|row| row.bound),
     },
@@ -62,6 +68,7 @@ pub(super) const CHARTS: [Chart; 6] = [
         tip: "Movements after which the marker was not seen",
         logarithmic: false,
         judged: false,
+        is_error: false,
         value: |row| Some(row.misses as f64),
         bound: None,
     },
@@ -71,6 +78,7 @@ pub(super) const CHARTS: [Chart; 6] = [
         tip: "How long it took to choose the movement",
         logarithmic: true,
         judged: false,
+        is_error: false,
         value: |row| row.selection_ms.filter(|ms| *ms > 0.0),
         bound: None,
     },
@@ -80,6 +88,11 @@ pub(super) const CHARTS: [Chart; 6] = [
 const FLOOR: f64 = 1e-9;
 
 impl Chart {
+    /// Its title with its unit.
+    pub(super) fn label(&self) -> String {
+        if self.unit.is_empty() { self.title.to_owned() } else { format!("{}, {}", self.title, self.unit) }
+    }
+
     pub(super) fn y(&self, value: f64) -> f64 {
         if self.logarithmic { value.max(FLOOR).log10() } else { value }
     }

@@ -1,9 +1,10 @@
 //! The boxes of DIRECT by size and value, and the hull from which it takes those to divide: Fig. 3c of the paper.
 
 use body_schema::optimize::{MAX_LEVEL, Variant};
-use egui::{Color32, RichText, Ui, Vec2b, vec2};
+use egui::{RichText, Sense, Ui, Vec2b, vec2};
 use egui_plot::{GridInput, GridMark, HoverPosition, Line, MarkerShape, Plot, PlotPoints, Points};
 
+use super::style::accent;
 use crate::{panel::Panel, search::Search};
 
 impl Panel {
@@ -18,7 +19,7 @@ impl Panel {
         };
         let mut hull = of(true);
         hull.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let bold = Color32::from_rgb(0xD5, 0x5E, 0x00);
+        let bold = accent(ui.visuals().dark_mode);
         let quiet = ui.visuals().text_color().gamma_multiply(0.6);
         // The largest size that is marked: those of DIRECT-l are halves of powers of three.
         let (name, largest) = match search.variant() {
@@ -28,6 +29,7 @@ impl Panel {
         Plot::new("hull")
             .height(220.0)
             .allow_zoom(false)
+            .sense(Sense::click())
             .allow_drag(false)
             .allow_scroll(false)
             .allow_boxed_zoom(false)

@@ -1,12 +1,13 @@
 //! The learners: their errors at the step that is shown, and what has become of each.
 
-use egui::{Grid, RichText, Shape, Ui, vec2};
+use egui::{Align, Layout, Rect, RichText, Shape, Ui, UiBuilder, accesskit::Role, pos2, vec2};
 use egui_plot::LineStyle;
 
 use super::{NARROW, alarm, good};
-use crate::{colours, history::Verdict, panel::Panel};
+use crate::{colours, history::Verdict, panel::Panel, words};
 
 const DASH: &str = "–";
+const ROW: f32 = 20.0;
 
 fn fixed(value: Option<f64>, scale: f64, digits: usize) -> String {
     value.map_or(DASH.to_owned(), |value| format!("{:.digits$}", value * scale))
@@ -30,82 +31,86 @@ pub(super) fn swatch(ui: &mut Ui, slot: usize) {
     };
 }
 
+/// A row of a table, for the eye and for assistive technology: each cell is drawn in its column.
+fn row(ui: &mut Ui, index: usize, shares: &[f32], role: Role, mut cell: impl FnMut(&mut Ui, usize)) {
+    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), egui::Sense::hover());
+    if index % 2 == 1 {
+        ui.painter().rect_filled(rect, 2.0, ui.visuals().faint_bg_color);
+    }
+    let builder = UiBuilder::new().id_salt(("row", index)).max_rect(rect).accessibility_role(Role::Row);
+    let mut line = ui.new_child(builder);
+    let mut left = rect.left();
+    for (column, share) in shares.iter().enumerate() {
+        let width = share * rect.width();
+        let place = Rect::from_min_size(pos2(left, rect.top()), vec2(width - 4.0, rect.height()));
+        let layout = Layout::left_to_right(Align::Center);
+        let builder = UiBuilder::new().id_salt(column).max_rect(place).layout(layout).accessibility_role(role);
+        cell(&mut line.new_child(builder), column);
+        left += width;
+    }
+}
+
 impl Panel {
     pub(super) fn learners(&mut self, ui: &mut Ui) {
         let Some(description) = self.description() else { return };
-        let misses =
-            (0..description.learners.len()).any(|i| self.history.row(self.cursor, i).is_some_and(|r| r.misses > 0));
-        let head = |ui: &mut Ui, text: &str, tip: &str| {
-            ui.label(RichText::new(text).weak().small()).on_hover_text(tip);
-        };
-        let narrow = ui.available_width() < if misses { 1.2 * NARROW } else { NARROW };
-        let spacing = if narrow { 6.0 } else { 10.0 };
-        egui::ScrollArea::horizontal().id_salt("learners").show(ui, |ui| {
-            Grid::new("learners").num_columns(6).spacing([spacing, 3.0]).min_col_width(30.0).striped(true).show(
-                ui,
-                |ui| {
-                    head(ui, "Learner", "Estimator × policy stands in the tooltip of the name");
-                    head(
-                        ui,
-                        if narrow { "Orient., °" } else { "Orientation, °" },
-                        "Mean error of the angles between the joints' axes",
-                    );
-                    head(
-                        ui,
-                        if narrow { "Loc., mm" } else { "Location, mm" },
-                        "Mean distance of the true axis points from the estimated axes",
-                    );
-                    head(
-                        ui,
-                        if narrow { "Pred., mm" } else { "Prediction, mm" },
-                        "Mean distance between the predicted and the true marker",
-                    );
-                    if misses {
-                        head(ui, "Misses", "Movements after which the marker was not seen; they count as movements");
+        let count = description.learners.len();
+        let misses = (0..count).any(|i| self.history.row(self.cursor, i).is_some_and(|row| row.misses > 0));
+        let narrow = ui.available_width() < NARROW;
+        let short = |long: &'static str, short: &'static str| if narrow { short } else { long };
+        let mut heads = vec![
+            ("Learner", "How each goes about it stands beside the chart; the terms stand in the tooltip of its name"),
+            (short("Orientation, °", "Orient., °"), "Mean error of the angles between the joints' axes"),
+            (short("Location, mm", "Loc., mm"), "Mean distance of the true axis points from the estimated axes"),
+            (short("Prediction, mm", "Pred., mm"), "Mean distance between the predicted and the true marker"),
+            ("State", "What has become of it, judged with the truth; the terms stand in the tooltip of each"),
+        ];
+        let mut shares = if narrow { vec![0.26, 0.15, 0.15, 0.15, 0.29] } else { vec![0.24, 0.17, 0.16, 0.18, 0.25] };
+        if misses {
+            heads.push(("Misses", "Movements after which the marker was not seen; they count as movements"));
+            shares.iter_mut().for_each(|share| *share *= 0.88);
+            shares.push(0.12);
+        }
+        let table = UiBuilder::new().accessibility_role(Role::Table).accessibility_label("Learners");
+        ui.scope_builder(table, |ui| {
+            ui.spacing_mut().item_spacing.y = 1.0;
+            row(ui, 0, &shares, Role::ColumnHeader, |ui, column| {
+                let (text, tip) = heads[column];
+                ui.add(egui::Label::new(RichText::new(text).weak().small()).truncate()).on_hover_text(tip);
+            });
+            for (index, (learner, slot)) in description.learners.iter().zip(colours::slots(description)).enumerate() {
+                let numbers = self.history.row(self.cursor, index).copied().unwrap_or_default();
+                row(ui, index + 1, &shares, Role::Cell, |ui, column| match column {
+                    0 => {
+                        swatch(ui, slot);
+                        let name = egui::Label::new(RichText::new(&learner.name).strong()).truncate();
+                        ui.add(name).on_hover_text(words::terms(learner));
                     }
-                    head(
-                        ui,
-                        "State",
-                        "Converged: both errors stay within the thresholds, confirmed by 20 more movements",
-                    );
-                    ui.end_row();
-                    let slots = colours::slots(description);
-                    for (index, (learner, slot)) in description.learners.iter().zip(slots).enumerate() {
-                        ui.horizontal(|ui| {
-                            swatch(ui, slot);
-                            let tip = format!("Estimator {}, policy {}", learner.estimator, learner.policy);
-                            ui.label(RichText::new(&learner.name).strong()).on_hover_text(tip);
-                        });
-                        let row = self.history.row(self.cursor, index).copied().unwrap_or_default();
-                        for text in [
-                            fixed(row.orientation_deg, 1.0, 2),
-                            fixed(row.location_m, 1e3, 1),
-                            fixed(row.prediction_m, 1e3, 1),
-                        ] {
-                            ui.label(RichText::new(text).monospace());
-                        }
-                        if misses {
-                            ui.label(RichText::new(row.misses.to_string()).monospace());
-                        }
-                        let text = RichText::new(self.verdict(index));
-                        let (text, tip) = match self.history.verdict(self.cursor, index) {
-                            Verdict::Converged(_) | Verdict::Settled => (text.color(good(ui)), None),
-                            Verdict::Diverged => (text.color(alarm(ui)), self.history.failure(index)),
-                            _ => (text, None),
+                    4 => self.state(ui, index),
+                    _ => {
+                        let text = match column {
+                            1 => fixed(numbers.orientation_deg, 1.0, 2),
+                            2 => fixed(numbers.location_m, 1e3, 1),
+                            3 => fixed(numbers.prediction_m, 1e3, 1),
+                            _ => numbers.misses.to_string(),
                         };
-                        let label = ui.label(if row.settled { text.strong() } else { text });
-                        label.on_hover_text(tip.unwrap_or(match row.settled {
-                            true => "It has settled: by its own estimate it predicts well enough",
-                            false => "It has not settled yet, by its own estimate",
-                        }));
-                        ui.end_row();
+                        ui.label(RichText::new(text).monospace());
                     }
-                },
-            );
+                });
+            }
         });
         if description.truth.is_none() {
             let text = "–: recorded data have no known truth. Prediction is over measurements held out from learning.";
             ui.label(RichText::new(text).weak().small());
         }
+    }
+
+    fn state(&self, ui: &mut Ui, index: usize) {
+        let text = RichText::new(self.verdict(index));
+        let text = match self.history.verdict(self.cursor, index) {
+            Verdict::Converged(_) | Verdict::Settled => text.color(good(ui)).strong(),
+            Verdict::Diverged => text.color(alarm(ui)),
+            _ => text,
+        };
+        ui.add(egui::Label::new(text).truncate()).on_hover_text(self.verdict_terms(index));
     }
 }

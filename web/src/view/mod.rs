@@ -1,99 +1,122 @@
 //! How the panel looks.
 //!
-//! What is needed all the time stands at the top and stays; the rest scrolls under it.
+//! What is needed all the time stands at the top and stays, with one chart; the rest scrolls under it. Cards of a story
+//! stand at the bottom and take their room from what scrolls, so that they cover nothing.
 
+mod card;
 mod chart;
 mod charts;
 mod controls;
+mod curves;
 mod diagram;
 mod dialogs;
+mod distribution;
+mod ending;
+mod game;
 mod learners;
+mod notices;
 mod setup;
 mod share;
 mod slice;
+mod stories;
+pub mod style;
 mod why;
 
-use egui::{CentralPanel, Frame, RichText, ScrollArea, Ui};
+use egui::{CentralPanel, Frame, RichText, ScrollArea, Ui, vec2};
 
 use crate::{
     panel::{Link, Panel},
     settings::Tab,
+    stories::Spot,
 };
-
-/// The colour of alarms, readable on light and dark grounds.
-pub(crate) fn alarm(ui: &Ui) -> egui::Color32 {
-    if ui.visuals().dark_mode {
-        egui::Color32::from_rgb(0xFF, 0x9D, 0x66)
-    } else {
-        egui::Color32::from_rgb(0xA6, 0x3D, 0)
-    }
-}
-
-/// The colour of success.
-pub(crate) fn good(ui: &Ui) -> egui::Color32 {
-    if ui.visuals().dark_mode {
-        egui::Color32::from_rgb(0x5F, 0xD3, 0xA8)
-    } else {
-        egui::Color32::from_rgb(0, 0x66, 0x4A)
-    }
-}
+pub(crate) use style::{alarm, good};
 
 /// Below this width words are shortened.
 pub(crate) const NARROW: f32 = 440.0;
-
-/// egui's small print is too small and its weak colour too weak to be read by everybody.
-fn legible(ui: &mut Ui) {
-    ui.visuals_mut().weak_text_alpha = 0.8;
-    if let Some(small) = ui.style_mut().text_styles.get_mut(&egui::TextStyle::Small) {
-        small.size = 11.0;
-    }
-}
+/// Below this height, room is kept for what matters most.
+pub(crate) const LOW: f32 = 600.0;
 
 impl Panel {
     /// Draws the panel and takes in what the visitor does.
     pub fn ui(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
-        legible(ui);
+        style::apply(ui);
+        self.touch = ctx.input(|input| input.has_touch_screen());
+        self.spots = crate::stories::Spots::default();
         self.take_keys(&ctx);
         let again = self.tick(ctx.input(|input| input.time));
         ctx.request_repaint_after(std::time::Duration::from_secs_f64(again.unwrap_or(1.0).clamp(0.005, 1.0)));
 
         let margin = egui::Margin::symmetric(10, 6);
         let frame = Frame::new().fill(ui.visuals().window_fill).inner_margin(margin);
-        egui::Panel::top("controls").frame(frame).show(ui, |ui| self.controls(ui));
-        let frame = Frame::new().fill(ui.visuals().panel_fill).inner_margin(margin);
-        CentralPanel::default().frame(frame).show(ui, |ui| {
-            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-                self.setup(ui);
-                self.notices(ui);
-                if self.session.is_none() {
-                    self.empty(ui);
-                    return;
-                }
-                ui.add_space(4.0);
-                self.learners(ui);
-                ui.add_space(6.0);
-                self.tabs(ui);
-                match self.settings.tab {
-                    Tab::Charts => self.charts(ui),
-                    Tab::Why => self.why(ui),
-                    Tab::Share => self.share(ui),
-                }
+        if self.settings.embed {
+            CentralPanel::default().frame(frame).show(ui, |ui| {
+                self.controls(ui);
+                let height = (ui.available_height() - 30.0).max(80.0);
+                self.pinned_chart(ui, height);
             });
-        });
+        } else {
+            let top = egui::Panel::top("controls").frame(frame).show(ui, |ui| {
+                self.controls(ui);
+                let height = (ctx.content_rect().height() * 0.2).clamp(88.0, 170.0);
+                self.pinned_chart(ui, height);
+            });
+            let above = top.response.rect;
+            // A swipe that begins here moves what scrolls below, as one would expect.
+            self.swiped += swipe(ui, above);
+            self.card_panel(ui);
+            let frame = Frame::new().fill(ui.visuals().panel_fill).inner_margin(margin);
+            CentralPanel::default().frame(frame).show(ui, |ui| self.scrolling(ui));
+        }
         self.dialogs(&ctx);
+        self.notices_above(&ctx);
+        self.point(&ctx);
         // What was just clicked is to be done now, not at the next movement of the mouse.
         if self.has_commands() {
             ctx.request_repaint();
         }
     }
 
+    fn scrolling(&mut self, ui: &mut Ui) {
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            ui.scroll_with_delta(vec2(0.0, std::mem::take(&mut self.swiped)));
+            if self.session.is_none() {
+                self.setup(ui);
+                self.empty(ui);
+                return;
+            }
+            self.game(ui);
+            self.ending_card(ui);
+            let learners = ui.scope(|ui| self.learners(ui)).response.rect;
+            self.spots.set(Spot::Learners, learners);
+            ui.add_space(6.0);
+            self.stories_row(ui);
+            self.setup(ui);
+            ui.add_space(6.0);
+            let tabs = ui.scope(|ui| self.tabs(ui)).response.rect;
+            self.spots.set(Spot::Tabs, tabs);
+            match self.settings.tab {
+                Tab::Charts => self.charts(ui),
+                Tab::Why => self.why(ui),
+                Tab::Share => self.share(ui),
+            }
+        });
+    }
+
     fn tabs(&mut self, ui: &mut Ui) {
-        ui.horizontal_wrapped(|ui| {
+        let before = self.settings.tab;
+        let row = ui.horizontal_wrapped(|ui| {
             for (tab, _, name) in Tab::ALL {
                 ui.selectable_value(&mut self.settings.tab, tab, RichText::new(name).strong());
             }
         });
+        // What a card or a key has opened is to be seen.
+        if self.tab_shown != self.settings.tab {
+            if before == self.settings.tab {
+                row.response.scroll_to_me(Some(egui::Align::TOP));
+            }
+            self.tab_shown = self.settings.tab;
+        }
         ui.separator();
     }
 
@@ -111,23 +134,14 @@ impl Panel {
             }
         });
     }
+}
 
-    fn notices(&mut self, ui: &mut Ui) {
-        let mut closed = None;
-        let all = self.notices.iter().chain(self.no_scene.iter()).enumerate();
-        for (index, notice) in all {
-            Frame::new().fill(ui.visuals().faint_bg_color).inner_margin(6).corner_radius(4).show(ui, |ui| {
-                ui.horizontal(|ui| {
-                    let is_scene = index >= self.notices.len();
-                    if !is_scene && ui.small_button("×").on_hover_text("Dismiss").clicked() {
-                        closed = Some(index);
-                    }
-                    ui.add(egui::Label::new(RichText::new(notice).color(alarm(ui))).wrap());
-                });
-            });
-        }
-        if let Some(index) = closed {
-            self.notices.remove(index);
-        }
+/// How far a finger that began in this rectangle has just moved up or down.
+fn swipe(ui: &Ui, rect: egui::Rect) -> f32 {
+    if !ui.input(|input| input.has_touch_screen()) {
+        return 0.0;
     }
+    let began = ui.input(|input| input.pointer.press_origin()).is_some_and(|origin| rect.contains(origin));
+    let dragged = ui.ctx().dragged_id().is_some();
+    if began && !dragged { ui.input(|input| input.pointer.delta().y) } else { 0.0 }
 }

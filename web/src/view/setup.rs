@@ -6,7 +6,7 @@ use body_schema::{
 };
 use egui::{ComboBox, RichText, TextEdit, Ui};
 
-use crate::{panel::Panel, settings::MAX_SEED};
+use crate::{panel::Panel, settings::MAX_SEED, words};
 
 /// There are so many colours, dashes and markers.
 const MOST_LEARNERS: usize = 6;
@@ -28,8 +28,8 @@ impl Panel {
             let label = ui.label("Scenario");
             let mut chosen = self.settings.scenario.clone();
             ComboBox::from_id_salt("scenario")
-                .selected_text(&chosen)
-                .width(170.0)
+                .selected_text(format!("All scenarios… ({chosen})"))
+                .width(190.0)
                 .height(420.0)
                 .show_ui(ui, |ui| {
                     for scenario in &self.scenarios {
@@ -41,6 +41,10 @@ impl Panel {
                 .labelled_by(label.id);
             if chosen != self.settings.scenario {
                 self.choose_scenario(&chosen);
+            }
+            if !self.server {
+                ui.label(format!("Seed {}", self.settings.seed));
+                return;
             }
             let label = ui.label("Seed");
             let field = TextEdit::singleline(&mut self.seed_text).desired_width(70.0).char_limit(16);
@@ -56,6 +60,10 @@ impl Panel {
         let Some(scenario) = self.scenario().cloned() else { return };
         ui.label(&scenario.title);
         ui.label(RichText::new(figures(&scenario)).weak().small());
+        self.pace_row(ui);
+        if !self.server {
+            return;
+        }
         ui.horizontal_wrapped(|ui| {
             ui.label("Compare");
             let compared = self.settings.learners.clone();
@@ -77,8 +85,7 @@ impl Panel {
         } else {
             None
         };
-        let about =
-            format!("Estimator {}, policy {}. A change begins the run anew.", learner.estimator, learner.policy);
+        let about = format!("{} A change begins the run anew.", words::terms(learner));
         let toggled = ui.add_enabled(refused.is_none(), egui::Checkbox::new(&mut on, &learner.name));
         if toggled.on_hover_text(about).on_disabled_hover_text(refused.unwrap_or_default()).changed() {
             self.compare(&learner.name, on);
@@ -122,6 +129,12 @@ impl Panel {
         self.settings.learners.clear();
         (self.settings.joints, self.settings.learner, self.settings.run_to) = (None, None, None);
         self.notices.clear();
+        // The cards speak of another scenario.
+        self.tour = None;
+        self.choose_usual_learners();
+        if let Some(story) = self.story_of_scenario() {
+            self.story = story;
+        }
         self.open(1);
     }
 
@@ -145,7 +158,7 @@ impl Panel {
         let seed = (mixed >> 33) % 10_000;
         self.settings.seed = if seed == self.settings.seed { (seed + 1) % 10_000 } else { seed };
         self.seed_text = self.settings.seed.to_string();
-        if !self.scenarios.is_empty() {
+        if !self.scenarios.is_empty() && self.server {
             self.open(1);
         }
     }

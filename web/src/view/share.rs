@@ -24,11 +24,14 @@ impl Panel {
     pub(super) fn share(&mut self, ui: &mut Ui) {
         ui.label(RichText::new("This view as a link").strong());
         ui.label("It holds scenario, seed, learners, step and view. Whoever opens it sees the same numbers.");
-        let link = format!("?{}", self.settings.query(false));
+        let link = format!("?{}", self.settings.link());
         ui.add(egui::Label::new(RichText::new(&link).monospace().small()).wrap().selectable(true));
         ui.horizontal(|ui| {
             if ui.button("Copy link").clicked() {
                 self.ask(Command::Copy { text: link });
+            }
+            if ui.button("Copy picture").on_hover_text("The scene as it is drawn, on the clipboard").clicked() {
+                self.ask(Command::Picture);
             }
             if let Some(copied) = &self.copied {
                 ui.label(copied);
@@ -65,6 +68,12 @@ impl Panel {
         }
         ui.add_space(8.0);
         ui.label(RichText::new("The scene").strong());
+        if ui.button("Reset view").on_hover_text("Camera and views as they were at first; the run stays").clicked() {
+            self.ask(Command::RestoreView);
+        }
+        if !self.server {
+            return;
+        }
         ui.horizontal_wrapped(|ui| {
             ui.label("Ellipsoids of uncertainty");
             let mut ellipsoids = self.settings.ellipsoids.clone();

@@ -1,9 +1,14 @@
 //! The partition of the joint box, cut by the plane of two joints through the chosen configuration.
 
-use body_schema::optimize::{Plane, Projection};
-use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Shape, Stroke, StrokeKind, Ui, pos2, vec2};
+use body_schema::{
+    experiment::Choice,
+    optimize::{Plane, Projection},
+};
+use egui::{
+    Align2, Color32, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, StrokeKind, Ui, WidgetInfo, accesskit::Role, pos2, vec2,
+};
 
-use super::why::joint_value;
+use super::{style::accent, why::joint_value};
 use crate::{
     colours::viridis,
     panel::Panel,
@@ -21,7 +26,7 @@ impl Panel {
     pub(super) fn slice(&self, ui: &mut Ui, search: &Search, plane: Plane, iteration: usize) -> Option<[f64; 2]> {
         let side = (ui.available_width() - MARGIN.0 - 8.0).clamp(120.0, LARGEST);
         let (area, response) =
-            ui.allocate_exact_size(vec2(side + MARGIN.0 + 8.0, side + MARGIN.1 + 26.0), Sense::click());
+            ui.allocate_exact_size(vec2(side + MARGIN.0 + 8.0, side + MARGIN.1), Sense::click());
         let square = Rect::from_min_size(area.min + vec2(MARGIN.0, 4.0), vec2(side, side));
         let at = |[x, y]: [f64; 2]| pos2(square.left() + x as f32 * side, square.bottom() - y as f32 * side);
         let cells = search.slice(plane, iteration);
@@ -37,7 +42,7 @@ impl Panel {
             let colour = cell.value.map_or(Color32::GRAY, |value| viridis(1.0 - (value - low) / (high - low)));
             painter.rect(rect(cell), 0.0, colour, thin, StrokeKind::Inside);
         }
-        let bold = Color32::from_rgb(0xD5, 0x5E, 0x00);
+        let bold = accent(ui.visuals().dark_mode);
         for cell in cells.iter().filter(|cell| cell.optimal) {
             painter.rect_stroke(rect(cell).shrink(1.0), 0.0, Stroke::new(2.0, bold), StrokeKind::Inside);
         }
@@ -46,6 +51,7 @@ impl Panel {
         if let Some(proposed) = self.why.proposed.as_ref().filter(|proposed| proposed.len() == joints) {
             let centre = at(search.place(plane, proposed));
             painter.circle(centre, 6.0, Color32::WHITE, Stroke::new(2.5, Color32::BLACK));
+            self.answer_at(&painter, centre, square, search.choice());
         }
         self.slice_axes(ui, &painter, square, search, plane);
         let inside = |pos: Pos2| {
@@ -53,8 +59,11 @@ impl Panel {
             let y = f64::from((square.bottom() - pos.y) / side);
             ((0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y)).then_some([x, y])
         };
+        let name = "Slice of the search: click a point to ask what it would have taught";
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
+        legend(ui);
         let hovered = response.hover_pos().and_then(inside);
-        let clicked = response.interact_pointer_pos().filter(|_| response.clicked()).and_then(inside);
+        let clicked = response.interact_pointer_pos().filter(|_| response.clicked() && self.server).and_then(inside);
         if let (Some(place), Some(pointer)) = (hovered, response.hover_pos()) {
             let under = cells.iter().find(|cell| rect(cell).contains(pointer));
             let text = self.slice_hint(search, plane, place, under.and_then(|cell| cell.value));
@@ -72,9 +81,33 @@ impl Panel {
             text += &format!("{name} {}\n", joint_value(self, joint, configuration[joint]));
         }
         if let (Some(trace), Some(value)) = (search.choice().trace, value) {
-            text += &format!("expected fall here {:.3}\n", trace - value);
+            text += &format!("the middle of its box teaches {:.3}\n", trace - value);
         }
-        text + "Click to propose it"
+        text + if !self.server {
+            ""
+        } else if self.touch {
+            "Tap to ask about this posture"
+        } else {
+            "Click to ask about this posture"
+        }
+    }
+
+    /// What the visitor's posture would have taught, beside the point that stands for it.
+    fn answer_at(&self, painter: &egui::Painter, point: Pos2, square: Rect, choice: &Choice) {
+        let text = match (self.share_of_chosen(choice), self.why.evaluating) {
+            (Some(share), _) => format!("{:.0} %", share * 100.0),
+            (None, true) => "…".to_owned(),
+            (None, false) => return,
+        };
+        let galley = painter.layout_no_wrap(text, FontId::proportional(13.0), Color32::WHITE);
+        let (off, align) = if point.x > square.center().x {
+            (vec2(-12.0, 0.0), Align2::RIGHT_CENTER)
+        } else {
+            (vec2(12.0, 0.0), Align2::LEFT_CENTER)
+        };
+        let rect = align.anchor_size(point + off, galley.size()).expand(3.0);
+        painter.rect_filled(rect, 3.0, Color32::from_black_alpha(220));
+        painter.galley(rect.min + vec2(3.0, 3.0), galley, Color32::WHITE);
     }
 
     fn slice_axes(&self, ui: &Ui, painter: &egui::Painter, square: Rect, search: &Search, plane: Plane) {
@@ -109,23 +142,29 @@ impl Panel {
             let start = pos2(square.left() - MARGIN.0, square.center().y + name.size().x / 2.0);
             painter.add(egui::epaint::TextShape::new(start, name, colour).with_angle(-std::f32::consts::FRAC_PI_2));
         }
-        let legend = pos2(square.left(), square.bottom() + OFF + 29.0);
-        let bar = Rect::from_min_size(legend + vec2(0.0, 3.0), vec2(60.0, 9.0));
+    }
+}
+
+/// What the slice's colours and marks mean.
+fn legend(ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 5.0;
+        let quiet = |text: &str| RichText::new(text).weak().small();
+        ui.label(quiet("teaches little"));
+        let (bar, _) = ui.allocate_exact_size(vec2(60.0, 9.0), Sense::hover());
         let steps = 20;
         for step in 0..steps {
             let strip = Rect::from_min_size(
                 bar.min + vec2(bar.width() * step as f32 / steps as f32, 0.0),
                 vec2(bar.width() / steps as f32 + 0.5, bar.height()),
             );
-            painter.rect_filled(strip, 0.0, viridis(f64::from(step) / f64::from(steps - 1)));
+            ui.painter().rect_filled(strip, 0.0, viridis(f64::from(step) / f64::from(steps - 1)));
         }
-        let text = if square.width() >= LARGEST {
-            "teaches little … much   outlined: divided next, ×: chosen"
-        } else {
-            "little … much   outlined: next"
-        };
-        painter.text(pos2(bar.right() + 6.0, legend.y), Align2::LEFT_TOP, text, font, colour);
-    }
+        ui.label(quiet("much"));
+        ui.label(quiet("× chosen"));
+        ui.label(quiet("□ divided next"));
+        ui.label(quiet("○ yours"));
+    });
 }
 
 /// The chosen point: black on white, to be seen on every colour.

@@ -37,9 +37,9 @@ impl Panel {
             if let Some(place) = proposed {
                 self.propose(search.configuration(plane, place));
             }
+            self.proposal(&mut uis[0], search.choice());
             self.diagram(&mut uis[columns - 1], &search, iteration);
         });
-        self.proposal(ui, search.choice());
     }
 
     fn choose_learner(&mut self, ui: &mut Ui) {
@@ -72,8 +72,9 @@ impl Panel {
         let number = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.3}"));
         let [before, predicted, realised] = [choice.trace, chosen.predicted_gain, chosen.realised_gain].map(number);
         let text =
-            format!("Uncertainty tr(W P) before: {before} · expected to fall by {predicted} · fell by {realised}");
-        ui.add(egui::Label::new(text).wrap());
+            format!("Uncertainty before: {before} · expected to fall by {predicted} · fell by {realised}");
+        let tip = "The trace of the weighted covariance, tr(W P), and its fall. Stabilising noise lets it rise again.";
+        ui.add(egui::Label::new(text).wrap()).on_hover_text(tip);
         if self.cursor != *step {
             let text = format!(
                 "The server keeps the search of the latest movement, {step}; the scene shows step {}.",
@@ -128,10 +129,20 @@ impl Panel {
         iteration
     }
 
+    /// What the visitor's posture would have taught, as a share of what was chosen.
+    pub(super) fn share_of_chosen(&self, choice: &Choice) -> Option<f64> {
+        let gain = self.why.appraisal.as_ref()?.gain;
+        Some(gain / choice.chosen.predicted_gain.filter(|best| *best > 0.0)?)
+    }
+
     fn proposal(&mut self, ui: &mut Ui, choice: &Choice) {
-        ui.add_space(6.0);
+        ui.add_space(4.0);
+        if !self.server {
+            return;
+        }
         let Some(proposed) = self.why.proposed.clone() else {
-            ui.label("Could you choose better? Click a point of the slice.");
+            let verb = if self.touch { "Tap" } else { "Click" };
+            ui.label(format!("Could you do better? {verb} a point of the slice."));
             return;
         };
         let joints = choice.joints.iter().zip(&proposed).enumerate();
@@ -144,8 +155,8 @@ impl Panel {
             return;
         };
         let gain = appraisal.gain;
-        let share = choice.chosen.predicted_gain.filter(|best| *best > 0.0).map(|best| gain / best * 100.0);
-        let share = share.map_or(String::new(), |share| format!(", {share:.0} % of what DIRECT found"));
+        let share = self.share_of_chosen(choice);
+        let share = share.map_or(String::new(), |share| format!(", {:.0} % of what DIRECT found", share * 100.0));
         ui.add(egui::Label::new(format!("It would have lowered the uncertainty by {gain:.3}{share}.")).wrap());
         let [x, y, z] = appraisal.predicted_marker_m;
         let spread = (0..3).map(|i| appraisal.marker_covariance_m2[i][i].max(0.0)).sum::<f64>().sqrt();

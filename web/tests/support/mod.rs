@@ -102,7 +102,7 @@ impl Page {
         let mut made = 0;
         for _ in 0..2000 {
             let asked = self.commands().into_iter().find_map(|command| match command {
-                Command::Step { count, expected_step, session } => Some((count, expected_step, session)),
+                Command::Step { count, expected_step, session, .. } => Some((count, expected_step, session)),
                 _ => None,
             });
             let Some((count, expected, session)) = asked else {

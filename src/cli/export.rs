@@ -1,0 +1,102 @@
+//! `export`: the page without a server.
+
+use std::{collections::BTreeSet, path::PathBuf, str::FromStr};
+
+use anyhow::Result;
+use body_schema::{
+    export::{Export, Plan, Written},
+    scenario::Scenario,
+};
+
+use super::{BadInput, load_scenario, no_person, output, progress};
+
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Built-in scenarios (see `body-schema scenarios`) or paths of scenario files
+    #[arg(value_name = "SCENARIO", required = true)]
+    scenarios: Vec<String>,
+    /// The folder to write; an earlier export in it is replaced
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// A learner, or estimator:policy, as in smoother:random; repeat for several [default: those that the explorer compares]
+    #[arg(long = "learner", value_name = "NAME")]
+    learners: Vec<String>,
+    /// Seeds to record: numbers and ranges with both ends, as 1,4 or 1..5
+    #[arg(long = "seed", value_name = "SEEDS", value_delimiter = ',', default_value = "1")]
+    seeds: Vec<SeedRange>,
+    /// Movements of every run, at most 1000 [default: 100, after the change where the body changes]
+    #[arg(long, value_name = "N")]
+    steps: Option<u64>,
+    /// Write into a folder that holds other files
+    #[arg(long)]
+    force: bool,
+    /// Take the page's panel from DIR, which `cargo run -p body-schema-bundle -- DIR` built
+    #[arg(long, value_name = "DIR", hide = true)]
+    panel_dir: Option<PathBuf>,
+}
+
+/// One seed, or all from one to another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct SeedRange {
+    first: u64,
+    last: u64,
+}
+
+/// More runs than this make a folder that nobody downloads.
+const MOST_SEEDS: usize = 200;
+
+impl FromStr for SeedRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |part: &str| part.parse::<u64>().map_err(|_| format!("`{part}` is not a whole number"));
+        let (first, last) = text.split_once("..").unwrap_or((text, text));
+        let (first, last) = (number(first)?, number(last)?);
+        if first > last {
+            return Err(format!("the range is empty; write {last}..{first}"));
+        }
+        if (last - first) as usize >= MOST_SEEDS {
+            return Err(format!("at most {MOST_SEEDS} seeds in one go"));
+        }
+        Ok(Self { first, last })
+    }
+}
+
+pub fn export(arguments: &Arguments) -> Result<()> {
+    let scenarios = arguments.scenarios.iter().map(|name| load_scenario(name)).collect::<Result<Vec<Scenario>>>()?;
+    let names: BTreeSet<&str> = scenarios.iter().map(|scenario| scenario.name.as_str()).collect();
+    if names.len() < scenarios.len() {
+        return Err(BadInput("a scenario is named twice, or two have one name; name each once".to_owned()).into());
+    }
+    let seeds: BTreeSet<u64> = arguments.seeds.iter().flat_map(|range| range.first..=range.last).collect();
+    let learners = (!arguments.learners.is_empty()).then_some(arguments.learners.as_slice());
+    for scenario in &scenarios {
+        no_person(&scenario.chosen(learners)?)?;
+    }
+    let plans = scenarios.iter().map(|scenario| Ok(Plan::new(scenario, learners, arguments.steps)?));
+    let export = Export {
+        plans: plans.collect::<Result<_>>()?,
+        seeds: seeds.into_iter().collect(),
+        panel_dir: arguments.panel_dir.clone(),
+    };
+    let bar = progress::bar(export.steps(), "recording");
+    let Written { files, bytes } = export.write(&arguments.out, arguments.force, &|| bar.inc(1))?;
+    bar.finish_and_clear();
+    let out = arguments.out.display();
+    output::say(format!("wrote {files} files, {:.1} MB, to {out}", bytes as f64 / 1e6))?;
+    output::say(format!("any static host serves it; here: python3 -m http.server -d {out}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_are_numbers_and_ranges() {
+        let range = |text: &str| text.parse::<SeedRange>().map(|range| (range.first, range.last));
+        assert_eq!((range("7"), range("1..5"), range("3..3")), (Ok((7, 7)), Ok((1, 5)), Ok((3, 3))));
+        for text in ["", "x", "-1", "5..1", "1..", "1..1000", "0..18446744073709551615"] {
+            assert!(range(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! What can go wrong with an export.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use crate::{experiment::ExperimentError, recording::RecordingError, scenario::ScenarioError, server::ServerError};
+
+/// Why a folder could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The folder holds something else.
+    #[error("the folder {} is not empty and holds no export; name another with --out, or write into it with --force", .0.display())]
+    NotEmpty(PathBuf),
+    /// A run cannot be so long.
+    #[error(
+        "a run of `{scenario}` in a page has 1 to {most} steps, {steps} were asked for; use --steps {most} or fewer"
+    )]
+    Steps {
+        /// The scenario.
+        scenario: String,
+        /// What was asked for.
+        steps: u64,
+        /// What is possible.
+        most: u64,
+    },
+    /// A scenario cannot be run so.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// A run broke off.
+    #[error("`{scenario}`, seed {seed}: {source}")]
+    Run {
+        /// The scenario.
+        scenario: String,
+        /// The seed.
+        seed: u64,
+        /// Why.
+        source: ExperimentError,
+    },
+    /// A run could not be recorded.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The page's files are not there.
+    #[error(transparent)]
+    Page(#[from] ServerError),
+    /// A value could not be written as JSON.
+    #[error("cannot write JSON: {0}; please report this as a bug, with the scenario and the seed")]
+    Json(#[from] serde_json::Error),
+    /// A file or folder could not be used.
+    #[error("cannot {doing} {}: {source}", path.display())]
+    File {
+        /// What was tried.
+        doing: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+}
+
+impl ExportError {
+    /// Whether the error lies in what was asked, and not in carrying it out.
+    pub fn is_bad_input(&self) -> bool {
+        match self {
+            Self::NotEmpty(_) | Self::Steps { .. } => true,
+            Self::Scenario(error) => !matches!(error, ScenarioError::Experiment(_)),
+            _ => false,
+        }
+    }
+}
+
+/// Says what was being done to which file when it failed.
+pub(super) trait Doing<T> {
+    fn doing(self, doing: &'static str, path: &Path) -> Result<T, ExportError>;
+}
+
+impl<T> Doing<T> for io::Result<T> {
+    fn doing(self, doing: &'static str, path: &Path) -> Result<T, ExportError> {
+        self.map_err(|source| ExportError::File { doing, path: path.to_owned(), source })
+    }
+}

@@ -1,0 +1,215 @@
+//! The page without a server: a folder of recorded runs that any static host serves.
+//!
+//! ```text
+//! index.html, *.js, *.css          the page, as the server has it, with relative addresses
+//! panel/, viewer/                  its WebAssembly, compressed; the page unpacks it
+//! export.json                      what is here: scenarios, and their runs
+//! scenarios/NAME.toml              the scenario files
+//! runs/NAME/SEED/                  a run: see the module `run`
+//! ```
+//!
+//! Nothing in it needs a server that computes, sets headers or knows a media type: everything is fetched as bytes from
+//! addresses relative to the page, so that the folder works below any address.
+
+mod error;
+mod page;
+mod run;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+pub use error::ExportError;
+
+use crate::scenario::{LearnerSpec, Scenario, ScenarioSummary, WorldSpec};
+use error::Doing;
+use run::Recorded;
+
+/// What says that a folder is an export, and what is in it.
+const MANIFEST: &str = "export.json";
+/// Raised when the meaning of a file changes.
+const FORMAT: u32 = 1;
+/// Steps of a run unless told otherwise.
+const USUAL_STEPS: u64 = 100;
+/// The longest run: what a page can fetch at once.
+pub const MAX_STEPS: u64 = 1000;
+
+/// What is to be exported.
+pub struct Export<'a> {
+    /// The scenarios, each with what to run of it.
+    pub plans: Vec<Plan<'a>>,
+    /// The seeds of each.
+    pub seeds: Vec<u64>,
+    /// Another build of the page's panel than that of this program, for those who work on it.
+    pub panel_dir: Option<PathBuf>,
+}
+
+/// A scenario, and what to run of it.
+pub struct Plan<'a> {
+    /// The scenario.
+    pub scenario: &'a Scenario,
+    /// Its learners, by their names.
+    pub learners: Vec<String>,
+    /// Steps of each run.
+    pub steps: u64,
+}
+
+impl<'a> Plan<'a> {
+    /// The learners and steps that are asked for, or those that a page shows.
+    pub fn new(scenario: &'a Scenario, learners: Option<&[String]>, steps: Option<u64>) -> Result<Self, ExportError> {
+        let learners = learners.map_or_else(|| scenario.summary().explorer, <[String]>::to_vec);
+        let available = scenario.experiment(1, Some(&learners))?.remaining().map(|left| left as u64);
+        let most = available.unwrap_or(MAX_STEPS).min(MAX_STEPS);
+        let steps = match steps {
+            Some(steps) if steps > most || steps == 0 => {
+                return Err(ExportError::Steps { scenario: scenario.name.clone(), steps, most });
+            }
+            Some(steps) => steps,
+            None => usual_steps(scenario).min(most),
+        };
+        Ok(Self { scenario, learners, steps })
+    }
+}
+
+/// As many as tell the story: where the body changes, also what comes after that.
+fn usual_steps(scenario: &Scenario) -> u64 {
+    let changes_at = match &scenario.world {
+        WorldSpec::Simulated { change: Some(change), .. } => change.step,
+        _ => 0,
+    };
+    (changes_at + USUAL_STEPS).min(scenario.steps)
+}
+
+/// What was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// How many files.
+    pub files: u64,
+    /// Their size together, bytes.
+    pub bytes: u64,
+}
+
+/// What is in a folder.
+#[derive(Debug, Serialize, Deserialize)]
+struct Manifest {
+    format: u32,
+    version: String,
+    scenarios: Vec<Exported>,
+    /// Sizes of the compressed files once they are unpacked, bytes, by address.
+    unpacked: std::collections::BTreeMap<String, usize>,
+}
+
+/// A scenario of the folder.
+#[derive(Debug, Serialize, Deserialize)]
+struct Exported {
+    /// As a server lists it, with the learners and steps of its runs alone.
+    #[serde(flatten)]
+    summary: ScenarioSummary,
+    /// The address of its file.
+    source: String,
+    runs: Vec<ExportedRun>,
+}
+
+/// A run of the folder.
+#[derive(Debug, Serialize, Deserialize)]
+struct ExportedRun {
+    seed: u64,
+    steps: u64,
+    learners: Vec<String>,
+    #[serde(flatten)]
+    recorded: Recorded,
+    /// The address of its files.
+    folder: String,
+}
+
+impl Export<'_> {
+    /// How many steps there are to make.
+    pub fn steps(&self) -> u64 {
+        self.plans.iter().map(|plan| plan.steps).sum::<u64>() * self.seeds.len() as u64
+    }
+
+    /// Writes the folder. One that holds another export is replaced; one that holds anything else is refused unless `force`
+    /// says to write beside it. `tick` is called after every step.
+    pub fn write(&self, out: &Path, force: bool, tick: &dyn Fn()) -> Result<Written, ExportError> {
+        prepare(out, force)?;
+        let files = page::Files::load(self.panel_dir.as_deref())?;
+        let mut manifest = Manifest {
+            format: FORMAT,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            scenarios: Vec::new(),
+            unpacked: files.unpacked(),
+        };
+        // At once, so that a folder whose export was interrupted is still known for one.
+        write_json(&out.join(MANIFEST), &manifest)?;
+        files.write(out, &self.plans)?;
+        for plan in &self.plans {
+            manifest.scenarios.push(self.write_plan(plan, out, tick)?);
+        }
+        write_json(&out.join(MANIFEST), &manifest)?;
+        measure(out)
+    }
+
+    fn write_plan(&self, plan: &Plan<'_>, out: &Path, tick: &dyn Fn()) -> Result<Exported, ExportError> {
+        let scenario = plan.scenario;
+        let source = format!("scenarios/{}.toml", scenario.name);
+        write(&out.join(&source), scenario.source.as_bytes())?;
+        let mut runs = Vec::with_capacity(self.seeds.len());
+        for &seed in &self.seeds {
+            let folder = format!("runs/{}/{seed}", scenario.name);
+            let recorded = run::record(plan, seed, &out.join(&folder), tick)?;
+            runs.push(ExportedRun { seed, steps: plan.steps, learners: plan.learners.clone(), recorded, folder });
+        }
+        let summary = ScenarioSummary {
+            learners: scenario.chosen(Some(&plan.learners))?.iter().map(LearnerSpec::description).collect(),
+            compositions: Vec::new(),
+            explorer: plan.learners.clone(),
+            steps: plan.steps,
+            ..scenario.summary()
+        };
+        Ok(Exported { summary, source, runs })
+    }
+}
+
+/// Makes the folder ready: empty, or an export whose runs go.
+fn prepare(out: &Path, force: bool) -> Result<(), ExportError> {
+    fs::create_dir_all(out).doing("make the folder", out)?;
+    let is_empty = fs::read_dir(out).doing("read the folder", out)?.next().is_none();
+    let text = fs::read(out.join(MANIFEST)).unwrap_or_default();
+    let is_export = serde_json::from_slice::<Manifest>(&text).is_ok();
+    if !(is_empty || is_export || force) {
+        return Err(ExportError::NotEmpty(out.to_owned()));
+    }
+    for folder in ["runs", "scenarios"].map(|name| out.join(name)).iter().filter(|folder| is_export && folder.exists())
+    {
+        fs::remove_dir_all(folder).doing("replace", folder)?;
+    }
+    Ok(())
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    fs::create_dir_all(folder).doing("make the folder", folder)?;
+    fs::write(path, bytes).doing("write", path)
+}
+
+fn write_json(path: &Path, value: &impl Serialize) -> Result<(), ExportError> {
+    write(path, &serde_json::to_vec(value)?)
+}
+
+/// All files below a folder.
+fn measure(folder: &Path) -> Result<Written, ExportError> {
+    let mut sum = Written { files: 0, bytes: 0 };
+    for entry in fs::read_dir(folder).doing("read the folder", folder)? {
+        let entry = entry.doing("read the folder", folder)?;
+        let metadata = entry.metadata().doing("read", &entry.path())?;
+        let found = match metadata.is_dir() {
+            true => measure(&entry.path())?,
+            false => Written { files: 1, bytes: metadata.len() },
+        };
+        sum = Written { files: sum.files + found.files, bytes: sum.bytes + found.bytes };
+    }
+    Ok(sum)
+}

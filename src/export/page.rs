@@ -1,0 +1,123 @@
+//! The page's files, as a folder holds them.
+
+use std::{collections::BTreeMap, path::Path};
+
+use super::{ExportError, Plan, write};
+use crate::server::{CONTENT_SECURITY_POLICY, INDEX, PageFile, page_files};
+
+/// All files of the page but the page itself.
+pub(super) struct Files(Vec<PageFile>);
+
+impl Files {
+    pub(super) fn load(panel: Option<&Path>) -> Result<Self, ExportError> {
+        Ok(Self(page_files(panel)?))
+    }
+
+    /// Sizes of the compressed ones once they are unpacked, bytes.
+    pub(super) fn unpacked(&self) -> BTreeMap<String, usize> {
+        self.0.iter().filter(|file| is_packed(file)).map(|file| (address(file), file.bytes.len())).collect()
+    }
+
+    pub(super) fn write(&self, out: &Path, plans: &[Plan<'_>]) -> Result<(), ExportError> {
+        for file in &self.0 {
+            write(&out.join(address(file)), if is_packed(file) { &file.packed } else { &file.bytes })?;
+        }
+        // Hosts that make pages of their own from what they are given leave these alone.
+        write(&out.join(".nojekyll"), b"")?;
+        write(&out.join("index.html"), index(INDEX, &self.0, plans).as_bytes())
+    }
+}
+
+/// WebAssembly is what is large.
+fn is_packed(file: &PageFile) -> bool {
+    file.path.ends_with(".wasm")
+}
+
+/// The address relative to the page.
+fn address(file: &PageFile) -> String {
+    let path = file.path.trim_start_matches('/');
+    if is_packed(file) { format!("{path}.gz") } else { path.to_owned() }
+}
+
+/// The page: with relative addresses, its policy in itself, and a title of its own.
+fn index(template: &str, files: &[PageFile], plans: &[Plan<'_>]) -> String {
+    let mut page = template.replacen("<html ", "<html data-source=\"files\" ", 1);
+    for file in files {
+        let versioned = format!("\"{}?v={}\"", address(file), file.version);
+        page = page.replace(&format!("\"{}\"", file.path), &versioned);
+    }
+    let policy = format!("<meta http-equiv=\"Content-Security-Policy\" content=\"{CONTENT_SECURITY_POLICY}\" />");
+    // First of all: a policy holds for what comes after it.
+    page = page.replacen("<head>", &format!("<head>\n    {policy}"), 1);
+    let (title, about) = titles(plans);
+    page = replace_between(&page, "<title>", "</title>", &title);
+    for (property, content) in [("og:title", &title), ("og:description", &about)] {
+        page = with_property(page, property, content);
+    }
+    replace_between(&page, "<noscript>", "</noscript>", "This page needs JavaScript.")
+}
+
+/// The title, and a sentence for those who see a link to the page.
+fn titles(plans: &[Plan<'_>]) -> (String, String) {
+    let [first, ..] = plans else { return ("body-schema".to_owned(), String::new()) };
+    let about = match plans {
+        [only] => {
+            let learners = only.learners.join(", ");
+            format!("{}. {} movements by {learners}, recorded: play them in the page.", only.scenario.title, only.steps)
+        }
+        _ => format!("{} recorded scenarios: a robot learns where its joints are. Play them in the page.", plans.len()),
+    };
+    let title =
+        if plans.len() == 1 { format!("{} · body-schema", first.scenario.title) } else { "body-schema".to_owned() };
+    (escaped(&title), escaped(&about))
+}
+
+/// Sets the content of a property for link previews, or adds the property.
+fn with_property(page: String, property: &str, content: &str) -> String {
+    let begin = format!("<meta property=\"{property}\" content=\"");
+    if page.contains(&begin) {
+        return replace_between(&page, &begin, "\"", content);
+    }
+    page.replacen("</head>", &format!("  {begin}{content}\" />\n  </head>"), 1)
+}
+
+/// The text with what stands between the first `begin` and the next `end` replaced.
+fn replace_between(text: &str, begin: &str, end: &str, with: &str) -> String {
+    let found = text.split_once(begin).and_then(|(before, rest)| Some((before, rest.split_once(end)?.1)));
+    found.map_or_else(|| text.to_owned(), |(before, after)| [before, begin, with, end, after].concat())
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::builtin;
+
+    #[test]
+    fn the_page_names_only_what_lies_beside_it() {
+        let mut scenario = builtin("arm-6dof").expect("built in");
+        scenario.title = "Six joints & \"one\" <marker>".to_owned();
+        let plan = Plan::new(&scenario, None, Some(3)).expect("a plan");
+        let files = Files::load(None).expect("the page").0;
+        let page = index(INDEX, &files, &[plan]);
+        assert!(page.contains("<html data-source=\"files\""));
+        assert!(page.contains("<title>Six joints &amp; &quot;one&quot; &lt;marker> · body-schema</title>"), "{page}");
+        assert!(page.contains("3 movements by active, random, global"));
+        let begin = page.find("Content-Security-Policy").expect("a policy");
+        assert!(page.find("<script").expect("scripts") > begin && page.find("<link").expect("links") > begin);
+        let addresses = page.split('"').skip(1).step_by(2);
+        assert!(!addresses.clone().any(|text| text.starts_with('/')), "an address from the root of the host");
+        assert!(addresses.clone().any(|text| text.starts_with("viewer/re_viewer_bg.wasm.gz?v=")));
+        assert!(!page.contains("/v1/"), "no server, no interface");
+    }
+
+    #[test]
+    fn properties_are_set_or_added() {
+        let page = "<head><meta property=\"og:title\" content=\"old\" /></head>".to_owned();
+        assert_eq!(with_property(page.clone(), "og:title", "new"), page.replace("old", "new"));
+        assert!(with_property(page, "og:description", "so").contains("content=\"so\" />\n  </head>"));
+    }
+}

@@ -1,0 +1,87 @@
+//! One run in files.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `description.json` | what stays the same from step to step |
+//! | `reports.ndjson.gz` | one report a line, from step 0 |
+//! | `scene.rrd` | the recording as the page's viewer takes it: a header of 12 bytes, then messages |
+//! | `selections/LEARNER/STEP.json.gz` | how each movement was chosen, where a search was made |
+//! | `recording.rrd`, `steps.csv`, `result.json` | to take away |
+
+use std::{collections::BTreeSet, io::Write, path::Path};
+
+use flate2::{Compression, write::GzEncoder};
+use serde::{Deserialize, Serialize};
+
+use super::{ExportError, Plan, error::Doing, write, write_json};
+use crate::{
+    experiment::Experiment,
+    recording::{LiveLog, Recorder, StepsCsv, Target},
+};
+
+/// What the page must know of a run before it opens it.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Recorded {
+    /// The id of its recording.
+    recording: String,
+    /// The learners whose choices are explained.
+    searched: BTreeSet<String>,
+}
+
+/// Runs a plan with a seed and writes its files.
+pub(super) fn record(plan: &Plan<'_>, seed: u64, folder: &Path, tick: &dyn Fn()) -> Result<Recorded, ExportError> {
+    let scenario = plan.scenario;
+    let mut experiment = scenario.experiment(seed, Some(&plan.learners))?;
+    let live = LiveLog::new();
+    let mut recorder = Recorder::new(experiment.description(), Target::live(live.clone()))?;
+    let mut table = Vec::new();
+    let mut csv = StepsCsv::new(experiment.description(), &mut table)?;
+    let (mut reports, mut searched) = (Vec::new(), BTreeSet::new());
+    for step in 0..=plan.steps {
+        if step > 0 {
+            let failed = |source| ExportError::Run { scenario: scenario.name.clone(), seed, source };
+            experiment.step().map_err(failed)?;
+            searched.extend(write_selections(&experiment, &plan.learners, folder)?);
+            tick();
+        }
+        let report = experiment.latest();
+        recorder.log(report)?;
+        csv.write(report)?;
+        serde_json::to_writer(&mut reports, report)?;
+        reports.push(b'\n');
+    }
+    csv.flush()?;
+    drop(csv);
+    let recording = recorder.recording_id().to_owned();
+    recorder.finish()?;
+
+    write_json(&folder.join("description.json"), experiment.description())?;
+    write_packed(&folder.join("reports.ndjson.gz"), &reports)?;
+    let messages = live.put_together(&live.scene_parts_from(1))?;
+    write(&folder.join("scene.rrd"), &[live.header(), messages].concat())?;
+    write(&folder.join("recording.rrd"), &live.complete()?)?;
+    write(&folder.join("steps.csv"), &table)?;
+    write_json(&folder.join("result.json"), &experiment.result())?;
+    Ok(Recorded { recording, searched })
+}
+
+/// How the last movements were chosen, of those learners that can tell, which are returned.
+fn write_selections(experiment: &Experiment, learners: &[String], folder: &Path) -> Result<Vec<String>, ExportError> {
+    let mut searched = Vec::new();
+    for learner in learners {
+        if let Ok(choice) = experiment.choice(learner) {
+            let name = learner.replace(':', "-");
+            let file = format!("selections/{name}/{}.json.gz", choice.step);
+            write_packed(&folder.join(file), &serde_json::to_vec(&choice)?)?;
+            searched.push(learner.clone());
+        }
+    }
+    Ok(searched)
+}
+
+/// Compresses a file; the page unpacks it, whatever the host says of it.
+fn write_packed(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
+    let packed = encoder.write_all(bytes).and_then(|()| encoder.finish());
+    write(path, &packed.doing("compress", path)?)
+}

@@ -1,0 +1,172 @@
+//! How a run ended, in a sentence: computed from the run, and naming both sides of every comparison.
+
+use crate::{history::Verdict, panel::Panel};
+
+/// What has become of a learner at the end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outcome {
+    /// Accurate from this movement on; after a change of the body they are counted from there.
+    After(u64),
+    /// Its estimate ran away.
+    Diverged,
+    /// Not within as many movements as were made.
+    NotWithin(u64),
+    /// No truth to judge by: the error over measurements held out, metres, at the end and as a mean over the run.
+    HeldOut {
+        /// At the end.
+        last: f64,
+        /// Mean over all movements.
+        mean: f64,
+    },
+}
+
+/// The end of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ending {
+    /// The sentence.
+    pub sentence: String,
+    /// What was counted.
+    pub counted: String,
+    /// Every learner by its place in the description, the best first.
+    pub outcomes: Vec<(usize, Outcome)>,
+}
+
+impl Outcome {
+    /// In a few words.
+    pub fn words(self) -> String {
+        match self {
+            Self::After(movements) => movements.to_string(),
+            Self::Diverged => "ran away".to_owned(),
+            Self::NotWithin(movements) => format!("not within {movements}"),
+            Self::HeldOut { last, .. } => format!("{:.1} mm", last * 1e3),
+        }
+    }
+
+    /// The smaller, the better.
+    fn rank(self) -> f64 {
+        match self {
+            Self::After(movements) => movements as f64,
+            Self::HeldOut { mean, .. } => mean,
+            Self::NotWithin(_) => f64::MAX,
+            Self::Diverged => f64::INFINITY,
+        }
+    }
+}
+
+impl Panel {
+    /// Whether every learner has learned the arm, judged with hindsight, or has run away.
+    pub fn is_told(&self) -> bool {
+        let Some(description) = self.description().filter(|description| description.truth.is_some()) else {
+            return false;
+        };
+        self.is_past_change() && (0..description.learners.len()).all(|learner| self.is_done(learner))
+    }
+
+    /// Whether nothing more is to be learned of a learner.
+    pub(crate) fn is_done(&self, learner: usize) -> bool {
+        let verdict = self.history.verdict(self.history.latest(), learner);
+        matches!(verdict, Verdict::Converged(_) | Verdict::Diverged)
+    }
+
+    /// Whether the body will not change any more.
+    pub(crate) fn is_past_change(&self) -> bool {
+        let change = self.description().and_then(|description| description.change_at);
+        change.is_none_or(|change| self.history.latest() > change)
+    }
+
+    /// How the run ended; `None` while it goes on.
+    pub fn ending(&self) -> Option<Ending> {
+        let latest = self.history.latest();
+        let over = self.is_told() || latest >= self.run_to() || self.remaining() == Some(0);
+        let description = self.description().filter(|_| over && latest > 0 && self.human().is_none())?;
+        let change = description.change_at.filter(|change| latest > *change);
+        let mut outcomes: Vec<(usize, Outcome)> =
+            (0..description.learners.len()).map(|learner| (learner, self.outcome(learner, change))).collect();
+        outcomes.sort_by(|(_, a), (_, b)| a.rank().total_cmp(&b.rank()));
+        let counted = match change {
+            _ if description.truth.is_none() => format!("Error over measurements held out, after {latest} movements"),
+            Some(_) => "Movements after the body changed, until accurate again".to_owned(),
+            None => "Movements until accurate".to_owned(),
+        };
+        let name = |learner: usize| description.learners[learner].name.as_str();
+        let sentence = self.compared(&outcomes).map_or_else(
+            || format!("{}: {}.", name(outcomes[0].0), outcomes[0].1.words()),
+            |[(a, first), (b, second)]| sentence(name(a), first, name(b), second),
+        );
+        Some(Ending { sentence, counted, outcomes })
+    }
+
+    fn outcome(&self, learner: usize, change: Option<u64>) -> Outcome {
+        let latest = self.history.latest();
+        let begin = change.unwrap_or(0);
+        match self.history.verdict(latest, learner) {
+            Verdict::Diverged => Outcome::Diverged,
+            Verdict::Converged(first) => Outcome::After(first - begin),
+            Verdict::Learning | Verdict::Settled | Verdict::Waiting => {
+                let errors = self.history.curve(learner, |row| row.prediction_m.filter(|_| row.movements > 0));
+                let last = errors.last().map_or(f64::INFINITY, |[_, error]| *error);
+                let mean = errors.iter().map(|[_, error]| error).sum::<f64>() / errors.len().max(1) as f64;
+                Outcome::HeldOut { last, mean }
+            }
+            Verdict::Outside | Verdict::Within(..) => Outcome::NotWithin(latest - begin),
+        }
+    }
+
+    /// The two that the sentence compares: who asks with who does not, or else the first with the last. The better
+    /// stands first.
+    fn compared(&self, outcomes: &[(usize, Outcome)]) -> Option<[(usize, Outcome); 2]> {
+        let learners = &self.description()?.learners;
+        let named = |name: &str| outcomes.iter().position(|(learner, _)| learners[*learner].name == name);
+        let (a, b) = named("active").zip(named("random")).unwrap_or((0, outcomes.len() - 1));
+        (a != b).then(|| [outcomes[a.min(b)], outcomes[a.max(b)]])
+    }
+}
+
+/// `a` is the better.
+fn sentence(a: &str, first: Outcome, b: &str, second: Outcome) -> String {
+    use Outcome::{After, Diverged, HeldOut, NotWithin};
+    match (first, second) {
+        (After(few), After(many)) if few == many => format!("{a} and {b} needed {few} movements each."),
+        (After(few), After(many)) => {
+            let times = many as f64 / few.max(1) as f64;
+            format!("{a} needed {times:.1} times fewer movements than {b}.")
+        }
+        (After(few), NotWithin(made)) => {
+            format!("{a} needed {few} movements; {made} were not enough for {b}.")
+        }
+        (After(few), _) => format!("{a} needed {few} movements; {b} ran away from the truth."),
+        (HeldOut { mean: low, .. }, HeldOut { mean: high, .. }) if low > 0.97 * high => {
+            format!("Over the whole run {a} and {b} predicted equally well.")
+        }
+        (HeldOut { mean: low, .. }, HeldOut { mean: high, .. }) => {
+            let less = (1.0 - low / high) * 100.0;
+            format!("Over the whole run, the mean error of {a} was {less:.0} % below that of {b}.")
+        }
+        (NotWithin(made), NotWithin(_)) => format!("{made} movements were not enough for {a} and {b}."),
+        (NotWithin(made), _) => format!("{made} movements were not enough for {a}, and {b} ran away from the truth."),
+        (Diverged, _) | (HeldOut { .. }, _) => format!("{a} and {b} ran away from the truth."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        Outcome::{After, Diverged, HeldOut, NotWithin},
+        sentence,
+    };
+
+    #[test]
+    fn sentences_name_both_sides_and_what_they_compare() {
+        assert_eq!(
+            sentence("active", After(55), "random", After(484)),
+            "active needed 8.8 times fewer movements than random."
+        );
+        let open = sentence("active", After(55), "random", NotWithin(1000));
+        assert_eq!(open, "active needed 55 movements; 1000 were not enough for random.");
+        assert!(sentence("active", After(7), "rigid", Diverged).contains("rigid ran away"));
+        let held_out = |last, mean| HeldOut { last, mean };
+        let better = sentence("active", held_out(0.002, 0.003), "random", held_out(0.002, 0.004));
+        assert!(better.contains("the mean error of active was 25 % below that of random"));
+        assert!(sentence("a", held_out(0.2, 0.30), "b", held_out(0.2, 0.301)).contains("equally well"));
+    }
+}

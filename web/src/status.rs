@@ -1,0 +1,32 @@
+//! What goes on, in a sentence.
+
+use crate::panel::{Link, Panel};
+
+impl Panel {
+    /// What stands above the controls: what goes on, or what to do.
+    pub fn status(&self) -> String {
+        let latest = self.history.latest();
+        match &self.link {
+            Link::Unreachable(why) => format!("The server cannot be used: {why}. Reset tries again."),
+            Link::Lost(seconds) => format!("The connection is lost; trying again in {seconds} s. The run is kept."),
+            Link::Expired => "This session has expired. Restore computes it again; Reset begins anew.".to_owned(),
+            Link::Failed(why) => format!("The engine has failed: {why}. Reset begins anew."),
+            _ if self.opening => "Opening a session…".to_owned(),
+            Link::Loading => "Loading…".to_owned(),
+            Link::Connected if self.restoring.is_some_and(|target| target > 1) => {
+                format!("Computing the run up to step {}…", self.restoring.unwrap_or_default())
+            }
+            Link::Connected if self.playing => match self.fast_forward() {
+                Some(what) => format!("Fast-forward, {what}…"),
+                None => format!("Running, {} movements a second.", self.settings.speed),
+            },
+            Link::Connected if self.human().is_some() => self.game_status(),
+            Link::Connected => match &self.stopped {
+                Some(reason) => reason.clone(),
+                None if self.cursor < latest => format!("Step {} of {latest}.", self.cursor),
+                None if self.touch => "Tap Play.".to_owned(),
+                None => "Press Space to play.".to_owned(),
+            },
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! What the page can tell: stories, each on a scenario of its own, told by cards that do things.
+//!
+//! A story is data. What its cards say is true of what is on screen; numbers that a run decides stand at its ending,
+//! not here.
+
+use egui::Rect;
+
+use crate::settings::Tab;
+
+/// A story.
+pub struct Story {
+    /// Its title.
+    pub title: &'static str,
+    /// One line that makes curious.
+    pub teaser: &'static str,
+    /// The scenario.
+    pub scenario: &'static str,
+    /// The seed.
+    pub seed: u64,
+    /// The learners; empty for those that the scenario shows usually.
+    pub learners: &'static [&'static str],
+    /// The step at which it begins.
+    pub step: u64,
+    /// Its cards.
+    pub cards: &'static [Card],
+}
+
+/// A card.
+pub struct Card {
+    /// Its title.
+    pub title: &'static str,
+    /// What it says.
+    pub text: &'static str,
+    /// What it points at.
+    pub spot: Spot,
+    /// What it offers to do, the first being the one that the story goes on with.
+    pub acts: &'static [Act],
+}
+
+/// Something on the page that a card can point at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Spot {
+    /// The controls at the top.
+    Transport,
+    /// The chart beneath them.
+    Chart,
+    /// The table of learners.
+    Learners,
+    /// The scene, which is not the panel's.
+    Scene,
+    /// What can be seen of the run: charts, reasons, links.
+    Tabs,
+    /// How the run ended.
+    Ending,
+}
+
+/// Where these are at the moment, as far as they are seen.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Spots([Option<Rect>; 6]);
+
+impl Spots {
+    pub(crate) fn set(&mut self, spot: Spot, rect: Rect) {
+        self.0[spot as usize] = Some(rect);
+    }
+
+    pub(crate) fn get(&self, spot: Spot) -> Option<Rect> {
+        self.0[spot as usize]
+    }
+}
+
+/// What a card does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Act {
+    /// Play to a step at so many steps a second, and pause.
+    PlayTo(u64, f64),
+    /// Play to the end, at so many steps a second.
+    PlayOn(f64),
+    /// Show a part of the panel.
+    Show(Tab),
+    /// Keep a chart in sight, by its title.
+    Chart(&'static str),
+    /// Run other seeds.
+    Seeds,
+    /// Let the visitor choose the movements.
+    Game,
+    /// Tell another story, by its title.
+    Story(&'static str),
+}
+
+impl Act {
+    /// What stands on its button.
+    pub fn label(self) -> String {
+        match self {
+            Self::PlayTo(step, _) => format!("Play to movement {step}"),
+            Self::PlayOn(_) => "Play to the end".to_owned(),
+            Self::Show(Tab::Why) => "Show the search".to_owned(),
+            Self::Show(_) => "Show it".to_owned(),
+            Self::Chart(title) => format!("Show “{title}”"),
+            Self::Seeds => "Run ten more seeds".to_owned(),
+            Self::Game => "Beat the algorithm".to_owned(),
+            Self::Story(title) => format!("Next: {title}"),
+        }
+    }
+
+    /// Whether something new has to be computed.
+    pub fn needs_server(self) -> bool {
+        matches!(self, Self::Seeds | Self::Game)
+    }
+}
+
+const ELBOW: &str = "The elbow breaks";
+
+/// All stories; the first is told to those who come for the first time.
+pub const STORIES: [Story; 4] = [
+    Story {
+        title: "Ten movements are enough",
+        teaser: "Three learners, one arm: who asks needs fewer movements",
+        scenario: "arm-6dof",
+        seed: 1,
+        learners: &[],
+        step: 1,
+        cards: &[
+            Card {
+                title: "What is learned",
+                text: "A robot moves its arm and sees a marker on its hand. From that alone it learns where its joints \
+                       are. In the scene, grey is the true arm and a colour what one learner believes. Let them make \
+                       ten movements.",
+                spot: Spot::Transport,
+                acts: &[Act::PlayTo(10, 2.0)],
+            },
+            Card {
+                title: "What the ellipsoids mean",
+                text: "Look at the scene: each translucent ellipsoid holds where a learner thinks a joint may be. Those \
+                       of global shrink, since it weighs all movements together. Those of active and random stay large: \
+                       noise is added to them on purpose, so that they can still adapt.",
+                spot: Spot::Scene,
+                acts: &[Act::Chart("Uncertainty")],
+            },
+            Card {
+                title: "Why this posture?",
+                text: "Before it moves, active tries many postures in its mind and takes the one that should teach it \
+                       most. Below is the search for its latest movement. Bright places teach much: click one, and see \
+                       whether you could do better.",
+                spot: Spot::Tabs,
+                acts: &[Act::Show(Tab::Why)],
+            },
+            Card {
+                title: "Who needs fewer movements?",
+                text: "A learner has learned the arm once its errors stay below the dashed lines for twenty movements \
+                       more. Play to the end: while only one is left, time runs faster.",
+                spot: Spot::Chart,
+                acts: &[Act::PlayOn(10.0)],
+            },
+            Card {
+                title: "Was it luck?",
+                text: "How it ended stands under the chart. Run ten more seeds to see whether it was luck, choose the \
+                       movements yourself, or let the robot's elbow break and see who recovers.",
+                spot: Spot::Ending,
+                acts: &[Act::Seeds, Act::Game, Act::Story(ELBOW)],
+            },
+        ],
+    },
+    Story {
+        title: ELBOW,
+        teaser: "What was learned is suddenly wrong: who notices?",
+        scenario: "body-change",
+        seed: 1,
+        learners: &[],
+        step: 295,
+        cards: &[
+            Card {
+                title: "Something is about to happen",
+                text: "For 295 movements the learners have got to know this arm. After movement 300, the upright line \
+                       in the chart, the forearm sits 5 cm further along, and nobody tells them.",
+                spot: Spot::Chart,
+                acts: &[Act::PlayTo(305, 2.0)],
+            },
+            Card {
+                title: "Who recovers?",
+                text: "What they knew is wrong now. Doubt helps: a filter whose uncertainty is kept large believes what \
+                       it sees. The state says how many movements each learner needs to recover.",
+                spot: Spot::Learners,
+                acts: &[Act::PlayOn(10.0)],
+            },
+        ],
+    },
+    Story {
+        title: "Out of sight",
+        teaser: "A head watches the hand: what it does not see teaches nothing",
+        scenario: "head-fov",
+        seed: 1,
+        learners: &["active", "random", "naive"],
+        step: 1,
+        cards: &[
+            Card {
+                title: "A head that cannot see everywhere",
+                text: "Here a head follows the marker with its eyes, and its neck has limits. A movement out of sight is \
+                       a miss: it counts, and teaches nothing. Watch the misses of naive, which forgets about them when \
+                       it chooses.",
+                spot: Spot::Learners,
+                acts: &[Act::PlayTo(30, 5.0)],
+            },
+            Card {
+                title: "Ask for what can be seen",
+                text: "active weighs what a posture would teach by the chance of seeing it. Play to the end to see what \
+                       that saves.",
+                spot: Spot::Chart,
+                acts: &[Act::PlayOn(10.0)],
+            },
+        ],
+    },
+    Story {
+        title: "A real TIAGo",
+        teaser: "Measured movements of a real robot",
+        scenario: "tiago-mocap",
+        seed: 6,
+        learners: &[],
+        step: 1,
+        cards: &[
+            Card {
+                title: "Measured, not simulated",
+                text: "These movements were made by a real robot and recorded with cameras. No truth is known: the error \
+                       is that of predicting measurements that were held out from learning.",
+                spot: Spot::Chart,
+                acts: &[Act::PlayOn(2.0)],
+            },
+            Card {
+                title: "Choosing among what was recorded",
+                text: "In the end all have used every movement, so the curves meet. What differs is how soon a learner \
+                       predicts well, and that is what choosing is for. Try another seed, which holds out others.",
+                spot: Spot::Ending,
+                acts: &[Act::Seeds],
+            },
+        ],
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use body_schema::scenario::builtin;
+
+    use super::*;
+
+    #[test]
+    fn stories_are_of_scenarios_learners_and_titles_that_exist() {
+        for story in &STORIES {
+            let summary = builtin(story.scenario).expect("a built-in scenario").summary();
+            for name in story.learners {
+                assert!(summary.learners.iter().any(|learner| learner.name == *name), "{} {name}", story.title);
+            }
+            assert!(story.step < summary.steps);
+            for act in story.cards.iter().flat_map(|card| card.acts) {
+                if let Act::Story(title) = act {
+                    assert!(STORIES.iter().any(|other| other.title == *title));
+                }
+            }
+        }
+        assert_eq!(STORIES[0].cards.len(), 5);
+    }
+}

@@ -1,0 +1,78 @@
+//! Going through a story, and what its cards do.
+
+use crate::{
+    host::Command,
+    panel::Panel,
+    settings::{StopWhen, Tab},
+    stories::{Act, Card, STORIES, Story},
+};
+
+impl Panel {
+    /// The card that is open, its story and its place.
+    pub fn card(&self) -> Option<(&'static Story, usize, &'static Card)> {
+        let story = STORIES.get(self.story)?;
+        let place = self.tour?;
+        Some((story, place, story.cards.get(place)?))
+    }
+
+    /// The stories that can be told here.
+    pub fn stories(&self) -> impl Iterator<Item = (usize, &'static Story)> {
+        let there = |story: &Story| self.scenarios.iter().any(|scenario| scenario.name == story.scenario);
+        STORIES.iter().enumerate().filter(move |(_, story)| there(story))
+    }
+
+    /// Begins a story with its first card.
+    pub fn tell(&mut self, index: usize) {
+        let Some(story) = STORIES.get(index) else { return };
+        (self.story, self.tour) = (index, Some(0));
+        story.scenario.clone_into(&mut self.settings.scenario);
+        let settings = &mut self.settings;
+        settings.learners = story.learners.iter().map(|name| (*name).to_owned()).collect();
+        (settings.seed, settings.stop, settings.tab) = (story.seed, StopWhen::Told, Tab::Charts);
+        (settings.joints, settings.learner, settings.run_to) = (None, None, None);
+        self.seed_text = story.seed.to_string();
+        self.notices.clear();
+        self.choose_usual_learners();
+        self.open(story.step);
+    }
+
+    /// Whether what is shown is what the open card speaks of.
+    pub(crate) fn is_on_story(&self) -> bool {
+        let shown = self.description().map(|description| description.scenario.as_str());
+        self.card().is_some_and(|(story, ..)| shown == Some(story.scenario)) && self.human().is_none()
+    }
+
+    /// Does what a card offers.
+    pub fn act(&mut self, act: Act) {
+        match act {
+            Act::PlayTo(step, speed) => {
+                self.settings.speed = speed;
+                self.play_to(step);
+            }
+            Act::PlayOn(speed) => {
+                self.settings.speed = speed;
+                self.settings.tab = Tab::Charts;
+                if self.description().is_some_and(|description| description.truth.is_some()) {
+                    self.chart = "Location error";
+                }
+                self.play();
+            }
+            Act::Show(tab) => self.settings.tab = tab,
+            Act::Chart(title) => self.chart = title,
+            Act::Seeds => self.run_seeds(),
+            Act::Game => self.begin_contest(),
+            Act::Story(title) => {
+                if let Some(index) = STORIES.iter().position(|story| story.title == title) {
+                    self.tell(index);
+                }
+            }
+        }
+    }
+
+    /// Whoever has closed the cards need not be offered them again.
+    pub(crate) fn close_tour(&mut self) {
+        if self.tour.take().is_some() {
+            self.ask(Command::Known);
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! The cards of a story: at the bottom, each as large as the largest, so that its buttons keep their places, and with a
+//! frame around what it speaks of.
+
+use egui::{
+    Align, Align2, Button, Color32, Context, FontId, Frame, LayerId, Layout, Order, RichText, ScrollArea, Shape, Stroke,
+    StrokeKind, TextStyle, Ui, pos2, vec2,
+};
+
+use super::style::accent;
+use crate::{
+    panel::Panel,
+    stories::{Act, Spot, Story},
+};
+
+const MARGIN: f32 = 10.0;
+const BUTTONS: f32 = 28.0;
+const TITLE: f32 = 24.0;
+
+impl Panel {
+    pub(super) fn card_panel(&mut self, ui: &mut Ui) {
+        self.card_height = 0.0;
+        let Some((story, place, card)) = self.card() else { return };
+        let height = height(ui, story);
+        self.card_height = height;
+        let frame = Frame::new()
+            .fill(ui.visuals().window_fill)
+            .stroke(Stroke::new(1.5, accent(ui.visuals().dark_mode)))
+            .inner_margin(MARGIN);
+        let panel = egui::Panel::bottom("card").resizable(false).exact_size(height).frame(frame);
+        panel.show(ui, |ui| {
+            ui.horizontal(|ui| {
+                let title = format!("{} of {}: {}", place + 1, story.cards.len(), card.title);
+                ui.add(egui::Label::new(RichText::new(title).strong().size(15.0)).truncate());
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    if ui.button("Close").on_hover_text("Closes the cards (Esc)").clicked() {
+                        self.close_tour();
+                    }
+                });
+            });
+            let room = (ui.available_height() - BUTTONS).max(20.0);
+            ScrollArea::vertical().id_salt(place).max_height(room).min_scrolled_height(room).show(ui, |ui| {
+                ui.set_min_height(room - 4.0);
+                let text = match card.spot {
+                    Spot::Scene => format!("{} {}", if self.scene_below { "▼" } else { "▶" }, card.text),
+                    _ => card.text.to_owned(),
+                };
+                ui.add(egui::Label::new(text).wrap());
+            });
+            ui.horizontal(|ui| {
+                // From the right, so that they stand in the same place on every card.
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    let is_last = place + 1 == story.cards.len();
+                    if ui.add_enabled(!is_last, Button::new("Next")).clicked() {
+                        self.tour = Some(place + 1);
+                    }
+                    if ui.add_enabled(place > 0, Button::new("Previous")).clicked() {
+                        self.tour = Some(place - 1);
+                    }
+                    ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.acts(ui, card.acts));
+                });
+            });
+        });
+    }
+
+    fn acts(&mut self, ui: &mut Ui, acts: &[Act]) {
+        if !self.is_on_story() {
+            let open = ui.add_enabled(!self.opening, Button::new(RichText::new("Open this story").strong()));
+            if open.on_hover_text("Its scenario and its seed").clicked() {
+                self.tell(self.story);
+            }
+            return;
+        }
+        let there = |act: &Act| match act {
+            Act::Story(title) => self.stories().any(|(_, story)| story.title == *title),
+            Act::Game => self.can_play(),
+            act => self.server || !act.needs_server(),
+        };
+        let acts: Vec<Act> = acts.iter().copied().filter(there).collect();
+        for (index, act) in acts.into_iter().enumerate() {
+            let idle = match act {
+                Act::PlayTo(step, _) => !self.playing && self.history.latest() < step,
+                Act::PlayOn(_) => !self.playing && self.ending().is_none(),
+                Act::Seeds => self.seeds.as_ref().is_none_or(|seeds| !seeds.running),
+                _ => true,
+            };
+            let text = RichText::new(act.label());
+            let button = if index == 0 { filled(ui, text) } else { Button::new(text) };
+            if ui.add_enabled(idle && self.is_ready(), button).clicked() {
+                self.act(act);
+            }
+        }
+    }
+
+    /// Draws a frame around what the open card speaks of, or an arrow towards the scene.
+    pub(super) fn point(&mut self, ctx: &Context) {
+        let Some((.., card)) = self.card() else { return };
+        let colour = accent(ctx.global_style().visuals.dark_mode);
+        let painter = ctx.layer_painter(LayerId::new(Order::Middle, egui::Id::unique("pointer")));
+        let screen = ctx.content_rect();
+        if card.spot == Spot::Scene {
+            let below = self.scene_below;
+            let (line, tip, text) = if below {
+                let y = screen.bottom() - 2.0;
+                let tip = pos2(screen.center().x, y);
+                ([pos2(screen.left(), y), pos2(screen.right(), y)], tip, "scene")
+            } else {
+                let x = screen.right() - 2.0;
+                ([pos2(x, screen.top()), pos2(x, screen.bottom())], pos2(x, screen.center().y), "scene")
+            };
+            painter.line_segment(line, Stroke::new(4.0, colour));
+            let (back, side) = if below { (vec2(0.0, -14.0), vec2(9.0, 0.0)) } else { (vec2(-14.0, 0.0), vec2(0.0, 9.0)) };
+            painter.add(Shape::convex_polygon(vec![tip, tip + back + side, tip + back - side], colour, Stroke::NONE));
+            let (at, align) = if below {
+                (tip + vec2(16.0, -3.0), Align2::LEFT_BOTTOM)
+            } else {
+                (tip + vec2(-16.0, 0.0), Align2::RIGHT_CENTER)
+            };
+            let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), Color32::WHITE);
+            let rect = align.anchor_size(at, galley.size()).expand(3.0);
+            painter.rect_filled(rect, 3.0, if ctx.global_style().visuals.dark_mode { Color32::from_rgb(0x8A, 0x3D, 0) } else { colour });
+            painter.galley(rect.min + vec2(3.0, 3.0), galley, Color32::WHITE);
+        } else if let Some(rect) = self.spots.get(card.spot) {
+            let rect = rect.expand(3.0).intersect(screen.shrink(2.0));
+            painter.rect_stroke(rect, 5.0, Stroke::new(2.0, colour), StrokeKind::Inside);
+        }
+    }
+}
+
+/// The button that a story goes on with.
+pub(super) fn filled(ui: &Ui, text: RichText) -> Button<'static> {
+    let selection = ui.visuals().selection;
+    Button::new(text.strong().color(selection.stroke.color)).fill(selection.bg_fill)
+}
+
+/// Room for the longest card of a story, but never more than leaves something to see above it.
+fn height(ui: &Ui, story: &Story) -> f32 {
+    let width = ui.available_width() - 2.0 * MARGIN - 16.0;
+    let font = TextStyle::Body.resolve(ui.style());
+    let longest = story.cards.iter().map(|card| {
+        let text = format!("▶ {}", card.text);
+        ui.ctx().fonts_mut(|fonts| fonts.layout(text, font.clone(), Color32::WHITE, width).size().y)
+    });
+    let text = longest.fold(0.0, f32::max) + 8.0;
+    (text + TITLE + BUTTONS + 2.0 * MARGIN + 8.0).min(ui.ctx().content_rect().height() * 0.34)
+}

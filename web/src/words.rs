@@ -1,0 +1,102 @@
+//! Plain words for what the engine names by its terms, which stand in the tooltips.
+
+use body_schema::experiment::{CONFIRMATION, LearnerDescription};
+
+use crate::{history::Verdict, panel::Panel};
+
+/// What the page is about, in one line.
+pub const STATEMENT: &str = "A robot learns its own arm by moving it. Who learns fastest?";
+
+/// How a learner goes about it, in a few words.
+pub fn about(learner: &LearnerDescription) -> &'static str {
+    let plans = learner.estimator.starts_with("smoother");
+    match learner.policy.as_str() {
+        "human" => "you choose the movements",
+        "random" if learner.estimator == "gradient" => "moves at random, learns by gradient",
+        "random" => "moves at random",
+        policy if policy.contains("naive") => "asks, but forgets that it may not see",
+        policy if policy.starts_with("active") && plans => "asks, weighing all movements together",
+        policy if policy.starts_with("active") => "asks which movement teaches most",
+        _ => "another way to choose",
+    }
+}
+
+/// The same with the terms of the field.
+pub fn terms(learner: &LearnerDescription) -> String {
+    let LearnerDescription { name, estimator, policy, .. } = learner;
+    let about = about(learner);
+    format!("{name}: {about}. Estimator: {estimator}; policy, by which it chooses its movements: {policy}.")
+}
+
+impl Panel {
+    /// What has become of a learner at the step that is shown.
+    pub fn verdict(&self, learner: usize) -> String {
+        let change = self.description().and_then(|one| one.change_at).filter(|change| self.cursor > *change);
+        match self.history.verdict(self.cursor, learner) {
+            Verdict::Waiting => "not moved yet".to_owned(),
+            Verdict::Diverged => "ran away".to_owned(),
+            Verdict::Learning => "learning".to_owned(),
+            Verdict::Settled => "sure of itself".to_owned(),
+            Verdict::Outside => "not accurate yet".to_owned(),
+            Verdict::Within(_, confirmed) => format!("accurate for {confirmed} of {CONFIRMATION}"),
+            Verdict::Converged(first) => match change {
+                Some(change) => format!("recovered in {}", first - change),
+                None => format!("learned in {first}"),
+            },
+        }
+    }
+
+    /// What that means, with its term.
+    pub(crate) fn verdict_terms(&self, learner: usize) -> String {
+        let thresholds = self.description().map(|description| description.thresholds);
+        let [degrees, millimetres] =
+            thresholds.map_or([0.0; 2], |limits| [limits.orientation_deg, limits.location_m * 1e3]);
+        let accurate = format!("orientation within {degrees}° and location within {millimetres:.0} mm");
+        let own = match self.history.row(self.cursor, learner).is_some_and(|row| row.settled) {
+            true => "It has settled: by its own estimate, without the truth, it predicts well enough.",
+            false => "It has not settled: by its own estimate it does not predict well enough yet.",
+        };
+        match self.history.verdict(self.cursor, learner) {
+            Verdict::Diverged => {
+                let why = self.history.failure(learner).unwrap_or("its estimate left all bounds");
+                format!("It diverged: {why}")
+            }
+            Verdict::Converged(first) => {
+                format!("It converged: {accurate} from movement {first} on, confirmed by {CONFIRMATION} more. {own}")
+            }
+            Verdict::Within(..) => {
+                format!("Its errors are {accurate}; it has converged once {CONFIRMATION} movements confirm it. {own}")
+            }
+            Verdict::Outside => format!("It converges once its errors stay in bounds: {accurate}. {own}"),
+            _ => own.to_owned(),
+        }
+    }
+
+    /// Whether a filter's own uncertainty is kept large on purpose, far above what its data allow.
+    pub(crate) fn is_kept_large(&self, learner: usize) -> bool {
+        const MUCH: f64 = 3.0;
+        let is_filter = self.description().and_then(|one| one.learners.get(learner)).is_some_and(|one| {
+            // Recursive estimators take stabilising noise; one that weighs all movements has no need of it.
+            !one.estimator.starts_with("smoother")
+        });
+        let row = self.history.row(self.cursor, learner);
+        let above = row.and_then(|row| Some(row.trace? > MUCH * row.bound?)).unwrap_or(false);
+        is_filter && above
+    }
+
+    /// The names of those learners, as a list.
+    pub(crate) fn kept_large(&self) -> Option<String> {
+        let learners = &self.description()?.learners;
+        let names: Vec<&str> = learners
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| self.is_kept_large(*index))
+            .map(|(_, learner)| learner.name.as_str())
+            .collect();
+        match &names[..] {
+            [] => None,
+            [one] => Some((*one).to_owned()),
+            [all @ .., last] => Some(format!("{} and {last}", all.join(", "))),
+        }
+    }
+}
