@@ -39,6 +39,43 @@ fn learners_keep_the_promises_of_their_scenarios() {
     assert!(promises >= 4, "the scenarios promise something");
 }
 
+/// One reading in ten shows something else. The robust loss tells every one that is far off, and hardly ever suspects a good
+/// one; least squares believes them all and never gets there.
+#[test]
+fn outliers_are_told_from_readings_and_least_squares_is_lost_to_them() {
+    let scenario = builtin("arm-6dof-outliers").expect("built in");
+    let seeds: Vec<u64> = (301..=320).collect();
+    let outcome = compare(&scenario, "global", &seeds, 60);
+    let median = outcome.summary.median_converged_at;
+    assert!(outcome.summary.converged == 20 && median.is_some_and(|median| median <= 14.0), "{:?}", outcome.summary);
+    let least_squares = compare(&scenario, "global-least-squares", &seeds[..6], 60);
+    assert_eq!(least_squares.summary.converged, 0, "{:?}", least_squares.runs);
+    let (mut suspected, mut good) = (0, 0);
+    for seed in seeds {
+        let names = ["global".to_owned()];
+        let mut experiment = scenario.experiment(seed, Some(&names)).expect("starts");
+        for step in 1..=40 {
+            experiment.step().expect("a step");
+            if step <= 20 {
+                continue;
+            }
+            let result = experiment.result();
+            let truth: Vec<_> = result.outliers.iter().map(|it| (it.movement, it.channel)).collect();
+            assert!(!truth.is_empty() && result.learners[0].readings.len() == step);
+            for reading in &result.learners[0].readings {
+                let probability = reading.outlier_probability.expect("a mixture");
+                if !truth.contains(&(reading.movement, reading.channel)) {
+                    good += 1;
+                    suspected += usize::from(probability > 0.9);
+                } else if reading.residual_sigmas > 5.0 {
+                    assert!(probability > 0.9, "seed {seed}, step {step}: {reading:?}");
+                }
+            }
+        }
+    }
+    assert!(suspected * 100 <= good, "{suspected} of {good}");
+}
+
 #[test]
 fn active_beats_random_and_the_gradient_does_not_converge() {
     let scenario = builtin("arm-6dof").expect("built in");

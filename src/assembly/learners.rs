@@ -80,8 +80,11 @@ impl Scenario {
                 let prior = Prior::new(briefing.initial.clone(), layout, covariance, within)
                     .map_err(|source| ScenarioError::Prior { scenario: self.name.clone(), source })?;
                 let (rig, rng) = (Arc::new(self.rig.assuming(sigma)), Stream::Hypotheses.rng(seed));
-                let smoother = Smoother::new(prior, layout.clone(), rig, hypotheses, rng)
-                    .with_loss(if spec.robust { loss } else { Loss::None });
+                let smoother = Smoother::new(prior, layout.clone(), rig, hypotheses, rng).with_loss(if spec.robust {
+                    loss
+                } else {
+                    Loss::None
+                });
                 // Recorded bodies do not change: what looks like it is an outlier or a model that does not hold.
                 let changes = matches!(self.world, WorldSpec::Simulated { .. });
                 Box::new(if changes { smoother } else { smoother.never_forgetting() })

@@ -110,7 +110,13 @@ impl Scenario {
                 let change = change.as_ref();
                 let change = change.map(|change| Box::new(Change { step: change.step, truth: change.truth.clone() }));
                 Ok((
-                    World::Simulated { truth: Box::new(truth), rig: self.rig.clone(), head, change, outliers: *outliers },
+                    World::Simulated {
+                        truth: Box::new(truth),
+                        rig: self.rig.clone(),
+                        head,
+                        change,
+                        outliers: *outliers,
+                    },
                     evaluation,
                     briefing,
                 ))

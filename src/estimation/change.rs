@@ -69,8 +69,7 @@ pub struct ChangeDetector {
 impl Rise {
     /// Whether the sum has come up to an alarm at a surprise.
     fn observe(&mut self, is_surprising: bool) -> bool {
-        let [changed, same] =
-            if is_surprising { [CHANGED, self.share] } else { [1.0 - CHANGED, 1.0 - self.share] };
+        let [changed, same] = if is_surprising { [CHANGED, self.share] } else { [1.0 - CHANGED, 1.0 - self.share] };
         self.sum = (self.sum + (changed / same).ln()).clamp(0.0, 2.0 * EVIDENCE);
         self.since = if self.sum > 0.0 { self.since + 1 } else { 0 };
         is_surprising && self.sum > EVIDENCE

@@ -41,7 +41,7 @@ pub use report::{
     Body, Description, JointDescription, JointReport, LearnerDescription, LearnerReport, ModelReport, MovementReport,
     StepReport,
 };
-pub use result::{OutlierReading, JointModel, LearnerResult, MarkerModel, Model, RunResult};
+pub use result::{JointModel, LearnerResult, MarkerModel, Model, OutlierReading, RunResult};
 pub use streams::Stream;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};
 

@@ -171,9 +171,9 @@ impl Scenario {
         let pairs =
             EstimatorKind::ALL.into_iter().flat_map(|estimator| PolicyKind::ALL.map(|policy| (estimator, policy)));
         let named = |(estimator, policy): &(EstimatorKind, PolicyKind)| {
-            self.learners
-                .iter()
-                .any(|spec| (spec.estimator, spec.policy, spec.stabilising, spec.robust) == (*estimator, *policy, true, true))
+            self.learners.iter().any(|spec| {
+                (spec.estimator, spec.policy, spec.stabilising, spec.robust) == (*estimator, *policy, true, true)
+            })
         };
         pairs
             .filter(|pair| !named(pair))

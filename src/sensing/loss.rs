@@ -44,7 +44,8 @@ impl Loss {
             Self::Mixture { fraction, spread } => {
                 let share = log_odds(fraction, spread, d);
                 // Both terms relative to that of a normal reading at s = 0.
-                log_sum(-0.5 * s, share - 0.5 * s / (spread * spread)).map_or(f64::INFINITY, |log| log_one_plus(share) - log)
+                log_sum(-0.5 * s, share - 0.5 * s / (spread * spread))
+                    .map_or(f64::INFINITY, |log| log_one_plus(share) - log)
             }
         }
     }

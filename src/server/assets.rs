@@ -57,8 +57,19 @@ struct Asset {
 /// The routes of all files.
 pub(super) fn routes() -> Router<Arc<App>> {
     let page = [
-        "/", "/page.css", "/page.js", "/controls.js", "/links.js", "/picture.js", "/scene.js", "/session.js", "/files.js", "/seeds.js",
-        "/viewer.js", "/icon.svg", "/preview.png",
+        "/",
+        "/page.css",
+        "/page.js",
+        "/controls.js",
+        "/links.js",
+        "/picture.js",
+        "/scene.js",
+        "/session.js",
+        "/files.js",
+        "/seeds.js",
+        "/viewer.js",
+        "/icon.svg",
+        "/preview.png",
     ];
     let panel = [PANEL_SCRIPT, PANEL_WASM];
     let viewer = ["/viewer/re_viewer.js", "/viewer/re_viewer_bg.wasm"];
@@ -180,7 +191,8 @@ impl Asset {
         let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default();
         let host = text("host");
         // A host is written into the page only if it can be nothing else.
-        let is_plain = !host.is_empty() && host.bytes().all(|byte| byte.is_ascii_alphanumeric() || b".:-[]".contains(&byte));
+        let is_plain =
+            !host.is_empty() && host.bytes().all(|byte| byte.is_ascii_alphanumeric() || b".:-[]".contains(&byte));
         let page = String::from_utf8_lossy(&self.bytes);
         let page = if is_plain {
             let scheme = if text("x-forwarded-proto") == "https" { "https" } else { "http" };

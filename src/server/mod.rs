@@ -16,8 +16,8 @@ mod api;
 mod assets;
 mod extract;
 mod frame;
-mod gzip;
 mod guard;
+mod gzip;
 mod problem;
 mod session;
 

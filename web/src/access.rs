@@ -357,7 +357,10 @@ mod tests {
         let mut form = Form::new();
         let elements = form.run(Vec::new(), None);
         let slider = find(&elements, Kind::Range, "Share");
-        assert_eq!(slider.number.map(|number| (number.value, number.min, number.max)), Some((0.5, Some(0.0), Some(1.0))));
+        assert_eq!(
+            slider.number.map(|number| (number.value, number.min, number.max)),
+            Some((0.5, Some(0.0), Some(1.0)))
+        );
         let seed = find(&elements, Kind::Field, "Seed");
         assert_eq!(seed.text.as_deref(), Some("1"));
         let play = find(&elements, Kind::Button, "Play");
@@ -380,7 +383,10 @@ mod tests {
         let list = elements.iter().find(|one| one.kind == Kind::Combobox).expect("a combo box").clone();
         assert_eq!(list.text.as_deref(), Some("one"));
         let elements = form.act(serde_json::json!({ "id": list.id, "act": "click" }));
-        let group = elements.iter().find(|one| one.kind == Kind::Group).unwrap_or_else(|| panic!("an open list in {elements:#?}"));
+        let group = elements
+            .iter()
+            .find(|one| one.kind == Kind::Group)
+            .unwrap_or_else(|| panic!("an open list in {elements:#?}"));
         let two = find(&group.children, Kind::Button, "two");
         let elements = form.act(serde_json::json!({ "id": two.id, "act": "choose" }));
         assert_eq!(form.choice, 2);

@@ -21,9 +21,8 @@ pub struct Score {
 impl Panel {
     /// Whether a game can be played on the chosen scenario.
     pub fn can_play(&self) -> bool {
-        let offers = |scenario: &body_schema::scenario::ScenarioSummary| {
-            scenario.offered().any(|learner| learner.name == HUMAN)
-        };
+        let offers =
+            |scenario: &body_schema::scenario::ScenarioSummary| scenario.offered().any(|learner| learner.name == HUMAN);
         self.server && self.scenario().is_some_and(offers)
     }
 

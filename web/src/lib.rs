@@ -42,11 +42,11 @@ pub mod play;
 pub mod search;
 pub mod seeds;
 pub mod settings;
+#[cfg(target_arch = "wasm32")]
+pub mod shell;
 mod status;
 pub mod stories;
 mod tour;
-#[cfg(target_arch = "wasm32")]
-pub mod shell;
 pub mod view;
 pub mod why;
 pub mod wire;

@@ -40,7 +40,9 @@ impl Panel {
         // While the run is computed again, everything happens at once and has happened before.
         if !opened && phase != "loading" && session == self.told.session {
             let ended = self.endings();
-            for (learner, _) in ended.iter().zip(&self.told.ended).enumerate().filter(|(_, (now, then))| **now && !**then) {
+            for (learner, _) in
+                ended.iter().zip(&self.told.ended).enumerate().filter(|(_, (now, then))| **now && !**then)
+            {
                 news.extend(self.end_of(learner));
             }
             self.told.ended = ended;

@@ -183,7 +183,8 @@ impl Panel {
     /// Makes so many steps, with so many postures shown on the way to each.
     pub(crate) fn request(&mut self, count: u64, frames: u64) {
         let Some(session) = &self.session else { return };
-        let command = Command::Step { session: session.id.clone(), count, expected_step: self.history.latest(), frames };
+        let command =
+            Command::Step { session: session.id.clone(), count, expected_step: self.history.latest(), frames };
         self.busy = true;
         self.pace.asked_at = self.now;
         self.ask(command);

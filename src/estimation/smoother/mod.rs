@@ -32,9 +32,7 @@ pub use hypotheses::HypothesisSettings;
 use hypotheses::Hypotheses;
 use posterior::{Effort, Measurement, Posterior};
 
-use super::{
-    Alternative, Belief, ChangeDetector, EstimationError, Estimator, ReadingReport, Update, change::quantile,
-};
+use super::{Alternative, Belief, ChangeDetector, EstimationError, Estimator, ReadingReport, Update, change::quantile};
 use crate::{
     model::{Layout, Prior},
     sensing::{Loss, Observation, Rig},

@@ -109,9 +109,16 @@ impl Check<'_> {
             let mend = "leave [head] out, or use sensors of the marker's position alone";
             self.problem(head.span(), "head", "a head watches the marker, and not what another sensor measures", mend);
         }
-        if let Some(outliers) = raw.outliers.as_ref().filter(|_| channels.iter().any(|channel| channel.target().is_none())) {
+        if let Some(outliers) =
+            raw.outliers.as_ref().filter(|_| channels.iter().any(|channel| channel.target().is_none()))
+        {
             let mend = "leave [outliers] out, or use sensors of positions alone";
-            self.problem(outliers.span(), "outliers", "they replace positions, and another sensor measures something else", mend);
+            self.problem(
+                outliers.span(),
+                "outliers",
+                "they replace positions, and another sensor measures something else",
+                mend,
+            );
         }
         (channels.len() == given.0.len() && !channels.is_empty()).then(|| Arc::new(Rig::new(channels)))
     }

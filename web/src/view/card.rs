@@ -2,8 +2,8 @@
 //! frame around what it speaks of.
 
 use egui::{
-    Align, Align2, Button, Color32, Context, FontId, Frame, LayerId, Layout, Order, RichText, ScrollArea, Shape, Stroke,
-    StrokeKind, TextStyle, Ui, pos2, vec2,
+    Align, Align2, Button, Color32, Context, FontId, Frame, LayerId, Layout, Order, RichText, ScrollArea, Shape,
+    Stroke, StrokeKind, TextStyle, Ui, pos2, vec2,
 };
 
 use super::style::accent;
@@ -108,7 +108,8 @@ impl Panel {
                 ([pos2(x, screen.top()), pos2(x, screen.bottom())], pos2(x, screen.center().y), "scene")
             };
             painter.line_segment(line, Stroke::new(4.0, colour));
-            let (back, side) = if below { (vec2(0.0, -14.0), vec2(9.0, 0.0)) } else { (vec2(-14.0, 0.0), vec2(0.0, 9.0)) };
+            let (back, side) =
+                if below { (vec2(0.0, -14.0), vec2(9.0, 0.0)) } else { (vec2(-14.0, 0.0), vec2(0.0, 9.0)) };
             painter.add(Shape::convex_polygon(vec![tip, tip + back + side, tip + back - side], colour, Stroke::NONE));
             let (at, align) = if below {
                 (tip + vec2(16.0, -3.0), Align2::LEFT_BOTTOM)
@@ -117,7 +118,11 @@ impl Panel {
             };
             let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), Color32::WHITE);
             let rect = align.anchor_size(at, galley.size()).expand(3.0);
-            painter.rect_filled(rect, 3.0, if ctx.global_style().visuals.dark_mode { Color32::from_rgb(0x8A, 0x3D, 0) } else { colour });
+            painter.rect_filled(
+                rect,
+                3.0,
+                if ctx.global_style().visuals.dark_mode { Color32::from_rgb(0x8A, 0x3D, 0) } else { colour },
+            );
             painter.galley(rect.min + vec2(3.0, 3.0), galley, Color32::WHITE);
         } else if let Some(rect) = self.spots.get(card.spot) {
             let rect = rect.expand(3.0).intersect(screen.shrink(2.0));

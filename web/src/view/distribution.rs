@@ -27,7 +27,9 @@ impl Panel {
         let (painter, text) = (ui.painter(), ui.visuals().text_color());
         let font = FontId::proportional(12.0);
         let bottom = rect.bottom() - AXIS;
-        for tick in [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0].into_iter().filter(|t| (least..=most).contains(t)) {
+        for tick in
+            [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0].into_iter().filter(|t| (least..=most).contains(t))
+        {
             let line = Stroke::new(1.0, ui.visuals().widgets.noninteractive.bg_stroke.color);
             painter.line_segment([pos2(x(tick), rect.top()), pos2(x(tick), bottom)], line);
             painter.text(pos2(x(tick), bottom + 2.0), Align2::CENTER_TOP, tick.to_string(), font.clone(), text);

@@ -4,12 +4,7 @@ use body_schema::kinematics::JointKind;
 use egui::{Button, ComboBox, Frame, ProgressBar, RichText, Sense, Slider, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::{card::filled, learners::swatch, style::accent, why::joint_value};
-use crate::{
-    colours,
-    game::ROUNDS,
-    host::Command,
-    panel::Panel,
-};
+use crate::{colours, game::ROUNDS, host::Command, panel::Panel};
 
 const SLICE: f32 = 150.0;
 
@@ -22,7 +17,11 @@ impl Panel {
         let frame = Frame::new().fill(ui.visuals().window_fill).stroke(line).inner_margin(10).corner_radius(6);
         frame.show(ui, |ui| {
             ui.set_width(ui.available_width());
-            if self.history.latest() < ROUNDS { self.round(ui) } else { self.final_score(ui) }
+            if self.history.latest() < ROUNDS {
+                self.round(ui)
+            } else {
+                self.final_score(ui)
+            }
             ui.add_space(4.0);
             ui.horizontal_wrapped(|ui| {
                 if ui.button("Copy challenge").on_hover_text("A link to the same game, on the same seed").clicked() {
@@ -125,7 +124,9 @@ impl Panel {
                     }
                 });
                 let name = format!("{salt}: {}", joints[*axis].name);
-                response.response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::ComboBox, true, &name));
+                response
+                    .response
+                    .widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::ComboBox, true, &name));
             }
         });
         self.game.axes = (x, y);

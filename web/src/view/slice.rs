@@ -5,7 +5,8 @@ use body_schema::{
     optimize::{Plane, Projection},
 };
 use egui::{
-    Align2, Color32, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, StrokeKind, Ui, WidgetInfo, accesskit::Role, pos2, vec2,
+    Align2, Color32, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, StrokeKind, Ui, WidgetInfo, accesskit::Role,
+    pos2, vec2,
 };
 
 use super::{style::accent, why::joint_value};
@@ -25,8 +26,7 @@ impl Panel {
     /// Draws the slice; the point that was clicked, in the unit square.
     pub(super) fn slice(&self, ui: &mut Ui, search: &Search, plane: Plane, iteration: usize) -> Option<[f64; 2]> {
         let side = (ui.available_width() - MARGIN.0 - 8.0).clamp(120.0, LARGEST);
-        let (area, response) =
-            ui.allocate_exact_size(vec2(side + MARGIN.0 + 8.0, side + MARGIN.1), Sense::click());
+        let (area, response) = ui.allocate_exact_size(vec2(side + MARGIN.0 + 8.0, side + MARGIN.1), Sense::click());
         let square = Rect::from_min_size(area.min + vec2(MARGIN.0, 4.0), vec2(side, side));
         let at = |[x, y]: [f64; 2]| pos2(square.left() + x as f32 * side, square.bottom() - y as f32 * side);
         let cells = search.slice(plane, iteration);

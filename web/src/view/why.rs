@@ -71,8 +71,7 @@ impl Panel {
         ui.add(egui::Label::new(RichText::new(text).strong()).wrap());
         let number = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.3}"));
         let [before, predicted, realised] = [choice.trace, chosen.predicted_gain, chosen.realised_gain].map(number);
-        let text =
-            format!("Uncertainty before: {before} · expected to fall by {predicted} · fell by {realised}");
+        let text = format!("Uncertainty before: {before} · expected to fall by {predicted} · fell by {realised}");
         let tip = "The trace of the weighted covariance, tr(W P), and its fall. Stabilising noise lets it rise again.";
         ui.add(egui::Label::new(text).wrap()).on_hover_text(tip);
         if self.cursor != *step {
