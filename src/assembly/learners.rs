@@ -9,7 +9,7 @@ use crate::{
     model::{Block, Prior},
     optimize::{Settings, Variant},
     scenario::{
-        ErrorDraw, EstimatorKind, Filter, InitialError, LearnerSpec, PolicyKind, Scenario, ScenarioError, SmootherSpec,
+        ErrorDraw, EstimatorKind, Filter, InitialError, Known, LearnerSpec, PolicyKind, Scenario, ScenarioError, SmootherSpec,
         WorldSpec,
     },
     selection::{Active, Human, Minimiser, Planner, Policy, Random},
@@ -67,7 +67,7 @@ impl Scenario {
                 Box::new(SixNumbers::new(belief(self.filter.sigma()), direction, point, stabilising(self.filter)))
             }
             EstimatorKind::Smoother => {
-                let SmootherSpec { sigma, hypotheses, loss } = self.smoother;
+                let SmootherSpec { sigma, hypotheses, loss, noise_unknown } = self.smoother;
                 let bound = match &self.world {
                     WorldSpec::Simulated {
                         initial_error: InitialError { draw: ErrorDraw::Anywhere, point_m, .. },
@@ -76,15 +76,17 @@ impl Scenario {
                     _ => None,
                 };
                 // Without a guess axes may be anywhere; a marker is known as well as the prior says.
-                let within = |block| bound.filter(|_| matches!(block, Block::Axis(_)));
+                let within = |block| match self.prior.of(block) {
+                    Some(Known::Anywhere { within_m }) => Some(within_m),
+                    _ => bound.filter(|_| matches!(block, Block::Axis(_))),
+                };
                 let prior = Prior::new(briefing.initial.clone(), layout, covariance, within)
                     .map_err(|source| ScenarioError::Prior { scenario: self.name.clone(), source })?;
                 let (rig, rng) = (Arc::new(self.rig.assuming(sigma)), Stream::Hypotheses.rng(seed));
-                let smoother = Smoother::new(prior, layout.clone(), rig, hypotheses, rng).with_loss(if spec.robust {
-                    loss
-                } else {
-                    Loss::None
-                });
+                let unknown = vec![noise_unknown; self.rig.noises().len()];
+                let smoother = Smoother::new(prior, layout.clone(), rig, hypotheses, rng)
+                    .with_loss(if spec.robust { loss } else { Loss::None })
+                    .with_unknown_noise(unknown);
                 // Recorded bodies do not change: what looks like it is an outlier or a model that does not hold.
                 let changes = matches!(self.world, WorldSpec::Simulated { .. });
                 Box::new(if changes { smoother } else { smoother.never_forgetting() })

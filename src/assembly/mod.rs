@@ -4,7 +4,7 @@ mod learners;
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Rotation3, UnitVector3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use rand::{RngExt, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
@@ -13,10 +13,10 @@ use crate::{
     experiment::{Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World},
     kinematics::{Joint, JointBox},
     model::{
-        Block, Element, Layout, State, anywhere,
+        Block, Element, Layout, State, Workspace, anywhere,
         registration::{Registration, register},
     },
-    scenario::{ErrorDraw, InitialError, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
+    scenario::{ErrorDraw, InitialError, Known, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
     selection::{Actions, Movement, Watch, Weights},
     sensing::Observation,
 };
@@ -36,7 +36,7 @@ struct Briefing {
     /// P₀ of recursive least squares and of a smoother with a guess.
     covariance: DMatrix<f64>,
     actions: Actions,
-    workspace: Vec<Vec<f64>>,
+    workspace: Workspace,
     watch: Option<Watch>,
 }
 
@@ -97,7 +97,7 @@ impl Scenario {
                     covariance: self.prior_covariance(),
                     actions: Actions::Box(limits.clone()),
                     // Uniform in the joint box, seen or not: what a head can see depends on the truth.
-                    workspace: drawn(limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true),
+                    workspace: self.workspace(drawn(limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true)),
                     watch: watch.clone(),
                 };
                 let head = watch.as_ref().map(|watch| watch.head);
@@ -106,7 +106,7 @@ impl Scenario {
                 if configurations.is_empty() {
                     configurations.extend(watch.as_ref().map(|watch| watch.visible_pose.clone()));
                 }
-                let evaluation = Evaluation::of_truth(configurations, &truth, self.marker_sigma());
+                let evaluation = Evaluation::of_truth(self.workspace(configurations), &truth, self.marker_sigma());
                 let change = change.as_ref();
                 let change = change.map(|change| Box::new(Change { step: change.step, truth: change.truth.clone() }));
                 Ok((
@@ -123,6 +123,10 @@ impl Scenario {
             }
             WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, *held_out),
         }
+    }
+
+    fn workspace(&self, configurations: Vec<Vec<f64>>) -> Workspace {
+        Workspace { configurations, up_to_motion: self.robot.up_to_motion }
     }
 
     /// What one measurement of the marker is worth, metres: of the tracker, or where none sees it of the first sensor.
@@ -161,10 +165,11 @@ impl Scenario {
             layout: Arc::new(layout),
             covariance,
             actions: Actions::Pool(training.iter().map(movement).collect()),
-            workspace: data.into_iter().map(|(theta, _)| theta).collect(),
+            workspace: self.workspace(data.into_iter().map(|(theta, _)| theta).collect()),
             watch: None,
         };
-        let evaluation = Evaluation::of_measurements(test.iter().map(pair).collect());
+        let (held_out, markers) = test.iter().map(pair).unzip();
+        let evaluation = Evaluation::of_measurements(self.workspace(held_out), markers);
         let observations = measurements.markers_m.iter().map(|marker| Observation::seen(*marker)).collect();
         Ok((World::Measured { observations }, evaluation, briefing))
     }
@@ -221,9 +226,20 @@ impl Scenario {
                 Joint::Prismatic(direction) => *direction = turned(direction),
             }
         }
-        if layout.block(Block::Target(0)).is_some() {
+        if layout.block(Block::Target(0)).is_some() && self.prior.of(Block::Target(0)).is_none() {
             let marker = state.marker() + error.draw(error.marker_m, rng);
             state = state.with_marker(marker);
+        }
+        for (block, _) in layout.blocks() {
+            let Some(known) = self.prior.of(block) else { continue };
+            let guess = match (block, known) {
+                // Readings are taken for what they say.
+                (Block::Offset(_), _) => Element::Numbers(DVector::zeros(1)),
+                (Block::Ratio(_), _) => Element::Numbers(DVector::from_element(1, 1.0)),
+                (_, Known::Anywhere { within_m }) => anywhere(&block.of(&state), within_m, rng),
+                (_, known) => known.displaced(&block.of(&state), rng),
+            };
+            block.put(&mut state, guess);
         }
         state
     }
@@ -270,6 +286,28 @@ fn drawn(limits: &JointBox, count: usize, stream: Stream, seed: u64, wanted: imp
     draws.filter(|theta| wanted(theta)).take(count).collect()
 }
 
+impl Known {
+    /// An element with an error uniform up to what it is known to.
+    fn displaced(self, element: &Element, rng: &mut ChaCha8Rng) -> Element {
+        let Self::Within { length_m, angle_rad, other } = self else { return element.clone() };
+        let mut vector = |size: f64| Vector3::from_fn(|_, _| size * rng.random_range(-1.0..=1.0));
+        match element {
+            Element::Point(point) => Element::Point(point + vector(length_m)),
+            Element::Pose(pose) => {
+                let shift = vector(length_m);
+                let angles = vector(angle_rad);
+                let turn = UnitQuaternion::from_euler_angles(angles.x, angles.y, angles.z);
+                let translation = Translation3::from(pose.translation.vector + shift);
+                Element::Pose(Isometry3::from_parts(translation, turn * pose.rotation))
+            }
+            Element::Numbers(numbers) => {
+                Element::Numbers(numbers.map(|x| x + other * rng.random_range(-1.0..=1.0)))
+            }
+            Element::Axis(_) => element.clone(),
+        }
+    }
+}
+
 impl InitialError {
     fn draw(&self, size: f64, rng: &mut ChaCha8Rng) -> Vector3<f64> {
         Vector3::from_fn(|_, _| match self.draw {
@@ -291,9 +329,9 @@ mod tests {
         let (world, evaluation, briefing) = scenario.draw(5).expect("a world");
         let head = world.head().expect("a head");
         assert_eq!(evaluation.targets().len(), EVALUATION_SIZE);
-        assert!(evaluation.targets().iter().all(|(_, marker)| head.sees(marker)));
+        assert!(evaluation.targets().all(|(_, marker)| head.sees(marker)));
         let truth = world.truth().expect("simulated");
-        assert!(briefing.workspace.iter().any(|theta| !head.sees(&truth.marker_at(theta))), "without truth");
+        assert!(briefing.workspace.configurations.iter().any(|theta| !head.sees(&truth.marker_at(theta))), "without truth");
     }
 
     /// No truth leaks: with the truth swapped behind the learners' backs, their first choices stay as they were, and

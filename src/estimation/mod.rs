@@ -43,6 +43,11 @@ pub trait Estimator: Send {
         Vec::new()
     }
 
+    /// The scales of noise that it learns, by kind of noise; empty for an estimator that is told them all.
+    fn noise(&self) -> Vec<NoiseReport> {
+        Vec::new()
+    }
+
     /// As [`correct`](Self::correct), for observations that nobody has looked at: what does not fit is refused, and
     /// nothing is changed by it.
     fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
@@ -67,6 +72,18 @@ pub struct ReadingReport {
     pub weight: f64,
     /// The probability that it is an outlier; null for a loss that knows of none.
     pub outlier_probability: Option<f64>,
+}
+
+/// The learned scale of one kind of noise.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct NoiseReport {
+    /// The channel, counted from 0.
+    pub channel: usize,
+    /// The first of its equations that this noise is of.
+    pub first: usize,
+    /// Its standard deviation in nominal ones.
+    pub scale: f64,
 }
 
 /// What an update found before it changed the belief.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{Experiment, convergence::Thresholds, metrics::Metrics, report::array};
 use crate::{
     design::BestDesign,
-    estimation::{Belief, ReadingReport},
+    estimation::{Belief, NoiseReport, ReadingReport},
     kinematics::{JointKind, chart},
 };
 
@@ -81,6 +81,9 @@ pub struct LearnerResult {
     /// What it makes of every reading, for a learner with a robust loss.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub readings: Vec<ReadingReport>,
+    /// The scales of noise that it learned.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub noise: Vec<NoiseReport>,
     /// The learned model.
     pub model: Model,
 }
@@ -200,6 +203,7 @@ impl Experiment {
                 efficiency: None,
                 metrics: report.metrics.clone(),
                 readings: learner.readings(),
+                noise: learner.noise(),
                 model: Model::new(learner.belief(), &names),
             })
             .collect();

@@ -32,7 +32,7 @@ pub use hypotheses::HypothesisSettings;
 use hypotheses::Hypotheses;
 use posterior::{Effort, Measurement, Posterior};
 
-use super::{Alternative, Belief, ChangeDetector, EstimationError, Estimator, ReadingReport, Update, change::quantile};
+use super::{Alternative, Belief, ChangeDetector, EstimationError, Estimator, NoiseReport, ReadingReport, Update, change::quantile};
 use crate::{
     model::{Layout, Prior},
     sensing::{Loss, Observation, Rig},
@@ -53,6 +53,10 @@ pub struct Smoother {
     movements: u64,
     /// What was made of readings that are no longer looked at one by one.
     past: Vec<ReadingReport>,
+    /// The rig with its nominal noise.
+    nominal: Arc<Rig>,
+    /// By kind of noise: whether its scale is learned.
+    unknown: Vec<bool>,
 }
 
 /// Steps without a new hypothesis after which none are searched for any more.
@@ -64,6 +68,12 @@ const SURPRISING: f64 = 2.326;
 const THOROUGH: Effort = Effort { steps: 60, tolerance: 1e-6, hopeless: f64::INFINITY };
 /// Equations beyond the number of parameters that must agree on another body.
 const AGREEING: usize = 6;
+/// ν: how many equations the scale of the noise so far counts for.
+const NOISE_WEIGHT: f64 = 3.0;
+/// How often scales and modes are found in turn, at most.
+const NOISE_ROUNDS: usize = 4;
+/// The least scale of a noise that is not known, in nominal σ.
+const LEAST_SCALE: f64 = 1e-3;
 /// Measurements that are kept as they are; beyond these the older half is compressed.
 const KEPT: usize = 60;
 
@@ -77,6 +87,7 @@ impl Smoother {
         rng: ChaCha8Rng,
     ) -> Self {
         let posterior = Posterior::new(prior, rig.clone());
+        let (nominal, unknown) = (rig.clone(), vec![false; rig.noises().len()]);
         let mut smoother = Self {
             belief: Belief::new(posterior.prior.guess().clone(), layout, rig),
             posterior,
@@ -87,6 +98,8 @@ impl Smoother {
             forgets: true,
             movements: 0,
             past: Vec::new(),
+            nominal,
+            unknown,
         };
         smoother.begin();
         smoother.publish();
@@ -106,6 +119,65 @@ impl Smoother {
         Self { forgets: false, ..self }
     }
 
+    /// The same where some kinds of noise (in the order of [`Rig::noises`]) are not known: the σ of the rig is then only a unit,
+    /// and its scale is learned with the rest.
+    pub fn with_unknown_noise(mut self, unknown: Vec<bool>) -> Self {
+        self.unknown = unknown;
+        self.unknown.resize(self.nominal.noises().len(), false);
+        self
+    }
+
+    /// The scale that the residuals of the first readings have at the guess: what it leaves unexplained.
+    fn begin_noise(&mut self) {
+        let guess = self.posterior.prior.guess().clone();
+        for (noise, fit) in self.posterior.fit(&guess, &self.belief.layout).iter().enumerate() {
+            if self.unknown[noise] && fit.equations > 0.0 && self.noise_seen(noise) == 1 {
+                self.posterior.scales[noise] = (fit.squared / fit.equations).sqrt().max(LEAST_SCALE);
+            }
+        }
+    }
+
+    /// Readings so far with a kind of noise.
+    fn noise_seen(&self, noise: usize) -> usize {
+        let channel = self.nominal.noises()[noise].channel;
+        let seen = self.posterior.measurements.iter();
+        let settled = self.posterior.settled.as_ref().map_or(0, |settled| settled.count);
+        settled + seen.filter(|seen| seen.observation.readings.get(channel).is_some_and(Option::is_some)).count()
+    }
+
+    /// Learns the scales of noise that is not known, by restricted maximum likelihood at the heaviest mode: what residuals are,
+    /// in their mean square over the equations that no parameter accounts for,
+    ///
+    /// ```text
+    /// s² = (Σ w ‖r‖² + ν s₀²) / (Σ w d − tr(Λₙ P) + ν),    ν = 3
+    /// ```
+    ///
+    /// with s₀ the scale before this movement, so that it does not jump while there are hardly more equations than parameters.
+    fn learn_noise(&mut self) {
+        let layout = self.belief.layout.clone();
+        let before = self.posterior.scales.clone();
+        for _ in 0..NOISE_ROUNDS {
+            let Some(mode) = self.hypotheses.modes.first() else { return };
+            let Some(absorbed) = self.posterior.absorbed(mode, &layout) else { return };
+            let fits = self.posterior.fit(&mode.state, &layout);
+            let mut change = 0.0_f64;
+            for noise in (0..fits.len()).filter(|noise| self.unknown[*noise] && fits[*noise].equations > 0.0) {
+                let free = (fits[noise].equations - absorbed[noise]).max(0.0);
+                let square = (fits[noise].squared + NOISE_WEIGHT * before[noise].powi(2)) / (free + NOISE_WEIGHT);
+                let scale = square.sqrt().max(LEAST_SCALE);
+                if scale.is_finite() {
+                    change = change.max((scale / self.posterior.scales[noise]).ln().abs());
+                    self.posterior.scales[noise] = scale;
+                }
+            }
+            if change < 1e-3 {
+                return;
+            }
+            self.hypotheses.follow(&self.posterior, &layout);
+            self.hypotheses.condense(self.settings.kept, &layout);
+        }
+    }
+
     /// The modes before any measurement: the guess, or without one draws of the prior.
     fn begin(&mut self) {
         let layout = self.belief.layout.clone();
@@ -123,6 +195,9 @@ impl Smoother {
 
     fn publish(&mut self) {
         let Some((best, rest)) = self.hypotheses.modes.split_first() else { return };
+        if self.unknown.contains(&true) {
+            self.belief.rig = Arc::new(self.nominal.scaled(&self.posterior.scales));
+        }
         self.belief.state = best.state.clone();
         self.belief.covariance = Some(best.covariance.clone());
         self.belief.alternatives = rest
@@ -243,6 +318,12 @@ impl Estimator for Smoother {
         Ok(update)
     }
 
+    fn noise(&self) -> Vec<NoiseReport> {
+        let noises = self.nominal.noises().iter().zip(&self.unknown).zip(&self.posterior.scales);
+        let unknown = noises.filter(|((_, unknown), _)| **unknown);
+        unknown.map(|((noise, _), scale)| NoiseReport { channel: noise.channel, first: noise.part.start, scale: *scale }).collect()
+    }
+
     fn readings(&self) -> Vec<ReadingReport> {
         if !self.posterior.loss.is_robust() {
             return Vec::new();
@@ -258,6 +339,7 @@ impl Smoother {
         self.movements += 1;
         let (positions, observation) = (positions.to_vec(), observation.clone());
         self.posterior.measurements.push(Measurement { positions, observation, movement: self.movements });
+        self.begin_noise();
         let change_noticed = self.notices_change(nis);
         if change_noticed && self.forgets {
             self.forget();
@@ -267,6 +349,9 @@ impl Smoother {
             self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         }
         self.hypotheses.condense(self.settings.kept, &layout);
+        if self.unknown.contains(&true) {
+            self.learn_noise();
+        }
         if self.hypotheses.modes.is_empty() {
             return Err(EstimationError::Diverged("no hypothesis explains the measurements"));
         }

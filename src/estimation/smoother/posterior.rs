@@ -5,11 +5,11 @@
 //! ```
 //!
 //! with whitened residuals, ρ the [loss](Loss) of a reading (½ of its argument, for least squares) and s the scale of its
-//! channel's noise, as a multiple of the nominal one. The last term stands for measurements whose linearisation has
+//! noise, as a multiple of the nominal one. The last term stands for measurements whose linearisation has
 //! settled: Λ = Σ w HᵀH / s² collects them in the chart at the state where they were linearised, δ are the coordinates of x
-//! there. It is kept by channel and in nominal σ, so that a scale that is learned later still applies.
+//! there. It is kept by kind of noise and in nominal σ, so that a scale that is learned later still applies.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rand::{Rng, RngExt};
@@ -33,15 +33,15 @@ pub(super) struct Measurement {
 #[derive(Clone, Debug)]
 pub(super) struct Settled {
     pub state: State,
-    /// By channel, in nominal σ.
-    pub channels: Vec<Quadratic>,
+    /// By kind of noise, in nominal σ.
+    pub noises: Vec<Quadratic>,
     /// What the readings cost at δ = 0 beyond their weighted squares: of outliers.
     pub excess: f64,
     /// How many measurements.
     pub count: usize,
 }
 
-/// Σ w HᵀH and its kin of one channel.
+/// Σ w HᵀH and its kin of one kind of noise.
 #[derive(Clone, Debug)]
 pub(super) struct Quadratic {
     /// Λ, m × m.
@@ -71,7 +71,7 @@ pub(super) struct Posterior {
     pub pins: State,
     pub rig: Arc<Rig>,
     pub loss: Loss,
-    /// s, by channel: 1 where the noise is known.
+    /// s, by kind of noise: 1 where it is known.
     pub scales: Vec<f64>,
     pub measurements: Vec<Measurement>,
     pub settled: Option<Settled>,
@@ -84,20 +84,22 @@ pub(super) struct Normal {
     pub descent: DVector<f64>,
 }
 
-/// How some measurements are fitted by channel: what a scale of the noise is told by.
+/// How some measurements are fitted, by kind of noise: what its scale is told by.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fit {
     /// Σ w ‖r‖² in nominal σ.
     pub squared: f64,
     /// Σ w d.
     pub equations: f64,
-    /// The equations of outliers, Σ (1 − w) d.
-    pub excluded: f64,
+}
+
+fn norm_squared(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum()
 }
 
 impl Posterior {
     pub fn new(prior: Prior, rig: Arc<Rig>) -> Self {
-        let scales = vec![1.0; rig.channels().len()];
+        let scales = vec![1.0; rig.noises().len()];
         Self { pins: prior.pins(), prior, rig, loss: Loss::None, scales, measurements: Vec::new(), settled: None }
     }
 
@@ -111,8 +113,8 @@ impl Posterior {
     pub fn readings(&self, state: &State) -> impl Iterator<Item = ReadingReport> {
         let of = move |seen: &Measurement| {
             let mut reports = Vec::new();
-            self.rig.squared_errors(state, &seen.positions, &seen.observation, |channel, squared, d| {
-                let squared = squared / self.scales[channel].powi(2);
+            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+                let (squared, d) = (self.squared(channel, whitened), whitened.len());
                 reports.push(ReadingReport {
                     movement: seen.movement,
                     channel,
@@ -167,21 +169,28 @@ impl Posterior {
     /// A measurement without the readings that are likelier outliers than not; `None` if that leaves none.
     fn without_outliers(&self, state: &State, seen: &Measurement) -> Option<Measurement> {
         let mut normal = seen.clone();
-        self.rig.squared_errors(state, &seen.positions, &seen.observation, |channel, squared, d| {
-            if self.weight(self.loss.into(), channel, squared, d) < 0.5 {
+        self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+            if self.loss.weight(self.squared(channel, whitened), whitened.len()) < 0.5 {
                 normal.observation.readings[channel] = None;
             }
         });
         (!normal.observation.is_miss()).then_some(normal)
     }
 
-    /// The weight of a reading's equations, its scale left aside.
-    fn weight(&self, loss: Graduated, channel: usize, squared: f64, d: usize) -> f64 {
-        loss.weight(squared / self.scales[channel].powi(2), d)
+    /// The kinds of noise of a channel, with their numbers among all.
+    fn noises(&self, channel: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
+        let all = self.rig.noises().iter().enumerate();
+        all.filter(move |(_, noise)| noise.channel == channel).map(|(index, noise)| (index, noise.part.clone()))
+    }
+
+    /// ‖r‖² of a reading, in σ as they are taken to be.
+    fn squared(&self, channel: usize, whitened: &[f64]) -> f64 {
+        self.noises(channel).map(|(noise, part)| norm_squared(&whitened[part]) / self.scales[noise].powi(2)).sum()
     }
 
     /// E(x); infinite where x is too far from where settled measurements were linearised. Axes are written with their
     /// points nearest to the pins.
+    #[cfg(test)]
     pub fn cost(&self, state: &State, layout: &Layout) -> f64 {
         self.cost_by(self.loss.into(), state, layout)
     }
@@ -190,34 +199,35 @@ impl Posterior {
     fn cost_by(&self, loss: Graduated, state: &State, layout: &Layout) -> f64 {
         let mut errors = 0.0;
         for seen in &self.measurements {
-            self.rig.squared_errors(state, &seen.positions, &seen.observation, |channel, squared, d| {
-                errors += loss.cost(squared / self.scales[channel].powi(2), d);
+            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+                errors += loss.cost(self.squared(channel, whitened), whitened.len());
             });
         }
         let settled = self.settled.as_ref().map_or(0.0, |settled| {
             settled.state.local(layout, state).map_or(f64::INFINITY, |delta| {
-                let of = settled.channels.iter().zip(&self.scales);
+                let of = settled.noises.iter().zip(&self.scales);
                 settled.excess + of.map(|(of, scale)| of.misfit_at(&delta) / (scale * scale)).sum::<f64>()
             })
         });
         self.prior.cost(state, None) + errors + settled
     }
 
-    /// By channel, how well the data are fitted at `state`: for an honest one `squared` is χ² distributed with `equations` degrees of freedom.
+    /// By kind of noise, how well the data are fitted at `state`: for one that is as assumed `squared` is χ² distributed with
+    /// `equations` degrees of freedom.
     pub fn fit(&self, state: &State, layout: &Layout) -> Vec<Fit> {
         let mut fits = vec![Fit::default(); self.scales.len()];
-        let loss = self.loss.into();
         for seen in &self.measurements {
-            self.rig.squared_errors(state, &seen.positions, &seen.observation, |channel, squared, d| {
-                let weight = self.weight(loss, channel, squared, d);
-                fits[channel].squared += weight * squared;
-                fits[channel].equations += weight * d as f64;
-                fits[channel].excluded += (1.0 - weight) * d as f64;
+            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+                let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
+                for (noise, part) in self.noises(channel) {
+                    fits[noise].squared += weight * norm_squared(&whitened[part.clone()]);
+                    fits[noise].equations += weight * part.len() as f64;
+                }
             });
         }
         if let Some(settled) = &self.settled {
             let delta = settled.state.local(layout, state);
-            for (fit, of) in fits.iter_mut().zip(&settled.channels) {
+            for (fit, of) in fits.iter_mut().zip(&settled.noises) {
                 fit.squared += delta.as_ref().map_or(f64::INFINITY, |delta| 2.0 * of.misfit_at(delta));
                 fit.equations += of.equations;
             }
@@ -231,6 +241,7 @@ impl Posterior {
     }
 
     /// The normal equations at `state`, linearised there; `None` outside the chart of settled measurements.
+    #[cfg(test)]
     pub fn normal(&self, state: &State, layout: &Layout) -> Option<Normal> {
         self.normal_by(self.loss.into(), state, layout)
     }
@@ -241,9 +252,9 @@ impl Posterior {
         let (mut information, mut descent) = (&stacked * stacked.transpose(), stacked * residuals);
         cost += self.prior.cost(state, Some((&mut information, &mut descent)));
         if let Some(settled) = &self.settled {
-            let (channels, excess) = settled.carried(state, layout)?;
+            let (noises, excess) = settled.carried(state, layout)?;
             cost += excess;
-            for (of, scale) in channels.into_iter().zip(&self.scales) {
+            for (of, scale) in noises.into_iter().zip(&self.scales) {
                 let precision = (scale * scale).recip();
                 information += of.information * precision;
                 descent += of.vector * precision;
@@ -289,51 +300,67 @@ impl Posterior {
         residual: &mut [f64],
     ) -> f64 {
         let (mut at, mut cost) = (0, 0.0);
-        for (reading, scale) in observation.readings.iter().zip(&self.scales) {
+        for (channel, reading) in observation.readings.iter().enumerate() {
             let Some(reading) = reading else { continue };
-            let place = at..at + reading.len();
-            let squared: f64 = residual[place.clone()].iter().map(|x| x * x).sum::<f64>() / (scale * scale);
+            let squared = self.squared(channel, &residual[at..at + reading.len()]);
             cost += loss.cost(squared, reading.len());
-            let factor = loss.weight(squared, reading.len()).sqrt() / scale;
-            if factor != 1.0 {
-                rows[place.start * m..place.end * m].iter_mut().for_each(|x| *x *= factor);
-                residual[place.clone()].iter_mut().for_each(|x| *x *= factor);
+            let root = loss.weight(squared, reading.len()).sqrt();
+            for (noise, part) in self.noises(channel) {
+                let factor = root / self.scales[noise];
+                if factor != 1.0 {
+                    let place = at + part.start..at + part.end;
+                    rows[place.start * m..place.end * m].iter_mut().for_each(|x| *x *= factor);
+                    residual[place].iter_mut().for_each(|x| *x *= factor);
+                }
             }
-            at = place.end;
+            at += reading.len();
         }
         cost
+    }
+
+    /// Σ w HᵀH and its kin of some measurements, by kind of noise and in nominal σ, and what they cost beyond ½ Σ w ‖r‖².
+    fn quadratics(&self, state: &State, layout: &Layout, measurements: &[Measurement]) -> (Vec<Quadratic>, f64) {
+        let (rows, residuals, cost) = self.stacked(self.loss.into(), state, layout, measurements);
+        let mut of_noise = vec![Vec::new(); self.scales.len()];
+        let mut at = 0;
+        for seen in measurements {
+            for (channel, reading) in seen.observation.readings.iter().enumerate() {
+                let Some(reading) = reading else { continue };
+                self.noises(channel).for_each(|(noise, part)| of_noise[noise].extend(at + part.start..at + part.end));
+                at += reading.len();
+            }
+        }
+        let of = |(columns, scale): (&Vec<usize>, &f64)| {
+            let (rows, residuals) = (rows.select_columns(columns), residuals.select_rows(columns));
+            let square = scale * scale;
+            Quadratic {
+                information: &rows * rows.transpose() * square,
+                misfit: 0.5 * residuals.norm_squared() * square,
+                vector: rows * residuals * square,
+                equations: 0.0,
+            }
+        };
+        let mut quadratics: Vec<Quadratic> = of_noise.iter().zip(&self.scales).map(of).collect();
+        for seen in measurements {
+            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+                let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
+                self.noises(channel).for_each(|(noise, part)| quadratics[noise].equations += weight * part.len() as f64);
+            });
+        }
+        let explained: f64 = quadratics.iter().zip(&self.scales).map(|(of, scale)| of.misfit / (scale * scale)).sum();
+        (quadratics, cost - explained)
     }
 
     /// Moves the oldest `count` measurements into the quadratic, linearised at `state`, with the weights that they have there.
     pub fn settle(&mut self, count: usize, state: &State, layout: &Layout) {
         let old: Vec<Measurement> = self.measurements.drain(..count.min(self.measurements.len())).collect();
-        let (m, loss) = (layout.dimension(), self.loss.into());
-        let mut channels = Vec::with_capacity(self.scales.len());
-        let mut excess = 0.0;
-        for channel in 0..self.scales.len() {
-            let of_channel: Vec<Measurement> = old.iter().filter_map(|seen| seen.only(channel)).collect();
-            let (rows, residuals, cost) = self.stacked(loss, state, layout, &of_channel);
-            let square = self.scales[channel].powi(2);
-            let mut quadratic = Quadratic {
-                information: &rows * rows.transpose() * square,
-                misfit: 0.5 * residuals.norm_squared() * square,
-                vector: rows * residuals * square,
-                equations: 0.0,
-            };
-            for seen in &of_channel {
-                self.rig.squared_errors(state, &seen.positions, &seen.observation, |_, squared, d| {
-                    quadratic.equations += self.weight(loss, channel, squared, d) * d as f64;
-                });
-            }
-            excess += cost - quadratic.misfit / square;
-            channels.push(quadratic);
-        }
+        let (mut noises, mut excess) = self.quadratics(state, layout, &old);
         let mut total = old.len();
         // What cannot be carried over is kept by nobody: the chart ends 90 deg away, where nothing settles.
         if let Some(before) = self.settled.take()
             && let Some((carried, more)) = before.carried(state, layout)
         {
-            for (into, of) in channels.iter_mut().zip(carried) {
+            for (into, of) in noises.iter_mut().zip(carried) {
                 into.information += of.information;
                 into.vector += of.vector;
                 into.misfit += of.misfit;
@@ -342,36 +369,25 @@ impl Posterior {
             excess += more;
             total += before.count;
         }
-        debug_assert!(channels.iter().all(|of| of.information.nrows() == m));
-        self.settled = Some(Settled { state: state.clone(), channels, excess, count: total });
+        self.settled = Some(Settled { state: state.clone(), noises, excess, count: total });
     }
 
-    /// Λ of one channel alone at `state`, its scale left aside: for what share of its equations the parameters account.
-    pub fn information_of(&self, channel: usize, state: &State, layout: &Layout) -> Option<DMatrix<f64>> {
-        let of_channel: Vec<Measurement> = self.measurements.iter().filter_map(|seen| seen.only(channel)).collect();
-        let (rows, ..) = self.stacked(self.loss.into(), state, layout, &of_channel);
-        let mut information = &rows * rows.transpose() * self.scales[channel].powi(2);
+    /// By kind of noise, how many of its equations the parameters account for: tr(Λₙ P), with Λₙ its share of the information.
+    pub fn absorbed(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
+        let (mut noises, _) = self.quadratics(&mode.state, layout, &self.measurements);
         if let Some(settled) = &self.settled {
-            let (channels, _) = settled.carried(state, layout)?;
-            information += &channels[channel].information;
+            let (carried, _) = settled.carried(&mode.state, layout)?;
+            noises.iter_mut().zip(carried).for_each(|(into, of)| into.information += of.information);
         }
-        Some(information)
-    }
-}
-
-impl Measurement {
-    /// The same with the readings of one channel alone; `None` if it had none.
-    fn only(&self, channel: usize) -> Option<Self> {
-        let mut readings = vec![None; self.observation.readings.len()];
-        readings[channel] = Some(self.observation.readings.get(channel)?.clone()?);
-        Some(Self { observation: Observation { readings }, positions: self.positions.clone(), movement: self.movement })
+        let of = |(noise, scale): (&Quadratic, &f64)| noise.information.dot(&mode.covariance) / (scale * scale);
+        Some(noises.iter().zip(&self.scales).map(of).collect())
     }
 }
 
 impl Settled {
     /// Equations that it holds, outliers not counted.
     fn equations(&self) -> f64 {
-        self.channels.iter().map(|of| of.equations).sum()
+        self.noises.iter().map(|of| of.equations).sum()
     }
 
     /// The quadratics in the chart at `state`: their information there, their descent and their misfit.
@@ -393,7 +409,7 @@ impl Settled {
                 equations: of.equations,
             }
         };
-        Some((self.channels.iter().map(carry).collect(), self.excess))
+        Some((self.noises.iter().map(carry).collect(), self.excess))
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod body;
 mod change;
+mod equipment;
 mod head;
 mod world;
 
@@ -11,7 +12,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use toml::Spanned;
 
 use super::{
-    EstimatorKind, Filter, LearnerSpec, PolicyKind, Prior, Scenario, SelectionSpec, SmootherSpec,
+    EstimatorKind, Filter, Known, LearnerSpec, PolicyKind, Prior, Robot, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError, similar},
     learners::{Fault, HUMAN, Misfit, Setting, misfit},
     raw,
@@ -19,6 +20,8 @@ use super::{
 use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
     experiment::Thresholds,
+    kinematics::JointKind,
+    model::Block,
     optimize::{Settings, Variant},
     selection::{CriterionUnits, Planning},
     sensing::{Loss, Rig},
@@ -118,9 +121,9 @@ impl Check<'_> {
             let mend = "use letters, digits, '-', '_' and '.'; the name becomes part of file names and addresses";
             self.problem(raw.name.span(), "name", format!("{name:?} cannot be a name"), mend);
         }
-        let robot = self.robot(&raw.robot)?;
+        let robot = self.robot(raw)?;
         let world = self.world(raw, &robot, open);
-        let rig = self.rig(raw);
+        let rig = self.rig(raw, &robot.equipment);
         let setting = Setting {
             learns_marker: raw.robot.learn_marker,
             is_measured: raw.measurements.is_some(),
@@ -132,7 +135,7 @@ impl Check<'_> {
             name: name.clone(),
             title: raw.title.clone(),
             steps: self.at_least_one("steps", &raw.steps),
-            prior: self.prior(raw),
+            prior: self.prior(raw, &robot),
             filter,
             unscented: raw.unscented.as_ref().map_or(filter, |unscented| self.filter("unscented", unscented)),
             smoother: self.smoother(raw, rig.as_deref()),
@@ -150,7 +153,7 @@ impl Check<'_> {
         })
     }
 
-    fn prior(&mut self, raw: &raw::Scenario) -> Prior {
+    fn prior(&mut self, raw: &raw::Scenario, robot: &Robot) -> Prior {
         let prior = raw.prior.get_ref();
         if raw.robot.learn_marker && prior.marker_m.is_none() {
             let mend = "add `marker_m = …`, its standard deviation in metres";
@@ -160,7 +163,42 @@ impl Check<'_> {
             direction_rad: self.positive("prior.direction_rad", &prior.direction_rad),
             point_m: self.positive("prior.point_m", &prior.point_m),
             marker_m: prior.marker_m.as_ref().map_or(1.0, |sd| self.positive("prior.marker_m", sd)),
+            known: self.known_blocks(raw, robot),
         }
+    }
+
+    /// What is known of targets, cameras, ratios and offsets that are learned.
+    fn known_blocks(&mut self, raw: &raw::Scenario, robot: &Robot) -> BTreeMap<Block, Known> {
+        let prior = raw.prior.get_ref();
+        let joints = raw.robot.joints.get_ref().iter().enumerate();
+        let mut known: BTreeMap<Block, Known> = robot.known.iter().copied().collect();
+        let unit = |size: f64| Known::Within { length_m: size, angle_rad: size, other: size };
+        for (index, joint) in joints {
+            let (span, joint) = (joint.span(), joint.get_ref());
+            if joint.learn_ratio {
+                match &prior.ratio {
+                    Some(sd) => drop(known.insert(Block::Ratio(index), unit(self.positive("prior.ratio", sd)))),
+                    None => {
+                        let mend = "add `ratio = 0.02`, say, to [prior]: the standard deviation of a ratio";
+                        self.problem(span.clone(), "prior.ratio", "a ratio is learned", mend);
+                    }
+                }
+            }
+            if joint.learn_offset {
+                let (key, sd) = match joint.kind {
+                    JointKind::Revolute => ("prior.offset_rad", &prior.offset_rad),
+                    JointKind::Prismatic => ("prior.offset_m", &prior.offset_m),
+                };
+                match sd {
+                    Some(sd) => drop(known.insert(Block::Offset(index), unit(self.positive(key, sd)))),
+                    None => {
+                        let mend = "add it to [prior]: the standard deviation of an offset";
+                        self.problem(span, key, "an offset is learned", mend);
+                    }
+                }
+            }
+        }
+        known
     }
 
     fn filter(&mut self, section: &str, raw: &raw::Filter) -> Filter {
@@ -190,7 +228,8 @@ impl Check<'_> {
             kept: count("smoother.hypotheses", given.and_then(|given| given.hypotheses.as_ref()), default.kept),
             spawned: count("smoother.spawned", given.and_then(|given| given.spawned.as_ref()), default.spawned),
         };
-        SmootherSpec { sigma, hypotheses, loss: self.loss(given) }
+        let noise_unknown = given.and_then(|given| given.noise) == Some(raw::NoiseKnowledge::Unknown);
+        SmootherSpec { sigma, hypotheses, loss: self.loss(given), noise_unknown }
     }
 
     fn loss(&mut self, given: Option<&raw::Smoother>) -> Loss {

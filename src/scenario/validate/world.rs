@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::{
     experiment::Outliers,
     scenario::{DataError, InitialError, Measurements, Robot, WorldSpec},
-    sensing::Rig,
+    sensing::{Equipment, Rig},
 };
 
 impl Check<'_> {
@@ -81,7 +81,7 @@ impl Check<'_> {
 
     /// What is measured: the sensors of a simulated world; where measurements are replayed a tracker with the noise that
     /// the filter assumes.
-    pub(super) fn rig(&mut self, raw: &raw::Scenario) -> Option<Arc<Rig>> {
+    pub(super) fn rig(&mut self, raw: &raw::Scenario, equipment: &Equipment) -> Option<Arc<Rig>> {
         let Some(sensors) = &raw.sensor else {
             return Some(Arc::new(Rig::tracker(raw.filter.measurement_variance_m2.get_ref().sqrt())));
         };
@@ -90,7 +90,7 @@ impl Check<'_> {
         for (index, keys) in given.0.iter().enumerate() {
             let section = if given.0.len() > 1 { format!("sensor[{index}]") } else { "sensor".to_owned() };
             let span = if given.0.len() > 1 { keys.span() } else { sensors.span() };
-            match keys.get_ref().channel() {
+            match keys.get_ref().channel(equipment) {
                 Ok(channel) if given.0.len() > 1 && channel.sigma() == 0.0 => {
                     let what = "several sensors are weighed by their noise, and this one has none";
                     self.problem(span, format!("{section}.sigma_m"), what, "write a number above 0");
