@@ -9,8 +9,8 @@ use crate::{
     model::{Block, Prior},
     optimize::{Settings, Variant},
     scenario::{
-        ErrorDraw, EstimatorKind, Filter, InitialError, Known, LearnerSpec, PolicyKind, Scenario, ScenarioError, SmootherSpec,
-        WorldSpec,
+        ErrorDraw, EstimatorKind, Filter, InitialError, Known, LearnerSpec, PolicyKind, Scenario, ScenarioError,
+        SmootherSpec, WorldSpec,
     },
     selection::{Active, Human, Minimiser, Planner, Policy, Random},
     sensing::Loss,

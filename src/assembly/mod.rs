@@ -66,7 +66,7 @@ impl Scenario {
             truth: self.robot.state.clone(),
             rig: self.rig.clone(),
             limits: self.robot.limits.clone(),
-            head: watch.as_ref().map(|watch| watch.head),
+            head: watch.as_ref().and_then(|watch| watch.head),
             prior: DMatrix::from_diagonal(&deviations.map(|sd| sd.powi(-2))),
             weights: self.weights(),
             layout,
@@ -100,7 +100,7 @@ impl Scenario {
                     workspace: self.workspace(drawn(limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true)),
                     watch: watch.clone(),
                 };
-                let head = watch.as_ref().map(|watch| watch.head);
+                let head = watch.as_ref().and_then(|watch| watch.head);
                 let seen = |theta: &[f64]| head.is_none_or(|head| head.sees(&truth.marker_at(theta)));
                 let mut configurations = drawn(limits, EVALUATION_SIZE, Stream::Evaluation, seed, seen);
                 if configurations.is_empty() {
@@ -269,7 +269,7 @@ impl Scenario {
             movements_available: briefing.actions.remaining(),
             truth: world.truth().map(ModelReport::of_state),
             change_at: world.change().map(|change| change.step),
-            head: briefing.watch.as_ref().map(|watch| HeadDescription::of(&watch.head)),
+            head: briefing.watch.as_ref().and_then(|watch| watch.head.as_ref().map(HeadDescription::of)),
             body: robot.body,
         };
         Ok(Experiment::new(description, world, learners, evaluation, self.design_problem()))
@@ -300,9 +300,7 @@ impl Known {
                 let translation = Translation3::from(pose.translation.vector + shift);
                 Element::Pose(Isometry3::from_parts(translation, turn * pose.rotation))
             }
-            Element::Numbers(numbers) => {
-                Element::Numbers(numbers.map(|x| x + other * rng.random_range(-1.0..=1.0)))
-            }
+            Element::Numbers(numbers) => Element::Numbers(numbers.map(|x| x + other * rng.random_range(-1.0..=1.0))),
             Element::Axis(_) => element.clone(),
         }
     }
@@ -331,7 +329,10 @@ mod tests {
         assert_eq!(evaluation.targets().len(), EVALUATION_SIZE);
         assert!(evaluation.targets().all(|(_, marker)| head.sees(marker)));
         let truth = world.truth().expect("simulated");
-        assert!(briefing.workspace.configurations.iter().any(|theta| !head.sees(&truth.marker_at(theta))), "without truth");
+        assert!(
+            briefing.workspace.configurations.iter().any(|theta| !head.sees(&truth.marker_at(theta))),
+            "without truth"
+        );
     }
 
     /// No truth leaks: with the truth swapped behind the learners' backs, their first choices stay as they were, and

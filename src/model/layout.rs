@@ -41,7 +41,12 @@ impl Layout {
         let mut blocks: Vec<Block> = learned.into_iter().filter(|block| block.is_in(state)).collect();
         blocks.sort_unstable();
         blocks.dedup();
-        let mut layout = Self { entries: Vec::new(), axes: vec![None; state.joints.len()], quantities: Vec::new(), hand: state.hand.block() };
+        let mut layout = Self {
+            entries: Vec::new(),
+            axes: vec![None; state.joints.len()],
+            quantities: Vec::new(),
+            hand: state.hand.block(),
+        };
         for block in blocks {
             let start = layout.quantities.len();
             layout.quantities.extend(block.quantities(state));

@@ -229,9 +229,9 @@ impl Prior {
                     (Some(Known::Within { angle_rad, .. }), Quantity::Angle) => angle_rad,
                     (Some(Known::Within { other, .. }), _) => other,
                     (None, quantity) => match (block, quantity) {
-                    (Block::Axis(_), Quantity::Length) => self.point_m,
-                    (_, Quantity::Length) => self.marker_m,
-                    _ => self.direction_rad,
+                        (Block::Axis(_), Quantity::Length) => self.point_m,
+                        (_, Quantity::Length) => self.marker_m,
+                        _ => self.direction_rad,
                     },
                 };
             }

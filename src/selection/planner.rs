@@ -81,6 +81,8 @@ struct Scene<'a> {
     limits: &'a JointBox,
     /// No movement planned: the belief as it is.
     now: Plan,
+    /// Postures in view, scaled to the unit cube, where the sensors see some only.
+    familiar: Vec<Vec<f64>>,
     /// What enters that not everything is seen: how, and by hypothesis what states drawn from it would see.
     sight: Option<(Sight<'a>, Vec<Option<Arc<Views>>>)>,
 }
@@ -151,7 +153,11 @@ impl<'a> Scene<'a> {
             let views = estimate.into_iter().chain(others).map(|(state, p)| sight.views(state, layout, p, rig));
             (sight, views.collect())
         });
-        Self { planner, limits, now, sight }
+        let familiar = match situation.belief.rig.has_view() {
+            true => situation.history.seen().iter().rev().take(planner.planning.polished).cloned().collect(),
+            false => Vec::new(),
+        };
+        Self { planner, limits, now, familiar, sight }
     }
 
     /// The criterion once `plan` is carried out.
@@ -242,8 +248,11 @@ impl<'a> Scene<'a> {
         let leaves = found.leaves.iter().filter_map(|leaf| Some((leaf.value?, leaf.centre.as_slice())));
         let mut starts: Vec<(f64, &[f64])> = leaves.collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let polished = starts.into_iter().take(planning.polished.max(1));
-        let best = least(polished.map(|(_, start)| polish(start, planning.polish, &mut evaluate)));
+        starts.truncate(planning.polished.max(1));
+        // What is in view may be too small a part of the box for DIRECT to come upon.
+        let familiar: Vec<&[f64]> = self.familiar.iter().map(Vec::as_slice).collect();
+        let polished = starts.into_iter().map(|(_, start)| start).chain(familiar);
+        let best = least(polished.map(|start| polish(start, planning.polish, &mut evaluate)));
         partition.get_or_insert(found);
         Ok(best.map(|(point, _)| self.limits.from_unit(&point)))
     }

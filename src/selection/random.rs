@@ -3,9 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::{
-    Actions, Appraisal, Criterion, Movement, Policy, Selection, SelectionError, Situation, Watch, Weights,
-};
+use super::{Actions, Appraisal, Criterion, Movement, Policy, Selection, SelectionError, Situation, Watch, Weights};
 use crate::kinematics::JointBox;
 
 /// Draws uniformly inside the limits, or from what is left of a pool (which shuffles it).

@@ -7,12 +7,12 @@ use nalgebra::{Matrix3, Point3};
 use super::{History, Selection, SelectionError, Sight, Situation};
 use crate::{kinematics::JointBox, sensing::Head};
 
-/// What is known of the head that watches; every learner of a scenario is told the same.
+/// What is known of what can be seen; every learner of a scenario is told the same.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Watch {
-    /// The head.
-    pub head: Head,
-    /// A configuration at which the marker is known to be seen, rad or m.
+    /// The head that watches; without one the sensors see what they see by themselves.
+    pub head: Option<Head>,
+    /// A configuration at which something is known to be seen, rad or m.
     pub visible_pose: Vec<f64>,
 }
 
@@ -24,7 +24,7 @@ impl Watch {
         situation: &Situation<'a>,
         limits: &'a JointBox,
     ) -> Option<Sight<'a>> {
-        let head = watch.map(|watch| &watch.head);
+        let head = watch.and_then(|watch| watch.head.as_ref());
         let matters = head.is_some() || situation.belief.rig.has_view();
         matters.then(|| Sight::Chance(Visibility::new(head, situation.history.misses()), limits))
     }

@@ -32,7 +32,10 @@ pub use hypotheses::HypothesisSettings;
 use hypotheses::Hypotheses;
 use posterior::{Effort, Measurement, Posterior};
 
-use super::{Alternative, Belief, ChangeDetector, EstimationError, Estimator, NoiseReport, ReadingReport, Update, change::quantile};
+use super::{
+    Alternative, Belief, ChangeDetector, EstimationError, Estimator, NoiseReport, ReadingReport, Update,
+    change::quantile,
+};
 use crate::{
     model::{Layout, Prior},
     sensing::{Loss, Observation, Rig},
@@ -321,7 +324,9 @@ impl Estimator for Smoother {
     fn noise(&self) -> Vec<NoiseReport> {
         let noises = self.nominal.noises().iter().zip(&self.unknown).zip(&self.posterior.scales);
         let unknown = noises.filter(|((_, unknown), _)| **unknown);
-        unknown.map(|((noise, _), scale)| NoiseReport { channel: noise.channel, first: noise.part.start, scale: *scale }).collect()
+        unknown
+            .map(|((noise, _), scale)| NoiseReport { channel: noise.channel, first: noise.part.start, scale: *scale })
+            .collect()
     }
 
     fn readings(&self) -> Vec<ReadingReport> {

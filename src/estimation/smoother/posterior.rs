@@ -344,7 +344,8 @@ impl Posterior {
         for seen in measurements {
             self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
                 let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
-                self.noises(channel).for_each(|(noise, part)| quadratics[noise].equations += weight * part.len() as f64);
+                self.noises(channel)
+                    .for_each(|(noise, part)| quadratics[noise].equations += weight * part.len() as f64);
             });
         }
         let explained: f64 = quadratics.iter().zip(&self.scales).map(|(of, scale)| of.misfit / (scale * scale)).sum();

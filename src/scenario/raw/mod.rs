@@ -27,6 +27,7 @@ pub struct Scenario {
     pub initial_error: Option<Spanned<InitialError>>,
     pub measurements: Option<Spanned<Measurements>>,
     pub head: Option<Spanned<Head>>,
+    pub view: Option<Spanned<View>>,
     #[serde(rename = "target", default)]
     pub targets: Vec<Spanned<Target>>,
     #[serde(rename = "camera", default)]
@@ -159,6 +160,12 @@ pub struct Head {
     pub tilt_limit_deg: Option<Spanned<f64>>,
     pub lens_half_angle_deg: Option<Spanned<f64>>,
     pub eye_baseline_m: Option<Spanned<f64>>,
+    pub visible_pose_deg: Spanned<Vec<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct View {
     pub visible_pose_deg: Spanned<Vec<f64>>,
 }
 

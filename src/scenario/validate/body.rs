@@ -102,7 +102,12 @@ impl Check<'_> {
             JointKind::Prismatic => ("offset_m", &raw.offset_m, &raw.offset_deg),
         };
         if let Some(other) = other {
-            self.problem(other.span(), key("offset"), "this unit does not fit the kind of joint", format!("write `{wanted}`"));
+            self.problem(
+                other.span(),
+                key("offset"),
+                "this unit does not fit the kind of joint",
+                format!("write `{wanted}`"),
+            );
         }
         if let Some(offset) = given {
             let offset = self.number(&key(wanted), offset, |_| true, "a number");

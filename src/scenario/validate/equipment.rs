@@ -45,7 +45,8 @@ impl Check<'_> {
         let link = raw.link.as_ref().map_or(Some(joints.len()), |link| self.link(&field("link"), link, joints));
         let at = self.point(&field("at_m"), &raw.at_m);
         let is_body = raw.rpy_deg.is_some() || raw.points_m.is_some();
-        let rotation = raw.rpy_deg.as_ref().map_or(UnitQuaternion::identity(), |rpy| self.rotation(&field("rpy_deg"), rpy));
+        let rotation =
+            raw.rpy_deg.as_ref().map_or(UnitQuaternion::identity(), |rpy| self.rotation(&field("rpy_deg"), rpy));
         let points = raw.points_m.as_ref().map_or_else(
             || vec![Point3::origin()],
             |points| points.get_ref().iter().map(|raw::Exactly(point)| Point3::from(*point)).collect(),
@@ -59,7 +60,12 @@ impl Check<'_> {
         let facing = raw.facing.as_ref().and_then(|direction| {
             let direction = self.unit(&field("facing"), direction)?;
             let within = raw.facing_within_deg.as_ref().map_or(FACING_WITHIN_DEG, |within| {
-                self.number(&field("facing_within_deg"), within, |x| x > 0.0 && x <= 180.0, "an angle from 0 to 180 degrees")
+                self.number(
+                    &field("facing_within_deg"),
+                    within,
+                    |x| x > 0.0 && x <= 180.0,
+                    "an angle from 0 to 180 degrees",
+                )
             });
             Some(Facing { direction, within: within.to_radians() })
         });
@@ -105,19 +111,27 @@ impl Check<'_> {
         let mut pair = |name: &str, value: &Spanned<raw::Exactly<f64, 2>>| {
             let raw::Exactly(pair) = *value.get_ref();
             if !pair.iter().all(|x| x.is_finite() && *x > 0.0) {
-                self.problem(value.span(), field(name), format!("{pair:?} is out of range"), "write two numbers above 0, in pixels");
+                self.problem(
+                    value.span(),
+                    field(name),
+                    format!("{pair:?} is out of range"),
+                    "write two numbers above 0, in pixels",
+                );
             }
             pair
         };
         let (size_px, focal) = (pair("size_px", &raw.size_px), pair("focal_px", &raw.focal_px));
-        let centre = raw.centre_px.as_ref().map_or([0.5 * size_px[0], 0.5 * size_px[1]], |centre| pair("centre_px", centre));
+        let centre =
+            raw.centre_px.as_ref().map_or([0.5 * size_px[0], 0.5 * size_px[1]], |centre| pair("centre_px", centre));
         let number = outfit.devices.len();
         if let Some(known) = self.known(key, &raw.known, spanned) {
             outfit.known.push((Block::Device(number), known));
         }
         if let Some(px) = &raw.known_to_px {
             let px = self.positive(&field("known_to_px"), px);
-            outfit.known.push((Block::Intrinsics(number), Known::Within { length_m: EXACTLY, angle_rad: EXACTLY, other: px }));
+            outfit
+                .known
+                .push((Block::Intrinsics(number), Known::Within { length_m: EXACTLY, angle_rad: EXACTLY, other: px }));
         }
         let pose = Isometry3::from_parts(Translation3::from(at.coords), rotation);
         let intrinsics = Some([focal[0], focal[1], centre[0], centre[1]]);

@@ -122,8 +122,8 @@ impl Check<'_> {
             self.problem(raw.name.span(), "name", format!("{name:?} cannot be a name"), mend);
         }
         let robot = self.robot(raw)?;
-        let world = self.world(raw, &robot, open);
         let rig = self.rig(raw, &robot.equipment);
+        let world = self.world(raw, &robot, rig.as_deref(), open);
         let setting = Setting {
             learns_marker: raw.robot.learn_marker,
             is_measured: raw.measurements.is_some(),

@@ -16,6 +16,7 @@ impl Check<'_> {
         &mut self,
         raw: &raw::Scenario,
         robot: &Robot,
+        rig: Option<&Rig>,
         open: &dyn Fn(&str) -> Result<String, String>,
     ) -> Option<WorldSpec> {
         match (&raw.sensor, &raw.initial_error, &raw.measurements) {
@@ -32,7 +33,16 @@ impl Check<'_> {
                     |angle| (0.0..=180.0).contains(&angle),
                     "an angle from 0 to 180 degrees",
                 );
-                let watch = raw.head.as_ref().map(|head| self.head(head, robot));
+                let watch = match (&raw.head, &raw.view, rig) {
+                    (Some(head), None, _) => self.head(head, robot),
+                    (None, Some(view), Some(rig)) => self.view(view, robot, rig),
+                    (Some(_), Some(view), _) => {
+                        let mend = "remove [view]: the head says which pose is in view";
+                        self.problem(view.span(), "view", "there is a head that watches", mend);
+                        None
+                    }
+                    _ => None,
+                };
                 let change = raw.change.as_ref().map(|change| self.change(change.get_ref(), robot));
                 Some(WorldSpec::Simulated {
                     initial_error: InitialError {
@@ -41,7 +51,7 @@ impl Check<'_> {
                         point_m: self.not_negative("initial_error.point_m", &error.point_m),
                         marker_m: marker_m.map_or(0.0, |size| self.not_negative("initial_error.marker_m", size)),
                     },
-                    watch: watch.flatten(),
+                    watch,
                     change: change.flatten().map(Box::new),
                     outliers: raw.outliers.as_ref().map(|outliers| self.outliers(outliers.get_ref())),
                 })
