@@ -14,6 +14,8 @@ mod openapi;
 mod pages;
 #[path = "http/program.rs"]
 mod program;
+#[path = "http/scene.rs"]
+mod scene;
 #[path = "http/sessions.rs"]
 mod sessions;
 #[path = "http/shutdown.rs"]

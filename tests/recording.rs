@@ -13,7 +13,7 @@ use body_schema::{
     design::best_designs,
     experiment::{Comparison, Description, StepReport, Trace},
     recording::{
-        EllipsoidSize, LiveLog, Recorder, RecordingError, StepsCsv, Target, comparison_csv, learner_color,
+        EllipsoidSize, LiveLog, Recorder, RecordingError, StepsCsv, Target, Theme, comparison_csv, learner_color,
         learner_slots,
     },
     scenario::{Scenario, builtin},
@@ -60,9 +60,10 @@ fn a_recording_holds_what_the_reports_said() {
     let so_far = Reading::of(&live.complete().unwrap());
     recorder.finish().unwrap();
     let bytes = fs::read(&file).unwrap();
-    for reading in
-        [Reading::of(&bytes), so_far, Reading::of(&live.complete().unwrap()), Reading::of(&live.parts_from(0).concat())]
-    {
+    let whole = Reading::of(&live.parts_from(0).concat());
+    assert_eq!(whole.timelines(), ["complete", "motion", "step"]);
+    check(&whole, &description, &reports);
+    for reading in [Reading::of(&bytes), so_far, Reading::of(&live.complete().unwrap())] {
         check(&reading, &description, &reports);
         assert_eq!(reading.recording_id, "arm-6dof-seed-3");
         assert_eq!(reading.timelines(), ["step"]);
@@ -80,13 +81,23 @@ fn the_entities_are_the_documented_ones() {
     let live = LiveLog::new();
     record(&description, &reports, Target::live(live.clone()));
     let reading = Reading::of(&live.complete().unwrap());
-    let mut expected: Vec<String> =
-        ["/", "/__properties", "/note", "/world/truth/axes", "/world/truth/links"].map(str::to_owned).into();
+    let mut expected: Vec<String> = ["/", "/__properties", "/note", "/key"].map(str::to_owned).into();
     for (learner, estimator, policy) in [("active", "rls", "active"), ("random", "rls", "r"), ("gradient", "g", "r")] {
-        let mut entities =
-            vec!["links", "axes", "movement/links", "movement/truth", "marker/predicted", "marker/measured"];
+        let mut entities = vec![
+            "body",
+            "name",
+            "arm/truth",
+            "arm/estimate",
+            "marker/predicted",
+            "marker/measured",
+            "marker/error",
+            "zero/links",
+            "zero/axes",
+            "zero/truth/links",
+            "zero/truth/axes",
+        ];
         if estimator == "rls" {
-            entities.extend(["point_ellipsoids", "direction_uncertainty"]);
+            entities.extend(["point_ellipsoids", "allowed_ellipsoids", "zero/directions"]);
         }
         if policy == "active" {
             entities.extend(["axes", "boxes", "centres", "chosen", "criterion", "leaves"].map(|name| match name {
@@ -98,6 +109,7 @@ fn the_entities_are_the_documented_ones() {
                 _ => "direct/leaves",
             }));
         }
+        expected.push(format!("/{learner}"));
         expected.extend(entities.iter().map(|entity| format!("/{learner}/{entity}")));
         for metric in
             "orientation_deg axis_deg location_m prediction_m prediction_mean_m expected_prediction_m trace bound_trace nis \
@@ -151,7 +163,7 @@ fn a_changed_body_is_drawn_anew() {
     record(experiment.description(), &reports, Target::live(live.clone()));
     let reading = Reading::of(&live.complete().unwrap());
     check(&reading, experiment.description(), &reports);
-    assert_eq!(reading.steps("/world/truth/links"), [0, 3]);
+    assert_eq!(reading.steps("/active/zero/truth/links"), [0, 3]);
 }
 
 #[test]
@@ -164,7 +176,10 @@ fn learners_keep_their_colours() {
     for (learner, slot) in description.learners.iter().zip(slots) {
         let series = reading.colour(&format!("/{}/metrics/nees", learner.name), "SeriesLines:colors");
         assert_eq!(series, learner_color(slot));
-        assert_eq!(reading.colour(&format!("/{}/links", learner.name), "LineStrips3D:colors"), learner_color(slot));
+        assert_eq!(
+            reading.colour(&format!("/{}/arm/estimate", learner.name), "Capsules3D:colors"),
+            learner_color(slot)
+        );
     }
 }
 
@@ -176,7 +191,7 @@ fn the_arrangement_comes_with_the_recording() {
     let reading = Reading::of(&live.complete().unwrap());
     assert!(reading.activated, "a blueprint is there and activated");
     let views = reading.views.iter().map(String::as_str).collect::<Vec<_>>();
-    for view in ["active (rls × active)", "Orientation error (deg)", "Location error (m)", "DIRECT, active", "Note"] {
+    for view in ["Scene", "Orientation error (deg)", "Location error (m)", "DIRECT, active", "Note"] {
         assert!(views.contains(&view), "{view} in {views:?}");
     }
     let (description, reports) = run("tiago-mocap", 1);
@@ -295,13 +310,113 @@ fn what_was_flushed_survives_a_kill() {
 
 #[test]
 fn a_long_recording_is_small() {
-    let steps = 40;
-    let (description, reports) = run("arm-6dof", steps);
+    let (description, reports) = run("arm-6dof", 200);
+    assert_eq!(description.learners.len(), 3);
     let file = path("long.rrd");
     record(&description, &reports, Target::file(&file));
     let bytes = fs::metadata(&file).unwrap().len();
-    // 200 steps stay well under 10 MB.
-    assert!(bytes < 35_000 * steps as u64, "{bytes} bytes in {steps} steps");
+    assert!(bytes < 10_000_000, "{bytes} bytes in 200 steps of three learners");
+}
+
+#[test]
+fn those_who_watch_live_see_the_way_from_step_to_step() {
+    let (description, reports) = run("arm-6dof", 2);
+    let (file, live) = (path("moving.rrd"), LiveLog::new());
+    let mut recorder = Recorder::new(&description, Target::live(live.clone()).and_file(&file)).unwrap();
+    for report in &reports {
+        recorder.log_moving(report, 3).unwrap();
+    }
+    recorder.finish().unwrap();
+    let moving = Reading::of(&live.parts_from(0).concat());
+    assert_eq!(moving.times("/active/arm/estimate", "motion"), [0, 8, 16, 24, 32, 40, 48, 56, 64]);
+    assert_eq!(moving.times("/active/point_ellipsoids", "motion"), [0, 8, 16, 24, 32, 40, 48, 56, 64]);
+    // What was seen after a movement is gone as soon as the next begins.
+    assert_eq!(moving.times("/active/marker/error", "motion"), [0, 1, 32, 33, 64]);
+    check(&moving, &description, &reports);
+    for steps in [Reading::of(&fs::read(&file).unwrap()), Reading::of(&live.complete().unwrap())] {
+        assert_eq!(steps.timelines(), ["step"]);
+        assert_eq!(steps.steps("/active/arm/estimate"), [0, 1, 2]);
+        check(&steps, &description, &reports);
+    }
+}
+
+#[test]
+fn a_step_is_said_to_be_complete_when_all_of_it_has_come() {
+    let (description, reports) = run("arm-6dof", 3);
+    let live = LiveLog::new();
+    let mut recorder = Recorder::new(&description, Target::live(live.clone())).unwrap();
+    let mut seen = live.len();
+    let follow = |parts: &[bytes::Bytes]| Reading::of(&[live.header(), parts.concat().into()].concat());
+    for report in &reports {
+        recorder.log_moving(report, 2).unwrap();
+        recorder.flush_shown().unwrap();
+        let new = live.parts_from(seen);
+        seen = live.len();
+        let step = report.step as i64;
+        let (before, last) = new.split_at(new.len() - 1);
+        assert!(follow(before).times("/complete", "complete").is_empty(), "nothing says so earlier");
+        assert_eq!(follow(last).times("/complete", "complete"), [step]);
+        for learner in &description.learners {
+            assert!(follow(before).steps(&format!("/{}/arm/estimate", learner.name)).contains(&step));
+        }
+    }
+    // So it is for those who take many parts at once.
+    let together = live.put_together(&live.parts_from(1)).unwrap();
+    let entities: Vec<String> = reading::entities_in_order(&[live.header(), together].concat());
+    assert_eq!(entities.iter().position(|entity| entity == "/complete"), Some(entities.len() - 1));
+}
+
+#[test]
+fn a_posture_that_is_tried_out_stays_until_the_next_step() {
+    let (description, reports) = run("arm-6dof", 2);
+    let (file, live) = (path("ghost.rrd"), LiveLog::new());
+    let mut recorder = Recorder::new(&description, Target::live(live.clone()).and_file(&file)).unwrap();
+    recorder.log(&reports[0]).unwrap();
+    recorder.log(&reports[1]).unwrap();
+    let skeleton = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.2, 0.0]];
+    let before = live.len();
+    recorder.log_ghost(1, 1, Some(&skeleton)).unwrap();
+    let shown = Reading::of(&[live.header(), live.parts_from(before).concat().into()].concat());
+    assert_eq!(shown.times("/random/arm/ghost", "motion"), [32], "it is there at once");
+    recorder.log(&reports[2]).unwrap();
+    recorder.finish().unwrap();
+    let whole = Reading::of(&live.parts_from(0).concat());
+    assert_eq!(whole.times("/random/arm/ghost", "motion"), [32, 33], "drawn after step 1, and cleared on the way to 2");
+    assert!(whole.times("/active/arm/ghost", "motion").is_empty());
+    for steps in [Reading::of(&fs::read(&file).unwrap()), Reading::of(&live.complete().unwrap())] {
+        assert!(!steps.entities().iter().any(|entity| entity.ends_with("ghost")));
+    }
+}
+
+#[test]
+fn what_a_learner_no_longer_knows_does_not_stay_in_sight() {
+    let (description, mut reports) = run("arm-6dof", 3);
+    for joint in &mut reports[2].learners[0].estimate.joints {
+        joint.point_covariance_m2 = None;
+        joint.allowed_point_covariance_m2 = None;
+    }
+    let live = LiveLog::new();
+    record(&description, &reports, Target::live(live.clone()));
+    let reading = Reading::of(&live.complete().unwrap());
+    check(&reading, &description, &reports);
+    assert_eq!(reading.steps("/active/point_ellipsoids"), [0, 1, 2, 3]);
+    assert!(reading.ellipsoids("/active/point_ellipsoids", 2).is_empty());
+    assert_eq!(reading.ellipsoids("/active/point_ellipsoids", 3).len(), 6);
+}
+
+#[test]
+fn an_arrangement_can_be_had_anew_for_any_shape_and_colours() {
+    let (description, reports) = run("arm-6dof", 1);
+    let live = LiveLog::new();
+    assert!(live.blueprint(Theme::Dark, 1.0).unwrap().is_none(), "nothing is arranged before step 0");
+    record(&description, &reports, Target::live(live.clone()));
+    let [light, dark] =
+        [Theme::Light, Theme::Dark].map(|theme| Reading::of(&live.blueprint(theme, 1.0).unwrap().unwrap()));
+    for reading in [&light, &dark] {
+        assert!(reading.activated && reading.entities().is_empty());
+        assert_eq!(reading.views, ["Scene"]);
+    }
+    assert_ne!(light.background, dark.background);
 }
 
 #[test]

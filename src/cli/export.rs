@@ -30,6 +30,9 @@ pub struct Arguments {
     /// Write into a folder that holds other files
     #[arg(long)]
     force: bool,
+    /// Where the folder will be served, as https://example.org/demo/: previews of links to it then have a picture
+    #[arg(long, value_name = "URL", value_parser = address)]
+    address: Option<String>,
     /// Take the page's panel from DIR, which `cargo run -p body-schema-bundle -- DIR` built
     #[arg(long, value_name = "DIR", hide = true)]
     panel_dir: Option<PathBuf>,
@@ -44,6 +47,8 @@ struct SeedRange {
 
 /// More runs than this make a folder that nobody downloads.
 const MOST_SEEDS: usize = 200;
+/// Browsers read greater numbers as others.
+const MAX_SEED: u64 = (1 << 53) - 1;
 
 impl FromStr for SeedRange {
     type Err = String;
@@ -55,11 +60,23 @@ impl FromStr for SeedRange {
         if first > last {
             return Err(format!("the range is empty; write {last}..{first}"));
         }
+        if last > MAX_SEED {
+            return Err(format!("a page takes seeds up to {MAX_SEED}"));
+        }
         if (last - first) as usize >= MOST_SEEDS {
             return Err(format!("at most {MOST_SEEDS} seeds in one go"));
         }
         Ok(Self { first, last })
     }
+}
+
+/// The address of a folder: with a slash at its end.
+fn address(text: &str) -> Result<String, String> {
+    let host = text.strip_prefix("https://").or_else(|| text.strip_prefix("http://"));
+    if host.is_none_or(|host| host.is_empty() || host.starts_with('/')) || text.contains(['?', '#', ' ', '"']) {
+        return Err("write the address of the folder, as https://example.org/demo/".to_owned());
+    }
+    Ok(format!("{}/", text.trim_end_matches('/')))
 }
 
 pub fn export(arguments: &Arguments) -> Result<()> {
@@ -77,6 +94,7 @@ pub fn export(arguments: &Arguments) -> Result<()> {
     let export = Export {
         plans: plans.collect::<Result<_>>()?,
         seeds: seeds.into_iter().collect(),
+        address: arguments.address.clone(),
         panel_dir: arguments.panel_dir.clone(),
     };
     let bar = progress::bar(export.steps(), "recording");
@@ -95,8 +113,18 @@ mod tests {
     fn seeds_are_numbers_and_ranges() {
         let range = |text: &str| text.parse::<SeedRange>().map(|range| (range.first, range.last));
         assert_eq!((range("7"), range("1..5"), range("3..3")), (Ok((7, 7)), Ok((1, 5)), Ok((3, 3))));
-        for text in ["", "x", "-1", "5..1", "1..", "1..1000", "0..18446744073709551615"] {
+        for text in ["", "x", "-1", "5..1", "1..", "1..1000", "0..18446744073709551615", "9007199254740992"] {
             assert!(range(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_address_is_that_of_a_folder() {
+        for text in ["https://example.org/demo", "https://example.org/demo/"] {
+            assert_eq!(address(text).as_deref(), Ok("https://example.org/demo/"));
+        }
+        for text in ["", "example.org", "ftp://example.org", "https://", "https:///a", "https://a/?b", "https://a b"] {
+            assert!(address(text).is_err(), "{text}");
         }
     }
 }

@@ -20,6 +20,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use error::ExportError;
@@ -43,6 +44,9 @@ pub struct Export<'a> {
     pub plans: Vec<Plan<'a>>,
     /// The seeds of each.
     pub seeds: Vec<u64>,
+    /// The address at which the folder will be, with a slash at its end, if it is known: previews of links to it have a
+    /// picture only then.
+    pub address: Option<String>,
     /// Another build of the page's panel than that of this program, for those who work on it.
     pub panel_dir: Option<PathBuf>,
 }
@@ -132,8 +136,9 @@ impl Export<'_> {
     }
 
     /// Writes the folder. One that holds another export is replaced; one that holds anything else is refused unless `force`
-    /// says to write beside it. `tick` is called after every step.
-    pub fn write(&self, out: &Path, force: bool, tick: &dyn Fn()) -> Result<Written, ExportError> {
+    /// says to write beside it. Seeds are run side by side;
+    /// `tick` is called after every step.
+    pub fn write(&self, out: &Path, force: bool, tick: &(dyn Fn() + Sync)) -> Result<Written, ExportError> {
         prepare(out, force)?;
         let files = page::Files::load(self.panel_dir.as_deref())?;
         let mut manifest = Manifest {
@@ -144,7 +149,7 @@ impl Export<'_> {
         };
         // At once, so that a folder whose export was interrupted is still known for one.
         write_json(&out.join(MANIFEST), &manifest)?;
-        files.write(out, &self.plans)?;
+        files.write(out, &self.plans, self.address.as_deref())?;
         for plan in &self.plans {
             manifest.scenarios.push(self.write_plan(plan, out, tick)?);
         }
@@ -152,16 +157,16 @@ impl Export<'_> {
         measure(out)
     }
 
-    fn write_plan(&self, plan: &Plan<'_>, out: &Path, tick: &dyn Fn()) -> Result<Exported, ExportError> {
+    fn write_plan(&self, plan: &Plan<'_>, out: &Path, tick: &(dyn Fn() + Sync)) -> Result<Exported, ExportError> {
         let scenario = plan.scenario;
         let source = format!("scenarios/{}.toml", scenario.name);
         write(&out.join(&source), scenario.source.as_bytes())?;
-        let mut runs = Vec::with_capacity(self.seeds.len());
-        for &seed in &self.seeds {
+        let run = |&seed: &u64| {
             let folder = format!("runs/{}/{seed}", scenario.name);
             let recorded = run::record(plan, seed, &out.join(&folder), tick)?;
-            runs.push(ExportedRun { seed, steps: plan.steps, learners: plan.learners.clone(), recorded, folder });
-        }
+            Ok(ExportedRun { seed, steps: plan.steps, learners: plan.learners.clone(), recorded, folder })
+        };
+        let runs = self.seeds.par_iter().map(run).collect::<Result<Vec<_>, ExportError>>()?;
         let summary = ScenarioSummary {
             learners: scenario.chosen(Some(&plan.learners))?.iter().map(LearnerSpec::description).collect(),
             compositions: Vec::new(),

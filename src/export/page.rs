@@ -18,13 +18,13 @@ impl Files {
         self.0.iter().filter(|file| is_packed(file)).map(|file| (address(file), file.bytes.len())).collect()
     }
 
-    pub(super) fn write(&self, out: &Path, plans: &[Plan<'_>]) -> Result<(), ExportError> {
+    pub(super) fn write(&self, out: &Path, plans: &[Plan<'_>], base: Option<&str>) -> Result<(), ExportError> {
         for file in &self.0 {
             write(&out.join(address(file)), if is_packed(file) { &file.packed } else { &file.bytes })?;
         }
         // Hosts that make pages of their own from what they are given leave these alone.
         write(&out.join(".nojekyll"), b"")?;
-        write(&out.join("index.html"), index(INDEX, &self.0, plans).as_bytes())
+        write(&out.join("index.html"), index(INDEX, &self.0, plans, base).as_bytes())
     }
 }
 
@@ -39,12 +39,16 @@ fn address(file: &PageFile) -> String {
     if is_packed(file) { format!("{path}.gz") } else { path.to_owned() }
 }
 
-/// The page: with relative addresses, its policy in itself, and a title of its own.
-fn index(template: &str, files: &[PageFile], plans: &[Plan<'_>]) -> String {
+/// The page: with relative addresses, its policy in itself, and a title of its own. The picture for previews of links is
+/// below `base`, if that is known.
+fn index(template: &str, files: &[PageFile], plans: &[Plan<'_>], base: Option<&str>) -> String {
     let mut page = template.replacen("<html ", "<html data-source=\"files\" ", 1);
     for file in files {
         let versioned = format!("\"{}?v={}\"", address(file), file.version);
         page = page.replace(&format!("\"{}\"", file.path), &versioned);
+    }
+    if let Some(base) = base {
+        page = page.replace("\"preview.png", &format!("\"{}preview.png", escaped(base)));
     }
     let policy = format!("<meta http-equiv=\"Content-Security-Policy\" content=\"{CONTENT_SECURITY_POLICY}\" />");
     // First of all: a policy holds for what comes after it.
@@ -102,7 +106,7 @@ mod tests {
         scenario.title = "Six joints & \"one\" <marker>".to_owned();
         let plan = Plan::new(&scenario, None, Some(3)).expect("a plan");
         let files = Files::load(None).expect("the page").0;
-        let page = index(INDEX, &files, &[plan]);
+        let page = index(INDEX, &files, &[plan], None);
         assert!(page.contains("<html data-source=\"files\""));
         assert!(page.contains("<title>Six joints &amp; &quot;one&quot; &lt;marker> · body-schema</title>"), "{page}");
         assert!(page.contains("3 movements by active, random, global"));
@@ -112,6 +116,13 @@ mod tests {
         assert!(!addresses.clone().any(|text| text.starts_with('/')), "an address from the root of the host");
         assert!(addresses.clone().any(|text| text.starts_with("viewer/re_viewer_bg.wasm.gz?v=")));
         assert!(!page.contains("/v1/"), "no server, no interface");
+    }
+
+    #[test]
+    fn previews_get_the_whole_address_of_the_picture() {
+        let files = Files::load(None).expect("the page").0;
+        let page = index(INDEX, &files, &[], Some("https://example.org/demo/"));
+        assert!(page.contains("content=\"https://example.org/demo/preview.png?v="), "{page}");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! | `description.json` | what stays the same from step to step |
 //! | `reports.ndjson.gz` | one report a line, from step 0 |
 //! | `scene.rrd` | the recording as the page's viewer takes it: a header of 12 bytes, then messages |
+//! | `blueprint-{light,dark}-ASPECT.rbl` | arrangements of its views, in the same form |
 //! | `selections/LEARNER/STEP.json.gz` | how each movement was chosen, where a search was made |
 //! | `recording.rrd`, `steps.csv`, `result.json` | to take away |
 
@@ -16,20 +17,33 @@ use serde::{Deserialize, Serialize};
 use super::{ExportError, Plan, error::Doing, write, write_json};
 use crate::{
     experiment::Experiment,
-    recording::{LiveLog, Recorder, StepsCsv, Target},
+    recording::{LiveLog, Recorder, StepsCsv, Target, Theme},
 };
+
+/// Postures on the way from each step to the next, in which the page moves while it plays slowly.
+const FRAMES: u64 = 6;
+/// The shapes of the view for which it is arranged, width in heights: a page takes the widest that is not wider than its
+/// own, so that no arm is cut off.
+const ASPECTS: [f64; 11] = [0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.8];
 
 /// What the page must know of a run before it opens it.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Recorded {
     /// The id of its recording.
     recording: String,
+    /// The shapes for which its view is arranged, width in heights, in order.
+    aspects: Vec<f64>,
     /// The learners whose choices are explained.
     searched: BTreeSet<String>,
 }
 
 /// Runs a plan with a seed and writes its files.
-pub(super) fn record(plan: &Plan<'_>, seed: u64, folder: &Path, tick: &dyn Fn()) -> Result<Recorded, ExportError> {
+pub(super) fn record(
+    plan: &Plan<'_>,
+    seed: u64,
+    folder: &Path,
+    tick: &(dyn Fn() + Sync),
+) -> Result<Recorded, ExportError> {
     let scenario = plan.scenario;
     let mut experiment = scenario.experiment(seed, Some(&plan.learners))?;
     let live = LiveLog::new();
@@ -45,7 +59,7 @@ pub(super) fn record(plan: &Plan<'_>, seed: u64, folder: &Path, tick: &dyn Fn())
             tick();
         }
         let report = experiment.latest();
-        recorder.log(report)?;
+        recorder.log_moving(report, FRAMES)?;
         csv.write(report)?;
         serde_json::to_writer(&mut reports, report)?;
         reports.push(b'\n');
@@ -59,10 +73,17 @@ pub(super) fn record(plan: &Plan<'_>, seed: u64, folder: &Path, tick: &dyn Fn())
     write_packed(&folder.join("reports.ndjson.gz"), &reports)?;
     let messages = live.put_together(&live.scene_parts_from(1))?;
     write(&folder.join("scene.rrd"), &[live.header(), messages].concat())?;
+    for (theme, name) in [(Theme::Light, "light"), (Theme::Dark, "dark")] {
+        for aspect in ASPECTS {
+            // There is one from step 0 on.
+            let arrangement = live.blueprint(theme, aspect)?.unwrap_or_default();
+            write(&folder.join(format!("blueprint-{name}-{aspect}.rbl")), &arrangement)?;
+        }
+    }
     write(&folder.join("recording.rrd"), &live.complete()?)?;
     write(&folder.join("steps.csv"), &table)?;
     write_json(&folder.join("result.json"), &experiment.result())?;
-    Ok(Recorded { recording, searched })
+    Ok(Recorded { recording, aspects: ASPECTS.into(), searched })
 }
 
 /// How the last movements were chosen, of those learners that can tell, which are returned.

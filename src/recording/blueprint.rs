@@ -44,6 +44,16 @@ pub enum Shape {
     Tall,
 }
 
+impl Shape {
+    /// A view's width in heights.
+    pub fn aspect(self) -> f64 {
+        match self {
+            Self::Wide => 1.4,
+            Self::Tall => 0.7,
+        }
+    }
+}
+
 impl Theme {
     /// The background, and the lines of the ground.
     fn colours(self) -> [[u8; 3]; 2] {
@@ -67,7 +77,7 @@ pub(super) struct Arranger {
 impl Arranger {
     /// For a file: the scene above; below, the curves, DIRECT's partition and the note.
     pub(super) fn whole(&self) -> Result<Vec<LogMsg>, RecordingError> {
-        let scene = self.view(Theme::default(), Shape::default(), true).into();
+        let scene = self.view(Theme::default(), Shape::default().aspect(), true).into();
         let mut below = self.charts();
         let note = View::new("TextDocument", "Note", &EntityPath::from("note")).into();
         let tabs = self.partitions().into_iter().chain(self.limits()).chain([note]);
@@ -77,15 +87,15 @@ impl Arranger {
     }
 
     /// For a page that has controls and curves of its own: the scene alone, to look at and to turn.
-    pub(super) fn scene(&self, theme: Theme, shape: Shape) -> Result<Vec<LogMsg>, RecordingError> {
-        let scene: Part = self.view(theme, shape, false).into();
+    pub(super) fn scene(&self, theme: Theme, aspect: f64) -> Result<Vec<LogMsg>, RecordingError> {
+        let scene: Part = self.view(theme, aspect, false).into();
         Container::tabs([scene]).messages(self.application.clone(), Time::Led)
     }
 
     /// All learners in one view. With `details` it can be asked what is what, there is a key to the colours, and the arms
     /// at θ = 0 can be switched on.
-    fn view(&self, theme: Theme, shape: Shape, details: bool) -> View {
-        let [target, eye] = self.stage.camera(shape).map(|point| single(point.coords.into()));
+    fn view(&self, theme: Theme, aspect: f64, details: bool) -> View {
+        let [target, eye] = self.stage.camera(aspect).map(|point| single(point.coords.into()));
         let [ground, lines] = theme.colours();
         let figure = &self.stage.figure;
         let mut contents = Vec::new();

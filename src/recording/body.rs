@@ -6,7 +6,7 @@ use super::solid::Capsule;
 use crate::{experiment::Description, model::State};
 
 /// The colour of a body: lighter than the true arm, and to be seen on light and on dark ground.
-const BODY: [u8; 3] = [0xC3, 0xC8, 0xD0];
+const BODY: [u8; 3] = [0xD6, 0xDA, 0xE0];
 /// Opacity of a trunk that is part of the learned chain: the joints within it are to be seen.
 const GLASS: u8 = 70;
 /// Joints whose names begin so are in the trunk.
@@ -106,16 +106,25 @@ impl Figure {
     /// A robot that is its arm: a foot below its first joint.
     fn pedestal(mut self) -> Self {
         let Self { shoulder, reach_m: a, .. } = self;
-        self.ground_m = shoulder.z - 1.0 * a;
         let [red, green, blue] = BODY;
-        let rod = |from: f64, to: f64, radius: f64| Capsule {
-            from: shoulder + Vector3::z() * (from * a),
-            to: shoulder + Vector3::z() * (to * a),
+        let rod = |from: [f64; 3], to: [f64; 3], radius: f64| Capsule {
+            from: shoulder + Vector3::from(from) * a,
+            to: shoulder + Vector3::from(to) * a,
             radius_m: radius * a,
             colour: [red, green, blue, 255],
         };
-        self.fixed = vec![rod(-0.9, -0.12, 0.11), rod(-0.96, -0.9, 0.2)];
-        self.name = shoulder + Vector3::z() * (0.75 * a);
+        // A flat base of three rods side by side, and a column; where a joint lifts the arm, an inner column goes with it.
+        let beam = |y: f64| rod([-0.2, y, -0.9], [0.2, y, -0.9], 0.1);
+        let column = |from: f64, to: f64, radius: f64| rod([0.0, 0.0, from], [0.0, 0.0, to], radius);
+        self.fixed = vec![beam(-0.14), beam(0.0), beam(0.14)];
+        if self.carried_by > 0 {
+            self.fixed.push(column(-0.85, -0.35, 0.1));
+            self.trunk = vec![column(-0.75, -0.04, 0.08)];
+        } else {
+            self.fixed.push(column(-0.85, -0.12, 0.1));
+        }
+        self.ground_m = shoulder.z - 1.0 * a;
+        self.name = shoulder + Vector3::z() * (0.5 * a);
         self
     }
 }

@@ -8,7 +8,7 @@ use rerun::{
     log::{Chunk, LogMsg},
 };
 
-use super::{RecordingError, message, rows::by_steps};
+use super::{COMPLETE, RecordingError, message, rows::by_steps};
 
 /// What of a live recording is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,12 +19,22 @@ pub(super) enum Keep {
     Steps,
 }
 
+/// The order of chunks. What is between steps cannot be put together with what is at them, and what says that they are
+/// complete comes after both.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Place {
+    Always,
+    Steps,
+    Between,
+    Complete,
+}
+
 /// The messages of a stream, with the chunks of each entity put together; what is static comes first.
 pub(super) fn put_together(stream: Vec<u8>, keep: Keep) -> Result<Vec<LogMsg>, RecordingError> {
     let decoded = |source: re_log_encoding::DecodeError| RecordingError::Encode(source.to_string());
     let mut messages = Vec::new();
-    // What is between steps cannot be put together with what is at them.
-    let mut chunks: BTreeMap<(bool, bool, EntityPath), (StoreId, Vec<Chunk>)> = BTreeMap::new();
+    let last = EntityPath::from(COMPLETE);
+    let mut chunks: BTreeMap<(Place, EntityPath), (StoreId, Vec<Chunk>)> = BTreeMap::new();
     for message in DecoderApp::decode_eager(Cursor::new(stream)).map_err(decoded)? {
         match message.map_err(decoded)? {
             LogMsg::ArrowMsg(store, message) if store.is_recording() => {
@@ -34,7 +44,14 @@ pub(super) fn put_together(stream: Vec<u8>, keep: Keep) -> Result<Vec<LogMsg>, R
                     None if keep == Keep::Steps => continue,
                     steps => (chunk, steps.is_none()),
                 };
-                let key = (!chunk.is_static(), is_between, chunk.entity_path().clone());
+                let entity = chunk.entity_path().clone();
+                let place = match is_between {
+                    _ if chunk.is_static() => Place::Always,
+                    false => Place::Steps,
+                    true if entity == last => Place::Complete,
+                    true => Place::Between,
+                };
+                let key = (place, entity);
                 chunks.entry(key).or_insert_with(|| (store, Vec::new())).1.push(chunk);
             }
             other => messages.push(other),

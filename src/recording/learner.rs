@@ -30,8 +30,9 @@ pub(super) const TRUE_ARM: ArmLook =
 const GHOST: [u8; 4] = [0xE6, 0xA1, 0x22, 110];
 /// How much thicker the estimated arm is than the true one, which is to be seen within it, and its opacity.
 const ESTIMATE: (f64, u8) = (1.22, 150);
-/// Opacities of what a learner believes of its uncertainty, and of what its data allow.
-const CLOUD: u8 = 50;
+/// Opacity of what a learner believes of its uncertainty, for an arm of six joints: those of more lie more densely.
+const CLOUD: f64 = 48.0;
+/// Opacity of what its data allow.
 const ALLOWED: u8 = 150;
 
 /// What all learners are drawn with.
@@ -147,7 +148,11 @@ impl LearnerEntities {
         rows.at(step, &self.entity("zero/links"), &[&model::links(&model.skeleton_m(), colour, 2.0)]);
         rows.at(step, &self.entity("zero/axes"), &[&model::axes(model, joints, arrow_m, colour)]);
         if let Some(directions) = self.uncertainty.of_directions(model, joints, arrow_m) {
-            rows.at(step, &self.entity("zero/directions"), &Drawn::new(&directions, &[], colour, CLOUD).parts());
+            rows.at(
+                step,
+                &self.entity("zero/directions"),
+                &Drawn::new(&directions, &[], colour, opacity(joints.len())).parts(),
+            );
         }
     }
 
@@ -173,15 +178,21 @@ impl LearnerEntities {
             self.log_trunk(rows, step, 0, posture, scenery.stage);
         }
         let links = links.map(|posture| posture.links).unwrap_or_default();
+        let cloud = opacity(joints.len());
         let points = self.uncertainty.of_points(model, joints);
-        if let Some(points) = &points {
-            let drawn = Drawn::new(points, &links, self.colour, CLOUD);
-            rows.at(step, &self.entity("point_ellipsoids"), &drawn.parts());
-        }
         let allowed = self.uncertainty.of_allowed(model, joints);
-        if let Some(allowed) = &allowed {
-            let drawn = Drawn::new(allowed, &links, self.colour, ALLOWED);
-            rows.at(step, &self.entity("allowed_ellipsoids"), &drawn.parts());
+        let (had_points, had_allowed) = match &self.shown {
+            Some(shown) => (shown.points.is_some(), shown.allowed.is_some()),
+            None => (false, false),
+        };
+        for (clouds, had, name, alpha) in
+            [(&points, had_points, "point_ellipsoids", cloud), (&allowed, had_allowed, "allowed_ellipsoids", ALLOWED)]
+        {
+            // Those that are no more must not stay with a later arm.
+            if clouds.is_some() || had {
+                let clouds = clouds.as_deref().unwrap_or_default();
+                rows.at(step, &self.entity(name), &Drawn::new(clouds, &links, self.colour, alpha).parts());
+            }
         }
         self.shown = Some(Shown { step, configuration, estimate, points, allowed });
     }
@@ -216,7 +227,7 @@ impl LearnerEntities {
             return;
         }
         self.stopped = failure.is_some() && report.is_none();
-        let label = if self.stopped { format!("{name} · has stopped") } else { format!("{name} · movement {step}") };
+        let label = if self.stopped { format!("{name} · has stopped") } else { name.clone() };
         rows.at(step, &self.entity("name"), &[&Points3D::update_fields().with_labels([label])]);
         // Of a learner that has stopped they are cleared.
         let movement = Movement::of(report, self.colour, stage.figure.reach_m);
@@ -245,4 +256,9 @@ impl LearnerEntities {
         }
         rows.at(step, &self.entity("direct/leaves"), &[&partition::data(partition)]);
     }
+}
+
+/// Opacity of the clouds of an arm of so many joints.
+fn opacity(joints: usize) -> u8 {
+    (CLOUD * (6.0 / joints.max(6) as f64).powf(0.7)) as u8
 }

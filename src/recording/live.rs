@@ -137,18 +137,18 @@ impl LiveLog {
 
     /// Appends the arrangement of views, as one part: the whole one, and that of the scene alone.
     pub(super) fn append_arrangement(&self, whole: &[LogMsg], arranger: Arranger) -> Result<(), RecordingError> {
-        let (whole, scene) = (encode_all(whole)?, encode_all(&arranger.scene(Theme::Light, Shape::Wide)?)?);
+        let (whole, scene) = (encode_all(whole)?, encode_all(&arranger.scene(Theme::Light, Shape::Wide.aspect())?)?);
         self.state().arranger = Some(Arc::new(arranger));
         self.push(vec![whole], Some(scene));
         Ok(())
     }
 
-    /// An arrangement of views for a page: the scene alone, in light or dark, for a wide or a tall view. A stream of its
+    /// An arrangement of views for a page: the scene alone, in light or dark, for a view this many times as wide as high. A stream of its
     /// own, which a viewer that has the recording takes up whatever became of its last one. `None` before step 0.
-    pub fn blueprint(&self, theme: Theme, shape: Shape) -> Result<Option<Bytes>, RecordingError> {
+    pub fn blueprint(&self, theme: Theme, aspect: f64) -> Result<Option<Bytes>, RecordingError> {
         let arranger = self.state().arranger.clone();
         let Some(arranger) = arranger else { return Ok(None) };
-        let messages = encode_all(&arranger.scene(theme, shape)?)?;
+        let messages = encode_all(&arranger.scene(theme, aspect)?)?;
         Ok(Some([self.header(), messages].concat().into()))
     }
 

@@ -16,8 +16,8 @@
 //! | `/key` | Points3D, static | what the colours mean, in a sentence |
 //! | `/{learner}` | Transform3D, static | where the frame of its measurements stands in the row |
 //! | `/{learner}/body` | Capsules3D, static | a human figure around the arm, or a pedestal |
-//! | `/{learner}/body/trunk` | Capsules3D, static; Transform3D | the part of the figure that joints of the chain carry; absent if they carry none |
-//! | `/{learner}/name` | Points3D, static; labels in time | name and movement, above its head |
+//! | `/{learner}/body/trunk` | Capsules3D, static; Transform3D | the part of figure or pedestal that joints of the chain carry; absent if they carry none |
+//! | `/{learner}/name` | Points3D, static; labels in time | its name above its head, and whether it has stopped |
 //! | `/{learner}/arm/truth` | Capsules3D | the true arm as shown: links, and a pin along each axis; absent without a truth |
 //! | `/{learner}/arm/estimate` | Capsules3D | the estimated arm as shown, after the update |
 //! | `/{learner}/point_ellipsoids` | Ellipsoids3D | covariances of the axis points as shown, then of the marker if it is learned |
@@ -46,7 +46,9 @@
 //!
 //! A [`LiveLog`] has a second timeline, `motion`, on which step k is at [`MOTION_PER_STEP`] k. Between two steps it may
 //! hold postures on the way from one to the next (`arm/…`, the ellipsoids and `body/trunk` moved, the markers empty), and
-//! after a step `/{learner}/arm/ghost`, a posture that is tried out. None of this is in files and downloads.
+//! after a step `/{learner}/arm/ghost`, a posture that is tried out. The timeline `complete` reaches k as soon as all rows
+//! of step k have come: a viewer that goes there earlier shows one learner's arm and another's last one. None of this is in
+//! files and downloads.
 //!
 //! # Compatibility
 //!
@@ -97,6 +99,9 @@ pub const TIMELINE: &str = "step";
 
 /// The timeline of a live recording on which there is something between two steps.
 pub const MOTION: &str = "motion";
+
+/// The timeline of a live recording, and the entity on it, that tells up to which step it is whole.
+pub const COMPLETE: &str = "complete";
 
 /// So many ticks of [`MOTION`] are from one step to the next.
 pub const MOTION_PER_STEP: u64 = 32;

@@ -18,7 +18,7 @@ use super::{
     learner::{LearnerEntities, Scenery},
     message, metrics, model,
     note::{key, note},
-    rows::{Rows, by_steps},
+    rows::{Rows, by_steps, complete},
     stage::Stage,
 };
 use crate::{
@@ -66,6 +66,8 @@ pub struct Recorder {
     stage: Option<Stage>,
     /// The true arm, where it is known.
     truth: Option<State>,
+    /// The last step, if the live log does not yet say that it is complete.
+    incomplete: Option<u64>,
     waiting_steps: usize,
     waiting_rectangles: usize,
     finished: bool,
@@ -92,6 +94,7 @@ impl Recorder {
                 .collect(),
             stage: None,
             truth: description.truth.as_ref().and_then(ModelReport::state),
+            incomplete: None,
             waiting_steps: 0,
             waiting_rectangles: 0,
             finished: false,
@@ -135,6 +138,7 @@ impl Recorder {
             self.waiting_rectangles += partition.map_or(0, |partition| partition.leaves.len());
         }
         self.stage = Some(stage);
+        self.incomplete = Some(report.step);
         self.waiting_steps += 1;
         if self.waiting_steps >= BATCH_STEPS || self.waiting_rectangles >= BATCH_RECTANGLES {
             self.flush()
@@ -195,7 +199,11 @@ impl Recorder {
         let messages = |chunks: &mut dyn Iterator<Item = Chunk>| -> Result<Vec<LogMsg>, RecordingError> {
             chunks.map(|chunk| message::data(&self.store, &chunk)).collect()
         };
-        let live = self.live.as_ref().map_or(Ok(()), |live| live.append(&messages(&mut chunks.iter().cloned())?));
+        let complete = self.incomplete.take().map(complete).transpose()?;
+        let live = self
+            .live
+            .as_ref()
+            .map_or(Ok(()), |live| live.append(&messages(&mut chunks.iter().cloned().chain(complete))?));
         let file = match &mut self.file {
             Some(file) => messages(&mut chunks.iter().filter_map(by_steps)).and_then(|steps| file.append(&steps)),
             None => Ok(()),

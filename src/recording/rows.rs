@@ -3,16 +3,19 @@
 //! Rerun's own stream batches in a thread and writes in another, where errors go to a log. Here rows are gathered and
 //! handed over when the recorder says so: many steps make one chunk per entity, and every error has a caller.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use rerun::{
-    AsComponents, ComponentIdentifier, SerializedComponentBatch, Timeline,
-    external::{arrow::array::ArrayRef, re_log_types::EntityPath},
+    AsComponents, ComponentIdentifier, DynamicArchetype, SerializedComponentBatch, Timeline,
+    external::{
+        arrow::array::{ArrayRef, UInt64Array},
+        re_log_types::EntityPath,
+    },
     log::{Chunk, ChunkError, RowId},
     time::TimePoint,
 };
 
-use super::{MOTION, MOTION_PER_STEP, TIMELINE};
+use super::{COMPLETE, MOTION, MOTION_PER_STEP, TIMELINE};
 
 /// Rows by entity, in the order of their logging.
 #[derive(Default)]
@@ -92,6 +95,14 @@ pub(super) fn by_steps(chunk: &Chunk) -> Option<Chunk> {
     let step = TIMELINE.into();
     let is_wanted = chunk.is_static() || chunk.timelines().contains_key(&step);
     is_wanted.then(|| chunk.timeline_sliced(step))
+}
+
+/// Says that all rows of a step that views show stand before this one.
+pub(super) fn complete(step: u64) -> Result<Chunk, ChunkError> {
+    let time = [(Timeline::new_sequence(COMPLETE), sequence(step))];
+    let mark = DynamicArchetype::new_without_archetype()
+        .with_component_from_data("step", Arc::new(UInt64Array::from_iter_values([step])));
+    Chunk::builder(COMPLETE).with_serialized_batches(RowId::new(), time, mark.as_serialized_batches()).build()
 }
 
 fn motion(step: u64, ticks: u64) -> (Timeline, i64) {

@@ -35,11 +35,41 @@ const PANEL_WASM: &str = "/panel/panel_bg.wasm";
 /// The page itself, whose addresses of the other files are still without versions.
 pub(crate) const INDEX: &str = include_str!("../../web/page/index.html");
 
-/// A file of the page.
+/// A file of the page: its path and its content.
 macro_rules! embedded {
     ($name:literal) => {
-        Bytes::from_static(include_bytes!(concat!("../../web/page/", $name)))
+        (concat!("/", $name), include_bytes!(concat!("../../web/page/", $name)) as &[u8])
     };
+}
+
+/// The page's own files, all but [`INDEX`].
+const PAGE: [(&str, &[u8]); 14] = [
+    embedded!("controls.js"),
+    embedded!("files.js"),
+    embedded!("icon.svg"),
+    embedded!("legend.js"),
+    embedded!("links.js"),
+    embedded!("page.css"),
+    embedded!("page.js"),
+    embedded!("picture.js"),
+    embedded!("preview.png"),
+    embedded!("quiet.js"),
+    embedded!("scene.js"),
+    embedded!("seeds.js"),
+    embedded!("session.js"),
+    embedded!("viewer.js"),
+];
+
+const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
+
+/// The media type of one of them, by how its name ends.
+fn media_type(path: &str) -> &'static str {
+    match path.rsplit('.').next() {
+        Some("css") => "text/css; charset=utf-8",
+        Some("png") => "image/png",
+        Some("svg") => "image/svg+xml",
+        _ => JAVASCRIPT,
+    }
 }
 
 /// All files, by their paths.
@@ -55,26 +85,8 @@ struct Asset {
 }
 
 /// The routes of all files.
-pub(super) fn routes() -> Router<Arc<App>> {
-    let page = [
-        "/",
-        "/page.css",
-        "/page.js",
-        "/controls.js",
-        "/links.js",
-        "/picture.js",
-        "/scene.js",
-        "/session.js",
-        "/files.js",
-        "/seeds.js",
-        "/viewer.js",
-        "/icon.svg",
-        "/preview.png",
-    ];
-    let panel = [PANEL_SCRIPT, PANEL_WASM];
-    let viewer = ["/viewer/re_viewer.js", "/viewer/re_viewer_bg.wasm"];
-    let paths = page.into_iter().chain(panel).chain(viewer);
-    paths.fold(Router::new(), |router, path| router.route(path, get(file)))
+pub(super) fn routes(Assets(assets): &Assets) -> Router<Arc<App>> {
+    assets.iter().fold(Router::new(), |router, asset| router.route(asset.path, get(file)))
 }
 
 async fn file(State(app): State<Arc<App>>, uri: Uri, headers: HeaderMap) -> Response {
@@ -89,7 +101,6 @@ impl Assets {
     /// All files; the page's addresses of the others carry their versions. The panel is that of a folder, if one is
     /// named.
     pub(super) fn load(panel: Option<&Path>) -> Result<Self, ServerError> {
-        const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
         let viewer = WebViewerData::load(None)?;
         let (panel_script, panel_wasm) = match panel {
             Some(folder) => {
@@ -104,24 +115,14 @@ impl Assets {
                 Bytes::from_static(include_bytes!("../../web/dist/panel_bg.wasm.gz")),
             ),
         };
-        let mut assets = vec![
-            Asset::new("/page.css", "text/css; charset=utf-8", embedded!("page.css")),
-            Asset::new("/page.js", JAVASCRIPT, embedded!("page.js")),
-            Asset::new("/controls.js", JAVASCRIPT, embedded!("controls.js")),
-            Asset::new("/links.js", JAVASCRIPT, embedded!("links.js")),
-            Asset::new("/picture.js", JAVASCRIPT, embedded!("picture.js")),
-            Asset::new("/scene.js", JAVASCRIPT, embedded!("scene.js")),
-            Asset::new("/session.js", JAVASCRIPT, embedded!("session.js")),
-            Asset::new("/files.js", JAVASCRIPT, embedded!("files.js")),
-            Asset::new("/seeds.js", JAVASCRIPT, embedded!("seeds.js")),
-            Asset::new("/viewer.js", JAVASCRIPT, embedded!("viewer.js")),
-            Asset::new("/icon.svg", "image/svg+xml", embedded!("icon.svg")),
-            Asset::new("/preview.png", "image/png", embedded!("preview.png")),
+        let page = PAGE.map(|(path, bytes)| Asset::new(path, media_type(path), Bytes::from_static(bytes)));
+        let mut assets = Vec::from(page);
+        assets.extend([
             Asset::new(PANEL_SCRIPT, JAVASCRIPT, panel_script),
             Asset::compressed_already(PANEL_WASM, "application/wasm", panel_wasm),
             Asset::new("/viewer/re_viewer.js", JAVASCRIPT, Bytes::copy_from_slice(viewer.viewer_js())),
             Asset::viewer("/viewer/re_viewer_bg.wasm", viewer_wasm(viewer)),
-        ];
+        ]);
         let mut page = INDEX.to_owned();
         for asset in &assets {
             let Asset { path, version, .. } = asset;
@@ -232,5 +233,22 @@ impl Asset {
         // The length of what comes out of the decompression, for the page's progress.
         headers.insert("uncompressed-length", HeaderValue::from(self.bytes.len()));
         response
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{collections::BTreeSet, fs, path::Path};
+
+    use super::PAGE;
+
+    #[test]
+    fn every_file_of_the_page_is_embedded() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("web/page");
+        let files = fs::read_dir(folder).expect("the page's folder");
+        let names = files.map(|file| file.expect("a file").file_name().into_string().expect("a name"));
+        let there: BTreeSet<String> =
+            names.filter(|name| name != "index.html").map(|name| format!("/{name}")).collect();
+        assert_eq!(there, PAGE.map(|(path, _)| path.to_owned()).into());
     }
 }

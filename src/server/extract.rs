@@ -6,7 +6,7 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::IntoResponse,
 };
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, IgnoredAny, IntoDeserializer};
 
 use super::{
     MAX_BODY_BYTES,
@@ -47,12 +47,12 @@ fn is_json(headers: &HeaderMap) -> bool {
 
 fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     // Syntax first: a body that breaks off is not blamed on the field where it does.
-    let value: serde_json::Value = serde_json::from_slice(bytes)
+    serde_json::from_slice::<IgnoredAny>(bytes)
         .map_err(|error| Problem::new(Kind::Malformed, format!("the body is not JSON: {error}")))?;
-    if !value.is_object() {
+    if !bytes.trim_ascii_start().starts_with(b"{") {
         return Err(Problem::new(Kind::InvalidValue, "the body must be a JSON object"));
     }
-    // Then from the text again, which also finds repeated fields.
+    // Then what it says, which also finds repeated fields and numbers that are too large.
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
     serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
         let message = error.inner().to_string();
@@ -77,6 +77,26 @@ pub(super) fn whole_numbers<const N: usize>(
     query: Option<&str>,
     known: [&'static str; N],
 ) -> Result<[Option<u64>; N], Problem> {
+    let mut numbers = [None; N];
+    for (number, (name, value)) in numbers.iter_mut().zip(known.into_iter().zip(parameters(query, known)?)) {
+        *number = value.map(|value| whole_number(name, value)).transpose()?;
+    }
+    Ok(numbers)
+}
+
+/// One of the words that `T` is written as, its default where the parameter is absent.
+pub(super) fn word<T: DeserializeOwned + Default>(name: &'static str, value: Option<&str>) -> Result<T, Problem> {
+    let Some(value) = value else { return Ok(T::default()) };
+    T::deserialize(value.into_deserializer()).map_err(|error: serde::de::value::Error| {
+        Problem::new(Kind::Malformed, format!("`{name}`: {error}")).field(name)
+    })
+}
+
+/// The parameters of a query as they are written, each of which must be among `known`.
+pub(super) fn parameters<'a, const N: usize>(
+    query: Option<&'a str>,
+    known: [&'static str; N],
+) -> Result<[Option<&'a str>; N], Problem> {
     let mut values = [None; N];
     for pair in query.unwrap_or_default().split('&').filter(|pair| !pair.is_empty()) {
         let (name, value) = pair.split_once('=').unwrap_or((pair, ""));
@@ -84,7 +104,7 @@ pub(super) fn whole_numbers<const N: usize>(
             let detail = format!("there is no parameter `{name}`; there is: {}", known.join(", "));
             return Err(Problem::new(Kind::Malformed, detail).field(name));
         };
-        values[index] = Some(whole_number(name, value)?);
+        values[index] = Some(value);
     }
     Ok(values)
 }
@@ -113,6 +133,9 @@ mod tests {
         #[serde(default)]
         #[allow(dead_code)]
         learners: Vec<String>,
+        #[serde(default)]
+        #[allow(dead_code)]
+        configuration: Vec<f64>,
     }
 
     #[test]
@@ -126,6 +149,9 @@ mod tests {
             (r#"{"scenario":"a","scenario":"b"}"#, 422, Some("scenario")),
             (r#"{"scenario":"a","learners":["b",2]}"#, 422, Some("learners[1]")),
             (r#"{"scenario":"a","learners":"b"}"#, 422, Some("learners")),
+            (r#"{"scenario":"a","configuration":[0,1e999]}"#, 422, Some("configuration[1]")),
+            (r#"{"scenario":"a","configuration":[NaN]}"#, 400, None),
+            (" 1", 422, None),
         ] {
             let problem = parse::<Body>(body.as_bytes()).expect_err(body);
             assert_eq!((problem.status, problem.field.as_deref()), (status, field), "{body}: {}", problem.detail);

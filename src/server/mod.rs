@@ -115,7 +115,7 @@ pub async fn serve(listener: TcpListener, options: Options, shutdown: Cancellati
         openapi: document,
         loopback,
     });
-    let router = Router::new().merge(routes).merge(assets::routes());
+    let router = Router::new().merge(routes).merge(assets::routes(&app.assets));
     let router = guard::layered(router, &app, guard::Headers::new(&options.frame_ancestors));
     let serving = axum::serve(listener, router).with_graceful_shutdown(shutdown.clone().cancelled_owned());
     let ending = async {

@@ -12,12 +12,14 @@ use std::{
 use fantoccini::{
     Client, ClientBuilder,
     actions::{InputSource, KeyAction, KeyActions},
-    wd::{WebDriverCompatibleCommand, WindowHandle},
+    wd::WindowHandle,
 };
 use hyper_util::client::legacy::connect::HttpConnector;
-use reqwest::{Method, Url};
+use reqwest::Url;
 use serde_json::{Value, json};
 use tokio::time::Instant;
+
+use crate::devtools::{Log, Network};
 
 const WAIT: Duration = Duration::from_secs(120);
 
@@ -98,6 +100,17 @@ impl Browser {
         self.client.execute(&format!("return {expression};"), Vec::new()).await.expect("a value")
     }
 
+    /// Runs a script.
+    pub async fn run(&self, script: &str) {
+        self.client.execute(script, Vec::new()).await.expect("a script");
+    }
+
+    /// The value of a promise.
+    pub async fn evaluate_later(&self, promise: &str) -> Value {
+        let script = format!("const done = arguments[0]; ({promise}).then(done, (error) => done(String(error)));");
+        self.client.execute_async(&script, Vec::new()).await.expect("a value")
+    }
+
     pub async fn wait_for(&self, what: &str, condition: &str) {
         let deadline = Instant::now() + WAIT;
         while self.evaluate(condition).await != true {
@@ -115,16 +128,22 @@ impl Browser {
         self.client.perform_actions(keys).await.expect("a key press");
     }
 
-    /// Clicks on a point of the page, pixels from its upper left corner.
-    pub async fn click(&self, x: f64, y: f64) {
-        for (kind, button, clicks) in
-            [("mouseMoved", "none", 0), ("mousePressed", "left", 1), ("mouseReleased", "left", 1)]
-        {
-            let event = json!({ "type": kind, "x": x, "y": y, "button": button, "clickCount": clicks });
-            self.client.issue_cmd(DevTools("Input.dispatchMouseEvent", event)).await.expect("a click");
-            // Viewers look at the pointer once a frame.
-            tokio::time::sleep(Duration::from_millis(300)).await;
-        }
+    /// Presses a key while another is held.
+    pub async fn press_with(&self, held: char, key: char) {
+        let keys = KeyActions::new("keyboard".to_owned()).then(KeyAction::Down { value: held });
+        let keys = keys.then(KeyAction::Down { value: key }).then(KeyAction::Up { value: key });
+        self.client.perform_actions(keys.then(KeyAction::Up { value: held })).await.expect("a key press");
+    }
+
+    /// What has the focus: its id, or how it is called.
+    pub async fn focus(&self) -> String {
+        let name = "((one) => one.id || one.getAttribute('aria-label') || one.textContent)(document.activeElement)";
+        self.evaluate(name).await.as_str().expect("text").to_owned()
+    }
+
+    /// One page back in the browser's history, or one forth.
+    pub async fn go(&self, pages: i32) {
+        self.run(&format!("history.go({pages})")).await;
     }
 
     /// What the page tells assistive technology, and scripts.
@@ -134,14 +153,25 @@ impl Browser {
     }
 
     pub async fn screenshot(&self) -> Vec<u8> {
+        // A busy machine may draw for longer than chromedriver waits.
+        for _ in 0..5 {
+            if let Ok(picture) = self.client.screenshot().await {
+                return picture;
+            }
+        }
         self.client.screenshot().await.expect("a picture")
     }
 
-    /// The errors in the console.
-    pub async fn errors(&self) -> Vec<String> {
+    /// The errors in the console, and what scripts have written to it.
+    pub async fn console(&self) -> Vec<String> {
         let entries = self.log("browser").await;
-        let severe = entries.iter().filter(|entry| entry["level"] == "SEVERE");
-        severe.map(|entry| entry["message"].to_string()).collect()
+        // What else is there comes from the browser itself, about its graphics.
+        let ours = entries.iter().filter(|entry| entry["level"] == "SEVERE" || entry["source"] == "console-api");
+        ours.map(|entry| entry["message"].to_string()).collect()
+    }
+
+    pub(crate) fn client(&self) -> &Client {
+        &self.client
     }
 
     /// The hosts that the page has asked for anything.
@@ -193,50 +223,6 @@ impl Drop for Driver {
     fn drop(&mut self) {
         drop(self.child.kill());
         drop(self.child.wait());
-    }
-}
-
-/// Chromedriver's own command for logs.
-#[derive(Debug)]
-struct Log(&'static str);
-
-impl WebDriverCompatibleCommand for Log {
-    fn endpoint(&self, base: &Url, session: Option<&str>) -> Result<Url, <Url as std::str::FromStr>::Err> {
-        base.join(&format!("session/{}/se/log", session.unwrap_or_default()))
-    }
-
-    fn method_and_body(&self, _: &Url) -> (Method, Option<String>) {
-        (Method::POST, Some(json!({ "type": self.0 }).to_string()))
-    }
-}
-
-/// A command of the developer tools, by way of chromedriver.
-#[derive(Debug)]
-struct DevTools(&'static str, Value);
-
-impl WebDriverCompatibleCommand for DevTools {
-    fn endpoint(&self, base: &Url, session: Option<&str>) -> Result<Url, <Url as std::str::FromStr>::Err> {
-        base.join(&format!("session/{}/goog/cdp/execute", session.unwrap_or_default()))
-    }
-
-    fn method_and_body(&self, _: &Url) -> (Method, Option<String>) {
-        (Method::POST, Some(json!({ "cmd": self.0, "params": self.1 }).to_string()))
-    }
-}
-
-/// Chromedriver's own command for the connection.
-#[derive(Debug)]
-struct Network(Option<(u64, u64)>);
-
-impl WebDriverCompatibleCommand for Network {
-    fn endpoint(&self, base: &Url, session: Option<&str>) -> Result<Url, <Url as std::str::FromStr>::Err> {
-        base.join(&format!("session/{}/chromium/network_conditions", session.unwrap_or_default()))
-    }
-
-    fn method_and_body(&self, _: &Url) -> (Method, Option<String>) {
-        let Some((latency, throughput)) = self.0 else { return (Method::DELETE, None) };
-        let conditions = json!({ "offline": false, "latency": latency, "throughput": throughput });
-        (Method::POST, Some(json!({ "network_conditions": conditions }).to_string()))
     }
 }
 

@@ -4,28 +4,25 @@ use std::io::Cursor;
 
 use body_schema::recording::{learner_color, learner_slots};
 
+/// The learners that the page compares unless told otherwise.
 const LEARNERS: usize = 3;
-const NAMES: [&str; LEARNERS] = ["active", "random", "gradient"];
-/// Three learners' views stand in two columns and two rows; DIRECT's partition is in the last place.
-const COLUMNS: usize = 2;
-const ROWS: usize = 2;
-/// Titles above a view and the time below all of them, pixels.
-const MARGIN: usize = 40;
-/// How far a channel may be from its colour: edges are smoothed and bodies shaded.
+const NAMES: [&str; LEARNERS] = ["active", "random", "global"];
+/// How far a pixel's hue may be from its learner's, degrees: bodies are shaded, and clouds lie over them.
+const HUE: f64 = 15.0;
+/// What is less colourful than this is a cloud, a label or grey.
+const COLOURFUL: f64 = 0.5;
+/// How far a channel must have moved for a pixel to be another: edges are smoothed.
 const TOLERANCE: u8 = 40;
 /// So many pixels are an arm, not a label.
 const ARM: usize = 150;
 
-/// The part of a screenshot in which the learners' arms are.
-pub struct Picture {
-    width: usize,
-    height: usize,
-    pixels: Vec<[u8; 3]>,
-}
+/// The part of a screenshot in which the scene is.
+pub struct Picture(Vec<[u8; 3]>);
 
 impl Picture {
-    /// The scenes of a viewer that begins so many pixels from the left and the upper edge.
-    pub fn of_scene(png: &[u8], left: usize, top: usize) -> Self {
+    /// The scene that begins so many pixels from the left and the upper edge, and the legend at its lower edge, which is
+    /// so high, left out.
+    pub fn of_scene(png: &[u8], [left, top]: [usize; 2], legend: usize) -> Self {
         let mut decoder = png::Decoder::new(Cursor::new(png));
         decoder.set_transformations(png::Transformations::normalize_to_color8());
         let mut reader = decoder.read_info().expect("a picture");
@@ -33,44 +30,50 @@ impl Picture {
         let info = reader.next_frame(&mut bytes).expect("a frame");
         let (width, height) = (info.width as usize, info.height as usize);
         let samples = info.color_type.samples();
-        let rows = bytes.chunks(info.line_size).take(height).skip(top);
-        let pixels =
-            rows.flat_map(|row| row.chunks(samples).take(width).skip(left)).map(|pixel| [pixel[0], pixel[1], pixel[2]]);
-        Self { width: width - left, height: height - top, pixels: pixels.collect() }
+        let rows = bytes.chunks(info.line_size).take(height - legend).skip(top);
+        let pixels = rows.flat_map(|row| row.chunks(samples).take(width).skip(left));
+        Self(pixels.map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect())
     }
 
-    /// How many pixels of its own colour each learner's view has.
+    /// How many pixels have each learner's colour.
     pub fn counts(&self) -> [usize; LEARNERS] {
         let slots = learner_slots(NAMES);
         std::array::from_fn(|learner| {
-            let colour = learner_color(slots[learner]);
-            let near = |pixel: &[u8; 3]| pixel.iter().zip(colour).all(|(a, b)| a.abs_diff(b) <= TOLERANCE);
-            let in_view = |index: usize| self.learner(index) == Some(learner);
-            self.pixels.iter().enumerate().filter(|(index, pixel)| in_view(*index) && near(pixel)).count()
+            let (hue, _) = hue_and_saturation(learner_color(slots[learner]));
+            let is_near = |pixel: &&[u8; 3]| {
+                let (other, saturation) = hue_and_saturation(**pixel);
+                let apart = (other - hue).rem_euclid(360.0);
+                saturation >= COLOURFUL && apart.min(360.0 - apart) <= HUE
+            };
+            self.0.iter().filter(is_near).count()
         })
-    }
-
-    /// In whose view a pixel is.
-    fn learner(&self, index: usize) -> Option<usize> {
-        let (row, column) = (index / self.width, index % self.width);
-        let height = self.height / ROWS;
-        let view = row / height * COLUMNS + column * COLUMNS / self.width;
-        let inside = (MARGIN..height.saturating_sub(MARGIN)).contains(&(row % height));
-        (inside && view < LEARNERS).then_some(view)
     }
 
     pub fn shows_all_learners(&self) -> bool {
         self.counts().iter().all(|count| *count >= ARM)
     }
 
-    /// Whether every learner's view has changed.
+    /// Whether something as large as an arm has changed.
     pub fn differs_from(&self, other: &Self) -> bool {
-        let mut changed = [0; LEARNERS];
-        for (index, (a, b)) in self.pixels.iter().zip(&other.pixels).enumerate() {
-            if a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > TOLERANCE) {
-                self.learner(index).into_iter().for_each(|learner| changed[learner] += 1);
-            }
-        }
-        changed.iter().all(|count| *count >= ARM)
+        let apart = |(a, b): (&[u8; 3], &[u8; 3])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > TOLERANCE);
+        self.0.iter().zip(&other.0).filter(|pair| apart(*pair)).count() >= ARM
     }
+}
+
+/// A colour's hue, degrees, and its saturation in 0..=1.
+fn hue_and_saturation(colour: [u8; 3]) -> (f64, f64) {
+    let [red, green, blue] = colour.map(f64::from);
+    let most = red.max(green).max(blue);
+    let range = most - red.min(green).min(blue);
+    if range == 0.0 {
+        return (0.0, 0.0);
+    }
+    let hue = if most == red {
+        (green - blue) / range
+    } else if most == green {
+        2.0 + (blue - red) / range
+    } else {
+        4.0 + (red - green) / range
+    };
+    (60.0 * hue, range / most)
 }

@@ -81,6 +81,8 @@ async fn a_person_sets_each_movement_before_its_step() {
         (409, "name", set("active", &[0.0; 6])),
         (422, "configuration", set("human", &[0.0; 5])),
         (422, "configuration", set("human", &[9.0; 6])),
+        (422, "configuration", (of("human"), json!({}))),
+        (422, "configuration[5]", (of("human"), json!({ "configuration": [0, 0, 0, 0, 0, null] }))),
     ] {
         problem(server.post(&path, body).await, status, Some(field)).await;
     }

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::support::{Server, timeless};
 
-const ROUTES: [(&str, &str); 19] = [
+const ROUTES: [(&str, &str); 20] = [
     ("get", "/v1/scenarios"),
     ("get", "/v1/scenarios/{name}"),
     ("get", "/v1/sessions"),
@@ -20,6 +20,7 @@ const ROUTES: [(&str, &str); 19] = [
     ("get", "/v1/sessions/{id}/events"),
     ("get", "/v1/sessions/{id}/live"),
     ("get", "/v1/sessions/{id}/live.rrd"),
+    ("get", "/v1/sessions/{id}/blueprint.rbl"),
     ("get", "/v1/sessions/{id}/recording.rrd"),
     ("get", "/v1/sessions/{id}/steps.csv"),
     ("get", "/v1/sessions/{id}/result.json"),

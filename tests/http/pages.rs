@@ -72,6 +72,19 @@ async fn the_panel_is_sent_as_it_was_compressed_and_unpacked_for_those_who_do_no
     server.stop().await;
 }
 
+/// Even the first visitor, who comes before anything was compressed on demand.
+#[tokio::test]
+async fn the_viewer_is_sent_compressed_from_the_start() {
+    let server = Server::start().await;
+    let path = "/viewer/re_viewer_bg.wasm";
+    let small = server.request(Method::GET, path).header("accept-encoding", "gzip").send().await.expect("an answer");
+    assert_eq!(small.headers()["content-encoding"], "gzip");
+    let unpacked: usize = small.headers()["uncompressed-length"].to_str().expect("text").parse().expect("a number");
+    let small = small.bytes().await.expect("a file");
+    assert!(small.len() < 15_000_000 && unpacked > 40_000_000, "{} of {unpacked} bytes", small.len());
+    server.stop().await;
+}
+
 #[tokio::test]
 async fn health() {
     let server = Server::start().await;

@@ -22,8 +22,8 @@ pub fn steps_of_recording(bytes: &[u8]) -> BTreeSet<i64> {
     for message in messages {
         let LogMsg::ArrowMsg(store, message) = message.expect("a message") else { continue };
         let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
-        if store.is_recording() {
-            steps.extend(chunk.timelines().values().flat_map(|times| times.times_raw().iter().copied()));
+        if store.is_recording() && !chunk.is_static() {
+            steps.extend(chunk.iter_indices(&"step".into()).map(|(step, _)| step.as_i64()));
         }
     }
     steps

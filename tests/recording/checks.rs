@@ -22,6 +22,7 @@ pub fn check(reading: &Reading, description: &Description, reports: &[StepReport
     for report in reports {
         for learner in &report.learners {
             check_estimate(reading, report.step, learner);
+            check_arms(reading, report.step, learner, description);
             check_metrics(reading, report.step, learner);
             check_movement(reading, report.step, learner, description);
         }
@@ -29,12 +30,16 @@ pub fn check(reading: &Reading, description: &Description, reports: &[StepReport
     let changed = reports.iter().filter_map(|report| Some((Some(report.step), report.truth.as_ref()?)));
     let start = description.truth.as_ref().map(|truth| (description.change_at.map(|_| reports[0].step), truth));
     for (step, truth) in start.into_iter().chain(changed) {
-        close(&reading.strip("/world/truth/links", step), &truth.skeleton_m().concat(), "true links");
-        check_axes(reading, "/world/truth/axes", step, truth);
+        for learner in &description.learners {
+            let zero = format!("/{}/zero/truth", learner.name);
+            close(&reading.strip(&format!("{zero}/links"), step), &truth.skeleton_m().concat(), "true links");
+            check_axes(reading, &format!("{zero}/axes"), step, truth);
+        }
     }
-    assert_eq!(reading.entities().iter().any(|e| e == "/world/head/frustum"), description.head.is_some());
+    let frustum = format!("/{}/head/frustum", description.learners[0].name);
+    assert_eq!(reading.entities().contains(&frustum), description.head.is_some());
     if let Some(head) = &description.head {
-        let strips = reading.strips("/world/head/frustum", None);
+        let strips = reading.strips(&frustum, None);
         for corner in strips.iter().flatten() {
             let ray = Vector3::from(*corner) - Vector3::from(head.position_m);
             let angle = ray.angle(&Vector3::from(head.look));
@@ -44,22 +49,52 @@ pub fn check(reading: &Reading, description: &Description, reports: &[StepReport
     }
 }
 
+/// At θ = 0.
 fn check_estimate(reading: &Reading, step: u64, learner: &LearnerReport) {
-    let (name, model) = (&learner.name, &learner.estimate);
-    close(&reading.strip(&format!("/{name}/links"), Some(step)), &model.skeleton_m().concat(), "links");
-    check_axes(reading, &format!("/{name}/axes"), Some(step), model);
-    let points = model.joints.iter().filter_map(|joint| Some((joint.point_m?, joint.point_covariance_m2?)));
-    let marker = model.marker_covariance_m2.map(|covariance| (model.marker_m, covariance));
-    let points: Vec<_> = points.chain(marker).collect();
-    check_ellipsoids(reading, &format!("/{name}/point_ellipsoids"), step, &points, 1.0);
-
-    let (origins, vectors) = reading.arrows(&format!("/{name}/axes"), Some(step));
+    let (zero, model) = (format!("/{}/zero", learner.name), &learner.estimate);
+    close(&reading.strip(&format!("{zero}/links"), Some(step)), &model.skeleton_m().concat(), "links");
+    check_axes(reading, &format!("{zero}/axes"), Some(step), model);
+    let (origins, vectors) = reading.arrows(&format!("{zero}/axes"), Some(step));
     let length = Vector3::from(vectors[0]).norm();
     let tip = |i: usize| std::array::from_fn(|k| origins[i][k] + vectors[i][k]);
     let directions: Vec<_> = (model.joints.iter().enumerate())
-        .filter_map(|(i, joint)| Some((tip(i), joint.direction_covariance_rad2?)))
+        .filter_map(|(i, joint)| Some((Some(tip(i)), joint.direction_covariance_rad2?)))
         .collect();
-    check_ellipsoids(reading, &format!("/{name}/direction_uncertainty"), step, &directions, length);
+    check_ellipsoids(reading, &format!("{zero}/directions"), step, &directions, length);
+}
+
+/// In the configuration of the movement.
+fn check_arms(reading: &Reading, step: u64, learner: &LearnerReport, description: &Description) {
+    let (name, model) = (&learner.name, &learner.estimate);
+    let movement = learner.movement.as_ref();
+    let skeleton = movement.map(|movement| movement.estimated_skeleton_m.as_slice());
+    if let Some(skeleton) = skeleton {
+        check_capsules(reading, &format!("/{name}/arm/estimate"), step, skeleton, description);
+    }
+    if let Some(truth) = movement.and_then(|movement| movement.true_skeleton_m.as_ref()) {
+        check_capsules(reading, &format!("/{name}/arm/truth"), step, truth, description);
+    }
+    // Prismatic joints have no point, and so no ellipsoid.
+    let pivots = (model.joints.iter().filter(|joint| joint.point_m.is_some()).enumerate())
+        .filter_map(|(pivot, joint)| Some((skeleton.map(|skeleton| skeleton[pivot]), joint.point_covariance_m2?)));
+    let marker = model.marker_covariance_m2.map(|covariance| (skeleton.map(|it| it[it.len() - 1]), covariance));
+    let points: Vec<_> = pivots.chain(marker).collect();
+    check_ellipsoids(reading, &format!("/{name}/point_ellipsoids"), step, &points, 1.0);
+}
+
+/// Links from pivot to pivot and on to the marker, then the pins of the joints.
+fn check_capsules(reading: &Reading, entity: &str, step: u64, skeleton: &[[f64; 3]], description: &Description) {
+    let joints = description.joints.len();
+    let capsules = reading.capsules(entity, step);
+    assert_eq!(capsules.len(), 2 * joints, "{entity}");
+    let links = capsules[..joints].iter().filter(|(from, to)| from != to || skeleton.len() > joints);
+    let (mut points, mut end): (Vec<_>, _) = (Vec::new(), None);
+    for (from, to) in links {
+        points.push(*from);
+        end = Some(*to);
+    }
+    points.extend(end);
+    close(&points.concat(), &skeleton.concat(), entity);
 }
 
 fn check_axes(reading: &Reading, entity: &str, step: Option<u64>, model: &ModelReport) {
@@ -73,21 +108,28 @@ fn check_axes(reading: &Reading, entity: &str, step: Option<u64>, model: &ModelR
     }
 }
 
-fn check_ellipsoids(reading: &Reading, entity: &str, step: u64, expected: &[([f64; 3], [[f64; 3]; 3])], scale: f64) {
+/// Where an ellipsoid is, if that is known, and its covariance at θ = 0.
+type Expected = (Option<[f64; 3]>, [[f64; 3]; 3]);
+
+fn check_ellipsoids(reading: &Reading, entity: &str, step: u64, expected: &[Expected], scale: f64) {
     let found = reading.ellipsoids(entity, step);
     assert_eq!(found.len(), expected.len(), "{entity}");
-    close(
-        &reading.numbers(entity, "covariances", Some(step)).unwrap_or_default(),
-        &expected.iter().flat_map(|(_, covariance)| covariance.concat()).collect::<Vec<_>>(),
-        "covariances",
-    );
-    for ((centre, half_sizes, [x, y, z, w]), (expected_centre, covariance)) in found.into_iter().zip(expected) {
-        close(&centre, expected_centre, "centre of an ellipsoid");
+    let covariances = reading.numbers(entity, "covariances", Some(step)).unwrap_or_default();
+    assert_eq!(covariances.len(), 9 * expected.len());
+    for (((centre, half_sizes, [x, y, z, w]), (expected_centre, reported)), shown) in
+        found.into_iter().zip(expected).zip(covariances.chunks(9))
+    {
+        if let Some(expected_centre) = expected_centre {
+            close(&centre, expected_centre, "centre of an ellipsoid");
+        }
+        // As shown it is turned with its link.
+        let covariance = Matrix3::from_row_slice(shown);
+        let reported = Matrix3::from_fn(|row, column| reported[row][column]);
+        close(&[covariance.trace(), covariance.norm()], &[reported.trace(), reported.norm()], "covariance");
         let quaternion = Quaternion::new(w, x, y, z);
         assert!((quaternion.norm() - 1.0).abs() < TOLERANCE);
         let axes = UnitQuaternion::from_quaternion(quaternion).to_rotation_matrix().into_inner();
         // The variance along each axis is the one that is drawn, but for the axis without any, drawn as a thin disc.
-        let covariance = Matrix3::from_fn(|row, column| covariance[row][column]);
         let largest = half_sizes.iter().copied().fold(0.0, f64::max);
         for (axis, half) in half_sizes.into_iter().enumerate() {
             let axis: Vector3<f64> = axes.column(axis).into();
@@ -140,14 +182,13 @@ fn check_movement(reading: &Reading, step: u64, learner: &LearnerReport, descrip
         }
         return;
     };
-    close(&reading.strip(&entity("movement/links"), Some(step)), &movement.estimated_skeleton_m.concat(), "movement");
     assert_eq!(movement.true_skeleton_m.is_some(), description.truth.is_some());
-    if let Some(truth) = &movement.true_skeleton_m {
-        close(&reading.strip(&entity("movement/truth"), Some(step)), &truth.concat(), "true movement");
-    }
     close(&reading.points(&entity("marker/predicted"), step).unwrap(), &movement.predicted_marker_m, "predicted");
     let measured = movement.measured_marker_m.map(Vec::from).unwrap_or_default();
     close(&reading.points(&entity("marker/measured"), step).unwrap(), &measured, "measured");
+    let lines = reading.strips(&entity("marker/error"), Some(step)).concat();
+    let ends = movement.measured_marker_m.map(|measured| [movement.predicted_marker_m, measured]);
+    close(&lines.concat(), &ends.map(|ends| ends.concat()).unwrap_or_default(), "from prediction to measurement");
     assert_eq!(movement.gaze.is_some(), description.head.is_some());
     if let (Some(gaze), Some(head)) = (&movement.gaze, &description.head) {
         let strips = reading.strips(&entity("head/gaze"), Some(step));

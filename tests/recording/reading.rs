@@ -6,7 +6,8 @@ use re_log_encoding::DecoderApp;
 use rerun::{
     Component,
     components::{
-        Color, HalfSize2D, HalfSize3D, LineStrip3D, Name, Position2D, Position3D, RotationQuat, Text, Vector3D,
+        Color, HalfSize2D, HalfSize3D, Length, LineStrip3D, Name, Position2D, Position3D, RotationQuat, Text,
+        Translation3D, Vector3D,
     },
     log::{Chunk, LogMsg},
 };
@@ -16,6 +17,15 @@ pub fn messages(bytes: &[u8]) -> Vec<LogMsg> {
     DecoderApp::decode_eager(Cursor::new(bytes)).unwrap().map(Result::unwrap).collect()
 }
 
+/// The entities of a stream's chunks, as they come.
+pub fn entities_in_order(bytes: &[u8]) -> Vec<String> {
+    let data = messages(bytes).into_iter().filter_map(|message| match message {
+        LogMsg::ArrowMsg(store, message) if store.is_recording() => Some(message),
+        _ => None,
+    });
+    data.map(|message| Chunk::from_arrow_msg(&message).unwrap().entity_path().to_string()).collect()
+}
+
 /// The chunks of a recording by entity, and what its blueprint says.
 pub struct Reading {
     pub recording_id: String,
@@ -23,13 +33,20 @@ pub struct Reading {
     pub views: Vec<String>,
     /// Whether the blueprint is activated.
     pub activated: bool,
+    /// The colour behind its views.
+    pub background: Option<[u8; 4]>,
     chunks: BTreeMap<String, Vec<Chunk>>,
 }
 
 impl Reading {
     pub fn of(bytes: &[u8]) -> Self {
-        let mut reading =
-            Self { recording_id: String::new(), views: Vec::new(), activated: false, chunks: BTreeMap::new() };
+        let mut reading = Self {
+            recording_id: String::new(),
+            views: Vec::new(),
+            activated: false,
+            background: None,
+            chunks: BTreeMap::new(),
+        };
         for message in messages(bytes) {
             match message {
                 LogMsg::SetStoreInfo(info) if info.info.store_id.is_recording() => {
@@ -40,6 +57,9 @@ impl Reading {
                     if store.is_recording() {
                         reading.chunks.entry(chunk.entity_path().to_string()).or_default().push(chunk);
                     } else {
+                        let colours = chunk.iter_component::<Color>("Background:color".into());
+                        let colours = colours.flat_map(|colours| colours.as_slice().first().copied());
+                        reading.background = colours.map(|colour| colour.0.to_array()).last().or(reading.background);
                         let names = chunk.iter_component::<Name>("ViewBlueprint:display_name".into());
                         reading
                             .views
@@ -71,8 +91,16 @@ impl Reading {
 
     /// The steps at which an entity has a row.
     pub fn steps(&self, entity: &str) -> Vec<i64> {
+        self.times(entity, "step")
+    }
+
+    /// The times at which an entity has a row, in order.
+    pub fn times(&self, entity: &str, timeline: &'static str) -> Vec<i64> {
         let chunks = self.chunks.get(entity).into_iter().flatten();
-        chunks.flat_map(|chunk| chunk.iter_indices(&"step".into()).map(|(time, _)| time.as_i64())).collect()
+        let times = chunks.flat_map(|chunk| chunk.iter_indices(&timeline.into()).map(|(time, _)| time.as_i64()));
+        let mut times: Vec<i64> = times.collect();
+        times.sort_unstable();
+        times
     }
 
     /// What `read` finds in the row of a step; of the static row without a step.
@@ -115,6 +143,22 @@ impl Reading {
     pub fn counts(&self, entity: &str, component: &'static str, step: u64) -> Vec<u32> {
         let read = |chunk: &Chunk, row: usize| chunk.iter_slices::<u32>(component.into()).nth(row).unwrap().to_vec();
         self.row(entity, component, Some(step), read).unwrap()
+    }
+
+    /// Where capsules begin and end. Lengths are those of the last row that has any.
+    pub fn capsules(&self, entity: &str, step: u64) -> Vec<([f64; 3], [f64; 3])> {
+        let lengths = (0..=step).rev().find_map(|step| {
+            self.components::<Length>(entity, "Capsules3D:lengths", Some(step)).filter(|lengths| !lengths.is_empty())
+        });
+        let begins: Vec<Translation3D> = self.components(entity, "Capsules3D:translations", Some(step)).unwrap();
+        let turns: Vec<RotationQuat> = self.components(entity, "Capsules3D:quaternions", Some(step)).unwrap();
+        (begins.iter().zip(turns).zip(lengths.unwrap_or_default()))
+            .map(|((begin, turn), length)| {
+                let ([x, y, z, w], begin) = (turn.0.0.map(f64::from), begin.0.0.map(f64::from));
+                let along = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)];
+                (begin, std::array::from_fn(|i| begin[i] + f64::from(length.0.0) * along[i]))
+            })
+            .collect()
     }
 
     /// The coordinates of a line, point after point.

@@ -145,7 +145,7 @@ export class Controls {
     if (["text", "heading", "button", "link"].includes(kind)) {
       if (element.textContent !== name) element.textContent = name;
     } else if (kind === "combobox") {
-      element.textContent = name === "" ? text : `${name}: ${text}`;
+      element.textContent = name.endsWith(text) ? name : text.startsWith(name) ? text : `${name}: ${text}`;
     } else if (kind !== "row" && kind !== "cell" && kind !== "head") {
       element.setAttribute("aria-label", name || "Choices");
     }

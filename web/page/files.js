@@ -14,6 +14,11 @@ export const server = false;
 const sessions = new Map();
 let opened = 0;
 
+/** What is to be used where the page cannot be shown. */
+export const instead = "the recordings in the folder runs open in Rerun's own viewer.";
+
+const sorted = (names) => [...names].sort().join(", ");
+
 const folder = new URL(".", document.baseURI);
 const at = (path) => new URL(path, folder);
 
@@ -47,23 +52,53 @@ const manifest = get("export.json").then((response) => response.json());
 // Who asks for it first hears of a failure.
 manifest.catch(() => {});
 
-/** The address of a query, completed by the first of the recorded runs. @param {string} search */
-export async function query(search) {
+/**
+ * The query to begin with: the page's own, or where that asks for what is not recorded, the nearest run that is.
+ * @param {string} search
+ * @returns {Promise<{query: string, seeds: number[], note?: string}>} with the seeds of all that is recorded
+ */
+export async function begin(search) {
   const asked = new URLSearchParams(search);
   const { scenarios } = await manifest.catch(() => ({ scenarios: [] }));
   const scenario = scenarios.find(({ name }) => name === asked.get("scenario")) ?? scenarios[0];
-  if (scenario === undefined) return search;
-  if (!asked.has("scenario")) asked.set("scenario", scenario.name);
-  if (!asked.has("seed")) asked.set("seed", scenario.runs[0].seed);
-  return `?${asked}`;
+  if (scenario === undefined) return { query: search, seeds: [] };
+  const seeds = scenario.runs.map(({ seed }) => seed);
+  const run = scenario.runs.find(({ seed }) => String(seed) === asked.get("seed")) ?? scenario.runs[0];
+  const isRecorded = {
+    scenario: (name) => name === scenario.name,
+    seed: (seed) => seed === String(run.seed),
+    learners: (names) => sorted(names.split(",")) === sorted(run.learners),
+  };
+  const missing = Object.keys(isRecorded).filter((name) => asked.has(name) && !isRecorded[name](asked.get(name)));
+  const inVain = missing.map((name) => `${name}=${asked.get(name)}`).join(", ");
+  // Sessions are of one visit alone.
+  for (const name of [...missing, "session"]) asked.delete(name);
+  asked.set("scenario", scenario.name);
+  asked.set("seed", run.seed);
+  const note = missing.length > 0 ? `${inVain} is not recorded here; the page shows what is.` : undefined;
+  return { query: `?${asked}`, seeds, note };
 }
+
+/** Files of WebAssembly that were asked for, and will be asked for again. */
+const again = new Map();
 
 /** A file of WebAssembly, as the browser takes it. @param {string} address */
 export async function wasm(address) {
   const path = address.split("?")[0];
   const length = (await manifest).unpacked[path] ?? 0;
   const headers = { "Content-Type": "application/wasm", "Uncompressed-Length": String(length) };
-  return new Response(await content(await get(address)), { headers });
+  // The viewer's is fetched to show how far it is, and then to be used: hosts that let nothing be kept send it once.
+  const [now, later] = again.get(address) ?? (await content(await get(address))).tee();
+  if (later === undefined) again.delete(address);
+  else again.set(address, [later]);
+  return new Response(now, { headers });
+}
+
+/** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */
+export async function arrangement(id, { theme, aspect }) {
+  const { folder: place, aspects } = known(id).run;
+  const fitting = aspects.filter((one) => one <= aspect).at(-1) ?? aspects[0];
+  return (await get(`${place}/blueprint-${theme}-${fitting}.rbl`)).arrayBuffer();
 }
 
 /** Where a file of a session is. @param {string} path as on a server */
@@ -141,7 +176,6 @@ async function open({ scenario: name, seed, learners }) {
     const seeds = scenario.runs.map(({ seed }) => seed).join(", ");
     throw problem(409, "Not recorded", `this page holds ${name} with the seeds ${seeds}, not ${seed}`, { field: "seed" });
   }
-  const sorted = (names) => [...names].sort().join(", ");
   if (learners != null && sorted(learners) !== sorted(run.learners)) {
     const detail = `this page holds ${name} with the learners ${run.learners.join(", ")}, recorded together`;
     throw problem(409, "Not recorded", detail, { field: "learners" });

@@ -2,14 +2,16 @@
 
 import { Controls } from "./controls.js";
 import { CUT, atScene } from "./scene.js";
+import { quiet } from "./quiet.js";
 import { passOn, picture } from "./picture.js";
+import { Legend } from "./legend.js";
 import { SeedRuns } from "./seeds.js";
 import { copied, identity } from "./links.js";
 import { startViewer } from "./viewer.js";
 
 /** Where runs come from: a server, or files beside the page. */
 const source = await import(document.documentElement.dataset.source === "files" ? "./files.js" : "./session.js");
-const { ask, Follower, sessionOf } = source;
+const { arrangement, ask, Follower, sessionOf } = source;
 
 /** Keys that mean something to the panel wherever on the page they are pressed. */
 const KEYS = [" ", "ArrowLeft", "ArrowRight", "Escape", "+", "=", "-", "?", "r", "s", "n", "t"];
@@ -33,9 +35,12 @@ let arriving = true;
 /** Parts that came before the viewer was there, and the step to show then. */
 let waiting = [];
 let sought = null;
+/** The steps to which the recording holds postures on the way. */
+const ways = new Set();
 
 const tell = (event) => panel.receive(JSON.stringify(event));
 const seeds = new SeedRuns(tell, ask);
+const legend = new Legend(element("legend"));
 
 /** Asks the server and tells the panel what became of it. */
 async function request(asked, method, path, body, answer) {
@@ -71,15 +76,17 @@ const commands = {
   },
 
   // The reports come over the WebSocket.
-  step: ({ session: id, count, expected_step }) =>
-    request("step", "POST", `/v1/sessions/${id}/steps`, { count, expected_step, reports: false }, ({ step }) =>
+  step({ session: id, count, expected_step, frames = 0 }) {
+    for (let step = expected_step + 1; frames > 0 && step <= expected_step + count; step++) ways.add(step);
+    return request("step", "POST", `/v1/sessions/${id}/steps`, { count, expected_step, frames, reports: false }, ({ step }) =>
       tell({ is: "stepped", session: id, step }),
-    ),
+    );
+  },
 
   seek({ step }) {
     sought = step;
     const id = session;
-    viewer?.seek(step).then(() => id === session && tell({ is: "shown", step }));
+    return viewer?.seek(step, ways.has(step)).then(() => id === session && tell({ is: "shown", step }));
   },
 
   select: ({ session: id, learner }) =>
@@ -92,7 +99,18 @@ const commands = {
       tell({ is: "evaluation", evaluation }),
     ),
 
+  configure: ({ session: id, learner, configuration }) =>
+    request("configure", "POST", `/v1/sessions/${id}/learners/${encodeURIComponent(learner)}/configuration`, { configuration }, (evaluation) =>
+      tell({ is: "configured", learner, evaluation }),
+    ),
+
+  // A card of a story speaks of something in the scene.
+  point({ at }) {
+    for (const line of element("legend").children) line.toggleAttribute("data-pointed", line.dataset.line === at);
+  },
+
   seeds: (job) => seeds.run(job),
+  enough_seed: ({ seed }) => seeds.enough(seed),
   cancel_seeds: () => seeds.cancel(),
 
   address({ query }) {
@@ -104,13 +122,13 @@ const commands = {
 
   copy: ({ text }) => copied(text).then((result) => tell({ is: "copied", ...result })),
 
-  restore_view: () => viewer?.restore?.(),
+  restore_view: () => viewer?.restore(),
 
   async picture() {
     try {
       if (viewer === null || said === null) throw new Error("there is no scene yet");
       const redraw = () => viewer.seek(sought ?? said.step);
-      const blob = picture(element("viewer"), CUT, said.caption, legend(), redraw);
+      const blob = picture(element("viewer"), CUT, said.caption, legend.lines(), redraw);
       // Both may refuse; that is told once.
       blob.catch(() => {});
       tell({ is: "copied", done: true, note: await passOn(blob, `${said.caption.title.replaceAll(/[^\w-]+/g, "-")}.png`) });
@@ -132,7 +150,8 @@ const commands = {
   known: () => keep(KNOWN, "yes", localStorage),
 
   say(state) {
-    const { text, news, phase, step, latest, session: id, typing } = (said = state);
+    const { text, news, phase, step, latest, session: id, typing, caption } = (said = state);
+    legend.show(caption);
     const mirror = element("mirror");
     Object.assign(mirror.dataset, { phase, step, latest, session: id, typing });
     if (mirror.textContent !== text) mirror.textContent = text;
@@ -147,8 +166,9 @@ function follow(resource) {
   recording = resource.recording ?? session;
   waiting = [];
   sought = null;
+  ways.clear();
   tell({ is: "session", session: resource });
-  viewer?.open(recording);
+  show();
   follower = new Follower(session, {
     part: (part) => (viewer === null ? waiting.push(part) : viewer.feed(part)),
     message: (text) => panel.receive(`{"is":"live","message":${text}}`),
@@ -158,15 +178,16 @@ function follow(resource) {
   });
 }
 
-/** What the colours of the legend mean, for a picture. */
-function legend() {
-  return [...element("legend").children]
-    .filter((line) => line.firstChild.className !== "belief")
-    .map((line) => {
-      const { backgroundColor, backgroundImage } = getComputedStyle(line.firstChild);
-      const inImage = /rgba?\([^)]*\)/.exec(backgroundImage);
-      return [line.textContent, inImage === null ? backgroundColor : inImage[0]];
-    });
+/** Tells the panel on which side of it the scene is. */
+function layOut() {
+  const [panel, scene] = ["panel", "scene"].map((id) => element(id).getBoundingClientRect());
+  tell({ is: "layout", scene: scene.top < panel.top ? "above" : scene.left < panel.left ? "left" : "right" });
+}
+
+/** Opens the session's recording in the viewer, if it is there. */
+function show() {
+  const id = session;
+  viewer?.open(recording, (view) => arrangement(id, view));
 }
 
 // ---- what is kept in the browser, where it lets us
@@ -215,14 +236,16 @@ async function openPanel() {
       text.textContent = `The controls have crashed: ${failure} Reload the page: the run is kept.`;
       element("panel-cover").hidden = false;
     }, 1000);
-    const query = await source.query(location.search);
-    tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server });
+    new ResizeObserver(layOut).observe(element("panel"));
+    const { query, seeds: recorded, note } = await source.begin(location.search);
+    tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server, seeds: recorded });
+    if (note !== undefined) tell({ is: "refused", asked: "address", problem: { status: 404, detail: note } });
     return true;
   } catch (error) {
     document.querySelector("#panel-cover progress").hidden = true;
     text.textContent =
       `The controls cannot be shown: ${error.message ?? error}. They need a browser with WebGL 2 and WebAssembly; ` +
-      "the HTTP interface at /v1/openapi.json and the command line do without.";
+      source.instead;
     element("mirror").dataset.phase = "failed";
     cover("Without the controls there is nothing to show.");
     return false;
@@ -236,19 +259,18 @@ async function openViewer() {
   try {
     const opened = await startViewer(
       element("viewer"),
-      { script: element("viewer-script").href, wasm: () => source.wasm(element("viewer-wasm").dataset.address) },
+      { script: element("viewer-script").dataset.address, wasm: () => source.wasm(element("viewer-wasm").dataset.address) },
       (fraction) => (fraction === null ? progress.removeAttribute("value") : (progress.value = fraction)),
-      (step) => tell({ is: "scrubbed", step }),
     );
     viewer = opened;
     element("viewer").tabIndex = 0;
     nameTextAgents();
     (before?.isConnected && before !== document.body ? before : element("controls")).focus();
-    element("legend").hidden = false;
-    if (session !== null) viewer.open(recording);
+    if (session !== null) show();
     waiting.splice(0).forEach((part) => viewer.feed(part));
-    if (sought !== null) commands.seek({ step: sought });
-    element("cover").hidden = true;
+    // Until a step is there in full, an arm or two would stand for all.
+    const shown = sought === null ? Promise.resolve() : commands.seek({ step: sought });
+    shown.then(() => (element("cover").hidden = true));
     const watch = setInterval(() => {
       const failure = viewer.failure();
       if (failure === null) return;
@@ -319,8 +341,9 @@ addEventListener("popstate", () => {
   arriving = true;
   if (panel !== null) tell({ is: "navigated", query: location.search });
 });
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => viewer?.restore?.());
-atScene(element("scene"));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => viewer?.restore());
+atScene(element("scene"), element("viewer"));
+quiet();
 if (new URLSearchParams(location.search).get("embed") === "1") document.documentElement.dataset.embed = "";
 
 if (await openPanel()) openViewer();

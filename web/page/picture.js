@@ -9,7 +9,7 @@ const LINE = 22;
  * The scene as a picture in PNG.
  * @param {HTMLCanvasElement} scene
  * @param {number} cut how much of the scene's upper edge is hidden on the page, CSS pixels
- * @param {{title: string, learners: [string, [number, number, number]][]}} caption
+ * @param {{title: string, learners: {name: string, errors: string, colour: number[]}[]}} caption
  * @param {[string, string][]} legend what the other colours mean: text and colour
  * @param {() => void} redraw makes the viewer draw
  * @returns {Promise<Blob>}
@@ -32,7 +32,7 @@ export async function picture(scene, cut, caption, legend, redraw) {
   pen.font = "14px system-ui, sans-serif";
   pen.textBaseline = "middle";
   const colour = style.color;
-  const learners = caption.learners.map(([text, rgb]) => [text, `rgb(${rgb.join(" ")})`]);
+  const learners = caption.learners.map(({ name, errors, colour }) => [`${name} ${errors}`, `rgb(${colour.join(" ")})`]);
   const bottom = height / scale + MARGIN / 2;
   write(pen, bottom + LINE / 2, colour, [[caption.title, null], ...learners]);
   write(pen, bottom + LINE * 1.5, colour, [["body-schema", null], ...legend]);

@@ -8,6 +8,8 @@ export class SeedRuns {
   #ask;
   /** Counts jobs: one that is not the latest ends. */
   #job = 0;
+  /** Seeds of which enough is known. */
+  #enough = new Set();
 
   /**
    * @param {(event: object) => void} tell
@@ -18,6 +20,11 @@ export class SeedRuns {
     this.#ask = ask;
   }
 
+  /** Ends the run of one seed; the others go on. @param {number} seed */
+  enough(seed) {
+    this.#enough.add(seed);
+  }
+
   cancel() {
     this.#job += 1;
   }
@@ -26,11 +33,12 @@ export class SeedRuns {
   async run({ scenario, learners, seeds, steps }) {
     const job = ++this.#job;
     const ask = this.#ask;
+    this.#enough.clear();
     for (const seed of seeds) {
       let id = null;
       try {
         id = (await ask("POST", "/v1/sessions", { scenario, seed, learners })).id;
-        for (let made = 0; made < steps && job === this.#job; ) {
+        for (let made = 0; made < steps && job === this.#job && !this.#enough.has(seed); ) {
           const answer = await ask("POST", `/v1/sessions/${id}/steps`, { count: Math.min(AT_ONCE, steps - made) });
           made = answer.step;
           if (job === this.#job) this.#tell({ is: "seeds", seed, reports: answer.reports, done: made >= steps });

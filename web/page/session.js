@@ -21,11 +21,22 @@ export class ProblemError extends Error {
 /** Runs are computed here and now. */
 export const server = true;
 
+/** What is to be used where the page cannot be shown. */
+export const instead = "the HTTP interface at /v1/openapi.json and the command line do without.";
+
 /** The query to begin with: the page's own. @param {string} search */
-export const query = async (search) => search;
+export const begin = async (search) => ({ query: search, seeds: [] });
 
 /** A file of WebAssembly. @param {string} address */
 export const wasm = (address) => fetch(address);
+
+/** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */
+export async function arrangement(id, { theme, aspect }) {
+  const query = new URLSearchParams({ theme, aspect: aspect.toFixed(3) });
+  const response = await fetch(`/v1/sessions/${encodeURIComponent(id)}/blueprint.rbl?${query}`);
+  if (!response.ok) throw new Error(`there is no arrangement (${response.status})`);
+  return response.arrayBuffer();
+}
 
 /** Where a file of a session is. @param {string} path */
 export const place = (path) => path;

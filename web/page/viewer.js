@@ -1,31 +1,41 @@
 // Rerun's viewer: its loading, and what it is fed.
 
-/** The timeline of every recording. */
-const TIMELINE = "step";
+import { CUT } from "./scene.js";
+
+/** The timeline of postures, and so many ticks of it from one step to the next. */
+const MOTION = "motion";
+const TICKS = 32;
+/** The timeline that tells up to which step the viewer has everything. */
+const COMPLETE = "complete";
 /** Length of the header that must stand before every message, bytes. */
 const HEADER_BYTES = 12;
 /** How long parts are gathered, ms. */
 const GATHER_MS = 10;
-/** So long after a seek, its echo may still come, ms. */
-const ECHO_MS = 3000;
+/** The first parts wait at most so long for the first step that is to be shown, ms. */
+const HOLD_MS = 1000;
+/** A movement takes this part of the time since the last one, within these limits, ms. */
+const GLIDE = { part: 0.6, least: 140, most: 700 };
+/** So many frames after another arrangement, the time is set again: the viewer takes it from there. */
+const UNSETTLED = 20;
+/** The camera is set anew where the shape of the view has changed by so much. */
+const RESHAPED = 1.25;
+/** How long the shape must have stayed, ms. */
+const RESHAPED_MS = 300;
 
 /**
  * Loads the viewer's WebAssembly and starts it on a canvas.
  * @param {HTMLCanvasElement} canvas
  * @param {{script: string, wasm: () => Promise<Response>}} addresses the script's, and what fetches the WebAssembly
  * @param {(fraction: number | null) => void} progress null where the size is not known
- * @param {(step: number) => void} scrubbed hears where the visitor moves the time to
  * @returns {Promise<Viewer>}
  */
-export async function startViewer(canvas, addresses, progress, scrubbed) {
+export async function startViewer(canvas, addresses, progress) {
   keepToThisHost();
   await Promise.all([loadScript(addresses.script), load(addresses.wasm, progress)]);
   // `wasm_bindgen` is what the script defines. Browsers keep what they have compiled only if they get the response as it
   // came, so it is asked for once more: from the browser's cache.
   await wasm_bindgen({ module_or_path: addresses.wasm() });
-  let viewer = null;
   const handle = new wasm_bindgen.WebHandle({
-    on_viewer_event: (json) => viewer?.hear(JSON.parse(json)),
     url: [],
     hide_welcome_screen: true,
     enable_history: false,
@@ -34,8 +44,7 @@ export async function startViewer(canvas, addresses, progress, scrubbed) {
   });
   await handle.start(canvas);
   for (const panel of ["top", "blueprint", "selection", "time"]) handle.override_panel_state(panel, "hidden");
-  viewer = new Viewer(handle, scrubbed);
-  return viewer;
+  return new Viewer(handle, canvas);
 }
 
 /**
@@ -83,60 +92,52 @@ async function load(fetched, progress) {
 /** A running viewer that shows one recording at a time. */
 export class Viewer {
   #handle;
+  #canvas;
   #channel = null;
   #header = null;
-  /** Parts that wait to be sent together. */
+  /** Parts that wait to be sent together, and whether they wait for the first step to be shown. */
   #parts = [];
   #timer = 0;
+  #held = true;
+  /** Asks for an arrangement of views; the shape for which the last one was made. */
+  #arrange = null;
+  #aspect = 1;
+  #reshaping = 0;
   /** The step to be at, and those who wait for it. */
   #step = 0;
   #waiting = [];
-  #seeking = false;
-  #check = 0;
-  #scrubbed;
-  /** When which step was sought: the viewer tells of these too. */
-  #sought = new Map();
+  #following = false;
+  #unsettled = 0;
+  /** The tick that is shown; when the last movement began, and the one that is shown now. */
+  #tick = 0;
+  #moved = -Infinity;
+  #glide = null;
 
-  constructor(handle, scrubbed) {
+  constructor(handle, canvas) {
     this.#handle = handle;
-    this.#scrubbed = scrubbed;
+    this.#canvas = canvas;
+    new ResizeObserver(() => this.#reshape()).observe(canvas);
   }
 
-  /** Takes in an event of the viewer's. @param {{type: string, time?: number}} event */
-  hear(event) {
-    if (event.type !== "time_update" || this.#channel === null || this.#seeking || this.#sought.size === 0) return;
-    const step = Math.round(event.time);
-    if (step === this.#step || step < 0) return;
-    const echo = performance.now() - (this.#sought.get(step) ?? -Infinity) < ECHO_MS;
-    if (!echo) return this.#scrubbed(step);
-    // An echo comes once. Was it the visitor after all, the viewer stays where it is.
-    this.#sought.delete(step);
-    this.#check ||= setTimeout(() => this.#compare(), ECHO_MS);
-  }
-
-  /** Tells where the viewer is, if it is not where it was sent. */
-  #compare() {
-    this.#check = 0;
-    if (this.#channel === null || this.#seeking) return;
-    const time = this.#handle.get_time_for_timeline(this.#channel, TIMELINE);
-    if (time !== undefined && Math.round(time) !== this.#step) this.#scrubbed(Math.round(time));
-  }
-
-  /** Begins a recording. @param {string} id its recording id */
-  open(id) {
+  /**
+   * Begins a recording.
+   * @param {string} id its recording id
+   * @param {(view: {theme: string, aspect: number}) => Promise<ArrayBuffer>} arrange asks for an arrangement of its views
+   */
+  open(id, arrange) {
     this.close();
     this.#channel = id;
+    this.#arrange = arrange;
     this.#handle.open_channel(id, id);
+    this.#timer = setTimeout(() => this.#release(), HOLD_MS);
   }
 
   /** Ends the recording; what was shown stays. */
   close() {
     clearTimeout(this.#timer);
-    clearTimeout(this.#check);
     if (this.#channel !== null) this.#handle.close_channel(this.#channel);
-    this.#channel = this.#header = null;
-    [this.#parts, this.#timer, this.#check, this.#step] = [[], 0, 0, 0];
-    this.#sought.clear();
+    this.#channel = this.#header = this.#arrange = this.#glide = null;
+    [this.#parts, this.#timer, this.#held, this.#step, this.#tick] = [[], 0, true, 0, 0];
     this.#wake();
   }
 
@@ -148,11 +149,13 @@ export class Viewer {
     }
     this.#parts.push(part);
     // Parts come in dozens: one header for all that are there.
-    this.#timer ||= setTimeout(() => this.#send(), GATHER_MS);
+    if (!this.#held) this.#timer ||= setTimeout(() => this.#send(), GATHER_MS);
   }
 
   #send() {
+    clearTimeout(this.#timer);
     this.#timer = 0;
+    if (this.#header === null || this.#parts.length === 0) return;
     const parts = [this.#header, ...this.#parts.splice(0)];
     const message = new Uint8Array(parts.reduce((length, part) => length + part.byteLength, 0));
     let length = 0;
@@ -163,36 +166,100 @@ export class Viewer {
     this.#handle.send_rrd_to_channel(this.#channel, message);
   }
 
+  /** Sends the first parts, with the arrangement for this page behind the one that they hold: neither is seen alone. */
+  async #release() {
+    const id = this.#channel;
+    this.#held = false;
+    clearTimeout(this.#timer);
+    // Not 0: nothing is to be sent before.
+    this.#timer = -1;
+    await this.restore();
+    if (id === this.#channel) this.#send();
+  }
+
+  /** Arranges the views and the camera as they were at first, for the present shape and colours. */
+  async restore() {
+    const id = this.#channel;
+    if (id === null) return;
+    this.#aspect = this.#shape();
+    const theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
+    // Without it there is the arrangement that the recording holds.
+    const bytes = await this.#arrange({ theme, aspect: this.#aspect }).catch(() => null);
+    if (id !== this.#channel || bytes === null) return;
+    this.#parts.push(bytes.slice(HEADER_BYTES));
+    this.#send();
+    this.#unsettled = UNSETTLED;
+    this.#run();
+  }
+
+  /** Width of the view in heights, as far as it is seen. */
+  #shape() {
+    const { clientWidth, clientHeight } = this.#canvas;
+    return clientWidth > 0 && clientHeight > CUT ? clientWidth / (clientHeight - CUT) : 1;
+  }
+
+  #reshape() {
+    clearTimeout(this.#reshaping);
+    this.#reshaping = setTimeout(() => {
+      const change = this.#shape() / this.#aspect;
+      if (!this.#held && Math.max(change, 1 / change) > RESHAPED) this.restore();
+    }, RESHAPED_MS);
+  }
+
   /**
-   * Goes to a step as soon as the viewer has taken it in, which may be some frames later.
+   * Goes to a step as soon as the viewer has all of it, which may be some frames later.
    * @param {number} step
+   * @param {boolean} glides whether the recording holds postures on the way to it, to be shown if it is the next
    * @returns {Promise<void>} resolves when the viewer is there, or when it shows another recording
    */
-  seek(step) {
-    this.#step = step;
-    if (!this.#seeking) {
-      this.#seeking = true;
-      requestAnimationFrame(() => this.#follow());
-    }
+  seek(step, glides = false) {
+    if (this.#held) this.#release();
+    const now = performance.now();
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const duration = Math.min(Math.max(GLIDE.part * (now - this.#moved), GLIDE.least), GLIDE.most);
+    const isNext = this.#tick === (step - 1) * TICKS;
+    this.#glide = glides && isNext && !still ? { duration, began: null } : null;
+    [this.#step, this.#moved] = [step, now];
+    this.#run();
     return new Promise((resolve) => this.#waiting.push(resolve));
   }
 
-  #follow() {
+  #run() {
+    if (this.#following) return;
+    this.#following = true;
+    requestAnimationFrame((now) => this.#follow(now));
+  }
+
+  #follow(now) {
+    this.#following = false;
     const id = this.#channel;
-    const newest = id === null ? undefined : this.#handle.get_timeline_time_range(id, TIMELINE)?.max;
-    if (newest !== undefined) {
-      this.#handle.set_active_recording_id(id);
-      this.#handle.set_playing(id, false);
-      const time = Math.min(this.#step, newest);
-      this.#sought.delete(time);
-      this.#sought.set(time, performance.now());
-      // The oldest have long been heard of.
-      if (this.#sought.size > 100) this.#sought.delete(this.#sought.keys().next().value);
-      this.#handle.set_time_for_timeline(id, TIMELINE, time);
-    }
-    this.#seeking = id !== null && !(newest >= this.#step);
-    if (this.#seeking) requestAnimationFrame(() => this.#follow());
-    else this.#wake();
+    if (id === null) return this.#wake();
+    const newest = this.#handle.get_timeline_time_range(id, COMPLETE)?.max;
+    const isThere = newest >= this.#step;
+    if (isThere) this.#show(this.#ticks(now));
+    else if (newest !== undefined && this.#glide === null) this.#show(newest * TICKS);
+    if (isThere && this.#glide === null) this.#wake();
+    if (!isThere || this.#glide !== null || this.#unsettled-- > 0) this.#run();
+  }
+
+  /** Where the movement is by now. */
+  #ticks(now) {
+    const end = this.#step * TICKS;
+    if (this.#glide === null) return end;
+    this.#glide.began ??= now;
+    const way = (now - this.#glide.began) / this.#glide.duration;
+    if (way < 1) return end - TICKS + Math.floor(way * TICKS);
+    this.#glide = null;
+    return end;
+  }
+
+  #show(tick) {
+    const [handle, id] = [this.#handle, this.#channel];
+    if (handle.get_active_recording_id() !== id) handle.set_active_recording_id(id);
+    if (handle.get_active_timeline(id) !== MOTION) handle.set_active_timeline(id, MOTION);
+    if (handle.get_playing(id)) handle.set_playing(id, false);
+    if (handle.get_time_for_timeline(id, MOTION) !== tick) handle.set_time_for_timeline(id, MOTION, tick);
+    this.#tick = tick;
   }
 
   #wake() {

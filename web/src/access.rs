@@ -1,8 +1,8 @@
 //! The panel for those who do not see its canvas: AccessKit's tree in the reduced form from which the page builds real
 //! buttons, fields and tables, and what they ask for on its way back.
 //!
-//! A widget that is a table says so with [`Role::Table`] and its number of columns; its children are the cells, row by
-//! row, the first row being the head.
+//! What is a table says so by the roles of its parts: [`Role::Table`], [`Role::Row`], and [`Role::ColumnHeader`] or
+//! [`Role::Cell`].
 
 use std::collections::HashMap;
 
@@ -127,7 +127,9 @@ impl Tree<'_> {
                 return self.read_children(node, self.pane, elements);
             }
             Role::Table | Role::Grid => {
-                elements.push(self.table(id, node, pane));
+                let mut table = Element { kind: Kind::Table, name, pane, id: id.0.to_string(), ..Element::default() };
+                self.parts(node, pane, &mut table.children);
+                elements.push(table);
                 return;
             }
             Role::ListBox | Role::Menu | Role::Dialog | Role::Window => Kind::Group,
@@ -167,23 +169,26 @@ impl Tree<'_> {
         }
     }
 
-    fn table(&mut self, id: NodeId, node: &Node, pane: usize) -> Element {
-        let columns = node.column_count().unwrap_or(1).max(1);
-        let mut rows: Vec<Element> = Vec::new();
-        for (index, child) in node.children().iter().enumerate() {
-            let mut cell = Element { id: format!("{}-cell", child.0), kind: Kind::Cell, pane, ..Element::default() };
-            if index < columns {
-                cell.kind = Kind::Head;
+    /// The rows of a table, or the cells of a row, whatever holds them.
+    fn parts(&mut self, node: &Node, pane: usize, elements: &mut Vec<Element>) {
+        for id in node.children() {
+            let Some(child) = self.nodes.get(id).copied() else { continue };
+            let kind = match child.role() {
+                Role::Row => Kind::Row,
+                Role::Cell => Kind::Cell,
+                Role::ColumnHeader => Kind::Head,
+                _ => {
+                    self.parts(child, pane, elements);
+                    continue;
+                }
+            };
+            let mut part = Element { id: id.0.to_string(), kind, pane, ..Element::default() };
+            match kind {
+                Kind::Row => self.parts(child, pane, &mut part.children),
+                _ => self.read_children(child, pane, &mut part.children),
             }
-            self.read(*child, pane, &mut cell.children);
-            if index % columns == 0 {
-                let id = format!("{}-row{}", id.0, index / columns);
-                rows.push(Element { id, kind: Kind::Row, pane, ..Element::default() });
-            }
-            rows.last_mut().into_iter().for_each(|row| row.children.push(std::mem::take(&mut cell)));
+            elements.push(part);
         }
-        let name = node.label().unwrap_or_default().to_owned();
-        Element { id: id.0.to_string(), kind: Kind::Table, name, pane, children: rows, ..Element::default() }
     }
 
     /// What a node is called: by itself, by its label, or by what it says.
@@ -242,7 +247,7 @@ enum Deed {
     Choose,
     /// It was given a number.
     Set { number: f64 },
-    /// It was given a text, and left.
+    /// It was given a text.
     Enter { text: String },
     /// It is to be scrolled into view.
     Show,
@@ -259,20 +264,15 @@ impl Act {
         match &self.deed {
             Deed::Click | Deed::Choose => vec![request(Action::Click, None)],
             Deed::Set { number } => vec![request(Action::SetValue, Some(ActionData::NumericValue(*number)))],
-            Deed::Enter { text } => vec![
-                request(Action::Focus, None),
-                request(Action::SetValue, Some(ActionData::Value(text.as_str().into()))),
-            ],
+            Deed::Enter { text } => vec![request(Action::SetValue, Some(ActionData::Value(text.as_str().into())))],
             Deed::Show => vec![request(Action::ScrollIntoView, None)],
         }
     }
 
-    /// What egui does only when a pointer or the focus leaves: called a frame after the events.
+    /// What egui does only when a pointer is released: called a frame after the events.
     pub fn finish(&self, ctx: &egui::Context) {
-        match self.deed {
-            Deed::Choose => egui::Popup::close_all(ctx),
-            Deed::Enter { .. } => release_focus(ctx),
-            Deed::Click | Deed::Set { .. } | Deed::Show => {}
+        if self.deed == Deed::Choose {
+            egui::Popup::close_all(ctx);
         }
     }
 }
@@ -295,7 +295,7 @@ mod tests {
         pressed: u32,
         share: f64,
         seed: String,
-        left: u32,
+        entered: u32,
         choice: u32,
     }
 
@@ -303,7 +303,7 @@ mod tests {
         fn new() -> Self {
             let ctx = egui::Context::default();
             ctx.enable_accesskit();
-            Self { ctx, pressed: 0, share: 0.5, seed: "1".to_owned(), left: 0, choice: 1 }
+            Self { ctx, pressed: 0, share: 0.5, seed: "1".to_owned(), entered: 0, choice: 1 }
         }
 
         fn run(&mut self, events: Vec<egui::Event>, finished: Option<&Act>) -> Vec<Element> {
@@ -317,21 +317,20 @@ mod tests {
                     ui.add(egui::Slider::new(&mut self.share, 0.0..=1.0).show_value(false)).labelled_by(label.id);
                     let label = ui.label("Seed");
                     let field = ui.text_edit_singleline(&mut self.seed).labelled_by(label.id);
-                    self.left += u32::from(field.lost_focus());
+                    self.entered += u32::from(field.changed() && !field.has_focus());
                     egui::ComboBox::from_id_salt("list").selected_text("one").show_ui(ui, |ui| {
                         ui.selectable_value(&mut self.choice, 2, "two");
                     });
-                    egui::Grid::new("table").show(ui, |ui| {
-                        ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
-                            node.set_role(Role::Table);
-                            node.set_label("Learners");
-                            node.set_column_count(2);
-                        });
-                        for row in [["Learner", "Error"], ["active", "3"], ["random", "20"]] {
-                            for text in row {
-                                ui.horizontal(|ui| ui.label(text));
-                            }
-                            ui.end_row();
+                    let part = |role| egui::UiBuilder::new().accessibility_role(role);
+                    ui.scope_builder(part(Role::Table).accessibility_label("Learners"), |ui| {
+                        for (row, texts) in [["Learner", "Error"], ["active", "3"], ["random", "20"]].iter().enumerate()
+                        {
+                            let cell = if row == 0 { Role::ColumnHeader } else { Role::Cell };
+                            ui.scope_builder(part(Role::Row).id_salt(row), |ui| {
+                                for text in texts {
+                                    ui.scope_builder(part(cell).id_salt(text), |ui| ui.label(*text));
+                                }
+                            });
                         }
                     });
                 });
@@ -369,7 +368,7 @@ mod tests {
         form.act(serde_json::json!({ "id": slider.id, "act": "set", "number": 0.25 }));
         form.act(serde_json::json!({ "id": seed.id, "act": "enter", "text": "7" }));
         assert_eq!((form.pressed, form.share, form.seed.as_str()), (1, 0.25, "7"));
-        assert!(form.left > 0, "a field is left, so that its text is taken in");
+        assert_eq!(form.entered, 1, "a text is taken in without the focus, so that the page keeps it");
         // An id of no widget, or of none that can be, changes nothing.
         form.act(serde_json::json!({ "id": "12", "act": "click" }));
         form.act(serde_json::json!({ "id": "no number", "act": "click" }));

@@ -1,12 +1,13 @@
 //! Playing the game: the visitor's movements against those of the learners that choose by themselves.
 
+use body_schema::experiment::AppraisalReport;
+
 use crate::{
     game::{Due, Game, ROUNDS},
     host::Command,
     panel::Panel,
     play::FRAMES,
     settings::{GAME, HUMAN},
-    wire::Evaluation,
 };
 
 /// How a game ended.
@@ -92,7 +93,7 @@ impl Panel {
         }
     }
 
-    pub(crate) fn take_evaluation(&mut self, learner: &str, evaluation: Evaluation) {
+    pub(crate) fn take_evaluation(&mut self, learner: &str, evaluation: AppraisalReport) {
         if self.human().is_some_and(|human| self.description().is_some_and(|one| one.learners[human].name == learner)) {
             self.game.answered(evaluation);
         }

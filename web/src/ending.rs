@@ -54,18 +54,12 @@ impl Outcome {
 }
 
 impl Panel {
-    /// Whether every learner has learned the arm, judged with hindsight, or has run away.
+    /// Whether every learner has learned the arm, judged with hindsight, or never will.
     pub fn is_told(&self) -> bool {
         let Some(description) = self.description().filter(|description| description.truth.is_some()) else {
             return false;
         };
-        self.is_past_change() && (0..description.learners.len()).all(|learner| self.is_done(learner))
-    }
-
-    /// Whether nothing more is to be learned of a learner.
-    pub(crate) fn is_done(&self, learner: usize) -> bool {
-        let verdict = self.history.verdict(self.history.latest(), learner);
-        matches!(verdict, Verdict::Converged(_) | Verdict::Diverged)
+        self.is_past_change() && (0..description.learners.len()).all(|learner| self.history.is_over(learner))
     }
 
     /// Whether the body will not change any more.

@@ -16,11 +16,11 @@ impl Panel {
     /// Takes in what happened.
     pub fn receive(&mut self, event: Event) {
         match event {
-            Event::Begin { query, known, server } => {
-                self.server = server;
+            Event::Begin { query, known, server, seeds } => {
+                (self.server, self.recorded_seeds) = (server, seeds);
                 self.begin(&query, known);
             }
-            Event::Layout { below } => self.scene_below = below,
+            Event::Layout { scene } => self.scene = scene,
             Event::Navigated { query } => self.navigate(&query),
             Event::Scenarios { scenarios } => self.take_scenarios(scenarios),
             Event::Session { session: Some(session) } => self.adopt(*session),
@@ -122,7 +122,8 @@ impl Panel {
         self.restoring = (step > 0).then(|| step.min(MAX_RESTORED));
         self.wanted = self.restoring;
         let Settings { scenario, seed, learners, ellipsoids, .. } = self.settings.clone();
-        let learners = Some(learners).filter(|learners| !learners.is_empty());
+        // A recorded run has the learners that it was recorded with.
+        let learners = Some(learners).filter(|learners| self.server && !learners.is_empty());
         self.ask(Command::Open { scenario, seed, learners, ellipsoids });
     }
 

@@ -1,6 +1,6 @@
 //! Beat the algorithm: the movements that the visitor chooses, and when the server is asked about them.
 
-use crate::wire::Evaluation;
+use body_schema::experiment::AppraisalReport;
 
 /// Movements of a game.
 pub const ROUNDS: u64 = 10;
@@ -15,7 +15,7 @@ pub struct Game {
     /// The joints of the slice, across and up.
     pub axes: (usize, usize),
     /// What it would teach, once that is known.
-    pub evaluation: Option<Evaluation>,
+    pub evaluation: Option<AppraisalReport>,
     /// Postures that were tried before this movement, and their shares of the best gain.
     pub tried: Vec<(Vec<f64>, f64)>,
     /// The shares of the movements made.
@@ -68,9 +68,9 @@ impl Game {
         self.values.clone()
     }
 
-    pub(crate) fn answered(&mut self, evaluation: Evaluation) {
+    pub(crate) fn answered(&mut self, evaluation: AppraisalReport) {
         let Some(asked) = self.asked.take() else { return };
-        if let Some(share) = evaluation.share_of_best {
+        if let Some(share) = evaluation.share {
             self.tried.push((asked.clone(), share));
         }
         if asked == self.values {
@@ -89,7 +89,7 @@ impl Game {
 
     /// The movement was made: what was known of postures is no longer so.
     pub(crate) fn moved(&mut self, made: u64, now: f64) {
-        self.shares.extend(self.evaluation.take().and_then(|evaluation| evaluation.share_of_best));
+        self.shares.extend(self.evaluation.take().and_then(|evaluation| evaluation.share));
         self.tried.clear();
         (self.made, self.wanted, self.changed_at) = (made, false, Some(now));
     }
@@ -105,8 +105,19 @@ impl Game {
 mod tests {
     use super::*;
 
-    fn answer(configuration: Vec<f64>, share: f64) -> Evaluation {
-        Evaluation { configuration, gain: 0.1, share_of_best: Some(share), chance_of_being_seen: 1.0 }
+    fn answer(configuration: Vec<f64>, share: f64) -> AppraisalReport {
+        AppraisalReport {
+            configuration,
+            criterion: 0.9,
+            gain: 0.1,
+            best_gain: Some(0.1 / share),
+            share: Some(share),
+            trace: 1.0,
+            estimated_skeleton_m: Vec::new(),
+            predicted_marker_m: [0.0; 3],
+            marker_covariance_m2: [[0.0; 3]; 3],
+            chance_of_being_seen: 1.0,
+        }
     }
 
     #[test]

@@ -80,6 +80,9 @@ pub enum Verdict {
     Converged(u64),
 }
 
+/// After so many movements of which it has seen none, nothing more is to be expected of a learner.
+const BLIND: u64 = 100;
+
 /// All steps of a session.
 #[derive(Clone, Debug, Default)]
 pub struct History {
@@ -104,6 +107,14 @@ impl History {
             rows: Vec::new(),
             failures: vec![None; description.learners.len()],
         }
+    }
+
+    /// Whether nothing more is to be told of a learner: it has learned the arm, has run away, or sees nothing any more.
+    pub fn is_over(&self, learner: usize) -> bool {
+        let latest = self.latest();
+        let misses = |step| self.row(step, learner).map_or(0, |row| row.misses);
+        let is_blind = || latest > BLIND && misses(latest) - misses(latest - BLIND) == BLIND;
+        matches!(self.verdict(latest, learner), Verdict::Converged(_) | Verdict::Diverged) || is_blind()
     }
 
     /// Takes a report in, the first whatever its step; one that is known already or leaves a gap changes nothing.

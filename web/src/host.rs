@@ -9,7 +9,7 @@ use body_schema::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::wire::{Evaluation, Problem, Session};
+use crate::wire::{Problem, Session};
 
 /// What happened.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -24,11 +24,14 @@ pub enum Event {
         /// Whether a server is there; without one the page shows recorded runs.
         #[serde(default = "usual")]
         server: bool,
+        /// The seeds of the recorded runs, where there is no server.
+        #[serde(default)]
+        seeds: Vec<u64>,
     },
     /// Where the scene is.
     Layout {
-        /// Beneath the panel, not beside it.
-        below: bool,
+        /// Seen from the panel.
+        scene: Side,
     },
     /// The visitor went back or forth to this address.
     Navigated {
@@ -110,7 +113,7 @@ pub enum Event {
         /// The learner.
         learner: String,
         /// The answer.
-        evaluation: Box<Evaluation>,
+        evaluation: Box<AppraisalReport>,
     },
     /// A part of a run in the background.
     Seeds {
@@ -129,6 +132,19 @@ pub enum Event {
         #[serde(default)]
         note: Option<String>,
     },
+}
+
+/// Where something lies, seen from the panel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// Beside it, on the left.
+    Left,
+    /// Beside it, on the right.
+    #[default]
+    Right,
+    /// Above it.
+    Above,
 }
 
 fn usual() -> bool {
@@ -208,6 +224,11 @@ pub enum Command {
         /// Rad or m per joint.
         configuration: Vec<f64>,
     },
+    /// Point at the line of the scene's legend with this mark, and at no other.
+    Point {
+        /// The mark's name; null for none.
+        at: Option<&'static str>,
+    },
     /// Put a picture of the scene on the clipboard.
     Picture,
     /// Show the scene as it was at first.
@@ -270,15 +291,28 @@ pub struct Mirror {
     pub session: String,
     /// Whether the visitor is typing, so that keys are text.
     pub typing: bool,
-    /// What is shown, as the caption of a picture.
+    /// What is shown in the scene.
     pub caption: Caption,
 }
 
-/// What stands under a picture of the scene.
+/// What the legend over the scene says, and what stands under a picture of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Caption {
     /// Scenario, seed and step.
     pub title: String,
-    /// Each learner's name with its errors, and its colour.
-    pub learners: Vec<(String, [u8; 3])>,
+    /// Every learner of the session.
+    pub learners: Vec<Captioned>,
+    /// What the translucent ellipsoids are.
+    pub ellipsoids: String,
+}
+
+/// A learner, as a caption names it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Captioned {
+    /// Its name.
+    pub name: String,
+    /// Its errors at the step that is shown, with their units.
+    pub errors: String,
+    /// Red, green, blue.
+    pub colour: [u8; 3],
 }

@@ -2,15 +2,16 @@
 
 use crate::{
     colours,
-    host::{Caption, Command, Mirror},
+    host::{Caption, Captioned, Command, Mirror},
     panel::{Link, Panel},
+    settings::ELLIPSOIDS,
 };
 
 /// How often words are renewed, s: a screen reader must be able to finish a sentence.
 const SAY_EVERY: f64 = 1.0;
 
 impl Panel {
-    /// What stands under a picture of the scene.
+    /// What the legend over the scene says, and what stands under a picture of it.
     fn caption(&self) -> Caption {
         let Some(description) = self.description() else { return Caption::default() };
         let title = format!("{}, seed {}, step {}", description.scenario, description.seed, self.cursor);
@@ -24,9 +25,11 @@ impl Panel {
             ];
             let errors: Vec<String> = errors.into_iter().flatten().collect();
             let [red, green, blue, _] = colours::learner(slot).to_array();
-            (format!("{} {}", learner.name, errors.join(", ")), [red, green, blue])
+            Captioned { name: learner.name.clone(), errors: errors.join(", "), colour: [red, green, blue] }
         });
-        Caption { title, learners: learners.collect() }
+        let size = ELLIPSOIDS.iter().find(|(name, _)| *name == self.settings.ellipsoids).map_or("", |(_, size)| size);
+        let ellipsoids = format!("where a learner thinks a joint may be ({size})");
+        Caption { title, learners: learners.collect(), ellipsoids }
     }
 
     pub(crate) fn phase(&self) -> &'static str {

@@ -62,7 +62,7 @@ impl Panel {
         Some(format!("Opened {scenario}, seed {seed}, comparing {}, at step {}.", names.join(", "), self.cursor))
     }
 
-    /// Per learner, whether it has converged, settled or diverged by the latest step.
+    /// Per learner, whether it has learned the arm, is sure of itself or ran away by the latest step.
     fn endings(&self) -> Vec<bool> {
         let (latest, learners) = (self.history.latest(), self.description().map_or(0, |one| one.learners.len()));
         let ended = |learner| {
@@ -75,9 +75,9 @@ impl Panel {
     fn end_of(&self, learner: usize) -> Option<String> {
         let name = &self.description()?.learners.get(learner)?.name;
         Some(match self.history.verdict(self.history.latest(), learner) {
-            Verdict::Converged(step) => format!("{name} has converged at movement {step}."),
-            Verdict::Settled => format!("{name} has settled."),
-            _ => format!("{name} has diverged."),
+            Verdict::Converged(step) => format!("{name} has learned the arm by movement {step}."),
+            Verdict::Settled => format!("{name} is sure of itself."),
+            _ => format!("{name} ran away."),
         })
     }
 }

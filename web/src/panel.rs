@@ -5,11 +5,11 @@ use body_schema::{experiment::Description, scenario::ScenarioSummary};
 use crate::{
     game::Game,
     history::History,
-    host::{Command, Mirror},
+    host::{Command, Mirror, Side},
     news::Told,
     seeds::SeedRuns,
     settings::{HUMAN, Settings, Tab},
-    stories::{STORIES, Spots},
+    stories::{STORIES, Spot, Spots},
     why::Why,
     wire::Session,
 };
@@ -81,6 +81,8 @@ pub struct Panel {
     pub game: Game,
     /// Whether there is a server; without one, recorded runs are shown and nothing new is computed.
     pub server: bool,
+    /// The seeds of the recorded runs, where there is no server.
+    pub recorded_seeds: Vec<u64>,
     /// The chart that is always in sight, by its title.
     pub chart: &'static str,
     /// Whether the help is open.
@@ -90,6 +92,12 @@ pub struct Panel {
     /// The answer to the last copying.
     pub copied: Option<String>,
     pub(crate) spots: Spots,
+    /// What is marked in the legend of the scene.
+    pub(crate) pointed: Option<&'static str>,
+    /// The card that was drawn last, by its story and place.
+    pub(crate) card_shown: Option<(usize, usize)>,
+    /// What the card that has just been opened speaks of.
+    pub(crate) reveal: Option<Spot>,
     /// How high the open card is.
     pub(crate) card_height: f32,
     /// The ending was brought into view.
@@ -98,8 +106,8 @@ pub struct Panel {
     pub(crate) tab_shown: Tab,
     /// The visitor touches the screen.
     pub(crate) touch: bool,
-    /// The scene is beneath the panel, not beside it.
-    pub(crate) scene_below: bool,
+    /// Where the scene lies.
+    pub(crate) scene: Side,
     /// By how much a swipe over what stays in place has moved what scrolls.
     pub(crate) swiped: f32,
     pub(crate) opening: bool,
@@ -140,16 +148,20 @@ impl Default for Panel {
             story: 0,
             game: Game::default(),
             server: true,
+            recorded_seeds: Vec::new(),
             chart: PREDICTION,
             help: false,
             seed_text: "1".to_owned(),
             copied: None,
             spots: Spots::default(),
+            pointed: None,
+            card_shown: None,
+            reveal: None,
             card_height: 0.0,
             ending_seen: false,
             tab_shown: Tab::Charts,
             touch: false,
-            scene_below: false,
+            scene: Side::default(),
             swiped: 0.0,
             opening: false,
             busy: false,

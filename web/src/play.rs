@@ -18,7 +18,7 @@ const RESTORED_AT_ONCE: u64 = 50;
 /// So many movements before the body changes, a run that was fast-forwarded is slow again.
 const BEFORE_CHANGE: u64 = 5;
 /// How long playing waits for a step to be shown, s.
-const SHOWN_WITHIN: f64 = 2.0;
+const SHOWN_WITHIN: f64 = 5.0;
 /// At this speed and below, steps/s, and for single steps, the scene shows postures between steps: so many.
 const SLOW: f64 = 4.0;
 pub(crate) const FRAMES: u64 = 12;
@@ -94,7 +94,7 @@ impl Panel {
         let news = (0..description.learners.len()).filter_map(|learner| self.history.converged_at(latest, learner));
         let is_quiet = latest >= news.max().unwrap_or(begin) + CONFIRMATION + QUIET;
         let waiting: Vec<&str> = (description.learners.iter().enumerate())
-            .filter(|(index, _)| !self.is_done(*index))
+            .filter(|(index, _)| !self.history.is_over(*index))
             .map(|(_, learner)| learner.name.as_str())
             .collect();
         let only_one = waiting.len() == 1 && description.learners.len() > 1;
@@ -113,10 +113,11 @@ impl Panel {
         let (settled, judging) = self.settled();
         let newly = settled > self.pace.settled;
         let told = self.settings.stop == StopWhen::Told && !self.pace.told && self.is_told();
+        let used_up = if self.server { "data: every movement has been used" } else { "run" };
         let reason = if self.pace.until.is_some_and(|until| latest >= until) {
             format!("Paused after movement {latest}.")
         } else if self.remaining() == Some(0) {
-            "The end of the recorded data: every movement has been used.".to_owned()
+            format!("The end of the recorded {used_up}.")
         } else if latest >= self.run_to() {
             format!("Stopped at step {latest}, the last of this run. Raise “Run to” to go on.")
         } else if told {
@@ -233,6 +234,7 @@ impl Panel {
         }
         again = [again, self.play_game(now)].into_iter().flatten().reduce(f64::min);
         self.explain(now);
+        self.point_at_scene();
         // The scene follows once, whatever moved the cursor how often.
         if self.is_ready() && self.sought != Some(self.cursor) {
             self.sought = Some(self.cursor);

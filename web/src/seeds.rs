@@ -61,12 +61,24 @@ impl SeedRuns {
     /// Movements until accurate, a learner's, over the seeds that are done, counted from the change of the body if it
     /// changes; `None` for a seed on which they were not enough.
     pub fn finishes(&self, learner: usize) -> Vec<Option<u64>> {
-        let runs = self.runs.iter().filter(|(seed, _)| self.done.contains(seed)).map(|(_, run)| run);
-        runs.map(|run| match run.verdict(run.latest(), learner) {
+        let finish = |run: &History| match run.verdict(run.latest(), learner) {
             Verdict::Converged(first) => Some(first - self.begin(run)),
             _ => None,
-        })
-        .collect()
+        };
+        self.finished().map(finish).collect()
+    }
+
+    /// Mean prediction errors of a learner over the movements of each seed that is done, metres.
+    pub fn mean_errors(&self, learner: usize) -> Vec<f64> {
+        let mean = |run: &History| {
+            let errors = run.curve(learner, |row| row.prediction_m);
+            errors.iter().map(|[_, error]| error).sum::<f64>() / errors.len().max(1) as f64
+        };
+        self.finished().map(mean).collect()
+    }
+
+    fn finished(&self) -> impl Iterator<Item = &History> {
+        self.runs.iter().filter(|(seed, _)| self.done.contains(seed)).map(|(_, run)| run)
     }
 
     fn begin(&self, run: &History) -> u64 {
@@ -75,10 +87,8 @@ impl SeedRuns {
 
     /// Whether this run has nothing more to tell.
     fn is_told(&self, run: &History) -> bool {
-        let latest = run.latest();
-        let done = |learner| matches!(run.verdict(latest, learner), Verdict::Converged(_) | Verdict::Diverged);
-        self.description.change_at.is_none_or(|change| latest > change)
-            && (0..self.description.learners.len()).all(done)
+        self.description.change_at.is_none_or(|change| run.latest() > change)
+            && (0..self.description.learners.len()).all(|learner| run.is_over(learner))
     }
 
     /// Takes a part of a run in; whether it is the one that tells that this seed needs no more.

@@ -46,8 +46,8 @@ pub enum Spot {
     Chart,
     /// The table of learners.
     Learners,
-    /// The scene, which is not the panel's.
-    Scene,
+    /// The ellipsoids in the scene, which is not the panel's.
+    Ellipsoids,
     /// What can be seen of the run: charts, reasons, links.
     Tabs,
     /// How the run ended.
@@ -132,8 +132,9 @@ pub const STORIES: [Story; 4] = [
                 title: "What the ellipsoids mean",
                 text: "Look at the scene: each translucent ellipsoid holds where a learner thinks a joint may be. Those \
                        of global shrink, since it weighs all movements together. Those of active and random stay large: \
-                       noise is added to them on purpose, so that they can still adapt.",
-                spot: Spot::Scene,
+                       noise is added to them on purpose, so that they can still adapt. The cores within them are \
+                       what their data allow.",
+                spot: Spot::Ellipsoids,
                 acts: &[Act::Chart("Uncertainty")],
             },
             Card {
@@ -226,8 +227,8 @@ pub const STORIES: [Story; 4] = [
             },
             Card {
                 title: "Choosing among what was recorded",
-                text: "In the end all have used every movement, so the curves meet. What differs is how soon a learner \
-                       predicts well, and that is what choosing is for. Try another seed, which holds out others.",
+                text: "In the end all have used every movement, so the curves meet. On this seed active predicts well \
+                       sooner. Was that luck? There are few movements to choose among: ten other seeds hold out others.",
                 spot: Spot::Ending,
                 acts: &[Act::Seeds],
             },

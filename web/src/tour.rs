@@ -4,7 +4,7 @@ use crate::{
     host::Command,
     panel::Panel,
     settings::{StopWhen, Tab},
-    stories::{Act, Card, STORIES, Story},
+    stories::{Act, Card, STORIES, Spot, Story},
 };
 
 impl Panel {
@@ -66,6 +66,15 @@ impl Panel {
                     self.tell(index);
                 }
             }
+        }
+    }
+
+    /// Marks what the open card speaks of in the legend of the scene.
+    pub(crate) fn point_at_scene(&mut self) {
+        let at = self.card().filter(|(.., card)| card.spot == Spot::Ellipsoids).map(|_| "ellipsoids");
+        if self.pointed != at {
+            self.pointed = at;
+            self.ask(Command::Point { at });
         }
     }
 

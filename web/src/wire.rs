@@ -18,20 +18,6 @@ pub struct Session {
     pub remaining: Option<u64>,
 }
 
-/// What the movement that the visitor is about to make would teach.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct Evaluation {
-    /// The posture, rad or m per joint.
-    pub configuration: Vec<f64>,
-    /// By how much the uncertainty would fall.
-    pub gain: f64,
-    /// The same as a share of the best that a search finds; null where nothing is to be gained.
-    #[serde(default)]
-    pub share_of_best: Option<f64>,
-    /// The believed chance of seeing the marker; 1 where no head watches.
-    pub chance_of_being_seen: f64,
-}
-
 /// Why the server refused (RFC 9457).
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default)]

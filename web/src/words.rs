@@ -75,13 +75,10 @@ impl Panel {
     /// Whether a filter's own uncertainty is kept large on purpose, far above what its data allow.
     pub(crate) fn is_kept_large(&self, learner: usize) -> bool {
         const MUCH: f64 = 3.0;
-        let is_filter = self.description().and_then(|one| one.learners.get(learner)).is_some_and(|one| {
-            // Recursive estimators take stabilising noise; one that weighs all movements has no need of it.
-            !one.estimator.starts_with("smoother")
-        });
+        let learners = self.description().map(|description| &description.learners);
+        let is_stabilised = learners.and_then(|all| all.get(learner)).is_some_and(|one| one.stabilised);
         let row = self.history.row(self.cursor, learner);
-        let above = row.and_then(|row| Some(row.trace? > MUCH * row.bound?)).unwrap_or(false);
-        is_filter && above
+        is_stabilised && row.and_then(|row| Some(row.trace? > MUCH * row.bound?)).unwrap_or(false)
     }
 
     /// The names of those learners, as a list.

@@ -86,7 +86,7 @@ fn a_run_stops_at_its_last_step_and_says_why() {
 #[test]
 fn a_run_stops_when_all_that_judge_themselves_have_settled_and_plays_on() {
     // The gradient keeps no uncertainty, so it never judges itself; the others settle after some fifteen movements.
-    let mut page = Page::with_session("learners=gradient,global,smoother:random&speed=50");
+    let mut page = Page::with_session("learners=gradient,global,smoother:random&speed=50&stop=all");
     page.press(Key::Space);
     page.make_steps(200);
     let latest = page.harness.state().history.latest();
@@ -95,7 +95,7 @@ fn a_run_stops_when_all_that_judge_themselves_have_settled_and_plays_on() {
     let last = settled("global").max(settled("smoother:random")).expect("both settle");
     // Steps are made by the dozen where drawing is slow, so that the last of them may overshoot.
     assert!((last..last + 25).contains(&latest), "{last} {latest}");
-    assert!(settled("gradient").is_none() && page.has("every learner that judges itself has settled"));
+    assert!(settled("gradient").is_none() && page.has("every learner that judges itself is sure of itself"));
     page.press(Key::Space);
     page.make_steps(20);
     assert!(page.harness.state().history.latest() > latest, "play goes on");
@@ -103,7 +103,7 @@ fn a_run_stops_when_all_that_judge_themselves_have_settled_and_plays_on() {
 
 #[test]
 fn convergence_and_divergence_are_shown() {
-    let mut page = Page::open("speed=100&to=80&stop=never");
+    let mut page = Page::open("learners=active,random,gradient&speed=100&to=80&stop=never");
     // A gradient whose steps are far too large.
     page.server.edit("gradient.rate", 1e6);
     page.begin();
@@ -111,12 +111,12 @@ fn convergence_and_divergence_are_shown() {
     page.make_steps(80);
     let result = page.server.experiment().result();
     let converged = result.learners[0].converged_at.expect("the active learner converges within 80 movements");
-    assert!(page.has(&format!("converged at {converged}")) && page.has("diverged"));
+    assert!(page.has(&format!("learned in {converged}")) && page.has("ran away"));
     // Going back undoes the verdict: it is that of the step that is shown.
     page.tell(json!({ "is": "scrubbed", "step": converged + 7 }));
-    assert!(page.has(&format!("within since {converged} (7/20)")));
+    assert!(page.has("accurate for 7 of 20"));
     page.tell(json!({ "is": "scrubbed", "step": 1 }));
-    assert!(page.has("not converged") && !page.has("diverged"));
+    assert!((0..3).all(|learner| page.harness.state().verdict(learner) == "not accurate yet"));
 }
 
 #[test]
@@ -174,7 +174,7 @@ fn a_reload_finds_its_session_or_computes_it_again() {
     });
     assert_eq!(
         query.as_deref(),
-        Some("v=1&scenario=head-fov&seed=3&learners=active,random,gradient,naive&step=5&session=head-fov-3")
+        Some("v=1&scenario=head-fov&seed=3&learners=active,random,global&step=5&session=head-fov-3")
     );
 }
 
@@ -196,7 +196,7 @@ fn learners_and_seeds_are_chosen() {
     assert!(matches!(commands.last(), Some(Command::Open { seed, .. }) if *seed != 1), "{commands:?}");
     page.server.open("arm-6dof", 5, None);
     page.follow();
-    page.press(Key::R);
+    page.click("Reset");
     assert!(matches!(page.commands().last(), Some(Command::Open { seed: 5, .. })));
     let compared = |page: &mut Page, toggled: Option<&str>| {
         toggled.into_iter().for_each(|label| page.toggle(label));
@@ -276,7 +276,8 @@ fn a_selection_that_does_not_hold_together_is_not_drawn() {
 #[test]
 fn other_seeds_run_in_the_background_and_can_be_cancelled() {
     let mut page = Page::with_session("");
-    page.click("Is this luck? Run 10 more seeds");
+    page.scroll_to("Luck? Run ten more seeds");
+    page.click("Luck? Run ten more seeds");
     let commands = page.commands();
     assert!(matches!(commands.last(), Some(Command::Seeds { seeds, .. }) if seeds.len() == 10), "{commands:?}");
     assert!(page.has("0 of 10 seeds"));
@@ -289,20 +290,7 @@ fn other_seeds_run_in_the_background_and_can_be_cancelled() {
     assert_eq!(band.steps, (1..=8).map(f64::from).collect::<Vec<_>>());
     page.click("Cancel");
     assert_eq!(page.commands(), [Command::CancelSeeds]);
-    assert!(page.has("bands: the middle 80 % of 4 seeds"));
-}
-
-#[test]
-fn a_newcomer_is_shown_around_once() {
-    let mut page = Page::with_session("");
-    page.click("Tour");
-    for title in ["What is learned", "random is wasteful", "ellipsoids", "DIRECT chooses"] {
-        assert!(page.has(title), "{title}");
-        page.click("Next");
-    }
-    assert!(page.has("What to try next"));
-    page.click("Done");
-    assert!(page.commands().contains(&Command::Known) && page.harness.state().tour.is_none());
+    assert!(page.has("bands in the charts: the middle 80 % of 4 seeds"));
 }
 
 #[test]
@@ -322,4 +310,17 @@ fn everything_can_be_taken_away() {
     let commands = page.commands();
     let Some(Command::Copy { text }) = commands.last() else { panic!("{commands:?}") };
     assert!(text.starts_with("?v=1") && !text.contains("session="), "{text}");
+}
+
+#[test]
+fn without_a_server_recorded_runs_are_offered_and_nothing_that_has_to_be_computed() {
+    let mut page = Page::open("");
+    page.tell(json!({ "is": "begin", "query": "?scenario=arm-6dof&seed=2&learners=active,random", "known": true,
+        "server": false, "seeds": [2, 4] }));
+    page.begin();
+    for absent in ["New seed", "Beat the algorithm", "The HTTP interface"] {
+        assert!(!page.has(absent), "{absent}");
+    }
+    assert_eq!(page.harness.state().recorded_seeds, [2, 4]);
+    assert!(page.has("Seed"));
 }

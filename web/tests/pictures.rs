@@ -5,15 +5,18 @@
 
 mod support;
 
+use body_schema_panel::game::ROUNDS;
 use egui::{Key, Theme, Vec2, vec2};
 use egui_kittest::{Harness, SnapshotOptions, SnapshotResult, SnapshotResults};
 use serde_json::json;
-use support::Page;
+use support::{Page, Server};
 
 /// Beside the scene on a screen of 1280 × 800, above it on a narrow one, and on a large screen.
 const USUAL: Vec2 = vec2(486.0, 800.0);
 const NARROW: Vec2 = vec2(400.0, 700.0);
 const WIDE: Vec2 = vec2(720.0, 1000.0);
+/// Beside the scene on a phone that lies on its side.
+const LOW: Vec2 = vec2(422.0, 390.0);
 
 /// Whether there is anything to draw with.
 fn can_draw() -> bool {
@@ -44,6 +47,29 @@ fn play(mut page: Page, steps: u64) -> Page {
     if steps > 1 {
         page.press(Key::Space);
         page.make_steps(steps - 1);
+    }
+    page
+}
+
+/// A game after so many movements, each from the posture that the sliders happen to be at.
+fn game(size: Vec2, rounds: u64) -> Page {
+    let mut page = Page::of_size("play=human", size);
+    page.tell(Server::scenarios());
+    page.open_session();
+    for round in 0..=rounds.min(ROUNDS - 1) {
+        for tried in [0.9, 0.4] {
+            let limits = page.server.experiment().description().joints.iter().map(|joint| joint.limits);
+            let within = |(joint, [lower, upper]): (usize, [f64; 2])| {
+                0.5 * (lower + upper + (upper - lower) * tried * (joint as f64 + round as f64 - 2.0).sin())
+            };
+            let values = limits.enumerate().map(within).collect();
+            page.harness.state_mut().pose(values);
+            page.answer_posture();
+        }
+        if round < rounds {
+            page.harness.state_mut().make_movement();
+            page.make_steps(1);
+        }
     }
     page
 }
@@ -86,6 +112,42 @@ fn the_panel_looks_as_it_should() {
 
     let mut page = run("speed=100&to=60&stop=never", NARROW, 60);
     held(&mut page, "narrow");
+    page.harness.ctx.set_theme(Theme::Dark);
+    page.press(Key::T);
+    (0..2).for_each(|_| page.click("Next"));
+    page.click("Show the search");
+    page.tell(page.server.selection("active"));
+    held(&mut page, "tour-narrow-dark");
+    let mut page = run("", LOW, 1);
+    page.press(Key::T);
+    page.click("Next");
+    held(&mut page, "tour-low");
+
+    // The end of the first story, and ten more seeds.
+    let mut page = run("speed=50", USUAL, 1000);
+    held(&mut page, "ending");
+    page.harness.state_mut().run_seeds();
+    for seed in 2..8 {
+        page.tell(page.server.other_seed(seed, 250));
+    }
+    held(&mut page, "ending-luck");
+    page.harness.ctx.set_theme(Theme::Dark);
+    page.run();
+    held(&mut page, "ending-luck-dark");
+    let mut page = run("scenario=body-change&learners=active,random&speed=100", WIDE, 1000);
+    held(&mut page, "recovered");
+
+    let mut page = game(USUAL, 0);
+    held(&mut page, "game");
+    page.harness.ctx.set_theme(Theme::Dark);
+    page.run();
+    held(&mut page, "game-dark");
+    held(&mut game(NARROW, 3), "game-narrow");
+    held(&mut game(USUAL, ROUNDS), "game-over");
+
+    for (name, size) in [("embed", vec2(400.0, 300.0)), ("embed-small", vec2(280.0, 200.0))] {
+        held(&mut run("embed=1&speed=100&to=30&stop=never", size, 30), name);
+    }
 
     // A head that does not see every movement, and a gradient whose steps are far too large.
     let mut page = Page::of_size("scenario=head-fov&speed=100&to=60&stop=never", USUAL);

@@ -100,7 +100,8 @@ pub(super) async fn configuration(
     json(Configuration { configuration: app.sessions.get(&id)?.configuration(name).await? }).await
 }
 
-/// Set the next movement of a learner for which a person chooses (policy `human`). It may be set anew until the next step.
+/// Set the next movement of a learner for which a person chooses (policy `human`). It may be set anew until the next step;
+/// the live recording shows the posture beside the learner's arm.
 #[utoipa::path(post, path = "/v1/sessions/{id}/learners/{name}/configuration", tag = "sessions",
     operation_id = "setConfiguration",
     params(
@@ -119,6 +120,7 @@ pub(super) async fn configuration(
         (status = 415, description = "The body is not said to be JSON", body = Problem),
         (status = 422, description = "A value is not valid; `field` names it", body = Problem),
         (status = 500, description = "The session's engine has failed", body = Problem),
+        (status = 503, description = "The server's memory is full", body = Problem),
     )
 )]
 pub(super) async fn set_configuration(

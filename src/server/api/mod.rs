@@ -6,6 +6,7 @@ mod readers;
 mod scenarios;
 mod sessions;
 mod streams;
+mod views;
 
 use std::sync::Arc;
 
@@ -83,6 +84,7 @@ pub(super) fn routes() -> (Router<Arc<App>>, Bytes) {
         .routes(routes!(streams::events))
         .routes(routes!(streams::live))
         .routes(routes!(streams::live_recording))
+        .routes(routes!(views::blueprint))
         .routes(routes!(downloads::recording))
         .routes(routes!(downloads::steps_csv))
         .routes(routes!(downloads::result))

@@ -15,6 +15,7 @@ use utoipa::ToSchema;
 use super::json;
 use crate::{
     experiment::StepReport,
+    recording::MOST_FRAMES,
     server::{
         App, MAX_STEPS_PER_REQUEST,
         extract::JsonBody,
@@ -22,6 +23,9 @@ use crate::{
         session::{NewSession, SessionResource},
     },
 };
+
+/// A request draws at most so many postures on the way: each takes some kilobytes of the session's memory.
+const MAX_FRAMES_PER_REQUEST: u64 = 1000;
 
 /// All sessions.
 #[derive(Clone, Debug, Serialize, ToSchema)]
@@ -41,6 +45,11 @@ pub struct StepRequest {
     /// The step that the session must be at; otherwise nothing is stepped (409). It makes a repeated request safe.
     #[serde(default)]
     pub expected_step: Option<u64>,
+    /// So many postures are drawn on the way to each step in the live recording, on its timeline `motion`; downloads have
+    /// none of them. At most 1000 in one request.
+    #[serde(default)]
+    #[schema(default = 0, maximum = 30)]
+    pub frames: u64,
     /// Whether the answer carries the reports of the steps. Whoever follows the session's events or its WebSocket gets
     /// them there.
     #[serde(default = "yes")]
@@ -154,15 +163,26 @@ pub(super) async fn delete(State(app): State<Arc<App>>, Path(id): Path<String>) 
 pub(super) async fn step(
     State(app): State<Arc<App>>,
     Path(id): Path<String>,
-    JsonBody(StepRequest { count, expected_step, reports }): JsonBody<StepRequest>,
+    JsonBody(StepRequest { count, expected_step, frames, reports }): JsonBody<StepRequest>,
 ) -> Result<Response, Problem> {
     let session = app.sessions.get(&id)?;
     if !(1..=MAX_STEPS_PER_REQUEST).contains(&count) {
         let detail = format!("`count` must be from 1 to {MAX_STEPS_PER_REQUEST}, not {count}");
         return Err(Problem::new(Kind::InvalidValue, detail).field("count"));
     }
+    if frames > MOST_FRAMES {
+        let detail = format!("`frames` must be from 0 to {MOST_FRAMES}, not {frames}");
+        return Err(Problem::new(Kind::InvalidValue, detail).field("frames"));
+    }
+    if count * frames > MAX_FRAMES_PER_REQUEST {
+        let detail = format!(
+            "{count} steps with {frames} postures on the way to each are more than {MAX_FRAMES_PER_REQUEST} postures; ask \
+             for fewer of them, or for fewer steps"
+        );
+        return Err(Problem::new(Kind::InvalidValue, detail).field("frames"));
+    }
     let session = session.watch();
-    let made = session.make_steps(count, expected_step).await?;
+    let made = session.make_steps(count, expected_step, frames).await?;
     let step = made.last().map_or(session.step(), |report| report.step);
     let reports = if reports { made.into_iter().map(|report| report.json).collect() } else { Vec::new() };
     json(MadeSteps { step, remaining: session.resource().remaining, reports }).await

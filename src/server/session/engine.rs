@@ -51,6 +51,8 @@ pub(super) enum Command {
     Step {
         count: u64,
         expected: Option<u64>,
+        /// So many postures are drawn on the way to each.
+        frames: u64,
         reply: Reply<Vec<Kept>>,
     },
     Result {
@@ -153,8 +155,8 @@ impl Engine<'_> {
     fn obey(&mut self, command: Command, recorder: &mut Recorder) {
         // Nobody may wait for an answer any longer; what was done stands all the same.
         match command {
-            Command::Step { count, expected, mut reply } => {
-                let outcome = self.steps(count, expected, recorder, &mut reply);
+            Command::Step { count, expected, frames, mut reply } => {
+                let outcome = self.steps((count, frames), expected, recorder, &mut reply);
                 drop(reply.send(outcome));
             }
             Command::Result { reply } => drop(reply.send(Ok(self.experiment.result()))),
@@ -165,7 +167,7 @@ impl Engine<'_> {
                 drop(reply.send(self.experiment.appraise(&learner, &configuration).map_err(Problem::from)));
             }
             Command::SetConfiguration { learner, configuration, reply } => {
-                drop(reply.send(self.experiment.set_configuration(&learner, &configuration).map_err(Problem::from)));
+                drop(reply.send(self.set_configuration(&learner, &configuration, recorder)));
             }
             Command::Configuration { learner, reply } => {
                 let configuration = self.experiment.configuration(&learner).map_err(Problem::from);
@@ -178,6 +180,25 @@ impl Engine<'_> {
         }
     }
 
+    /// Sets a person's next movement, and shows the posture.
+    fn set_configuration(
+        &mut self,
+        learner: &str,
+        configuration: &[f64],
+        recorder: &mut Recorder,
+    ) -> Result<AppraisalReport, Problem> {
+        // Every posture that is tried out takes memory.
+        self.has_no_room().map_or(Ok(()), Err)?;
+        let appraisal = self.experiment.set_configuration(learner, configuration)?;
+        let learners = &self.experiment.description().learners;
+        if let Some(index) = learners.iter().position(|described| described.name == learner) {
+            let (step, skeleton_m) = (self.experiment.latest().step, &appraisal.estimated_skeleton_m);
+            recorder.log_ghost(step, index, Some(skeleton_m)).map_err(recording_failed)?;
+            self.shared.publish(Vec::new(), self.experiment.remaining());
+        }
+        Ok(appraisal)
+    }
+
     fn flush(&self, recorder: &mut Recorder) -> Result<(), Problem> {
         let flushed = recorder.flush().map_err(recording_failed);
         self.shared.publish(Vec::new(), self.experiment.remaining());
@@ -186,7 +207,7 @@ impl Engine<'_> {
 
     fn steps(
         &mut self,
-        count: u64,
+        (count, frames): (u64, u64),
         expected: Option<u64>,
         recorder: &mut Recorder,
         reply: &mut Reply<Vec<Kept>>,
@@ -208,7 +229,7 @@ impl Engine<'_> {
                 outcome = Err(Problem::new(Kind::ShuttingDown, detail));
                 break;
             }
-            outcome = self.step(&mut batch, recorder);
+            outcome = self.step(frames, &mut batch, recorder);
             if outcome.is_ok() && batch.last.elapsed() >= PUBLISH_EVERY {
                 outcome = self.publish(&mut batch, recorder);
             }
@@ -217,12 +238,12 @@ impl Engine<'_> {
         outcome.and(published).map(|()| batch.made).map_err(|problem| problem.step(self.experiment.latest().step))
     }
 
-    fn step(&mut self, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
+    fn step(&mut self, frames: u64, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
         self.experiment.step().map_err(|error| Problem::new(Kind::EngineFailed, error.to_string()))?;
         let report = self.experiment.latest();
         // The step stands even if it cannot be recorded.
         batch.made.push(Kept::of(report, self.experiment.description())?);
-        recorder.log(report).map_err(recording_failed)
+        recorder.log_moving(report, frames).map_err(recording_failed)
     }
 
     fn publish(&self, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
@@ -260,6 +281,10 @@ impl Engine<'_> {
             let detail = format!("a session makes at most {MAX_STEPS_PER_SESSION} steps: {left} are left, not {count}");
             return Some(few(left, detail));
         }
+        self.has_no_room()
+    }
+
+    fn has_no_room(&self) -> Option<Problem> {
         (!self.shared.budget.has_room()).then(|| {
             Problem::new(Kind::ServerFull, "the sessions together fill the server's memory; delete some and go on")
         })

@@ -181,9 +181,14 @@ impl Session {
         &self.shared.ended
     }
 
-    /// Makes `count` steps, after whatever the session is busy with.
-    pub(super) async fn make_steps(&self, count: u64, expected: Option<u64>) -> Result<Vec<Kept>, Problem> {
-        self.ask(|reply| Command::Step { count, expected, reply }).await
+    /// Makes `count` steps, after whatever the session is busy with, and draws so many postures on the way to each.
+    pub(super) async fn make_steps(
+        &self,
+        count: u64,
+        expected: Option<u64>,
+        frames: u64,
+    ) -> Result<Vec<Kept>, Problem> {
+        self.ask(|reply| Command::Step { count, expected, frames, reply }).await
     }
 
     /// The outcome so far, after whatever the session is busy with.

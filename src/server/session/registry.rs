@@ -200,10 +200,10 @@ mod tests {
             ellipsoids: EllipsoidSize::default(),
         };
         let session = sessions.open(new("arm-6dof")).await.expect("a session");
-        session.make_steps(2, None).await.expect("steps");
+        session.make_steps(2, None, 0).await.expect("steps");
         session.panic();
         for _ in 0..2 {
-            let problem = session.make_steps(1, None).await.expect_err("a failed engine");
+            let problem = session.make_steps(1, None, 0).await.expect_err("a failed engine");
             assert_eq!((problem.status, problem.step), (500, Some(2)));
             assert!(problem.detail.contains("as the test asked"), "{}", problem.detail);
         }
@@ -224,7 +224,7 @@ mod tests {
             ellipsoids: EllipsoidSize::default(),
         };
         let session = sessions.open(new).await.expect("a session");
-        let made = session.make_steps(2, None).await.expect("steps");
+        let made = session.make_steps(2, None, 0).await.expect("steps");
         for _ in 0..2 {
             for (made, read) in made.iter().zip(session.reports(1, 2)) {
                 assert!(Arc::ptr_eq(&made.json, &read.json) && Arc::ptr_eq(&made.rows, &read.rows));
@@ -242,13 +242,13 @@ mod tests {
             ellipsoids: EllipsoidSize::default(),
         };
         let (first, second) = (sessions.open(new.clone()).await.expect("one"), sessions.open(new).await.expect("two"));
-        first.make_steps(300, None).await.expect("the last command may overshoot");
-        assert_eq!(second.make_steps(1, None).await.expect_err("full").status, 503);
+        first.make_steps(300, None, 0).await.expect("the last command may overshoot");
+        assert_eq!(second.make_steps(1, None, 0).await.expect_err("full").status, 503);
         sessions.close(first.id).await.expect("deleted");
         drop(first);
         // The engine's thread lets go of the session a moment after its end.
         let room = async {
-            while second.make_steps(1, None).await.is_err() {
+            while second.make_steps(1, None, 0).await.is_err() {
                 tokio::time::sleep(Duration::from_millis(10)).await;
             }
         };

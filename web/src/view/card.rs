@@ -2,12 +2,13 @@
 //! frame around what it speaks of.
 
 use egui::{
-    Align, Align2, Button, Color32, Context, FontId, Frame, LayerId, Layout, Order, RichText, ScrollArea, Shape,
-    Stroke, StrokeKind, TextStyle, Ui, pos2, vec2,
+    Align, Button, Color32, Context, Frame, LayerId, Layout, Order, Rect, RichText, ScrollArea, Shape, Stroke,
+    StrokeKind, TextStyle, Ui, vec2,
 };
 
 use super::style::accent;
 use crate::{
+    host::Side,
     panel::Panel,
     stories::{Act, Spot, Story},
 };
@@ -15,11 +16,23 @@ use crate::{
 const MARGIN: f32 = 10.0;
 const BUTTONS: f32 = 28.0;
 const TITLE: f32 = 24.0;
+const NOT_YET: &str = "The run has not come to its end yet. Play it to the end: how it ended is told under the chart.";
 
 impl Panel {
     pub(super) fn card_panel(&mut self, ui: &mut Ui) {
         self.card_height = 0.0;
-        let Some((story, place, card)) = self.card() else { return };
+        let Some((story, place, card)) = self.card() else {
+            self.card_shown = None;
+            return;
+        };
+        if self.card_shown != Some((self.story, place)) {
+            (self.card_shown, self.reveal) = (Some((self.story, place)), Some(card.spot));
+        }
+        // What has not come yet cannot be spoken of.
+        let (text, acts) = match card.spot {
+            Spot::Ending if self.ending().is_none() => (NOT_YET, &[Act::PlayOn(10.0)][..]),
+            _ => (card.text, card.acts),
+        };
         let height = height(ui, story);
         self.card_height = height;
         let frame = Frame::new()
@@ -38,14 +51,13 @@ impl Panel {
                 });
             });
             let room = (ui.available_height() - BUTTONS).max(20.0);
-            ScrollArea::vertical().id_salt(place).max_height(room).min_scrolled_height(room).show(ui, |ui| {
-                ui.set_min_height(room - 4.0);
-                let text = match card.spot {
-                    Spot::Scene => format!("{} {}", if self.scene_below { "▼" } else { "▶" }, card.text),
-                    _ => card.text.to_owned(),
-                };
-                ui.add(egui::Label::new(text).wrap());
-            });
+            ScrollArea::vertical().id_salt(place).auto_shrink(false).max_height(room).min_scrolled_height(room).show(
+                ui,
+                |ui| {
+                    ui.set_min_height(room - 4.0);
+                    ui.add(egui::Label::new(text).wrap());
+                },
+            );
             ui.horizontal(|ui| {
                 // From the right, so that they stand in the same place on every card.
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -56,7 +68,7 @@ impl Panel {
                     if ui.add_enabled(place > 0, Button::new("Previous")).clicked() {
                         self.tour = Some(place - 1);
                     }
-                    ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.acts(ui, card.acts));
+                    ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.acts(ui, acts));
                 });
             });
         });
@@ -97,37 +109,24 @@ impl Panel {
         let colour = accent(ctx.global_style().visuals.dark_mode);
         let painter = ctx.layer_painter(LayerId::new(Order::Middle, egui::Id::unique("pointer")));
         let screen = ctx.content_rect();
-        if card.spot == Spot::Scene {
-            let below = self.scene_below;
-            let (line, tip, text) = if below {
-                let y = screen.bottom() - 2.0;
-                let tip = pos2(screen.center().x, y);
-                ([pos2(screen.left(), y), pos2(screen.right(), y)], tip, "scene")
-            } else {
-                let x = screen.right() - 2.0;
-                ([pos2(x, screen.top()), pos2(x, screen.bottom())], pos2(x, screen.center().y), "scene")
-            };
-            painter.line_segment(line, Stroke::new(4.0, colour));
-            let (back, side) =
-                if below { (vec2(0.0, -14.0), vec2(9.0, 0.0)) } else { (vec2(-14.0, 0.0), vec2(0.0, 9.0)) };
-            painter.add(Shape::convex_polygon(vec![tip, tip + back + side, tip + back - side], colour, Stroke::NONE));
-            let (at, align) = if below {
-                (tip + vec2(16.0, -3.0), Align2::LEFT_BOTTOM)
-            } else {
-                (tip + vec2(-16.0, 0.0), Align2::RIGHT_CENTER)
-            };
-            let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), Color32::WHITE);
-            let rect = align.anchor_size(at, galley.size()).expand(3.0);
-            painter.rect_filled(
-                rect,
-                3.0,
-                if ctx.global_style().visuals.dark_mode { Color32::from_rgb(0x8A, 0x3D, 0) } else { colour },
-            );
-            painter.galley(rect.min + vec2(3.0, 3.0), galley, Color32::WHITE);
+        if card.spot == Spot::Ellipsoids {
+            self.arrow(&painter, screen, colour);
         } else if let Some(rect) = self.spots.get(card.spot) {
             let rect = rect.expand(3.0).intersect(screen.shrink(2.0));
             painter.rect_stroke(rect, 5.0, Stroke::new(2.0, colour), StrokeKind::Inside);
         }
+    }
+
+    /// Towards the scene, from the edge that it lies at.
+    fn arrow(&self, painter: &egui::Painter, screen: Rect, colour: Color32) {
+        let (edge, tip, ahead) = match self.scene {
+            Side::Right => ([screen.right_top(), screen.right_bottom()], screen.right_center(), vec2(1.0, 0.0)),
+            Side::Left => ([screen.left_top(), screen.left_bottom()], screen.left_center(), vec2(-1.0, 0.0)),
+            Side::Above => ([screen.left_top(), screen.right_top()], screen.center_top(), vec2(0.0, -1.0)),
+        };
+        painter.line_segment(edge, Stroke::new(6.0, colour));
+        let (back, side) = (tip - 22.0 * ahead, 12.0 * ahead.rot90());
+        painter.add(Shape::convex_polygon(vec![tip, back + side, back - side], colour, Stroke::NONE));
     }
 }
 
@@ -142,8 +141,7 @@ fn height(ui: &Ui, story: &Story) -> f32 {
     let width = ui.available_width() - 2.0 * MARGIN - 16.0;
     let font = TextStyle::Body.resolve(ui.style());
     let longest = story.cards.iter().map(|card| {
-        let text = format!("▶ {}", card.text);
-        ui.ctx().fonts_mut(|fonts| fonts.layout(text, font.clone(), Color32::WHITE, width).size().y)
+        ui.ctx().fonts_mut(|fonts| fonts.layout(card.text.to_owned(), font.clone(), Color32::WHITE, width).size().y)
     });
     let text = longest.fold(0.0, f32::max) + 8.0;
     (text + TITLE + BUTTONS + 2.0 * MARGIN + 8.0).min(ui.ctx().content_rect().height() * 0.34)

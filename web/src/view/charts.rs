@@ -3,9 +3,9 @@
 use egui::{ComboBox, RichText, Ui};
 
 use super::{
-    LOW,
+    LOW, TALL,
     chart::{CHARTS, Chart},
-    learners::swatch,
+    learners::entry,
 };
 use crate::{colours, panel::Panel, seeds::SeedRuns, stories::Spot, words};
 
@@ -46,7 +46,8 @@ impl Panel {
                 let combo = response.response;
                 combo.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::ComboBox, true, &name));
                 combo.on_hover_text(chart.tip);
-                self.legend(ui, !low);
+                let wordy = ui.ctx().content_rect().height() >= TALL;
+                self.legend(ui, wordy);
             });
             self.curves(ui, chart, height)
         });
@@ -95,14 +96,11 @@ impl Panel {
     fn legend(&self, ui: &mut Ui, wordy: bool) {
         let Some(description) = self.description() else { return };
         for (learner, slot) in description.learners.iter().zip(colours::slots(description)) {
-            ui.horizontal(|ui| {
-                ui.spacing_mut().item_spacing.x = 4.0;
-                swatch(ui, slot);
-                ui.label(RichText::new(&learner.name).strong()).on_hover_text(words::terms(learner));
-                if wordy {
-                    ui.label(RichText::new(words::about(learner)).weak().small());
-                }
-            });
+            let mut texts = vec![RichText::new(&learner.name).strong()];
+            if wordy {
+                texts.push(RichText::new(words::about(learner)).weak().small());
+            }
+            entry(ui, slot, texts, &words::terms(learner));
         }
     }
 

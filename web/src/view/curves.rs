@@ -27,6 +27,7 @@ impl Panel {
             .set_margin_fraction(vec2(0.02, 0.08))
             .y_axis_min_width(34.0)
             .show_crosshair(false)
+            .grid_color(ui.visuals().text_color().gamma_multiply(0.4))
             .x_grid_spacer(steps)
             .x_axis_formatter(|mark, _| if mark.value < 0.0 { String::new() } else { mark.value.to_string() })
             .y_axis_formatter(|mark, _| chart.number(mark.value))

@@ -36,6 +36,7 @@ impl Panel {
             .auto_bounds(Vec2b::TRUE)
             .set_margin_fraction(vec2(0.06, 0.08))
             .show_crosshair(false)
+            .grid_color(ui.visuals().text_color().gamma_multiply(0.4))
             .x_axis_label(format!("size of the box: {name}"))
             .y_axis_label("criterion")
             .y_axis_min_width(40.0)

@@ -2,7 +2,11 @@
 
 use egui::{Align2, FontId, Sense, Stroke, Ui, WidgetInfo, accesskit::Role, pos2, vec2};
 
-use crate::{colours, panel::Panel, seeds::median};
+use crate::{
+    colours,
+    panel::Panel,
+    seeds::{SeedRuns, median},
+};
 
 const ROW: f32 = 26.0;
 const AXIS: f32 = 18.0;
@@ -11,9 +15,17 @@ const NAMES: f32 = 76.0;
 const MEDIANS: f32 = 96.0;
 
 impl Panel {
-    pub(super) fn distribution(&self, ui: &mut Ui) {
-        let Some(description) = self.description().filter(|description| description.truth.is_some()) else { return };
+    /// How the other seeds ended, once some have.
+    pub(super) fn other_endings(&self, ui: &mut Ui) {
         let Some(seeds) = self.other_seeds().filter(|seeds| seeds.done() > 0) else { return };
+        self.distribution(ui, seeds);
+        if let Some(sentence) = self.wins(seeds) {
+            ui.label(sentence);
+        }
+    }
+
+    fn distribution(&self, ui: &mut Ui, seeds: &SeedRuns) {
+        let Some(description) = self.description().filter(|description| description.truth.is_some()) else { return };
         let all: Vec<Vec<Option<u64>>> = (0..description.learners.len()).map(|one| seeds.finishes(one)).collect();
         let most = seeds.steps() as f64;
         let least = all.iter().flatten().flatten().min().map_or(1.0, |least| (*least as f64 * 0.7).max(1.0));
@@ -66,18 +78,26 @@ impl Panel {
             note += &format!("; hollow: not within {most:.0}");
         }
         ui.label(egui::RichText::new(note).weak().small());
-        if let Some(sentence) = self.wins(&all) {
-            ui.label(sentence);
-        }
     }
 
-    /// On how many seeds who asks was quicker than who does not.
-    fn wins(&self, all: &[Vec<Option<u64>>]) -> Option<String> {
-        let learners = &self.description()?.learners;
-        let named = |name: &str| learners.iter().position(|learner| learner.name == name);
-        let (active, random) = (all.get(named("active")?)?, all.get(named("random")?)?);
-        let movements = |finish: &Option<u64>| finish.unwrap_or(u64::MAX);
-        let won = active.iter().zip(random).filter(|(a, b)| movements(a) < movements(b)).count();
-        Some(format!("active needed fewer movements than random on {won} of {} other seeds.", active.len()))
+    /// On how many seeds who asks was quicker than who does not, or predicted better where no truth is known.
+    fn wins(&self, seeds: &SeedRuns) -> Option<String> {
+        let description = self.description()?;
+        let named = |name: &str| description.learners.iter().position(|learner| learner.name == name);
+        let (active, random) = (named("active")?, named("random")?);
+        if description.truth.is_none() {
+            let pairs: Vec<(f64, f64)> = seeds.mean_errors(active).into_iter().zip(seeds.mean_errors(random)).collect();
+            let won = pairs.iter().filter(|(a, b)| a < b).count();
+            let all = pairs.len();
+            return Some(format!("The mean error of active was below that of random on {won} of {all} other seeds."));
+        }
+        let movements = |finish: Option<u64>| finish.unwrap_or(u64::MAX);
+        let pairs: Vec<(u64, u64)> = (seeds.finishes(active).into_iter().map(movements))
+            .zip(seeds.finishes(random).into_iter().map(movements))
+            .filter(|(a, b)| (*a).min(*b) < u64::MAX)
+            .collect();
+        let won = pairs.iter().filter(|(a, b)| a < b).count();
+        (!pairs.is_empty())
+            .then(|| format!("active needed fewer movements than random on {won} of {} other seeds.", pairs.len()))
     }
 }

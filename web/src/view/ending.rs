@@ -2,7 +2,7 @@
 
 use egui::{Button, Frame, RichText, Stroke, Ui};
 
-use super::{card::filled, good, learners::swatch};
+use super::{card::filled, good, learners::entry};
 use crate::{
     colours,
     panel::Panel,
@@ -27,9 +27,8 @@ impl Panel {
             ui.add_space(2.0);
             ui.horizontal_wrapped(|ui| {
                 for (learner, outcome) in &ending.outcomes {
-                    swatch(ui, slots[*learner]);
-                    ui.label(RichText::new(format!("{} {}", names[*learner], outcome.words())).size(15.0));
-                    ui.add_space(8.0);
+                    let text = RichText::new(format!("{} {}", names[*learner], outcome.words())).size(15.0);
+                    entry(ui, slots[*learner], vec![text], &ending.counted);
                 }
             });
             let thresholds = self.description().filter(|one| one.truth.is_some()).map(|one| one.thresholds);
@@ -41,12 +40,12 @@ impl Panel {
                     limits.location_m * 1e3
                 ));
             }
-            self.distribution(ui);
+            self.other_endings(ui);
             ui.add_space(4.0);
             self.seeds_row(ui);
         });
         ui.add_space(8.0);
-        self.spots.set(Spot::Ending, card.response.rect);
+        self.show_spot(ui, Spot::Ending, &card.response);
         if !self.ending_seen {
             self.ending_seen = true;
             card.response.scroll_to_me(Some(egui::Align::TOP));

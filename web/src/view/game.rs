@@ -3,8 +3,8 @@
 use body_schema::kinematics::JointKind;
 use egui::{Button, ComboBox, Frame, ProgressBar, RichText, Sense, Slider, Stroke, StrokeKind, Ui, pos2, vec2};
 
-use super::{card::filled, learners::swatch, style::accent, why::joint_value};
-use crate::{colours, game::ROUNDS, host::Command, panel::Panel};
+use super::{card::filled, learners::entry, style::accent, why::joint_value};
+use crate::{colours, game::ROUNDS, host::Command, panel::Panel, words::terms};
 
 const SLICE: f32 = 150.0;
 
@@ -67,7 +67,7 @@ impl Panel {
     }
 
     fn teaches(&self, ui: &mut Ui) {
-        let share = self.game.evaluation.as_ref().and_then(|evaluation| evaluation.share_of_best);
+        let share = self.game.evaluation.as_ref().and_then(|evaluation| evaluation.share);
         let text = match (share, &self.game.evaluation) {
             (Some(share), _) => format!("Your posture teaches {:.0} % of the best.", share * 100.0),
             (None, Some(_)) => "Nothing is to be gained here.".to_owned(),
@@ -172,11 +172,10 @@ impl Panel {
         ui.label(format!("Prediction error after {ROUNDS} movements, seed {}:", description.seed));
         ui.horizontal_wrapped(|ui| {
             for (learner, error) in &score.errors {
-                swatch(ui, slots[*learner]);
                 let is_you = Some(*learner) == self.human();
                 let name = if is_you { "you" } else { &description.learners[*learner].name };
-                ui.label(RichText::new(format!("{name} {:.0} mm", error * 1e3)).size(15.0));
-                ui.add_space(8.0);
+                let text = RichText::new(format!("{name} {:.0} mm", error * 1e3)).size(15.0);
+                entry(ui, slots[*learner], vec![text], &terms(&description.learners[*learner]));
             }
         });
         if let Some(share) = self.game.mean_share() {

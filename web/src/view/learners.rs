@@ -1,6 +1,11 @@
 //! The learners: their errors at the step that is shown, and what has become of each.
 
-use egui::{Align, Layout, Rect, RichText, Shape, Ui, UiBuilder, accesskit::Role, pos2, vec2};
+use std::sync::Arc;
+
+use egui::{
+    Align, Galley, Layout, Rect, RichText, Shape, TextStyle, TextWrapMode, Ui, UiBuilder, Vec2, WidgetText,
+    accesskit::Role, pos2, vec2,
+};
 use egui_plot::LineStyle;
 
 use super::{NARROW, alarm, good};
@@ -8,6 +13,7 @@ use crate::{colours, history::Verdict, panel::Panel, words};
 
 const DASH: &str = "–";
 const ROW: f32 = 20.0;
+const SWATCH: Vec2 = vec2(22.0, 12.0);
 
 fn fixed(value: Option<f64>, scale: f64, digits: usize) -> String {
     value.map_or(DASH.to_owned(), |value| format!("{:.digits$}", value * scale))
@@ -15,7 +21,7 @@ fn fixed(value: Option<f64>, scale: f64, digits: usize) -> String {
 
 /// A learner's colour and line, as the charts draw it.
 pub(super) fn swatch(ui: &mut Ui, slot: usize) {
-    let (rect, _) = ui.allocate_exact_size(vec2(22.0, 12.0), egui::Sense::hover());
+    let (rect, _) = ui.allocate_exact_size(SWATCH, egui::Sense::hover());
     let stroke = egui::Stroke::new(2.5, colours::learner(slot));
     // Round dots and thick ends stay within.
     let rect = rect.shrink2(vec2(1.5, 0.0));
@@ -29,6 +35,25 @@ pub(super) fn swatch(ui: &mut Ui, slot: usize) {
             ui.painter().add(Shape::Vec(Shape::dotted_line(&line, stroke.color, spacing, 1.5)))
         }
     };
+}
+
+/// A learner's swatch and words beside it, on one line: the next where this one has no room for them.
+pub(super) fn entry(ui: &mut Ui, slot: usize, texts: Vec<RichText>, tip: &str) {
+    const GAP: f32 = 4.0;
+    let galleys: Vec<Arc<Galley>> = (texts.into_iter())
+        .map(|text| WidgetText::from(text).into_galley(ui, Some(TextWrapMode::Extend), f32::INFINITY, TextStyle::Body))
+        .collect();
+    let width = SWATCH.x + galleys.iter().map(|galley| GAP + galley.size().x).sum::<f32>();
+    if ui.available_size_before_wrap().x < width {
+        ui.end_row();
+    }
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = GAP;
+        swatch(ui, slot);
+        for galley in galleys {
+            ui.label(galley).on_hover_text(tip);
+        }
+    });
 }
 
 /// A row of a table, for the eye and for assistive technology: each cell is drawn in its column.
@@ -59,12 +84,12 @@ impl Panel {
         let short = |long: &'static str, short: &'static str| if narrow { short } else { long };
         let mut heads = vec![
             ("Learner", "How each goes about it stands beside the chart; the terms stand in the tooltip of its name"),
-            (short("Orientation, °", "Orient., °"), "Mean error of the angles between the joints' axes"),
-            (short("Location, mm", "Loc., mm"), "Mean distance of the true axis points from the estimated axes"),
-            (short("Prediction, mm", "Pred., mm"), "Mean distance between the predicted and the true marker"),
+            (short("Orientation, °", "Orient. °"), "Mean error of the angles between the joints' axes"),
+            (short("Location, mm", "Loc. mm"), "Mean distance of the true axis points from the estimated axes"),
+            (short("Prediction, mm", "Pred. mm"), "Mean distance between the predicted and the true marker"),
             ("State", "What has become of it, judged with the truth; the terms stand in the tooltip of each"),
         ];
-        let mut shares = if narrow { vec![0.26, 0.15, 0.15, 0.15, 0.29] } else { vec![0.24, 0.17, 0.16, 0.18, 0.25] };
+        let mut shares = if narrow { vec![0.24, 0.15, 0.14, 0.15, 0.32] } else { vec![0.24, 0.17, 0.16, 0.18, 0.25] };
         if misses {
             heads.push(("Misses", "Movements after which the marker was not seen; they count as movements"));
             shares.iter_mut().for_each(|share| *share *= 0.88);

@@ -32,9 +32,11 @@ use crate::{
 pub(crate) use style::{alarm, good};
 
 /// Below this width words are shortened.
-pub(crate) const NARROW: f32 = 440.0;
+pub(crate) const NARROW: f32 = 560.0;
 /// Below this height, room is kept for what matters most.
 pub(crate) const LOW: f32 = 600.0;
+/// From this height on there is room to say what each learner does.
+pub(crate) const TALL: f32 = 720.0;
 
 impl Panel {
     /// Draws the panel and takes in what the visitor does.
@@ -87,20 +89,35 @@ impl Panel {
             }
             self.game(ui);
             self.ending_card(ui);
-            let learners = ui.scope(|ui| self.learners(ui)).response.rect;
-            self.spots.set(Spot::Learners, learners);
+            let learners = ui.scope(|ui| self.learners(ui)).response;
+            self.show_spot(ui, Spot::Learners, &learners);
             ui.add_space(6.0);
             self.stories_row(ui);
             self.setup(ui);
             ui.add_space(6.0);
-            let tabs = ui.scope(|ui| self.tabs(ui)).response.rect;
-            self.spots.set(Spot::Tabs, tabs);
-            match self.settings.tab {
-                Tab::Charts => self.charts(ui),
-                Tab::Why => self.why(ui),
-                Tab::Share => self.share(ui),
-            }
+            let tabs = ui.scope(|ui| self.tabs(ui)).response;
+            self.show_spot(ui, Spot::Tabs, &tabs);
+            ui.scope(|ui| {
+                // Room to bring the tabs to the top, whatever they show or still wait for.
+                ui.set_min_height((ui.clip_rect().height() - tabs.rect.height()).max(0.0));
+                match self.settings.tab {
+                    Tab::Charts => self.charts(ui),
+                    Tab::Why => self.why(ui),
+                    Tab::Share => self.share(ui),
+                }
+            });
         });
+    }
+
+    /// Notes where something is, as far as it is in sight, and brings it there if a card has just begun to speak of it.
+    fn show_spot(&mut self, ui: &Ui, spot: Spot, response: &egui::Response) {
+        if self.reveal.take_if(|wanted| *wanted == spot).is_some() {
+            response.scroll_to_me(Some(egui::Align::TOP));
+        }
+        let seen = response.rect.intersect(ui.clip_rect());
+        if seen.is_positive() {
+            self.spots.set(spot, seen);
+        }
     }
 
     fn tabs(&mut self, ui: &mut Ui) {

@@ -43,13 +43,14 @@ impl Panel {
                 self.choose_scenario(&chosen);
             }
             if !self.server {
-                ui.label(format!("Seed {}", self.settings.seed));
+                self.choose_recorded_seed(ui);
                 return;
             }
             let label = ui.label("Seed");
             let field = TextEdit::singleline(&mut self.seed_text).desired_width(70.0).char_limit(16);
             let field = ui.add(field).labelled_by(label.id);
-            if field.lost_focus() {
+            // Assistive technology sets the whole text at once, without the focus.
+            if field.lost_focus() || field.changed() && !field.has_focus() {
                 self.choose_seed();
             }
             field.on_hover_text("Initial error, noise and random movements all come from it");
@@ -149,6 +150,30 @@ impl Panel {
             _ => self.notice(format!("A seed is a whole number from 0 to {MAX_SEED}.")),
         }
         self.seed_text = self.settings.seed.to_string();
+    }
+
+    /// One of the runs that there are.
+    fn choose_recorded_seed(&mut self, ui: &mut Ui) {
+        if self.recorded_seeds.len() < 2 {
+            ui.label(format!("Seed {}", self.settings.seed));
+            return;
+        }
+        let label = ui.label("Seed");
+        let mut chosen = self.settings.seed;
+        ComboBox::from_id_salt("recorded seed")
+            .selected_text(chosen.to_string())
+            .width(70.0)
+            .show_ui(ui, |ui| {
+                for seed in &self.recorded_seeds {
+                    ui.selectable_value(&mut chosen, *seed, seed.to_string());
+                }
+            })
+            .response
+            .labelled_by(label.id);
+        if chosen != self.settings.seed {
+            self.settings.seed = chosen;
+            self.open(1);
+        }
     }
 
     /// Another seed, and its run.

@@ -50,7 +50,7 @@ impl Panel {
         let joints = search.choice().joints.len();
         if let Some(proposed) = self.why.proposed.as_ref().filter(|proposed| proposed.len() == joints) {
             let centre = at(search.place(plane, proposed));
-            painter.circle(centre, 6.0, Color32::WHITE, Stroke::new(2.5, Color32::BLACK));
+            yours(&painter, centre);
             self.answer_at(&painter, centre, square, search.choice());
         }
         self.slice_axes(ui, &painter, square, search, plane);
@@ -161,10 +161,27 @@ fn legend(ui: &mut Ui) {
             ui.painter().rect_filled(strip, 0.0, viridis(f64::from(step) / f64::from(steps - 1)));
         }
         ui.label(quiet("much"));
-        ui.label(quiet("× chosen"));
-        ui.label(quiet("□ divided next"));
-        ui.label(quiet("○ yours"));
+        let bold = accent(ui.visuals().dark_mode);
+        let mut mark = |text: &str, draw: &dyn Fn(&egui::Painter, Pos2)| {
+            ui.horizontal(|ui| {
+                ui.spacing_mut().item_spacing.x = 3.0;
+                let (place, _) = ui.allocate_exact_size(vec2(16.0, 16.0), Sense::hover());
+                draw(ui.painter(), place.center());
+                ui.label(quiet(text));
+            });
+        };
+        mark("chosen", &cross);
+        mark("divided next", &|painter, centre| {
+            let square = Rect::from_center_size(centre, vec2(11.0, 11.0));
+            painter.rect_stroke(square, 0.0, Stroke::new(2.0, bold), StrokeKind::Inside);
+        });
+        mark("yours", &yours);
     });
+}
+
+/// The point that the visitor asks about.
+fn yours(painter: &egui::Painter, centre: Pos2) {
+    painter.circle(centre, 6.0, Color32::WHITE, Stroke::new(2.5, Color32::BLACK));
 }
 
 /// The chosen point: black on white, to be seen on every colour.

@@ -78,7 +78,8 @@ mod tests {
             let ctx = egui::Context::default();
             ctx.set_theme(theme);
             let mut named = Vec::new();
-            drop(ctx.run_ui(egui::RawInput::default(), |ui| named = vec![alarm(ui), good(ui)]));
+            let mut drawn = ctx.run_ui(egui::RawInput::default(), |ui| named = vec![alarm(ui), good(ui)]);
+            drawn.textures_delta.clear();
             for ground in [visuals.panel_fill, visuals.window_fill, visuals.faint_bg_color] {
                 // The faint ground is a tint upon the panel's.
                 let ground = if ground.a() < 255 { visuals.panel_fill.blend(ground) } else { ground };

@@ -7,7 +7,7 @@ use body_schema_panel::{
     Panel,
     host::{Command, Event},
 };
-use egui::{Vec2, vec2};
+use egui::{Modifiers, PointerButton, Pos2, Rect, TouchDeviceId, TouchId, TouchPhase, Vec2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 use serde_json::{Value, json};
 
@@ -71,7 +71,7 @@ impl Page {
     }
 
     /// Tells the reports that are new.
-    fn catch_up(&mut self) {
+    pub fn catch_up(&mut self) {
         for report in self.server.news() {
             self.tell(json!({ "is": "live", "message": { "type": "step", "data": report } }));
         }
@@ -128,6 +128,60 @@ impl Page {
     pub fn click(&mut self, label: &str) {
         self.harness.get_by_label(label).click();
         self.run();
+    }
+
+    /// Answers what the panel asks about a posture of the visitor's; whether it asked.
+    pub fn answer_posture(&mut self) -> bool {
+        self.harness.run_steps(20);
+        let commands = self.commands();
+        let asked = commands.iter().find_map(|command| match command {
+            Command::Configure { learner, configuration, .. } => Some((learner.clone(), configuration.clone())),
+            _ => None,
+        });
+        let Some((learner, configuration)) = asked else { return false };
+        let answer = self.server.configure(&learner, &configuration);
+        self.tell(answer);
+        true
+    }
+
+    /// Clicks on a point of the panel, whatever is there.
+    pub fn click_at(&mut self, pos: Pos2) {
+        self.harness.event(egui::Event::PointerMoved(pos));
+        for pressed in [true, false] {
+            let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+            self.harness.event(egui::Event::PointerButton { pos, button, pressed, modifiers });
+            self.harness.run_steps(1);
+        }
+        self.run();
+    }
+
+    /// Swipes with a finger from a point upwards.
+    pub fn swipe_up(&mut self, from: Pos2, by: f32) {
+        let steps = 8;
+        let mut touch = |phase, moved: f32| {
+            let pos = from - vec2(0.0, moved);
+            let (device_id, id) = (TouchDeviceId(0), TouchId(1));
+            self.harness.event(egui::Event::Touch { device_id, id, phase, pos, force: None });
+            match phase {
+                TouchPhase::Move => self.harness.event(egui::Event::PointerMoved(pos)),
+                TouchPhase::Start | TouchPhase::End | TouchPhase::Cancel => {
+                    let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+                    self.harness.event(egui::Event::PointerMoved(pos));
+                    let pressed = phase == TouchPhase::Start;
+                    self.harness.event(egui::Event::PointerButton { pos, button, pressed, modifiers });
+                }
+            }
+            self.harness.run_steps(1);
+        };
+        touch(TouchPhase::Start, 0.0);
+        (1..=steps).for_each(|step| touch(TouchPhase::Move, by * step as f32 / steps as f32));
+        touch(TouchPhase::End, by);
+        self.harness.run_steps(40);
+    }
+
+    /// Where something is.
+    pub fn place(&self, label: &str) -> Rect {
+        self.harness.get_by_label(label).rect()
     }
 
     /// Brings what stands further down in a list into view.

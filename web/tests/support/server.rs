@@ -28,7 +28,8 @@ impl Server {
 
     /// What there is to choose from: as many scenarios as a test needs.
     pub fn scenarios() -> Value {
-        let summaries = ["arm-6dof", "head-fov"].map(|name| builtin(name).expect("a built-in scenario").summary());
+        let summaries = ["arm-6dof", "head-fov", "body-change", "tiago-mocap"]
+            .map(|name| builtin(name).expect("a built-in scenario").summary());
         json!({ "is": "scenarios", "scenarios": summaries })
     }
 
@@ -40,6 +41,10 @@ impl Server {
     }
 
     fn begin(&self, name: &str, seed: u64, learners: Option<&[String]>) -> Experiment {
+        if self.edits.is_empty() {
+            let scenario = builtin(name).expect("a built-in scenario");
+            return scenario.experiment(seed, learners).expect("an experiment");
+        }
         let text = edited(&builtin(name).expect("a built-in scenario").source, &self.edits).expect("paths that exist");
         let scenario = Scenario::parse(name, &text, &|file| Err(format!("{file} is not needed here")));
         scenario.and_then(|scenario| scenario.experiment(seed, learners)).expect("an experiment")
@@ -98,6 +103,13 @@ impl Server {
     pub fn evaluation(&self, learner: &str, configuration: &[f64]) -> Value {
         let appraisal = self.experiment().appraise(learner, configuration).expect("an appraisal");
         json!({ "is": "evaluation", "evaluation": appraisal })
+    }
+
+    /// Sets the next movement of a learner whose movements the visitor chooses, and says what it would teach.
+    pub fn configure(&mut self, learner: &str, configuration: &[f64]) -> Value {
+        let experiment = self.experiment.as_mut().expect("a session");
+        let appraisal = experiment.set_configuration(learner, configuration).expect("an appraisal");
+        json!({ "is": "configured", "learner": learner, "evaluation": appraisal })
     }
 
     /// The session's comparison with another seed, from step 1 on.

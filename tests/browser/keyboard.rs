@@ -1,0 +1,99 @@
+//! A visitor without a pointer, who may not see the panel's canvas either.
+
+use crate::{
+    Server,
+    axe::serious_findings,
+    driver::Browser,
+    visits::{ESCAPE, SHIFT, SPACE},
+};
+
+const TAB: char = '\u{e004}';
+const ENTER: char = '\u{e007}';
+const F6: char = '\u{e036}';
+/// More presses of Tab than the panel has controls.
+const MANY: usize = 80;
+
+/// Goes on with Tab until what is called so has the focus.
+pub async fn tab_to(page: &Browser, name: &str) {
+    let mut passed = Vec::new();
+    for _ in 0..MANY {
+        page.press(TAB).await;
+        let focus = page.focus().await;
+        if focus == name {
+            return;
+        }
+        passed.push(focus);
+    }
+    panic!("Tab does not reach {name}: {passed:?}");
+}
+
+/// The same backwards.
+async fn back_to(page: &Browser, name: &str) {
+    for _ in 0..MANY {
+        page.press_with(SHIFT, TAB).await;
+        if page.focus().await == name {
+            return;
+        }
+    }
+    panic!("Shift and Tab do not reach {name}");
+}
+
+pub async fn visit(page: &Browser, server: Server) {
+    page.open(&server.at("")).await;
+    page.wait_for_state("step 1", "state.phase === 'ready' && state.step === '1'").await;
+    page.wait_for("the scene", "document.getElementById('cover').hidden").await;
+    page.wait_for("the mirrored table", "document.querySelectorAll('#controls tr').length === 4").await;
+    assert_eq!(page.focus().await, "controls", "the focus begins on the panel");
+
+    // Another seed, without one of the learners.
+    tab_to(page, "Seed").await;
+    page.press('7').await;
+    page.press(ENTER).await;
+    page.wait_for("seed 7", "document.getElementById('mirror').textContent.includes('seed 7,')").await;
+    tab_to(page, "random").await;
+    page.press(SPACE).await;
+    page.wait_for("two learners", "document.querySelectorAll('#controls tr').length === 3").await;
+    page.wait_for_state("the session", "state.phase === 'ready' && state.step === '1'").await;
+
+    // They play; only what happens is read out.
+    page.run(
+        "window.heard = []; new MutationObserver(() => heard.push(document.getElementById('news').textContent))
+        .observe(document.getElementById('news'), { childList: true, characterData: true, subtree: true })",
+    )
+    .await;
+    back_to(page, "Play").await;
+    page.press(SPACE).await;
+    page.wait_for_state("some steps", "state.phase === 'playing' && Number(state.latest) >= 15").await;
+    assert_eq!(page.focus().await, "Pause", "what was pressed keeps the focus");
+    page.press(SPACE).await;
+    page.wait_for_state("the pause", "state.phase === 'ready'").await;
+    page.wait_for("the news", "document.getElementById('news').textContent.includes('Paused at step')").await;
+    let heard = page.evaluate("heard").await;
+    assert!(heard.as_array().expect("texts").len() <= 5, "few sentences: {heard}");
+
+    // The comparison, as a table.
+    let row =
+        "[...document.querySelectorAll('#controls tr')].map((row) => [...row.cells].map((cell) => cell.textContent))";
+    let table = page.evaluate(row).await;
+    assert_eq!((table[0][0].as_str(), table[0][4].as_str()), (Some("Learner"), Some("State")), "{table}");
+    assert_eq!((table[1][0].as_str(), table[2][0].as_str()), (Some("active"), Some("global")), "{table}");
+    for learner in [1, 2] {
+        let error = table[learner][2].as_str().and_then(|text| text.parse::<f64>().ok());
+        assert!(error.is_some_and(|error| error > 0.0), "a location error: {table}");
+    }
+
+    // No trap: Tab comes to the scene and leaves it, Esc and F6 change between the two.
+    tab_to(page, "viewer").await;
+    page.press(TAB).await;
+    assert_ne!(page.focus().await, "viewer");
+    page.press(F6).await;
+    assert_eq!(page.focus().await, "viewer");
+    page.press(ESCAPE).await;
+    assert_ne!(page.focus().await, "viewer");
+
+    for scheme in ["light", "dark"] {
+        page.scheme(scheme).await;
+        assert_eq!(serious_findings(page).await, Vec::<String>::new(), "{scheme}");
+    }
+    server.stop().await;
+}

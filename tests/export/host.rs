@@ -1,0 +1,71 @@
+//! A host that sends files and knows nothing of them.
+
+use std::{
+    net::SocketAddr,
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex},
+};
+
+use axum::{
+    Router,
+    extract::State,
+    http::{HeaderValue, StatusCode, Uri, header},
+    response::{IntoResponse, Response},
+};
+use tokio::{net::TcpListener, task::JoinHandle};
+
+/// A host, as long as it is needed.
+pub struct Host {
+    pub address: SocketAddr,
+    site: Arc<Site>,
+    serving: JoinHandle<()>,
+}
+
+struct Site {
+    folder: PathBuf,
+    /// The address of the folder, with a slash at both ends.
+    below: &'static str,
+    missed: Mutex<Vec<String>>,
+}
+
+impl Host {
+    /// Serves a folder below an address.
+    pub async fn start(folder: &Path, below: &'static str) -> Self {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).await.expect("a port");
+        let address = listener.local_addr().expect("an address");
+        let site = Arc::new(Site { folder: folder.to_owned(), below, missed: Mutex::default() });
+        let router = Router::new().fallback(file).with_state(site.clone());
+        let serving = tokio::spawn(async { axum::serve(listener, router).await.expect("no error") });
+        Self { address, site, serving }
+    }
+
+    /// What was asked for in vain.
+    pub fn missed(&self) -> Vec<String> {
+        self.site.missed.lock().expect("no panic").clone()
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        self.serving.abort();
+    }
+}
+
+/// Sends a file as it is: never compressed, nothing said of keeping it, and only what no browser does without is known of
+/// its type.
+async fn file(State(site): State<Arc<Site>>, uri: Uri) -> Response {
+    let path = uri.path().strip_prefix(site.below).filter(|path| !path.contains(".."));
+    let path = path.map(|path| if path.is_empty() { "index.html" } else { path });
+    let bytes = path.and_then(|path| std::fs::read(site.folder.join(path)).ok());
+    let Some((path, bytes)) = path.zip(bytes) else {
+        site.missed.lock().expect("no panic").push(uri.to_string());
+        return StatusCode::NOT_FOUND.into_response();
+    };
+    let kind = match path.rsplit('.').next() {
+        Some("html") => "text/html",
+        Some("js") => "text/javascript",
+        Some("css") => "text/css",
+        _ => "text/plain",
+    };
+    ([(header::CONTENT_TYPE, HeaderValue::from_static(kind))], bytes).into_response()
+}

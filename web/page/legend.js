@@ -1,0 +1,45 @@
+// The legend over the scene: what its colours mean.
+
+const COLOUR = /rgba?\([^)]*\)/;
+
+export class Legend {
+  #list;
+  #learners;
+  #ellipsoids;
+  /** What it says of the session, as text: it is built anew only for another. */
+  #said = "";
+
+  /** @param {HTMLElement} list whose lines say what is the same in every session */
+  constructor(list) {
+    this.#list = list;
+    this.#learners = list.querySelector("[data-line=learner]");
+    this.#ellipsoids = list.querySelector("[data-line=ellipsoids] span");
+    this.#learners.remove();
+  }
+
+  /** @param {{learners: {name: string, colour: number[]}[], ellipsoids: string}} caption */
+  show({ learners, ellipsoids }) {
+    const said = JSON.stringify([learners.map(({ name, colour }) => [name, colour]), ellipsoids]);
+    if (said === this.#said) return;
+    this.#said = said;
+    this.#ellipsoids.textContent = ellipsoids;
+    this.#list.querySelectorAll("[data-line=learner]").forEach((line) => line.remove());
+    this.#list.prepend(...learners.map((learner) => this.#line(learner)));
+    this.#list.hidden = learners.length === 0;
+  }
+
+  #line({ name, colour }) {
+    const line = this.#learners.cloneNode(true);
+    line.querySelector("i").style.backgroundColor = `rgb(${colour.join(" ")})`;
+    line.querySelector("span").textContent = name;
+    return line;
+  }
+
+  /** What is the same in every session, for a picture. @returns {[string, string][]} text and colour */
+  lines() {
+    return [...this.#list.querySelectorAll("li:not([data-line=learner])")].map((line) => {
+      const { backgroundColor, backgroundImage } = getComputedStyle(line.querySelector("i"));
+      return [line.textContent.trim(), COLOUR.exec(backgroundImage)?.[0] ?? backgroundColor];
+    });
+  }
+}

@@ -1,0 +1,98 @@
+//! Beat the algorithm, as its player meets it.
+
+mod support;
+
+use body_schema_panel::{game::ROUNDS, host::Command};
+use egui::{Key, accesskit::Role};
+use egui_kittest::kittest::{NodeT, Queryable};
+use support::Page;
+
+/// A game that has just been opened.
+fn begin(query: &str) -> Page {
+    let mut page = Page::open(query);
+    page.tell(support::Server::scenarios());
+    page.open_session();
+    page
+}
+
+#[test]
+fn ten_movements_of_your_own_against_active_and_random() {
+    let mut page = Page::with_session("seed=3");
+    page.click("Beat the algorithm");
+    let commands = page.commands();
+    let Some(Command::Open { seed: 3, learners: Some(learners), .. }) = commands.last() else { panic!("{commands:?}") };
+    assert_eq!(learners[..], ["active", "random", "human"]);
+    page.server.open("arm-6dof", 3, Some(learners));
+    page.follow();
+    assert!(page.has("movement 1 of 10") && page.harness.state().cursor == 0);
+    for round in 1..=ROUNDS {
+        assert!(page.answer_posture(), "round {round}: the panel asks what the posture teaches");
+        let share = page.harness.state().game.evaluation.as_ref().and_then(|answer| answer.share).expect("a share");
+        assert!(page.has(&format!("Your posture teaches {:.0} % of the best.", share * 100.0)));
+        let mut values = page.harness.state().game.values.clone();
+        values[round as usize % 6] += 0.2;
+        page.harness.state_mut().pose(values.clone());
+        assert!(page.answer_posture(), "round {round}: another posture");
+        // Sliders go by whole degrees.
+        let sent = &page.harness.state().game.values;
+        assert!(sent.iter().zip(&values).all(|(sent, value)| (sent - value).abs() < 0.01), "{sent:?} {values:?}");
+        // The sliders may have rounded it since.
+        page.answer_posture();
+        page.click("Make this movement");
+        assert_eq!(page.make_steps(1), 1, "round {round}");
+    }
+    let score = page.harness.state().score().expect("a score");
+    assert!(page.has(&score.verdict) && score.errors.len() == 3, "{score:?}");
+    assert!(page.has("Your movements taught") && !page.has("Make this movement"));
+    page.commands();
+    page.click("Copy challenge");
+    let link = "?v=1&scenario=arm-6dof&seed=3&play=human".to_owned();
+    assert_eq!(page.commands(), [Command::Copy { text: link }]);
+    page.click("Leave the game");
+    let commands = page.commands();
+    let learners = Some(["active", "random", "global"].map(str::to_owned).to_vec());
+    assert!(
+        matches!(commands.last(), Some(Command::Open { learners: opened, .. }) if *opened == learners),
+        "{commands:?}"
+    );
+}
+
+#[test]
+fn a_challenge_opens_the_same_game() {
+    let mut page = begin("v=1&scenario=arm-6dof&seed=3&play=human");
+    assert!(page.has("Beat the algorithm: movement 1 of 10"));
+    assert_eq!(page.harness.state().description().map(|one| one.seed), Some(3));
+    // Keys make no movement that was not chosen, and playing makes none at all.
+    page.press(Key::Space);
+    assert!(!page.harness.state().playing && !page.has("Pause"));
+}
+
+#[test]
+fn a_click_in_the_slice_and_a_slider_change_the_posture() {
+    let mut page = begin("play=human");
+    assert!(page.answer_posture());
+    let before = page.harness.state().game.values.clone();
+    page.scroll_to("Slice: click to set both joints");
+    let square = page.place("Slice: click to set both joints");
+    page.click_at(square.lerp_inside(egui::vec2(0.75, 0.25)));
+    let after = page.harness.state().game.values.clone();
+    assert!(after[0] > before[0] && after[1] > before[1] && after[2..] == before[2..], "{before:?} {after:?}");
+    assert!(page.answer_posture(), "the arm in the scene follows");
+    assert_eq!(page.harness.query_all_by_role(Role::Slider).count(), 6 + 1, "a slider per joint, and the scrubber");
+    for slider in page.harness.query_all_by_role(Role::Slider) {
+        assert!(slider.accesskit_node().label().is_some_and(|label| !label.is_empty()));
+    }
+}
+
+#[test]
+fn a_posture_that_is_refused_is_told_and_another_can_be_chosen() {
+    let mut page = begin("play=human");
+    page.harness.run_steps(20);
+    assert!(page.commands().iter().any(|command| matches!(command, Command::Configure { .. })));
+    page.tell(serde_json::json!({ "is": "refused", "asked": "configure",
+        "problem": { "status": 422, "title": "Invalid", "detail": "too far" } }));
+    assert!(page.has("This posture cannot be taken: too far"));
+    let values = page.harness.state().game.values.iter().map(|value| value + 0.1).collect();
+    page.harness.state_mut().pose(values);
+    assert!(page.answer_posture());
+}
