@@ -12,10 +12,7 @@ use crate::{
     design::{Problem, Stretch, movements_by_counting},
     experiment::{Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World},
     kinematics::{Joint, JointBox},
-    model::{
-        Block, Element, Layout, State, Workspace, anywhere,
-        registration::{Registration, register},
-    },
+    model::{Block, Element, Layout, State, Workspace, anywhere},
     scenario::{ErrorDraw, InitialError, Known, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
     selection::{Actions, Movement, Watch, Weights},
     sensing::Observation,
@@ -38,6 +35,24 @@ struct Briefing {
     actions: Actions,
     workspace: Workspace,
     watch: Option<Watch>,
+}
+
+impl Briefing {
+    /// The same for a learner that takes the axes for what the description says.
+    fn holding_axes(&self, scenario: &Scenario) -> Self {
+        let others = self.layout.blocks().map(|(block, _)| block).filter(|block| !matches!(block, Block::Axis(_)));
+        let layout = Layout::new(&self.initial, others);
+        let deviations = scenario.prior.standard_deviations(&layout);
+        Self {
+            initial: self.initial.clone(),
+            weights: Weights::new(scenario.selection.units, &layout, &deviations),
+            covariance: DMatrix::from_diagonal(&deviations.map(|sd| sd * sd)),
+            layout: Arc::new(layout),
+            actions: self.actions.clone(),
+            workspace: self.workspace.clone(),
+            watch: self.watch.clone(),
+        }
+    }
 }
 
 impl Scenario {
@@ -121,7 +136,7 @@ impl Scenario {
                     briefing,
                 ))
             }
-            WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, *held_out),
+            WorldSpec::Measured { measurements, held_out } => Ok(self.draw_measured(seed, measurements, *held_out)),
         }
     }
 
@@ -139,68 +154,29 @@ impl Scenario {
         DMatrix::from_diagonal(&deviations.map(|sd| sd * sd))
     }
 
-    /// Holds rows out, and registers the nominal robot to the others. What the fit leaves unsure of base and marker is
-    /// added to the prior: it correlates the axes.
-    fn draw_measured(
-        &self,
-        seed: u64,
-        measurements: &Measurements,
-        held_out: usize,
-    ) -> Result<(World, Evaluation, Briefing), ScenarioError> {
+    /// Holds rows out; learners begin with the robot's description, and find where it stands from the rows that they choose.
+    fn draw_measured(&self, seed: u64, measurements: &Measurements, held_out: usize) -> (World, Evaluation, Briefing) {
         let mut rows: Vec<usize> = (0..measurements.markers_m.len()).collect();
         rows.shuffle(&mut Stream::HeldOut.rng(seed));
         let (test, training) = rows.split_at_mut(held_out);
         training.sort_unstable();
-        let pair = |row: &usize| (measurements.configurations[*row].clone(), measurements.markers_m[*row]);
-        let data: Vec<_> = training.iter().map(pair).collect();
-        let registration = register(&self.robot.state, &data, self.robot.layout.marker().is_some())
-            .map_err(|source| ScenarioError::Registration { scenario: self.name.clone(), seed, source })?;
-        let (initial, layout, covariance) = self.registered(&registration);
-        let deviations = covariance.diagonal().map(f64::sqrt);
         let movement =
             |row: &usize| Movement { configuration: measurements.configurations[*row].clone(), row: Some(*row) };
+        let workspace = training.iter().map(|row| measurements.configurations[*row].clone()).collect();
         let briefing = Briefing {
-            initial,
-            weights: Weights::new(self.selection.units, &layout, &deviations),
-            layout: Arc::new(layout),
-            covariance,
+            initial: self.robot.state.clone(),
+            weights: self.weights(),
+            layout: Arc::new(self.robot.layout.clone()),
+            covariance: self.prior_covariance(),
             actions: Actions::Pool(training.iter().map(movement).collect()),
-            workspace: self.workspace(data.into_iter().map(|(theta, _)| theta).collect()),
+            workspace: self.workspace(workspace),
             watch: None,
         };
-        let (held_out, markers) = test.iter().map(pair).unzip();
+        let held_out = test.iter().map(|row| (measurements.configurations[*row].clone(), measurements.markers_m[*row]));
+        let (held_out, markers) = held_out.unzip();
         let evaluation = Evaluation::of_measurements(self.workspace(held_out), markers);
         let observations = measurements.markers_m.iter().map(|marker| Observation::seen(*marker)).collect();
-        Ok((World::Measured { observations }, evaluation, briefing))
-    }
-
-    /// The robot after a rigid fit, what is learned of it, and its prior covariance. Where all axes and the marker are learned
-    /// the base is folded into them. Where something is held it must not move with an error of the fit: then the base is a
-    /// block of its own.
-    fn registered(&self, registration: &Registration) -> (State, Layout, DMatrix<f64>) {
-        let robot = &self.robot;
-        let is_free = robot.layout.block(Block::Target(0)).is_some()
-            && (0..robot.layout.joints()).all(|joint| robot.layout.is_learned(joint));
-        if is_free {
-            let (initial, unsure) = registration.carried(&robot.layout);
-            return (initial, robot.layout.clone(), self.prior_covariance() + unsure);
-        }
-        let state = registration.state.clone();
-        let layout = Layout::new(&state, robot.layout.blocks().map(|(block, _)| block).chain([Block::Base]));
-        let mut covariance = DMatrix::zeros(layout.dimension(), layout.dimension());
-        let mut add = |own: &Layout, of: &DMatrix<f64>| {
-            for (row, rows) in own.blocks() {
-                for (column, columns) in own.blocks() {
-                    let (Some(to_row), Some(to_column)) = (layout.block(row), layout.block(column)) else { continue };
-                    let size = (rows.len(), columns.len());
-                    let mut place = covariance.view_mut((to_row.start, to_column.start), size);
-                    place += of.view((rows.start, columns.start), size);
-                }
-            }
-        };
-        add(&robot.layout, &self.prior_covariance());
-        add(&registration.layout, &registration.covariance);
-        (state, layout, covariance)
+        (World::Measured { observations }, evaluation, briefing)
     }
 
     /// The true state with the error of the initial estimate: for each learned joint three Euler angles, then for a
@@ -233,6 +209,7 @@ impl Scenario {
         for (block, _) in layout.blocks() {
             let Some(known) = self.prior.of(block) else { continue };
             let guess = match (block, known) {
+                (Block::Base, _) => known.displaced(&block.of(&state), rng),
                 // Readings are taken for what they say.
                 (Block::Offset(_), _) => Element::Numbers(DVector::zeros(1)),
                 (Block::Ratio(_), _) => Element::Numbers(DVector::from_element(1, 1.0)),

@@ -11,6 +11,7 @@
 //!
 //! All of them read observations through a whitened [`Rig`](crate::sensing::Rig): R = I.
 
+mod begun;
 mod belief;
 mod change;
 mod gradient;
@@ -19,6 +20,7 @@ mod six_numbers;
 mod smoother;
 mod unscented;
 
+pub use begun::{Begin, Begun};
 pub use belief::{Alternative, Belief};
 pub use change::ChangeDetector;
 pub use gradient::Gradient;

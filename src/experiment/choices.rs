@@ -140,11 +140,7 @@ fn a_posture_is_told_its_share_of_the_best_gain() {
             assert_eq!(told.share, Some((told.gain / told.best_gain.expect("searched")).clamp(0.0, 1.0)));
             experiment.step().expect("a step");
             let again = experiment.appraise("human", &vec![0.05; joints]).expect("an appraisal");
-            assert_eq!(
-                (again.best_gain, again.share),
-                (told.best_gain, told.share),
-                "the same, looked back at"
-            );
+            assert_eq!((again.best_gain, again.share), (told.best_gain, told.share), "the same, looked back at");
         }
         let choice = experiment.choice("human").expect("what DIRECT would have found");
         let best = choice.boxes.iter().filter_map(|found| Some((found.value?, &found.centre)));

@@ -117,8 +117,28 @@ pub struct JointModel {
     pub point_m: Option<[f64; 3]>,
     /// The chart's basis: two unit vectors ⟂ axis along which point (m) and direction (rad) move.
     pub basis: [[f64; 3]; 2],
+    /// What its readings are multiplied by; 1 unless it is learned.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub ratio: f64,
+    /// What is added to its readings, rad or m; 0 unless it is learned.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub offset: f64,
     /// Indices of this joint's coordinates in the covariance: two of the point (revolute only), two of the direction.
     pub coordinates: Vec<usize>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it")]
+fn is_one(x: &f64) -> bool {
+    *x == 1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it")]
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
 }
 
 /// The marker on the hand.
@@ -155,6 +175,8 @@ impl Model {
                     axis: array(&joint.direction()),
                     point_m: joint.line().map(|line| array(&line.point.coords)),
                     basis: [array(&basis.column(0).into_owned()), array(&basis.column(1).into_owned())],
+                    ratio: belief.state.corrections[index].ratio,
+                    offset: belief.state.corrections[index].offset,
                     coordinates: coordinates.into_iter().flatten().flatten().collect(),
                 }
             })

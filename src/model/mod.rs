@@ -7,7 +7,6 @@
 //! * [`Pass`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
 //!   and not among the kinematics since it is the layout that says which parameters there are.
 //! * [`Workspace`]: where predictions of the hand count.
-//! * [`registration`]: base and marker of a nominal robot, fitted to measurements.
 
 mod block;
 mod element;
@@ -15,7 +14,6 @@ mod layout;
 mod pass;
 mod prior;
 mod rank;
-pub mod registration;
 mod state;
 mod workspace;
 

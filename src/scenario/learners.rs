@@ -16,6 +16,8 @@ pub struct LearnerSpec {
     pub stabilising: bool,
     /// Whether its smoother takes the scenario's loss; otherwise least squares.
     pub robust: bool,
+    /// Whether it takes the axes for what the description says, and learns the rest.
+    pub holds_axes: bool,
     /// Whether it runs when no learner is named.
     pub by_default: bool,
 }
@@ -195,7 +197,15 @@ impl Scenario {
         match misfit(estimator, policy, self.setting()) {
             None => {
                 let name = name.to_owned();
-                Ok(LearnerSpec { name, estimator, policy, stabilising: true, robust: true, by_default: false })
+                Ok(LearnerSpec {
+                    name,
+                    estimator,
+                    policy,
+                    stabilising: true,
+                    robust: true,
+                    holds_axes: false,
+                    by_default: false,
+                })
             }
             Some(Misfit { what, .. }) => {
                 Err(ScenarioError::Misfit { name: name.to_owned(), what, fitting: self.fitting(estimator, policy) })

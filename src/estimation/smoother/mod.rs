@@ -155,7 +155,7 @@ impl Smoother {
     /// s² = (Σ w ‖r‖² + ν s₀²) / (Σ w d − tr(Λₙ P) + ν),    ν = 3
     /// ```
     ///
-    /// with s₀ the scale before this movement, so that it does not jump while there are hardly more equations than parameters.
+    /// with s₀ the scale so far, so that it does not jump while there are hardly more equations than parameters.
     fn learn_noise(&mut self) {
         let layout = self.belief.layout.clone();
         let before = self.posterior.scales.clone();
@@ -166,7 +166,9 @@ impl Smoother {
             let mut change = 0.0_f64;
             for noise in (0..fits.len()).filter(|noise| self.unknown[*noise] && fits[*noise].equations > 0.0) {
                 let free = (fits[noise].equations - absorbed[noise]).max(0.0);
-                let square = (fits[noise].squared + NOISE_WEIGHT * before[noise].powi(2)) / (free + NOISE_WEIGHT);
+                // With equations to spare it may change as often as the modes follow.
+                let from = if free > NOISE_WEIGHT { self.posterior.scales[noise] } else { before[noise] };
+                let square = (fits[noise].squared + NOISE_WEIGHT * from * from) / (free + NOISE_WEIGHT);
                 let scale = square.sqrt().max(LEAST_SCALE);
                 if scale.is_finite() {
                     change = change.max((scale / self.posterior.scales[noise]).ln().abs());

@@ -26,6 +26,7 @@ pub struct Scenario {
     pub sensor: Option<Spanned<Sensors>>,
     pub initial_error: Option<Spanned<InitialError>>,
     pub measurements: Option<Spanned<Measurements>>,
+    pub base: Option<Spanned<Base>>,
     pub head: Option<Spanned<Head>>,
     pub view: Option<Spanned<View>>,
     #[serde(rename = "target", default)]
@@ -113,6 +114,16 @@ pub struct Camera {
     #[serde(default)]
     pub known: Known,
     pub known_to_px: Option<Spanned<f64>>,
+}
+
+/// Where the robot stands in the frame of the measurements.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Base {
+    pub at_m: Spanned<Exactly<f64, 3>>,
+    pub rpy_deg: Spanned<Exactly<f64, 3>>,
+    #[serde(default)]
+    pub known: Known,
 }
 
 /// How well a place is known; without any of these it is known exactly.
@@ -308,6 +319,7 @@ pub struct Learner {
     pub policy: Spanned<PolicyKind>,
     pub stabilising_noise: Option<Spanned<bool>>,
     pub robust: Option<Spanned<bool>>,
+    pub holds_axes: Option<Spanned<bool>>,
     #[serde(default = "yes")]
     pub by_default: bool,
 }

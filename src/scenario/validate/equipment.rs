@@ -15,9 +15,10 @@ const FACING_WITHIN_DEG: f64 = 80.0;
 /// How well what is said to be known is known in the other respect.
 const EXACTLY: f64 = 1e-6;
 
-/// Targets, cameras, and how well their places are known where they are learned.
+/// Base, targets, cameras, and how well their places are known where they are learned.
 #[derive(Default)]
 pub(super) struct Outfit {
+    pub base: Isometry3<f64>,
     pub targets: Vec<Target>,
     pub devices: Vec<Device>,
     pub equipment: Equipment,
@@ -28,6 +29,13 @@ impl Check<'_> {
     /// The targets and cameras of a file, `joints` being the joints' names.
     pub(super) fn outfit(&mut self, raw: &raw::Scenario, joints: &[String]) -> Outfit {
         let mut outfit = Outfit::default();
+        if let Some(spanned) = &raw.base {
+            let base = spanned.get_ref();
+            let at = self.point("base.at_m", &base.at_m);
+            let rotation = self.rotation("base.rpy_deg", &base.rpy_deg);
+            outfit.base = Isometry3::from_parts(Translation3::from(at.coords), rotation);
+            outfit.known.extend(self.known("base", &base.known, spanned).map(|known| (Block::Base, known)));
+        }
         for (index, target) in raw.targets.iter().enumerate() {
             self.target(&format!("target[{index}]"), target, joints, &mut outfit);
         }
@@ -209,6 +217,7 @@ impl Outfit {
             state.targets.clone_from(&self.targets);
         }
         state.devices.clone_from(&self.devices);
+        state.base = self.base;
     }
 }
 

@@ -228,7 +228,9 @@ impl Check<'_> {
             kept: count("smoother.hypotheses", given.and_then(|given| given.hypotheses.as_ref()), default.kept),
             spawned: count("smoother.spawned", given.and_then(|given| given.spawned.as_ref()), default.spawned),
         };
-        let noise_unknown = given.and_then(|given| given.noise) == Some(raw::NoiseKnowledge::Unknown);
+        // Of recorded data nobody knows more than the filter assumes.
+        let usual = if raw.measurements.is_some() { raw::NoiseKnowledge::Unknown } else { raw::NoiseKnowledge::Known };
+        let noise_unknown = given.and_then(|given| given.noise).unwrap_or(usual) == raw::NoiseKnowledge::Unknown;
         SmootherSpec { sigma, hypotheses, loss: self.loss(given), noise_unknown }
     }
 
@@ -361,10 +363,23 @@ impl Check<'_> {
                 let mend = "remove it; only a `smoother` has a loss that can be robust";
                 self.problem(given.span(), format!("{key}.robust"), "this estimator knows least squares alone", mend);
             }
+            if let (Some(given), true) = (&learner.holds_axes, learner.estimator != EstimatorKind::Smoother) {
+                let mend = "remove it; only a `smoother` holds the axes and learns the rest";
+                self.problem(given.span(), format!("{key}.holds_axes"), "this estimator learns all there is", mend);
+            }
+            let holds_axes = learner.holds_axes.as_ref().is_some_and(|given| *given.get_ref());
             let stabilising = learner.stabilising_noise.as_ref().is_none_or(|given| *given.get_ref());
             let robust = learner.robust.as_ref().is_none_or(|given| *given.get_ref());
             let (name, by_default) = (name.clone(), learner.by_default);
-            learners.push(LearnerSpec { name, estimator: learner.estimator, policy, stabilising, robust, by_default });
+            learners.push(LearnerSpec {
+                name,
+                estimator: learner.estimator,
+                policy,
+                stabilising,
+                robust,
+                holds_axes,
+                by_default,
+            });
         }
         if learners.is_empty() {
             self.problem(raw.span(), "learner", "there is no learner", "add a [[learner]]");
