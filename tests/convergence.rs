@@ -282,7 +282,9 @@ fn a_camera_on_the_hand_is_calibrated_with_the_arm() {
     let scenario = builtin("hand-eye-6dof").expect("built in");
     for seed in 301..=310 {
         let mut experiment = scenario.experiment(seed, Some(&["global".to_owned()])).expect("starts");
-        (0..25).for_each(|_| drop(experiment.step().expect("a step").step));
+        for _ in 0..25 {
+            experiment.step().expect("a step");
+        }
         let metrics = &experiment.latest().learners[0].metrics;
         let (found, expected) =
             (metrics.prediction_mean_m.expect("a truth"), metrics.expected_prediction_m.expect("kept"));
@@ -299,7 +301,9 @@ fn gears_and_noise_that_nobody_knows_are_learned() {
     let (mut within, mut scales, mut nees, mut ratio) = (0, [Vec::new(), Vec::new()], 0.0, 0.0);
     for &seed in &seeds {
         let mut experiment = scenario.experiment(seed, Some(&["global".to_owned()])).expect("starts");
-        (0..150).for_each(|_| drop(experiment.step().expect("a step").step));
+        for _ in 0..150 {
+            experiment.step().expect("a step");
+        }
         let learner = &experiment.result().learners[0];
         let truth = scenario.robot.state.corrections.iter();
         let errors = truth.zip(&learner.model.joints).map(|(truth, joint)| (joint.ratio / truth.ratio - 1.0).abs());

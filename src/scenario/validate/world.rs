@@ -169,7 +169,7 @@ impl Check<'_> {
             }
         };
         let (count, held_out) = (rows.markers_m.len(), *measurements.held_out.get_ref());
-        // The rigid fit needs four rows at least.
+        // Base and marker take four rows at least.
         if held_out == 0 || held_out + 4 > count {
             let what = format!("{held_out} of {count} rows cannot be held out");
             let mend = format!("write a number from 1 to {}", count.saturating_sub(4));
