@@ -50,7 +50,7 @@ fn outliers_are_told_from_readings_and_least_squares_is_lost_to_them() {
     assert!(outcome.summary.converged == 20 && median.is_some_and(|median| median <= 14.0), "{:?}", outcome.summary);
     let least_squares = compare(&scenario, "global-least-squares", &seeds[..6], 60);
     assert_eq!(least_squares.summary.converged, 0, "{:?}", least_squares.runs);
-    let (mut suspected, mut good) = (0, 0);
+    let (mut suspected, mut good, mut told) = (0, 0, 0);
     for seed in seeds {
         let names = ["global".to_owned()];
         let mut experiment = scenario.experiment(seed, Some(&names)).expect("starts");
@@ -61,7 +61,8 @@ fn outliers_are_told_from_readings_and_least_squares_is_lost_to_them() {
             }
             let result = experiment.result();
             let truth: Vec<_> = result.outliers.iter().map(|it| (it.movement, it.channel)).collect();
-            assert!(!truth.is_empty() && result.learners[0].readings.len() == step);
+            assert_eq!(result.learners[0].readings.len(), step);
+            told += truth.len();
             for reading in &result.learners[0].readings {
                 let probability = reading.outlier_probability.expect("a mixture");
                 if !truth.contains(&(reading.movement, reading.channel)) {
@@ -73,7 +74,7 @@ fn outliers_are_told_from_readings_and_least_squares_is_lost_to_them() {
             }
         }
     }
-    assert!(suspected * 100 <= good, "{suspected} of {good}");
+    assert!(suspected * 100 <= good && told > 100, "{suspected} of {good}, {told}");
 }
 
 #[test]
@@ -131,7 +132,7 @@ fn a_real_robot_is_predicted_better_after_learning_and_sooner_when_chosen_active
         })
     };
     let ([start, active_12, active_end], [_, random_12, random_end]) = (mean("active"), mean("random"));
-    assert!((3.4..4.6).contains(&start), "{start} mm before learning");
+    assert!(start > 100.0, "{start} mm before learning: nobody has told where it stands");
     assert!(active_end <= 3.3 && random_end <= 3.3, "{active_end} and {random_end} mm with all rows");
     assert!(active_12 <= 0.92 * random_12, "{active_12} and {random_12} mm at 12 rows");
 }
