@@ -27,7 +27,7 @@ fn one(text: &str, from: &str, to: &str) -> (Problem, usize) {
 fn watched(scenario: &Scenario) -> (Head, Vec<f64>, State) {
     match &scenario.world {
         WorldSpec::Simulated { watch: Some(watch), .. } => {
-            (watch.head, watch.visible_pose.clone(), scenario.robot.state.clone())
+            (watch.head.expect("a head"), watch.visible_pose.clone(), scenario.robot.state.clone())
         }
         other => panic!("a head watches: {other:?}"),
     }

@@ -4,15 +4,16 @@ use std::sync::Arc;
 
 use super::Briefing;
 use crate::{
-    estimation::{Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls},
+    estimation::{Begin, Begun, Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls},
     experiment::{Agent, Learner, LearnerDescription, Stream},
-    model::{Block, Prior},
+    model::{Block, Layout, Prior},
     optimize::{Settings, Variant},
     scenario::{
-        ErrorDraw, EstimatorKind, Filter, InitialError, LearnerSpec, PolicyKind, Scenario, ScenarioError, SmootherSpec,
-        WorldSpec,
+        ErrorDraw, EstimatorKind, Filter, InitialError, Known, LearnerSpec, PolicyKind, Scenario, ScenarioError,
+        SmootherSpec, WorldSpec,
     },
     selection::{Active, Human, Minimiser, Planner, Policy, Random},
+    sensing::Loss,
 };
 
 /// States drawn from the posterior for one Monte Carlo evaluation of (7).
@@ -27,6 +28,8 @@ impl Scenario {
     }
 
     pub(super) fn agent_of(&self, spec: &LearnerSpec, seed: u64, briefing: &Briefing) -> Result<Agent, ScenarioError> {
+        let held = spec.holds_axes.then(|| briefing.holding_axes(self));
+        let briefing = held.as_ref().unwrap_or(briefing);
         let estimator = self.estimator(spec, seed, briefing)?;
         let (actions, limits) = (briefing.actions.clone(), self.robot.limits.clone());
         Ok(Agent::new(estimator, self.policy(spec, briefing), actions, limits, seed))
@@ -48,41 +51,95 @@ impl Scenario {
         seed: u64,
         briefing: &Briefing,
     ) -> Result<Box<dyn Estimator>, ScenarioError> {
-        let layout = &briefing.layout;
-        let belief = |sigma: f64| {
-            let rig = Arc::new(self.rig.assuming(sigma));
-            Belief::new(briefing.initial.clone(), layout.clone(), rig)
-        };
-        let covariance = briefing.covariance.clone();
-        let stabilising = |filter: Filter| filter.stabilising.filter(|_| spec.stabilising);
-        Ok(match spec.estimator {
-            EstimatorKind::Rls => Box::new(Rls::new(belief(self.filter.sigma()), covariance, stabilising(self.filter))),
-            EstimatorKind::Unscented => {
-                let filter = self.unscented;
-                Box::new(UnscentedRls::new(belief(filter.sigma()), covariance, stabilising(filter)))
-            }
-            EstimatorKind::RlsSixNumbers => {
-                let (direction, point) = (self.prior.direction_rad, self.prior.point_m);
-                Box::new(SixNumbers::new(belief(self.filter.sigma()), direction, point, stabilising(self.filter)))
-            }
+        let sigma = match spec.estimator {
             EstimatorKind::Smoother => {
-                let SmootherSpec { sigma, hypotheses } = self.smoother;
-                let bound = match &self.world {
-                    WorldSpec::Simulated {
-                        initial_error: InitialError { draw: ErrorDraw::Anywhere, point_m, .. },
-                        ..
-                    } => Some(*point_m),
-                    _ => None,
-                };
-                // Without a guess axes may be anywhere; a marker is known as well as the prior says.
-                let within = |block| bound.filter(|_| matches!(block, Block::Axis(_)));
-                let prior = Prior::new(briefing.initial.clone(), layout, covariance, within)
-                    .map_err(|source| ScenarioError::Prior { scenario: self.name.clone(), source })?;
-                let (rig, rng) = (Arc::new(self.rig.assuming(sigma)), Stream::Hypotheses.rng(seed));
-                Box::new(Smoother::new(prior, layout.clone(), rig, hypotheses, rng))
+                return Ok(Box::new(self.smoother(
+                    spec,
+                    seed,
+                    briefing,
+                    self.smoother.sigma,
+                    self.smoother.noise_unknown,
+                )?));
             }
-            EstimatorKind::Gradient => Box::new(Gradient::new(belief(1.0), self.gradient_rate)),
+            EstimatorKind::Gradient => 1.0,
+            EstimatorKind::Unscented => self.unscented.sigma(),
+            EstimatorKind::Rls | EstimatorKind::RlsSixNumbers => self.filter.sigma(),
+        };
+        let rig = Arc::new(self.rig.assuming(sigma));
+        let begin = self.filter_of(spec);
+        let unknown = self.unknown_places(&briefing.layout);
+        if !unknown.is_empty() {
+            return Ok(Box::new(Begun::new(
+                self.smoother(spec, seed, briefing, self.filter.sigma(), false)?,
+                unknown,
+                rig,
+                begin,
+            )));
+        }
+        let belief = Belief::new(briefing.initial.clone(), briefing.layout.clone(), rig);
+        Ok(begin(belief, briefing.covariance.clone()))
+    }
+
+    /// What makes a filter of a belief and its covariance.
+    fn filter_of(&self, spec: &LearnerSpec) -> Begin {
+        let stabilising = |filter: Filter| filter.stabilising.filter(|_| spec.stabilising);
+        let (linear, unscented) = (stabilising(self.filter), stabilising(self.unscented));
+        let (direction, point, rate) = (self.prior.direction_rad, self.prior.point_m, self.gradient_rate);
+        let kind = spec.estimator;
+        Box::new(move |belief, covariance| match kind {
+            EstimatorKind::Unscented => Box::new(UnscentedRls::new(belief, covariance, unscented)),
+            EstimatorKind::RlsSixNumbers => Box::new(SixNumbers::new(belief, direction, point, linear)),
+            EstimatorKind::Gradient => Box::new(Gradient::new(belief, rate)),
+            EstimatorKind::Rls | EstimatorKind::Smoother => Box::new(Rls::new(belief, covariance, linear)),
         })
+    }
+
+    /// Learned places of which next to nothing is known, so that a filter cannot begin at the guess: all that an unknown base
+    /// carries, or what may be anywhere.
+    fn unknown_places(&self, layout: &Layout) -> Vec<Block> {
+        let has_base = layout.block(Block::Base).is_some();
+        let is_unknown = |block: &Block| match block {
+            Block::Base => true,
+            Block::Target(_) | Block::Device(_) => {
+                has_base || matches!(self.prior.of(*block), Some(Known::Anywhere { .. }))
+            }
+            _ => false,
+        };
+        layout.blocks().map(|(block, _)| block).filter(is_unknown).collect()
+    }
+
+    /// A smoother that takes σ of the first channel for `sigma`, for a unit alone if the noise is unknown.
+    fn smoother(
+        &self,
+        spec: &LearnerSpec,
+        seed: u64,
+        briefing: &Briefing,
+        sigma: f64,
+        noise_unknown: bool,
+    ) -> Result<Smoother, ScenarioError> {
+        let (layout, covariance) = (&briefing.layout, briefing.covariance.clone());
+        let SmootherSpec { hypotheses, loss, .. } = self.smoother;
+        let bound = match &self.world {
+            WorldSpec::Simulated { initial_error: InitialError { draw: ErrorDraw::Anywhere, point_m, .. }, .. } => {
+                Some(*point_m)
+            }
+            _ => None,
+        };
+        // Without a guess axes may be anywhere; a marker is known as well as the prior says.
+        let within = |block| match self.prior.of(block) {
+            Some(Known::Anywhere { within_m }) => Some(within_m),
+            _ => bound.filter(|_| matches!(block, Block::Axis(_))),
+        };
+        let prior = Prior::new(briefing.initial.clone(), layout, covariance, within)
+            .map_err(|source| ScenarioError::Prior { scenario: self.name.clone(), source })?;
+        let (rig, rng) = (Arc::new(self.rig.assuming(sigma)), Stream::Hypotheses.rng(seed));
+        let unknown = vec![noise_unknown; self.rig.noises().len()];
+        let smoother = Smoother::new(prior, layout.clone(), rig, hypotheses, rng)
+            .with_loss(if spec.robust { loss } else { Loss::None })
+            .with_unknown_noise(unknown);
+        // Recorded bodies do not change: what looks like it is an outlier or a model that does not hold.
+        let changes = matches!(self.world, WorldSpec::Simulated { .. });
+        Ok(if changes { smoother } else { smoother.never_forgetting() })
     }
 
     fn policy(&self, spec: &LearnerSpec, briefing: &Briefing) -> Box<dyn Policy> {

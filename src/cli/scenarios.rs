@@ -47,7 +47,7 @@ pub fn list(arguments: &ListArguments) -> Result<()> {
 
 pub fn check(arguments: &CheckArguments) -> Result<()> {
     let scenario = load_scenario(&arguments.file)?;
-    // What only a seed brings to light: a rigid fit that fails, say.
+    // What only a seed brings to light: a prior that is none, say.
     scenario.experiment(1, None)?;
     let summary = scenario.summary();
     writeln!(

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
 
 use crate::{
     kinematics::{Joint, chart},
-    model::{Block, Layout, State, jacobian},
+    model::{Block, Layout, State, Workspace, jacobian},
     sensing::{Observation, Refused, Rig},
 };
 
@@ -95,16 +95,17 @@ impl Belief {
         Some(spread.fixed_view::<3, 3>(0, 0).into_owned())
     }
 
-    /// The mean over `configurations` of √tr(H P Hᵀ): the prediction error that the belief itself expects, metres.
-    pub fn expected_error_m(&self, configurations: &[Vec<f64>]) -> Option<f64> {
-        if configurations.is_empty() {
-            return None;
-        }
-        let sum = configurations
-            .iter()
-            .map(|theta| self.marker_covariance(theta).map(|spread| spread.trace().max(0.0).sqrt()))
-            .sum::<Option<f64>>()?;
-        Some(sum / configurations.len() as f64)
+    /// The mean over a workspace of √tr(H P Hᵀ): the prediction error that the belief itself expects, metres.
+    pub fn expected_error_m(&self, workspace: &Workspace) -> Option<f64> {
+        let covariance = self.covariance.as_ref()?;
+        let count = workspace.configurations.len();
+        let jacobian = workspace.jacobian(&self.state, &self.layout);
+        let spread = &jacobian * covariance;
+        let of = |index: usize| {
+            let place = 3 * index..3 * index + 3;
+            place.map(|row| spread.row(row).dot(&jacobian.row(row))).sum::<f64>().max(0.0).sqrt()
+        };
+        (count > 0).then(|| (0..count).map(of).sum::<f64>() / count as f64)
     }
 
     /// The covariance (m², frame of the measurements) of the point of a joint's axis that lies `along` metres from the

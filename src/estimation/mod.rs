@@ -11,6 +11,7 @@
 //!
 //! All of them read observations through a whitened [`Rig`](crate::sensing::Rig): R = I.
 
+mod begun;
 mod belief;
 mod change;
 mod gradient;
@@ -19,6 +20,7 @@ mod six_numbers;
 mod smoother;
 mod unscented;
 
+pub use begun::{Begin, Begun};
 pub use belief::{Alternative, Belief};
 pub use change::ChangeDetector;
 pub use gradient::Gradient;
@@ -38,12 +40,52 @@ pub trait Estimator: Send {
     /// the belief [accepts](Belief::accepts). An estimator that diverges keeps the belief that it had.
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError>;
 
+    /// What it makes of every reading so far; empty for an estimator that weighs none.
+    fn readings(&self) -> Vec<ReadingReport> {
+        Vec::new()
+    }
+
+    /// The scales of noise that it learns, by kind of noise; empty for an estimator that is told them all.
+    fn noise(&self) -> Vec<NoiseReport> {
+        Vec::new()
+    }
+
     /// As [`correct`](Self::correct), for observations that nobody has looked at: what does not fit is refused, and
     /// nothing is changed by it.
     fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         self.belief().accepts(positions, observation)?;
         self.correct(positions, observation)
     }
+}
+
+/// What an estimator makes of one reading, by its belief.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct ReadingReport {
+    /// The movement, counted from 1.
+    pub movement: u64,
+    /// The channel, counted from 0.
+    pub channel: usize,
+    /// Its equations.
+    pub equations: usize,
+    /// How far it is from what the belief predicts, in standard deviations of its noise.
+    pub residual_sigmas: f64,
+    /// The weight of its equations; 1 for least squares.
+    pub weight: f64,
+    /// The probability that it is an outlier; null for a loss that knows of none.
+    pub outlier_probability: Option<f64>,
+}
+
+/// The learned scale of one kind of noise.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct NoiseReport {
+    /// The channel, counted from 0.
+    pub channel: usize,
+    /// The first of its equations that this noise is of.
+    pub first: usize,
+    /// Its standard deviation in nominal ones.
+    pub scale: f64,
 }
 
 /// What an update found before it changed the belief.

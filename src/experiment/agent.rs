@@ -12,7 +12,7 @@ use web_time::Instant;
 
 use super::streams::Stream;
 use crate::{
-    estimation::{Belief, EstimationError, Estimator, Update},
+    estimation::{Belief, EstimationError, Estimator, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
     selection::{
         Actions, Appraisal, History, Movement, Policy, Search, Selection, SelectionError, Situation, condition,
@@ -94,6 +94,16 @@ impl Agent {
     /// What it believes.
     pub fn belief(&self) -> &Belief {
         self.estimator.belief()
+    }
+
+    /// What it makes of every reading so far; empty for an estimator that keeps none.
+    pub fn readings(&self) -> Vec<ReadingReport> {
+        self.estimator.readings()
+    }
+
+    /// The scales of noise that it learns.
+    pub fn noise(&self) -> Vec<NoiseReport> {
+        self.estimator.noise()
     }
 
     /// What it may do.

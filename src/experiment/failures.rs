@@ -61,7 +61,7 @@ fn beyond_all_numbers() -> State {
 
 fn world(change: Option<Change>) -> World {
     let rig = Arc::new(Rig::tracker(0.01));
-    World::Simulated { truth: Box::new(truth()), rig, head: None, change: change.map(Box::new) }
+    World::Simulated { truth: Box::new(truth()), rig, head: None, change: change.map(Box::new), outliers: None }
 }
 
 /// Two learners, the first active and the other random; the flag makes the second falter.
@@ -146,7 +146,8 @@ fn a_world_that_has_nothing_to_show_changes_nothing() {
     let (mut broken, _) = experiment(world(None));
     (0..2).for_each(|_| assert_eq!(step(&mut steady), step(&mut broken)));
     let World::Simulated { rig, .. } = world(None) else { unreachable!("simulated") };
-    let nowhere = World::Simulated { truth: Box::new(beyond_all_numbers()), rig, head: None, change: None };
+    let nowhere =
+        World::Simulated { truth: Box::new(beyond_all_numbers()), rig, head: None, change: None, outliers: None };
     let whole = std::mem::replace(&mut broken.world, nowhere);
     for _ in 0..2 {
         let before = timeless(broken.latest());

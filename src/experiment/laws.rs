@@ -16,7 +16,9 @@ use crate::{
 /// Every estimator with every policy that fits it.
 fn pairs(scenario: &Scenario) -> Vec<String> {
     let pairs = EstimatorKind::ALL.into_iter().flat_map(|estimator| PolicyKind::ALL.map(|policy| (estimator, policy)));
+    // A person proposes nothing.
     pairs
+        .filter(|(_, policy)| *policy != PolicyKind::Human)
         .map(|(estimator, policy)| format!("{}:{}", estimator.name(), policy.name()))
         .filter(|name| scenario.chosen(Some(std::slice::from_ref(name))).is_ok())
         .collect()

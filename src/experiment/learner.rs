@@ -12,9 +12,9 @@ use super::{
     world::World,
 };
 use crate::{
-    estimation::{Belief, Update},
+    estimation::{Belief, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
-    model::State,
+    model::{State, Workspace},
     selection::{SelectionError, Weights},
     sensing::Observation,
 };
@@ -33,7 +33,7 @@ pub struct Learner {
     /// The weights of its trace.
     weights: Weights,
     /// Configurations over which it judges itself.
-    workspace: Vec<Vec<f64>>,
+    workspace: Workspace,
     /// It calls itself settled when its expected prediction error stays below this, metres.
     settled_below_m: f64,
     /// Where it stood before its last movement; at the start, where it stands.
@@ -64,7 +64,7 @@ impl Learner {
         description: LearnerDescription,
         agent: Agent,
         weights: Weights,
-        workspace: Vec<Vec<f64>>,
+        workspace: impl Into<Workspace>,
         settled_below_m: f64,
     ) -> Self {
         let before = agent.standpoint().to_owned();
@@ -72,7 +72,7 @@ impl Learner {
             description,
             agent,
             weights,
-            workspace,
+            workspace: workspace.into(),
             settled_below_m,
             before,
             best_gain_before: OnceLock::new(),
@@ -86,6 +86,16 @@ impl Learner {
     /// What it believes.
     pub fn belief(&self) -> &Belief {
         self.agent.belief()
+    }
+
+    /// What it makes of every reading so far, where it weighs them.
+    pub(super) fn readings(&self) -> Vec<ReadingReport> {
+        self.agent.readings()
+    }
+
+    /// The scales of noise that it learns.
+    pub(super) fn noise(&self) -> Vec<NoiseReport> {
+        self.agent.noise()
     }
 
     /// The joint limits.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     kinematics::Joint,
-    model::{Layout, State},
+    model::{Layout, State, Workspace},
 };
 
 /// The metrics of one learner after one step. What needs the truth is null where none is known.
@@ -101,8 +101,10 @@ pub fn location_m(estimate: &State, truth: &State, layout: &Layout) -> Option<f6
 /// The configurations over which estimates are judged, and where the marker is there.
 #[derive(Clone, Debug)]
 pub struct Evaluation {
-    /// Joint positions and the true, noise-free marker; or held-out measurements.
-    targets: Vec<(Vec<f64>, Point3<f64>)>,
+    /// Where the marker is predicted.
+    workspace: Workspace,
+    /// The true, noise-free marker there; or what was measured.
+    markers: Vec<Point3<f64>>,
     /// σ of the sensor per coordinate, metres; `None` for measurements.
     sigma_m: Option<f64>,
 }
@@ -112,35 +114,29 @@ const SIGNAL_SIZE: usize = 50;
 
 impl Evaluation {
     /// Against the noise-free markers of the truth.
-    pub fn of_truth(configurations: Vec<Vec<f64>>, truth: &State, sigma_m: f64) -> Self {
-        let pair = |theta: Vec<f64>| {
-            let marker = truth.marker_at(&theta);
-            (theta, marker)
-        };
-        Self { targets: configurations.into_iter().map(pair).collect(), sigma_m: Some(sigma_m) }
+    pub fn of_truth(workspace: impl Into<Workspace>, truth: &State, sigma_m: f64) -> Self {
+        let workspace = workspace.into();
+        Self { markers: workspace.points(truth), workspace, sigma_m: Some(sigma_m) }
     }
 
-    /// Against held-out measurements.
-    pub fn of_measurements(targets: Vec<(Vec<f64>, Point3<f64>)>) -> Self {
-        Self { targets, sigma_m: None }
+    /// Against held-out measurements, one at each configuration.
+    pub fn of_measurements(workspace: impl Into<Workspace>, markers: Vec<Point3<f64>>) -> Self {
+        Self { workspace: workspace.into(), markers, sigma_m: None }
     }
 
     /// The same configurations, against another truth.
     pub fn follow(&mut self, truth: &State) {
-        for (theta, marker) in &mut self.targets {
-            *marker = truth.marker_at(theta);
-        }
+        self.markers = self.workspace.points(truth);
     }
 
     /// Joint positions and markers.
-    pub fn targets(&self) -> &[(Vec<f64>, Point3<f64>)] {
-        &self.targets
+    pub fn targets(&self) -> impl ExactSizeIterator<Item = (&[f64], &Point3<f64>)> {
+        self.workspace.configurations.iter().map(Vec::as_slice).zip(&self.markers)
     }
 
     /// Root mean square and mean of the distances between predicted and true marker, metres.
     pub fn prediction_m(&self, estimate: &State) -> Option<(f64, f64)> {
-        let distances = || self.targets.iter().map(|(theta, marker)| (estimate.marker_at(theta) - marker).norm());
-        Some((mean(distances().map(|d| d * d))?.sqrt(), mean(distances())?))
+        self.workspace.distance(&self.workspace.points(estimate), &self.markers)
     }
 
     /// Every joint by itself.
@@ -161,9 +157,10 @@ impl Evaluation {
         let sigma = self.sigma_m.filter(|sigma| *sigma > 0.0)?;
         let mut state = truth.clone();
         *state.joints.get_mut(index)? = *found;
-        let displacements = self.targets.iter().take(SIGNAL_SIZE);
+        let displacements = self.targets().take(SIGNAL_SIZE);
         Some(
-            mean(displacements.map(|(theta, marker)| (state.marker_at(theta) - marker).norm_squared()))?.sqrt() / sigma,
+            mean(displacements.map(|(theta, marker)| (state.marker_at(theta) - *marker).norm_squared()))?.sqrt()
+                / sigma,
         )
     }
 }
@@ -199,7 +196,7 @@ mod tests {
         let estimate = State { joints: vec![line([0., 0., 1.], [0., 0.1, 0.])], ..truth.clone() };
         let layout = Layout::of_arm(&truth, &[], false);
         let turns = [60_f64, 180.].map(|degrees| vec![degrees.to_radians()]);
-        let evaluation = Evaluation::of_truth(turns.into(), &truth, 0.05);
+        let evaluation = Evaluation::of_truth(turns.to_vec(), &truth, 0.05);
         let joint = evaluation.joints(&estimate, Some(&truth), &layout)[0];
         // ‖I − R(θ)‖ = 2 sin θ/2: displaced by 0.1 and 0.2 m.
         let expected = ((0.01_f64 + 0.04) / 2.0).sqrt() / 0.05;

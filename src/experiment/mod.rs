@@ -41,9 +41,9 @@ pub use report::{
     Body, Description, JointDescription, JointReport, LearnerDescription, LearnerReport, ModelReport, MovementReport,
     StepReport,
 };
-pub use result::{JointModel, LearnerResult, MarkerModel, Model, RunResult};
+pub use result::{JointModel, LearnerResult, MarkerModel, Model, OutlierReading, RunResult};
 pub use streams::Stream;
-pub use world::{Change, NoiseSequence, World, WorldError};
+pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};
 
 use crate::{design::Problem, estimation::Update, selection::SelectionError};
 
@@ -52,6 +52,8 @@ pub struct Experiment {
     description: Description,
     world: World,
     noise: NoiseSequence,
+    /// The readings so far that had nothing to do with the robot.
+    outliers: Vec<OutlierReading>,
     learners: Vec<Learner>,
     judge: Judge,
     latest: StepReport,
@@ -107,7 +109,7 @@ impl Experiment {
         let mut latest = StepReport { step: 0, learners: reports, truth: None };
         judge.conclude(&mut latest);
         let noise = NoiseSequence::new(description.seed);
-        Self { description, world, noise, learners, judge, latest }
+        Self { description, world, noise, outliers: Vec::new(), learners, judge, latest }
     }
 
     /// What stays the same from step to step.
@@ -141,7 +143,7 @@ impl Experiment {
             proposals.push(proposed.map_err(|source| ExperimentError::Selection { learner: name(), source })?);
         }
         let mut noise = self.noise.clone();
-        let draw = noise.draw(self.world.equations());
+        let draw = noise.draw(&self.world);
         let changed = self.world.changed_after(self.latest.step);
         let world = changed.as_ref().unwrap_or(&self.world);
         let mut observations = Vec::with_capacity(self.learners.len());
@@ -160,6 +162,9 @@ impl Experiment {
             observations.push(Some(observation));
         }
         self.noise = noise;
+        let (movement, channels) = (self.latest.step + 1, 0..draw.outliers.len());
+        let spoilt = channels.filter(|channel| world.is_outlier(&draw, *channel));
+        self.outliers.extend(spoilt.map(|channel| OutlierReading { movement, channel }));
         let has_changed = changed.is_some();
         if let Some(world) = changed {
             world.truth().into_iter().for_each(|truth| self.judge.follow(truth));

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{Experiment, convergence::Thresholds, metrics::Metrics, report::array};
 use crate::{
     design::BestDesign,
-    estimation::Belief,
+    estimation::{Belief, NoiseReport, ReadingReport},
     kinematics::{JointKind, chart},
 };
 
@@ -30,8 +30,21 @@ pub struct RunResult {
     /// truth is known.
     #[serde(default)]
     pub best_designs: Vec<BestDesign>,
+    /// The readings that had nothing to do with the robot, where the world is simulated and has such.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outliers: Vec<OutlierReading>,
     /// The learners.
     pub learners: Vec<LearnerResult>,
+}
+
+/// A reading that had nothing to do with the robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct OutlierReading {
+    /// The movement, counted from 1.
+    pub movement: u64,
+    /// The channel, counted from 0.
+    pub channel: usize,
 }
 
 /// The outcome of one learner.
@@ -65,6 +78,12 @@ pub struct LearnerResult {
     pub efficiency: Option<f64>,
     /// The metrics at the end.
     pub metrics: Metrics,
+    /// What it makes of every reading, for a learner with a robust loss.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub readings: Vec<ReadingReport>,
+    /// The scales of noise that it learned.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub noise: Vec<NoiseReport>,
     /// The learned model.
     pub model: Model,
 }
@@ -98,8 +117,28 @@ pub struct JointModel {
     pub point_m: Option<[f64; 3]>,
     /// The chart's basis: two unit vectors ⟂ axis along which point (m) and direction (rad) move.
     pub basis: [[f64; 3]; 2],
+    /// What its readings are multiplied by; 1 unless it is learned.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub ratio: f64,
+    /// What is added to its readings, rad or m; 0 unless it is learned.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub offset: f64,
     /// Indices of this joint's coordinates in the covariance: two of the point (revolute only), two of the direction.
     pub coordinates: Vec<usize>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it")]
+fn is_one(x: &f64) -> bool {
+    *x == 1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it")]
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
 }
 
 /// The marker on the hand.
@@ -136,6 +175,8 @@ impl Model {
                     axis: array(&joint.direction()),
                     point_m: joint.line().map(|line| array(&line.point.coords)),
                     basis: [array(&basis.column(0).into_owned()), array(&basis.column(1).into_owned())],
+                    ratio: belief.state.corrections[index].ratio,
+                    offset: belief.state.corrections[index].offset,
                     coordinates: coordinates.into_iter().flatten().flatten().collect(),
                 }
             })
@@ -183,6 +224,8 @@ impl Experiment {
                 failure: report.failure.clone(),
                 efficiency: None,
                 metrics: report.metrics.clone(),
+                readings: learner.readings(),
+                noise: learner.noise(),
                 model: Model::new(learner.belief(), &names),
             })
             .collect();
@@ -194,6 +237,7 @@ impl Experiment {
             thresholds: description.thresholds,
             movements_by_counting: description.movements_by_counting,
             best_designs: Vec::new(),
+            outliers: self.outliers.clone(),
             learners,
         }
     }

@@ -20,6 +20,8 @@ pub enum Stream {
     HeldOut = 6,
     /// Where a smoother searches for hypotheses.
     Hypotheses = 7,
+    /// Which readings are outliers, and where they lie; one draw per movement.
+    Outliers = 8,
 }
 
 impl Stream {

@@ -28,12 +28,32 @@ pub enum World {
         head: Option<Head>,
         /// How the body will change.
         change: Option<Box<Change>>,
+        /// Readings that have nothing to do with the robot.
+        outliers: Option<Outliers>,
     },
     /// Recorded observations by row; no truth is known.
     Measured {
         /// What was observed at every row of the data set.
         observations: Vec<Observation>,
     },
+}
+
+/// Readings of a tracker that show anything but the marker: each with a chance of its own, uniform in a cube about the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outliers {
+    /// The chance of a reading to be one.
+    pub fraction: f64,
+    /// The edge of the cube, metres.
+    pub box_m: f64,
+}
+
+/// What chance decides about one movement, the same for every learner.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Draw {
+    /// Standard normal numbers, one per equation.
+    pub noise: Vec<f64>,
+    /// By channel four numbers uniform in 0..1: whether the reading is an outlier, and where it lies.
+    pub outliers: Vec<[f64; 4]>,
 }
 
 /// A change of the body.
@@ -64,19 +84,25 @@ pub enum WorldError {
     NoMeasurement(#[from] Refused),
 }
 
-/// The noise of one world: the k-th movement of every learner sees the k-th draw, whether its marker was seen or not.
+/// What chance decides in one world: the k-th movement of every learner sees the k-th draw, whether its marker was seen or not.
 #[derive(Clone, Debug)]
-pub struct NoiseSequence(ChaCha8Rng);
+pub struct NoiseSequence {
+    noise: ChaCha8Rng,
+    outliers: ChaCha8Rng,
+}
 
 impl NoiseSequence {
     /// The sequence of a seed.
     pub fn new(seed: u64) -> Self {
-        Self(Stream::Noise.rng(seed))
+        Self { noise: Stream::Noise.rng(seed), outliers: Stream::Outliers.rng(seed) }
     }
 
-    /// The standard normal draw of the next movement, a number for each of `equations`.
-    pub fn draw(&mut self, equations: usize) -> Vec<f64> {
-        (0..equations).map(|_| self.0.sample(StandardNormal)).collect()
+    /// The draw of the next movement in a world.
+    pub fn draw(&mut self, world: &World) -> Draw {
+        let World::Simulated { rig, outliers, .. } = world else { return Draw::default() };
+        let noise = (0..rig.equations()).map(|_| self.noise.sample(StandardNormal)).collect();
+        let channels = outliers.map_or(0, |_| rig.channels().len());
+        Draw { noise, outliers: (0..channels).map(|_| self.outliers.random()).collect() }
     }
 }
 
@@ -107,33 +133,38 @@ impl World {
 
     /// The world with the body changed, if that is due after so many movements.
     pub(super) fn changed_after(&self, movements: u64) -> Option<Self> {
-        let Self::Simulated { rig, head, change: Some(change), .. } = self else { return None };
+        let Self::Simulated { rig, head, change: Some(change), outliers, .. } = self else { return None };
         (change.step <= movements).then(|| Self::Simulated {
             truth: Box::new(change.truth.clone()),
             rig: rig.clone(),
             head: *head,
             change: None,
+            outliers: *outliers,
         })
     }
 
-    /// Equations of a movement of which nothing is missed, where measurements are made here.
-    pub fn equations(&self) -> usize {
-        match self {
-            Self::Simulated { rig, .. } => rig.equations(),
-            Self::Measured { .. } => 0,
-        }
+    /// Whether the draw makes an outlier of a channel's reading.
+    pub fn is_outlier(&self, draw: &Draw, channel: usize) -> bool {
+        let Self::Simulated { outliers: Some(outliers), .. } = self else { return false };
+        draw.outliers.get(channel).is_some_and(|[chance, ..]| *chance < outliers.fraction)
     }
 
-    /// What is seen after `movement`, under the standard normal draw `noise`, a number for each equation.
-    pub fn observe(&self, movement: &Movement, noise: &[f64]) -> Result<Observation, WorldError> {
+    /// What is seen after `movement`, under a draw of chance.
+    pub fn observe(&self, movement: &Movement, draw: &Draw) -> Result<Observation, WorldError> {
         match self {
-            Self::Simulated { truth, rig, head, .. } => {
+            Self::Simulated { truth, rig, head, outliers, .. } => {
                 let theta = &movement.configuration;
                 Observation::missed(rig.channels().len()).check(rig, truth.joints.len(), theta)?;
-                let observation = match head {
+                let mut observation = match head {
                     Some(head) if !head.sees(&truth.marker_at(theta)) => Observation::missed(rig.channels().len()),
-                    _ => rig.observe(truth, theta, noise),
+                    _ => rig.observe(truth, theta, &draw.noise),
                 };
+                for (channel, reading) in observation.readings.iter_mut().enumerate() {
+                    if let (Some(reading), Some(outliers), true) = (reading, outliers, self.is_outlier(draw, channel)) {
+                        let place = &draw.outliers[channel][1..];
+                        reading.iter_mut().zip(place).for_each(|(x, u)| *x = outliers.box_m * (u - 0.5));
+                    }
+                }
                 observation.check(rig, truth.joints.len(), theta)?;
                 Ok(observation)
             }
@@ -155,7 +186,7 @@ mod tests {
     #[test]
     fn an_unknown_row_is_no_miss() {
         let world = World::Measured { observations: vec![Observation::of([1.0, 2.0, 3.0])] };
-        let at = |row| world.observe(&Movement { configuration: vec![0.0], row }, &[]);
+        let at = |row| world.observe(&Movement { configuration: vec![0.0], row }, &Draw::default());
         assert_eq!(at(Some(0)), Ok(Observation::of([1.0, 2.0, 3.0])));
         assert_eq!(at(Some(1)), Err(WorldError::NoSuchRow { row: 1, rows: 1 }));
         assert_eq!(at(None), Err(WorldError::NotRecorded));
@@ -165,9 +196,10 @@ mod tests {
     fn a_body_beyond_all_numbers_shows_nothing() {
         let mut truth = random_arm(&mut ChaCha8Rng::seed_from_u64(1), 2);
         truth = truth.with_marker(nalgebra::Point3::new(f64::INFINITY, 0.0, 0.0));
-        let world =
-            World::Simulated { truth: Box::new(truth), rig: Arc::new(Rig::tracker(0.1)), head: None, change: None };
-        let shown = world.observe(&Movement { configuration: vec![0.1; 2], row: None }, &[0.0; 3]);
+        let (truth, rig) = (Box::new(truth), Arc::new(Rig::tracker(0.1)));
+        let world = World::Simulated { truth, rig, head: None, change: None, outliers: None };
+        let draw = Draw { noise: vec![0.0; 3], outliers: Vec::new() };
+        let shown = world.observe(&Movement { configuration: vec![0.1; 2], row: None }, &draw);
         assert!(matches!(shown, Err(WorldError::NoMeasurement(_))), "{shown:?}");
     }
 }

@@ -21,7 +21,7 @@ fn random_point(rng: &mut ChaCha8Rng) -> Point3<f64> {
     Point3::from(Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0)))
 }
 
-fn random_pose(rng: &mut ChaCha8Rng) -> Isometry3<f64> {
+pub(crate) fn random_pose(rng: &mut ChaCha8Rng) -> Isometry3<f64> {
     Isometry3::new(random_point(rng).coords, Vector3::from_fn(|_, _| rng.random_range(-1.5..1.5)))
 }
 

@@ -18,6 +18,8 @@ pub struct Layout {
     /// By joint: where its axis stands.
     axes: Vec<Option<Range<usize>>>,
     quantities: Vec<Quantity>,
+    /// Of the hand: whose place is the marker's.
+    hand: Block,
 }
 
 /// What one tangent coordinate measures.
@@ -39,7 +41,12 @@ impl Layout {
         let mut blocks: Vec<Block> = learned.into_iter().filter(|block| block.is_in(state)).collect();
         blocks.sort_unstable();
         blocks.dedup();
-        let mut layout = Self { entries: Vec::new(), axes: vec![None; state.joints.len()], quantities: Vec::new() };
+        let mut layout = Self {
+            entries: Vec::new(),
+            axes: vec![None; state.joints.len()],
+            quantities: Vec::new(),
+            hand: state.hand.block(),
+        };
         for block in blocks {
             let start = layout.quantities.len();
             layout.quantities.extend(block.quantities(state));
@@ -96,9 +103,9 @@ impl Layout {
         Some(range.end - 2..range.end)
     }
 
-    /// Where the marker, the first target, stands if it is learned: three coordinates of its origin.
+    /// Where the marker on the hand stands if it is learned: three coordinates of its origin.
     pub fn marker(&self) -> Option<Range<usize>> {
-        self.block(Block::Target(0)).map(|range| range.start..range.start + 3)
+        self.block(self.hand).map(|range| range.start..range.start + 3)
     }
 
     /// What each tangent coordinate measures, in order.

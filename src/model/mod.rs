@@ -6,7 +6,7 @@
 //! * [`Prior`]: what is known before any measurement, with a full covariance, or anywhere within bounds.
 //! * [`Pass`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
 //!   and not among the kinematics since it is the layout that says which parameters there are.
-//! * [`registration`]: base and marker of a nominal robot, fitted to measurements.
+//! * [`Workspace`]: where predictions of the hand count.
 
 mod block;
 mod element;
@@ -14,8 +14,8 @@ mod layout;
 mod pass;
 mod prior;
 mod rank;
-pub mod registration;
 mod state;
+mod workspace;
 
 pub use block::Block;
 pub use element::{Displacement, Element};
@@ -23,7 +23,8 @@ pub use layout::{Layout, Quantity};
 pub use pass::{Frame, Motion, Pass, jacobian};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
 pub use rank::rank;
-pub use state::{Correction, Device, Place, State, Target};
+pub use state::{Correction, Device, Hand, Place, State, Target};
+pub use workspace::{Workspace, best_motion};
 
 #[cfg(test)]
 pub(crate) mod laws;

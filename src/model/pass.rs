@@ -23,7 +23,7 @@ use nalgebra::{
     Isometry3, Matrix3, Matrix3x2, Matrix3xX, Matrix6xX, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
 };
 
-use super::{Block, Layout, State};
+use super::{Block, Hand, Layout, State};
 use crate::kinematics::{Joint, chart};
 
 /// A rigid motion as a matrix and a shift: `x ↦ R x + t`.
@@ -277,6 +277,13 @@ impl<'a> Pass<'a> {
 pub fn jacobian(state: &State, layout: &Layout, positions: &[f64]) -> (Point3<f64>, Matrix3xX<f64>) {
     let mut h = Matrix3xX::zeros(layout.dimension());
     let mut pass = Pass::new(state, layout);
-    let marker = pass.at(positions).point_columns(0, |coordinate, column| h.set_column(coordinate, &column));
+    pass.at(positions);
+    let marker = match state.hand {
+        Hand::Target(target) => pass.point_columns(target, |coordinate, column| h.set_column(coordinate, &column)),
+        Hand::Device(_) => {
+            h.copy_from(&pass.frame_twists(state.hand.frame()).fixed_rows::<3>(0));
+            pass.pose(state.hand.frame()).translation.vector
+        }
+    };
     (Point3::from(marker), h)
 }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3};
 
-use super::Layout;
+use super::{Block, Frame, Layout};
 use crate::kinematics::Joint;
 
 /// Everything that can be learned: joints from base to hand, and what is placed on links or beside the robot.
@@ -26,6 +26,35 @@ pub struct State {
     pub devices: Vec<Device>,
     /// Places beside the robot, in the frame of the measurements, metres.
     pub sockets: Vec<Point3<f64>>,
+    /// What the robot is asked to bring somewhere: the marker.
+    pub hand: Hand,
+}
+
+/// What of a robot is its hand, so that predictions are of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hand {
+    /// The origin of a target.
+    Target(usize),
+    /// The origin of a device, as of a camera that the hand carries.
+    Device(usize),
+}
+
+impl Hand {
+    /// Its frame.
+    pub fn frame(self) -> Frame {
+        match self {
+            Self::Target(target) => Frame::Target(target),
+            Self::Device(device) => Frame::Device(device),
+        }
+    }
+
+    /// Its block.
+    pub fn block(self) -> Block {
+        match self {
+            Self::Target(target) => Block::Target(target),
+            Self::Device(device) => Block::Device(device),
+        }
+    }
 }
 
 /// What makes a joint's position θ of its reading q: `θ = offset + ratio q + sine sin q + cosine cos q`.
@@ -117,6 +146,7 @@ impl State {
             targets: vec![target],
             devices: Vec::new(),
             sockets: Vec::new(),
+            hand: Hand::Target(0),
         }
     }
 
@@ -130,23 +160,52 @@ impl State {
         self.base * moved
     }
 
-    /// The marker: the first target, `p = base e^{ξ₁θ₁} … e^{ξₙθₙ} p₀`.
+    /// Where a frame is at readings `positions` (rad or m, one per joint), in the frame of the measurements.
+    pub fn frame_at(&self, frame: Frame, positions: &[f64]) -> Isometry3<f64> {
+        let behind = |link: usize, place: Isometry3<f64>| {
+            let moved = (0..link)
+                .rev()
+                .fold(place, |place, index| self.joints[index].exp(self.theta(index, positions)) * place);
+            self.base * moved
+        };
+        match frame {
+            Frame::Link(link) => behind(link, Isometry3::identity()),
+            Frame::Target(target) => behind(self.targets[target].link, self.targets[target].place.frame()),
+            Frame::Device(device) => {
+                let device = &self.devices[device];
+                device.link.map_or(device.pose, |link| behind(link, device.pose))
+            }
+        }
+    }
+
+    /// The marker, which is on the hand: `p = base e^{ξ₁θ₁} … e^{ξₙθₙ} p₀`.
     pub fn marker_at(&self, positions: &[f64]) -> Point3<f64> {
-        self.target_at(0, positions)
+        match self.hand {
+            Hand::Target(target) => self.target_at(target, positions),
+            Hand::Device(_) => Point3::from(self.frame_at(self.hand.frame(), positions).translation.vector),
+        }
     }
 
     /// The marker at θ = 0 in the robot's frame, p₀, metres.
     pub fn marker(&self) -> Point3<f64> {
-        self.targets.first().map_or(Point3::origin(), |target| target.place.origin())
+        match self.hand {
+            Hand::Target(target) => self.targets.get(target).map_or(Point3::origin(), |target| target.place.origin()),
+            Hand::Device(device) => Point3::from(self.devices[device].pose.translation.vector),
+        }
     }
 
     /// The same with the marker at another place, metres.
     pub fn with_marker(mut self, marker: Point3<f64>) -> Self {
-        if let Some(target) = self.targets.first_mut() {
-            target.place = match &target.place {
-                Place::Point(_) => Place::Point(marker),
-                Place::Pose(pose) => Place::Pose(Isometry3::from_parts(marker.coords.into(), pose.rotation)),
-            };
+        match self.hand {
+            Hand::Device(device) => self.devices[device].pose.translation = marker.coords.into(),
+            Hand::Target(target) => {
+                if let Some(target) = self.targets.get_mut(target) {
+                    target.place = match &target.place {
+                        Place::Point(_) => Place::Point(marker),
+                        Place::Pose(pose) => Place::Pose(Isometry3::from_parts(marker.coords.into(), pose.rotation)),
+                    };
+                }
+            }
         }
         self
     }

@@ -2,10 +2,7 @@
 
 use std::fmt;
 
-use crate::{
-    experiment::ExperimentError,
-    model::{PriorError, registration::RegistrationError},
-};
+use crate::{experiment::ExperimentError, model::PriorError};
 
 /// One thing that is wrong in a scenario file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -79,16 +76,6 @@ pub enum ScenarioError {
     /// No learner is named.
     #[error("no learner is named; leave the list out to take the scenario's own")]
     NoLearner,
-    /// The nominal robot does not fit the measurements.
-    #[error("scenario `{scenario}`, seed {seed}: {source}")]
-    Registration {
-        /// The scenario.
-        scenario: String,
-        /// The seed.
-        seed: u64,
-        /// Why.
-        source: RegistrationError,
-    },
     /// The prior is none.
     #[error("scenario `{scenario}`: {source}")]
     Prior {

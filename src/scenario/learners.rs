@@ -14,6 +14,10 @@ pub struct LearnerSpec {
     pub policy: PolicyKind,
     /// Whether its filter adds the scenario's stabilising noise.
     pub stabilising: bool,
+    /// Whether its smoother takes the scenario's loss; otherwise least squares.
+    pub robust: bool,
+    /// Whether it takes the axes for what the description says, and learns the rest.
+    pub holds_axes: bool,
     /// Whether it runs when no learner is named.
     pub by_default: bool,
 }
@@ -169,9 +173,9 @@ impl Scenario {
         let pairs =
             EstimatorKind::ALL.into_iter().flat_map(|estimator| PolicyKind::ALL.map(|policy| (estimator, policy)));
         let named = |(estimator, policy): &(EstimatorKind, PolicyKind)| {
-            self.learners
-                .iter()
-                .any(|spec| (spec.estimator, spec.policy, spec.stabilising) == (*estimator, *policy, true))
+            self.learners.iter().any(|spec| {
+                (spec.estimator, spec.policy, spec.stabilising, spec.robust) == (*estimator, *policy, true, true)
+            })
         };
         pairs
             .filter(|pair| !named(pair))
@@ -191,7 +195,18 @@ impl Scenario {
         let estimator = EstimatorKind::ALL.into_iter().find(|kind| kind.name() == estimator).ok_or_else(unknown)?;
         let policy = PolicyKind::ALL.into_iter().find(|kind| kind.name() == policy).ok_or_else(unknown)?;
         match misfit(estimator, policy, self.setting()) {
-            None => Ok(LearnerSpec { name: name.to_owned(), estimator, policy, stabilising: true, by_default: false }),
+            None => {
+                let name = name.to_owned();
+                Ok(LearnerSpec {
+                    name,
+                    estimator,
+                    policy,
+                    stabilising: true,
+                    robust: true,
+                    holds_axes: false,
+                    by_default: false,
+                })
+            }
             Some(Misfit { what, .. }) => {
                 Err(ScenarioError::Misfit { name: name.to_owned(), what, fitting: self.fitting(estimator, policy) })
             }

@@ -26,12 +26,12 @@ pub use summary::{ScenarioSummary, WorldKind};
 
 use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
-    experiment::{Body, Thresholds},
+    experiment::{Body, Outliers, Thresholds},
     kinematics::JointBox,
     model::{Block, Layout, Quantity, State},
     optimize::Settings,
     selection::{CriterionUnits, Planning, Watch, Weights},
-    sensing::Rig,
+    sensing::{Equipment, Loss, Rig},
 };
 
 /// A validated scenario.
@@ -112,6 +112,12 @@ pub struct Robot {
     pub limits: JointBox,
     /// What it is drawn as.
     pub body: Option<Body>,
+    /// How well targets and cameras that are learned are known.
+    pub known: Vec<(Block, Known)>,
+    /// What its sensors can name.
+    pub equipment: Equipment,
+    /// Whether predictions are judged after the rigid motion that fits best.
+    pub up_to_motion: bool,
 }
 
 /// The world of a scenario.
@@ -125,6 +131,8 @@ pub enum WorldSpec {
         watch: Option<Watch>,
         /// How the body changes during a run, if it does.
         change: Option<Box<ChangeSpec>>,
+        /// Readings that have nothing to do with the robot, if there are any.
+        outliers: Option<Outliers>,
     },
     /// A recorded data set is replayed; the initial estimate is the nominal robot, registered to the training rows.
     Measured {
@@ -170,8 +178,28 @@ pub enum ErrorDraw {
     Anywhere,
 }
 
-/// Prior standard deviations in tangent coordinates.
+/// How well a block other than an axis is known before any measurement: how wrong the initial estimate is, and what the prior
+/// says of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Known {
+    /// Uniform up to these sizes per coordinate, which are also the prior's standard deviations.
+    Within {
+        /// Of lengths, metres.
+        length_m: f64,
+        /// Of angles, radians.
+        angle_rad: f64,
+        /// Of pixels and of plain numbers.
+        other: f64,
+    },
+    /// Nothing but that it is within so many metres of the origin, turned in any way.
+    Anywhere {
+        /// The bound, metres.
+        within_m: f64,
+    },
+}
+
+/// Prior standard deviations in tangent coordinates.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
     /// Of a direction, radians.
     pub direction_rad: f64,
@@ -179,18 +207,32 @@ pub struct Prior {
     pub point_m: f64,
     /// Of the marker, metres.
     pub marker_m: f64,
+    /// Of other blocks, where they are learned.
+    pub known: BTreeMap<Block, Known>,
 }
 
 impl Prior {
+    /// What is known of a block that is neither an axis nor the marker of the robot.
+    pub fn of(&self, block: Block) -> Option<Known> {
+        self.known.get(&block).copied()
+    }
+
     /// The standard deviation of every tangent coordinate.
     pub fn standard_deviations(&self, layout: &Layout) -> DVector<f64> {
         let mut deviations = DVector::zeros(layout.dimension());
         for (block, range) in layout.blocks() {
             for k in range {
-                deviations[k] = match (block, layout.quantities()[k]) {
-                    (Block::Axis(_), Quantity::Length) => self.point_m,
-                    (_, Quantity::Length) => self.marker_m,
-                    _ => self.direction_rad,
+                deviations[k] = match (self.of(block), layout.quantities()[k]) {
+                    (Some(Known::Anywhere { within_m }), Quantity::Length) => within_m / 3_f64.sqrt(),
+                    (Some(Known::Anywhere { .. }), _) => std::f64::consts::PI / 3_f64.sqrt(),
+                    (Some(Known::Within { length_m, .. }), Quantity::Length) => length_m,
+                    (Some(Known::Within { angle_rad, .. }), Quantity::Angle) => angle_rad,
+                    (Some(Known::Within { other, .. }), _) => other,
+                    (None, quantity) => match (block, quantity) {
+                        (Block::Axis(_), Quantity::Length) => self.point_m,
+                        (_, Quantity::Length) => self.marker_m,
+                        _ => self.direction_rad,
+                    },
                 };
             }
         }
@@ -221,6 +263,10 @@ pub struct SmootherSpec {
     pub sigma: f64,
     /// How many hypotheses it keeps and searches.
     pub hypotheses: HypothesisSettings,
+    /// What a reading costs that is far from its prediction.
+    pub loss: Loss,
+    /// Whether it is not told how much noise there is, so that the sensors' σ are units alone.
+    pub noise_unknown: bool,
 }
 
 /// How movements are chosen actively.

@@ -91,9 +91,10 @@ impl Active {
         limits: &'a JointBox,
     ) -> Result<Criterion<'a>, SelectionError> {
         let criterion = Criterion::new(belief, &self.weights)?;
-        let Some(watch) = &self.watch else { return Ok(criterion) };
-        let visibility = watch.visibility(situation.history);
-        let sight = if self.naive { Sight::Predicted(visibility) } else { Sight::Chance(visibility, limits) };
+        let sight = Watch::sight(self.watch.as_ref(), situation, limits).map(|sight| match sight {
+            Sight::Chance(visibility, _) if self.naive => Sight::Predicted(visibility),
+            sight => sight,
+        });
         Ok(criterion.watched(sight))
     }
 

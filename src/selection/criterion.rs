@@ -15,20 +15,23 @@
 //!
 //! The criterion adds square metres and square radians. W decides what a radian is worth.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, Matrix3, Point3};
 
-use super::{Optimality, SelectionError, Visibility, Weights, optimality, prediction::Predictions};
+use super::{Optimality, SelectionError, Visibility, Weights, optimality, prediction::Predictions, views::Views};
 use crate::{
     estimation::Belief,
     kinematics::JointBox,
-    model::{Layout, State, jacobian},
+    model::{Layout, State, Workspace, jacobian},
     sensing::Rig,
 };
 
-/// How a head that watches enters the criterion.
+/// How it enters the criterion that not everything is seen.
 #[derive(Clone, Copy, Debug)]
 pub enum Sight<'a> {
-    /// The gain times the chance of being seen; not finite where that is certainly 0.
+    /// The gain times the chance of being seen, by a head that watches or by the sensors themselves; not finite where that is
+    /// certainly 0.
     Chance(Visibility<'a>, &'a JointBox),
     /// The naive form, for comparison: the plain criterion, not finite unless the *predicted* marker is in view.
     Predicted(Visibility<'a>),
@@ -44,6 +47,8 @@ pub struct Criterion<'a> {
     weights: &'a Weights,
     value: f64,
     sight: Option<Sight<'a>>,
+    /// What states drawn from the belief would see, where the sensors do not see everything.
+    views: Option<Arc<Views>>,
     /// The covariance that visibility is judged by, if it is another than that of the criterion.
     unsure: Option<&'a DMatrix<f64>>,
     optimality: Optimality,
@@ -103,15 +108,22 @@ impl<'a> Criterion<'a> {
             weights,
             value: weights.trace(covariance),
             sight: None,
+            views: None,
             unsure: None,
             optimality: Optimality::A,
             metric: None,
         }
     }
 
-    /// The same where a head watches.
-    pub fn watched(self, sight: Sight<'a>) -> Self {
-        Self { sight: Some(sight), ..self }
+    /// The same where not everything is seen.
+    pub fn watched(self, sight: Option<Sight<'a>>) -> Self {
+        let views = sight.and_then(|sight| sight.views(self.state, self.layout, self.covariance, self.rig));
+        Self { sight, views, ..self }
+    }
+
+    /// The same with what states drawn from the belief would see.
+    pub(super) fn watched_by(self, sight: Sight<'a>, views: Option<Arc<Views>>) -> Self {
+        Self { sight: Some(sight), views, ..self }
     }
 
     /// The same with visibility judged by another covariance: by today's, where the criterion is that of a plan.
@@ -120,7 +132,7 @@ impl<'a> Criterion<'a> {
     }
 
     /// The same by another optimality; `workspace` serves criterion I alone.
-    pub fn by(self, optimality: Optimality, workspace: &[Vec<f64>]) -> Self {
+    pub fn by(self, optimality: Optimality, workspace: &Workspace) -> Self {
         let (mut metric, covariance) = (None, self.covariance);
         let value = match optimality {
             Optimality::A => self.weights.trace(covariance),
@@ -177,8 +189,11 @@ impl<'a> Criterion<'a> {
 
     /// What is predicted of every candidate.
     pub(super) fn predictions<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Predictions {
-        let mut predictions = Predictions::new(self.state, self.layout, self.rig, self.covariance, candidates);
-        if let Some(sight) = &self.sight {
+        let views = self.views.as_deref();
+        let mut predictions = Predictions::new(self.state, self.layout, self.rig, self.covariance, candidates, views);
+        if let (Some(Sight::Chance(visibility, limits)), true) = (&self.sight, views.is_some()) {
+            predictions.discount(|index| visibility.discount(&limits.to_unit(candidates[index].as_ref())));
+        } else if let Some(sight) = &self.sight {
             predictions.seen(self.rig, self.unsure, |index, marker, spread| {
                 sight.chance(candidates[index].as_ref(), marker, spread)
             });
@@ -211,16 +226,33 @@ impl<'a> Criterion<'a> {
         let (marker, h) = jacobian(self.state, self.layout, candidate);
         let spread = &h * self.covariance * h.transpose();
         let spread = spread.fixed_view::<3, 3>(0, 0).into_owned();
-        let chance = self.sight.as_ref().map_or(1.0, |sight| sight.chance(candidate, &marker, &spread));
+        let chance = match (&self.sight, &self.views) {
+            (None, _) => 1.0,
+            (Some(_), Some(_)) => self.predictions(&[candidate]).chance(0),
+            (Some(sight), None) => sight.chance(candidate, &marker, &spread),
+        };
         (marker, spread, chance)
     }
 }
 
 impl Sight<'_> {
+    /// What states drawn from a belief would see, where the sensors do not see everything.
+    pub(super) fn views(
+        &self,
+        state: &State,
+        layout: &Layout,
+        covariance: &DMatrix<f64>,
+        rig: &Rig,
+    ) -> Option<Arc<Views>> {
+        let Self::Chance(visibility, limits) = self else { return None };
+        let misses = visibility.misses().map(|miss| limits.from_unit(miss));
+        rig.has_view().then(|| Arc::new(Views::new(state, layout, covariance, rig, misses)))
+    }
+
     /// p(θ), given the distribution of the predicted marker.
     fn chance(&self, candidate: &[f64], marker: &Point3<f64>, spread: &Matrix3<f64>) -> f64 {
         match self {
-            Self::Predicted(visibility) => f64::from(visibility.head().sees(marker)),
+            Self::Predicted(visibility) => f64::from(visibility.head().is_none_or(|head| head.sees(marker))),
             Self::Chance(visibility, limits) => visibility.chance(&limits.to_unit(candidate), marker, spread),
         }
     }
@@ -276,7 +308,7 @@ mod tests {
     fn equals_what_is_left_of_the_posterior() {
         for seed in 0..40 {
             let (belief, weights, mut rng) = random_belief(seed, 1 + seed as usize % 2);
-            let workspace = candidates(&mut rng, 10);
+            let workspace = Workspace::from(candidates(&mut rng, 10));
             for optimality in [Optimality::A, Optimality::D, Optimality::E, Optimality::I] {
                 let criterion = Criterion::new(&belief, &weights).expect("a covariance").by(optimality, &workspace);
                 let candidates = candidates(&mut rng, 7);
@@ -290,7 +322,7 @@ mod tests {
                         Optimality::I => {
                             let after = belief.clone().with_covariance(posterior);
                             let spread = |theta: &Vec<f64>| after.marker_covariance(theta).expect("kept").trace();
-                            workspace.iter().map(spread).sum::<f64>() / 10.0
+                            workspace.configurations.iter().map(spread).sum::<f64>() / 10.0
                         }
                     };
                     // Lanczos' iteration comes near from below.

@@ -25,6 +25,7 @@ mod prediction;
 mod random;
 mod search;
 mod situation;
+mod views;
 mod visibility;
 mod weights;
 

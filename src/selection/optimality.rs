@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use super::Weights;
-use crate::model::{Layout, State, jacobian};
+use crate::model::{Layout, State, Workspace};
 
 /// What is to become small (Atkinson, Donev, Tobias: *Optimum Experimental Designs*, 2007).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
@@ -27,13 +27,9 @@ pub(super) fn half_log_determinant(covariance: &DMatrix<f64>) -> f64 {
 }
 
 /// Mean of HᵀH over the workspace, H being the marker's (m).
-pub(super) fn prediction_metric(state: &State, layout: &Layout, workspace: &[Vec<f64>]) -> DMatrix<f64> {
-    let m = layout.dimension();
-    let sum = workspace.iter().fold(DMatrix::zeros(m, m), |sum, theta| {
-        let (_, h) = jacobian(state, layout, theta);
-        sum + h.transpose() * h
-    });
-    sum / workspace.len().max(1) as f64
+pub(super) fn prediction_metric(state: &State, layout: &Layout, workspace: &Workspace) -> DMatrix<f64> {
+    let jacobian = workspace.jacobian(state, layout);
+    jacobian.tr_mul(&jacobian) / workspace.configurations.len().max(1) as f64
 }
 
 /// Steps of Lanczos' iteration.

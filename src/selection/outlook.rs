@@ -19,14 +19,17 @@
 //!
 //! so both parts are in the same units, and nothing is left to tune between them. pⱼ is the chance of being seen.
 
+use std::sync::Arc;
+
 use super::{
     Appraisal, Criterion, Optimality, SelectionError, Sight, Weights,
     criterion::in_chunks,
     prediction::{Predictions, told_apart},
+    views::Views,
 };
 use crate::{
     estimation::Belief,
-    model::{Block, Element, Layout, State},
+    model::{Block, Element, Layout, State, Workspace},
     sensing::Rig,
 };
 
@@ -46,7 +49,7 @@ impl<'a> Outlook<'a> {
         belief: &'a Belief,
         weights: &'a Weights,
         optimality: Optimality,
-        workspace: &[Vec<f64>],
+        workspace: &Workspace,
     ) -> Result<Self, SelectionError> {
         let mut hypotheses = vec![(belief.weight(), Criterion::new(belief, weights)?)];
         let mut states = vec![&belief.state];
@@ -116,7 +119,14 @@ impl<'a> Outlook<'a> {
 
     /// The same where a head watches.
     pub fn watched(mut self, sight: Sight<'a>) -> Self {
-        self.hypotheses = self.hypotheses.into_iter().map(|(weight, c)| (weight, c.watched(sight))).collect();
+        self.hypotheses = self.hypotheses.into_iter().map(|(weight, c)| (weight, c.watched(Some(sight)))).collect();
+        self
+    }
+
+    /// The same with what states drawn from every hypothesis would see.
+    pub(super) fn watched_by(mut self, sight: Sight<'a>, views: &[Option<Arc<Views>>]) -> Self {
+        let pairs = self.hypotheses.into_iter().zip(views);
+        self.hypotheses = pairs.map(|((weight, c), views)| (weight, c.watched_by(sight, views.clone()))).collect();
         self
     }
 
@@ -185,9 +195,8 @@ fn squared_distance(a: &State, b: &State, layout: &Layout, weights: &Weights) ->
 }
 
 /// Mean squared distance of predicted markers over the workspace, m².
-fn apart(a: &State, b: &State, workspace: &[Vec<f64>]) -> f64 {
-    let sum: f64 = workspace.iter().map(|theta| (a.marker_at(theta) - b.marker_at(theta)).norm_squared()).sum();
-    sum / workspace.len().max(1) as f64
+fn apart(a: &State, b: &State, workspace: &Workspace) -> f64 {
+    workspace.distance(&workspace.points(a), &workspace.points(b)).map_or(0.0, |(rms, _)| rms * rms)
 }
 
 #[cfg(test)]
@@ -228,7 +237,7 @@ mod tests {
         let rival = belief.state.retract(&belief.layout, &DVector::from_element(m, 0.3));
         belief.covariance = Some(tiny.clone());
         belief.alternatives = vec![Alternative { weight: 0.4, state: rival.clone(), covariance: tiny }];
-        let outlook = Outlook::new(&belief, &weights, Optimality::A, &[]).expect("a covariance");
+        let outlook = Outlook::new(&belief, &weights, Optimality::A, &Workspace::default()).expect("a covariance");
         // θ = 0 shows the marker where it is known to be.
         let nothing = outlook.evaluate(&[vec![0.0; 4]])[0];
         assert!((nothing - outlook.before()).abs() < 1e-6 * outlook.before());

@@ -1,13 +1,17 @@
 //! Selection that plans: the movements that are still needed, chosen together, under all hypotheses.
 
+use std::sync::Arc;
+
 use rand_chacha::ChaCha8Rng;
 
 use super::{
     Actions, Appraisal, Movement, Optimality, Outlook, Partition, Planned, Policy, Search, Selection, SelectionError,
-    Sight, Situation, Watch, Weights, plan::Plan, search::direct,
+    Sight, Situation, Watch, Weights, plan::Plan, search::direct, views::Views,
 };
 use crate::{
+    estimation::Belief,
     kinematics::JointBox,
+    model::Workspace,
     optimize::{Polish, Settings, least, polish},
 };
 
@@ -67,22 +71,25 @@ pub struct Planner {
     weights: Weights,
     search: Settings,
     planning: Planning,
-    workspace: Vec<Vec<f64>>,
+    workspace: Workspace,
     watch: Option<Watch>,
 }
 
 /// Where everything of one choice is looked up.
 struct Scene<'a> {
     planner: &'a Planner,
-    situation: &'a Situation<'a>,
     limits: &'a JointBox,
     /// No movement planned: the belief as it is.
     now: Plan,
+    /// Postures in view, scaled to the unit cube, where the sensors see some only.
+    familiar: Vec<Vec<f64>>,
+    /// What enters that not everything is seen: how, and by hypothesis what states drawn from it would see.
+    sight: Option<(Sight<'a>, Vec<Option<Arc<Views>>>)>,
 }
 
 impl Planner {
     /// Planning by the criterion with `weights`; `workspace` holds the configurations over which criterion I predicts.
-    pub fn new(weights: Weights, search: Settings, planning: Planning, workspace: Vec<Vec<f64>>) -> Self {
+    pub fn new(weights: Weights, search: Settings, planning: Planning, workspace: Workspace) -> Self {
         Self { weights, search, planning, workspace, watch: None }
     }
 
@@ -138,18 +145,27 @@ impl Planner {
 
 impl<'a> Scene<'a> {
     fn new(planner: &'a Planner, situation: &'a Situation<'a>, limits: &'a JointBox) -> Self {
-        Self { planner, situation, limits, now: Plan::new(situation.belief, planner.planning.considered) }
+        let now = Plan::new(situation.belief, planner.planning.considered);
+        let sight = Watch::sight(planner.watch.as_ref(), situation, limits).map(|sight| {
+            let Belief { state, layout, rig, covariance, alternatives } = &now.after;
+            let estimate = covariance.as_ref().map(|covariance| (state, covariance));
+            let others = alternatives.iter().map(|alternative| (&alternative.state, &alternative.covariance));
+            let views = estimate.into_iter().chain(others).map(|(state, p)| sight.views(state, layout, p, rig));
+            (sight, views.collect())
+        });
+        let familiar = match situation.belief.rig.has_view() {
+            true => situation.history.seen().iter().rev().take(planner.planning.polished).cloned().collect(),
+            false => Vec::new(),
+        };
+        Self { planner, limits, now, familiar, sight }
     }
 
     /// The criterion once `plan` is carried out.
     fn outlook<'b>(&'b self, plan: &'b Plan) -> Result<Outlook<'b>, SelectionError> {
-        let Planner { weights, planning, workspace, watch, .. } = self.planner;
+        let Planner { weights, planning, workspace, .. } = self.planner;
         let outlook = Outlook::new(&plan.after, weights, planning.optimality, workspace)?.told(&plan.told());
-        Ok(match watch {
-            Some(watch) => {
-                let visibility = watch.visibility(self.situation.history);
-                outlook.unsure(&self.now.after).watched(Sight::Chance(visibility, self.limits))
-            }
+        Ok(match &self.sight {
+            Some((sight, views)) => outlook.unsure(&self.now.after).watched_by(*sight, views),
             None => outlook,
         })
     }
@@ -232,8 +248,11 @@ impl<'a> Scene<'a> {
         let leaves = found.leaves.iter().filter_map(|leaf| Some((leaf.value?, leaf.centre.as_slice())));
         let mut starts: Vec<(f64, &[f64])> = leaves.collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let polished = starts.into_iter().take(planning.polished.max(1));
-        let best = least(polished.map(|(_, start)| polish(start, planning.polish, &mut evaluate)));
+        starts.truncate(planning.polished.max(1));
+        // What is in view may be too small a part of the box for DIRECT to come upon.
+        let familiar: Vec<&[f64]> = self.familiar.iter().map(Vec::as_slice).collect();
+        let polished = starts.into_iter().map(|(_, start)| start).chain(familiar);
+        let best = least(polished.map(|start| polish(start, planning.polish, &mut evaluate)));
         partition.get_or_insert(found);
         Ok(best.map(|(point, _)| self.limits.from_unit(&point)))
     }

@@ -6,6 +6,7 @@
 
 use nalgebra::{Cholesky, Const, DMatrix, DefaultAllocator, Dim, Dyn, Matrix3, OMatrix, Point3, allocator::Allocator};
 
+use super::views::Views;
 use crate::{
     model::{Layout, Pass, State},
     sensing::Rig,
@@ -28,24 +29,29 @@ pub(super) struct Predictions {
 }
 
 impl Predictions {
-    /// Of `candidates` (joint positions, rad or m) for a belief in `state` with `covariance`. Every candidate is seen for
-    /// certain until [`seen`](Self::seen) says otherwise.
+    /// Of `candidates` (joint positions, rad or m) for a belief in `state` with `covariance`, seen as `views` tells; without
+    /// them for certain, until [`seen`](Self::seen) says otherwise.
     pub fn new<C: AsRef<[f64]>>(
         state: &State,
         layout: &Layout,
         rig: &Rig,
         covariance: &DMatrix<f64>,
         candidates: &[C],
+        views: Option<&Views>,
     ) -> Self {
         let (m, d) = (layout.dimension(), rig.equations());
         let mut rows = DMatrix::zeros(m, d * candidates.len());
         let mut readings = vec![0.0; d * candidates.len()];
+        let mut chances = vec![1.0; candidates.len()];
         let mut pass = Pass::new(state, layout);
         for (index, candidate) in candidates.iter().enumerate() {
             pass.at(candidate.as_ref());
             let place = index * d..(index + 1) * d;
             let columns = &mut rows.as_mut_slice()[place.start * m..place.end * m];
             rig.rows(&pass, &mut readings[place], columns);
+            if let Some(views) = views {
+                chances[index] = views.weigh(rig, candidate.as_ref(), columns);
+            }
         }
         let gains = covariance * &rows;
         let spreads = if d == 3 {
@@ -53,7 +59,6 @@ impl Predictions {
         } else {
             products(Dyn(d), &rows, &gains, candidates.len())
         };
-        let chances = vec![1.0; candidates.len()];
         Self { d, readings, rows, gains, spreads, chances }
     }
 
@@ -79,6 +84,11 @@ impl Predictions {
             let marker = Point3::from_slice(&self.readings[at..at + 3]);
             self.chances[index] = chance(index, &marker, &spread);
         }
+    }
+
+    /// The same with every chance multiplied by a factor.
+    pub fn discount(&mut self, factor: impl Fn(usize) -> f64) {
+        self.chances.iter_mut().enumerate().for_each(|(index, chance)| *chance *= factor(index));
     }
 
     /// How many candidates.

@@ -3,9 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::{
-    Actions, Appraisal, Criterion, Movement, Policy, Selection, SelectionError, Sight, Situation, Watch, Weights,
-};
+use super::{Actions, Appraisal, Criterion, Movement, Policy, Selection, SelectionError, Situation, Watch, Weights};
 use crate::kinematics::JointBox;
 
 /// Draws uniformly inside the limits, or from what is left of a pool (which shuffles it).
@@ -42,10 +40,6 @@ impl Policy for Random {
         configuration: &[f64],
     ) -> Result<Appraisal, SelectionError> {
         let criterion = Criterion::new(situation.belief, &self.weights)?;
-        let criterion = match &self.watch {
-            Some(watch) => criterion.watched(Sight::Chance(watch.visibility(situation.history), limits)),
-            None => criterion,
-        };
-        criterion.appraise(configuration)
+        criterion.watched(Watch::sight(self.watch.as_ref(), situation, limits)).appraise(configuration)
     }
 }

@@ -21,6 +21,7 @@ pub struct Situation<'a> {
 pub struct History {
     has_moved: bool,
     misses: VecDeque<Vec<f64>>,
+    seen: VecDeque<Vec<f64>>,
     plan: Option<Planned>,
 }
 
@@ -44,10 +45,11 @@ impl History {
     /// A movement was made.
     pub fn moved(&mut self, movement: &Movement, actions: &Actions, observation: &Observation) {
         self.has_moved = true;
-        if let (Actions::Box(limits), true) = (actions, observation.is_miss()) {
-            self.misses.push_back(limits.to_unit(&movement.configuration));
-            if self.misses.len() > MEMORY {
-                self.misses.pop_front();
+        if let Actions::Box(limits) = actions {
+            let latest = if observation.is_miss() { &mut self.misses } else { &mut self.seen };
+            latest.push_back(limits.to_unit(&movement.configuration));
+            if latest.len() > MEMORY {
+                latest.pop_front();
             }
         }
     }
@@ -65,6 +67,11 @@ impl History {
     /// The latest movements after which nothing was seen, scaled to the unit cube of the joint box.
     pub fn misses(&self) -> &VecDeque<Vec<f64>> {
         &self.misses
+    }
+
+    /// The latest movements after which anything was seen, scaled likewise.
+    pub fn seen(&self) -> &VecDeque<Vec<f64>> {
+        &self.seen
     }
 
     /// The plan of the latest proposal.

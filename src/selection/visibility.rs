@@ -1,25 +1,32 @@
-//! Whether the marker will be seen: the weight of a movement's gain when a head watches.
+//! Whether the marker will be seen: the weight of a movement's gain when a head watches, and what misses teach.
 
 use std::collections::VecDeque;
 
 use nalgebra::{Matrix3, Point3};
 
-use super::{History, Selection, SelectionError};
-use crate::sensing::Head;
+use super::{History, Selection, SelectionError, Sight, Situation};
+use crate::{kinematics::JointBox, sensing::Head};
 
-/// What is known of the head that watches; every learner of a scenario is told the same.
+/// What is known of what can be seen; every learner of a scenario is told the same.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Watch {
-    /// The head.
-    pub head: Head,
-    /// A configuration at which the marker is known to be seen, rad or m.
+    /// The head that watches; without one the sensors see what they see by themselves.
+    pub head: Option<Head>,
+    /// A configuration at which something is known to be seen, rad or m.
     pub visible_pose: Vec<f64>,
 }
 
 impl Watch {
-    /// What is believed to be in view after what happened so far.
-    pub fn visibility<'a>(&'a self, history: &'a History) -> Visibility<'a> {
-        Visibility::new(&self.head, history.misses())
+    /// How what is seen enters the criterion in a situation: by the head that watches, if there is one, or by what the
+    /// sensors themselves can see. `None` where everything is seen.
+    pub(super) fn sight<'a>(
+        watch: Option<&'a Self>,
+        situation: &Situation<'a>,
+        limits: &'a JointBox,
+    ) -> Option<Sight<'a>> {
+        let head = watch.and_then(|watch| watch.head.as_ref());
+        let matters = head.is_some() || situation.belief.rig.has_view();
+        matters.then(|| Sight::Chance(Visibility::new(head, situation.history.misses()), limits))
     }
 
     /// The first movement of all, where anybody watches: to where the marker is known to be seen.
@@ -43,7 +50,7 @@ const RADIUS: f64 = 0.15;
 pub(super) const MEMORY: usize = 50;
 /// κ², by which the believed covariance of the marker is widened: linearised at a poor estimate it is too small. Of 4, 9
 /// and 16 four served best (`head-fov`, seeds 1001 to 1040); 1 and 2 did no better on a first look.
-const CAUTION: f64 = 4.0;
+pub(super) const CAUTION: f64 = 4.0;
 
 /// The chance that the marker is seen after a movement, as believed before it:
 ///
@@ -57,30 +64,37 @@ const CAUTION: f64 = 4.0;
 /// the same movement again and again.
 #[derive(Clone, Copy, Debug)]
 pub struct Visibility<'a> {
-    head: &'a Head,
+    head: Option<&'a Head>,
     /// The latest misses, scaled to the unit cube.
     misses: &'a VecDeque<Vec<f64>>,
 }
 
 impl<'a> Visibility<'a> {
-    /// Of what `head` sees, with the misses that there were.
-    pub fn new(head: &'a Head, misses: &'a VecDeque<Vec<f64>>) -> Self {
+    /// Of what `head` sees, or without one of all, with the misses that there were.
+    pub fn new(head: Option<&'a Head>, misses: &'a VecDeque<Vec<f64>>) -> Self {
         Self { head, misses }
     }
 
     /// The head that watches.
-    pub fn head(&self) -> &'a Head {
+    pub fn head(&self) -> Option<&'a Head> {
         self.head
+    }
+
+    /// The latest misses, scaled to the unit cube.
+    pub fn misses(&self) -> impl Iterator<Item = &'a Vec<f64>> + use<'a> {
+        self.misses.iter()
     }
 
     /// The chance of seeing the marker, predicted as N(`marker`, `covariance`), at a configuration scaled to the unit
     /// cube.
     pub fn chance(&self, scaled: &[f64], marker: &Point3<f64>, covariance: &Matrix3<f64>) -> f64 {
-        let believed = self.head.chance(marker, &(covariance * CAUTION));
-        if believed == 0.0 {
-            return 0.0;
-        }
-        self.misses.iter().fold(believed, |chance, miss| {
+        let believed = self.head.map_or(1.0, |head| head.chance(marker, &(covariance * CAUTION)));
+        if believed == 0.0 { 0.0 } else { believed * self.discount(scaled) }
+    }
+
+    /// The factor by which the latest misses lower the chance at a configuration scaled to the unit cube.
+    pub fn discount(&self, scaled: &[f64]) -> f64 {
+        self.misses.iter().fold(1.0, |chance, miss| {
             let squared: f64 = scaled.iter().zip(miss).map(|(a, b)| (a - b).powi(2)).sum();
             chance * -(-0.5 * squared / (RADIUS * RADIUS)).exp_m1()
         })
@@ -115,7 +129,7 @@ mod tests {
             history.moved(&movement(at), &Actions::Box(limits.clone()), &Observation::missed(1));
         };
         let chance = |history: &History, at: f64| {
-            let visibility = Visibility::new(&head, history.misses());
+            let visibility = Visibility::new(Some(&head), history.misses());
             visibility.chance(&[at, 0.5], &Point3::new(1.0, 0.0, 0.0), &Matrix3::zeros())
         };
         assert_eq!(chance(&history, 0.5), 1.0);

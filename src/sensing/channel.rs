@@ -2,9 +2,6 @@
 
 use std::{fmt, sync::Arc};
 
-use nalgebra::Point3;
-use serde::{Deserialize, Serialize};
-
 use crate::model::{Pass, State};
 
 /// One kind of reading: what a model predicts for it, and how predictions differ from what was measured.
@@ -19,8 +16,13 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// σ, in the unit of the reading: the nominal standard deviation of its noise.
     fn sigma(&self) -> f64;
 
-    /// The same channel with another σ.
+    /// The same channel with another σ, and other noises in proportion.
     fn with_sigma(&self, sigma: f64) -> Arc<dyn Channel>;
+
+    /// The same channel with every noise so many times as large; one factor for each of [`noises`](Self::noises).
+    fn scaled(&self, factors: &[f64]) -> Arc<dyn Channel> {
+        self.with_sigma(self.sigma() * factors.first().copied().unwrap_or(1.0))
+    }
 
     /// Writes the predicted reading h (d numbers, in the channel's own units) at `positions` (rad or m per joint); false
     /// where there is none, as for a point behind a camera.
@@ -36,64 +38,27 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// What is read where `reading` would be without noise: y = h ⊕ L v, with v standard normal (d numbers).
     fn disturb(&self, reading: &mut [f64], v: &[f64]);
 
+    /// How many kinds of noise a reading has, each with a σ of its own in proportion to [`sigma`](Self::sigma): the equations
+    /// are so many equal parts, one after the other. A scale of the noise is learned for each.
+    fn noises(&self) -> usize {
+        1
+    }
+
+    /// How far what is measured is inside what the sensor can see, radians: negative outside, continuous. `None` where the
+    /// sensor sees everything.
+    fn clearance(&self, state: &State, positions: &[f64]) -> Option<f64> {
+        let _ = (state, positions);
+        None
+    }
+
+    /// Whether [`clearance`](Self::clearance) is ever told.
+    fn has_view(&self) -> bool {
+        false
+    }
+
     /// The target whose position this channel measures, if it does.
     fn target(&self) -> Option<usize> {
         None
-    }
-}
-
-/// What a scenario may say of a sensor. A channel takes the keys that it knows and refuses the others.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Keys {
-    /// Which channel; `position` unless told otherwise.
-    pub channel: Option<String>,
-    /// Standard deviation of the noise, metres.
-    pub sigma_m: Option<f64>,
-    /// A fixed point in the frame of the measurements, three coordinates in metres.
-    pub to_m: Option<Vec<f64>>,
-}
-
-/// What is wrong with the keys of a sensor.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("`{key}`: {what}")]
-pub struct KeyError {
-    /// The key.
-    pub key: String,
-    /// What is wrong.
-    pub what: String,
-    /// How to mend it.
-    pub mend: String,
-}
-
-impl Keys {
-    pub(super) fn sigma_m(&self) -> Result<f64, KeyError> {
-        let error = |what: String, mend: &str| KeyError { key: "sigma_m".to_owned(), what, mend: mend.to_owned() };
-        let sigma = self.sigma_m.ok_or_else(|| error("missing".to_owned(), "add `sigma_m = …`, in metres"))?;
-        let holds = sigma.is_finite() && sigma >= 0.0;
-        holds
-            .then_some(sigma)
-            .ok_or_else(|| error(format!("{sigma} is out of range"), "write a number that is 0 or more"))
-    }
-
-    pub(super) fn to_m(&self) -> Result<Point3<f64>, KeyError> {
-        let given = self.to_m.as_deref().unwrap_or_default();
-        let is_point = given.len() == 3 && given.iter().all(|x| x.is_finite());
-        let what = self.to_m.as_ref().map_or("missing".to_owned(), |given| format!("{given:?} is no point"));
-        let mend = "write `to_m = [x, y, z]`, in metres, in the frame of the measurements".to_owned();
-        let error = || KeyError { key: "to_m".to_owned(), what, mend };
-        is_point.then(|| Point3::from_slice(given)).ok_or_else(error)
-    }
-
-    /// Refuses keys that a channel has no use for.
-    pub(super) fn only(&self, known: &[&str]) -> Result<(), KeyError> {
-        let given = serde_json::to_value(self).unwrap_or_default();
-        let given = given.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
-        let unknown = given.map(|(key, _)| key).find(|key| *key != "channel" && !known.contains(&key.as_str()));
-        unknown.map_or(Ok(()), |key| {
-            let what = "this channel has no use for it".to_owned();
-            Err(KeyError { key: key.clone(), what, mend: format!("remove it; the keys here are {}", known.join(", ")) })
-        })
     }
 }
 
@@ -106,10 +71,12 @@ macro_rules! channels {
         pub const CHANNELS: &[&str] = &[$(stringify!($module)),*];
 
         impl Keys {
-            /// The channel that these keys describe.
-            pub fn channel(&self) -> Result<std::sync::Arc<dyn Channel>, KeyError> {
+            /// The channel that these keys describe, of a robot with this equipment.
+            pub fn channel(&self, equipment: &Equipment) -> Result<std::sync::Arc<dyn Channel>, KeyError> {
                 match self.channel.as_deref().unwrap_or(CHANNELS[0]) {
-                    $(stringify!($module) => $Type::from_keys(self).map(|it| std::sync::Arc::new(it) as _),)*
+                    $(stringify!($module) => {
+                        $Type::from_keys(self, equipment).map(|it| std::sync::Arc::new(it) as _)
+                    })*
                     other => Err(KeyError {
                         key: "channel".to_owned(),
                         what: format!("there is no channel `{other}`"),

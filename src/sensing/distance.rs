@@ -1,16 +1,18 @@
-//! The distance of the marker from a fixed point: `y = ‖p(θ) − a‖ + v`, `v ~ N(0, σ²)`, one equation. A laser, or a cable
+//! The distance of a target from a fixed point: `y = ‖p(θ) − a‖ + v`, `v ~ N(0, σ²)`, one equation. A laser, or a cable
 //! with an encoder.
 
 use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use super::{Channel, KeyError, Keys};
+use super::{Channel, Equipment, KeyError, Keys};
 use crate::model::{Pass, State};
 
-/// The distance of the marker, the first target, from a point whose place is known, metres.
+/// The distance of a target from a point whose place is known, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distance {
+    /// Which target.
+    pub target: usize,
     /// a, in the frame of the measurements, metres.
     pub to: Point3<f64>,
     /// Standard deviation of the noise, metres.
@@ -18,16 +20,17 @@ pub struct Distance {
 }
 
 impl Distance {
-    pub(super) fn from_keys(keys: &Keys) -> Result<Self, KeyError> {
-        keys.only(&["sigma_m", "to_m"])?;
-        Ok(Self { to: keys.to_m()?, sigma_m: keys.sigma_m()? })
+    pub(super) fn from_keys(keys: &Keys, equipment: &Equipment) -> Result<Self, KeyError> {
+        keys.only(&["target", "sigma_m", "to_m"])?;
+        Ok(Self { target: keys.target(equipment)?.0, to: keys.to_m()?, sigma_m: keys.sigma_m()? })
     }
 
     #[cfg(test)]
-    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, _state: &State) -> Self {
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Self {
         use rand::RngExt;
+        let target = rng.random_range(0..state.targets.len());
         let to = Point3::from(nalgebra::Vector3::from_fn(|_, _| rng.random_range(-2.0..2.0)));
-        Self { to, sigma_m: rng.random_range(0.001..0.1) }
+        Self { target, to, sigma_m: rng.random_range(0.001..0.1) }
     }
 }
 
@@ -45,7 +48,7 @@ impl Channel for Distance {
     }
 
     fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        reading[0] = (state.marker_at(positions) - self.to).norm();
+        reading[0] = (state.target_at(self.target, positions) - self.to).norm();
         reading[0] > 0.0
     }
 
@@ -54,14 +57,14 @@ impl Channel for Distance {
     }
 
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-        let away = pass.target(0) - self.to.coords;
+        let away = pass.target(self.target) - self.to.coords;
         reading[0] = away.norm();
         // At the point itself every direction leads away from it.
         if reading[0] <= 0.0 {
             return false;
         }
         let slope = away / (reading[0] * self.sigma_m);
-        pass.point_columns(0, |coordinate, column| rows[coordinate] = slope.dot(&column));
+        pass.point_columns(self.target, |coordinate, column| rows[coordinate] = slope.dot(&column));
         true
     }
 

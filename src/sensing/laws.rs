@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{CHANNELS, Rig, examples};
+use super::{CHANNELS, Observation, Rig, examples};
 use crate::model::{
     Layout, Pass,
     laws::{all_blocks, random_state},
@@ -95,7 +95,21 @@ fn a_rig_stacks_its_channels() {
     let rig = Rig::new(channels);
     let positions = [0.3, -0.2, 0.9, 1.1, -0.4];
     let v: Vec<f64> = (0..rig.equations()).map(|_| rng.sample(StandardNormal)).collect();
-    let mut observation = rig.observe(&state, &positions, &v);
+    // Of what is in view and of what is not: readings are made by hand.
+    let mut start = 0;
+    let readings = rig.channels().iter().map(|channel| {
+        let mut reading = vec![0.0; channel.equations()];
+        assert!(channel.predict(&state, &positions, &mut reading));
+        channel.disturb(&mut reading, &v[start..start + channel.equations()]);
+        start += channel.equations();
+        Some(reading)
+    });
+    let mut observation = Observation { readings: readings.collect() };
+    let mut clearances = vec![0.0; rig.channels().len()];
+    rig.clearances(&state, &positions, &mut clearances);
+    for (reading, clearance) in rig.observe(&state, &positions, &v).readings.iter().zip(&clearances) {
+        assert_eq!(reading.is_some(), *clearance >= 0.0, "what is in view is seen");
+    }
     let equations = rig.equations_of(&state, &layout, &positions, &observation);
     assert_eq!(equations.rows.shape(), (layout.dimension(), rig.equations()));
     assert!(equations.residual.iter().zip(&v).all(|(found, v)| (found - v).abs() < 1e-6));

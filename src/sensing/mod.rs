@@ -3,25 +3,36 @@
 //! * [`Channel`]: one kind of reading, whitened at the source; the list below names all there are.
 //! * [`Rig`]: the channels of a robot together, and what they say at one posture.
 //! * [`Observation`]: the readings of one movement; a channel may have none.
+//! * [`Keys`]: what a scenario may say of a sensor; [`Equipment`]: what it can name.
+//! * [`Loss`]: what a reading costs that is far from its prediction.
 //! * [`Head`]: a camera head that follows the marker; where it cannot, the movement is a miss.
 //!
 //! An *equation* is a scalar, a *reading* is one channel at one movement.
 
 mod channel;
 mod head;
+mod keys;
 #[cfg(test)]
 mod laws;
+mod loss;
 mod observation;
 mod rig;
 
-pub use channel::{Channel, KeyError, Keys};
+pub use channel::Channel;
 pub use head::{Gaze, Head};
+pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
+pub use loss::{Graduated, Loss};
 pub use observation::{Observation, Refused};
-pub use rig::{Equations, Rig};
+pub use pixels::{Facing, NEAR};
+pub use rig::{Equations, Noise, Rig};
 
 channel::channels! {
     /// Where a target is, three coordinates.
     position::Position,
-    /// How far the marker is from a fixed point.
+    /// Where a target is and how it is turned, six numbers.
+    pose::Pose,
+    /// Where the points of a target are in a camera's picture.
+    pixels::Pixels,
+    /// How far a target is from a fixed point.
     distance::Distance,
 }

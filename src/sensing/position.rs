@@ -1,8 +1,10 @@
-//! The position of a target: `y = p(θ) + v`, `v ~ N(0, σ² I)`, three equations.
+//! The position of a target: `y = p(θ) + v`, `v ~ N(0, σ² I)` or `N(0, L Lᵀ)`, three equations.
 
 use std::sync::Arc;
 
-use super::{Channel, KeyError, Keys};
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Channel, Equipment, KeyError, Keys};
 use crate::model::{Pass, State};
 
 /// A tracker of a target's position in space, metres, in the frame of the measurements.
@@ -10,25 +12,71 @@ use crate::model::{Pass, State};
 pub struct Position {
     /// Which target.
     pub target: usize,
-    /// Standard deviation of the noise per coordinate, metres.
+    /// Standard deviation of the noise per coordinate, metres; of a full covariance √(tr/3).
     pub sigma_m: f64,
+    /// L/σ, lower triangular, and its inverse, if the noise is not the same in all directions.
+    shape: Option<(Matrix3<f64>, Matrix3<f64>)>,
 }
 
 impl Position {
     /// The tracker of the marker, the first target.
     pub fn of_marker(sigma_m: f64) -> Self {
-        Self { target: 0, sigma_m }
+        Self::of(0, sigma_m)
     }
 
-    pub(super) fn from_keys(keys: &Keys) -> Result<Self, KeyError> {
-        keys.only(&["sigma_m"])?;
-        Ok(Self::of_marker(keys.sigma_m()?))
+    /// The tracker of a target.
+    pub fn of(target: usize, sigma_m: f64) -> Self {
+        Self { target, sigma_m, shape: None }
+    }
+
+    /// The tracker of a target with noise of this covariance (m²); `None` if it is not positive.
+    pub fn with_covariance(target: usize, covariance: &Matrix3<f64>) -> Option<Self> {
+        let sigma_m = (covariance.trace() / 3.0).sqrt();
+        let root = covariance.cholesky()?.l() / sigma_m;
+        Some(Self { target, sigma_m, shape: Some((root, root.try_inverse()?)) })
+    }
+
+    pub(super) fn from_keys(keys: &Keys, equipment: &Equipment) -> Result<Self, KeyError> {
+        keys.only(&["target", "sigma_m", "covariance_m2"])?;
+        let (target, _) = keys.target(equipment)?;
+        match keys.covariance_m2()? {
+            Some(covariance) if keys.sigma_m.is_none() => {
+                let error = || KeyError {
+                    key: "covariance_m2".to_owned(),
+                    what: "it is not positive".to_owned(),
+                    mend: "write a positive matrix".to_owned(),
+                };
+                Self::with_covariance(target, &covariance).ok_or_else(error)
+            }
+            Some(_) => Err(KeyError {
+                key: "sigma_m".to_owned(),
+                what: "the covariance says how much noise there is".to_owned(),
+                mend: "remove `sigma_m` or `covariance_m2`".to_owned(),
+            }),
+            None => Ok(Self::of(target, keys.sigma_m()?)),
+        }
+    }
+
+    /// L⁻¹ x.
+    #[inline]
+    fn whiten(&self, x: Vector3<f64>) -> Vector3<f64> {
+        let weight = self.sigma_m.recip();
+        match &self.shape {
+            None => x * weight,
+            Some((_, inverse)) => inverse * x * weight,
+        }
     }
 
     #[cfg(test)]
     pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Self {
         use rand::RngExt;
-        Self { target: rng.random_range(0..state.targets.len()), sigma_m: rng.random_range(0.001..0.1) }
+        let target = rng.random_range(0..state.targets.len());
+        if rng.random() {
+            return Self::of(target, rng.random_range(0.001..0.1));
+        }
+        let root = Matrix3::from_fn(|_, _| rng.random_range(-0.1..0.1)) + Matrix3::identity() * 0.02;
+        let covariance = root * root.transpose() + Matrix3::identity() * 1e-4;
+        Self::with_covariance(target, &covariance).expect("positive")
     }
 }
 
@@ -51,25 +99,27 @@ impl Channel for Position {
     }
 
     fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
-        let weight = self.sigma_m.recip();
-        whitened.iter_mut().zip(y).zip(h).for_each(|((whitened, y), h)| *whitened = (y - h) * weight);
+        let difference = Vector3::from_column_slice(y) - Vector3::from_column_slice(h);
+        whitened.copy_from_slice(self.whiten(difference).as_slice());
     }
 
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-        let weight = self.sigma_m.recip();
         let (first, rest) = rows.split_at_mut(rows.len() / 3);
         let (second, third) = rest.split_at_mut(first.len());
         let point = pass.point_columns(self.target, |coordinate, column| {
-            first[coordinate] = column.x * weight;
-            second[coordinate] = column.y * weight;
-            third[coordinate] = column.z * weight;
+            let column = self.whiten(column);
+            first[coordinate] = column.x;
+            second[coordinate] = column.y;
+            third[coordinate] = column.z;
         });
         reading.copy_from_slice(point.as_slice());
         true
     }
 
     fn disturb(&self, reading: &mut [f64], v: &[f64]) {
-        reading.iter_mut().zip(v).for_each(|(reading, v)| *reading += self.sigma_m * v);
+        let v = Vector3::from_column_slice(v) * self.sigma_m;
+        let noise = self.shape.as_ref().map_or(v, |(root, _)| root * v);
+        reading.iter_mut().zip(&noise).for_each(|(reading, noise)| *reading += noise);
     }
 
     fn target(&self) -> Option<usize> {

@@ -13,7 +13,18 @@ pub struct Rig {
     channels: Vec<Arc<dyn Channel>>,
     /// Where each channel's equations stand among all.
     places: Vec<Range<usize>>,
+    /// All kinds of noise, channel by channel.
+    noises: Vec<Noise>,
     marker: Option<usize>,
+}
+
+/// One kind of noise of a channel: the equations that share a σ.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Noise {
+    /// The channel.
+    pub channel: usize,
+    /// Its equations among those of the channel.
+    pub part: Range<usize>,
 }
 
 /// What an observation says of a state: `residual ≈ H δ + v`, `v ~ N(0, I)`.
@@ -35,7 +46,13 @@ impl Rig {
             start += channel.equations();
         }
         let marker = channels.iter().position(|channel| channel.target() == Some(0));
-        Self { channels, places, marker }
+        let noises = channels.iter().enumerate().flat_map(|(index, channel)| {
+            let count = channel.noises().max(1);
+            let size = channel.equations() / count;
+            (0..count).map(move |noise| Noise { channel: index, part: noise * size..(noise + 1) * size })
+        });
+        let noises = noises.collect();
+        Self { channels, places, noises, marker }
     }
 
     /// A tracker of the marker alone, with so much noise per coordinate (metres).
@@ -46,6 +63,32 @@ impl Rig {
     /// The channels in order.
     pub fn channels(&self) -> &[Arc<dyn Channel>] {
         &self.channels
+    }
+
+    /// All kinds of noise, channel by channel.
+    pub fn noises(&self) -> &[Noise] {
+        &self.noises
+    }
+
+    /// The same channels with each kind of noise so many times as large.
+    pub fn scaled(&self, factors: &[f64]) -> Self {
+        let of = |index: usize| {
+            let of_channel = self.noises.iter().zip(factors).filter(|(noise, _)| noise.channel == index);
+            of_channel.map(|(_, factor)| *factor).collect::<Vec<f64>>()
+        };
+        Self::new(self.channels.iter().enumerate().map(|(index, channel)| channel.scaled(&of(index))).collect())
+    }
+
+    /// Whether any channel sees some postures only.
+    pub fn has_view(&self) -> bool {
+        self.channels.iter().any(|channel| channel.has_view())
+    }
+
+    /// Writes for every channel how far what it measures is inside what it can see, radians; infinite where it sees everything.
+    pub fn clearances(&self, state: &State, positions: &[f64], clearances: &mut [f64]) {
+        for (channel, clearance) in self.channels.iter().zip(clearances) {
+            *clearance = channel.clearance(state, positions).unwrap_or(f64::INFINITY);
+        }
     }
 
     /// Equations of a movement of which nothing is missed, d.
@@ -184,24 +227,39 @@ impl Rig {
 
     /// ‖L⁻¹ (y ⊖ h)‖² of an observation.
     pub fn squared_error(&self, state: &State, positions: &[f64], observation: &Observation) -> f64 {
-        let (mut sum, mut predicted, mut whitened) = (0.0, Scratch::default(), Scratch::default());
-        for (channel, reading) in self.channels.iter().zip(&observation.readings) {
+        let mut sum = 0.0;
+        self.residuals(state, positions, observation, |_, whitened| {
+            sum += whitened.iter().map(|x| x * x).sum::<f64>();
+        });
+        sum
+    }
+
+    /// Hands L⁻¹ (y ⊖ h) of every reading that there is to `each`, with its channel.
+    pub fn residuals(
+        &self,
+        state: &State,
+        positions: &[f64],
+        observation: &Observation,
+        mut each: impl FnMut(usize, &[f64]),
+    ) {
+        let (mut predicted, mut whitened) = (Scratch::default(), Scratch::default());
+        for (index, (channel, reading)) in self.channels.iter().zip(&observation.readings).enumerate() {
             let Some(reading) = reading else { continue };
             let (predicted, whitened) = (predicted.take(reading.len()), whitened.take(reading.len()));
             if channel.predict(state, positions, predicted) {
                 channel.difference(reading, predicted, whitened);
-                sum += whitened.iter().map(|x| x * x).sum::<f64>();
+                each(index, whitened);
             }
         }
-        sum
     }
 
-    /// What is observed of a robot that is as `state` says: its readings at `positions`, with `v` (d standard normal
+    /// What is observed of a robot that is as `state` says: its readings at `positions` of what is in view, with `v` (d standard normal
     /// numbers) as noise.
     pub fn observe(&self, state: &State, positions: &[f64], v: &[f64]) -> Observation {
         let reading = |(channel, place): (&Arc<dyn Channel>, &Range<usize>)| {
             let mut reading = vec![0.0; channel.equations()];
-            channel.predict(state, positions, &mut reading).then(|| {
+            let in_view = channel.clearance(state, positions).is_none_or(|clearance| clearance >= 0.0);
+            (in_view && channel.predict(state, positions, &mut reading)).then(|| {
                 channel.disturb(&mut reading, &v[place.clone()]);
                 reading
             })

@@ -125,7 +125,6 @@ impl From<ScenarioError> for Problem {
             | ScenarioError::Misfit { .. }
             | ScenarioError::RepeatedLearner(_)
             | ScenarioError::NoLearner => "learners",
-            ScenarioError::Registration { .. } => "seed",
             ScenarioError::Invalid { .. } | ScenarioError::Prior { .. } | ScenarioError::Experiment(_) => {
                 return Self::new(Kind::EngineFailed, error.to_string());
             }

@@ -51,19 +51,25 @@ impl Hypotheses {
         self.modes = self.modes.iter().filter_map(|mode| posterior.mode(&mode.state, layout, WARM)).collect();
     }
 
-    /// Searches new modes, half of them from the prior, half of them from the modes there are.
+    /// Searches new modes, half of them from the prior, half of them from the modes there are. Where readings may be outliers,
+    /// half of these suspect some of the readings: they begin where all others are explained.
     pub fn spawn(&mut self, count: usize, posterior: &Posterior, layout: &Layout, rng: &mut impl Rng) {
         let best = self.modes.iter().map(|mode| mode.cost).fold(f64::INFINITY, f64::min);
         let effort = Effort { hopeless: (best + HOPELESS) * 10.0 + 1e3, ..COLD };
         let before = self.modes.len();
         for index in 0..count {
+            if posterior.loss.is_robust() && index % 4 == 1 && before > 0 {
+                let start = &self.modes[rng.random_range(0..before)].state;
+                self.modes.extend(posterior.mode_suspecting(start, layout, effort, rng));
+                continue;
+            }
             let drawn = posterior.prior.draw(layout, rng);
             let start = if index % 2 == 0 || before == 0 {
                 drawn
             } else {
                 mutated(&self.modes[rng.random_range(0..before)].state, &drawn, layout, rng)
             };
-            self.modes.extend(posterior.mode(&start, layout, effort));
+            self.modes.extend(posterior.mode_from_afar(&start, layout, effort));
         }
     }
 
@@ -212,7 +218,7 @@ mod tests {
 
     fn see(posterior: &mut Posterior, truth: &State, positions: &[f64]) {
         let observation = Observation::seen(truth.marker_at(positions));
-        posterior.measurements.push(Measurement { positions: positions.to_vec(), observation });
+        posterior.measurements.push(Measurement { positions: positions.to_vec(), observation, movement: 0 });
     }
 
     #[test]
@@ -231,7 +237,7 @@ mod tests {
         let (one, other) = (&hypotheses.modes[0], &hypotheses.modes[1]);
         assert!((along(one) + along(other)).abs() < 1e-2 && along(one).abs() > 0.999);
         for mode in [one, other] {
-            assert!(posterior.data_cost(&mode.state, &layout) < 0.5, "it explains what was seen");
+            assert!(posterior.misfit(&mode.state, &layout) < 0.5, "it explains what was seen");
             assert!((mode.weight - 0.5).abs() < 0.01, "{}", mode.weight);
         }
         // A quarter turn tells them apart. Modes are searched anew given it.
@@ -254,6 +260,6 @@ mod tests {
         let mut hypotheses = Hypotheses::default();
         hypotheses.spawn(8, &posterior, &layout, &mut ChaCha8Rng::seed_from_u64(1));
         hypotheses.condense(16, &layout);
-        assert!(posterior.data_cost(&hypotheses.modes[0].state, &layout) < 0.5);
+        assert!(posterior.misfit(&hypotheses.modes[0].state, &layout) < 0.5);
     }
 }

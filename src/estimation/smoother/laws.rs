@@ -36,7 +36,7 @@ fn case(seed: u64, joints: usize, count: usize, anywhere: bool) -> (State, Layou
         let positions: Vec<f64> = (0..joints).map(|_| rng.random_range(-1.5..1.5)).collect();
         let noise = Vector3::from_fn(|_, _| SIGMA * rng.sample::<f64, _>(StandardNormal));
         let marker: Point3<f64> = truth.marker_at(&positions) + noise;
-        posterior.measurements.push(Measurement { positions, observation: Observation::seen(marker) });
+        posterior.measurements.push(Measurement { positions, observation: Observation::seen(marker), movement: 0 });
     }
     (truth, layout, posterior, rng)
 }

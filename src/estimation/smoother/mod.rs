@@ -30,12 +30,15 @@ use rand_chacha::ChaCha8Rng;
 pub use hypotheses::HypothesisSettings;
 
 use hypotheses::Hypotheses;
-use posterior::{Measurement, Posterior};
+use posterior::{Effort, Measurement, Posterior};
 
-use super::{Alternative, Belief, ChangeDetector, EstimationError, Estimator, Update, change::quantile};
+use super::{
+    Alternative, Belief, ChangeDetector, EstimationError, Estimator, NoiseReport, ReadingReport, Update,
+    change::quantile,
+};
 use crate::{
     model::{Layout, Prior},
-    sensing::{Observation, Rig},
+    sensing::{Loss, Observation, Rig},
 };
 
 /// The maximum a posteriori state given everything that was seen, with its rivals.
@@ -47,6 +50,16 @@ pub struct Smoother {
     settings: HypothesisSettings,
     rng: ChaCha8Rng,
     changes: ChangeDetector,
+    /// Whether it drops what was measured before the body changed.
+    forgets: bool,
+    /// Movements absorbed so far, misses among them.
+    movements: u64,
+    /// What was made of readings that are no longer looked at one by one.
+    past: Vec<ReadingReport>,
+    /// The rig with its nominal noise.
+    nominal: Arc<Rig>,
+    /// By kind of noise: whether its scale is learned.
+    unknown: Vec<bool>,
 }
 
 /// Steps without a new hypothesis after which none are searched for any more.
@@ -54,6 +67,16 @@ const CALM: usize = 6;
 /// Standard deviations of a normalised innovation squared (by Wilson and Hilferty) that the old body hardly explains: 99 %
 /// of what it does explain is below.
 const SURPRISING: f64 = 2.326;
+/// The search for another body that explains what is surprising.
+const THOROUGH: Effort = Effort { steps: 60, tolerance: 1e-6, hopeless: f64::INFINITY };
+/// Equations beyond the number of parameters that must agree on another body.
+const AGREEING: usize = 6;
+/// ν: how many equations the scale of the noise so far counts for.
+const NOISE_WEIGHT: f64 = 3.0;
+/// How often scales and modes are found in turn, at most.
+const NOISE_ROUNDS: usize = 4;
+/// The least scale of a noise that is not known, in nominal σ.
+const LEAST_SCALE: f64 = 1e-3;
 /// Measurements that are kept as they are; beyond these the older half is compressed.
 const KEPT: usize = 60;
 
@@ -67,6 +90,7 @@ impl Smoother {
         rng: ChaCha8Rng,
     ) -> Self {
         let posterior = Posterior::new(prior, rig.clone());
+        let (nominal, unknown) = (rig.clone(), vec![false; rig.noises().len()]);
         let mut smoother = Self {
             belief: Belief::new(posterior.prior.guess().clone(), layout, rig),
             posterior,
@@ -74,16 +98,95 @@ impl Smoother {
             settings,
             rng,
             changes: ChangeDetector::honest(),
+            forgets: true,
+            movements: 0,
+            past: Vec::new(),
+            nominal,
+            unknown,
         };
         smoother.begin();
         smoother.publish();
         smoother
     }
 
+    /// The same with another loss than least squares. With a robust one a surprising reading is taken for an outlier; only
+    /// several in a row that agree with each other are a changed body.
+    pub fn with_loss(mut self, loss: Loss) -> Self {
+        self.posterior.loss = loss;
+        self.changes = ChangeDetector::for_loss(loss);
+        self
+    }
+
+    /// The same for a body that never changes: an alarm is raised as ever, but nothing is dropped.
+    pub fn never_forgetting(self) -> Self {
+        Self { forgets: false, ..self }
+    }
+
+    /// The same where some kinds of noise (in the order of [`Rig::noises`]) are not known: the σ of the rig is then only a unit,
+    /// and its scale is learned with the rest.
+    pub fn with_unknown_noise(mut self, unknown: Vec<bool>) -> Self {
+        self.unknown = unknown;
+        self.unknown.resize(self.nominal.noises().len(), false);
+        self
+    }
+
+    /// The scale that the residuals of the first readings have at the guess: what it leaves unexplained.
+    fn begin_noise(&mut self) {
+        let guess = self.posterior.prior.guess().clone();
+        for (noise, fit) in self.posterior.fit(&guess, &self.belief.layout).iter().enumerate() {
+            if self.unknown[noise] && fit.equations > 0.0 && self.noise_seen(noise) == 1 {
+                self.posterior.scales[noise] = (fit.squared / fit.equations).sqrt().max(LEAST_SCALE);
+            }
+        }
+    }
+
+    /// Readings so far with a kind of noise.
+    fn noise_seen(&self, noise: usize) -> usize {
+        let channel = self.nominal.noises()[noise].channel;
+        let seen = self.posterior.measurements.iter();
+        let settled = self.posterior.settled.as_ref().map_or(0, |settled| settled.count);
+        settled + seen.filter(|seen| seen.observation.readings.get(channel).is_some_and(Option::is_some)).count()
+    }
+
+    /// Learns the scales of noise that is not known, by restricted maximum likelihood at the heaviest mode: what residuals are,
+    /// in their mean square over the equations that no parameter accounts for,
+    ///
+    /// ```text
+    /// s² = (Σ w ‖r‖² + ν s₀²) / (Σ w d − tr(Λₙ P) + ν),    ν = 3
+    /// ```
+    ///
+    /// with s₀ the scale so far, so that it does not jump while there are hardly more equations than parameters.
+    fn learn_noise(&mut self) {
+        let layout = self.belief.layout.clone();
+        let before = self.posterior.scales.clone();
+        for _ in 0..NOISE_ROUNDS {
+            let Some(mode) = self.hypotheses.modes.first() else { return };
+            let Some(absorbed) = self.posterior.absorbed(mode, &layout) else { return };
+            let fits = self.posterior.fit(&mode.state, &layout);
+            let mut change = 0.0_f64;
+            for noise in (0..fits.len()).filter(|noise| self.unknown[*noise] && fits[*noise].equations > 0.0) {
+                let free = (fits[noise].equations - absorbed[noise]).max(0.0);
+                // With equations to spare it may change as often as the modes follow.
+                let from = if free > NOISE_WEIGHT { self.posterior.scales[noise] } else { before[noise] };
+                let square = (fits[noise].squared + NOISE_WEIGHT * from * from) / (free + NOISE_WEIGHT);
+                let scale = square.sqrt().max(LEAST_SCALE);
+                if scale.is_finite() {
+                    change = change.max((scale / self.posterior.scales[noise]).ln().abs());
+                    self.posterior.scales[noise] = scale;
+                }
+            }
+            if change < 1e-3 {
+                return;
+            }
+            self.hypotheses.follow(&self.posterior, &layout);
+            self.hypotheses.condense(self.settings.kept, &layout);
+        }
+    }
+
     /// The modes before any measurement: the guess, or without one draws of the prior.
     fn begin(&mut self) {
         let layout = self.belief.layout.clone();
-        let once = posterior::Effort { steps: 0, tolerance: 0.0, hopeless: f64::INFINITY };
+        let once = Effort { steps: 0, tolerance: 0.0, hopeless: f64::INFINITY };
         let prior = &self.posterior.prior;
         let starts = if prior.is_vague() {
             (0..self.settings.kept.max(1)).map(|_| prior.draw(&layout, &mut self.rng)).collect()
@@ -97,6 +200,9 @@ impl Smoother {
 
     fn publish(&mut self) {
         let Some((best, rest)) = self.hypotheses.modes.split_first() else { return };
+        if self.unknown.contains(&true) {
+            self.belief.rig = Arc::new(self.nominal.scaled(&self.posterior.scales));
+        }
         self.belief.state = best.state.clone();
         self.belief.covariance = Some(best.covariance.clone());
         self.belief.alternatives = rest
@@ -114,22 +220,57 @@ impl Smoother {
         self.hypotheses.calm >= CALM
     }
 
+    /// Whether the body has changed: its innovations say so, and where readings may be outliers, another body near this one
+    /// explains what is surprising, so that it agrees with itself.
+    fn notices_change(&mut self, nis: Option<(f64, usize)>) -> bool {
+        // Before the belief is settled its innovations say little about the body.
+        if !self.is_settled() || !nis.is_some_and(|(nis, degrees)| self.changes.observe(nis, degrees)) {
+            return false;
+        }
+        if !self.posterior.loss.is_robust() {
+            return true;
+        }
+        let layout = self.belief.layout.clone();
+        let Some(changed) = self.since_change() else { return false };
+        // As many equations as parameters, whatever they say, some body explains.
+        let equations: usize = changed.measurements.iter().map(|seen| seen.observation.equations()).sum();
+        if equations < layout.dimension() + AGREEING {
+            return false;
+        }
+        let mode = changed.mode_from_afar(&self.belief.state, &layout, THOROUGH);
+        let explains = mode.is_some_and(|mode| changed.readings(&mode.state).all(|reading| reading.weight > 0.5));
+        if explains && !self.forgets {
+            self.changes.reset();
+        }
+        explains
+    }
+
     /// Drops what was measured before the body changed. The estimate stays as a guess, with half the deviations that
     /// the prior had; of the measurements the latest stay, those that the old body does not explain.
     fn forget(&mut self) {
+        let Some(changed) = self.since_change() else { return };
+        let first = changed.measurements.first().map_or(u64::MAX, |seen| seen.movement);
+        let dropped = self.posterior.readings(&self.belief.state).take_while(|reading| reading.movement < first);
+        self.past.extend(dropped.collect::<Vec<_>>());
+        self.posterior = changed;
+        self.hypotheses.calm = 0;
+        self.changes.reset();
+    }
+
+    /// What is known if the body has changed: the estimate as a guess, and the latest measurements that it does not explain;
+    /// where readings may be outliers, all since the alarm began to rise.
+    fn since_change(&self) -> Option<Posterior> {
         let explained = |(nis, degrees): (f64, usize)| nis <= quantile(degrees as f64, SURPRISING);
-        let surprising = (self.posterior.measurements.iter().rev())
+        let measurements = &self.posterior.measurements;
+        let surprising = (measurements.iter().rev())
             .take_while(|seen| {
                 self.belief.nis(&seen.positions, &seen.observation).is_some_and(|found| !explained(found))
             })
             .count();
-        let recent = self.posterior.measurements.split_off(self.posterior.measurements.len() - surprising);
+        let surprising = self.changes.since().unwrap_or(surprising).min(measurements.len());
         let covariance = self.prior_here() * 0.25;
-        let Ok(prior) = Prior::around(self.belief.state.clone(), &self.belief.layout, covariance) else { return };
-        self.posterior = Posterior::new(prior, self.posterior.rig.clone());
-        self.posterior.measurements = recent;
-        self.hypotheses.calm = 0;
-        self.changes.reset();
+        let prior = Prior::around(self.belief.state.clone(), &self.belief.layout, covariance).ok()?;
+        Some(self.posterior.anew(prior, measurements[measurements.len() - surprising..].to_vec()))
     }
 
     /// The prior's covariance in the chart at the estimate; without what correlates its parameters where the estimate has
@@ -149,15 +290,18 @@ impl Smoother {
     /// Whether there are as many independent equations as parameters; where some can never be determined, twice as many
     /// equations must do.
     fn is_determined(&self) -> bool {
-        let (m, equations) = (self.belief.layout.dimension(), self.posterior.equations());
-        equations >= 2 * m || (equations >= m && self.posterior.rank(&self.belief.state, &self.belief.layout) >= m)
+        let (state, layout) = (&self.belief.state, &self.belief.layout);
+        let m = layout.dimension();
+        let equations = self.posterior.equations(state, layout);
+        equations >= 2.0 * m as f64 || (equations >= m as f64 && self.posterior.rank(state, layout) >= m)
     }
 
     /// Whether the data cost of the heaviest hypothesis is what noise alone explains, 2E ~ χ² with as many degrees of
     /// freedom as equations at most: within five standard deviations.
     fn explains(&self) -> bool {
-        let degrees = self.posterior.equations() as f64;
-        let cost = 2.0 * self.posterior.data_cost(&self.belief.state, &self.belief.layout);
+        let (state, layout) = (&self.belief.state, &self.belief.layout);
+        let degrees = self.posterior.equations(state, layout);
+        let cost = 2.0 * self.posterior.misfit(state, layout);
         cost <= degrees + 5.0 * (2.0 * degrees).sqrt()
     }
 }
@@ -169,6 +313,7 @@ impl Estimator for Smoother {
 
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         if observation.is_miss() {
+            self.movements += 1;
             return Ok(Update::default());
         }
         // All or nothing: an observation that ends it leaves no trace.
@@ -177,17 +322,33 @@ impl Estimator for Smoother {
         *self = revised;
         Ok(update)
     }
+
+    fn noise(&self) -> Vec<NoiseReport> {
+        let noises = self.nominal.noises().iter().zip(&self.unknown).zip(&self.posterior.scales);
+        let unknown = noises.filter(|((_, unknown), _)| **unknown);
+        unknown
+            .map(|((noise, _), scale)| NoiseReport { channel: noise.channel, first: noise.part.start, scale: *scale })
+            .collect()
+    }
+
+    fn readings(&self) -> Vec<ReadingReport> {
+        if !self.posterior.loss.is_robust() {
+            return Vec::new();
+        }
+        self.past.iter().copied().chain(self.posterior.readings(&self.belief.state)).collect()
+    }
 }
 
 impl Smoother {
     fn absorb(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let nis = self.belief.nis(positions, observation);
         let layout = self.belief.layout.clone();
-        let measurement = Measurement { positions: positions.to_vec(), observation: observation.clone() };
-        self.posterior.measurements.push(measurement);
-        // Before the belief is settled its innovations say little about the body.
-        let change_noticed = self.is_settled() && nis.is_some_and(|(nis, degrees)| self.changes.observe(nis, degrees));
-        if change_noticed {
+        self.movements += 1;
+        let (positions, observation) = (positions.to_vec(), observation.clone());
+        self.posterior.measurements.push(Measurement { positions, observation, movement: self.movements });
+        self.begin_noise();
+        let change_noticed = self.notices_change(nis);
+        if change_noticed && self.forgets {
             self.forget();
         }
         self.hypotheses.follow(&self.posterior, &layout);
@@ -195,6 +356,9 @@ impl Smoother {
             self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         }
         self.hypotheses.condense(self.settings.kept, &layout);
+        if self.unknown.contains(&true) {
+            self.learn_noise();
+        }
         if self.hypotheses.modes.is_empty() {
             return Err(EstimationError::Diverged("no hypothesis explains the measurements"));
         }
@@ -202,6 +366,9 @@ impl Smoother {
         if self.is_determined() && self.belief.alternatives.is_empty() && self.explains() {
             self.hypotheses.calm += 1;
             if self.is_settled() && self.posterior.measurements.len() > KEPT {
+                let first = self.posterior.measurements[KEPT / 2].movement;
+                let settling = self.posterior.readings(&self.belief.state).take_while(|it| it.movement < first);
+                self.past.extend(settling.collect::<Vec<_>>());
                 self.posterior.settle(KEPT / 2, &self.belief.state, &layout);
             }
         } else {

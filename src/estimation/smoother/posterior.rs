@@ -1,19 +1,23 @@
 //! The posterior: prior and all measurements so far, as a cost on states.
 //!
 //! ```text
-//! E(x) = prior(x) + ½ Σᵢ ‖yᵢ − h(x, θᵢ)‖² + ½ (δ − δ̂)ᵀ Λ (δ − δ̂)
+//! E(x) = prior(x) + Σᵢ ρ(‖yᵢ − h(x, θᵢ)‖² / s²) + ½ (δ − δ̂)ᵀ Λ (δ − δ̂)
 //! ```
 //!
-//! with whitened residuals. The last term stands for measurements whose linearisation has settled: Λ = Σ HᵀH collects
-//! them in the chart at the state where they were linearised, δ are the coordinates of x there.
+//! with whitened residuals, ρ the [loss](Loss) of a reading (½ of its argument, for least squares) and s the scale of its
+//! noise, as a multiple of the nominal one. The last term stands for measurements whose linearisation has
+//! settled: Λ = Σ w HᵀH / s² collects them in the chart at the state where they were linearised, δ are the coordinates of x
+//! there. It is kept by kind of noise and in nominal σ, so that a scale that is learned later still applies.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use rand::{Rng, RngExt};
 
 use crate::{
-    model::{Layout, Pass, Prior, State, rank},
-    sensing::{Observation, Rig},
+    estimation::ReadingReport,
+    model::{Layout, Pass, Prior, Quantity, State, rank},
+    sensing::{Graduated, Loss, Observation, Rig},
 };
 
 /// A movement and what was seen after it.
@@ -21,22 +25,43 @@ use crate::{
 pub(super) struct Measurement {
     pub positions: Vec<f64>,
     pub observation: Observation,
+    /// Its number among all movements, from 1.
+    pub movement: u64,
 }
 
 /// Measurements as a quadratic in the chart at `state`.
 #[derive(Clone, Debug)]
 pub(super) struct Settled {
     pub state: State,
+    /// By kind of noise, in nominal σ.
+    pub noises: Vec<Quadratic>,
+    /// What the readings cost at δ = 0 beyond their weighted squares: of outliers.
+    pub excess: f64,
+    /// How many measurements.
+    pub count: usize,
+}
+
+/// Σ w HᵀH and its kin of one kind of noise.
+#[derive(Clone, Debug)]
+pub(super) struct Quadratic {
     /// Λ, m × m.
     pub information: DMatrix<f64>,
     /// Λ δ̂.
     pub vector: DVector<f64>,
-    /// The quadratic's cost at δ = 0.
-    pub cost: f64,
-    /// How many equations it holds.
-    pub equations: usize,
-    /// How many measurements.
-    pub count: usize,
+    /// ½ Σ w ‖r‖² at δ = 0.
+    pub misfit: f64,
+    /// Σ w d: how many equations it holds, outliers not counted.
+    pub equations: f64,
+}
+
+impl Quadratic {
+    fn nothing(m: usize) -> Self {
+        Self { information: DMatrix::zeros(m, m), vector: DVector::zeros(m), misfit: 0.0, equations: 0.0 }
+    }
+
+    fn misfit_at(&self, delta: &DVector<f64>) -> f64 {
+        self.misfit + 0.5 * delta.dot(&(&self.information * delta)) - self.vector.dot(delta)
+    }
 }
 
 /// Everything that is known.
@@ -45,6 +70,9 @@ pub(super) struct Posterior {
     pub prior: Prior,
     pub pins: State,
     pub rig: Arc<Rig>,
+    pub loss: Loss,
+    /// s, by kind of noise: 1 where it is known.
+    pub scales: Vec<f64>,
     pub measurements: Vec<Measurement>,
     pub settled: Option<Settled>,
 }
@@ -56,9 +84,49 @@ pub(super) struct Normal {
     pub descent: DVector<f64>,
 }
 
+/// How some measurements are fitted, by kind of noise: what its scale is told by.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Fit {
+    /// Σ w ‖r‖² in nominal σ.
+    pub squared: f64,
+    /// Σ w d.
+    pub equations: f64,
+}
+
+fn norm_squared(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum()
+}
+
 impl Posterior {
     pub fn new(prior: Prior, rig: Arc<Rig>) -> Self {
-        Self { pins: prior.pins(), prior, rig, measurements: Vec::new(), settled: None }
+        let scales = vec![1.0; rig.noises().len()];
+        Self { pins: prior.pins(), prior, rig, loss: Loss::None, scales, measurements: Vec::new(), settled: None }
+    }
+
+    /// The same rig and likelihood with another prior, and of the measurements only these.
+    pub fn anew(&self, prior: Prior, measurements: Vec<Measurement>) -> Self {
+        let (loss, scales) = (self.loss, self.scales.clone());
+        Self { loss, scales, measurements, ..Self::new(prior, self.rig.clone()) }
+    }
+
+    /// What is made of every reading at `state`, but for those that have settled.
+    pub fn readings(&self, state: &State) -> impl Iterator<Item = ReadingReport> {
+        let of = move |seen: &Measurement| {
+            let mut reports = Vec::new();
+            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+                let (squared, d) = (self.squared(channel, whitened), whitened.len());
+                reports.push(ReadingReport {
+                    movement: seen.movement,
+                    channel,
+                    equations: d,
+                    residual_sigmas: squared.sqrt(),
+                    weight: self.loss.weight(squared, d),
+                    outlier_probability: self.loss.outlier(squared, d),
+                });
+            });
+            reports
+        };
+        self.measurements.iter().flat_map(of)
     }
 
     /// How many measurements there were.
@@ -67,115 +135,282 @@ impl Posterior {
         self.measurements.len() + self.settled.as_ref().map_or(0, |settled| settled.count)
     }
 
-    /// How many equations they brought.
-    pub fn equations(&self) -> usize {
-        let kept: usize = self.measurements.iter().map(|seen| seen.observation.equations()).sum();
-        kept + self.settled.as_ref().map_or(0, |settled| settled.equations)
+    /// How many equations they brought, those of outliers at `state` not counted.
+    pub fn equations(&self, state: &State, layout: &Layout) -> f64 {
+        if !self.loss.is_robust() {
+            let kept: usize = self.measurements.iter().map(|seen| seen.observation.equations()).sum();
+            return kept as f64 + self.settled.as_ref().map_or(0.0, Settled::equations);
+        }
+        self.fit(state, layout).iter().map(|fit| fit.equations).sum()
     }
 
-    /// How many independent equations the measurements are that have not settled; all settled ones count as independent.
+    /// How many independent equations the measurements are that have not settled, outliers at `state` not counted; all settled ones
+    /// count as independent.
     pub fn rank(&self, state: &State, layout: &Layout) -> usize {
-        let (rows, _) = self.stacked(state, layout, &self.measurements);
-        rank(&rows.transpose()) + self.settled.as_ref().map_or(0, |settled| settled.equations)
+        let m = layout.dimension();
+        let normal: Vec<Measurement> = if self.loss.is_robust() {
+            self.measurements.iter().filter_map(|seen| self.without_outliers(state, seen)).collect()
+        } else {
+            self.measurements.clone()
+        };
+        let mut rows = DMatrix::zeros(m, normal.iter().map(|seen| seen.observation.equations()).sum());
+        let mut pass = Pass::new(state, layout);
+        let mut at = 0;
+        for seen in &normal {
+            let d = seen.observation.equations();
+            let mut residual = vec![0.0; d];
+            let place = &mut rows.as_mut_slice()[at * m..(at + d) * m];
+            self.rig.linearise(pass.at(&seen.positions), &seen.observation, place, &mut residual);
+            at += d;
+        }
+        rank(&rows.transpose()) + self.settled.as_ref().map_or(0, |settled| settled.equations() as usize)
+    }
+
+    /// A measurement without the readings that are likelier outliers than not; `None` if that leaves none.
+    fn without_outliers(&self, state: &State, seen: &Measurement) -> Option<Measurement> {
+        let mut normal = seen.clone();
+        self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+            if self.loss.weight(self.squared(channel, whitened), whitened.len()) < 0.5 {
+                normal.observation.readings[channel] = None;
+            }
+        });
+        (!normal.observation.is_miss()).then_some(normal)
+    }
+
+    /// The kinds of noise of a channel, with their numbers among all.
+    fn noises(&self, channel: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
+        let all = self.rig.noises().iter().enumerate();
+        all.filter(move |(_, noise)| noise.channel == channel).map(|(index, noise)| (index, noise.part.clone()))
+    }
+
+    /// ‖r‖² of a reading, in σ as they are taken to be.
+    fn squared(&self, channel: usize, whitened: &[f64]) -> f64 {
+        self.noises(channel).map(|(noise, part)| norm_squared(&whitened[part]) / self.scales[noise].powi(2)).sum()
     }
 
     /// E(x); infinite where x is too far from where settled measurements were linearised. Axes are written with their
     /// points nearest to the pins.
+    #[cfg(test)]
     pub fn cost(&self, state: &State, layout: &Layout) -> f64 {
-        self.prior.cost(state, None) + self.data_cost(state, layout)
+        self.cost_by(self.loss.into(), state, layout)
     }
 
-    /// The part of the cost at `state` that is due to the data alone: twice it is χ² distributed at the truth.
-    pub fn data_cost(&self, state: &State, layout: &Layout) -> f64 {
-        let errors: f64 = (self.measurements.iter())
-            .map(|seen| self.rig.squared_error(state, &seen.positions, &seen.observation))
-            .sum();
+    /// The same by another loss.
+    fn cost_by(&self, loss: Graduated, state: &State, layout: &Layout) -> f64 {
+        let mut errors = 0.0;
+        for seen in &self.measurements {
+            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+                errors += loss.cost(self.squared(channel, whitened), whitened.len());
+            });
+        }
         let settled = self.settled.as_ref().map_or(0.0, |settled| {
             settled.state.local(layout, state).map_or(f64::INFINITY, |delta| {
-                settled.cost + 0.5 * delta.dot(&(&settled.information * &delta)) - settled.vector.dot(&delta)
+                let of = settled.noises.iter().zip(&self.scales);
+                settled.excess + of.map(|(of, scale)| of.misfit_at(&delta) / (scale * scale)).sum::<f64>()
             })
         });
-        0.5 * errors + settled
+        self.prior.cost(state, None) + errors + settled
+    }
+
+    /// By kind of noise, how well the data are fitted at `state`: for one that is as assumed `squared` is χ² distributed with
+    /// `equations` degrees of freedom.
+    pub fn fit(&self, state: &State, layout: &Layout) -> Vec<Fit> {
+        let mut fits = vec![Fit::default(); self.scales.len()];
+        for seen in &self.measurements {
+            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+                let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
+                for (noise, part) in self.noises(channel) {
+                    fits[noise].squared += weight * norm_squared(&whitened[part.clone()]);
+                    fits[noise].equations += weight * part.len() as f64;
+                }
+            });
+        }
+        if let Some(settled) = &self.settled {
+            let delta = settled.state.local(layout, state);
+            for (fit, of) in fits.iter_mut().zip(&settled.noises) {
+                fit.squared += delta.as_ref().map_or(f64::INFINITY, |delta| 2.0 * of.misfit_at(delta));
+                fit.equations += of.equations;
+            }
+        }
+        fits
+    }
+
+    /// The part of the cost at `state` that is due to normal readings: twice it is χ² distributed at the truth.
+    pub fn misfit(&self, state: &State, layout: &Layout) -> f64 {
+        self.fit(state, layout).iter().zip(&self.scales).map(|(fit, scale)| 0.5 * fit.squared / (scale * scale)).sum()
     }
 
     /// The normal equations at `state`, linearised there; `None` outside the chart of settled measurements.
+    #[cfg(test)]
     pub fn normal(&self, state: &State, layout: &Layout) -> Option<Normal> {
-        let (mut information, mut descent, data) = self.linearised(state, layout, &self.measurements);
-        let mut cost = data;
+        self.normal_by(self.loss.into(), state, layout)
+    }
+
+    /// The same by another loss.
+    fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout) -> Option<Normal> {
+        let (stacked, residuals, mut cost) = self.stacked(loss, state, layout, &self.measurements);
+        let (mut information, mut descent) = (&stacked * stacked.transpose(), stacked * residuals);
         cost += self.prior.cost(state, Some((&mut information, &mut descent)));
         if let Some(settled) = &self.settled {
-            let (carried, vector, value) = settled.carried(state, layout)?;
-            information += carried;
-            descent += vector;
-            cost += value;
+            let (noises, excess) = settled.carried(state, layout)?;
+            cost += excess;
+            for (of, scale) in noises.into_iter().zip(&self.scales) {
+                let precision = (scale * scale).recip();
+                information += of.information * precision;
+                descent += of.vector * precision;
+                cost += of.misfit * precision;
+            }
         }
         Some(Normal { cost, information, descent })
     }
 
-    /// Σ HᵀH, Σ Hᵀ(y − h) and the cost of some measurements at `state`.
-    pub fn linearised(
+    /// √w Hᵀ/s and √w (y − h)/s of some measurements, one beside the other, and what they cost.
+    fn stacked(
         &self,
+        loss: Graduated,
         state: &State,
         layout: &Layout,
         measurements: &[Measurement],
     ) -> (DMatrix<f64>, DVector<f64>, f64) {
-        let (stacked, residuals) = self.stacked(state, layout, measurements);
-        let information = &stacked * stacked.transpose();
-        let cost = 0.5 * residuals.norm_squared();
-        (information, stacked * residuals, cost)
-    }
-
-    /// Hᵀ and y − h of some measurements, one beside the other.
-    fn stacked(&self, state: &State, layout: &Layout, measurements: &[Measurement]) -> (DMatrix<f64>, DVector<f64>) {
         let m = layout.dimension();
         let equations = measurements.iter().map(|seen| seen.observation.equations()).sum();
         let mut stacked = DMatrix::zeros(m, equations);
         let mut residuals = DVector::zeros(equations);
         let mut pass = Pass::new(state, layout);
-        let mut at = 0;
+        let (mut at, mut cost) = (0, 0.0);
         for seen in measurements {
             pass.at(&seen.positions);
             let d = seen.observation.equations();
             let rows = &mut stacked.as_mut_slice()[at * m..(at + d) * m];
-            self.rig.linearise(&pass, &seen.observation, rows, &mut residuals.as_mut_slice()[at..at + d]);
+            let residual = &mut residuals.as_mut_slice()[at..at + d];
+            self.rig.linearise(&pass, &seen.observation, rows, residual);
+            cost += self.weigh(loss, &seen.observation, m, rows, residual);
             at += d;
         }
-        (stacked, residuals)
+        (stacked, residuals, cost)
     }
 
-    /// Moves the oldest `count` measurements into the quadratic, linearised at `state`.
-    pub fn settle(&mut self, count: usize, state: &State, layout: &Layout) {
-        let old: Vec<Measurement> = self.measurements.drain(..count.min(self.measurements.len())).collect();
-        let (mut information, mut vector, mut cost) = self.linearised(state, layout, &old);
-        let mut total = old.len();
-        let mut equations = old.iter().map(|seen| seen.observation.equations()).sum();
-        if let Some(before) = self.settled.take() {
-            // What cannot be carried over is kept by nobody: the chart ends 90 deg away, where nothing settles.
-            if let Some((carried, pull, value)) = before.carried(state, layout) {
-                cost += value;
-                vector += pull;
-                information += carried;
-                total += before.count;
-                equations += before.equations;
+    /// Weighs the rows and residuals of an observation, reading by reading, and returns what they cost.
+    fn weigh(
+        &self,
+        loss: Graduated,
+        observation: &Observation,
+        m: usize,
+        rows: &mut [f64],
+        residual: &mut [f64],
+    ) -> f64 {
+        let (mut at, mut cost) = (0, 0.0);
+        for (channel, reading) in observation.readings.iter().enumerate() {
+            let Some(reading) = reading else { continue };
+            let squared = self.squared(channel, &residual[at..at + reading.len()]);
+            cost += loss.cost(squared, reading.len());
+            let root = loss.weight(squared, reading.len()).sqrt();
+            for (noise, part) in self.noises(channel) {
+                let factor = root / self.scales[noise];
+                if factor != 1.0 {
+                    let place = at + part.start..at + part.end;
+                    rows[place.start * m..place.end * m].iter_mut().for_each(|x| *x *= factor);
+                    residual[place].iter_mut().for_each(|x| *x *= factor);
+                }
+            }
+            at += reading.len();
+        }
+        cost
+    }
+
+    /// Σ w HᵀH and its kin of some measurements, by kind of noise and in nominal σ, and what they cost beyond ½ Σ w ‖r‖².
+    fn quadratics(&self, state: &State, layout: &Layout, measurements: &[Measurement]) -> (Vec<Quadratic>, f64) {
+        let (rows, residuals, cost) = self.stacked(self.loss.into(), state, layout, measurements);
+        let mut of_noise = vec![Vec::new(); self.scales.len()];
+        let mut at = 0;
+        for seen in measurements {
+            for (channel, reading) in seen.observation.readings.iter().enumerate() {
+                let Some(reading) = reading else { continue };
+                self.noises(channel).for_each(|(noise, part)| of_noise[noise].extend(at + part.start..at + part.end));
+                at += reading.len();
             }
         }
-        self.settled = Some(Settled { state: state.clone(), information, vector, cost, equations, count: total });
+        let of = |(columns, scale): (&Vec<usize>, &f64)| {
+            let (rows, residuals) = (rows.select_columns(columns), residuals.select_rows(columns));
+            let square = scale * scale;
+            Quadratic {
+                information: &rows * rows.transpose() * square,
+                misfit: 0.5 * residuals.norm_squared() * square,
+                vector: rows * residuals * square,
+                equations: 0.0,
+            }
+        };
+        let mut quadratics: Vec<Quadratic> = of_noise.iter().zip(&self.scales).map(of).collect();
+        for seen in measurements {
+            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+                let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
+                self.noises(channel)
+                    .for_each(|(noise, part)| quadratics[noise].equations += weight * part.len() as f64);
+            });
+        }
+        let explained: f64 = quadratics.iter().zip(&self.scales).map(|(of, scale)| of.misfit / (scale * scale)).sum();
+        (quadratics, cost - explained)
+    }
+
+    /// Moves the oldest `count` measurements into the quadratic, linearised at `state`, with the weights that they have there.
+    pub fn settle(&mut self, count: usize, state: &State, layout: &Layout) {
+        let old: Vec<Measurement> = self.measurements.drain(..count.min(self.measurements.len())).collect();
+        let (mut noises, mut excess) = self.quadratics(state, layout, &old);
+        let mut total = old.len();
+        // What cannot be carried over is kept by nobody: the chart ends 90 deg away, where nothing settles.
+        if let Some(before) = self.settled.take()
+            && let Some((carried, more)) = before.carried(state, layout)
+        {
+            for (into, of) in noises.iter_mut().zip(carried) {
+                into.information += of.information;
+                into.vector += of.vector;
+                into.misfit += of.misfit;
+                into.equations += of.equations;
+            }
+            excess += more;
+            total += before.count;
+        }
+        self.settled = Some(Settled { state: state.clone(), noises, excess, count: total });
+    }
+
+    /// By kind of noise, how many of its equations the parameters account for: tr(Λₙ P), with Λₙ its share of the information.
+    pub fn absorbed(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
+        let (mut noises, _) = self.quadratics(&mode.state, layout, &self.measurements);
+        if let Some(settled) = &self.settled {
+            let (carried, _) = settled.carried(&mode.state, layout)?;
+            noises.iter_mut().zip(carried).for_each(|(into, of)| into.information += of.information);
+        }
+        let of = |(noise, scale): (&Quadratic, &f64)| noise.information.dot(&mode.covariance) / (scale * scale);
+        Some(noises.iter().zip(&self.scales).map(of).collect())
     }
 }
 
 impl Settled {
-    /// The quadratic in the chart at `state`: its information there, its descent and its cost.
+    /// Equations that it holds, outliers not counted.
+    fn equations(&self) -> f64 {
+        self.noises.iter().map(|of| of.equations).sum()
+    }
+
+    /// The quadratics in the chart at `state`: their information there, their descent and their misfit.
     ///
     /// A change of chart moves δ by `D = ∂ local(settled, retract(state, ε))/∂ε` at ε = 0. It is not the inverse of the
     /// transport at δ: a line is pinned, and its pivot in `state` need not be where a retraction from the settled state
     /// would leave it, so that turning it also shifts it.
-    fn carried(&self, state: &State, layout: &Layout) -> Option<(DMatrix<f64>, DVector<f64>, f64)> {
+    fn carried(&self, state: &State, layout: &Layout) -> Option<(Vec<Quadratic>, f64)> {
         let delta = self.state.local(layout, state)?;
         let change = self.state.change_of_chart(layout, state)?;
-        let pulled = &self.information * &delta;
-        let cost = self.cost + 0.5 * delta.dot(&pulled) - self.vector.dot(&delta);
-        let information = change.transpose() * &self.information * &change;
-        Some((information, change.transpose() * (&self.vector - pulled), cost))
+        let carry = |of: &Quadratic| {
+            if of.equations == 0.0 {
+                return Quadratic::nothing(delta.len());
+            }
+            Quadratic {
+                information: change.transpose() * &of.information * &change,
+                vector: change.transpose() * (&of.vector - &of.information * &delta),
+                misfit: of.misfit_at(&delta),
+                equations: of.equations,
+            }
+        };
+        Some((self.noises.iter().map(carry).collect(), self.excess))
     }
 }
 
@@ -204,16 +439,62 @@ pub(super) struct Effort {
     pub hopeless: f64,
 }
 
-/// The largest turn (rad) or shift (m) of one step.
+/// The widths of a loss through which a search goes that begins far from its end, the last being the loss itself.
+const WIDTHS: [f64; 4] = [f64::INFINITY, 10.0, 3.0, 1.0];
+/// Steps at every width but the last.
+const STEPS_AT_WIDTH: usize = 8;
+
+/// The largest step: a turn of so many radians, a shift of as many metres; of numbers without a unit a third of that, and
+/// of pixels three hundred times as many.
 const LONGEST_STEP: f64 = 0.7;
+
+/// The length of a step, in multiples of the longest of every quantity.
+fn length(delta: &DVector<f64>, layout: &Layout) -> f64 {
+    let longest = |quantity: &Quantity| match quantity {
+        Quantity::Length | Quantity::Angle => LONGEST_STEP,
+        Quantity::Ratio => LONGEST_STEP / 3.0,
+        Quantity::Pixels => LONGEST_STEP * 300.0,
+    };
+    delta.iter().zip(layout.quantities()).map(|(x, quantity)| x.abs() / longest(quantity)).fold(0.0, f64::max)
+}
 
 impl Posterior {
     /// The local minimum that Levenberg–Marquardt reaches from `start`, and the Gaussian there.
     ///
     /// Steps solve `(Λ + λ diag Λ) δ = descent`; λ follows the ratio of found to predicted descent (Nielsen's rule).
     pub fn mode(&self, start: &State, layout: &Layout, effort: Effort) -> Option<Mode> {
+        let (state, normal) = self.descend(self.loss.into(), start, layout, effort)?;
+        Mode::at(state, normal)
+    }
+
+    /// The same from a start that may be far from where the search ends: a robust loss narrows on the way.
+    pub fn mode_from_afar(&self, start: &State, layout: &Layout, effort: Effort) -> Option<Mode> {
+        if !self.loss.is_robust() {
+            return self.mode(start, layout, effort);
+        }
+        let coarse = Effort { steps: STEPS_AT_WIDTH, tolerance: effort.tolerance * 1e2, hopeless: f64::INFINITY };
+        let mut state = start.clone();
+        for width in WIDTHS.into_iter().filter(|width| *width > 1.0) {
+            let steps = if width.is_infinite() { Effort { steps: effort.steps, ..coarse } } else { coarse };
+            state = self.descend(Graduated { loss: self.loss, width }, &state, layout, steps)?.0;
+        }
+        self.mode(&state, layout, effort)
+    }
+
+    /// The same from where all measurements but one to three are explained by least squares.
+    pub fn mode_suspecting(&self, start: &State, layout: &Layout, effort: Effort, rng: &mut impl Rng) -> Option<Mode> {
+        let mut others = self.clone();
+        for _ in 0..rng.random_range(1..=3).min(others.measurements.len()) {
+            others.measurements.swap_remove(rng.random_range(0..others.measurements.len()));
+        }
+        let least_squares = Graduated { loss: self.loss, width: f64::INFINITY };
+        let (state, _) = others.descend(least_squares, start, layout, effort)?;
+        self.mode(&state, layout, effort)
+    }
+
+    fn descend(&self, loss: Graduated, start: &State, layout: &Layout, effort: Effort) -> Option<(State, Normal)> {
         let mut state = start.slid_towards(&self.pins);
-        let mut normal = self.normal(&state, layout)?;
+        let mut normal = self.normal_by(loss, &state, layout)?;
         let (mut lambda, mut growth) = (1e-3, 2.0);
         for step in 0..effort.steps {
             if step == effort.steps / 2 && normal.cost > effort.hopeless {
@@ -224,20 +505,20 @@ impl Posterior {
                 damped[(k, k)] *= 1.0 + lambda;
             }
             let mut delta = Cholesky::new(damped)?.solve(&normal.descent);
-            let longest = delta.amax();
-            if longest > LONGEST_STEP {
-                delta *= LONGEST_STEP / longest;
+            let length = length(&delta, layout);
+            if length > 1.0 {
+                delta /= length;
             }
             let predicted = delta.dot(&normal.descent) - 0.5 * delta.dot(&(&normal.information * &delta));
             if !predicted.is_finite() {
                 return None;
             }
             let next = state.retract(layout, &delta).slid_towards(&self.pins);
-            let cost = self.cost(&next, layout);
+            let cost = self.cost_by(loss, &next, layout);
             let ratio = (normal.cost - cost) / predicted;
             if ratio > 0.0 {
                 state = next;
-                normal = self.normal(&state, layout)?;
+                normal = self.normal_by(loss, &state, layout)?;
                 lambda = (lambda * (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0)).max(1e-9);
                 growth = 2.0;
             } else {
@@ -248,7 +529,7 @@ impl Posterior {
                 break;
             }
         }
-        Mode::at(state, normal)
+        Some((state, normal))
     }
 }
 

@@ -26,8 +26,16 @@ pub struct Scenario {
     pub sensor: Option<Spanned<Sensors>>,
     pub initial_error: Option<Spanned<InitialError>>,
     pub measurements: Option<Spanned<Measurements>>,
+    pub base: Option<Spanned<Base>>,
     pub head: Option<Spanned<Head>>,
+    pub view: Option<Spanned<View>>,
+    #[serde(rename = "target", default)]
+    pub targets: Vec<Spanned<Target>>,
+    #[serde(rename = "camera", default)]
+    pub cameras: Vec<Spanned<Camera>>,
+    pub prediction: Option<Spanned<Prediction>>,
     pub change: Option<Spanned<Change>>,
+    pub outliers: Option<Spanned<Outliers>>,
     pub prior: Spanned<Prior>,
     pub filter: Filter,
     pub unscented: Option<Filter>,
@@ -45,7 +53,8 @@ pub struct Scenario {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Robot {
-    pub marker_m: Spanned<Exactly<f64, 3>>,
+    pub marker_m: Option<Spanned<Exactly<f64, 3>>>,
+    #[serde(default)]
     pub learn_marker: bool,
     pub body: Option<Body>,
     #[serde(rename = "joint")]
@@ -63,11 +72,77 @@ pub struct Joint {
     pub limits_m: Option<Spanned<Exactly<f64, 2>>>,
     #[serde(default = "yes")]
     pub learned: bool,
+    pub ratio: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub learn_ratio: bool,
+    pub offset_deg: Option<Spanned<f64>>,
+    pub offset_m: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub learn_offset: bool,
     pub column: Option<Spanned<String>>,
 }
 
 fn yes() -> bool {
     true
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    pub name: Spanned<String>,
+    pub link: Option<Spanned<String>>,
+    pub at_m: Spanned<Exactly<f64, 3>>,
+    pub rpy_deg: Option<Spanned<Exactly<f64, 3>>>,
+    pub points_m: Option<Spanned<Vec<Exactly<f64, 3>>>>,
+    pub facing: Option<Spanned<Exactly<f64, 3>>>,
+    pub facing_within_deg: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub known: Known,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    pub name: Spanned<String>,
+    pub link: Option<Spanned<String>>,
+    pub at_m: Spanned<Exactly<f64, 3>>,
+    pub rpy_deg: Option<Spanned<Exactly<f64, 3>>>,
+    pub looks_at_m: Option<Spanned<Exactly<f64, 3>>>,
+    pub size_px: Spanned<Exactly<f64, 2>>,
+    pub focal_px: Spanned<Exactly<f64, 2>>,
+    pub centre_px: Option<Spanned<Exactly<f64, 2>>>,
+    #[serde(default)]
+    pub known: Known,
+    pub known_to_px: Option<Spanned<f64>>,
+}
+
+/// Where the robot stands in the frame of the measurements.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Base {
+    pub at_m: Spanned<Exactly<f64, 3>>,
+    pub rpy_deg: Spanned<Exactly<f64, 3>>,
+    #[serde(default)]
+    pub known: Known,
+}
+
+/// How well a place is known; without any of these it is known exactly.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Known {
+    #[serde(rename = "to_m")]
+    pub known_to_m: Option<Spanned<f64>>,
+    #[serde(rename = "to_deg")]
+    pub known_to_deg: Option<Spanned<f64>>,
+    pub anywhere_m: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Prediction {
+    pub of: Spanned<String>,
+    #[serde(default)]
+    pub up_to_motion: bool,
 }
 
 #[derive(Debug, Deserialize)]
@@ -101,6 +176,12 @@ pub struct Head {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
+pub struct View {
+    pub visible_pose_deg: Spanned<Vec<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Change {
     pub step: Spanned<u64>,
     pub tilt: Option<Tilt>,
@@ -124,10 +205,20 @@ pub struct Shift {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
+pub struct Outliers {
+    pub fraction: Spanned<f64>,
+    pub box_m: Spanned<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Prior {
     pub direction_rad: Spanned<f64>,
     pub point_m: Spanned<f64>,
     pub marker_m: Option<Spanned<f64>>,
+    pub ratio: Option<Spanned<f64>>,
+    pub offset_rad: Option<Spanned<f64>>,
+    pub offset_m: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -143,6 +234,26 @@ pub struct Smoother {
     pub measurement_variance_m2: Option<Spanned<f64>>,
     pub hypotheses: Option<Spanned<u64>>,
     pub spawned: Option<Spanned<u64>>,
+    pub loss: Option<Loss>,
+    pub outlier_fraction: Option<Spanned<f64>>,
+    pub outlier_spread: Option<Spanned<f64>>,
+    pub noise: Option<NoiseKnowledge>,
+}
+
+/// Whether the smoother is told how much noise there is.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoiseKnowledge {
+    Known,
+    Unknown,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Loss {
+    None,
+    Huber,
+    Mixture,
 }
 
 #[derive(Debug, Deserialize)]
@@ -207,6 +318,8 @@ pub struct Learner {
     pub estimator: EstimatorKind,
     pub policy: Spanned<PolicyKind>,
     pub stabilising_noise: Option<Spanned<bool>>,
+    pub robust: Option<Spanned<bool>>,
+    pub holds_axes: Option<Spanned<bool>>,
     #[serde(default = "yes")]
     pub by_default: bool,
 }

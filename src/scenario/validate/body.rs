@@ -2,16 +2,38 @@
 
 use std::ops::Range;
 
-use super::{Check, raw};
+use nalgebra::Point3;
+
+use super::{Check, equipment::Outfit, raw};
 use crate::{
     kinematics::{Joint, JointBox, JointKind, Line},
-    model::{Layout, State},
+    model::{Block, Correction, Layout, State},
     scenario::Robot,
+    sensing::TargetKind,
 };
 
 impl Check<'_> {
-    pub(super) fn robot(&mut self, raw: &raw::Robot) -> Option<Robot> {
-        let marker = self.point("robot.marker_m", &raw.marker_m);
+    pub(super) fn robot(&mut self, scenario: &raw::Scenario) -> Option<Robot> {
+        let raw = &scenario.robot;
+        let marker = match (&raw.marker_m, scenario.targets.first()) {
+            (Some(marker), None) => self.point("robot.marker_m", marker),
+            (None, Some(_)) if !raw.learn_marker => Point3::origin(),
+            (None, Some(target)) => {
+                let mend = "remove `learn_marker`; say `known = { to_m = … }` of the target instead";
+                self.problem(target.span(), "robot.learn_marker", "targets take the marker's place", mend);
+                Point3::origin()
+            }
+            (Some(marker), Some(_)) => {
+                let mend = "remove it, or the [[target]]s";
+                self.problem(marker.span(), "robot.marker_m", "targets take the marker's place", mend);
+                Point3::origin()
+            }
+            (None, None) => {
+                let mend = "add `marker_m = [x, y, z]`, where the marker on the hand is at θ = 0, or a [[target]]";
+                self.problem(raw.joints.span(), "robot.marker_m", "missing", mend);
+                Point3::origin()
+            }
+        };
         let mut names: Vec<String> = Vec::new();
         let (mut joints, mut limits, mut learned) = (Vec::new(), Vec::new(), Vec::new());
         for (index, spanned) in raw.joints.get_ref().iter().enumerate() {
@@ -30,8 +52,32 @@ impl Check<'_> {
         if names.is_empty() {
             self.problem(raw.joints.span(), "robot.joint", "there is no joint", "add a [[robot.joint]]");
         }
-        let state = State::arm(joints, marker);
-        let layout = Layout::of_arm(&state, &learned, raw.learn_marker);
+        let outfit = self.outfit(scenario, &names);
+        let mut state = State::arm(joints, marker);
+        let is_whole = state.joints.len() == names.len();
+        let mut blocks: Vec<Block> = (0..names.len()).filter(|joint| learned[*joint]).map(Block::Axis).collect();
+        for (index, spanned) in raw.joints.get_ref().iter().enumerate().filter(|_| is_whole) {
+            state.corrections[index] = self.correction(index, spanned.get_ref());
+            blocks.extend(spanned.get_ref().learn_ratio.then_some(Block::Ratio(index)));
+            blocks.extend(spanned.get_ref().learn_offset.then_some(Block::Offset(index)));
+        }
+        outfit.equip(&mut state);
+        blocks.extend(outfit.known.iter().map(|(block, _)| *block));
+        blocks.extend(raw.learn_marker.then_some(Block::Target(0)));
+        let Outfit { mut equipment, known, .. } = outfit;
+        if equipment.targets.is_empty() {
+            let (name, points) = ("marker".to_owned(), vec![Point3::origin()]);
+            equipment.targets.push(TargetKind { name, points, facing: None });
+        }
+        let mut up_to_motion = false;
+        if let Some(prediction) = &scenario.prediction {
+            let prediction = prediction.get_ref();
+            up_to_motion = prediction.up_to_motion;
+            if let Some(hand) = self.hand("prediction.of", &prediction.of, &equipment) {
+                state.hand = hand;
+            }
+        }
+        let layout = Layout::new(&state, blocks);
         if layout.dimension() == 0 {
             let mend = "set `learned = true` on a joint, or `learn_marker = true`";
             self.problem(raw.joints.span(), "robot.joint", "nothing is to be learned", mend);
@@ -41,7 +87,33 @@ impl Check<'_> {
             self.problem(raw.joints.span(), "robot.joint", error.to_string(), "write limits that a robot can have");
         });
         let limits = limits.ok().filter(|_| complete)?;
-        Some(Robot { names, state, layout, limits, body: raw.body })
+        Some(Robot { names, state, layout, limits, body: raw.body, known, equipment, up_to_motion })
+    }
+
+    /// What a joint's readings are truly corrected by.
+    fn correction(&mut self, index: usize, raw: &raw::Joint) -> Correction {
+        let key = |field: &str| format!("robot.joint[{index}].{field}");
+        let mut correction = Correction::default();
+        if let Some(ratio) = &raw.ratio {
+            correction.ratio = self.number(&key("ratio"), ratio, |ratio| ratio != 0.0, "a number other than 0");
+        }
+        let (wanted, given, other) = match raw.kind {
+            JointKind::Revolute => ("offset_deg", &raw.offset_deg, &raw.offset_m),
+            JointKind::Prismatic => ("offset_m", &raw.offset_m, &raw.offset_deg),
+        };
+        if let Some(other) = other {
+            self.problem(
+                other.span(),
+                key("offset"),
+                "this unit does not fit the kind of joint",
+                format!("write `{wanted}`"),
+            );
+        }
+        if let Some(offset) = given {
+            let offset = self.number(&key(wanted), offset, |_| true, "a number");
+            correction.offset = if raw.kind == JointKind::Revolute { offset.to_radians() } else { offset };
+        }
+        correction
     }
 
     fn joint(&mut self, raw: &raw::Joint, span: Range<usize>, key: &dyn Fn(&str) -> String) -> Option<Joint> {

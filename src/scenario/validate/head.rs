@@ -3,7 +3,12 @@
 use toml::Spanned;
 
 use super::{Check, raw};
-use crate::{kinematics::JointKind, scenario::Robot, selection::Watch, sensing::Head};
+use crate::{
+    kinematics::JointKind,
+    scenario::Robot,
+    selection::Watch,
+    sensing::{Head, Rig},
+};
 
 /// The limits of pan and tilt unless told otherwise, degrees.
 const SERVO_DEG: f64 = 15.0;
@@ -33,7 +38,7 @@ impl Check<'_> {
             return None;
         }
         let head = Head { position, look, pan_limit, tilt_limit, lens_half_angle, baseline };
-        let visible_pose = self.visible_pose(&raw.visible_pose_deg, robot)?;
+        let visible_pose = self.visible_pose("head.visible_pose_deg", &raw.visible_pose_deg, robot)?;
         let marker = robot.state.marker_at(&visible_pose);
         if self.problems.len() > problems {
             return None;
@@ -50,12 +55,31 @@ impl Check<'_> {
             self.problem(raw.visible_pose_deg.span(), "head.visible_pose_deg", what, mend);
             return None;
         }
-        Some(Watch { head, visible_pose })
+        Some(Watch { head: Some(head), visible_pose })
+    }
+
+    /// What is known to be seen without a head: a posture in view of a sensor that sees some postures only.
+    pub(super) fn view(&mut self, spanned: &Spanned<raw::View>, robot: &Robot, rig: &Rig) -> Option<Watch> {
+        let raw = &spanned.get_ref().visible_pose_deg;
+        let key = "view.visible_pose_deg";
+        let visible_pose = self.visible_pose(key, raw, robot)?;
+        let mut clearances = vec![0.0; rig.channels().len()];
+        rig.clearances(&robot.state, &visible_pose, &mut clearances);
+        let best = clearances.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if best < 0.0 {
+            let what = format!("nothing is in view there: it is {:.1} degrees outside", -best.to_degrees());
+            self.problem(raw.span(), key, what, "name a pose in view");
+            return None;
+        }
+        if !rig.has_view() {
+            let mend = "remove it; only cameras see some postures and others not";
+            self.problem(spanned.span(), "view", "these sensors see everything", mend);
+        }
+        Some(Watch { head: None, visible_pose })
     }
 
     /// The positions of a pose (degrees or metres as the kind of each joint says), within the limits.
-    fn visible_pose(&mut self, raw: &Spanned<Vec<f64>>, robot: &Robot) -> Option<Vec<f64>> {
-        let key = "head.visible_pose_deg";
+    fn visible_pose(&mut self, key: &str, raw: &Spanned<Vec<f64>>, robot: &Robot) -> Option<Vec<f64>> {
         let (given, wanted) = (raw.get_ref(), robot.state.joints.len());
         if given.len() != wanted {
             let what = format!("it has {} positions, the robot {wanted} joints", given.len());

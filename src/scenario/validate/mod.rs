@@ -2,6 +2,7 @@
 
 mod body;
 mod change;
+mod equipment;
 mod head;
 mod world;
 
@@ -11,7 +12,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use toml::Spanned;
 
 use super::{
-    EstimatorKind, Filter, LearnerSpec, PolicyKind, Prior, Scenario, SelectionSpec, SmootherSpec,
+    EstimatorKind, Filter, Known, LearnerSpec, PolicyKind, Prior, Robot, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError, similar},
     learners::{Fault, HUMAN, Misfit, Setting, misfit},
     raw,
@@ -19,9 +20,11 @@ use super::{
 use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
     experiment::Thresholds,
+    kinematics::JointKind,
+    model::Block,
     optimize::{Settings, Variant},
     selection::{CriterionUnits, Planning},
-    sensing::Rig,
+    sensing::{Loss, Rig},
 };
 
 /// How far from 1 the length of an axis may be: what is lost by writing six digits.
@@ -118,9 +121,9 @@ impl Check<'_> {
             let mend = "use letters, digits, '-', '_' and '.'; the name becomes part of file names and addresses";
             self.problem(raw.name.span(), "name", format!("{name:?} cannot be a name"), mend);
         }
-        let robot = self.robot(&raw.robot)?;
-        let world = self.world(raw, &robot, open);
-        let rig = self.rig(raw);
+        let robot = self.robot(raw)?;
+        let rig = self.rig(raw, &robot.equipment);
+        let world = self.world(raw, &robot, rig.as_deref(), open);
         let setting = Setting {
             learns_marker: raw.robot.learn_marker,
             is_measured: raw.measurements.is_some(),
@@ -132,7 +135,7 @@ impl Check<'_> {
             name: name.clone(),
             title: raw.title.clone(),
             steps: self.at_least_one("steps", &raw.steps),
-            prior: self.prior(raw),
+            prior: self.prior(raw, &robot),
             filter,
             unscented: raw.unscented.as_ref().map_or(filter, |unscented| self.filter("unscented", unscented)),
             smoother: self.smoother(raw, rig.as_deref()),
@@ -150,7 +153,7 @@ impl Check<'_> {
         })
     }
 
-    fn prior(&mut self, raw: &raw::Scenario) -> Prior {
+    fn prior(&mut self, raw: &raw::Scenario, robot: &Robot) -> Prior {
         let prior = raw.prior.get_ref();
         if raw.robot.learn_marker && prior.marker_m.is_none() {
             let mend = "add `marker_m = …`, its standard deviation in metres";
@@ -160,7 +163,42 @@ impl Check<'_> {
             direction_rad: self.positive("prior.direction_rad", &prior.direction_rad),
             point_m: self.positive("prior.point_m", &prior.point_m),
             marker_m: prior.marker_m.as_ref().map_or(1.0, |sd| self.positive("prior.marker_m", sd)),
+            known: self.known_blocks(raw, robot),
         }
+    }
+
+    /// What is known of targets, cameras, ratios and offsets that are learned.
+    fn known_blocks(&mut self, raw: &raw::Scenario, robot: &Robot) -> BTreeMap<Block, Known> {
+        let prior = raw.prior.get_ref();
+        let joints = raw.robot.joints.get_ref().iter().enumerate();
+        let mut known: BTreeMap<Block, Known> = robot.known.iter().copied().collect();
+        let unit = |size: f64| Known::Within { length_m: size, angle_rad: size, other: size };
+        for (index, joint) in joints {
+            let (span, joint) = (joint.span(), joint.get_ref());
+            if joint.learn_ratio {
+                match &prior.ratio {
+                    Some(sd) => drop(known.insert(Block::Ratio(index), unit(self.positive("prior.ratio", sd)))),
+                    None => {
+                        let mend = "add `ratio = 0.02`, say, to [prior]: the standard deviation of a ratio";
+                        self.problem(span.clone(), "prior.ratio", "a ratio is learned", mend);
+                    }
+                }
+            }
+            if joint.learn_offset {
+                let (key, sd) = match joint.kind {
+                    JointKind::Revolute => ("prior.offset_rad", &prior.offset_rad),
+                    JointKind::Prismatic => ("prior.offset_m", &prior.offset_m),
+                };
+                match sd {
+                    Some(sd) => drop(known.insert(Block::Offset(index), unit(self.positive(key, sd)))),
+                    None => {
+                        let mend = "add it to [prior]: the standard deviation of an offset";
+                        self.problem(span, key, "an offset is learned", mend);
+                    }
+                }
+            }
+        }
+        known
     }
 
     fn filter(&mut self, section: &str, raw: &raw::Filter) -> Filter {
@@ -190,7 +228,34 @@ impl Check<'_> {
             kept: count("smoother.hypotheses", given.and_then(|given| given.hypotheses.as_ref()), default.kept),
             spawned: count("smoother.spawned", given.and_then(|given| given.spawned.as_ref()), default.spawned),
         };
-        SmootherSpec { sigma, hypotheses }
+        // Of recorded data nobody knows more than the filter assumes.
+        let usual = if raw.measurements.is_some() { raw::NoiseKnowledge::Unknown } else { raw::NoiseKnowledge::Known };
+        let noise_unknown = given.and_then(|given| given.noise).unwrap_or(usual) == raw::NoiseKnowledge::Unknown;
+        SmootherSpec { sigma, hypotheses, loss: self.loss(given), noise_unknown }
+    }
+
+    fn loss(&mut self, given: Option<&raw::Smoother>) -> Loss {
+        let Some(given) = given else { return Loss::None };
+        let keys = [("fraction", &given.outlier_fraction), ("spread", &given.outlier_spread)];
+        let loss = given.loss.unwrap_or(raw::Loss::None);
+        let Loss::Mixture { mut fraction, mut spread } = Loss::MIXTURE else { return Loss::None };
+        for (key, value) in keys {
+            let Some(value) = value else { continue };
+            let key = format!("smoother.outlier_{key}");
+            if loss != raw::Loss::Mixture {
+                let mend = "remove it, or write `loss = \"mixture\"`";
+                self.problem(value.span(), key, "only a mixture of noise and outliers has one", mend);
+            } else if key.ends_with("fraction") {
+                fraction = self.number(&key, value, |x| x > 0.0 && x < 0.5, "a share above 0 and below 0.5");
+            } else {
+                spread = self.number(&key, value, |x| x > 1.0, "a number above 1, in standard deviations of the noise");
+            }
+        }
+        match loss {
+            raw::Loss::None => Loss::None,
+            raw::Loss::Huber => Loss::Huber,
+            raw::Loss::Mixture => Loss::Mixture { fraction, spread },
+        }
     }
 
     /// The rate of the gradient. A file that has learn by it says which; others leave it to a default.
@@ -294,9 +359,27 @@ impl Check<'_> {
                 let what = "a gradient has no covariance to add noise to";
                 self.problem(key_span.span(), format!("{key}.stabilising_noise"), what, mend);
             }
+            if let (Some(given), true) = (&learner.robust, learner.estimator != EstimatorKind::Smoother) {
+                let mend = "remove it; only a `smoother` has a loss that can be robust";
+                self.problem(given.span(), format!("{key}.robust"), "this estimator knows least squares alone", mend);
+            }
+            if let (Some(given), true) = (&learner.holds_axes, learner.estimator != EstimatorKind::Smoother) {
+                let mend = "remove it; only a `smoother` holds the axes and learns the rest";
+                self.problem(given.span(), format!("{key}.holds_axes"), "this estimator learns all there is", mend);
+            }
+            let holds_axes = learner.holds_axes.as_ref().is_some_and(|given| *given.get_ref());
             let stabilising = learner.stabilising_noise.as_ref().is_none_or(|given| *given.get_ref());
+            let robust = learner.robust.as_ref().is_none_or(|given| *given.get_ref());
             let (name, by_default) = (name.clone(), learner.by_default);
-            learners.push(LearnerSpec { name, estimator: learner.estimator, policy, stabilising, by_default });
+            learners.push(LearnerSpec {
+                name,
+                estimator: learner.estimator,
+                policy,
+                stabilising,
+                robust,
+                holds_axes,
+                by_default,
+            });
         }
         if learners.is_empty() {
             self.problem(raw.span(), "learner", "there is no learner", "add a [[learner]]");

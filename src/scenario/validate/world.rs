@@ -6,8 +6,9 @@ use super::{Check, raw};
 use std::sync::Arc;
 
 use crate::{
+    experiment::Outliers,
     scenario::{DataError, InitialError, Measurements, Robot, WorldSpec},
-    sensing::Rig,
+    sensing::{Equipment, Rig},
 };
 
 impl Check<'_> {
@@ -15,6 +16,7 @@ impl Check<'_> {
         &mut self,
         raw: &raw::Scenario,
         robot: &Robot,
+        rig: Option<&Rig>,
         open: &dyn Fn(&str) -> Result<String, String>,
     ) -> Option<WorldSpec> {
         match (&raw.sensor, &raw.initial_error, &raw.measurements) {
@@ -31,7 +33,16 @@ impl Check<'_> {
                     |angle| (0.0..=180.0).contains(&angle),
                     "an angle from 0 to 180 degrees",
                 );
-                let watch = raw.head.as_ref().map(|head| self.head(head, robot));
+                let watch = match (&raw.head, &raw.view, rig) {
+                    (Some(head), None, _) => self.head(head, robot),
+                    (None, Some(view), Some(rig)) => self.view(view, robot, rig),
+                    (Some(_), Some(view), _) => {
+                        let mend = "remove [view]: the head says which pose is in view";
+                        self.problem(view.span(), "view", "there is a head that watches", mend);
+                        None
+                    }
+                    _ => None,
+                };
                 let change = raw.change.as_ref().map(|change| self.change(change.get_ref(), robot));
                 Some(WorldSpec::Simulated {
                     initial_error: InitialError {
@@ -40,16 +51,18 @@ impl Check<'_> {
                         point_m: self.not_negative("initial_error.point_m", &error.point_m),
                         marker_m: marker_m.map_or(0.0, |size| self.not_negative("initial_error.marker_m", size)),
                     },
-                    watch: watch.flatten(),
+                    watch,
                     change: change.flatten().map(Box::new),
+                    outliers: raw.outliers.as_ref().map(|outliers| self.outliers(outliers.get_ref())),
                 })
             }
             (None, None, Some(measurements)) => {
                 let head = raw.head.as_ref().map(|head| ("head", head.span()));
                 let change = raw.change.as_ref().map(|change| ("change", change.span()));
-                for (key, span) in head.into_iter().chain(change) {
+                let outliers = raw.outliers.as_ref().map(|outliers| ("outliers", outliers.span()));
+                for (key, span) in head.into_iter().chain(change).chain(outliers) {
                     let mend = "remove it; it belongs to a simulated world";
-                    self.problem(span, key, "recorded measurements cannot be watched or changed", mend);
+                    self.problem(span, key, "recorded measurements cannot be watched, changed or spoilt", mend);
                 }
                 self.measured(raw, measurements.get_ref(), open)
             }
@@ -68,9 +81,17 @@ impl Check<'_> {
         }
     }
 
+    fn outliers(&mut self, raw: &raw::Outliers) -> Outliers {
+        let mend = "a share of readings, from 0 to 1";
+        Outliers {
+            fraction: self.number("outliers.fraction", &raw.fraction, |share| (0.0..=1.0).contains(&share), mend),
+            box_m: self.positive("outliers.box_m", &raw.box_m),
+        }
+    }
+
     /// What is measured: the sensors of a simulated world; where measurements are replayed a tracker with the noise that
     /// the filter assumes.
-    pub(super) fn rig(&mut self, raw: &raw::Scenario) -> Option<Arc<Rig>> {
+    pub(super) fn rig(&mut self, raw: &raw::Scenario, equipment: &Equipment) -> Option<Arc<Rig>> {
         let Some(sensors) = &raw.sensor else {
             return Some(Arc::new(Rig::tracker(raw.filter.measurement_variance_m2.get_ref().sqrt())));
         };
@@ -79,7 +100,7 @@ impl Check<'_> {
         for (index, keys) in given.0.iter().enumerate() {
             let section = if given.0.len() > 1 { format!("sensor[{index}]") } else { "sensor".to_owned() };
             let span = if given.0.len() > 1 { keys.span() } else { sensors.span() };
-            match keys.get_ref().channel() {
+            match keys.get_ref().channel(equipment) {
                 Ok(channel) if given.0.len() > 1 && channel.sigma() == 0.0 => {
                     let what = "several sensors are weighed by their noise, and this one has none";
                     self.problem(span, format!("{section}.sigma_m"), what, "write a number above 0");
@@ -97,6 +118,17 @@ impl Check<'_> {
         if let Some(head) = raw.head.as_ref().filter(|_| channels.iter().any(|channel| channel.target() != Some(0))) {
             let mend = "leave [head] out, or use sensors of the marker's position alone";
             self.problem(head.span(), "head", "a head watches the marker, and not what another sensor measures", mend);
+        }
+        if let Some(outliers) =
+            raw.outliers.as_ref().filter(|_| channels.iter().any(|channel| channel.target().is_none()))
+        {
+            let mend = "leave [outliers] out, or use sensors of positions alone";
+            self.problem(
+                outliers.span(),
+                "outliers",
+                "they replace positions, and another sensor measures something else",
+                mend,
+            );
         }
         (channels.len() == given.0.len() && !channels.is_empty()).then(|| Arc::new(Rig::new(channels)))
     }
@@ -137,7 +169,7 @@ impl Check<'_> {
             }
         };
         let (count, held_out) = (rows.markers_m.len(), *measurements.held_out.get_ref());
-        // The rigid fit needs four rows at least.
+        // Base and marker take four rows at least.
         if held_out == 0 || held_out + 4 > count {
             let what = format!("{held_out} of {count} rows cannot be held out");
             let mend = format!("write a number from 1 to {}", count.saturating_sub(4));

@@ -162,13 +162,13 @@ fn the_naive_form_believes_its_own_prediction() {
     case.moved(&first, true);
     let selection = case.select(&policy).expect("a selection");
     let pose = &selection.movement.configuration;
-    assert!(watch.head.sees(&case.belief.state.marker_at(pose)));
+    assert!(watch.head.expect("a head").sees(&case.belief.state.marker_at(pose)));
     let plain = case.value(&by_direct(&case), pose);
     assert!((selection.criterion.expect("chosen by it") - plain).abs() < 1e-12 * plain);
     let leaves = &selection.search.as_ref().expect("searched").partition.leaves;
     for leaf in leaves {
         let marker = case.belief.state.marker_at(&case.limits().from_unit(&leaf.centre));
-        assert_eq!(leaf.value.is_some(), watch.head.sees(&marker));
+        assert_eq!(leaf.value.is_some(), watch.head.expect("a head").sees(&marker));
     }
     case.moved(&selection, false);
     assert_eq!(case.select(&policy), Ok(selection));

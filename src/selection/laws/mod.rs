@@ -127,7 +127,7 @@ fn watch(along_x: f64) -> Watch {
         lens_half_angle: 0.3,
         baseline: None,
     };
-    Watch { head, visible_pose: vec![0.0; JOINTS] }
+    Watch { head: Some(head), visible_pose: vec![0.0; JOINTS] }
 }
 
 /// The distance of two configurations in the unit cube of the joint box.

@@ -7,7 +7,7 @@ use crate::selection::{CriterionUnits, Planned, Planner, Planning, Policy, Selec
 
 fn planner(case: &Case, planning: Planning) -> Planner {
     let short = Planning { sweeps: 1, ..planning };
-    Planner::new(case.weights.clone(), search(60), short, Vec::new())
+    Planner::new(case.weights.clone(), search(60), short, Vec::new().into())
 }
 
 fn greedy(case: &Case) -> Planner {

@@ -1,0 +1,120 @@
+//! A filter that begins where a smoother has got to.
+//!
+//! A filter linearises every measurement once, where it stands, and from a guess that is a metre and a radian off it gets
+//! nowhere. So the first measurements are smoothed, until they determine the blocks that nothing was known of; there the
+//! filter takes over, with the smoother's estimate and covariance.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use super::{Belief, EstimationError, Estimator, Smoother, Update};
+use crate::{
+    model::{Block, rank},
+    sensing::{Observation, Rig},
+};
+
+/// What begins a filter from a belief with a covariance.
+pub type Begin = Box<dyn Fn(Belief, DMatrix<f64>) -> Box<dyn Estimator> + Send>;
+
+/// A smoother, and after it a filter.
+pub struct Begun {
+    smoother: Smoother,
+    /// What the first measurements must determine.
+    blocks: Vec<Block>,
+    /// Where the robot was when it was seen.
+    postures: Vec<Vec<f64>>,
+    rig: Arc<Rig>,
+    begin: Begin,
+    filter: Option<Box<dyn Estimator>>,
+}
+
+/// Equations wanted for each unknown: with just enough the fit takes up all their noise.
+const MARGIN: usize = 2;
+
+impl Begun {
+    /// Smooths until `blocks` are determined, and goes on with what `begin` makes of the belief, whitened by `rig`.
+    pub fn new(smoother: Smoother, blocks: Vec<Block>, rig: Arc<Rig>, begin: Begin) -> Self {
+        Self { smoother, blocks, postures: Vec::new(), rig, begin, filter: None }
+    }
+
+    /// Whether what was seen so far determines the blocks, everything else held.
+    fn is_determined(&self) -> bool {
+        let Belief { state, layout, rig, .. } = self.smoother.belief();
+        let columns: Vec<usize> = self.blocks.iter().filter_map(|block| layout.block(*block)).flatten().collect();
+        if self.postures.len() * rig.equations() < MARGIN * columns.len() {
+            return false;
+        }
+        let mut stacked = DMatrix::zeros(columns.len(), 0);
+        for posture in &self.postures {
+            let rows = rig.jacobian(state, layout, posture).select_rows(&columns);
+            let start = stacked.ncols();
+            stacked = stacked.resize_horizontally(start + rows.ncols(), 0.0);
+            stacked.columns_mut(start, rows.ncols()).copy_from(&rows);
+        }
+        rank(&stacked.transpose()) == columns.len()
+    }
+}
+
+impl Estimator for Begun {
+    fn belief(&self) -> &Belief {
+        self.filter.as_ref().map_or_else(|| self.smoother.belief(), |filter| filter.belief())
+    }
+
+    fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
+        if let Some(filter) = &mut self.filter {
+            return filter.correct(positions, observation);
+        }
+        let update = self.smoother.correct(positions, observation)?;
+        if !observation.is_miss() {
+            self.postures.push(positions.to_vec());
+        }
+        if self.is_determined() {
+            let belief = self.smoother.belief();
+            let covariance = belief.covariance.clone().unwrap_or_default();
+            let belief = Belief::new(belief.state.clone(), belief.layout.clone(), self.rig.clone());
+            self.filter = Some((self.begin)(belief, covariance));
+        }
+        Ok(update)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::{
+        estimation::{HypothesisSettings, Rls},
+        model::{Layout, Prior, laws::random_arm},
+    };
+
+    /// A base a radian off: after four positions of a marker the filter takes over, and stands where the robot does.
+    #[test]
+    fn the_filter_takes_over_when_the_base_is_determined() {
+        let truth = random_arm(&mut ChaCha8Rng::seed_from_u64(4), 4);
+        let layout = Arc::new(Layout::new(&truth, [Block::Base]));
+        let mut guess = truth.clone();
+        guess.base =
+            nalgebra::Isometry3::new(nalgebra::Vector3::new(0.5, -0.3, 0.2), nalgebra::Vector3::new(0.3, 0.8, -0.4));
+        let covariance = DMatrix::identity(6, 6);
+        let prior = Prior::around(guess, &layout, covariance).expect("a prior");
+        let rig = Arc::new(Rig::tracker(0.001));
+        let (settings, rng) = (HypothesisSettings::default(), ChaCha8Rng::seed_from_u64(1));
+        let smoother = Smoother::new(prior, layout, rig.clone(), settings, rng);
+        let begin: Begin = Box::new(|belief, covariance| Box::new(Rls::new(belief, covariance, None)));
+        let mut begun = Begun::new(smoother, vec![Block::Base], rig, begin);
+        for (index, theta) in
+            [[0.3, -0.7, 1.0, 0.2], [-0.9, 0.4, -0.3, 1.1], [1.2, 0.8, 0.5, -0.6], [0.6, -0.2, -0.9, -1.0]]
+                .iter()
+                .enumerate()
+        {
+            assert!(begun.filter.is_none(), "after {index}");
+            begun.update(theta, &Observation::seen(truth.marker_at(theta))).expect("absorbed");
+        }
+        assert!(begun.filter.is_some());
+        let theta = [0.1, 0.2, -0.5, 0.9];
+        assert!((begun.belief().state.marker_at(&theta) - truth.marker_at(&theta)).norm() < 0.01);
+    }
+}

@@ -1,0 +1,196 @@
+//! Which readings there will be: the chance of each channel, where sensors see some postures only.
+//!
+//! Whether a tag is in a camera's picture and faces it depends on the whole state, and not by much of a linear function. So
+//! states are drawn from the belief, and a posture's chance is the share of them in which the channel sees its target:
+//!
+//! ```text
+//! p_c(θ) = Σₖ wₖ s_c(xₖ, θ),     s_c = max(clamp(½ + clearance_c/2h, 0, 1), 10⁻³ e^{clearance_c/¼}),     xₖ = x ⊕ κ P^½ zₖ
+//! ```
+//!
+//! The tail of s_c is too low to be chosen for, and leads a search to where there is something to see. κ = 2, as for a head: linearised at a poor estimate P is too small. *Misses teach*: a belief knows only what was seen, so a
+//! draw counts the less, the surer it would have seen something where nothing was seen,
+//!
+//! ```text
+//! wₖ ∝ Πₘ Π_c (1 − s_c(xₖ, θₘ)),     θₘ the misses
+//! ```
+//!
+//! Of many draws those of the greatest weight are kept. The zₖ are the same for all beliefs, in pairs of opposite signs.
+//!
+//! With several channels the rows of each are weighed by √(p_c/p), p being the greatest of the chances and that of the
+//! movement: the information that is expected, given that something is seen. With one channel nothing is approximated.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use super::visibility::CAUTION;
+use crate::{
+    model::{Layout, State},
+    sensing::Rig,
+};
+
+/// States drawn from a belief, to see what they would see.
+#[derive(Clone, Debug)]
+pub(super) struct Views {
+    /// wₖ and xₖ.
+    states: Vec<(f64, State)>,
+}
+
+/// Pairs of states, before misses and after.
+const DRAWN: usize = 8;
+const DRAWN_AFTER_MISSES: usize = 96;
+/// States kept.
+const KEPT: usize = 16;
+/// h, radians.
+const RAMP: f64 = 0.03;
+/// Where nothing was seen a draw that sees something is not ruled out altogether: it stands for its neighbours too.
+const DOUBT: f64 = 0.05;
+
+impl Views {
+    /// Of a belief in `state` with `covariance`, given movements (rad or m) after which nothing was seen.
+    pub fn new(
+        state: &State,
+        layout: &Layout,
+        covariance: &DMatrix<f64>,
+        rig: &Rig,
+        misses: impl Iterator<Item = Vec<f64>>,
+    ) -> Self {
+        let misses: Vec<Vec<f64>> = misses.collect();
+        let m = layout.dimension();
+        let root = Cholesky::new(covariance * CAUTION).map_or_else(
+            || DMatrix::from_diagonal(&covariance.diagonal().map(|x| (CAUTION * x).max(0.0).sqrt())),
+            |cholesky| cholesky.unpack(),
+        );
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let pairs = if misses.is_empty() { DRAWN } else { DRAWN_AFTER_MISSES };
+        let mut states = Vec::with_capacity(2 * pairs);
+        let mut clearances = vec![0.0; rig.channels().len()];
+        for _ in 0..pairs {
+            let delta = &root * DVector::from_fn(m, |_, _| rng.sample::<f64, _>(StandardNormal));
+            for delta in [delta.clone(), -delta] {
+                let drawn = state.retract(layout, &delta);
+                let mut weight = 1.0;
+                for miss in &misses {
+                    rig.clearances(&drawn, miss, &mut clearances);
+                    weight *= clearances.iter().map(|clearance| (1.0 - seen(*clearance)).max(DOUBT)).product::<f64>();
+                }
+                states.push((weight, drawn));
+            }
+        }
+        states.sort_by(|a, b| b.0.total_cmp(&a.0));
+        states.truncate(KEPT);
+        let total: f64 = states.iter().map(|(weight, _)| weight).sum();
+        let share = |weight: f64| if total > 0.0 { weight / total } else { 1.0 / KEPT as f64 };
+        states.iter_mut().for_each(|(weight, _)| *weight = share(*weight));
+        Self { states }
+    }
+
+    /// Weighs the rows (d columns of m numbers) of a movement to `positions` by what channels will see, and tells the chance
+    /// that anything is seen.
+    pub fn weigh(&self, rig: &Rig, positions: &[f64], rows: &mut [f64]) -> f64 {
+        let mut chances = vec![0.0; rig.channels().len()];
+        self.chances(rig, positions, &mut chances);
+        let best = chances.iter().copied().fold(0.0, f64::max);
+        let m = rows.len() / rig.equations().max(1);
+        let mut start = 0;
+        for (channel, chance) in rig.channels().iter().zip(&chances) {
+            let end = start + channel.equations() * m;
+            if *chance < best {
+                let factor = (chance / best).sqrt();
+                rows[start..end].iter_mut().for_each(|x| *x *= factor);
+            }
+            start = end;
+        }
+        best
+    }
+
+    /// Writes p_c of every channel of `rig` at `positions` (rad or m).
+    pub fn chances(&self, rig: &Rig, positions: &[f64], chances: &mut [f64]) {
+        let mut clearances = vec![0.0; chances.len()];
+        chances.fill(0.0);
+        for (weight, state) in &self.states {
+            rig.clearances(state, positions, &mut clearances);
+            for (chance, clearance) in chances.iter_mut().zip(&clearances) {
+                *chance += weight * seen(*clearance);
+            }
+        }
+    }
+}
+
+/// s of a clearance, radians.
+fn seen(clearance: f64) -> f64 {
+    let tail = 1e-3 * (clearance.min(0.0) / 0.25).exp();
+    (0.5 + 0.5 * clearance / RAMP).clamp(tail, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Isometry3, Point3, Vector3};
+
+    use super::*;
+    use crate::{
+        model::{Block, Device, laws::random_arm},
+        sensing::{Pixels, Position},
+    };
+
+    /// A marker on an arm and a camera that looks at where it is believed to be: seen for certain where it is known well, never
+    /// from behind, and half of the time where it is believed at the border.
+    #[test]
+    fn the_chance_follows_the_belief() {
+        let mut state = random_arm(&mut ChaCha8Rng::seed_from_u64(5), 3);
+        let layout = Layout::new(&state, [Block::Target(0)]);
+        let marker = state.marker();
+        let towards = |turn: f64| {
+            let ahead = Vector3::new(turn.sin(), 0.0, turn.cos());
+            let eye = marker - ahead;
+            Isometry3::from_parts(eye.coords.into(), nalgebra::UnitQuaternion::identity())
+        };
+        let pixels = Pixels {
+            camera: 0,
+            target: 0,
+            points: [Point3::origin()].into(),
+            size_px: [640.0, 480.0],
+            facing: None,
+            sigma_px: 1.0,
+        };
+        let rig = Rig::new(vec![Arc::new(pixels), Arc::new(Position::of_marker(0.01))]);
+        let mut chance = |pose: Isometry3<f64>, sd: f64| {
+            state.devices = vec![Device { link: None, pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]) }];
+            let mut chances = [0.0; 2];
+            let covariance = DMatrix::identity(3, 3) * sd * sd;
+            let views = Views::new(&state, &layout, &covariance, &rig, std::iter::empty());
+            views.chances(&rig, &[0.0; 3], &mut chances);
+            assert!((chances[1] - 1.0).abs() < 1e-12, "a tracker sees everything");
+            chances[0]
+        };
+        assert!((chance(towards(0.0), 1e-3) - 1.0).abs() < 1e-12);
+        assert!(chance(towards(std::f64::consts::PI), 1e-3) < 1e-3);
+        let border = (320_f64 / 500.0).atan();
+        let unsure = chance(towards(border), 0.1);
+        assert!((unsure - 0.5).abs() < 0.2, "{unsure}");
+    }
+
+    /// A marker that was not seen where it might have been is where the camera does not look.
+    #[test]
+    fn a_miss_moves_the_belief_out_of_view() {
+        let mut state = random_arm(&mut ChaCha8Rng::seed_from_u64(5), 3);
+        let layout = Layout::new(&state, [Block::Target(0)]);
+        let eye = state.marker() - Vector3::z();
+        let pose = Isometry3::from_parts(eye.coords.into(), nalgebra::UnitQuaternion::identity());
+        state.devices = vec![Device { link: None, pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]) }];
+        let (points, size_px) = ([Point3::origin()].into(), [640.0, 480.0]);
+        let pixels = Pixels { camera: 0, target: 0, points, size_px, facing: None, sigma_px: 1.0 };
+        let rig = Rig::new(vec![Arc::new(pixels)]);
+        let chance = |misses: usize| {
+            let covariance = DMatrix::identity(3, 3) * 0.09;
+            let missed = std::iter::repeat_n(vec![0.0; 3], misses);
+            let mut chances = [0.0];
+            Views::new(&state, &layout, &covariance, &rig, missed).chances(&rig, &[0.0; 3], &mut chances);
+            chances[0]
+        };
+        assert!(chance(0) > 0.4 && chance(1) < 0.2, "{} {}", chance(0), chance(1));
+    }
+}

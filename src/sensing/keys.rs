@@ -1,0 +1,164 @@
+//! What a scenario may say of a sensor.
+
+use nalgebra::{Matrix3, Point3};
+use serde::{Deserialize, Serialize};
+
+use super::Facing;
+
+/// The keys of a sensor. A channel takes those that it knows and refuses the others.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Keys {
+    /// Which channel; `position` unless told otherwise.
+    pub channel: Option<String>,
+    /// The name of the target that is measured; the first unless told otherwise.
+    pub target: Option<String>,
+    /// The name of the camera that measures; the first unless told otherwise.
+    pub camera: Option<String>,
+    /// Standard deviation of the noise per coordinate, metres.
+    pub sigma_m: Option<f64>,
+    /// Standard deviation of the noise of a rotation, degrees per axis.
+    pub sigma_deg: Option<f64>,
+    /// Standard deviation of the noise per coordinate, pixels.
+    pub sigma_px: Option<f64>,
+    /// The covariance of the noise of a position, 3 × 3, m².
+    pub covariance_m2: Option<Vec<Vec<f64>>>,
+    /// A fixed point in the frame of the measurements, three coordinates in metres.
+    pub to_m: Option<Vec<f64>>,
+}
+
+/// What sensors can name: targets and cameras, in the order of the [`State`](crate::model::State) they belong to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Equipment {
+    /// What can be looked at.
+    pub targets: Vec<TargetKind>,
+    /// What looks.
+    pub cameras: Vec<CameraKind>,
+}
+
+/// What is known of a target besides its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TargetKind {
+    /// Its name.
+    pub name: String,
+    /// The known points of a rigid body in its own frame, metres; the origin alone for a point.
+    pub points: Vec<Point3<f64>>,
+    /// From where it can be seen; from everywhere, if it does not say.
+    pub facing: Option<Facing>,
+}
+
+/// What is known of a camera besides its place and its lens.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraKind {
+    /// Its name.
+    pub name: String,
+    /// Width and height of its picture, pixels.
+    pub size_px: [f64; 2],
+}
+
+/// What is wrong with the keys of a sensor.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("`{key}`: {what}")]
+pub struct KeyError {
+    /// The key.
+    pub key: String,
+    /// What is wrong.
+    pub what: String,
+    /// How to mend it.
+    pub mend: String,
+}
+
+impl KeyError {
+    fn new(key: &str, what: impl Into<String>, mend: impl Into<String>) -> Self {
+        Self { key: key.to_owned(), what: what.into(), mend: mend.into() }
+    }
+}
+
+impl Keys {
+    pub(super) fn sigma_m(&self) -> Result<f64, KeyError> {
+        sigma("sigma_m", self.sigma_m, "metres")
+    }
+
+    /// Radians.
+    pub(super) fn sigma_rad(&self) -> Result<f64, KeyError> {
+        sigma("sigma_deg", self.sigma_deg, "degrees").map(f64::to_radians)
+    }
+
+    pub(super) fn sigma_px(&self) -> Result<f64, KeyError> {
+        sigma("sigma_px", self.sigma_px, "pixels")
+    }
+
+    pub(super) fn to_m(&self) -> Result<Point3<f64>, KeyError> {
+        let given = self.to_m.as_deref().unwrap_or_default();
+        let is_point = given.len() == 3 && given.iter().all(|x| x.is_finite());
+        let what = self.to_m.as_ref().map_or("missing".to_owned(), |given| format!("{given:?} is no point"));
+        let mend = "write `to_m = [x, y, z]`, in metres, in the frame of the measurements";
+        is_point.then(|| Point3::from_slice(given)).ok_or_else(|| KeyError::new("to_m", what, mend))
+    }
+
+    /// The full covariance, if there is one.
+    pub(super) fn covariance_m2(&self) -> Result<Option<Matrix3<f64>>, KeyError> {
+        let Some(given) = &self.covariance_m2 else { return Ok(None) };
+        let mend = "write three rows of three numbers, symmetric and positive, in square metres";
+        let rows_of_three = given.len() == 3 && given.iter().all(|row| row.len() == 3);
+        if !rows_of_three {
+            return Err(KeyError::new("covariance_m2", "it is not 3 × 3", mend));
+        }
+        let matrix = Matrix3::from_fn(|row, column| given[row][column]);
+        let is_symmetric = (matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
+        if !is_symmetric || matrix.cholesky().is_none() {
+            return Err(KeyError::new("covariance_m2", "it is not symmetric and positive", mend));
+        }
+        Ok(Some(matrix))
+    }
+
+    /// Which target is meant, and what is known of it.
+    pub(super) fn target<'a>(&self, equipment: &'a Equipment) -> Result<(usize, &'a TargetKind), KeyError> {
+        let names = equipment.targets.iter().map(|target| target.name.as_str());
+        let index = named("target", self.target.as_deref(), names)?;
+        Ok((index, &equipment.targets[index]))
+    }
+
+    /// Which camera is meant, and what is known of it.
+    pub(super) fn camera<'a>(&self, equipment: &'a Equipment) -> Result<(usize, &'a CameraKind), KeyError> {
+        let names = equipment.cameras.iter().map(|camera| camera.name.as_str());
+        let index = named("camera", self.camera.as_deref(), names)?;
+        Ok((index, &equipment.cameras[index]))
+    }
+
+    /// Refuses keys that a channel has no use for.
+    pub(super) fn only(&self, known: &[&str]) -> Result<(), KeyError> {
+        let given = serde_json::to_value(self).unwrap_or_default();
+        let given = given.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
+        let unknown = given.map(|(key, _)| key).find(|key| *key != "channel" && !known.contains(&key.as_str()));
+        unknown.map_or(Ok(()), |key| {
+            let mend = format!("remove it; the keys here are {}", known.join(", "));
+            Err(KeyError::new(key, "this channel has no use for it", mend))
+        })
+    }
+}
+
+fn sigma(key: &str, given: Option<f64>, unit: &str) -> Result<f64, KeyError> {
+    let sigma = given.ok_or_else(|| KeyError::new(key, "missing", format!("add `{key} = …`, in {unit}")))?;
+    let holds = sigma.is_finite() && sigma >= 0.0;
+    let error = || KeyError::new(key, format!("{sigma} is out of range"), "write a number that is 0 or more");
+    holds.then_some(sigma).ok_or_else(error)
+}
+
+/// The index of what is named, the first unless told otherwise.
+fn named<'a>(key: &str, name: Option<&str>, names: impl Iterator<Item = &'a str> + Clone) -> Result<usize, KeyError> {
+    let found = match name {
+        Some(name) => names.clone().position(|known| known == name),
+        None => names.clone().next().map(|_| 0),
+    };
+    found.ok_or_else(|| {
+        let known: Vec<&str> = names.collect();
+        match (name, known.is_empty()) {
+            (_, true) => KeyError::new(key, format!("there is no {key}"), format!("add a `[[{key}]]`")),
+            (Some(name), false) => {
+                KeyError::new(key, format!("there is no {key} `{name}`"), format!("write one of {}", known.join(", ")))
+            }
+            (None, false) => KeyError::new(key, "missing", format!("write one of {}", known.join(", "))),
+        }
+    })
+}

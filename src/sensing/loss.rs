@@ -1,0 +1,175 @@
+//! What a reading costs that is far from its prediction.
+//!
+//! With s = ‖L⁻¹ (y ⊖ h)‖², the squared whitened residual of a reading of d equations, and z = √s:
+//!
+//! | loss | cost ρ(s) | weight w = 2 dρ/ds |
+//! |---|---|---|
+//! | none | s/2 | 1 |
+//! | Huber | s/2 up to z = k, then k z − k²/2 | min(1, k/z) |
+//! | mixture | −ln((1 − ε) e^{−s/2} + ε κ^{−d} e^{−s/2κ²}) + constant | q + (1 − q)/κ² |
+//!
+//! The mixture takes a share ε of readings to be outliers, with κ times the deviations of the others; 1 − q is the probability
+//! that this one is, and the constant makes ρ(0) = 0. Huber's k is where 95 % of normal readings lie within. A loss enters a
+//! least squares problem as the weight of the reading's equations (iteratively reweighted least squares), and the answer as ρ.
+
+/// What a reading costs that is far from its prediction, as a function of the whitened residual.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Loss {
+    /// Least squares: readings are all of the same kind.
+    #[default]
+    None,
+    /// Huber's: beyond what 95 % of normal readings keep within, the cost grows linearly.
+    Huber,
+    /// Normal readings, and among them outliers.
+    Mixture {
+        /// ε, the share of outliers before anything is known of a reading; above 0, below 1.
+        fraction: f64,
+        /// κ, the deviation of an outlier in those of a normal reading; above 1.
+        spread: f64,
+    },
+}
+
+impl Loss {
+    /// The mixture unless told otherwise: one reading in twenty, fifty times as far off.
+    pub const MIXTURE: Self = Self::Mixture { fraction: 0.05, spread: 50.0 };
+
+    /// ρ(s) of a reading of d equations.
+    pub fn cost(&self, s: f64, d: usize) -> f64 {
+        match *self {
+            Self::None => 0.5 * s,
+            Self::Huber => {
+                let k = huber(d);
+                if s <= k * k { 0.5 * s } else { k * s.sqrt() - 0.5 * k * k }
+            }
+            Self::Mixture { fraction, spread } => {
+                let share = log_odds(fraction, spread, d);
+                // Both terms relative to that of a normal reading at s = 0.
+                log_sum(-0.5 * s, share - 0.5 * s / (spread * spread))
+                    .map_or(f64::INFINITY, |log| log_one_plus(share) - log)
+            }
+        }
+    }
+
+    /// w, the weight of a reading's equations.
+    pub fn weight(&self, s: f64, d: usize) -> f64 {
+        match *self {
+            Self::None => 1.0,
+            Self::Huber => (huber(d) / s.sqrt()).min(1.0),
+            Self::Mixture { spread, .. } => {
+                let outlier = self.outlier(s, d).unwrap_or(0.0);
+                (1.0 - outlier) + outlier / (spread * spread)
+            }
+        }
+    }
+
+    /// 1 − q, the probability that a reading is an outlier; `None` for a loss that knows of none.
+    pub fn outlier(&self, s: f64, d: usize) -> Option<f64> {
+        let Self::Mixture { fraction, spread } = *self else { return None };
+        let odds = log_odds(fraction, spread, d) + 0.5 * s * (1.0 - (spread * spread).recip());
+        Some(1.0 / (1.0 + (-odds).exp()))
+    }
+
+    /// Whether one reading that fits nothing is taken to be the reading's fault.
+    pub fn is_robust(&self) -> bool {
+        *self != Self::None
+    }
+}
+
+/// A loss seen from `width` times as far: `τ² ρ(s/τ²)`. Near 0 it is least squares like the loss itself, but it gives a
+/// reading up only τ times as far out: a fit that is still on its way does not take half of the readings for outliers.
+/// Searches go from wide to 1 (graduated non-convexity, Blake and Zisserman 1987).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Graduated {
+    /// ρ.
+    pub loss: Loss,
+    /// τ; 1 is the loss itself.
+    pub width: f64,
+}
+
+impl From<Loss> for Graduated {
+    fn from(loss: Loss) -> Self {
+        Self { loss, width: 1.0 }
+    }
+}
+
+impl Graduated {
+    /// τ² ρ(s/τ²).
+    pub fn cost(&self, s: f64, d: usize) -> f64 {
+        let square = self.width * self.width;
+        if square.is_finite() { square * self.loss.cost(s / square, d) } else { 0.5 * s }
+    }
+
+    /// The weight of a reading's equations.
+    pub fn weight(&self, s: f64, d: usize) -> f64 {
+        let square = self.width * self.width;
+        if square.is_finite() { self.loss.weight(s / square, d) } else { 1.0 }
+    }
+}
+
+/// Where 95 % of normal readings of d equations lie within, standard deviations: √ of the χ² quantile (Wilson and Hilferty).
+fn huber(d: usize) -> f64 {
+    let variance = 2.0 / (9.0 * d.max(1) as f64);
+    (d.max(1) as f64 * (1.0 - variance + 1.645 * variance.sqrt()).powi(3)).sqrt()
+}
+
+/// ln(ε κ^{−d} / (1 − ε)).
+fn log_odds(fraction: f64, spread: f64, d: usize) -> f64 {
+    fraction.ln() - (-fraction).ln_1p() - d as f64 * spread.ln()
+}
+
+fn log_one_plus(log: f64) -> f64 {
+    log.exp().ln_1p()
+}
+
+/// ln(eᵃ + eᵇ); `None` where it is no number.
+fn log_sum(a: f64, b: f64) -> Option<f64> {
+    let (high, low) = (a.max(b), a.min(b));
+    let sum = high + log_one_plus(low - high);
+    sum.is_finite().then_some(sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LOSSES: [Loss; 3] = [Loss::None, Loss::Huber, Loss::MIXTURE];
+
+    /// w = 2 dρ/ds, ρ grows from 0, and no loss is above least squares.
+    #[test]
+    fn weights_are_the_slopes_of_costs() {
+        for loss in LOSSES {
+            for d in [1, 2, 3, 6, 8] {
+                assert!(loss.cost(0.0, d).abs() < 1e-12, "{loss:?}");
+                for s in [0.01, 0.5, 2.0, 9.0, 20.0, 26.0, 35.0, 80.0, 1e4, 1e7] {
+                    let step = 1e-5 * s;
+                    let slope = (loss.cost(s + step, d) - loss.cost(s - step, d)) / (2.0 * step);
+                    let weight = loss.weight(s, d);
+                    assert!((2.0 * slope - weight).abs() < 1e-4 * (1.0 + weight), "{loss:?} {d} {s}: {slope} {weight}");
+                    assert!(loss.cost(s, d) <= 0.5 * s + 1e-9 && (0.0..=1.0).contains(&weight));
+                }
+            }
+        }
+    }
+
+    /// At six standard deviations and three equations it is likelier than not, at four it is not; far out it is certain.
+    #[test]
+    fn an_outlier_is_told_from_a_normal_reading() {
+        let probability = |z: f64| Loss::MIXTURE.outlier(z * z, 3).expect("a mixture");
+        assert!(probability(3.0) < 0.01 && probability(4.0) < 0.5 && probability(6.0) > 0.9);
+        assert!(probability(1e6) == 1.0 && probability(1e200) == 1.0);
+        assert_eq!(Loss::Huber.outlier(9.0, 3), None);
+        // By Bayes' rule, worked out by hand for one equation, ε = 1/2, κ = 2, s = 4.
+        let (normal, outlier) = ((-2.0_f64).exp(), 0.5 * (-0.5_f64).exp());
+        let found = Loss::Mixture { fraction: 0.5, spread: 2.0 }.outlier(4.0, 1).expect("a mixture");
+        assert!((found - outlier / (normal + outlier)).abs() < 1e-12);
+    }
+
+    /// 95 % of readings: tables of χ².
+    #[test]
+    fn huber_begins_where_normal_readings_end() {
+        for (d, x) in [(1, 3.841), (2, 5.991), (3, 7.815), (6, 12.592)] {
+            assert!((huber(d).powi(2) / x - 1.0_f64).abs() < 0.03, "{d}: {}", huber(d).powi(2));
+        }
+        assert!((Loss::Huber.weight(4.0 * huber(3).powi(2), 3) - 0.5).abs() < 1e-12);
+    }
+}
