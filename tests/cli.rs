@@ -116,10 +116,12 @@ fn run_writes_all_that_it_is_asked_for() {
         assert_eq!((learner["estimator"].as_str(), learner["metrics"]["movements"].as_u64()), (Some("rls"), Some(9)));
         assert!(learner["converged_at"].is_null() && learner["metrics"]["orientation_deg"].is_null());
         let covariance = learner["model"]["covariance"].as_array().expect("a covariance");
-        assert_eq!(covariance.len(), 33);
+        assert_eq!(covariance.len(), 39);
         let coordinates = |part: &Value| part["coordinates"].as_array().expect("indices").len();
         let joints = learner["model"]["joints"].as_array().expect("joints");
         assert_eq!(joints.iter().map(coordinates).sum::<usize>() + coordinates(&learner["model"]["marker"]), 33);
+        let others = learner["model"]["others"].as_array().expect("parts");
+        assert_eq!((others.len(), others[0]["what"].as_str(), coordinates(&others[0])), (1, Some("Base"), 6));
     }
     let rows = std::fs::read_to_string(&csv).expect("a table").lines().count();
     assert_eq!(rows, 1 + 2 * 10, "a header, and steps 0 to 9 of two learners");
@@ -280,7 +282,7 @@ fn a_scenario_can_be_a_path_with_data_beside_it() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/tiago-mocap.toml");
     let output = body_schema(&["check", path]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(String::from_utf8_lossy(&output.stdout).contains("33 parameters"));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("39 parameters"));
     let list = body_schema(&["scenarios"]);
     let text = String::from_utf8_lossy(&list.stdout).into_owned();
     assert!(["arm-6dof", "arm-12dof", "tiago-mocap"].iter().all(|name| text.contains(name)), "{text}");

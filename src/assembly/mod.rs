@@ -365,7 +365,8 @@ mod tests {
             let text = nominal.source.replacen("learn_marker = true", &learned, 1);
             let scenario = Scenario::parse("marker.toml", &text, &|file| nominal.data_file(file)).expect("still valid");
             let spec = scenario.chosen(Some(&["global".to_owned()])).expect("offered").remove(0);
-            let (mut agent, world) = (scenario.agent(&spec, 3).expect("an agent"), scenario.draw(3).expect("a world").0);
+            let (mut agent, world) =
+                (scenario.agent(&spec, 3).expect("an agent"), scenario.draw(3).expect("a world").0);
             for _ in 0..8 {
                 let movement = agent.propose(1).expect("a proposal")[0].selection.movement.clone();
                 let observation = world.observe(&movement, &Draw::default()).expect("a row");

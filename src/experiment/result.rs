@@ -7,6 +7,7 @@ use crate::{
     design::BestDesign,
     estimation::{Belief, NoiseReport, ReadingReport},
     kinematics::{JointKind, chart},
+    model::Block,
 };
 
 /// The outcome of one run: `result.json`.
@@ -96,8 +97,11 @@ pub struct Model {
     pub joints: Vec<JointModel>,
     /// The marker on the hand.
     pub marker: MarkerModel,
-    /// Covariance of all learned parameters in tangent coordinates, row by row; null if the estimator keeps none.
-    /// Coordinates are joint by joint those listed in `coordinates`, then those of the marker.
+    /// What else is learned: base, ratios, offsets, other targets, cameras.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<OtherModel>,
+    /// Covariance of all learned parameters in tangent coordinates, row by row; null if the estimator keeps none. Every part
+    /// of the model lists its own under `coordinates`.
     pub covariance: Option<Vec<Vec<f64>>>,
 }
 
@@ -124,6 +128,16 @@ pub struct JointModel {
     #[serde(default, skip_serializing_if = "is_zero")]
     pub offset: f64,
     /// Indices of this joint's coordinates in the covariance: two of the point (revolute only), two of the direction.
+    pub coordinates: Vec<usize>,
+}
+
+/// Something learned besides axes and marker.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct OtherModel {
+    /// What it is, by its name in the engine and its number from 0: `Base`, `Ratio(3)`.
+    pub what: String,
+    /// Indices of its coordinates in the covariance.
     pub coordinates: Vec<usize>,
 }
 
@@ -186,9 +200,14 @@ impl Model {
             learned: layout.marker().is_some(),
             coordinates: layout.marker().into_iter().flatten().collect(),
         };
+        let others = layout.blocks().filter(|(block, _)| !matches!(block, Block::Axis(_)));
+        let others = others.filter(|(_, range)| Some(range.start) != layout.marker().map(|marker| marker.start));
+        let others =
+            others.map(|(block, range)| OtherModel { what: format!("{block:?}"), coordinates: range.collect() });
+        let others = others.collect();
         let covariance =
             belief.covariance.as_ref().map(|p| p.row_iter().map(|row| row.iter().copied().collect()).collect());
-        Self { joints, marker, covariance }
+        Self { joints, marker, others, covariance }
     }
 }
 

@@ -151,6 +151,7 @@ const commands = {
   say(state) {
     const { text, news, phase, step, latest, session: id, typing, caption } = (said = state);
     legend.show(caption);
+    viewer?.playing(phase === "playing");
     const mirror = element("mirror");
     Object.assign(mirror.dataset, { phase, step, latest, session: id, typing });
     if (mirror.textContent !== text) mirror.textContent = text;

@@ -21,10 +21,8 @@ const UNSETTLED = 20;
 const RESHAPED = 1.25;
 /** How long the shape must have stayed, ms. */
 const RESHAPED_MS = 300;
-/** Without a graphics card, the scene is drawn at this part of the screen's resolution while it moves, … */
+/** Without a graphics card, the scene is drawn at this part of the screen's resolution while it plays. */
 const COARSE = 0.6;
-/** … which it does while one step follows the other within this time, ms. */
-const MOVES_MS = 1200;
 
 /**
  * Loads the viewer's WebAssembly and starts it on a canvas.
@@ -94,11 +92,10 @@ async function load(fetched, progress) {
   }
 }
 
-/** The resolution of the scene: software draws a third of the pixels in less than half of the time. */
+/** The resolution of the scene: what software draws takes its time by the pixels. */
 class Resolution {
   #canvas;
   #scale = 1;
-  #resting = 0;
   #isSlow;
 
   /** @param {HTMLCanvasElement} canvas the viewer's */
@@ -132,15 +129,9 @@ class Resolution {
     }
   }
 
-  /** The scene moves: coarse, until it rests. */
-  moving() {
-    if (!this.#isSlow) return;
-    clearTimeout(this.#resting);
-    this.#resting = setTimeout(() => this.#set(1), MOVES_MS);
-    this.#set(COARSE);
-  }
-
-  #set(scale) {
+  /** Chooses the resolution: coarse while the scene plays, if software draws it. @param {boolean} plays */
+  choose(plays) {
+    const scale = plays && this.#isSlow ? COARSE : 1;
     if (scale === this.#scale) return;
     this.#scale = scale;
     // The viewer looks at its size only when that changes: by one pixel, behind the lower edge.
@@ -292,7 +283,6 @@ export class Viewer {
     const duration = Math.min(Math.max(GLIDE.part * (now - this.#moved), GLIDE.least), GLIDE.most);
     const isNext = this.#tick === (step - 1) * TICKS;
     this.#glide = glides && isNext && !still ? { duration, began: null } : null;
-    if (step !== this.#step && now - this.#moved < MOVES_MS) this.#resolution.moving();
     [this.#step, this.#moved] = [step, now];
     this.#run();
     return new Promise((resolve) => this.#waiting.push(resolve));
@@ -347,6 +337,11 @@ export class Viewer {
   /** Draws in the next frame, though nothing has changed: whatever happens to the pointer has the viewer do so. */
   redraw() {
     this.#canvas.dispatchEvent(new MouseEvent("mouseleave"));
+  }
+
+  /** Tells whether steps follow one another by themselves. @param {boolean} plays */
+  playing(plays) {
+    this.#resolution.choose(plays);
   }
 
   /** Why the viewer has crashed, or null. */
