@@ -13,6 +13,31 @@ export class PanelHandle {
         wasm.__wbg_panelhandle_free(ptr, 0);
     }
     /**
+     * Does what was done to an element, told as JSON.
+     * @param {string} act
+     */
+    act(act) {
+        const ptr0 = passStringToWasm0(act, wasm.__wbindgen_malloc, wasm.__wbindgen_realloc);
+        const len0 = WASM_VECTOR_LEN;
+        const ret = wasm.panelhandle_act(this.__wbg_ptr, ptr0, len0);
+        if (ret[1]) {
+            throw takeFromExternrefTable0(ret[0]);
+        }
+    }
+    /**
+     * The elements that the page is to have, as JSON; nothing if they are those that it was given last.
+     * @returns {string | undefined}
+     */
+    elements() {
+        const ret = wasm.panelhandle_elements(this.__wbg_ptr);
+        let v1;
+        if (ret[0] !== 0) {
+            v1 = getStringFromWasm0(ret[0], ret[1]);
+            wasm.__wbindgen_free(ret[0], ret[1] * 1, 1);
+        }
+        return v1;
+    }
+    /**
      * Why the panel has crashed, if it has.
      * @returns {string | undefined}
      */
@@ -58,6 +83,12 @@ export class PanelHandle {
         if (ret[1]) {
             throw takeFromExternrefTable0(ret[0]);
         }
+    }
+    /**
+     * Takes the focus from the widget that has it: it is elsewhere on the page now.
+     */
+    release() {
+        wasm.panelhandle_release(this.__wbg_ptr);
     }
     /**
      * Draws on a canvas from now on.
@@ -1342,22 +1373,22 @@ function __wbg_get_imports() {
             return ret;
         },
         __wbindgen_generic_0000000000000001: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 824, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 900, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
             const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___wasm_bindgen_2e5cde4e98ad3f85___JsValue__core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsError___true_);
             return ret;
         },
         __wbindgen_generic_0000000000000002: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 437, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 518, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
             const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true_);
             return ret;
         },
         __wbindgen_generic_0000000000000003: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 437, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__8);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 518, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__11);
             return ret;
         },
         __wbindgen_generic_0000000000000004: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 440, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 521, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
             const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsValue___true_);
             return ret;
         },
@@ -1427,8 +1458,8 @@ function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2
     wasm.wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true_(arg0, arg1, arg2);
 }
 
-function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__8(arg0, arg1, arg2) {
-    wasm.wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__8(arg0, arg1, arg2);
+function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__11(arg0, arg1, arg2) {
+    wasm.wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__11(arg0, arg1, arg2);
 }
 
 function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___wasm_bindgen_2e5cde4e98ad3f85___JsValue__core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsError___true_(arg0, arg1, arg2) {
