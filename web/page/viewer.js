@@ -22,7 +22,7 @@ const RESHAPED = 1.25;
 /** How long the shape must have stayed, ms. */
 const RESHAPED_MS = 300;
 /** Without a graphics card, the scene is drawn at this part of the screen's resolution while it plays. */
-const COARSE = 0.6;
+const COARSE = 0.4;
 
 /**
  * Loads the viewer's WebAssembly and starts it on a canvas.
