@@ -58,7 +58,10 @@ impl Panel {
         if ui.available_width() > SLICE + 260.0 {
             ui.horizontal_top(|ui| {
                 self.sliders(ui, SLICE + 30.0);
-                ui.vertical(|ui| self.pad(ui));
+                ui.vertical(|ui| {
+                    ui.set_max_width(SLICE);
+                    self.pad(ui);
+                });
             });
         } else {
             self.sliders(ui, 0.0);
@@ -117,7 +120,8 @@ impl Panel {
         ui.horizontal(|ui| {
             let taken = (y, x);
             for (salt, axis, other) in [("slice across", &mut x, taken.0), ("slice up", &mut y, taken.1)] {
-                let combo = ComboBox::from_id_salt(salt).width(72.0).selected_text(&joints[*axis].name);
+                let width = 0.5 * (SLICE - ui.spacing().item_spacing.x);
+                let combo = ComboBox::from_id_salt(salt).width(width).truncate().selected_text(&joints[*axis].name);
                 let response = combo.show_ui(ui, |ui| {
                     for (index, joint) in joints.iter().enumerate().filter(|(index, _)| *index != other) {
                         ui.selectable_value(axis, index, &joint.name);
