@@ -8,7 +8,7 @@ use crate::model::{Pass, State};
 ///
 /// A channel whitens: what it hands out are equations, differences divided by its own standard deviation σ (or multiplied
 /// by L⁻¹, where the covariance of its noise is L Lᵀ). Behind it R = I. Adding one takes a file here, a line in the list of
-/// this folder, and the keys that it wants in [`Keys`]; the laws of `laws.rs` hold for all in the list.
+/// this folder, and the keys that it wants in [`Keys`](super::Keys); the laws of `laws.rs` hold for all in the list.
 pub trait Channel: fmt::Debug + Send + Sync {
     /// Equations of one reading, d; as many as numbers of a reading.
     fn equations(&self) -> usize;
