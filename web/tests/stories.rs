@@ -94,7 +94,10 @@ fn on_the_seed_of_the_real_robot_the_curves_tell_something() {
         movements += 1;
         let report = run.to(movements);
         let errors = places.map(|place| report.learners[place].metrics.prediction_mean_m.expect("held out"));
-        sums = [sums[0] + errors[0], sums[1] + errors[1]];
+        // Before that nobody knows where the robot stands.
+        if movements >= 4 {
+            sums = [sums[0] + errors[0], sums[1] + errors[1]];
+        }
     }
     assert!(sums[0] < 0.9 * sums[1], "{sums:?}");
 }
