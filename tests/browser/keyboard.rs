@@ -11,7 +11,7 @@ const TAB: char = '\u{e004}';
 pub const ENTER: char = '\u{e007}';
 const F6: char = '\u{e036}';
 /// More presses of Tab than the panel has controls.
-const MANY: usize = 80;
+const MANY: usize = 200;
 
 /// Goes on with Tab until what is called so has the focus.
 pub async fn tab_to(page: &Browser, name: &str) {
