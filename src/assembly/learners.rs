@@ -51,22 +51,35 @@ impl Scenario {
         seed: u64,
         briefing: &Briefing,
     ) -> Result<Box<dyn Estimator>, ScenarioError> {
-        let sigma = match spec.estimator {
+        let stabilising = |filter: Filter| filter.stabilising.filter(|_| spec.stabilising);
+        let (sigma, begin): (f64, Begin) = match spec.estimator {
             EstimatorKind::Smoother => {
-                return Ok(Box::new(self.smoother(
-                    spec,
-                    seed,
-                    briefing,
-                    self.smoother.sigma,
-                    self.smoother.noise_unknown,
-                )?));
+                let (sigma, unknown) = (self.smoother.sigma, self.smoother.noise_unknown);
+                return Ok(Box::new(self.smoother(spec, seed, briefing, sigma, unknown)?));
             }
-            EstimatorKind::Gradient => 1.0,
-            EstimatorKind::Unscented => self.unscented.sigma(),
-            EstimatorKind::Rls | EstimatorKind::RlsSixNumbers => self.filter.sigma(),
+            EstimatorKind::Rls => {
+                let noise = stabilising(self.filter);
+                (self.filter.sigma(), Box::new(move |belief, covariance| Box::new(Rls::new(belief, covariance, noise))))
+            }
+            EstimatorKind::Unscented => {
+                let noise = stabilising(self.unscented);
+                let begin: Begin =
+                    Box::new(move |belief, covariance| Box::new(UnscentedRls::new(belief, covariance, noise)));
+                (self.unscented.sigma(), begin)
+            }
+            EstimatorKind::RlsSixNumbers => {
+                let (noise, direction, point) =
+                    (stabilising(self.filter), self.prior.direction_rad, self.prior.point_m);
+                let begin: Begin =
+                    Box::new(move |belief, _| Box::new(SixNumbers::new(belief, direction, point, noise)));
+                (self.filter.sigma(), begin)
+            }
+            EstimatorKind::Gradient => {
+                let rate = self.gradient_rate;
+                (1.0, Box::new(move |belief, _| Box::new(Gradient::new(belief, rate))))
+            }
         };
         let rig = Arc::new(self.rig.assuming(sigma));
-        let begin = self.filter_of(spec);
         let unknown = self.unknown_places(&briefing.layout);
         if !unknown.is_empty() {
             return Ok(Box::new(Begun::new(
@@ -78,20 +91,6 @@ impl Scenario {
         }
         let belief = Belief::new(briefing.initial.clone(), briefing.layout.clone(), rig);
         Ok(begin(belief, briefing.covariance.clone()))
-    }
-
-    /// What makes a filter of a belief and its covariance.
-    fn filter_of(&self, spec: &LearnerSpec) -> Begin {
-        let stabilising = |filter: Filter| filter.stabilising.filter(|_| spec.stabilising);
-        let (linear, unscented) = (stabilising(self.filter), stabilising(self.unscented));
-        let (direction, point, rate) = (self.prior.direction_rad, self.prior.point_m, self.gradient_rate);
-        let kind = spec.estimator;
-        Box::new(move |belief, covariance| match kind {
-            EstimatorKind::Unscented => Box::new(UnscentedRls::new(belief, covariance, unscented)),
-            EstimatorKind::RlsSixNumbers => Box::new(SixNumbers::new(belief, direction, point, linear)),
-            EstimatorKind::Gradient => Box::new(Gradient::new(belief, rate)),
-            EstimatorKind::Rls | EstimatorKind::Smoother => Box::new(Rls::new(belief, covariance, linear)),
-        })
     }
 
     /// Learned places of which next to nothing is known, so that a filter cannot begin at the guess: all that an unknown base

@@ -58,14 +58,14 @@ impl Briefing {
 impl Scenario {
     /// The experiment of a seed with the named learners; with all of the scenario's if none are named.
     pub fn experiment(&self, seed: u64, learners: Option<&[String]>) -> Result<Experiment, ScenarioError> {
-        let (world, evaluation, briefing) = self.draw(seed)?;
+        let (world, evaluation, briefing) = self.draw(seed);
         self.assemble(seed, &self.chosen(learners)?, world, evaluation, &briefing)
     }
 
     /// The agent of a learner, told what the learners of this seed are told: what has no world to live in, but a robot of
     /// its own.
     pub fn agent(&self, learner: &LearnerSpec, seed: u64) -> Result<Agent, ScenarioError> {
-        let (.., briefing) = self.draw(seed)?;
+        let (.., briefing) = self.draw(seed);
         self.agent_of(learner, seed, &briefing)
     }
 
@@ -100,7 +100,7 @@ impl Scenario {
         vec![Stretch { problem, from: 0, to: change.step }, Stretch { problem: changed, from: change.step, to: steps }]
     }
 
-    fn draw(&self, seed: u64) -> Result<(World, Evaluation, Briefing), ScenarioError> {
+    fn draw(&self, seed: u64) -> (World, Evaluation, Briefing) {
         match &self.world {
             WorldSpec::Simulated { initial_error, watch, change, outliers } => {
                 let truth = self.robot.state.clone();
@@ -124,19 +124,10 @@ impl Scenario {
                 let evaluation = Evaluation::of_truth(self.workspace(configurations), &truth, self.marker_sigma());
                 let change = change.as_ref();
                 let change = change.map(|change| Box::new(Change { step: change.step, truth: change.truth.clone() }));
-                Ok((
-                    World::Simulated {
-                        truth: Box::new(truth),
-                        rig: self.rig.clone(),
-                        head,
-                        change,
-                        outliers: *outliers,
-                    },
-                    evaluation,
-                    briefing,
-                ))
+                let (truth, rig, outliers) = (Box::new(truth), self.rig.clone(), *outliers);
+                (World::Simulated { truth, rig, head, change, outliers }, evaluation, briefing)
             }
-            WorldSpec::Measured { measurements, held_out } => Ok(self.draw_measured(seed, measurements, *held_out)),
+            WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, *held_out),
         }
     }
 
@@ -304,7 +295,7 @@ mod tests {
     #[test]
     fn the_evaluation_set_lies_in_view() {
         let scenario = builtin("head-fov").expect("a built-in scenario");
-        let (world, evaluation, briefing) = scenario.draw(5).expect("a world");
+        let (world, evaluation, briefing) = scenario.draw(5);
         let head = world.head().expect("a head");
         assert_eq!(evaluation.targets().len(), EVALUATION_SIZE);
         assert!(evaluation.targets().all(|(_, marker)| head.sees(marker)));
@@ -329,7 +320,7 @@ mod tests {
         ] {
             let scenario = builtin(name).expect("a built-in scenario");
             let selections = |swap: bool| {
-                let (mut world, mut evaluation, briefing) = scenario.draw(11).expect("a world");
+                let (mut world, mut evaluation, briefing) = scenario.draw(11);
                 if let (true, World::Simulated { truth, .. }) = (swap, &mut world) {
                     **truth = scenario.perturbed(
                         &InitialError { draw: ErrorDraw::Exactly, angle_rad: 0.7, point_m: 0.3, marker_m: 0.1 },
@@ -365,8 +356,7 @@ mod tests {
             let text = nominal.source.replacen("learn_marker = true", &learned, 1);
             let scenario = Scenario::parse("marker.toml", &text, &|file| nominal.data_file(file)).expect("still valid");
             let spec = scenario.chosen(Some(&["global".to_owned()])).expect("offered").remove(0);
-            let (mut agent, world) =
-                (scenario.agent(&spec, 3).expect("an agent"), scenario.draw(3).expect("a world").0);
+            let (mut agent, world) = (scenario.agent(&spec, 3).expect("an agent"), scenario.draw(3).0);
             for _ in 0..8 {
                 let movement = agent.propose(1).expect("a proposal")[0].selection.movement.clone();
                 let observation = world.observe(&movement, &Draw::default()).expect("a row");

@@ -35,13 +35,15 @@ impl Workspace {
     pub fn jacobian(&self, state: &State, layout: &Layout) -> DMatrix<f64> {
         let count = self.configurations.len();
         let mut stacked = DMatrix::zeros(3 * count, layout.dimension());
-        let mut motions = DMatrix::zeros(3 * count, 6);
+        let mut motions = DMatrix::zeros(if self.up_to_motion { 3 * count } else { 0 }, 6);
         for (index, theta) in self.configurations.iter().enumerate() {
             let (point, h) = jacobian(state, layout, theta);
             stacked.rows_mut(3 * index, 3).copy_from(&h);
-            let mut motion = motions.rows_mut(3 * index, 3);
-            motion.columns_mut(0, 3).copy_from(&Matrix3::identity());
-            motion.columns_mut(3, 3).copy_from(&-point.coords.cross_matrix());
+            if self.up_to_motion {
+                let mut motion = motions.rows_mut(3 * index, 3);
+                motion.columns_mut(0, 3).copy_from(&Matrix3::identity());
+                motion.columns_mut(3, 3).copy_from(&-point.coords.cross_matrix());
+            }
         }
         if self.up_to_motion && count > 0 {
             // An orthonormal basis also where the points lie on a line.

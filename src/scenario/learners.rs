@@ -23,6 +23,19 @@ pub struct LearnerSpec {
 }
 
 impl LearnerSpec {
+    /// A pair that no file names: with all the settings of the scenario.
+    fn composed(name: &str, estimator: EstimatorKind, policy: PolicyKind) -> Self {
+        Self {
+            name: name.to_owned(),
+            estimator,
+            policy,
+            stabilising: true,
+            robust: true,
+            holds_axes: false,
+            by_default: false,
+        }
+    }
+
     pub(crate) fn description(&self) -> LearnerDescription {
         LearnerDescription {
             name: self.name.clone(),
@@ -173,9 +186,10 @@ impl Scenario {
         let pairs =
             EstimatorKind::ALL.into_iter().flat_map(|estimator| PolicyKind::ALL.map(|policy| (estimator, policy)));
         let named = |(estimator, policy): &(EstimatorKind, PolicyKind)| {
-            self.learners.iter().any(|spec| {
-                (spec.estimator, spec.policy, spec.stabilising, spec.robust) == (*estimator, *policy, true, true)
-            })
+            let composed = LearnerSpec::composed("", *estimator, *policy);
+            self.learners
+                .iter()
+                .any(|spec| LearnerSpec { name: String::new(), by_default: false, ..spec.clone() } == composed)
         };
         pairs
             .filter(|pair| !named(pair))
@@ -195,18 +209,7 @@ impl Scenario {
         let estimator = EstimatorKind::ALL.into_iter().find(|kind| kind.name() == estimator).ok_or_else(unknown)?;
         let policy = PolicyKind::ALL.into_iter().find(|kind| kind.name() == policy).ok_or_else(unknown)?;
         match misfit(estimator, policy, self.setting()) {
-            None => {
-                let name = name.to_owned();
-                Ok(LearnerSpec {
-                    name,
-                    estimator,
-                    policy,
-                    stabilising: true,
-                    robust: true,
-                    holds_axes: false,
-                    by_default: false,
-                })
-            }
+            None => Ok(LearnerSpec::composed(name, estimator, policy)),
             Some(Misfit { what, .. }) => {
                 Err(ScenarioError::Misfit { name: name.to_owned(), what, fitting: self.fitting(estimator, policy) })
             }

@@ -134,7 +134,7 @@ pub enum WorldSpec {
         /// Readings that have nothing to do with the robot, if there are any.
         outliers: Option<Outliers>,
     },
-    /// A recorded data set is replayed; the initial estimate is the nominal robot, registered to the training rows.
+    /// A recorded data set is replayed; the initial estimate is the nominal robot, wherever it may stand.
     Measured {
         /// The rows.
         measurements: Measurements,

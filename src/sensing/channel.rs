@@ -77,11 +77,11 @@ macro_rules! channels {
                     $(stringify!($module) => {
                         $Type::from_keys(self, equipment).map(|it| std::sync::Arc::new(it) as _)
                     })*
-                    other => Err(KeyError {
-                        key: "channel".to_owned(),
-                        what: format!("there is no channel `{other}`"),
-                        mend: format!("write one of {}", CHANNELS.join(", ")),
-                    }),
+                    other => Err(KeyError::new(
+                        "channel",
+                        format!("there is no channel `{other}`"),
+                        format!("write one of {}", CHANNELS.join(", ")),
+                    )),
                 }
             }
         }

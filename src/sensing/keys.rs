@@ -69,7 +69,7 @@ pub struct KeyError {
 }
 
 impl KeyError {
-    fn new(key: &str, what: impl Into<String>, mend: impl Into<String>) -> Self {
+    pub(super) fn new(key: &str, what: impl Into<String>, mend: impl Into<String>) -> Self {
         Self { key: key.to_owned(), what: what.into(), mend: mend.into() }
     }
 }
@@ -96,7 +96,7 @@ impl Keys {
         is_point.then(|| Point3::from_slice(given)).ok_or_else(|| KeyError::new("to_m", what, mend))
     }
 
-    /// The full covariance, if there is one.
+    /// The full covariance, symmetric, if there is one.
     pub(super) fn covariance_m2(&self) -> Result<Option<Matrix3<f64>>, KeyError> {
         let Some(given) = &self.covariance_m2 else { return Ok(None) };
         let mend = "write three rows of three numbers, symmetric and positive, in square metres";
@@ -106,10 +106,7 @@ impl Keys {
         }
         let matrix = Matrix3::from_fn(|row, column| given[row][column]);
         let is_symmetric = (matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
-        if !is_symmetric || matrix.cholesky().is_none() {
-            return Err(KeyError::new("covariance_m2", "it is not symmetric and positive", mend));
-        }
-        Ok(Some(matrix))
+        if is_symmetric { Ok(Some(matrix)) } else { Err(KeyError::new("covariance_m2", "it is not symmetric", mend)) }
     }
 
     /// Which target is meant, and what is known of it.

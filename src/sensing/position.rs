@@ -41,18 +41,13 @@ impl Position {
         let (target, _) = keys.target(equipment)?;
         match keys.covariance_m2()? {
             Some(covariance) if keys.sigma_m.is_none() => {
-                let error = || KeyError {
-                    key: "covariance_m2".to_owned(),
-                    what: "it is not positive".to_owned(),
-                    mend: "write a positive matrix".to_owned(),
-                };
+                let error = || KeyError::new("covariance_m2", "it is not positive", "write a symmetric, positive matrix");
                 Self::with_covariance(target, &covariance).ok_or_else(error)
             }
-            Some(_) => Err(KeyError {
-                key: "sigma_m".to_owned(),
-                what: "the covariance says how much noise there is".to_owned(),
-                mend: "remove `sigma_m` or `covariance_m2`".to_owned(),
-            }),
+            Some(_) => {
+                let what = "the covariance says how much noise there is";
+                Err(KeyError::new("sigma_m", what, "remove `sigma_m` or `covariance_m2`"))
+            }
             None => Ok(Self::of(target, keys.sigma_m()?)),
         }
     }

@@ -43,7 +43,7 @@ macro_rules! embedded {
 }
 
 /// The page's own files, all but [`INDEX`].
-const PAGE: [(&str, &[u8]); 14] = [
+const PAGE: [(&str, &[u8]); 15] = [
     embedded!("controls.js"),
     embedded!("files.js"),
     embedded!("icon.svg"),
@@ -54,6 +54,7 @@ const PAGE: [(&str, &[u8]); 14] = [
     embedded!("picture.js"),
     embedded!("preview.png"),
     embedded!("quiet.js"),
+    embedded!("save.js"),
     embedded!("scene.js"),
     embedded!("seeds.js"),
     embedded!("session.js"),

@@ -1,11 +1,10 @@
 // Recorded runs in files beside the page, offered as the server offers sessions: the same as session.js, without a server.
 
 import { ProblemError } from "./session.js";
+import { HEADER_BYTES } from "./viewer.js";
 
 /** How compressed files begin. Some hosts unpack them on the way, so that the content decides and not the name. */
 const GZIP = [0x1f, 0x8b];
-/** Length of the header of a recording, bytes. */
-const HEADER_BYTES = 12;
 
 /** Nothing is computed here. */
 export const server = false;

@@ -28,6 +28,11 @@ export class Legend {
     this.#list.hidden = learners.length === 0;
   }
 
+  /** Marks the line that is spoken of, or none. @param {string | null} at its name */
+  point(at) {
+    for (const line of this.#list.children) line.toggleAttribute("data-pointed", line.dataset.line === at);
+  }
+
   #line({ name, colour }) {
     const line = this.#learners.cloneNode(true);
     line.querySelector("i").style.backgroundColor = `rgb(${colour.join(" ")})`;

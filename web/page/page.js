@@ -4,6 +4,7 @@ import { Controls } from "./controls.js";
 import { CUT, atScene } from "./scene.js";
 import { quiet } from "./quiet.js";
 import { passOn, picture } from "./picture.js";
+import { save, saveBlob } from "./save.js";
 import { Legend } from "./legend.js";
 import { SeedRuns } from "./seeds.js";
 import { copied, identity } from "./links.js";
@@ -105,9 +106,7 @@ const commands = {
     ),
 
   // A card of a story speaks of something in the scene.
-  point({ at }) {
-    for (const line of element("legend").children) line.toggleAttribute("data-pointed", line.dataset.line === at);
-  },
+  point: ({ at }) => legend.point(at),
 
   seeds: (job) => seeds.run(job),
   enough_seed: ({ seed }) => seeds.enough(seed),
@@ -137,13 +136,9 @@ const commands = {
   },
 
   async download({ path, name }) {
-    const link = Object.assign(document.createElement("a"), { href: source.place(path), download: name });
-    if (path.startsWith("/v1/scenarios/")) {
-      const scenario = await ask("GET", path);
-      link.href = URL.createObjectURL(new Blob([scenario.source], { type: "application/toml" }));
-      setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-    }
-    link.click();
+    if (!path.startsWith("/v1/scenarios/")) return save(source.place(path), name);
+    const scenario = await ask("GET", path);
+    saveBlob(new Blob([scenario.source], { type: "application/toml" }), name);
   },
 
   known: () => keep(KNOWN, "yes", localStorage),

@@ -1,5 +1,7 @@
 // A picture of the scene with its caption, to be passed on.
 
+import { saveBlob } from "./save.js";
+
 /** Frames in which the viewer must have drawn. */
 const FRAMES = 60;
 const MARGIN = 16;
@@ -85,9 +87,7 @@ export async function passOn(blob, name) {
     await navigator.clipboard.write([new ClipboardItem({ "image/png": blob })]);
     return "The picture is on the clipboard.";
   } catch {
-    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(await blob), download: name });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+    saveBlob(await blob, name);
     return "The picture was saved as a file.";
   }
 }

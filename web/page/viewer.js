@@ -8,7 +8,7 @@ const TICKS = 32;
 /** The timeline that tells up to which step the viewer has everything. */
 const COMPLETE = "complete";
 /** Length of the header that must stand before every message, bytes. */
-const HEADER_BYTES = 12;
+export const HEADER_BYTES = 12;
 /** How long parts are gathered, ms. */
 const GATHER_MS = 10;
 /** The first parts wait at most so long for the first step that is to be shown, ms. */

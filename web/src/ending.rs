@@ -56,16 +56,7 @@ impl Outcome {
 impl Panel {
     /// Whether every learner has learned the arm, judged with hindsight, or never will.
     pub fn is_told(&self) -> bool {
-        let Some(description) = self.description().filter(|description| description.truth.is_some()) else {
-            return false;
-        };
-        self.is_past_change() && (0..description.learners.len()).all(|learner| self.history.is_over(learner))
-    }
-
-    /// Whether the body will not change any more.
-    pub(crate) fn is_past_change(&self) -> bool {
-        let change = self.description().and_then(|description| description.change_at);
-        change.is_none_or(|change| self.history.latest() > change)
+        self.description().is_some_and(|description| description.truth.is_some()) && self.history.is_told()
     }
 
     /// How the run ended; `None` while it goes on.
@@ -75,7 +66,7 @@ impl Panel {
         let description = self.description().filter(|_| over && latest > 0 && self.human().is_none())?;
         let change = description.change_at.filter(|change| latest > *change);
         let mut outcomes: Vec<(usize, Outcome)> =
-            (0..description.learners.len()).map(|learner| (learner, self.outcome(learner, change))).collect();
+            (0..description.learners.len()).map(|learner| (learner, self.outcome(learner))).collect();
         outcomes.sort_by(|(_, a), (_, b)| a.rank().total_cmp(&b.rank()));
         let counted = match change {
             _ if description.truth.is_none() => format!("Error over measurements held out, after {latest} movements"),
@@ -90,17 +81,16 @@ impl Panel {
         Some(Ending { sentence, counted, outcomes })
     }
 
-    fn outcome(&self, learner: usize, change: Option<u64>) -> Outcome {
+    fn outcome(&self, learner: usize) -> Outcome {
         let latest = self.history.latest();
-        let begin = change.unwrap_or(0);
+        let begin = self.history.begin(latest);
         match self.history.verdict(latest, learner) {
             Verdict::Diverged => Outcome::Diverged,
             Verdict::Converged(first) => Outcome::After(first - begin),
             Verdict::Learning | Verdict::Settled | Verdict::Waiting => {
                 let errors = self.history.curve(learner, |row| row.prediction_m.filter(|_| row.movements > 0));
                 let last = errors.last().map_or(f64::INFINITY, |[_, error]| *error);
-                let mean = errors.iter().map(|[_, error]| error).sum::<f64>() / errors.len().max(1) as f64;
-                Outcome::HeldOut { last, mean }
+                Outcome::HeldOut { last, mean: self.history.mean_error(learner) }
             }
             Verdict::Outside | Verdict::Within(..) => Outcome::NotWithin(latest - begin),
         }

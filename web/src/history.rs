@@ -117,6 +117,23 @@ impl History {
         matches!(self.verdict(latest, learner), Verdict::Converged(_) | Verdict::Diverged) || is_blind()
     }
 
+    /// Whether nothing more is to be told of any learner, and the body will not change any more.
+    pub fn is_told(&self) -> bool {
+        self.change_at.is_none_or(|change| self.latest() > change)
+            && (0..self.failures.len()).all(|learner| self.is_over(learner))
+    }
+
+    /// The step from which movements count, seen from a step: the change of the body, once it has changed.
+    pub fn begin(&self, step: u64) -> u64 {
+        self.change_at.filter(|change| step > *change).unwrap_or(0)
+    }
+
+    /// Mean prediction error of a learner over its movements, metres; 0 before any.
+    pub fn mean_error(&self, learner: usize) -> f64 {
+        let errors = self.curve(learner, |row| row.prediction_m.filter(|_| row.movements > 0));
+        errors.iter().map(|[_, error]| error).sum::<f64>() / errors.len().max(1) as f64
+    }
+
     /// Takes a report in, the first whatever its step; one that is known already or leaves a gap changes nothing.
     pub fn take(&mut self, report: &StepReport) -> bool {
         if self.rows.is_empty() {
@@ -131,7 +148,7 @@ impl History {
         if self.change_at.is_some_and(|change| report.step == change + 1) {
             self.convergence.iter_mut().for_each(Convergence::restart);
         }
-        let begin = self.change_at.filter(|change| report.step > *change).unwrap_or(0);
+        let begin = self.begin(report.step);
         let rows = self.convergence.iter_mut().zip(&report.learners).map(|(convergence, learner)| {
             let metrics = &learner.metrics;
             convergence.observe(report.step - begin, metrics.orientation_deg, metrics.location_m);

@@ -90,7 +90,7 @@ impl Panel {
         let description = self.description().filter(|description| due && description.truth.is_some())?;
         let latest = self.history.latest();
         let change = description.change_at;
-        let begin = change.filter(|change| latest > *change).unwrap_or(0);
+        let begin = self.history.begin(latest);
         let news = (0..description.learners.len()).filter_map(|learner| self.history.converged_at(latest, learner));
         let is_quiet = latest >= news.max().unwrap_or(begin) + CONFIRMATION + QUIET;
         let waiting: Vec<&str> = (description.learners.iter().enumerate())

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use body_schema::experiment::{Description, StepReport};
 
-use crate::history::{History, Row, Verdict};
+use crate::history::{History, Row};
 
 /// How many further seeds are run.
 pub const SEEDS: u64 = 10;
@@ -61,34 +61,17 @@ impl SeedRuns {
     /// Movements until accurate, a learner's, over the seeds that are done, counted from the change of the body if it
     /// changes; `None` for a seed on which they were not enough.
     pub fn finishes(&self, learner: usize) -> Vec<Option<u64>> {
-        let finish = |run: &History| match run.verdict(run.latest(), learner) {
-            Verdict::Converged(first) => Some(first - self.begin(run)),
-            _ => None,
-        };
+        let finish = |run: &History| Some(run.converged_at(run.latest(), learner)? - run.begin(run.latest()));
         self.finished().map(finish).collect()
     }
 
     /// Mean prediction errors of a learner over the movements of each seed that is done, metres.
     pub fn mean_errors(&self, learner: usize) -> Vec<f64> {
-        let mean = |run: &History| {
-            let errors = run.curve(learner, |row| row.prediction_m);
-            errors.iter().map(|[_, error]| error).sum::<f64>() / errors.len().max(1) as f64
-        };
-        self.finished().map(mean).collect()
+        self.finished().map(|run| run.mean_error(learner)).collect()
     }
 
     fn finished(&self) -> impl Iterator<Item = &History> {
         self.runs.iter().filter(|(seed, _)| self.done.contains(seed)).map(|(_, run)| run)
-    }
-
-    fn begin(&self, run: &History) -> u64 {
-        self.description.change_at.filter(|change| run.latest() > *change).unwrap_or(0)
-    }
-
-    /// Whether this run has nothing more to tell.
-    fn is_told(&self, run: &History) -> bool {
-        self.description.change_at.is_none_or(|change| run.latest() > change)
-            && (0..self.description.learners.len()).all(|learner| run.is_over(learner))
     }
 
     /// Takes a part of a run in; whether it is the one that tells that this seed needs no more.
@@ -101,7 +84,7 @@ impl SeedRuns {
         for report in reports {
             run.take(report);
         }
-        let told = self.runs.get(&seed).is_some_and(|run| self.is_told(run));
+        let told = self.runs.get(&seed).is_some_and(History::is_told);
         if done || told {
             self.done.insert(seed);
         }

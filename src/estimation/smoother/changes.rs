@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{HypothesisSettings, KEPT, Smoother, posterior::Effort};
+use super::{HypothesisSettings, KEPT, Smoother, mode::Effort};
 use crate::{
     estimation::{Estimator, Update},
     kinematics::{Joint, Line},

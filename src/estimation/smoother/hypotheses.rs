@@ -6,7 +6,10 @@
 
 use rand::{Rng, RngExt};
 
-use super::posterior::{Effort, Mode, Posterior};
+use super::{
+    mode::{Effort, Mode},
+    posterior::Posterior,
+};
 use crate::{
     kinematics::{Joint, Line},
     model::{Block, Layout, State},

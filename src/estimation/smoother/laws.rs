@@ -10,7 +10,8 @@ use rand_distr::StandardNormal;
 
 use super::{
     HypothesisSettings, Smoother,
-    posterior::{Effort, Measurement, Posterior},
+    mode::Effort,
+    posterior::{Measurement, Posterior},
 };
 use crate::{
     estimation::Estimator,

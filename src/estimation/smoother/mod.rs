@@ -20,6 +20,7 @@ mod changes;
 mod hypotheses;
 #[cfg(test)]
 mod laws;
+mod mode;
 mod posterior;
 
 use std::sync::Arc;
@@ -30,7 +31,8 @@ use rand_chacha::ChaCha8Rng;
 pub use hypotheses::HypothesisSettings;
 
 use hypotheses::Hypotheses;
-use posterior::{Effort, Measurement, Posterior};
+use mode::Effort;
+use posterior::{Measurement, Posterior};
 
 use super::{
     Alternative, Belief, ChangeDetector, EstimationError, Estimator, NoiseReport, ReadingReport, Update,
@@ -132,11 +134,16 @@ impl Smoother {
 
     /// The scale that the residuals of the first readings have at the guess: what it leaves unexplained.
     fn begin_noise(&mut self) {
+        let first: Vec<usize> =
+            (0..self.unknown.len()).filter(|noise| self.unknown[*noise] && self.noise_seen(*noise) == 1).collect();
+        if first.is_empty() {
+            return;
+        }
         let guess = self.posterior.prior.guess().clone();
-        for (noise, fit) in self.posterior.fit(&guess, &self.belief.layout).iter().enumerate() {
-            if self.unknown[noise] && fit.equations > 0.0 && self.noise_seen(noise) == 1 {
-                self.posterior.scales[noise] = (fit.squared / fit.equations).sqrt().max(LEAST_SCALE);
-            }
+        let fits = self.posterior.fit(&guess, &self.belief.layout);
+        for noise in first.into_iter().filter(|noise| fits[*noise].equations > 0.0) {
+            let scale = (fits[noise].squared / fits[noise].equations).sqrt();
+            self.posterior.scales[noise] = scale.max(LEAST_SCALE);
         }
     }
 

@@ -11,12 +11,12 @@
 
 use std::{ops::Range, sync::Arc};
 
-use nalgebra::{Cholesky, DMatrix, DVector};
-use rand::{Rng, RngExt};
+use nalgebra::{DMatrix, DVector};
 
+use super::mode::Mode;
 use crate::{
     estimation::ReadingReport,
-    model::{Layout, Pass, Prior, Quantity, State, rank},
+    model::{Layout, Pass, Prior, State, rank},
     sensing::{Graduated, Loss, Observation, Rig},
 };
 
@@ -196,7 +196,7 @@ impl Posterior {
     }
 
     /// The same by another loss.
-    fn cost_by(&self, loss: Graduated, state: &State, layout: &Layout) -> f64 {
+    pub fn cost_by(&self, loss: Graduated, state: &State, layout: &Layout) -> f64 {
         let mut errors = 0.0;
         for seen in &self.measurements {
             self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
@@ -247,7 +247,7 @@ impl Posterior {
     }
 
     /// The same by another loss.
-    fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout) -> Option<Normal> {
+    pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout) -> Option<Normal> {
         let (stacked, residuals, mut cost) = self.stacked(loss, state, layout, &self.measurements);
         let (mut information, mut descent) = (&stacked * stacked.transpose(), stacked * residuals);
         cost += self.prior.cost(state, Some((&mut information, &mut descent)));
@@ -411,137 +411,5 @@ impl Settled {
             }
         };
         Some((self.noises.iter().map(carry).collect(), self.excess))
-    }
-}
-
-/// A local minimum of the posterior's cost, found by Levenberg–Marquardt, and the Gaussian there (Laplace).
-#[derive(Clone, Debug)]
-pub(super) struct Mode {
-    pub state: State,
-    pub cost: f64,
-    pub information: DMatrix<f64>,
-    /// P, the inverse of the information.
-    pub covariance: DMatrix<f64>,
-    /// −E − ½ ln det Λ: the logarithm of its share of the evidence, but for what all modes have in common.
-    pub log_evidence: f64,
-    /// Its share of the evidence, once that is told.
-    pub weight: f64,
-}
-
-/// When a search ends.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Effort {
-    /// Steps at most, accepted or not.
-    pub steps: usize,
-    /// It has converged when a step promises to lower the cost by less than this.
-    pub tolerance: f64,
-    /// It is given up when, half way through, the cost is still above this.
-    pub hopeless: f64,
-}
-
-/// The widths of a loss through which a search goes that begins far from its end, the last being the loss itself.
-const WIDTHS: [f64; 4] = [f64::INFINITY, 10.0, 3.0, 1.0];
-/// Steps at every width but the last.
-const STEPS_AT_WIDTH: usize = 8;
-
-/// The largest step: a turn of so many radians, a shift of as many metres; of numbers without a unit a third of that, and
-/// of pixels three hundred times as many.
-const LONGEST_STEP: f64 = 0.7;
-
-/// The length of a step, in multiples of the longest of every quantity.
-fn length(delta: &DVector<f64>, layout: &Layout) -> f64 {
-    let longest = |quantity: &Quantity| match quantity {
-        Quantity::Length | Quantity::Angle => LONGEST_STEP,
-        Quantity::Ratio => LONGEST_STEP / 3.0,
-        Quantity::Pixels => LONGEST_STEP * 300.0,
-    };
-    delta.iter().zip(layout.quantities()).map(|(x, quantity)| x.abs() / longest(quantity)).fold(0.0, f64::max)
-}
-
-impl Posterior {
-    /// The local minimum that Levenberg–Marquardt reaches from `start`, and the Gaussian there.
-    ///
-    /// Steps solve `(Λ + λ diag Λ) δ = descent`; λ follows the ratio of found to predicted descent (Nielsen's rule).
-    pub fn mode(&self, start: &State, layout: &Layout, effort: Effort) -> Option<Mode> {
-        let (state, normal) = self.descend(self.loss.into(), start, layout, effort)?;
-        Mode::at(state, normal)
-    }
-
-    /// The same from a start that may be far from where the search ends: a robust loss narrows on the way.
-    pub fn mode_from_afar(&self, start: &State, layout: &Layout, effort: Effort) -> Option<Mode> {
-        if !self.loss.is_robust() {
-            return self.mode(start, layout, effort);
-        }
-        let coarse = Effort { steps: STEPS_AT_WIDTH, tolerance: effort.tolerance * 1e2, hopeless: f64::INFINITY };
-        let mut state = start.clone();
-        for width in WIDTHS.into_iter().filter(|width| *width > 1.0) {
-            let steps = if width.is_infinite() { Effort { steps: effort.steps, ..coarse } } else { coarse };
-            state = self.descend(Graduated { loss: self.loss, width }, &state, layout, steps)?.0;
-        }
-        self.mode(&state, layout, effort)
-    }
-
-    /// The same from where all measurements but one to three are explained by least squares.
-    pub fn mode_suspecting(&self, start: &State, layout: &Layout, effort: Effort, rng: &mut impl Rng) -> Option<Mode> {
-        let mut others = self.clone();
-        for _ in 0..rng.random_range(1..=3).min(others.measurements.len()) {
-            others.measurements.swap_remove(rng.random_range(0..others.measurements.len()));
-        }
-        let least_squares = Graduated { loss: self.loss, width: f64::INFINITY };
-        let (state, _) = others.descend(least_squares, start, layout, effort)?;
-        self.mode(&state, layout, effort)
-    }
-
-    fn descend(&self, loss: Graduated, start: &State, layout: &Layout, effort: Effort) -> Option<(State, Normal)> {
-        let mut state = start.slid_towards(&self.pins);
-        let mut normal = self.normal_by(loss, &state, layout)?;
-        let (mut lambda, mut growth) = (1e-3, 2.0);
-        for step in 0..effort.steps {
-            if step == effort.steps / 2 && normal.cost > effort.hopeless {
-                return None;
-            }
-            let mut damped = normal.information.clone();
-            for k in 0..damped.nrows() {
-                damped[(k, k)] *= 1.0 + lambda;
-            }
-            let mut delta = Cholesky::new(damped)?.solve(&normal.descent);
-            let length = length(&delta, layout);
-            if length > 1.0 {
-                delta /= length;
-            }
-            let predicted = delta.dot(&normal.descent) - 0.5 * delta.dot(&(&normal.information * &delta));
-            if !predicted.is_finite() {
-                return None;
-            }
-            let next = state.retract(layout, &delta).slid_towards(&self.pins);
-            let cost = self.cost_by(loss, &next, layout);
-            let ratio = (normal.cost - cost) / predicted;
-            if ratio > 0.0 {
-                state = next;
-                normal = self.normal_by(loss, &state, layout)?;
-                lambda = (lambda * (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0)).max(1e-9);
-                growth = 2.0;
-            } else {
-                lambda *= growth;
-                growth *= 2.0;
-            }
-            if predicted < effort.tolerance || lambda > 1e12 {
-                break;
-            }
-        }
-        Some((state, normal))
-    }
-}
-
-impl Mode {
-    fn at(state: State, normal: Normal) -> Option<Self> {
-        let Normal { cost, information, .. } = normal;
-        let cholesky = Cholesky::new(information.clone())?;
-        let log_determinant = 2.0 * cholesky.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
-        let log_evidence = -cost - 0.5 * log_determinant;
-        if !log_evidence.is_finite() {
-            return None;
-        }
-        Some(Self { state, cost, information, covariance: cholesky.inverse(), log_evidence, weight: 0.0 })
     }
 }
