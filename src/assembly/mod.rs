@@ -4,7 +4,7 @@ mod learners;
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{DMatrix, Isometry3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use rand::{RngExt, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
@@ -12,7 +12,7 @@ use crate::{
     design::{Problem, Stretch, movements_by_counting},
     experiment::{Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World},
     kinematics::{Joint, JointBox},
-    model::{Block, Element, Layout, State, Workspace, anywhere},
+    model::{Block, Correction, Element, Layout, State, Workspace, anywhere},
     scenario::{ErrorDraw, InitialError, Known, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
     selection::{Actions, Movement, Watch, Weights},
     sensing::Observation,
@@ -175,6 +175,8 @@ impl Scenario {
     fn perturbed(&self, error: &InitialError, rng: &mut ChaCha8Rng) -> State {
         let mut state = self.robot.state.clone();
         let layout = &self.robot.layout;
+        // Readings are taken for what they say, whether what they are truly corrected by is learned or not.
+        state.corrections.fill(Correction::default());
         for (_, joint) in state.joints.iter_mut().enumerate().filter(|(index, _)| layout.is_learned(*index)) {
             if error.draw == ErrorDraw::Anywhere {
                 if let Element::Axis(drawn) = anywhere(&Element::Axis(*joint), error.point_m, rng) {
@@ -201,9 +203,7 @@ impl Scenario {
             let Some(known) = self.prior.of(block) else { continue };
             let guess = match (block, known) {
                 (Block::Base, _) => known.displaced(&block.of(&state), rng),
-                // Readings are taken for what they say.
-                (Block::Offset(_), _) => Element::Numbers(DVector::zeros(1)),
-                (Block::Ratio(_), _) => Element::Numbers(DVector::from_element(1, 1.0)),
+                (Block::Offset(_) | Block::Ratio(_) | Block::Eccentricity(_), _) => block.of(&state),
                 (_, Known::Anywhere { within_m }) => anywhere(&block.of(&state), within_m, rng),
                 (_, known) => known.displaced(&block.of(&state), rng),
             };

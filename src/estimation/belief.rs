@@ -25,6 +25,9 @@ pub struct Belief {
     pub covariance: Option<DMatrix<f64>>,
     /// Other states that explain what was seen, the likeliest first; empty if the estimator keeps one hypothesis.
     pub alternatives: Vec<Alternative>,
+    /// By how much predictions of the hand are off, beyond what the covariance says, since no parameter explains it: root mean
+    /// square, metres.
+    pub model_error_m: f64,
 }
 
 /// A rival of the estimate: another mode of the posterior.
@@ -41,7 +44,7 @@ pub struct Alternative {
 impl Belief {
     /// Of one hypothesis without a covariance.
     pub fn new(state: State, layout: Arc<Layout>, rig: Arc<Rig>) -> Self {
-        Self { state, layout, rig, covariance: None, alternatives: Vec::new() }
+        Self { state, layout, rig, covariance: None, alternatives: Vec::new(), model_error_m: 0.0 }
     }
 
     /// The same with a covariance.
@@ -95,17 +98,34 @@ impl Belief {
         Some(spread.fixed_view::<3, 3>(0, 0).into_owned())
     }
 
-    /// The mean over a workspace of √tr(H P Hᵀ): the prediction error that the belief itself expects, metres.
+    /// The mean over a workspace of √(tr(H P Hᵀ) + e²), e what no parameter explains: the prediction error that the belief itself
+    /// expects, metres.
     pub fn expected_error_m(&self, workspace: &Workspace) -> Option<f64> {
+        let variances = self.prediction_variances_m2(workspace)?;
+        let floor = self.model_error_m * self.model_error_m;
+        let sum: f64 = variances.iter().map(|variance| (variance + floor).sqrt()).sum();
+        (!variances.is_empty()).then(|| sum / variances.len() as f64)
+    }
+
+    /// Whether what no parameter explains makes predictions over a workspace worse than what is not known of the parameters.
+    pub fn model_error_prevails(&self, workspace: &Workspace) -> bool {
+        let floor = self.model_error_m * self.model_error_m;
+        floor > 0.0
+            && self
+                .prediction_variances_m2(workspace)
+                .is_some_and(|variances| variances.iter().sum::<f64>() < floor * variances.len() as f64)
+    }
+
+    /// tr(H P Hᵀ) at every configuration of a workspace, m².
+    fn prediction_variances_m2(&self, workspace: &Workspace) -> Option<Vec<f64>> {
         let covariance = self.covariance.as_ref()?;
-        let count = workspace.configurations.len();
         let jacobian = workspace.jacobian(&self.state, &self.layout);
         let spread = &jacobian * covariance;
         let of = |index: usize| {
             let place = 3 * index..3 * index + 3;
-            place.map(|row| spread.row(row).dot(&jacobian.row(row))).sum::<f64>().max(0.0).sqrt()
+            place.map(|row| spread.row(row).dot(&jacobian.row(row))).sum::<f64>().max(0.0)
         };
-        (count > 0).then(|| (0..count).map(of).sum::<f64>() / count as f64)
+        Some((0..workspace.configurations.len()).map(of).collect())
     }
 
     /// The covariance (m², frame of the measurements) of the point of a joint's axis that lies `along` metres from the

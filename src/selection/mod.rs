@@ -13,6 +13,7 @@
 
 mod active;
 mod criterion;
+mod herding;
 mod human;
 #[cfg(test)]
 mod laws;

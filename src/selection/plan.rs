@@ -101,7 +101,7 @@ impl Plan {
 /// Changes the covariance of every hypothesis of `belief` as an observation after moving to `pose` would, counted `weight`
 /// times, by hypothesis; a negative weight takes it out again. Whether that was sound.
 pub(crate) fn condition(belief: &mut Belief, pose: &[f64], weight: impl Fn(usize) -> f64) -> bool {
-    let Belief { state, layout, rig, covariance, alternatives } = belief;
+    let Belief { state, layout, rig, covariance, alternatives, .. } = belief;
     let mut sound = true;
     if let Some(covariance) = covariance {
         sound &= update(covariance, &rig.jacobian(state, layout, pose), weight(0));

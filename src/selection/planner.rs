@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{
     Actions, Appraisal, Movement, Optimality, Outlook, Partition, Planned, Policy, Search, Selection, SelectionError,
-    Sight, Situation, Watch, Weights, plan::Plan, search::direct, views::Views,
+    Sight, Situation, Watch, Weights, herding::herd, plan::Plan, search::direct, views::Views,
 };
 use crate::{
     estimation::Belief,
@@ -66,6 +66,11 @@ impl Default for Planning {
 /// would change the plan by much.
 ///
 /// Over a pool of recorded movements every one is tried, and the best is taken.
+///
+/// Once what no parameter explains makes predictions worse than what is not known of the parameters, movements are chosen to be
+/// distributed like those over which predictions count, by `herding`. No criterion of variance helps then: it goes to the edges, where it would tell
+/// parameters best, and the parameters come out as suits the edges; the best design against bias has the moments of the region
+/// that counts (Box and Draper, *J. Am. Stat. Assoc.* 54, 1959).
 #[derive(Clone, Debug)]
 pub struct Planner {
     weights: Weights,
@@ -74,6 +79,9 @@ pub struct Planner {
     workspace: Workspace,
     watch: Option<Watch>,
 }
+
+/// Draws of which one is to be seen, likelier than not.
+const DRAWS: usize = 64;
 
 /// Where everything of one choice is looked up.
 struct Scene<'a> {
@@ -97,6 +105,29 @@ impl Planner {
     /// weighed by the chance of being seen, and misses are remembered.
     pub fn watched(self, watch: Watch) -> Self {
         Self { watch: Some(watch), ..self }
+    }
+
+    /// A movement like those over which predictions count.
+    fn represent(
+        &self,
+        situation: &Situation<'_>,
+        limits: &JointBox,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Selection, SelectionError> {
+        let scene = Scene::new(self, situation, limits);
+        let outlook = scene.outlook(&scene.now)?;
+        let drawn: Vec<Vec<f64>> = (0..DRAWS).map(|_| limits.draw(rng)).collect();
+        let is_seen = |pose: &&Vec<f64>| outlook.expectations(pose).0.first().is_none_or(|chance| *chance >= 0.5);
+        let seen: Vec<&Vec<f64>> = drawn.iter().filter(is_seen).collect();
+        match herd(&seen, &drawn, situation.history.made()) {
+            Some(index) => {
+                let pose = seen[index];
+                let value = outlook.evaluate(&[pose]).first().copied();
+                let gain = value.map(|value| outlook.before() - value);
+                Ok(Selection { criterion: value, gain, evaluations: 1, ..Selection::plain(pose.clone()) })
+            }
+            None => self.select_in_box(situation, limits),
+        }
     }
 
     fn select_in_box(&self, situation: &Situation<'_>, limits: &JointBox) -> Result<Selection, SelectionError> {
@@ -147,7 +178,7 @@ impl<'a> Scene<'a> {
     fn new(planner: &'a Planner, situation: &'a Situation<'a>, limits: &'a JointBox) -> Self {
         let now = Plan::new(situation.belief, planner.planning.considered);
         let sight = Watch::sight(planner.watch.as_ref(), situation, limits).map(|sight| {
-            let Belief { state, layout, rig, covariance, alternatives } = &now.after;
+            let Belief { state, layout, rig, covariance, alternatives, .. } = &now.after;
             let estimate = covariance.as_ref().map(|covariance| (state, covariance));
             let others = alternatives.iter().map(|alternative| (&alternative.state, &alternative.covariance));
             let views = estimate.into_iter().chain(others).map(|(state, p)| sight.views(state, layout, p, rig));
@@ -259,8 +290,17 @@ impl<'a> Scene<'a> {
 }
 
 impl Policy for Planner {
-    fn select(&self, situation: &Situation<'_>, _rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+    fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+        let represents = situation.belief.model_error_prevails(&self.workspace);
         match situation.actions {
+            Actions::Pool(pool) if represents => {
+                let rows = pool.iter().map(|movement| movement.configuration.as_slice());
+                let made = situation.history.made();
+                let candidates: Vec<&[f64]> = rows.clone().collect();
+                let all: Vec<&[f64]> = rows.chain(made.iter().map(Vec::as_slice)).collect();
+                let index = herd(&candidates, &all, made).ok_or(SelectionError::Exhausted)?;
+                Ok(Selection::of(pool[index].clone()))
+            }
             Actions::Pool(pool) => {
                 let mut belief = situation.belief.clone();
                 belief.truncate(self.planning.considered);
@@ -270,6 +310,7 @@ impl Policy for Planner {
             }
             Actions::Box(limits) => match Watch::beginning(self.watch.as_ref(), situation.history) {
                 Some(beginning) => Ok(beginning),
+                None if represents => self.represent(situation, limits, rng),
                 None => self.select_in_box(situation, limits),
             },
         }

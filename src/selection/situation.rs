@@ -20,6 +20,7 @@ pub struct Situation<'a> {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
     has_moved: bool,
+    made: Vec<Vec<f64>>,
     misses: VecDeque<Vec<f64>>,
     seen: VecDeque<Vec<f64>>,
     plan: Option<Planned>,
@@ -45,6 +46,7 @@ impl History {
     /// A movement was made.
     pub fn moved(&mut self, movement: &Movement, actions: &Actions, observation: &Observation) {
         self.has_moved = true;
+        self.made.push(movement.configuration.clone());
         if let Actions::Box(limits) = actions {
             let latest = if observation.is_miss() { &mut self.misses } else { &mut self.seen };
             latest.push_back(limits.to_unit(&movement.configuration));
@@ -57,6 +59,11 @@ impl History {
     /// As if a movement had been made already: one is pending.
     pub fn expect_movements(&mut self) {
         self.has_moved = true;
+    }
+
+    /// All movements made, rad or m.
+    pub fn made(&self) -> &[Vec<f64>] {
+        &self.made
     }
 
     /// Whether any movement was made.

@@ -21,6 +21,7 @@ mod hypotheses;
 #[cfg(test)]
 mod laws;
 mod mode;
+mod model_error;
 mod posterior;
 
 use std::sync::Arc;
@@ -62,6 +63,8 @@ pub struct Smoother {
     nominal: Arc<Rig>,
     /// By kind of noise: whether its scale is learned.
     unknown: Vec<bool>,
+    /// By kind of noise: equations that no parameter accounts for.
+    spare: Vec<f64>,
 }
 
 /// Steps without a new hypothesis after which none are searched for any more.
@@ -93,6 +96,7 @@ impl Smoother {
     ) -> Self {
         let posterior = Posterior::new(prior, rig.clone());
         let (nominal, unknown) = (rig.clone(), vec![false; rig.noises().len()]);
+        let spare = vec![0.0; unknown.len()];
         let mut smoother = Self {
             belief: Belief::new(posterior.prior.guess().clone(), layout, rig),
             posterior,
@@ -105,6 +109,7 @@ impl Smoother {
             past: Vec::new(),
             nominal,
             unknown,
+            spare,
         };
         smoother.begin();
         smoother.publish();
@@ -173,6 +178,7 @@ impl Smoother {
             let mut change = 0.0_f64;
             for noise in (0..fits.len()).filter(|noise| self.unknown[*noise] && fits[*noise].equations > 0.0) {
                 let free = (fits[noise].equations - absorbed[noise]).max(0.0);
+                self.spare[noise] = free;
                 // With equations to spare it may change as often as the modes follow.
                 let from = if free > NOISE_WEIGHT { self.posterior.scales[noise] } else { before[noise] };
                 let square = (fits[noise].squared + NOISE_WEIGHT * from * from) / (free + NOISE_WEIGHT);
@@ -220,6 +226,7 @@ impl Smoother {
                 covariance: mode.covariance.clone(),
             })
             .collect();
+        self.belief.model_error_m = self.model_error_m();
     }
 
     /// Whether one hypothesis has explained everything alone for some time.

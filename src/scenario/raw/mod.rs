@@ -79,6 +79,9 @@ pub struct Joint {
     pub offset_m: Option<Spanned<f64>>,
     #[serde(default)]
     pub learn_offset: bool,
+    pub eccentricity_deg: Option<Spanned<Exactly<f64, 2>>>,
+    #[serde(default)]
+    pub learn_eccentricity: bool,
     pub column: Option<Spanned<String>>,
 }
 
@@ -219,6 +222,7 @@ pub struct Prior {
     pub ratio: Option<Spanned<f64>>,
     pub offset_rad: Option<Spanned<f64>>,
     pub offset_m: Option<Spanned<f64>>,
+    pub eccentricity_rad: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Deserialize)]

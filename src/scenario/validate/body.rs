@@ -60,6 +60,7 @@ impl Check<'_> {
             state.corrections[index] = self.correction(index, spanned.get_ref());
             blocks.extend(spanned.get_ref().learn_ratio.then_some(Block::Ratio(index)));
             blocks.extend(spanned.get_ref().learn_offset.then_some(Block::Offset(index)));
+            blocks.extend(spanned.get_ref().learn_eccentricity.then_some(Block::Eccentricity(index)));
         }
         outfit.equip(&mut state);
         blocks.extend(outfit.known.iter().map(|(block, _)| *block));
@@ -112,6 +113,24 @@ impl Check<'_> {
         if let Some(offset) = given {
             let offset = self.number(&key(wanted), offset, |_| true, "a number");
             correction.offset = if raw.kind == JointKind::Revolute { offset.to_radians() } else { offset };
+        }
+        if raw.kind == JointKind::Prismatic
+            && let Some(span) =
+                raw.eccentricity_deg.as_ref().map(|given| given.span()).or(raw.learn_eccentricity.then_some(0..0))
+        {
+            let what = "an encoder off its centre misreads a joint that turns, not one that slides";
+            self.problem(span, key("eccentricity"), what, "remove it");
+        } else if let Some(given) = &raw.eccentricity_deg {
+            let [sine, cosine] = given.get_ref().0;
+            if !(sine.is_finite() && cosine.is_finite()) {
+                self.problem(
+                    given.span(),
+                    key("eccentricity_deg"),
+                    "it is not finite",
+                    "write `[sine, cosine]`, in degrees",
+                );
+            }
+            (correction.sine, correction.cosine) = (sine.to_radians(), cosine.to_radians());
         }
         correction
     }

@@ -185,6 +185,16 @@ impl Check<'_> {
                     }
                 }
             }
+            if joint.learn_eccentricity {
+                let (block, key) = (Block::Eccentricity(index), "prior.eccentricity_rad");
+                match &prior.eccentricity_rad {
+                    Some(sd) => drop(known.insert(block, unit(self.positive(key, sd)))),
+                    None => {
+                        let mend = "add `eccentricity_rad = 0.005`, say, to [prior]: the standard deviation of its sine and cosine";
+                        self.problem(span.clone(), key, "an eccentricity is learned", mend);
+                    }
+                }
+            }
             if joint.learn_offset {
                 let (key, sd) = match joint.kind {
                     JointKind::Revolute => ("prior.offset_rad", &prior.offset_rad),
