@@ -352,3 +352,41 @@ fn a_real_robot_is_learned_from_the_rows_that_are_chosen() {
     assert!(median(2, 12) <= 0.95 * median(1, 12) && median(3, 12) <= 0.95 * median(1, 12));
     assert!((1..4).all(|learner| median(learner, 27) <= 0.88 * median(0, 27)));
 }
+
+/// Encoders off their centres, which no learner models: chosen movements do not run to where the model fails, and learners know how
+/// far off they are.
+#[test]
+fn what_no_parameter_explains_is_expected_and_not_chased() {
+    let scenario = builtin("arm-7dof-eccentric").expect("built in");
+    let names = ["global", "smoother-random"].map(str::to_owned);
+    let seeds = 301..=340;
+    let mut errors = vec![vec![Vec::new(); 61]; names.len()];
+    let mut found_by_expected = errors.clone();
+    for seed in seeds.clone() {
+        let mut experiment = scenario.experiment(seed, Some(&names)).expect("starts");
+        for step in 1..=60 {
+            experiment.step().expect("a step");
+            for (index, learner) in experiment.latest().learners.iter().enumerate() {
+                let found = learner.metrics.prediction_mean_m.expect("a truth");
+                errors[index][step].push(found);
+                found_by_expected[index][step].push(found / learner.metrics.expected_prediction_m.expect("kept"));
+            }
+        }
+        let result = experiment.result();
+        let remark = &result.learners[0].remarks;
+        assert!(remark.iter().any(|remark| remark.contains("no parameter explains")), "{remark:?}");
+    }
+    let median = |values: &[f64]| {
+        let mut values = values.to_vec();
+        values.sort_by(f64::total_cmp);
+        0.5 * (values[19] + values[20])
+    };
+    for step in 13..=60 {
+        let [chosen, random] = [0, 1].map(|learner| median(&errors[learner][step]));
+        assert!(chosen <= 1.02 * random, "{step} movements: chosen {chosen}, random {random}");
+        for learner in [0, 1] {
+            let ratio = median(&found_by_expected[learner][step]);
+            assert!(ratio <= 1.3, "{step} movements of {}: found/expected {ratio}", names[learner]);
+        }
+    }
+}

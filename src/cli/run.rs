@@ -144,6 +144,11 @@ fn summarise(result: &RunResult) -> Result<()> {
     });
     let header = ["learner", "orient. (deg)", "axis (deg)", "location (mm)", "predict. (mm)", "misses", "verdict"];
     output::say(output::table(header, rows))?;
+    for learner in &result.learners {
+        for remark in &learner.remarks {
+            output::say(format!("{}: {remark}", learner.name))?;
+        }
+    }
     let efficiencies = result.learners.iter().map(|learner| (learner.name.as_str(), learner.efficiency));
     designs::say(result.movements_by_counting, &result.best_designs, efficiencies)
 }

@@ -63,6 +63,12 @@ impl Gauge {
         self.layout.dimension() - self.undetermined
     }
 
+    /// By parameter the share of it that undetermined directions hold, 0..1: the diagonal of N Nᵀ at `state`.
+    pub fn shares(&self, state: &State) -> DVector<f64> {
+        let free = self.null_space(state);
+        DVector::from_fn(free.nrows(), |row, _| free.row(row).norm_squared())
+    }
+
     /// N at a state (m × k).
     fn null_space(&self, state: &State) -> DMatrix<f64> {
         let m = self.layout.dimension();

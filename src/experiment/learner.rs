@@ -251,6 +251,7 @@ impl Learner {
         }
         let metrics = Metrics {
             expected_prediction_m: expected,
+            model_error_m: (!self.agent.noise().is_empty()).then_some(belief.model_error_m),
             trace: belief.covariance.as_ref().map(|covariance| self.weights.trace(covariance)),
             nis: update.nis.map(|(nis, _)| nis),
             nis_dof: update.nis.map(|(_, dof)| dof),

@@ -25,8 +25,13 @@ pub struct Metrics {
     pub prediction_m: Option<f64>,
     /// Mean of that distance, metres.
     pub prediction_mean_m: Option<f64>,
-    /// The prediction error that the learner itself expects over its workspace: mean of √tr(H P Hᵀ), metres.
+    /// The prediction error that the learner itself expects over its workspace: mean of √(tr(H P Hᵀ) + e²), e the model error,
+    /// metres.
     pub expected_prediction_m: Option<f64>,
+    /// By how much predictions are off that no parameter explains, root mean square, metres; null for a learner that takes the noise
+    /// for known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_error_m: Option<f64>,
     /// tr(W P), in the units of the criterion.
     pub trace: Option<f64>,
     /// Normalised innovation squared of the last update.

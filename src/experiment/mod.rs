@@ -19,6 +19,7 @@ mod judge;
 mod laws;
 mod learner;
 mod metrics;
+mod remarks;
 mod report;
 mod result;
 mod streams;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Experiment, convergence::Thresholds, metrics::Metrics, report::array};
+use super::{Experiment, convergence::Thresholds, metrics::Metrics, remarks::remarks, report::array};
 use crate::{
     design::BestDesign,
     estimation::{Belief, NoiseReport, ReadingReport},
@@ -85,6 +85,9 @@ pub struct LearnerResult {
     /// The scales of noise that it learned.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub noise: Vec<NoiseReport>,
+    /// What is to be said of it in words: what no movement can tell, noise other than promised, outliers, alarms.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
     /// The learned model.
     pub model: Model,
 }
@@ -245,6 +248,7 @@ impl Experiment {
                 metrics: report.metrics.clone(),
                 readings: learner.readings(),
                 noise: learner.noise(),
+                remarks: remarks(learner, &report.metrics, description, &self.world),
                 model: Model::new(learner.belief(), &names),
             })
             .collect();

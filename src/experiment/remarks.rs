@@ -1,0 +1,94 @@
+//! What is worth saying of a learner in words: what its numbers rest on, and what they leave open.
+
+use super::{World, gauge::Gauge, learner::Learner};
+use crate::{
+    estimation::{NoiseReport, ReadingReport},
+    experiment::{Description, Metrics},
+    model::Block,
+};
+
+/// The share of a parameter that undetermined directions must hold for it to be named.
+const NAMED: f64 = 0.05;
+/// Movements listed at most.
+const LISTED: usize = 8;
+/// A scale of the noise nearer to 1 than this is as promised.
+const AS_PROMISED: f64 = 0.2;
+
+/// All remarks on a learner.
+pub(super) fn remarks(learner: &Learner, metrics: &Metrics, description: &Description, world: &World) -> Vec<String> {
+    let mut said = Vec::new();
+    said.extend(undetermined(learner, description));
+    said.extend(learner.noise().iter().filter_map(noise));
+    said.extend(metrics.model_error_m.filter(|error| *error > 0.0).map(model_error));
+    said.extend(outliers(&learner.readings()));
+    let alarms = metrics.changes_noticed;
+    if alarms > 0 && matches!(world, World::Measured { .. }) {
+        said.push(format!(
+            "{alarms} {}: what was measured no longer fitted what had been learned. A recorded body does not change, so nothing was \
+             dropped; look for outliers, or for errors that the model cannot explain",
+            if alarms == 1 { "alarm" } else { "alarms" }
+        ));
+    }
+    said
+}
+
+fn undetermined(learner: &Learner, description: &Description) -> Option<String> {
+    let belief = learner.belief();
+    let gauge = Gauge::new(&belief.state, &belief.layout, &belief.rig, learner.limits());
+    let count = gauge.undetermined();
+    if count == 0 {
+        return None;
+    }
+    let shares = gauge.shares(&belief.state);
+    let joint = |index: usize| description.joints.get(index).map_or("a joint", |joint| joint.name.as_str());
+    let named = belief.layout.blocks().filter(|(_, range)| range.clone().any(|coordinate| shares[coordinate] > NAMED));
+    let names: Vec<String> = named
+        .map(|(block, _)| match block {
+            Block::Base => "the base".to_owned(),
+            Block::Axis(index) => format!("the axis of {}", joint(index)),
+            Block::Offset(index) => format!("the offset of {}", joint(index)),
+            Block::Ratio(index) => format!("the ratio of {}", joint(index)),
+            Block::Eccentricity(index) => format!("the eccentricity of {}", joint(index)),
+            Block::Target(0) => "the marker".to_owned(),
+            Block::Target(index) => format!("target {index}"),
+            Block::Device(index) => format!("camera {index}"),
+            Block::Intrinsics(index) => format!("the lens of camera {index}"),
+            Block::Socket(index) => format!("socket {index}"),
+        })
+        .collect();
+    let (m, directions) = (belief.layout.dimension(), if count == 1 { "direction" } else { "directions" });
+    Some(format!(
+        "{count} {directions} among its {m} parameters cannot be told by any movement, and stay as described: they move {} together \
+         so that nothing that is measured changes",
+        names.join(", ")
+    ))
+}
+
+fn noise(noise: &NoiseReport) -> Option<String> {
+    let NoiseReport { channel, scale, .. } = noise;
+    ((scale - 1.0).abs() > AS_PROMISED)
+        .then(|| format!("what channel {channel} measures scatters {scale:.2} times as much as its σ says"))
+}
+
+fn model_error(error_m: f64) -> String {
+    format!(
+        "the hand is off by {:.2} mm (rms) that no parameter explains; they are part of the error that it expects",
+        error_m * 1e3
+    )
+}
+
+fn outliers(readings: &[ReadingReport]) -> Option<String> {
+    let suspected: Vec<u64> =
+        readings.iter().filter(|reading| reading.weight < 0.5).map(|reading| reading.movement).collect();
+    if suspected.is_empty() {
+        return None;
+    }
+    let listed: Vec<String> = suspected.iter().take(LISTED).map(u64::to_string).collect();
+    let more = if suspected.len() > LISTED { ", …" } else { "" };
+    Some(format!(
+        "{} of {} readings are likelier outliers than not, after the movements {}{more}",
+        suspected.len(),
+        readings.len(),
+        listed.join(", ")
+    ))
+}
