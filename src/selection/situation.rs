@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{Actions, Movement, visibility::MEMORY};
+use super::{Actions, Constraints, Movement, visibility::MEMORY};
 use crate::{estimation::Belief, sensing::Observation};
 
 /// Everything that a policy chooses from. A policy remembers nothing itself.
@@ -14,12 +14,15 @@ pub struct Situation<'a> {
     pub actions: &'a Actions,
     /// What was done.
     pub history: &'a History,
+    /// What movements are bound to, if to anything.
+    pub constraints: Option<&'a Constraints>,
 }
 
 /// What policies go by of all that happened: made of the list of events, and nothing else.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
     has_moved: bool,
+    posture: Option<Vec<f64>>,
     misses: VecDeque<Vec<f64>>,
     seen: VecDeque<Vec<f64>>,
     plan: Option<Planned>,
@@ -44,7 +47,7 @@ impl History {
 
     /// A movement was made.
     pub fn moved(&mut self, movement: &Movement, actions: &Actions, observation: &Observation) {
-        self.has_moved = true;
+        self.expect(&movement.configuration);
         if let Actions::Box(limits) = actions {
             let latest = if observation.is_miss() { &mut self.misses } else { &mut self.seen };
             latest.push_back(limits.to_unit(&movement.configuration));
@@ -54,9 +57,15 @@ impl History {
         }
     }
 
-    /// As if a movement had been made already: one is pending.
-    pub fn expect_movements(&mut self) {
+    /// As if a movement to `configuration` had been made already: it is pending.
+    pub fn expect(&mut self, configuration: &[f64]) {
         self.has_moved = true;
+        self.posture = Some(configuration.to_vec());
+    }
+
+    /// Where the robot stands: the posture of the latest movement as it was executed, rad or m per joint.
+    pub fn posture(&self) -> Option<&[f64]> {
+        self.posture.as_deref()
     }
 
     /// Whether any movement was made.
