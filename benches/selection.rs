@@ -88,7 +88,7 @@ fn d_one_active_selection(bencher: Bencher<'_, '_>, name: &str) {
     let active = Active::new(case.weights.clone(), Minimiser::Direct(case.scenario.selection.search));
     let actions = Actions::Box(case.scenario.robot.limits.clone());
     let history = History::default();
-    let situation = Situation { belief: &case.belief, actions: &actions, history: &history };
+    let situation = Situation { belief: &case.belief, actions: &actions, history: &history, constraints: None };
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     bencher.bench_local(|| active.select(&situation, &mut rng).expect("a selection"));
 }

@@ -340,3 +340,64 @@ fn distances_alone_are_a_sensor_too() {
         assert_eq!(problems[0].key, key, "{problems:?}");
     }
 }
+
+/// What constraints may say, each mistake on its line.
+#[test]
+fn constraints_are_held_to_the_robot() {
+    const TABLE: &str = include_str!("../scenarios/arm-6dof-table.toml");
+    let height = "minimum_height_m = -0.45";
+    let travel = "greatest_travel_deg = 120.0";
+    for (from, to, key, what, mend) in [
+        (height, "limits_deg = { elbo = [-80.0, 0.0] }", "constraints.limits_deg.elbo", "no such joint", "`elbow`"),
+        (height, "limits_m = { elbow = [-0.1, 0.0] }", "constraints.limits_m.elbow", "does not fit", "`limits_deg`"),
+        (
+            height,
+            "limits_deg = { elbow = [-10.0, -80.0] }",
+            "constraints.limits_deg.elbow",
+            "not below",
+            "lower one first",
+        ),
+        (height, "limits_deg = { elbow = [-130.0, 0.0] }", "constraints.limits_deg.elbow", "-120.0000", "within them"),
+        (height, "minimum_height_m = nan", "constraints.minimum_height_m", "out of range", "metres"),
+        (height, "minimum_height = -0.45", "constraints.minimum_height", "unknown key", "`minimum_height_m`"),
+        (height, "allowed_deg = []", "constraints.allowed_deg", "nothing is allowed", "add a posture"),
+        (height, "allowed_deg = [[0.0, 0.0]]", "constraints.allowed_deg[0]", "2 positions", "one position per joint"),
+        (travel, "greatest_travel_deg = 0.0", "constraints.greatest_travel_deg", "out of range", "above 0"),
+        (travel, "greatest_travel_m = 0.1", "constraints.greatest_travel_m", "no joint", "remove it"),
+        (travel, "travel_price = -1.0", "constraints.travel_price", "out of range", "0 or more"),
+        (
+            "upper_m = [1.0, 0.8, -0.25]",
+            "upper_m = [1.0, 0.8, -0.5]",
+            "constraints.box[0].upper_m",
+            "along z",
+            "lower_m",
+        ),
+        ("name = \"pillar\"", "name = \"table\"", "constraints.box[1].name", "taken", "a name of its own"),
+        (
+            "start_deg = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]",
+            "start_deg = [0.0, 50.0, 0.0, 0.0, 0.0, 0.0]",
+            "constraints.start_deg",
+            "the box `table`",
+            "that the constraints allow",
+        ),
+    ] {
+        let (problem, line) = one(TABLE, from, to);
+        assert_eq!((problem.key.as_str(), problem.line), (key, line), "{problem}");
+        assert!(problem.what.contains(what) && problem.mend.contains(mend), "{problem}");
+    }
+    // What leaves nothing to do is told with the constraint that does.
+    for (text, nothing, named) in [
+        (ARM, "minimum_height_m = 2.0", "the minimum height excludes all of 20000 postures"),
+        (ARM, "allowed_deg = [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]\nminimum_height_m = 0.1", "the minimum height excludes"),
+        (TIAGO, "limits_deg = { arm_1_joint = [150.0, 157.0] }", "the limits of `arm_1_joint` excludes all of 34"),
+    ] {
+        let found =
+            problems(&text.replacen("[filter]", &format!("[constraints]\n{nothing}\n[filter]"), 1), Ok(TIAGO_CSV));
+        assert!(found.len() == 1 && found[0].key == "constraints" && found[0].what.contains(named), "{found:?}");
+    }
+    // A pose that must be reached must be allowed.
+    let fov = include_str!("../scenarios/head-fov.toml");
+    let found =
+        problems(&fov.replacen("[filter]", "[constraints]\nminimum_height_m = 0.3\n[filter]", 1), Err("no data"));
+    assert!(found.iter().any(|problem| problem.what.contains("known to be in view")), "{found:?}");
+}

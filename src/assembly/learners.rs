@@ -32,7 +32,11 @@ impl Scenario {
         let briefing = held.as_ref().unwrap_or(briefing);
         let estimator = self.estimator(spec, seed, briefing)?;
         let (actions, limits) = (briefing.actions.clone(), self.robot.limits.clone());
-        Ok(Agent::new(estimator, self.policy(spec, briefing), actions, limits, seed))
+        let agent = Agent::new(estimator, self.policy(spec, briefing), actions, limits, seed);
+        Ok(match &self.constraints {
+            Some(constraints) => agent.bound_to(constraints.clone()),
+            None => agent,
+        })
     }
 
     pub(super) fn learner_description(&self, spec: &LearnerSpec) -> LearnerDescription {

@@ -154,12 +154,18 @@ impl Scenario {
         let movement =
             |row: &usize| Movement { configuration: measurements.configurations[*row].clone(), row: Some(*row) };
         let workspace = training.iter().map(|row| measurements.configurations[*row].clone()).collect();
+        let mut pool: Vec<Movement> = training.iter().map(movement).collect();
+        if let Some(constraints) = &self.constraints {
+            // What no movement can reach does not count as left. Where that is all, whoever chooses names the constraint.
+            let feasible = constraints.of(None, pool.clone(), |movement| &movement.configuration);
+            pool = feasible.unwrap_or(pool);
+        }
         let briefing = Briefing {
             initial: self.robot.state.clone(),
             weights: self.weights(),
             layout: Arc::new(self.robot.layout.clone()),
             covariance: self.prior_covariance(),
-            actions: Actions::Pool(training.iter().map(movement).collect()),
+            actions: Actions::Pool(pool),
             workspace: self.workspace(workspace),
             watch: None,
         };

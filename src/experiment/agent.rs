@@ -8,6 +8,8 @@
 //! keyed by the seed and by its ordinal; what a policy planned with it stands in its event, and nothing is remembered
 //! elsewhere; so a stored list of events is restored without choosing anything again.
 
+use std::sync::Arc;
+
 use web_time::Instant;
 
 use super::streams::Stream;
@@ -15,7 +17,8 @@ use crate::{
     estimation::{Belief, EstimationError, Estimator, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
     selection::{
-        Actions, Appraisal, History, Movement, Policy, Search, Selection, SelectionError, Situation, condition,
+        Actions, Appraisal, Constraints, History, Movement, Policy, Search, Selection, SelectionError, Situation,
+        condition,
     },
     sensing::{Observation, Refused},
 };
@@ -26,6 +29,7 @@ pub struct Agent {
     policy: Box<dyn Policy>,
     actions: Actions,
     limits: JointBox,
+    constraints: Option<Arc<Constraints>>,
     seed: u64,
     /// Proposals made so far.
     proposals: u64,
@@ -65,6 +69,8 @@ pub enum Event {
     Executed(Executed),
     /// A proposal was taken back.
     Withdrawn(u64),
+    /// The robot refused a posture, rad or m per joint.
+    Vetoed(Vec<f64>),
 }
 
 /// Why an agent has not absorbed what was executed.
@@ -88,7 +94,13 @@ impl Agent {
         seed: u64,
     ) -> Self {
         let (pending, history) = (Vec::new(), History::default());
-        Self { estimator, policy, actions, limits, seed, proposals: 0, pending, history, failure: None }
+        let constraints = None;
+        Self { estimator, policy, actions, limits, constraints, seed, proposals: 0, pending, history, failure: None }
+    }
+
+    /// The same bound to constraints: it proposes nothing that violates them.
+    pub fn bound_to(self, constraints: Constraints) -> Self {
+        Self { constraints: Some(Arc::new(constraints)), ..self }
     }
 
     /// What it believes.
@@ -116,6 +128,11 @@ impl Agent {
         &self.limits
     }
 
+    /// What its movements are bound to, if to anything.
+    pub fn constraints(&self) -> Option<&Constraints> {
+        self.constraints.as_deref()
+    }
+
     /// Why it has ended, if it has.
     pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
@@ -131,6 +148,7 @@ impl Agent {
     ///
     /// An error leaves the agent as it was, but for proposals made before it was met: no choice ends an agent.
     pub fn propose(&mut self, count: usize) -> Result<&[Proposal], SelectionError> {
+        self.drop_infeasible();
         while self.pending.len() < count && self.failure.is_none() {
             let start = Instant::now();
             let selection = self.select()?;
@@ -140,20 +158,45 @@ impl Agent {
         Ok(&self.pending)
     }
 
-    /// Chooses one more movement, given the pending ones.
+    /// The constraint that a movement to `configuration` violates if it follows these proposals.
+    fn refuse(&self, before: &[Proposal], configuration: &[f64]) -> Result<(), SelectionError> {
+        let Some(constraints) = &self.constraints else { return Ok(()) };
+        let last = before.last().map(|proposal| proposal.selection.movement.configuration.as_slice());
+        let from = last.or(self.history.posture()).or(constraints.start.as_deref());
+        constraints.violation(from, configuration).map_or(Ok(()), |violation| Err(SelectionError::Refused(violation)))
+    }
+
+    /// Takes back the first pending proposal that is no longer feasible, as after a veto or a movement to elsewhere, and those
+    /// that were to follow it.
+    fn drop_infeasible(&mut self) {
+        let is_refused = |index: usize| {
+            let Proposal { selection, .. } = &self.pending[index];
+            self.refuse(&self.pending[..index], &selection.movement.configuration).is_err()
+        };
+        let kept = (0..self.pending.len()).find(|index| is_refused(*index)).unwrap_or(self.pending.len());
+        self.pending.truncate(kept);
+    }
+
+    /// Chooses one more movement, given the pending ones; whatever the policy, a feasible one.
     fn select(&self) -> Result<Selection, SelectionError> {
+        let selection = self.choose()?;
+        self.refuse(&self.pending, &selection.movement.configuration)?;
+        Ok(selection)
+    }
+
+    fn choose(&self) -> Result<Selection, SelectionError> {
         let mut rng = Stream::Policy.keyed(self.seed, self.proposals);
         if self.pending.is_empty() {
             return self.policy.select(&self.standpoint().situation(), &mut rng);
         }
         let mut standpoint = self.standpoint().to_owned();
-        standpoint.history.expect_movements();
         for Proposal { selection, .. } in &self.pending {
             let configuration = &selection.movement.configuration;
             // What is not expected to be seen is not expected to teach.
             let appraisal = self.policy.appraise(&standpoint.borrowed().situation(), &self.limits, configuration);
             let chance = appraisal.map_or(1.0, |appraisal| appraisal.chance);
             condition(&mut standpoint.belief, configuration, |_| chance);
+            standpoint.history.expect(configuration);
             standpoint.actions.use_up(&selection.movement);
         }
         self.policy.select(&standpoint.borrowed().situation(), &mut rng)
@@ -174,6 +217,7 @@ impl Agent {
     /// other: stored with the events, and restored with them. An agent that has ended proposes nothing.
     pub fn set(&mut self, configuration: &[f64]) -> Result<Appraisal, SelectionError> {
         let appraisal = self.appraise(self.standpoint(), configuration)?;
+        self.refuse(&[], configuration)?;
         let selection = Selection {
             criterion: Some(appraisal.criterion),
             gain: Some(appraisal.gain),
@@ -184,6 +228,25 @@ impl Agent {
             self.proposed(Proposal { id: self.proposals, selection, selection_ms: 0.0 });
         }
         Ok(appraisal)
+    }
+
+    /// The robot cannot go to `configuration`: it and its neighbourhood are excluded (see
+    /// [`Vetoes`](crate::selection::Vetoes)), and pending proposals in there replaced, with those that were to follow them.
+    /// An error leaves the veto in force.
+    pub fn veto(&mut self, configuration: &[f64]) -> Result<&[Proposal], SelectionError> {
+        if configuration.len() != self.limits.dimension() {
+            return Err(SelectionError::NoConfiguration(configuration.len()));
+        }
+        let count = self.pending.len();
+        self.exclude(configuration);
+        let count = if self.is_set_from_outside() { 0 } else { count };
+        self.propose(count)
+    }
+
+    fn exclude(&mut self, configuration: &[f64]) {
+        let unbound = || Arc::new(Constraints::none(self.limits.clone()));
+        Arc::make_mut(self.constraints.get_or_insert_with(unbound)).veto(configuration);
+        self.drop_infeasible();
     }
 
     /// Takes a proposal back; false if it is not pending.
@@ -233,13 +296,15 @@ impl Agent {
                 Err(refused) => return Err(refused),
             },
             Event::Withdrawn(id) => drop(self.withdraw(*id)),
+            Event::Vetoed(configuration) => self.exclude(configuration),
         }
         Ok(())
     }
 
     /// Where it stands now.
     pub fn standpoint(&self) -> Standpoint<'_> {
-        Standpoint { belief: self.belief(), actions: &self.actions, history: &self.history }
+        let (actions, history, constraints) = (&self.actions, &self.history, &self.constraints);
+        Standpoint { belief: self.belief(), actions, history, constraints }
     }
 
     /// What a movement would teach it where it stood at `standpoint`, by what it chooses by.
@@ -262,16 +327,19 @@ pub struct Standpoint<'a> {
     belief: &'a Belief,
     actions: &'a Actions,
     history: &'a History,
+    constraints: &'a Option<Arc<Constraints>>,
 }
 
 impl<'a> Standpoint<'a> {
     fn situation(&self) -> Situation<'a> {
-        Situation { belief: self.belief, actions: self.actions, history: self.history }
+        let constraints = self.constraints.as_deref();
+        Situation { belief: self.belief, actions: self.actions, history: self.history, constraints }
     }
 
     /// A copy to keep.
     pub fn to_owned(&self) -> OwnedStandpoint {
-        OwnedStandpoint { belief: self.belief.clone(), actions: self.actions.clone(), history: self.history.clone() }
+        let (actions, history) = (self.actions.clone(), self.history.clone());
+        OwnedStandpoint { belief: self.belief.clone(), actions, history, constraints: self.constraints.clone() }
     }
 }
 
@@ -282,11 +350,13 @@ pub struct OwnedStandpoint {
     pub belief: Belief,
     actions: Actions,
     history: History,
+    constraints: Option<Arc<Constraints>>,
 }
 
 impl OwnedStandpoint {
     /// The same to look at.
     pub fn borrowed(&self) -> Standpoint<'_> {
-        Standpoint { belief: &self.belief, actions: &self.actions, history: &self.history }
+        let Self { belief, actions, history, constraints } = self;
+        Standpoint { belief, actions, history, constraints }
     }
 }

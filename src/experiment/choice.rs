@@ -82,7 +82,8 @@ pub struct Choice {
 pub struct SearchedJoint {
     /// Its name.
     pub name: String,
-    /// Its limits, rad (revolute) or m (prismatic).
+    /// The limits between which it was searched, rad (revolute) or m (prismatic): the joint's own, or what constraints leave of
+    /// them.
     pub limits: [f64; 2],
 }
 
@@ -112,7 +113,8 @@ pub struct ChosenReport {
 pub struct BoxReport {
     /// Its centre in the unit cube.
     pub centre: Vec<f64>,
-    /// The criterion there; null if it is not finite (certainly out of view).
+    /// The criterion there, with the price of the travel to it if that has one; null if it is not finite (certainly out of
+    /// view) or the centre is not feasible.
     pub value: Option<f64>,
     /// How it shrank.
     pub shapes: Vec<ShapeReport>,
@@ -196,7 +198,7 @@ impl AppraisalReport {
 }
 
 impl Choice {
-    /// `values` are the criterion before and after the movement. The joints are left to the caller, who knows their names.
+    /// `values` are the criterion before and after the movement. The joints' names are left to the caller, who knows them.
     pub(super) fn of(
         step: u64,
         report: &LearnerReport,
@@ -205,8 +207,9 @@ impl Choice {
         limits: &JointBox,
         values: [Option<f64>; 2],
     ) -> Result<Self, ChoiceError> {
-        let point = limits.to_unit(&movement.configuration);
         let Search { settings, partition } = search;
+        let searched = partition.searched(limits);
+        let point = searched.to_unit(&movement.configuration);
         let partition = partition.choosing(&point);
         let of_leaves: Vec<f64> = partition.leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)).collect();
         let dimension = partition.leaves.first().map_or(0, |leaf| leaf.centre.len());
@@ -238,7 +241,9 @@ impl Choice {
             learner: report.name.clone(),
             variant: settings.variant.name().to_owned(),
             epsilon: settings.epsilon,
-            joints: Vec::new(),
+            joints: (searched.joints().iter())
+                .map(|&(lower, upper)| SearchedJoint { name: String::new(), limits: [lower, upper] })
+                .collect(),
             trace: before,
             evaluations: partition.leaves.len(),
             chosen: ChosenReport {
@@ -260,10 +265,11 @@ impl Experiment {
     pub fn choice(&self, learner: &str) -> Result<Choice, ChoiceError> {
         let index = self.index_of(learner)?;
         let limits = self.joint_box()?;
-        let choice = self.learners[index].choice(self.latest.step, &self.latest.learners[index], &limits)?;
-        let joints = self.description.joints.iter();
-        let joints = joints.map(|joint| SearchedJoint { name: joint.name.clone(), limits: joint.limits }).collect();
-        Ok(Choice { joints, ..choice })
+        let mut choice = self.learners[index].choice(self.latest.step, &self.latest.learners[index], &limits)?;
+        for (joint, description) in choice.joints.iter_mut().zip(&self.description.joints) {
+            joint.name.clone_from(&description.name);
+        }
+        Ok(choice)
     }
 
     /// What a movement to `configuration` (rad or m per joint) would have taught a learner instead of its last one;

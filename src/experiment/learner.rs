@@ -108,14 +108,15 @@ impl Learner {
         self.agent.actions().remaining()
     }
 
-    /// Its next movement; `None` once it has ended, or found no finite criterion: nothing more can come of it then.
+    /// Its next movement; `None` once it has ended, or found no finite criterion or nothing feasible: nothing more can come of
+    /// it then.
     pub(super) fn propose(&mut self) -> Result<Option<Proposal>, SelectionError> {
         if self.stopped.is_some() {
             return Ok(None);
         }
         match self.agent.propose(1) {
             Ok(proposals) => Ok(proposals.first().cloned()),
-            Err(error @ SelectionError::NoFiniteCriterion) => {
+            Err(error @ (SelectionError::NoFiniteCriterion | SelectionError::Infeasible(_))) => {
                 self.stopped = Some(error);
                 Ok(None)
             }
@@ -142,7 +143,10 @@ impl Learner {
         if let Some(why) = self.end() {
             return Err(ChoiceError::Ended { name: self.description.name.clone(), why });
         }
-        let appraisal = self.agent.set(configuration)?;
+        let appraisal = self.agent.set(configuration).map_err(|error| match error {
+            SelectionError::Refused(why) => ChoiceError::Configuration(format!("is not feasible: {why}")),
+            error => error.into(),
+        })?;
         let best = *self.best_gain.get_or_init(|| self.searched_gain(self.agent.standpoint()));
         Ok(AppraisalReport::of(configuration, &appraisal, &self.belief().state, best))
     }
@@ -155,9 +159,11 @@ impl Learner {
     /// The gain of the best movement that DIRECT finds at a standpoint, for a policy that explains itself by one.
     fn searched_gain(&self, standpoint: Standpoint<'_>) -> Option<f64> {
         let partition = self.agent.explain(standpoint).ok()??.partition;
-        let best = partition.leaves.iter().filter_map(|leaf| leaf.value).min_by(f64::total_cmp)?;
-        let centre = self.limits().from_unit(&partition.leaves.first()?.centre);
-        Some(self.agent.appraise(standpoint, &centre).ok()?.before - best)
+        let values = partition.leaves.iter().filter_map(|leaf| Some((leaf, leaf.value?)));
+        let (best, _) = values.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let centre = partition.searched(self.limits()).from_unit(&best.centre);
+        // Without the price of the travel there.
+        Some(self.agent.appraise(standpoint, &centre).ok()?.gain)
     }
 
     /// Takes in what was seen after a proposal was carried out.

@@ -9,6 +9,8 @@ mod choice;
 #[cfg(test)]
 mod choices;
 mod comparison;
+#[cfg(test)]
+mod constrained;
 mod convergence;
 #[cfg(test)]
 mod failures;

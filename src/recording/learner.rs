@@ -251,7 +251,7 @@ impl LearnerEntities {
             rows.always(&self.entity("direct/axes"), &[square.as_ref(), labels.as_ref()]);
             rows.always(&self.entity("direct/criterion"), &[&partition::fill_transform()]);
         }
-        if let Some(slice) = self.plane.and_then(|plane| Slice::of(partition, plane)) {
+        if let Some(slice) = self.plane.and_then(|plane| Slice::of(partition, plane, joints)) {
             rows.at(step, &self.entity("direct/criterion"), &[&slice.fill]);
             rows.at(step, &self.entity("direct/boxes"), &[&slice.outlines]);
             rows.at(step, &self.entity("direct/centres"), &[&slice.centres]);

@@ -26,10 +26,30 @@ const PIXELS: usize = 81;
 /// How bright the fill of a face is beside its outline.
 const FILL: f64 = 0.5;
 
-/// Centre and half-sizes of a rectangle's face in a slice. Rerun's 2-D views have y downwards: upper limits are at 0.
-fn face(plane: Plane, leaf: &Leaf) -> ([f32; 2], [f32; 2]) {
-    let Projection { centre: [x, y], half } = plane.project(&leaf.centre, &leaf.levels);
-    ([x as f32, (1.0 - y) as f32], half.map(|half| half as f32))
+/// Where the box that was searched is in a slice of the joint box: its least corner and its sides, of the square's 1.
+struct Window {
+    plane: Plane,
+    corner: [f64; 2],
+    sides: [f64; 2],
+}
+
+impl Window {
+    fn of(partition: &Partition, plane: Plane, joints: &[JointDescription]) -> Self {
+        let range = |joint: Option<usize>| {
+            let (joint, searched) = joint.and_then(|joint| Some((joints.get(joint)?, partition.limits.get(joint)?)))?;
+            let ([lower, upper], [from, to]) = (joint.limits, *searched);
+            (lower < upper).then(|| ((from - lower) / (upper - lower), (to - from) / (upper - lower)))
+        };
+        let [(left, width), (bottom, height)] = [Some(plane.x), plane.y].map(|side| range(side).unwrap_or((0.0, 1.0)));
+        Self { plane, corner: [left, bottom], sides: [width, height] }
+    }
+
+    /// Centre and half-sizes of a rectangle's face. Rerun's 2-D views have y downwards: upper limits are at 0.
+    fn face(&self, leaf: &Leaf) -> ([f32; 2], [f32; 2]) {
+        let Projection { centre, half } = self.plane.project(&leaf.centre, &leaf.levels);
+        let [x, y] = [0, 1].map(|side| self.corner[side] + centre[side] * self.sides[side]);
+        ([x as f32, (1.0 - y) as f32], [0, 1].map(|side| (half[side] * self.sides[side]) as f32))
+    }
 }
 
 /// The frame of a slice and the names and limits of its joints, each from its lower limit to its upper: `x` to the
@@ -73,17 +93,18 @@ pub(super) struct Slice {
 }
 
 impl Slice {
-    /// The slice of a partition through its chosen rectangle; `None` if it has none.
-    pub(super) fn of(partition: &Partition, plane: Plane) -> Option<Self> {
+    /// The slice of a partition through its chosen rectangle, in the joint box; `None` if it has none.
+    pub(super) fn of(partition: &Partition, plane: Plane, joints: &[JointDescription]) -> Option<Self> {
         let chosen = partition.leaves.get(partition.chosen)?;
         let colour = scale(partition);
         let (mut cut, other): (Vec<&Leaf>, Vec<&Leaf>) =
             partition.leaves.iter().partition(|leaf| plane.cuts(&leaf.centre, &leaf.levels, &chosen.centre));
         // Potentially optimal ones last, on top of their neighbours.
         cut.sort_by_key(|rectangle| rectangle.potentially_optimal);
-        let faces = || cut.iter().map(|rectangle| face(plane, rectangle));
+        let window = Window::of(partition, plane, joints);
+        let faces = || cut.iter().map(|rectangle| window.face(rectangle));
         Some(Self {
-            fill: fill(cut.iter().map(|rectangle| (face(plane, rectangle), colour(rectangle)))),
+            fill: fill(cut.iter().map(|rectangle| (window.face(rectangle), colour(rectangle)))),
             outlines: Boxes2D::from_centers_and_half_sizes(faces().map(|(c, _)| c), faces().map(|(_, h)| h))
                 .with_colors(cut.iter().map(|rectangle| Color::from(colour(rectangle))))
                 .with_radii(
@@ -91,11 +112,11 @@ impl Slice {
                         .map(|rectangle| Radius::new_ui_points(if rectangle.potentially_optimal { 2.5 } else { 1.0 })),
                 )
                 .with_draw_order(10.0),
-            centres: Points2D::new(other.iter().map(|rectangle| face(plane, rectangle).0))
+            centres: Points2D::new(other.iter().map(|rectangle| window.face(rectangle).0))
                 .with_colors(other.iter().map(|rectangle| Color::from(colour(rectangle))))
                 .with_radii([Radius::new_ui_points(1.5)])
                 .with_draw_order(20.0),
-            chosen: Points2D::new([face(plane, chosen).0])
+            chosen: Points2D::new([window.face(chosen).0])
                 .with_colors([Color::from(CHOSEN)])
                 .with_radii([Radius::new_ui_points(5.0)])
                 .with_labels(["chosen"])

@@ -23,6 +23,7 @@ pub const BUILTIN: &[Builtin] = builtins![
     "arm-6dof-doubled-error",
     "arm-6dof-no-prior",
     "arm-6dof-selectors",
+    "arm-6dof-table",
     "arm-6dof-outliers",
     "arm-6dof-camera",
     "hand-eye-6dof",

@@ -30,7 +30,7 @@ use crate::{
     kinematics::JointBox,
     model::{Block, Layout, Quantity, State},
     optimize::Settings,
-    selection::{CriterionUnits, Planning, Watch, Weights},
+    selection::{Constraints, CriterionUnits, Planning, Watch, Weights},
     sensing::{Equipment, Loss, Rig},
 };
 
@@ -62,6 +62,8 @@ pub struct Scenario {
     pub gradient_rate: f64,
     /// How movements are chosen actively.
     pub selection: SelectionSpec,
+    /// What movements are bound to, if to anything.
+    pub constraints: Option<Constraints>,
     /// Thresholds of `converged_at`; [`THRESHOLDS`](Self::THRESHOLDS) where measurements are replayed and the file says
     /// nothing.
     pub thresholds: Thresholds,

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::{
-    Actions, Appraisal, Criterion, Movement, Policy, Search, Selection, SelectionError, Sight, Situation, Watch,
+    Appraisal, Criterion, Domain, Movement, Policy, Scope, Search, Selection, SelectionError, Sight, Situation, Watch,
     Weights, search::direct,
 };
 use crate::{
@@ -105,17 +105,21 @@ impl Active {
         limits: &JointBox,
     ) -> Result<Option<Search>, SelectionError> {
         let Minimiser::Direct(settings) = self.minimiser else { return Ok(None) };
-        let criterion = self.criterion(situation.belief, situation, limits)?;
+        let (criterion, scope) = (self.criterion(situation.belief, situation, limits)?, Scope::of(situation)?);
+        let Some(searched) = scope.limits() else { return Ok(None) };
         let at = |points: &[Vec<f64>]| {
-            criterion.evaluate(&points.iter().map(|point| limits.from_unit(point)).collect::<Vec<Vec<f64>>>())
+            let candidates: Vec<Vec<f64>> = points.iter().map(|point| searched.from_unit(point)).collect();
+            scope.evaluate(&candidates, |feasible| criterion.evaluate(feasible))
         };
-        Ok(Some(Search { settings, partition: direct(limits.dimension(), settings, at)? }))
+        Ok(Some(Search { settings, partition: direct(&scope, searched, settings, at)? }))
     }
 
     fn search_box(
         &self,
         situation: &Situation<'_>,
         limits: &JointBox,
+        scope: &Scope<'_>,
+        searched: &JointBox,
         rng: &mut ChaCha8Rng,
     ) -> Result<Selection, SelectionError> {
         let outlooks = self.outlooks(situation.belief, rng)?;
@@ -123,38 +127,48 @@ impl Active {
             .iter()
             .map(|belief| self.criterion(belief, situation, limits))
             .collect::<Result<Vec<_>, SelectionError>>()?;
-        let evaluate = |candidates: &[Vec<f64>]| {
+        let plainly = |candidates: &[Vec<f64>]| {
             let mut sums = vec![0.0; candidates.len()];
             for criterion in &criteria {
                 sums.iter_mut().zip(criterion.evaluate(candidates)).for_each(|(sum, value)| *sum += value);
             }
             sums.iter().map(|sum| sum / criteria.len() as f64).collect::<Vec<f64>>()
         };
+        let evaluate = |candidates: &[Vec<f64>]| scope.evaluate(candidates, plainly);
         let at = |points: &[Vec<f64>]| {
-            evaluate(&points.iter().map(|point| limits.from_unit(point)).collect::<Vec<Vec<f64>>>())
+            evaluate(&points.iter().map(|point| searched.from_unit(point)).collect::<Vec<Vec<f64>>>())
         };
-        let (best, evaluations, search) = match self.minimiser {
+        let (mut best, mut evaluations, search) = match self.minimiser {
             Minimiser::Direct(settings) => {
-                let partition = direct(limits.dimension(), settings, at)?;
+                let partition = direct(scope, searched, settings, at)?;
                 let chosen = partition.leaves.get(partition.chosen);
-                let best = chosen.and_then(|leaf| Some((limits.from_unit(&leaf.centre), leaf.value?)));
+                let best = chosen.and_then(|leaf| Some((searched.from_unit(&leaf.centre), leaf.value?)));
                 (best, partition.leaves.len(), Some(Search { settings, partition }))
             }
             Minimiser::Random { evaluations } => {
-                let candidates: Vec<_> = (0..evaluations).map(|_| limits.draw(rng)).collect();
+                let draws = (0..evaluations).map(|_| scope.draw(searched, rng));
+                let candidates = draws.collect::<Result<Vec<_>, SelectionError>>()?;
                 let values = evaluate(&candidates);
                 (least(candidates.into_iter().zip(values)), evaluations, None)
             }
             Minimiser::Bayesian { evaluations } => {
-                let one = |point: &[f64]| evaluate(&[limits.from_unit(point)])[0];
-                let found = bayesian(limits.dimension(), evaluations, rng.random(), one);
-                (found.map(|found| (limits.from_unit(&found.point), found.value)), evaluations, None)
+                let one = |point: &[f64]| evaluate(&[searched.from_unit(point)])[0];
+                let found = bayesian(searched.dimension(), evaluations, rng.random(), one);
+                (found.map(|found| (searched.from_unit(&found.point), found.value)), evaluations, None)
             }
         };
+        if best.is_none() && scope.is_constrained() {
+            // What is feasible may be too small a part of the box for a search to come upon.
+            let found = scope.some()?;
+            evaluations += found.len();
+            let values = evaluate(&found);
+            best = least(found.into_iter().zip(values));
+        }
         let before = criteria.iter().map(Criterion::before).sum::<f64>() / criteria.len() as f64;
         let Some((configuration, value)) = best.filter(|(_, value)| value.is_finite()) else {
-            return Watch::fallback(self.watch.as_ref(), before);
+            return Watch::fallback(self.watch.as_ref(), before, scope);
         };
+        let value = value - scope.price(&configuration);
         Ok(Selection {
             criterion: Some(value),
             gain: Some(before - value),
@@ -167,15 +181,21 @@ impl Active {
 
 impl Policy for Active {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
-        match situation.actions {
-            Actions::Box(limits) => match Watch::beginning(self.watch.as_ref(), situation.history) {
-                Some(beginning) => Ok(beginning),
-                None => self.search_box(situation, limits, rng),
-            },
-            Actions::Pool(pool) => {
-                let criterion = Criterion::new(situation.belief, &self.weights)?;
-                let candidates: Vec<&[f64]> = pool.iter().map(|movement| movement.configuration.as_slice()).collect();
-                Selection::of_pool(pool, criterion.evaluate(&candidates), criterion.before())
+        let scope = Scope::of(situation)?;
+        if let Some(beginning) = Watch::beginning(self.watch.as_ref(), situation.history, &scope)? {
+            return Ok(beginning);
+        }
+        match &scope.domain {
+            Domain::Box { searched, joints } => self.search_box(situation, joints, &scope, searched, rng),
+            Domain::List { movements, joints } => {
+                let criterion = match joints {
+                    Some(joints) => self.criterion(situation.belief, situation, joints)?,
+                    None => Criterion::new(situation.belief, &self.weights)?,
+                };
+                let candidates: Vec<&[f64]> =
+                    movements.iter().map(|movement| movement.configuration.as_slice()).collect();
+                let best = Selection::of_list(&scope, movements, criterion.evaluate(&candidates), criterion.before());
+                best.map_or_else(|| Watch::fallback(self.watch.as_ref(), criterion.before(), &scope), Ok)
             }
         }
     }

@@ -8,11 +8,13 @@
 //! * [`Visibility`]: where a head watches, the chance that the marker is seen, which weighs the gain.
 //! * [`Random`]: draws uniformly, the paper's comparison.
 //! * [`Human`]: waits for a person, and tells how good their choices are.
+//! * [`Constraints`]: what movements are bound to; every policy chooses within a [`Scope`].
 //!
 //! A policy chooses, explains and appraises, each time from the situation alone: it remembers nothing.
 
 mod active;
 mod criterion;
+mod feasible;
 mod herding;
 mod human;
 #[cfg(test)]
@@ -34,6 +36,7 @@ use rand_chacha::ChaCha8Rng;
 
 pub use active::{Active, Minimiser};
 pub use criterion::{Appraisal, Criterion, Sight};
+pub use feasible::{Constraints, Domain, Infeasible, Obstacle, Outline, Scope, Tally, Vetoes, Violation, travel};
 pub use human::Human;
 pub use optimality::Optimality;
 pub use outlook::Outlook;
@@ -118,16 +121,16 @@ impl Selection {
         Self::of(Movement { configuration, row: None })
     }
 
-    /// The best of recorded movements by the values of their criterion, which was `before` before.
-    pub(crate) fn of_pool(pool: &[Movement], values: Vec<f64>, before: f64) -> Result<Self, SelectionError> {
-        if pool.is_empty() {
-            return Err(SelectionError::Exhausted);
-        }
-        let (movement, value) = least(pool.iter().zip(values)).ok_or(SelectionError::NoFiniteCriterion)?;
-        Ok(Self {
+    /// The best of listed movements by the values of their criterion, which was `before` before, and by what the travel to
+    /// them costs; `None` if no value is finite.
+    pub(crate) fn of_list(scope: &Scope<'_>, list: &[Movement], values: Vec<f64>, before: f64) -> Option<Self> {
+        let priced = |(movement, value): (&Movement, &f64)| value + scope.price(&movement.configuration);
+        let priced: Vec<f64> = list.iter().zip(&values).map(priced).collect();
+        let ((movement, value), _) = least(list.iter().zip(values).zip(priced))?;
+        Some(Self {
             criterion: Some(value),
             gain: Some(before - value),
-            evaluations: pool.len(),
+            evaluations: list.len(),
             ..Self::of(movement.clone())
         })
     }
@@ -151,6 +154,12 @@ pub enum SelectionError {
     /// A person chooses, and has not chosen yet.
     #[error("a person chooses it, and has not chosen yet; set a configuration first, then step")]
     Unset,
+    /// A configuration that the constraints exclude.
+    #[error("this configuration is not feasible: {0}")]
+    Refused(Violation),
+    /// The constraints exclude everything.
+    #[error("no configuration is feasible: {0}")]
+    Infeasible(#[from] Infeasible),
     /// No configuration has a finite criterion.
     #[error("no configuration has a finite criterion: the belief has diverged")]
     NoFiniteCriterion,

@@ -2,16 +2,24 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::optimize::{Direct, contains};
+use crate::{
+    kinematics::JointBox,
+    optimize::{Direct, contains},
+};
 
-/// The rectangles into which DIRECT had divided the joint box when its budget ended.
+/// The rectangles into which DIRECT had divided the box that it searched when its budget ended.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
 pub struct Partition {
-    /// All rectangles; they fill the unit cube (each joint from its lower limit, 0, to its upper, 1).
+    /// All rectangles; they fill the unit cube (each joint from its lower limit, 0, to its upper, 1; those of `limits`, where
+    /// there are any).
     pub leaves: Vec<Leaf>,
     /// Which of them holds the chosen configuration: as its centre, if DIRECT chose it; a planner moves on from there.
     pub chosen: usize,
+    /// The box that was searched, `[lower, upper]` per joint, rad or m, where constraints made it smaller than the joint box;
+    /// else empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub limits: Vec<[f64; 2]>,
 }
 
 /// One rectangle of a partition.
@@ -22,7 +30,8 @@ pub struct Leaf {
     pub centre: Vec<f64>,
     /// How often each side was trisected: side i is 3^−levels\[i\] long.
     pub levels: Vec<u8>,
-    /// The criterion at the centre; null if it is not finite.
+    /// The criterion at the centre, with the price of the travel to it if that has one; null if it is not finite, or the
+    /// centre not feasible.
     pub value: Option<f64>,
     /// The iteration of DIRECT that gave the rectangle its present shape.
     pub generation: usize,
@@ -46,7 +55,18 @@ impl Partition {
             .collect();
         let best = direct.best().map(|(centre, _)| centre);
         let chosen = leaves.iter().position(|leaf| Some(leaf.centre.as_slice()) == best).unwrap_or(0);
-        Self { leaves, chosen }
+        Self { leaves, chosen, limits: Vec::new() }
+    }
+
+    /// The same of a search of this box, which constraints made smaller than the joint box.
+    pub(super) fn within(self, limits: &JointBox) -> Self {
+        Self { limits: limits.joints().iter().map(|&(lower, upper)| [lower, upper]).collect(), ..self }
+    }
+
+    /// The box that was searched, in a robot of these joint limits.
+    pub fn searched(&self, limits: &JointBox) -> JointBox {
+        let searched = self.limits.iter().map(|&[lower, upper]| (lower, upper)).collect::<Vec<_>>();
+        JointBox::new(searched).ok().filter(|searched| searched.dimension() > 0).unwrap_or_else(|| limits.clone())
     }
 
     /// The same where another point of the unit cube was chosen.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Actions, Appraisal, Movement, Optimality, Outlook, Partition, Planned, Policy, Search, Selection, SelectionError,
-    Sight, Situation, Watch, Weights, herding::herd, plan::Plan, search::direct, views::Views,
+    Appraisal, Domain, Movement, Optimality, Outlook, Partition, Planned, Policy, Scope, Search, Selection,
+    SelectionError, Sight, Situation, Watch, Weights, herding::herd, plan::Plan, search::direct, views::Views,
 };
 use crate::{
     estimation::Belief,
@@ -86,13 +86,23 @@ const DRAWS: usize = 64;
 /// Where everything of one choice is looked up.
 struct Scene<'a> {
     planner: &'a Planner,
-    limits: &'a JointBox,
     /// No movement planned: the belief as it is.
     now: Plan,
-    /// Postures in view, scaled to the unit cube, where the sensors see some only.
-    familiar: Vec<Vec<f64>>,
     /// What enters that not everything is seen: how, and by hypothesis what states drawn from it would see.
     sight: Option<(Sight<'a>, Vec<Option<Arc<Views>>>)>,
+}
+
+/// Where the movements of a plan are sought.
+struct Ground<'a> {
+    scope: &'a Scope<'a>,
+    /// The box to search.
+    searched: &'a JointBox,
+    /// Postures in view, scaled to the unit cube of that box, where the sensors see some only.
+    familiar: Vec<Vec<f64>>,
+    /// Evaluations of the criterion so far.
+    evaluations: usize,
+    /// What DIRECT's first search left.
+    partition: Option<Partition>,
 }
 
 impl Planner {
@@ -112,11 +122,13 @@ impl Planner {
         &self,
         situation: &Situation<'_>,
         limits: &JointBox,
+        scope: &Scope<'_>,
+        searched: &JointBox,
         rng: &mut ChaCha8Rng,
     ) -> Result<Selection, SelectionError> {
         let scene = Scene::new(self, situation, limits);
         let outlook = scene.outlook(&scene.now)?;
-        let drawn: Vec<Vec<f64>> = (0..DRAWS).map(|_| limits.draw(rng)).collect();
+        let drawn = (0..DRAWS).map(|_| scope.draw(searched, rng)).collect::<Result<Vec<_>, _>>()?;
         let is_seen = |pose: &&Vec<f64>| outlook.expectations(pose).0.first().is_none_or(|chance| *chance >= 0.5);
         let seen: Vec<&Vec<f64>> = drawn.iter().filter(is_seen).collect();
         match herd(&seen, &drawn, situation.history.made()) {
@@ -126,20 +138,28 @@ impl Planner {
                 let gain = value.map(|value| outlook.before() - value);
                 Ok(Selection { criterion: value, gain, evaluations: 1, ..Selection::plain(pose.clone()) })
             }
-            None => self.select_in_box(situation, limits),
+            None => self.select_in_box(situation, limits, scope, searched),
         }
     }
 
-    fn select_in_box(&self, situation: &Situation<'_>, limits: &JointBox) -> Result<Selection, SelectionError> {
+    fn select_in_box(
+        &self,
+        situation: &Situation<'_>,
+        limits: &JointBox,
+        scope: &Scope<'_>,
+        searched: &JointBox,
+    ) -> Result<Selection, SelectionError> {
         let scene = Scene::new(self, situation, limits);
+        let mut ground = Ground::new(self, situation, limits, scope, searched);
         // As many movements are needed as bring one independent equation for each unknown. How many one brings is much the
         // same at any posture off the middle, where axes may be in line.
         let equations = scene.now.equations(&limits.from_unit(&vec![0.37; limits.dimension()]));
         let unknown = scene.now.unknown(&self.weights, self.planning.unknown)?.div_ceil(equations);
-        let (mut evaluations, mut partition) = (0, None);
         let before = situation.history.plan();
         let mut committed = before.map_or(0, |plan| plan.committed);
-        let standing = before.map(|plan| plan.poses.clone()).unwrap_or_default();
+        let mut standing = before.map(|plan| plan.poses.clone()).unwrap_or_default();
+        // Of what was planned elsewhere some may be out of reach from here.
+        standing.retain(|pose| scope.is_feasible(pose));
         // What was committed when nothing was unknown may be more than a batch.
         let mut poses = if committed > 0 && (unknown == 0 || committed < self.planning.batch) && !standing.is_empty() {
             standing
@@ -151,18 +171,21 @@ impl Planner {
                 (unknown + self.planning.spare).max(self.planning.batch)
             };
             let horizon = wanted.clamp(1, self.planning.ahead.max(self.planning.batch).max(1));
-            let plan = scene.plan(horizon, standing, &mut evaluations, &mut partition)?;
+            let plan = scene.plan(horizon, standing, &mut ground)?;
             committed = if determined { plan.poses.len() } else { self.planning.batch };
             plan.poses
         };
         // Of the plan, what teaches most at once comes first.
         let outlook = scene.outlook(&scene.now)?;
-        let Some((index, value)) = least(outlook.evaluate(&poses).into_iter().enumerate()) else {
-            let selection = Watch::fallback(self.watch.as_ref(), outlook.before())?;
+        let values = scope.evaluate(&poses, |poses| outlook.evaluate(poses));
+        let Some((index, value)) = least(values.into_iter().enumerate()) else {
+            let selection = Watch::fallback(self.watch.as_ref(), outlook.before(), scope)?;
             return Ok(Selection { plan: Some(Planned { poses, committed: 0 }), ..selection });
         };
         let configuration = poses.remove(index);
-        let chosen = limits.to_unit(&configuration);
+        let value = value - scope.price(&configuration);
+        let chosen = searched.to_unit(&configuration);
+        let Ground { evaluations, partition, .. } = ground;
         Ok(Selection {
             movement: Movement { configuration, row: None },
             criterion: Some(value),
@@ -184,11 +207,7 @@ impl<'a> Scene<'a> {
             let views = estimate.into_iter().chain(others).map(|(state, p)| sight.views(state, layout, p, rig));
             (sight, views.collect())
         });
-        let familiar = match situation.belief.rig.has_view() {
-            true => situation.history.seen().iter().rev().take(planner.planning.polished).cloned().collect(),
-            false => Vec::new(),
-        };
-        Self { planner, limits, now, familiar, sight }
+        Self { planner, now, sight }
     }
 
     /// The criterion once `plan` is carried out.
@@ -201,12 +220,6 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// The criterion at points of the unit cube.
-    fn evaluate(&self, outlook: &Outlook<'_>, points: &[Vec<f64>]) -> Vec<f64> {
-        let candidates: Vec<Vec<f64>> = points.iter().map(|point| self.limits.from_unit(point)).collect();
-        outlook.evaluate(&candidates)
-    }
-
     fn add(&self, plan: &mut Plan, pose: Vec<f64>) -> Result<(), SelectionError> {
         let (chances, told) = self.outlook(plan)?.expectations(&pose);
         plan.add(pose, chances, told);
@@ -214,13 +227,8 @@ impl<'a> Scene<'a> {
     }
 
     /// A plan of `horizon` movements, from where it stood. The partition is that of DIRECT's first search.
-    fn plan(
-        &self,
-        horizon: usize,
-        standing: Vec<Vec<f64>>,
-        evaluations: &mut usize,
-        partition: &mut Option<Partition>,
-    ) -> Result<Plan, SelectionError> {
+    fn plan(&self, horizon: usize, standing: Vec<Vec<f64>>, ground: &mut Ground<'_>) -> Result<Plan, SelectionError> {
+        let searched = ground.searched;
         let mut plan = self.now.clone();
         for pose in standing.into_iter().take(horizon) {
             self.add(&mut plan, pose)?;
@@ -241,7 +249,7 @@ impl<'a> Scene<'a> {
             }
         }
         while plan.poses.len() < horizon {
-            let Some(pose) = self.search(&plan, evaluations, partition)? else { break };
+            let Some(pose) = self.search(&plan, ground)? else { break };
             self.add(&mut plan, pose)?;
         }
         if plan.poses.len() > 1 {
@@ -250,69 +258,102 @@ impl<'a> Scene<'a> {
                 let pose = plan.remove(0);
                 let found = {
                     let outlook = self.outlook(&plan)?;
-                    let evaluate = |points: &[Vec<f64>]| {
-                        *evaluations += points.len();
-                        self.evaluate(&outlook, points)
-                    };
-                    polish(&self.limits.to_unit(&pose), self.planner.planning.exchange, evaluate).0
+                    let evaluate = |points: &[Vec<f64>]| ground.evaluate(&outlook, &plan.poses, points);
+                    polish(&searched.to_unit(&pose), self.planner.planning.exchange, evaluate).0
                 };
-                self.add(&mut plan, self.limits.from_unit(&found))?;
+                let found = searched.from_unit(&found);
+                // On the edge of what is feasible rounding alone may put the pose beyond it.
+                let is_feasible = ground.scope.is_feasible(&found);
+                self.add(&mut plan, if is_feasible { found } else { pose })?;
             }
         }
         Ok(plan)
     }
 
-    /// The best pose to add to a plan: DIRECT over the joint box, its best leaves polished.
-    fn search(
-        &self,
-        plan: &Plan,
-        evaluations: &mut usize,
-        partition: &mut Option<Partition>,
-    ) -> Result<Option<Vec<f64>>, SelectionError> {
+    /// The best pose to add to a plan: DIRECT over the box, its best leaves polished.
+    fn search(&self, plan: &Plan, ground: &mut Ground<'_>) -> Result<Option<Vec<f64>>, SelectionError> {
         let Planner { search, planning, .. } = self.planner;
+        let (scope, searched) = (ground.scope, ground.searched);
         let outlook = self.outlook(plan)?;
-        let mut evaluate = |points: &[Vec<f64>]| {
-            *evaluations += points.len();
-            self.evaluate(&outlook, points)
-        };
-        let found = direct(self.limits.dimension(), *search, &mut evaluate)?;
-        let leaves = found.leaves.iter().filter_map(|leaf| Some((leaf.value?, leaf.centre.as_slice())));
-        let mut starts: Vec<(f64, &[f64])> = leaves.collect();
+        let mut evaluate = |points: &[Vec<f64>]| ground.evaluate(&outlook, &plan.poses, points);
+        let partition = direct(scope, searched, *search, &mut evaluate)?;
+        let leaves = partition.leaves.iter().filter_map(|leaf| Some((leaf.value?, leaf.centre.clone())));
+        let mut starts: Vec<(f64, Vec<f64>)> = leaves.collect();
+        if starts.is_empty() && scope.is_constrained() {
+            // What is feasible may be too small a part of the box for DIRECT to come upon.
+            let found: Vec<Vec<f64>> = scope.some()?.iter().map(|pose| searched.to_unit(pose)).collect();
+            starts.extend(evaluate(&found).into_iter().zip(found));
+        }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         starts.truncate(planning.polished.max(1));
-        // What is in view may be too small a part of the box for DIRECT to come upon.
-        let familiar: Vec<&[f64]> = self.familiar.iter().map(Vec::as_slice).collect();
+        ground.partition.get_or_insert(partition);
+        // What is in view may be too small as well.
+        let familiar = ground.familiar.clone();
+        let mut evaluate = |points: &[Vec<f64>]| ground.evaluate(&outlook, &plan.poses, points);
         let polished = starts.into_iter().map(|(_, start)| start).chain(familiar);
-        let best = least(polished.map(|start| polish(start, planning.polish, &mut evaluate)));
-        partition.get_or_insert(found);
-        Ok(best.map(|(point, _)| self.limits.from_unit(&point)))
+        let best = least(polished.map(|start| polish(&start, planning.polish, &mut evaluate)));
+        Ok(best.map(|(point, _)| searched.from_unit(&point)))
+    }
+}
+
+impl<'a> Ground<'a> {
+    fn new(
+        planner: &Planner,
+        situation: &Situation<'_>,
+        limits: &JointBox,
+        scope: &'a Scope<'a>,
+        searched: &'a JointBox,
+    ) -> Self {
+        let scaled = |point: &Vec<f64>| match scope.is_constrained() {
+            true => searched.to_unit(&limits.from_unit(point)),
+            false => point.clone(),
+        };
+        let familiar = match situation.belief.rig.has_view() {
+            true => situation.history.seen().iter().rev().take(planner.planning.polished).map(scaled).collect(),
+            false => Vec::new(),
+        };
+        Self { scope, searched, familiar, evaluations: 0, partition: None }
+    }
+
+    /// The criterion at points of the unit cube, beside the `poses` of a plan.
+    fn evaluate(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], points: &[Vec<f64>]) -> Vec<f64> {
+        self.evaluations += points.len();
+        let candidates: Vec<Vec<f64>> = points.iter().map(|point| self.searched.from_unit(point)).collect();
+        self.scope.evaluate_beside(poses, &candidates, |feasible| outlook.evaluate(feasible))
     }
 }
 
 impl Policy for Planner {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+        let scope = Scope::of(situation)?;
+        if let Some(beginning) = Watch::beginning(self.watch.as_ref(), situation.history, &scope)? {
+            return Ok(beginning);
+        }
         let represents = situation.belief.model_error_prevails(&self.workspace);
-        match situation.actions {
-            Actions::Pool(pool) if represents => {
-                let rows = pool.iter().map(|movement| movement.configuration.as_slice());
+        match &scope.domain {
+            Domain::Box { searched, joints } if represents => self.represent(situation, joints, &scope, searched, rng),
+            Domain::Box { searched, joints } => self.select_in_box(situation, joints, &scope, searched),
+            Domain::List { movements, .. } if represents => {
+                let listed = movements.iter().map(|movement| movement.configuration.as_slice());
                 let made = situation.history.made();
-                let candidates: Vec<&[f64]> = rows.clone().collect();
-                let all: Vec<&[f64]> = rows.chain(made.iter().map(Vec::as_slice)).collect();
+                let candidates: Vec<&[f64]> = listed.clone().collect();
+                let all: Vec<&[f64]> = listed.chain(made.iter().map(Vec::as_slice)).collect();
                 let index = herd(&candidates, &all, made).ok_or(SelectionError::Exhausted)?;
-                Ok(Selection::of(pool[index].clone()))
+                Ok(Selection::of(movements[index].clone()))
             }
-            Actions::Pool(pool) => {
+            Domain::List { movements, joints } => {
+                let scene = joints.map(|joints| Scene::new(self, situation, joints));
                 let mut belief = situation.belief.clone();
                 belief.truncate(self.planning.considered);
-                let outlook = Outlook::new(&belief, &self.weights, self.planning.optimality, &self.workspace)?;
-                let candidates: Vec<&[f64]> = pool.iter().map(|movement| movement.configuration.as_slice()).collect();
-                Selection::of_pool(pool, outlook.evaluate(&candidates), outlook.before())
+                let outlook = match &scene {
+                    Some(scene) => scene.outlook(&scene.now)?,
+                    None => Outlook::new(&belief, &self.weights, self.planning.optimality, &self.workspace)?,
+                };
+                let candidates: Vec<&[f64]> =
+                    movements.iter().map(|movement| movement.configuration.as_slice()).collect();
+                let best = Selection::of_list(&scope, movements, outlook.evaluate(&candidates), outlook.before());
+                best.map_or_else(|| Watch::fallback(self.watch.as_ref(), outlook.before(), &scope), Ok)
             }
-            Actions::Box(limits) => match Watch::beginning(self.watch.as_ref(), situation.history) {
-                Some(beginning) => Ok(beginning),
-                None if represents => self.represent(situation, limits, rng),
-                None => self.select_in_box(situation, limits),
-            },
         }
     }
 
@@ -327,9 +368,11 @@ impl Policy for Planner {
     }
 
     fn explain(&self, situation: &Situation<'_>, limits: &JointBox) -> Result<Option<Search>, SelectionError> {
-        let scene = Scene::new(self, situation, limits);
+        let (scene, scope) = (Scene::new(self, situation, limits), Scope::of(situation)?);
+        let Some(searched) = scope.limits() else { return Ok(None) };
+        let mut ground = Ground::new(self, situation, limits, &scope, searched);
         let outlook = scene.outlook(&scene.now)?;
-        let partition = direct(limits.dimension(), self.search, |points| scene.evaluate(&outlook, points))?;
+        let partition = direct(&scope, searched, self.search, |points| ground.evaluate(&outlook, &[], points))?;
         Ok(Some(Search { settings: self.search, partition }))
     }
 }

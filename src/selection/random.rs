@@ -3,10 +3,12 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Actions, Appraisal, Criterion, Movement, Policy, Selection, SelectionError, Situation, Watch, Weights};
+use super::{
+    Appraisal, Criterion, Domain, Movement, Policy, Scope, Selection, SelectionError, Situation, Watch, Weights,
+};
 use crate::kinematics::JointBox;
 
-/// Draws uniformly inside the limits, or from what is left of a pool (which shuffles it).
+/// Draws uniformly among what is feasible: inside the limits, or from what is left of a pool (which shuffles it).
 ///
 /// Where a head watches, it is told as much as every learner, and ignores it: the paper's random movements. What a
 /// movement would have taught it tells by the A-criterion.
@@ -25,10 +27,10 @@ impl Random {
 
 impl Policy for Random {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
-        let movement = match situation.actions {
-            Actions::Box(limits) => Movement { configuration: limits.draw(rng), row: None },
-            Actions::Pool(pool) if pool.is_empty() => return Err(SelectionError::Exhausted),
-            Actions::Pool(pool) => pool[rng.random_range(0..pool.len())].clone(),
+        let scope = Scope::of(situation)?;
+        let movement = match &scope.domain {
+            Domain::Box { searched, .. } => Movement { configuration: scope.draw(searched, rng)?, row: None },
+            Domain::List { movements, .. } => movements[rng.random_range(0..movements.len())].clone(),
         };
         Ok(Selection::of(movement))
     }

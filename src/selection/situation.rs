@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{Actions, Movement, visibility::MEMORY};
+use super::{Actions, Constraints, Movement, visibility::MEMORY};
 use crate::{estimation::Belief, sensing::Observation};
 
 /// Everything that a policy chooses from. A policy remembers nothing itself.
@@ -14,6 +14,8 @@ pub struct Situation<'a> {
     pub actions: &'a Actions,
     /// What was done.
     pub history: &'a History,
+    /// What movements are bound to, if to anything.
+    pub constraints: Option<&'a Constraints>,
 }
 
 /// What policies go by of all that happened: made of the list of events, and nothing else.
@@ -21,6 +23,7 @@ pub struct Situation<'a> {
 pub struct History {
     has_moved: bool,
     made: Vec<Vec<f64>>,
+    posture: Option<Vec<f64>>,
     misses: VecDeque<Vec<f64>>,
     seen: VecDeque<Vec<f64>>,
     plan: Option<Planned>,
@@ -45,7 +48,7 @@ impl History {
 
     /// A movement was made.
     pub fn moved(&mut self, movement: &Movement, actions: &Actions, observation: &Observation) {
-        self.has_moved = true;
+        self.expect(&movement.configuration);
         self.made.push(movement.configuration.clone());
         if let Actions::Box(limits) = actions {
             let latest = if observation.is_miss() { &mut self.misses } else { &mut self.seen };
@@ -56,9 +59,15 @@ impl History {
         }
     }
 
-    /// As if a movement had been made already: one is pending.
-    pub fn expect_movements(&mut self) {
+    /// As if a movement to `configuration` had been made already: it is pending.
+    pub fn expect(&mut self, configuration: &[f64]) {
         self.has_moved = true;
+        self.posture = Some(configuration.to_vec());
+    }
+
+    /// Where the robot stands: the posture of the latest movement as it was executed, rad or m per joint.
+    pub fn posture(&self) -> Option<&[f64]> {
+        self.posture.as_deref()
     }
 
     /// All movements made, rad or m.

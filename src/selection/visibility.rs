@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Matrix3, Point3};
 
-use super::{History, Selection, SelectionError, Sight, Situation};
+use super::{History, Scope, Selection, SelectionError, Sight, Situation};
 use crate::{kinematics::JointBox, sensing::Head};
 
 /// What is known of what can be seen; every learner of a scenario is told the same.
@@ -29,17 +29,21 @@ impl Watch {
         matters.then(|| Sight::Chance(Visibility::new(head, situation.history.misses()), limits))
     }
 
-    /// The first movement of all, where anybody watches: to where the marker is known to be seen.
-    pub(super) fn beginning(watch: Option<&Self>, history: &History) -> Option<Selection> {
-        let watch = watch.filter(|_| !history.has_moved())?;
-        Some(Selection::plain(watch.visible_pose.clone()))
+    /// The first movement of all, where anybody watches: to where the marker is known to be seen, or as near to it as may be.
+    pub(super) fn beginning(
+        watch: Option<&Self>,
+        history: &History,
+        scope: &Scope<'_>,
+    ) -> Result<Option<Selection>, SelectionError> {
+        let watch = watch.filter(|_| !history.has_moved());
+        watch.map(|watch| Ok(Selection::plain(scope.towards(watch.visible_pose.clone())?))).transpose()
     }
 
     /// The movement where a search found no finite criterion, whose value was `before` before: where nothing in view was
     /// found, back to where the marker is known to be seen.
-    pub(super) fn fallback(watch: Option<&Self>, before: f64) -> Result<Selection, SelectionError> {
+    pub(super) fn fallback(watch: Option<&Self>, before: f64, scope: &Scope<'_>) -> Result<Selection, SelectionError> {
         let watch = watch.filter(|_| before.is_finite()).ok_or(SelectionError::NoFiniteCriterion)?;
-        Ok(Selection::plain(watch.visible_pose.clone()))
+        Ok(Selection::plain(scope.towards(watch.visible_pose.clone())?))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The keys of a scenario file.
 
+mod constraints;
 mod exactly;
 mod read;
 mod sensors;
@@ -12,6 +13,7 @@ use toml::Spanned;
 use super::{ErrorDraw, EstimatorKind, PolicyKind};
 use crate::{experiment::Body, kinematics::JointKind, selection::Optimality};
 
+pub use constraints::{Constraints, ForbiddenBox};
 pub use exactly::Exactly;
 pub use read::{key_in, line_of, read};
 pub use sensors::Sensors;
@@ -42,6 +44,7 @@ pub struct Scenario {
     pub smoother: Option<Smoother>,
     pub gradient: Option<Gradient>,
     pub selection: Selection,
+    pub constraints: Option<Spanned<Constraints>>,
     pub thresholds: Option<Thresholds>,
     pub settled: Settled,
     #[serde(rename = "learner")]

@@ -165,7 +165,12 @@ impl Check<'_> {
         Some(Known::Within { length_m, angle_rad: angle.unwrap_or(EXACTLY), other: EXACTLY })
     }
 
-    fn free_name<'a>(&mut self, key: &str, name: &Spanned<String>, mut taken: impl Iterator<Item = &'a str>) {
+    pub(super) fn free_name<'a>(
+        &mut self,
+        key: &str,
+        name: &Spanned<String>,
+        mut taken: impl Iterator<Item = &'a str>,
+    ) {
         if name.get_ref().is_empty() || taken.any(|other| other == name.get_ref()) {
             let what = format!("{:?} is empty or taken", name.get_ref());
             self.problem(name.span(), key, what, "give each a name of its own");

@@ -38,7 +38,7 @@ impl Check<'_> {
             return None;
         }
         let head = Head { position, look, pan_limit, tilt_limit, lens_half_angle, baseline };
-        let visible_pose = self.visible_pose("head.visible_pose_deg", &raw.visible_pose_deg, robot)?;
+        let visible_pose = self.pose("head.visible_pose_deg", &raw.visible_pose_deg, robot)?;
         let marker = robot.state.marker_at(&visible_pose);
         if self.problems.len() > problems {
             return None;
@@ -62,7 +62,7 @@ impl Check<'_> {
     pub(super) fn view(&mut self, spanned: &Spanned<raw::View>, robot: &Robot, rig: &Rig) -> Option<Watch> {
         let raw = &spanned.get_ref().visible_pose_deg;
         let key = "view.visible_pose_deg";
-        let visible_pose = self.visible_pose(key, raw, robot)?;
+        let visible_pose = self.pose(key, raw, robot)?;
         let mut clearances = vec![0.0; rig.channels().len()];
         rig.clearances(&robot.state, &visible_pose, &mut clearances);
         let best = clearances.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -79,7 +79,7 @@ impl Check<'_> {
     }
 
     /// The positions of a pose (degrees or metres as the kind of each joint says), within the limits.
-    fn visible_pose(&mut self, key: &str, raw: &Spanned<Vec<f64>>, robot: &Robot) -> Option<Vec<f64>> {
+    pub(super) fn pose(&mut self, key: &str, raw: &Spanned<Vec<f64>>, robot: &Robot) -> Option<Vec<f64>> {
         let (given, wanted) = (raw.get_ref(), robot.state.joints.len());
         if given.len() != wanted {
             let what = format!("it has {} positions, the robot {wanted} joints", given.len());

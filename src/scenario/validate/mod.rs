@@ -2,6 +2,7 @@
 
 mod body;
 mod change;
+mod constraints;
 mod equipment;
 mod head;
 mod learners;
@@ -132,6 +133,8 @@ impl Check<'_> {
         };
         let learners = self.learners(&raw.learners, setting);
         let filter = self.filter("filter", &raw.filter);
+        let constraints = raw.constraints.as_ref();
+        let constraints = constraints.and_then(|given| self.constraints(given, &robot, world.as_ref()));
         Some(Scenario {
             name: name.clone(),
             title: raw.title.clone(),
@@ -142,6 +145,7 @@ impl Check<'_> {
             smoother: self.smoother(raw, rig.as_deref()),
             gradient_rate: self.gradient_rate(raw),
             selection: self.selection(&raw.selection),
+            constraints,
             thresholds: self.thresholds(raw),
             settled_below_m: self.positive("settled.expected_prediction_m", &raw.settled.expected_prediction_m),
             promises: self.promises(&raw.promises, &learners),

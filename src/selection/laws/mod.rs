@@ -1,6 +1,7 @@
 //! Laws of the policies, on one arm of six joints.
 
 mod active;
+mod feasible;
 mod planner;
 
 use std::sync::Arc;
@@ -9,7 +10,10 @@ use nalgebra::{DMatrix, DVector, Point3, UnitVector3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Actions, CriterionUnits, History, Movement, Policy, Selection, SelectionError, Situation, Watch, Weights};
+use super::{
+    Actions, Constraints, CriterionUnits, History, Movement, Policy, Selection, SelectionError, Situation, Watch,
+    Weights,
+};
 use crate::{
     estimation::{Alternative, Belief},
     kinematics::{Joint, JointBox, Line},
@@ -82,11 +86,17 @@ impl Case {
     }
 
     fn situation(&self) -> Situation<'_> {
-        Situation { belief: &self.belief, actions: &self.actions, history: &self.history }
+        Situation { belief: &self.belief, actions: &self.actions, history: &self.history, constraints: None }
     }
 
     fn select(&self, policy: &impl Policy) -> Result<Selection, SelectionError> {
         policy.select(&self.situation(), &mut ChaCha8Rng::seed_from_u64(1))
+    }
+
+    /// The same bound to constraints.
+    fn select_within(&self, policy: &dyn Policy, constraints: &Constraints) -> Result<Selection, SelectionError> {
+        let situation = Situation { constraints: Some(constraints), ..self.situation() };
+        policy.select(&situation, &mut ChaCha8Rng::seed_from_u64(1))
     }
 
     /// C(θ), as the policy judges it.
@@ -95,7 +105,7 @@ impl Case {
     }
 
     /// What the policy says of its selection holds: the criterion is that of the appraisal, and so is the gain.
-    fn check_values(&self, policy: &impl Policy, selection: &Selection) {
+    fn check_values(&self, policy: &(impl Policy + ?Sized), selection: &Selection) {
         let appraisal = policy.appraise(&self.situation(), &self.limits(), &selection.movement.configuration);
         let appraisal = appraisal.expect("an appraisal");
         let tolerance = 1e-9 * appraisal.before;

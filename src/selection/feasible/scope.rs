@@ -1,0 +1,161 @@
+//! What may be proposed now.
+
+use std::borrow::Cow;
+
+use rand::Rng;
+
+use super::{Constraints, travel, witness::PATIENCE};
+use crate::{
+    kinematics::JointBox,
+    selection::{Actions, Movement, SelectionError, Situation},
+};
+
+/// What may be proposed in a [`Situation`]: a list of movements or a box, and in the box what the constraints leave of it.
+pub struct Scope<'a> {
+    /// Where to choose from.
+    pub domain: Domain<'a>,
+    constraints: Option<&'a Constraints>,
+    /// Where the robot stands, rad or m per joint, if that is known.
+    from: Option<&'a [f64]>,
+}
+
+/// Where to choose from.
+pub enum Domain<'a> {
+    /// One of a list of movements. All are feasible, and there is one at least.
+    List {
+        /// The movements.
+        movements: Cow<'a, [Movement]>,
+        /// The joint box; `None` for recorded ones.
+        joints: Option<&'a JointBox>,
+    },
+    /// A posture that [is feasible](Scope::is_feasible).
+    Box {
+        /// The box to search: without constraints the joint box, all of it feasible; with them the smallest box that is sure
+        /// to hold all that is.
+        searched: Cow<'a, JointBox>,
+        /// The joint box.
+        joints: &'a JointBox,
+    },
+}
+
+impl<'a> Scope<'a> {
+    /// Of a situation.
+    ///
+    /// # Errors
+    ///
+    /// Where a list has come to its end, or nothing in it is feasible, or a joint cannot come back within its limits.
+    pub fn of(situation: &Situation<'a>) -> Result<Self, SelectionError> {
+        let constraints = situation.constraints;
+        let standing = constraints.and_then(|constraints| constraints.start.as_deref());
+        let from = situation.history.posture().or(standing).filter(|_| constraints.is_some());
+        let domain = match (situation.actions, constraints) {
+            (Actions::Pool(pool), _) if pool.is_empty() => return Err(SelectionError::Exhausted),
+            (Actions::Pool(pool), None) => Domain::List { movements: Cow::Borrowed(pool), joints: None },
+            (Actions::Pool(pool), Some(constraints)) => Domain::List {
+                movements: Cow::Owned(constraints.of(from, pool.iter().cloned(), |movement| &movement.configuration)?),
+                joints: None,
+            },
+            (Actions::Box(joints), None) => Domain::Box { searched: Cow::Borrowed(joints), joints },
+            (Actions::Box(joints), Some(constraints)) => match &constraints.allowed {
+                Some(allowed) => {
+                    let movement = |posture: &Vec<f64>| Movement { configuration: posture.clone(), row: None };
+                    let movements =
+                        constraints.of(from, allowed.iter().map(movement), |movement| &movement.configuration)?;
+                    Domain::List { movements: Cow::Owned(movements), joints: Some(joints) }
+                }
+                None => Domain::Box { searched: Cow::Owned(constraints.reach(from)?), joints },
+            },
+        };
+        Ok(Self { domain, constraints, from })
+    }
+
+    /// The box to search, where there is one.
+    pub fn limits(&self) -> Option<&JointBox> {
+        match &self.domain {
+            Domain::Box { searched, .. } => Some(searched),
+            Domain::List { .. } => None,
+        }
+    }
+
+    /// Whether anything is constrained.
+    pub fn is_constrained(&self) -> bool {
+        self.constraints.is_some()
+    }
+
+    /// Whether a posture may be proposed now.
+    pub fn is_feasible(&self, posture: &[f64]) -> bool {
+        self.constraints.is_none_or(|constraints| constraints.allow(self.from, posture))
+    }
+
+    /// The values of all candidates, in order: not finite where one is not feasible, which `values` is never asked, and
+    /// elsewhere its value and the price of the travel to it.
+    pub fn evaluate(&self, candidates: &[Vec<f64>], values: impl FnOnce(&[Vec<f64>]) -> Vec<f64>) -> Vec<f64> {
+        self.evaluate_beside(&[], candidates, values)
+    }
+
+    /// The same for movements that are planned beside others: the price is that of the travel from where the robot stands or
+    /// from one of the `others`, whichever is nearest, as a tree that joins them all would grow.
+    pub fn evaluate_beside(
+        &self,
+        others: &[Vec<f64>],
+        candidates: &[Vec<f64>],
+        values: impl FnOnce(&[Vec<f64>]) -> Vec<f64>,
+    ) -> Vec<f64> {
+        let Some(constraints) = self.constraints else { return values(candidates) };
+        let is_feasible: Vec<bool> = candidates.iter().map(|posture| constraints.allow(self.from, posture)).collect();
+        let kept = candidates.iter().zip(&is_feasible).filter(|(_, is_feasible)| **is_feasible);
+        let kept: Vec<Vec<f64>> = kept.map(|(posture, _)| posture.clone()).collect();
+        let priced = values(&kept).into_iter().zip(&kept).map(|(value, posture)| value + self.toll(others, posture));
+        let mut priced = priced.collect::<Vec<f64>>().into_iter();
+        let mut value = |is_feasible: &bool| if *is_feasible { priced.next() } else { None };
+        is_feasible.iter().map(|is_feasible| value(is_feasible).unwrap_or(f64::INFINITY)).collect()
+    }
+
+    /// What the travel to a posture costs, in units of the criterion.
+    pub fn price(&self, posture: &[f64]) -> f64 {
+        self.toll(&[], posture)
+    }
+
+    fn toll(&self, others: &[Vec<f64>], posture: &[f64]) -> f64 {
+        let price = self.constraints.map_or(0.0, |constraints| constraints.price);
+        if price == 0.0 {
+            return 0.0;
+        }
+        let places = self.from.into_iter().chain(others.iter().map(Vec::as_slice));
+        places.map(|place| price * travel(place, posture)).min_by(f64::total_cmp).unwrap_or(0.0)
+    }
+
+    /// A feasible posture, drawn uniformly.
+    pub fn draw<R: Rng + ?Sized>(&self, limits: &JointBox, rng: &mut R) -> Result<Vec<f64>, SelectionError> {
+        let mut draws = std::iter::repeat_with(|| limits.draw(rng)).take(PATIENCE);
+        match draws.find(|posture| self.is_feasible(posture)) {
+            Some(posture) => Ok(posture),
+            None => Ok(self.some()?.swap_remove(0)),
+        }
+    }
+
+    /// Some feasible postures, one at least where anything is constrained, always the same ones: where a search over the box
+    /// comes upon none.
+    pub fn some(&self) -> Result<Vec<Vec<f64>>, SelectionError> {
+        self.constraints.map_or(Ok(Vec::new()), |constraints| Ok(constraints.some(self.from)?))
+    }
+
+    /// The posture itself if it may be proposed, or else the nearest one to it, by travel, of some that may.
+    pub fn towards(&self, posture: Vec<f64>) -> Result<Vec<f64>, SelectionError> {
+        if self.is_feasible(&posture) {
+            return Ok(posture);
+        }
+        let candidates = match &self.domain {
+            Domain::List { movements, .. } => movements.iter().map(|movement| movement.configuration.clone()).collect(),
+            Domain::Box { searched, .. } => {
+                let nearest = searched.from_unit(&searched.to_unit(&posture));
+                if self.is_feasible(&nearest) {
+                    return Ok(nearest);
+                }
+                self.some()?
+            }
+        };
+        let nearest = candidates.into_iter().min_by(|a, b| travel(a, &posture).total_cmp(&travel(b, &posture)));
+        nearest.ok_or(SelectionError::Exhausted)
+    }
+}
