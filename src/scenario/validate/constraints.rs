@@ -1,5 +1,7 @@
 //! What movements are bound to.
 
+use std::cmp::Ordering;
+
 use toml::Spanned;
 
 use super::{Check, raw};
@@ -79,8 +81,7 @@ impl Check<'_> {
                 }
                 let shown = |x: f64| if kind == JointKind::Revolute { x.to_degrees() } else { x };
                 let raw::Exactly([lower, upper]) = *range.get_ref();
-                // A NaN is below nothing.
-                if !(lower < upper) {
+                if lower.partial_cmp(&upper) != Some(Ordering::Less) {
                     let what = format!("the lower limit {lower} is not below the upper {upper}");
                     self.problem(range.span(), key, what, format!("write the lower one first, in {unit}"));
                     continue;
