@@ -387,9 +387,17 @@ fn constraints_are_held_to_the_robot() {
     }
     // What leaves nothing to do is told with the constraint that does.
     for (text, nothing, named) in [
-        (ARM, "minimum_height_m = 2.0", "the minimum height excludes all of 20000 postures"),
-        (ARM, "allowed_deg = [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]\nminimum_height_m = 0.1", "the minimum height excludes"),
-        (TIAGO, "limits_deg = { arm_1_joint = [150.0, 157.0] }", "the limits of `arm_1_joint` excludes all of 34"),
+        (ARM, "minimum_height_m = 2.0", "all 20000 postures tried are excluded by the minimum height"),
+        (
+            ARM,
+            "allowed_deg = [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]\nminimum_height_m = 0.1",
+            "the only posture tried is excluded by the minimum height",
+        ),
+        (
+            TIAGO,
+            "limits_deg = { arm_1_joint = [150.0, 157.0] }",
+            "all 34 postures tried are excluded by the limits of `arm_1_joint`",
+        ),
     ] {
         let found =
             problems(&text.replacen("[filter]", &format!("[constraints]\n{nothing}\n[filter]"), 1), Ok(TIAGO_CSV));

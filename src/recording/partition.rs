@@ -205,3 +205,37 @@ pub(super) fn data(partition: &Partition) -> DynamicArchetype {
         .with_component_from_data("dimension", Arc::new(UInt32Array::from_iter_values([dimension as u32])))
         .with_component_from_data("chosen", Arc::new(UInt32Array::from_iter_values([partition.chosen as u32])))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What was searched within reach lies where it is in the joint box; without limits of its own it fills the slice.
+    #[test]
+    fn a_part_of_the_joint_box_is_drawn_as_that_part() {
+        let joint = |name: &str, limits| JointDescription {
+            name: name.to_owned(),
+            kind: JointKind::Revolute,
+            learned: true,
+            limits,
+        };
+        let joints = [joint("a", [-1.0, 1.0]), joint("b", [0.0, 4.0])];
+        let whole = Leaf {
+            centre: vec![0.5; 2],
+            levels: vec![0; 2],
+            value: Some(1.0),
+            generation: 0,
+            potentially_optimal: false,
+        };
+        let plane = Plane { x: 0, y: Some(1) };
+        for (limits, centre, half) in [
+            (vec![], [0.5, 0.5], [0.5, 0.5]),
+            (vec![[0.0, 0.5], [1.0, 3.0]], [0.625, 0.5], [0.125, 0.25]),
+            (vec![[-1.0, 1.0], [3.0, 4.0]], [0.5, 0.125], [0.5, 0.125]),
+        ] {
+            let partition = Partition { leaves: vec![whole.clone()], chosen: 0, limits };
+            let face = Window::of(&partition, plane, &joints).face(&whole);
+            assert_eq!(face, (centre, half));
+        }
+    }
+}

@@ -140,13 +140,16 @@ impl Tally {
 
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.culprits() {
-            (alone, _) if alone.len() == 1 => write!(f, "{} excludes", alone[0])?,
-            (alone, _) if alone.len() > 1 => write!(f, "each of {} excludes", alone.join(" and "))?,
-            (_, all) => write!(f, "together {} exclude", all.join(" and "))?,
-        }
         let reach = if self.within_reach { " within the greatest travel" } else { "" };
-        write!(f, " all of {} postures tried{reach}", self.tried)
+        match self.tried {
+            1 => write!(f, "the only posture tried{reach} is excluded by ")?,
+            tried => write!(f, "all {tried} postures tried{reach} are excluded by ")?,
+        }
+        match self.culprits() {
+            (alone, _) if alone.len() > 1 => write!(f, "each of {}", alone.join(" and ")),
+            (alone, _) if alone.len() == 1 => f.write_str(alone[0]),
+            (_, all) => write!(f, "{} together", all.join(" and ")),
+        }
     }
 }
 
@@ -166,15 +169,15 @@ mod tests {
         };
         assert_eq!(
             said(false, &[&[height()], &[height()], &[inside(), crosses()]]),
-            "together the minimum height and the box `pillar` exclude all of 3 postures tried"
+            "all 3 postures tried are excluded by the minimum height and the box `pillar` together"
         );
         assert_eq!(
             said(true, &[&[height()], &[inside(), height()]]),
-            "the minimum height excludes all of 2 postures tried within the greatest travel"
+            "all 2 postures tried within the greatest travel are excluded by the minimum height"
         );
         assert_eq!(
             said(false, &[&[height(), inside()]]),
-            "each of the box `pillar` and the minimum height excludes all of 1 postures tried"
+            "the only posture tried is excluded by each of the box `pillar` and the minimum height"
         );
     }
 }

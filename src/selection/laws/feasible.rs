@@ -211,7 +211,7 @@ fn who_excludes_everything_is_named() {
         constraints.greatest_travel = vec![0.5; JOINTS];
     });
     let found = case.select_within(&Random::new(case.weights.clone(), None), &constraints);
-    assert!(found.expect_err("out of reach").to_string().contains("the greatest travel excludes all"));
+    assert!(found.expect_err("out of reach").to_string().contains("is excluded by the greatest travel"));
 }
 
 /// The dearer travel is, the shorter the way to the movement; what it would teach is told without its price.
