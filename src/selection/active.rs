@@ -105,13 +105,13 @@ impl Active {
         limits: &JointBox,
     ) -> Result<Option<Search>, SelectionError> {
         let Minimiser::Direct(settings) = self.minimiser else { return Ok(None) };
-        let (criterion, scope) = (self.criterion(situation.belief, situation, limits)?, Scope::of(situation)?);
-        let Some(searched) = scope.limits() else { return Ok(None) };
+        let criterion = self.criterion(situation.belief, situation, limits)?;
+        let Some((scope, searched)) = Scope::around(situation, limits)? else { return Ok(None) };
         let at = |points: &[Vec<f64>]| {
             let candidates: Vec<Vec<f64>> = points.iter().map(|point| searched.from_unit(point)).collect();
             scope.evaluate(&candidates, |feasible| criterion.evaluate(feasible))
         };
-        Ok(Some(Search { settings, partition: direct(&scope, searched, settings, at)? }))
+        Ok(Some(Search { settings, partition: direct(&scope, &searched, settings, at)? }))
     }
 
     fn search_box(

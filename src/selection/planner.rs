@@ -368,11 +368,11 @@ impl Policy for Planner {
     }
 
     fn explain(&self, situation: &Situation<'_>, limits: &JointBox) -> Result<Option<Search>, SelectionError> {
-        let (scene, scope) = (Scene::new(self, situation, limits), Scope::of(situation)?);
-        let Some(searched) = scope.limits() else { return Ok(None) };
-        let mut ground = Ground::new(self, situation, limits, &scope, searched);
+        let scene = Scene::new(self, situation, limits);
+        let Some((scope, searched)) = Scope::around(situation, limits)? else { return Ok(None) };
+        let mut ground = Ground::new(self, situation, limits, &scope, &searched);
         let outlook = scene.outlook(&scene.now)?;
-        let partition = direct(&scope, searched, self.search, |points| ground.evaluate(&outlook, &[], points))?;
+        let partition = direct(&scope, &searched, self.search, |points| ground.evaluate(&outlook, &[], points))?;
         Ok(Some(Search { settings: self.search, partition }))
     }
 }

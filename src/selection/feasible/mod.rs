@@ -82,88 +82,55 @@ impl Constraints {
 
     /// The first constraint that a movement from `from` (nowhere known, without it) to `posture` violates.
     pub fn violation(&self, from: Option<&[f64]>, posture: &[f64]) -> Option<Violation> {
-        let mut first = None;
-        self.check(from, posture, &mut |violation| {
-            first = Some(violation());
-            false
-        });
-        first
-    }
-
-    /// All that a movement violates.
-    pub fn violations(&self, from: Option<&[f64]>, posture: &[f64]) -> Vec<Violation> {
-        let mut all = Vec::new();
-        self.check(from, posture, &mut |violation| {
-            all.push(violation());
-            true
-        });
-        all
+        self.violations(from, posture).next()
     }
 
     /// Whether a movement is feasible.
     pub fn allow(&self, from: Option<&[f64]>, posture: &[f64]) -> bool {
-        self.check(from, posture, &mut |_| false)
+        self.violation(from, posture).is_none()
     }
 
-    /// Tells `found` of every violation, the cheapest to find first, until it says no; whether there was none. O(joints ×
-    /// boxes).
-    fn check(
-        &self,
-        from: Option<&[f64]>,
-        posture: &[f64],
-        found: &mut dyn FnMut(&dyn Fn() -> Violation) -> bool,
-    ) -> bool {
-        let mut none = true;
-        let mut violated = |violation: &dyn Fn() -> Violation| {
-            none = false;
-            found(violation)
-        };
-        for (joint, &position) in posture.iter().enumerate() {
-            let (lower, upper) = (self.tightened.lower(joint), self.tightened.upper(joint));
-            let constrained = (lower, upper) != (self.limits.lower(joint), self.limits.upper(joint));
-            let name = || self.joints[joint].clone();
-            let said = || Violation::Limits { joint: name(), position, lower, upper };
-            if constrained && !(lower..=upper).contains(&position) && !violated(&said) {
-                return false;
-            }
-            let (by, greatest) = (from.map_or(0.0, |from| (position - from[joint]).abs()), self.greatest_travel[joint]);
-            let said = || Violation::Travel { joint: name(), by, greatest };
-            if by > greatest * (1.0 + ROUNDING) && !violated(&said) {
-                return false;
-            }
-        }
-        if !self.is_listed(posture) && !violated(&|| Violation::NotAllowed) {
-            return false;
-        }
-        if self.vetoes.exclude(&self.limits, posture) && !violated(&|| Violation::Vetoed) {
-            return false;
-        }
+    /// All that a movement violates, the cheapest to find first: O(joints × boxes) for all.
+    pub fn violations(&self, from: Option<&[f64]>, posture: &[f64]) -> impl Iterator<Item = Violation> {
+        let of_joints = (0..posture.len()).flat_map(move |joint| self.at_joint(joint, from, posture[joint]));
+        let listed = std::iter::once_with(|| (!self.is_listed(posture)).then_some(Violation::NotAllowed));
+        let vetoed = || self.vetoes.exclude(&self.limits, posture).then_some(Violation::Vetoed);
+        let in_space = std::iter::once_with(|| self.in_space(posture));
+        of_joints.chain(listed.chain(std::iter::once_with(vetoed)).flatten()).chain(in_space.flatten())
+    }
+
+    /// What one joint violates.
+    fn at_joint(&self, joint: usize, from: Option<&[f64]>, position: f64) -> impl Iterator<Item = Violation> {
+        let (lower, upper) = (self.tightened.lower(joint), self.tightened.upper(joint));
+        let is_tighter = (lower, upper) != (self.limits.lower(joint), self.limits.upper(joint));
+        let is_outside = is_tighter && !(lower..=upper).contains(&position);
+        let (by, greatest) = (from.map_or(0.0, |from| (position - from[joint]).abs()), self.greatest_travel[joint]);
+        let name = || self.joints[joint].clone();
+        let outside = is_outside.then(|| Violation::Limits { joint: name(), position, lower, upper });
+        let far = by > greatest * (1.0 + ROUNDING);
+        outside.into_iter().chain(far.then(|| Violation::Travel { joint: name(), by, greatest }))
+    }
+
+    /// What the outline violates.
+    fn in_space(&self, posture: &[f64]) -> Vec<Violation> {
+        let mut found = Vec::new();
         if self.obstacles.is_empty() && self.minimum_height.is_none() {
-            return none;
+            return found;
         }
         let points = self.outline.at(posture);
-        for (index, name) in self.outline.moving() {
-            let (part, height) = (|| name.to_owned(), points[index].z);
-            if let Some(least) = self.minimum_height.filter(|least| height < *least)
-                && !violated(&|| Violation::Height { part: part(), height, least })
-            {
-                return false;
-            }
-            for obstacle in self.obstacles.iter().filter(|obstacle| obstacle.contains(&points[index])) {
-                if !violated(&|| Violation::Inside { part: part(), obstacle: obstacle.name.clone() }) {
-                    return false;
-                }
-            }
+        for (index, part) in self.outline.moving() {
+            let (part, height) = (|| part.to_owned(), points[index].z);
+            let least = self.minimum_height.filter(|least| height < *least);
+            found.extend(least.map(|least| Violation::Height { part: part(), height, least }));
+            let inside = self.obstacles.iter().filter(|obstacle| obstacle.contains(&points[index]));
+            found.extend(inside.map(|obstacle| Violation::Inside { part: part(), obstacle: obstacle.name.clone() }));
         }
-        for ([from, to], name) in self.outline.links() {
-            for obstacle in self.obstacles.iter().filter(|obstacle| obstacle.meets(&points[from], &points[to])) {
-                let (part, obstacle) = (|| name.to_owned(), || obstacle.name.clone());
-                if !violated(&|| Violation::Crosses { part: part(), obstacle: obstacle() }) {
-                    return false;
-                }
-            }
+        for ([from, to], part) in self.outline.links() {
+            let crossed = self.obstacles.iter().filter(|obstacle| obstacle.meets(&points[from], &points[to]));
+            let crosses = |obstacle: &Obstacle| (part.to_owned(), obstacle.name.clone());
+            found.extend(crossed.map(crosses).map(|(part, obstacle)| Violation::Crosses { part, obstacle }));
         }
-        none
+        found
     }
 
     /// Whether a posture is one of the list, if there is one, but for what rounding it for people does to it.

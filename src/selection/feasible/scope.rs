@@ -45,9 +45,7 @@ impl<'a> Scope<'a> {
     ///
     /// Where a list has come to its end, or nothing in it is feasible, or a joint cannot come back within its limits.
     pub fn of(situation: &Situation<'a>) -> Result<Self, SelectionError> {
-        let constraints = situation.constraints;
-        let standing = constraints.and_then(|constraints| constraints.start.as_deref());
-        let from = situation.history.posture().or(standing).filter(|_| constraints.is_some());
+        let (constraints, from) = (situation.constraints, standing(situation));
         let domain = match (situation.actions, constraints) {
             (Actions::Pool(pool), _) if pool.is_empty() => return Err(SelectionError::Exhausted),
             (Actions::Pool(pool), None) => Domain::List { movements: Cow::Borrowed(pool), joints: None },
@@ -69,12 +67,23 @@ impl<'a> Scope<'a> {
         Ok(Self { domain, constraints, from })
     }
 
-    /// The box to search, where there is one.
-    pub fn limits(&self) -> Option<&JointBox> {
-        match &self.domain {
-            Domain::Box { searched, .. } => Some(searched),
-            Domain::List { .. } => None,
+    /// Of what could be proposed if every posture could be, recorded or not: to show how the criterion looks over the whole
+    /// joint box. `None` where the constraints are a list. With the box to search.
+    ///
+    /// # Errors
+    ///
+    /// Where a joint cannot come back within its limits.
+    pub fn around(
+        situation: &Situation<'a>,
+        joints: &'a JointBox,
+    ) -> Result<Option<(Self, Cow<'a, JointBox>)>, SelectionError> {
+        let (constraints, from) = (situation.constraints, standing(situation));
+        if constraints.is_some_and(|constraints| constraints.allowed.is_some()) {
+            return Ok(None);
         }
+        let searched = constraints.map(|constraints| constraints.reach(from)).transpose()?;
+        let searched = searched.map_or(Cow::Borrowed(joints), Cow::Owned);
+        Ok(Some((Self { domain: Domain::Box { searched: searched.clone(), joints }, constraints, from }, searched)))
     }
 
     /// Whether anything is constrained.
@@ -158,4 +167,9 @@ impl<'a> Scope<'a> {
         let nearest = candidates.into_iter().min_by(|a, b| travel(a, &posture).total_cmp(&travel(b, &posture)));
         nearest.ok_or(SelectionError::Exhausted)
     }
+}
+
+/// Where the robot stands, if that matters.
+fn standing<'a>(situation: &Situation<'a>) -> Option<&'a [f64]> {
+    situation.constraints.and_then(|constraints| situation.history.posture().or(constraints.start.as_deref()))
 }

@@ -44,7 +44,7 @@ impl Constraints {
         let mut found: Vec<Vec<f64>> = Vec::new();
         let stands = from.filter(|from| reach.contains(from)).map(<[f64]>::to_vec);
         for posture in stands.into_iter().chain(std::iter::repeat_with(|| reach.draw(&mut rng)).take(PATIENCE)) {
-            match self.violations(from, &posture).as_slice() {
+            match self.violations(from, &posture).collect::<Vec<_>>().as_slice() {
                 [] => found.push(posture),
                 violations => tally.count(violations),
             }
@@ -69,7 +69,7 @@ impl Constraints {
         let mut tally = Tally::default();
         let mut kept = Vec::new();
         for one in list {
-            match self.violations(from, posture(&one)).as_slice() {
+            match self.violations(from, posture(&one)).collect::<Vec<_>>().as_slice() {
                 [] => kept.push(one),
                 violations => tally.count(violations),
             }

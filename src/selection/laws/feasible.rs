@@ -12,7 +12,7 @@ use crate::{
     optimize::Settings,
     selection::{
         Actions, Active, Constraints, Human, Minimiser, Movement, Obstacle, Outline, Planner, Planning, Policy, Random,
-        SelectionError, travel,
+        SelectionError, Situation, travel,
     },
     sensing::{Equipment, TargetKind},
 };
@@ -248,5 +248,28 @@ fn what_a_person_might_have_done_is_feasible() {
     let limits = partition.searched(&case.limits());
     for leaf in &partition.leaves {
         assert_eq!(leaf.value.is_some(), constraints.allow(None, &limits.from_unit(&leaf.centre)));
+    }
+}
+
+/// How the criterion looks over the box is told also where recorded movements are chosen from, and none is left of them.
+#[test]
+fn a_choice_from_a_list_is_explained_over_the_box() {
+    let planner =
+        |case: &Case| Planner::new(case.weights.clone(), search(40), Planning::default(), Workspace::default());
+    for count in [20, 0] {
+        let case = Case::new(0.3).with_pool(count);
+        let limits = case.limits();
+        let explained = planner(&case).explain(&case.situation(), &limits).expect("searched").expect("by DIRECT");
+        assert!(explained.partition.limits.is_empty() && explained.partition.leaves.len() > 20);
+        let mut constraints = unconstrained(&limits);
+        constraints.minimum_height = Some(-0.1);
+        let within = |constraints: &Constraints| {
+            let situation = Situation { constraints: Some(constraints), ..case.situation() };
+            planner(&case).explain(&situation, &limits).expect("explained")
+        };
+        let leaves = within(&constraints).expect("by DIRECT").partition.leaves;
+        assert!(leaves.iter().any(|leaf| leaf.value.is_none()) && leaves.iter().any(|leaf| leaf.value.is_some()));
+        constraints.allowed = Some(vec![vec![0.0; JOINTS]]);
+        assert_eq!(within(&constraints), None);
     }
 }
