@@ -75,6 +75,7 @@ pub mod selection;
 pub mod sensing;
 #[cfg(feature = "app")]
 pub mod server;
+mod similar;
 
 /// The code in the README, compiled and run.
 #[cfg(doctest)]
