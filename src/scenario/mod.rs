@@ -18,7 +18,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use nalgebra::DVector;
 
 pub use builtin::{BUILTIN, Builtin, builtin};
-pub use data::{DataError, Measurements};
+pub use data::Measurements;
 pub use edit::edited;
 pub use error::{Problem, ScenarioError};
 pub use learners::{EstimatorKind, LearnerSpec, PolicyKind};
