@@ -19,7 +19,8 @@ pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
 
 fn constant(joint: usize, column: &str, evidence: &Evidence) -> Option<Doubt> {
     let first = evidence.configurations.first()?[joint];
-    if evidence.configurations.len() < 2 || evidence.configurations.iter().any(|row| (row[joint] - first).abs() > 1e-9) {
+    if evidence.configurations.len() < 2 || evidence.configurations.iter().any(|row| (row[joint] - first).abs() > 1e-9)
+    {
         return None;
     }
     Some(Doubt {
@@ -57,7 +58,8 @@ fn repeated(evidence: &Evidence) -> Option<Doubt> {
     if evidence.repeated.is_empty() {
         return None;
     }
-    let list = |of: &dyn Fn(&(String, String)) -> String| evidence.repeated.iter().map(of).collect::<Vec<_>>().join(", ");
+    let list =
+        |of: &dyn Fn(&(String, String)) -> String| evidence.repeated.iter().map(of).collect::<Vec<_>>().join(", ");
     let (repeating, original) = (list(&|pair| pair.0.clone()), list(&|pair| pair.1.clone()));
     Some(Doubt {
         kind: DoubtKind::RepeatedColumn,

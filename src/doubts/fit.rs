@@ -13,14 +13,27 @@ pub enum Sight {
     Sockets(Vec<usize>),
 }
 
+/// What a fit leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Root mean square, metres.
+    pub rms: f64,
+    /// What fits are compared by: `rms`; with sockets per rotation of the last link, since a link that does not turn leaves
+    /// every target where it is.
+    pub judged: f64,
+}
+
 /// Steps of Gauss and Newton at most; a good hypothesis needs four.
 const STEPS: usize = 12;
 
 impl Sight {
-    /// The root mean square of what is left, metres, when the last link moves by `motions`, row by row.
-    pub fn residual(&self, motions: &[Isometry3<f64>]) -> f64 {
+    /// What is left when the last link moves by `motions`, row by row.
+    pub fn fit(&self, motions: &[Isometry3<f64>]) -> Fit {
         match self {
-            Self::Points(guess, points) => of_points(*guess, points, motions),
+            Self::Points(guess, points) => {
+                let rms = of_points(*guess, points, motions);
+                Fit { rms, judged: rms }
+            }
             Self::Sockets(sockets) => of_sockets(sockets, motions),
         }
     }
@@ -69,7 +82,7 @@ fn of_points(guess: Point3<f64>, points: &[Point3<f64>], motions: &[Isometry3<f6
 }
 
 /// `Tⱼ p` is the same in all rows of a socket, p free: a linear problem.
-fn of_sockets(sockets: &[usize], motions: &[Isometry3<f64>]) -> f64 {
+fn of_sockets(sockets: &[usize], motions: &[Isometry3<f64>]) -> Fit {
     let count = sockets.iter().max().map_or(0, |last| last + 1);
     let mut means = vec![(0.0, Matrix3::<f64>::zeros(), Vector3::<f64>::zeros()); count];
     let parts = |t: &Isometry3<f64>| (t.rotation.to_rotation_matrix().into_inner(), t.translation.vector);
@@ -90,5 +103,7 @@ fn of_sockets(sockets: &[usize], motions: &[Isometry3<f64>]) -> f64 {
     let target = information.cholesky().map_or_else(Vector3::zeros, |factor| factor.solve(&gradient));
     let sum: f64 =
         sockets.iter().zip(motions).map(centred).map(|(turn, shift)| (turn * target + shift).norm_squared()).sum();
-    (sum / sockets.len().max(1) as f64).sqrt()
+    let count = sockets.len().max(1) as f64;
+    let rms = (sum / count).sqrt();
+    Fit { rms, judged: rms / (information.trace() / count).sqrt() }
 }

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3};
 use super::{
     Doubt, DoubtKind, Evidence, Subject,
     doubt::length,
-    fit::Sight,
+    fit::{Fit, Sight},
 };
 use crate::kinematics::{Joint, JointKind};
 
@@ -43,9 +43,12 @@ enum Hypothesis {
 pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
     let Some(mut readings) = Readings::new(subject, evidence) else { return Vec::new() };
     let mut doubts: Vec<Doubt> = Vec::new();
-    let mut residual = readings.sight.residual(&readings.motions());
+    let mut residual = readings.sight.fit(&readings.motions());
     for _ in 0..ROUNDS {
-        let Some((hypothesis, left)) = readings.best().filter(|(_, left)| *left < CONVINCING * residual) else { break };
+        let Some((hypothesis, left)) = readings.best().filter(|(_, left)| left.judged < CONVINCING * residual.judged)
+        else {
+            break;
+        };
         doubts.push(hypothesis.doubt(subject, &readings.target, residual, left));
         readings.apply(hypothesis);
         residual = left;
@@ -78,9 +81,7 @@ impl<'a> Readings<'a> {
         let rows: Vec<usize> = (0..count).map(|k| usable[k * usable.len() / count]).collect();
         let sight = match (&evidence.sockets, evidence.targets.first()) {
             (Some(sockets), _) => Sight::Sockets(rows.iter().map(|row| sockets[*row]).collect()),
-            (None, seen) => {
-                Sight::Points(subject.target, rows.iter().filter_map(|row| seen?.points[*row]).collect())
-            }
+            (None, seen) => Sight::Points(subject.target, rows.iter().filter_map(|row| seen?.points[*row]).collect()),
         };
         let configurations = rows.iter().map(|row| evidence.configurations[*row].clone()).collect();
         let target = evidence.targets.first().map(|seen| seen.name.clone()).unwrap_or_default();
@@ -115,14 +116,14 @@ impl<'a> Readings<'a> {
     }
 
     /// The hypothesis that fits best, and what it leaves.
-    fn best(&self) -> Option<(Hypothesis, f64)> {
+    fn best(&self) -> Option<(Hypothesis, Fit)> {
         let mut tried = self.of_target();
         tried.extend(self.of_order());
         tried.extend(self.of_joints());
-        tried.into_iter().filter(|(_, left)| left.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))
+        tried.into_iter().filter(|(_, left)| left.judged.is_finite()).min_by(|a, b| a.1.judged.total_cmp(&b.1.judged))
     }
 
-    fn whole(&self, hypothesis: Hypothesis) -> (Hypothesis, f64) {
+    fn whole(&self, hypothesis: Hypothesis) -> (Hypothesis, Fit) {
         let mut readings = Self {
             joints: self.joints,
             configurations: self.configurations.clone(),
@@ -130,25 +131,26 @@ impl<'a> Readings<'a> {
             target: String::new(),
         };
         readings.apply(hypothesis);
-        (hypothesis, readings.sight.residual(&readings.motions()))
+        (hypothesis, readings.sight.fit(&readings.motions()))
     }
 
-    fn of_target(&self) -> Vec<(Hypothesis, f64)> {
+    fn of_target(&self) -> Vec<(Hypothesis, Fit)> {
         let mut tried = vec![self.whole(Hypothesis::Angles(PI / 180.0)), self.whole(Hypothesis::Angles(180.0 / PI))];
         if let Sight::Points(guess, points) = &self.sight {
             let motions = self.motions();
+            let expected = spread(&motions.iter().map(|motion| motion * guess).collect::<Vec<_>>());
             for hypothesis in [Hypothesis::Target(1e-3), Hypothesis::Target(1e3), Hypothesis::Mirrored] {
                 let read: Vec<Point3<f64>> = points.iter().map(|point| hypothesis.of_point(point)).collect();
-                // Points that shrink come nearer to anything: they must be explained, not only be small.
-                let spread = spread(&read);
-                let left = Sight::Points(*guess, read).residual(&motions);
-                tried.extend((left < 0.3 * spread).then_some((hypothesis, left)));
+                // Points that shrink come nearer to anything: they must be spread as the robot's are.
+                let is_likely = (0.2..5.0).contains(&(spread(&read) / expected));
+                let fit = Sight::Points(*guess, read).fit(&motions);
+                tried.extend(is_likely.then_some((hypothesis, fit)));
             }
         }
         tried
     }
 
-    fn of_order(&self) -> Vec<(Hypothesis, f64)> {
+    fn of_order(&self) -> Vec<(Hypothesis, Fit)> {
         let joints = self.joints.len();
         let reach = if joints > SWAPS { 1 } else { joints };
         let pairs = (0..joints).flat_map(|one| (one + 1..joints.min(one + 1 + reach)).map(move |other| (one, other)));
@@ -163,7 +165,7 @@ impl<'a> Readings<'a> {
 
     /// Each joint by itself; what stands before and behind it is computed once, so that a joint costs the same however many
     /// there are.
-    fn of_joints(&self) -> Vec<(Hypothesis, f64)> {
+    fn of_joints(&self) -> Vec<(Hypothesis, Fit)> {
         let mut tried = Vec::new();
         let mut before: Vec<Isometry3<f64>> = vec![Isometry3::identity(); self.configurations.len()];
         let mut behind = self.motions();
@@ -174,7 +176,7 @@ impl<'a> Readings<'a> {
             let read = |of: &dyn Fn(f64) -> f64| {
                 let rows = self.configurations.iter().zip(before.iter().zip(&behind));
                 let motions = rows.map(|(row, (before, behind))| before * joint.exp(of(row[index])) * behind);
-                self.sight.residual(&motions.collect::<Vec<_>>())
+                self.sight.fit(&motions.collect::<Vec<_>>())
             };
             let factors: &[f64] = match joint.kind() {
                 JointKind::Revolute => &[-1.0, PI / 180.0, 180.0 / PI],
@@ -194,15 +196,15 @@ impl<'a> Readings<'a> {
 }
 
 /// The shift within half a turn that leaves least: on a grid of 30 deg, then between its neighbours if `fine`.
-fn shift(left: &dyn Fn(f64) -> f64, fine: bool) -> (f64, f64) {
+fn shift(left: &dyn Fn(f64) -> Fit, fine: bool) -> (f64, Fit) {
     const STEP: f64 = PI / 6.0;
     let grid = (-5..=6).map(|k| f64::from(k) * STEP).map(|by| (by, left(by)));
-    let Some(mut best) = grid.min_by(|a, b| a.1.total_cmp(&b.1)) else { return (0.0, f64::INFINITY) };
+    let Some(mut best) = grid.min_by(|a, b| a.1.judged.total_cmp(&b.1.judged)) else { return (0.0, left(0.0)) };
     let mut step = STEP / 2.0;
     while fine && step > 0.002 {
         for by in [best.0 - step, best.0 + step] {
             let there = left(by);
-            if there < best.1 {
+            if there.judged < best.1.judged {
                 best = (by, there);
             }
         }
@@ -225,7 +227,7 @@ impl Hypothesis {
         }
     }
 
-    fn doubt(self, subject: &Subject, target: &str, residual: f64, left: f64) -> Doubt {
+    fn doubt(self, subject: &Subject, target: &str, residual: Fit, left: Fit) -> Doubt {
         let column = |joint: usize| subject.columns[joint].clone();
         let turns = |joint: usize| subject.joints[joint].kind() == JointKind::Revolute;
         let small = |factor: f64| factor.abs() < 1.0;
@@ -236,21 +238,30 @@ impl Hypothesis {
                 "its sign is reversed against the description".to_owned(),
                 "turn the sign of the column round, or the joint's <axis>",
             ),
-            Self::Scaled(joint, factor) if turns(joint) && small(factor) => {
-                (DoubtKind::Unit, Some(column(joint)), "degrees, read as radians".to_owned(), "end its title with `_deg`")
-            }
-            Self::Scaled(joint, _) if turns(joint) => {
-                (DoubtKind::Unit, Some(column(joint)), "radians, read as degrees".to_owned(), "end its title with `_rad`")
-            }
+            Self::Scaled(joint, factor) if turns(joint) && small(factor) => (
+                DoubtKind::Unit,
+                Some(column(joint)),
+                "degrees, read as radians".to_owned(),
+                "end its title with `_deg`",
+            ),
+            Self::Scaled(joint, _) if turns(joint) => (
+                DoubtKind::Unit,
+                Some(column(joint)),
+                "radians, read as degrees".to_owned(),
+                "end its title with `_rad`",
+            ),
             Self::Scaled(joint, factor) if small(factor) => (
                 DoubtKind::Unit,
                 Some(column(joint)),
                 "millimetres, read as metres".to_owned(),
                 "end its title with `_mm`",
             ),
-            Self::Scaled(joint, _) => {
-                (DoubtKind::Unit, Some(column(joint)), "metres, read as millimetres".to_owned(), "end its title with `_m`")
-            }
+            Self::Scaled(joint, _) => (
+                DoubtKind::Unit,
+                Some(column(joint)),
+                "metres, read as millimetres".to_owned(),
+                "end its title with `_m`",
+            ),
             Self::Angles(factor) if small(factor) => (
                 DoubtKind::Unit,
                 None,
@@ -295,7 +306,7 @@ impl Hypothesis {
             ),
         };
         let evidence =
-            format!("read so, the description fits to {} instead of {} rms", length(left), length(residual));
+            format!("read so, the description fits to {} instead of {} rms", length(left.rms), length(residual.rms));
         Doubt { kind, column, lines: Vec::new(), what, evidence, mend: mend.to_owned() }
     }
 }

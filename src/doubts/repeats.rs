@@ -4,10 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
-use super::{
-    Doubt, DoubtKind, Evidence,
-    doubt::length,
-};
+use super::{Doubt, DoubtKind, Evidence, doubt::length};
 
 /// Postures that differ by less are one, rad or m: what encoders repeat to.
 const SAME: f64 = 1e-4;
@@ -32,7 +29,8 @@ pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
     if deviations.len() < 2 || degrees < 1.0 {
         return (doubts, None);
     }
-    let mut sizes: Vec<f64> = deviations.iter().flat_map(|(_, by)| by.iter().map(|x| x.abs()).collect::<Vec<_>>()).collect();
+    let mut sizes: Vec<f64> =
+        deviations.iter().flat_map(|(_, by)| by.iter().map(|x| x.abs()).collect::<Vec<_>>()).collect();
     sizes.sort_by(f64::total_cmp);
     // The median of absolute deviations, as a standard deviation.
     let robust = 1.4826 * sizes[sizes.len() / 2];

@@ -13,6 +13,10 @@ pub struct Measurements {
     pub markers_m: Vec<Point3<f64>>,
     /// The line of the file that each row stands on, counted from 1.
     pub lines: Vec<usize>,
+    /// The titles of the joints' columns.
+    pub columns: Vec<String>,
+    /// The titles of the marker's.
+    pub marker: String,
     /// Columns that repeat another in every row, with that other; only where one of the two is used here.
     pub repeated: Vec<(String, String)>,
 }
@@ -30,7 +34,8 @@ impl Measurements {
         };
         let joints = joint_columns.iter().map(joint).collect::<Result<_, TableError>>()?;
         let readings = vec![titles.reading_titled(Layout::Position, marker_columns)?];
-        let mut measurements = Self::default();
+        let columns = joint_columns.iter().map(|title| (*title).to_owned()).collect();
+        let mut measurements = Self { columns, marker: marker_columns.join(", "), ..Self::default() };
         let mut rows = table.rows(Columns { joints, readings, labels: Vec::new() });
         for row in rows.by_ref() {
             let row = row?;

@@ -8,6 +8,7 @@ mod builtin;
 mod data;
 mod edit;
 mod error;
+mod examine;
 mod learners;
 mod raw;
 mod summary;
