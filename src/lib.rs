@@ -15,6 +15,8 @@
 //! | [`kinematics`] | joints as twists, minimal coordinates of lines, directions and rotations, joint limits |
 //! | [`model`] | what can be learned, in blocks; the prior; one pass over the chain that gives every derivative |
 //! | [`sensing`] | what is measured after a movement, channel by channel and whitened; what a head can see |
+//! | [`table`] | tables of measurements in CSV, read as they stream by |
+//! | [`doubts`] | what is doubtful in such a table, with the evidence |
 //! | [`estimation`] | estimators and their beliefs: recursive least squares, stochastic gradient, a smoother with several hypotheses |
 //! | [`optimize`] | DIRECT and a bounded local search: minimisers over the unit cube that know nothing of robots |
 //! | [`selection`] | the A-criterion and its kin, and the policies that choose movements or plan them |
@@ -59,6 +61,7 @@ pub mod assembly;
 #[cfg(feature = "app")]
 mod chart;
 pub mod design;
+pub mod doubts;
 pub mod estimation;
 pub mod experiment;
 #[cfg(feature = "app")]
@@ -75,6 +78,8 @@ pub mod selection;
 pub mod sensing;
 #[cfg(feature = "app")]
 pub mod server;
+mod similar;
+pub mod table;
 
 /// The code in the README, compiled and run.
 #[cfg(doctest)]

@@ -289,6 +289,37 @@ fn a_scenario_can_be_a_path_with_data_beside_it() {
 }
 
 #[test]
+fn doubts_about_data_are_warnings_unless_strict() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("written");
+    let toml =
+        include_str!("../scenarios/tiago-mocap.toml").replace("\"x1\", \"y1\", \"z1\"", "\"x3\", \"y3\", \"z3\"");
+    write("my.toml", &toml);
+    write("tiago-mocap.csv", include_str!("../scenarios/tiago-mocap.csv"));
+    let path = folder.path().join("my.toml");
+    let path = path.to_str().expect("a plain path");
+    let output = body_schema(&["check", path]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.contains("warning: column `x4, y4, z4`: a copy of `x3, y3, z3`"), "{said}");
+    let (code, message) = failure(&["check", path, "--strict"]);
+    assert!(code == 2 && message.contains("1 doubt about the data"), "{message}");
+    assert!(body_schema(&["check", "tiago-mocap", "--strict"]).status.success());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_never_ends_is_refused_at_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("my.toml");
+    let toml = include_str!("../scenarios/tiago-mocap.toml").replace("tiago-mocap.csv\"", "/dev/zero\"");
+    std::fs::write(&path, toml).expect("written");
+    for path in ["/dev/zero", path.to_str().expect("a plain path")] {
+        let (code, message) = failure(&["check", path]);
+        assert!(code == 2 && message.contains("is not text: its byte 1 is 0"), "{message}");
+    }
+}
+
+#[test]
 fn a_sweep_ranks_by_the_learners_own_median() {
     let trials = json(&[
         "sweep",

@@ -1,9 +1,16 @@
 //! Where scenarios and their data come from.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs::File,
+    io::{ErrorKind, Read},
+    path::{Path, PathBuf},
+};
 
 use anyhow::Result;
-use body_schema::scenario::{BUILTIN, Scenario, builtin};
+use body_schema::{
+    scenario::{BUILTIN, Scenario, builtin},
+    table::{Guard, MOST_BYTES},
+};
 
 use super::BadInput;
 
@@ -22,14 +29,17 @@ pub fn load_scenario(name: &str) -> Result<Scenario> {
     Ok(Scenario::parse(name, &text, &|file| read_text(&folder.join(file)))?)
 }
 
-/// The text of a file. An error continues a sentence that begins with the file's name.
+/// The text of a file. An error continues a sentence that begins with the file's name. What has no end, or is no text, is
+/// refused as soon as that is seen.
 fn read_text(path: &Path) -> Result<String, String> {
-    let bytes = std::fs::read(path).map_err(|error| format!("cannot be read: {error}"))?;
-    String::from_utf8(bytes).map_err(|error| match error.as_bytes() {
-        // The byte order marks of UTF-16, as spreadsheets write it.
-        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => "is text in UTF-16; save it in UTF-8".to_owned(),
-        _ => format!("is not text in UTF-8: its byte {} is not", error.utf8_error().valid_up_to() + 1),
-    })
+    let file = File::open(path).map_err(|error| format!("cannot be read: {error}"))?;
+    let mut bytes = Vec::new();
+    Guard::new(file, MOST_BYTES).read_to_end(&mut bytes).map_err(|error| match error.kind() {
+        ErrorKind::InvalidData => error.to_string(),
+        _ => format!("cannot be read: {error}"),
+    })?;
+    String::from_utf8(bytes)
+        .map_err(|error| format!("is not text in UTF-8: its byte {} is not", error.utf8_error().valid_up_to() + 1))
 }
 
 #[cfg(test)]
@@ -46,6 +56,7 @@ mod tests {
         };
         assert_eq!(error(b"x,y\n\x80"), "is not text in UTF-8: its byte 5 is not");
         assert_eq!(error(b"\xff\xfex\0"), "is text in UTF-16; save it in UTF-8");
+        assert_eq!(error(b"x,y\n1,\0"), "is not text: its byte 7 is 0");
         assert!(read_text(&folder.path().join("none")).expect_err("no file").starts_with("cannot be read: "));
     }
 }

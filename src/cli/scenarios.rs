@@ -5,7 +5,7 @@ use std::{io::Write, path::PathBuf};
 use anyhow::Result;
 use body_schema::scenario::{BUILTIN, ScenarioSummary, builtin};
 
-use super::{load_scenario, output};
+use super::{BadInput, load_scenario, output};
 
 #[derive(Debug, clap::Args)]
 pub struct ListArguments {
@@ -19,6 +19,9 @@ pub struct CheckArguments {
     /// The path of a scenario file, or a built-in name
     #[arg(value_name = "FILE")]
     file: String,
+    /// Fail where something in the data is doubtful
+    #[arg(long)]
+    strict: bool,
 }
 
 pub fn list(arguments: &ListArguments) -> Result<()> {
@@ -47,8 +50,7 @@ pub fn list(arguments: &ListArguments) -> Result<()> {
 
 pub fn check(arguments: &CheckArguments) -> Result<()> {
     let scenario = load_scenario(&arguments.file)?;
-    // What only a seed brings to light: a prior that is none, say.
-    scenario.experiment(1, None)?;
+    scenario.check_prior()?;
     let summary = scenario.summary();
     writeln!(
         std::io::stdout(),
@@ -59,5 +61,16 @@ pub fn check(arguments: &CheckArguments) -> Result<()> {
         summary.parameters,
         summary.learners.iter().map(|learner| learner.name.as_str()).collect::<Vec<_>>().join(", ")
     )?;
-    Ok(())
+    let doubts = scenario.examine().map(|examination| examination.doubts).unwrap_or_default();
+    for doubt in &doubts {
+        writeln!(std::io::stderr(), "warning: {doubt}")?;
+    }
+    match doubts.len() {
+        0 => Ok(()),
+        _ if !arguments.strict => Ok(()),
+        1 => Err(BadInput(format!("{}: there is 1 doubt about the data, told above", arguments.file)).into()),
+        count => {
+            Err(BadInput(format!("{}: there are {count} doubts about the data, told above", arguments.file)).into())
+        }
+    }
 }

@@ -7,6 +7,7 @@
 //! * [`Pass`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
 //!   and not among the kinematics since it is the layout that says which parameters there are.
 //! * [`Workspace`]: where predictions of the hand count.
+//! * [`urdf`]: robot descriptions, read into a chain and written with the axes that were learned.
 
 mod block;
 mod element;
@@ -15,6 +16,7 @@ mod pass;
 mod prior;
 mod rank;
 mod state;
+pub mod urdf;
 mod workspace;
 
 pub use block::Block;

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::error::similar;
+use crate::table::{Column, Columns, Layout, Quantity, Table, TableError};
 
 /// Recorded joint positions and marker positions, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -11,96 +11,46 @@ pub struct Measurements {
     pub configurations: Vec<Vec<f64>>,
     /// Measured markers, metres.
     pub markers_m: Vec<Point3<f64>>,
-}
-
-/// What is wrong with a data file, and how to mend it.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what}; {mend}")]
-pub struct DataError {
-    /// What was found, and where.
-    pub what: String,
-    /// How to mend it.
-    pub mend: String,
-}
-
-impl DataError {
-    fn new(what: impl Into<String>, mend: impl Into<String>) -> Self {
-        Self { what: what.into(), mend: mend.into() }
-    }
+    /// The line of the file that each row stands on, counted from 1.
+    pub lines: Vec<usize>,
+    /// The titles of the joints' columns.
+    pub columns: Vec<String>,
+    /// The titles of the marker's.
+    pub marker: String,
+    /// Columns that repeat another in every row, with that other; only where one of the two is used here.
+    pub repeated: Vec<(String, String)>,
 }
 
 impl Measurements {
     /// Reads the named columns of a CSV text with a header line: columns are separated by commas, and a number has a
-    /// decimal point if anything (`0.03`, `.03`, `3e-2`). An error says which line or column is at fault.
-    pub fn from_csv(text: &str, joint_columns: &[&str], marker_columns: &[String; 3]) -> Result<Self, DataError> {
-        if let Some(at) = text.find('\0') {
-            return Err(DataError::new(format!("is not text: its byte {} is 0", at + 1), AS_TEXT));
-        }
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
-        let header = reader.headers().map_err(|error| unreadable(&error))?.clone();
-        let column =
-            |name: &str| header.iter().position(|title| title == name).ok_or_else(|| unknown_column(name, &header));
-        let joints = joint_columns.iter().map(|name| column(name)).collect::<Result<Vec<_>, _>>()?;
-        let marker = marker_columns.iter().map(|name| column(name)).collect::<Result<Vec<_>, _>>()?;
-        let mut measurements = Self::default();
-        for record in reader.records() {
-            let record = record.map_err(|error| unreadable(&error))?;
-            let line = record.position().map_or(0, csv::Position::line);
-            let number = |index: &usize| {
-                let title = header.get(*index).unwrap_or_default();
-                number(record.get(*index).unwrap_or_default(), &format!("line {line}, column `{title}`"))
+    /// decimal point if anything (`0.03`, `.03`, `3e-2`). Titles may end with a unit (see [`table`](crate::table)). An error says which line or column is at fault.
+    pub fn from_csv(text: &str, joint_columns: &[&str], marker_columns: &[String; 3]) -> Result<Self, TableError> {
+        let table = Table::open(text.as_bytes())?;
+        let titles = table.titles();
+        // A title's end says its unit, as everywhere; without one it is rad or m.
+        let joint = |title: &&str| {
+            let (angle, length) = (titles.titled(title, Quantity::Angle)?, titles.titled(title, Quantity::Length)?);
+            Ok(Column { factor: angle.factor * length.factor, ..angle })
+        };
+        let joints = joint_columns.iter().map(joint).collect::<Result<_, TableError>>()?;
+        let readings = vec![titles.reading_titled(Layout::Position, marker_columns)?];
+        let columns = joint_columns.iter().map(|title| (*title).to_owned()).collect();
+        let mut measurements = Self { columns, marker: marker_columns.join(", "), ..Self::default() };
+        let mut rows = table.rows(Columns { joints, readings, labels: Vec::new() });
+        for row in rows.by_ref() {
+            let row = row?;
+            let Some(Some(marker)) = row.observation.readings.first() else {
+                let what = format!("line {}, column `{}` is empty", row.line, marker_columns[0]);
+                return Err(TableError::new(what, "write a number, or remove the line"));
             };
-            measurements.configurations.push(joints.iter().map(number).collect::<Result<_, _>>()?);
-            let marker = marker.iter().map(number).collect::<Result<Vec<_>, _>>()?;
-            measurements.markers_m.push(Point3::from_slice(&marker));
+            measurements.markers_m.push(Point3::from_slice(marker));
+            measurements.configurations.push(row.positions);
+            measurements.lines.push(row.line);
         }
+        let is_used = |title: &String| marker_columns.contains(title) || joint_columns.contains(&title.as_str());
+        measurements.repeated = rows.repeated_columns();
+        measurements.repeated.retain(|(repeating, repeated)| is_used(repeating) || is_used(repeated));
         Ok(measurements)
-    }
-}
-
-const AS_TEXT: &str = "export the table as CSV, text in UTF-8";
-
-/// A finite number. A comma in it is refused: it may separate decimals or thousands.
-fn number(text: &str, place: &str) -> Result<f64, DataError> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ if text.is_empty() => Err(DataError::new(format!("{place} is empty"), "write a number, or remove the line")),
-        _ => {
-            let with_point = text.replacen(',', ".", 1);
-            let mend = if with_point != text && with_point.parse::<f64>().is_ok() {
-                format!("write a decimal point: {with_point}")
-            } else {
-                "write a number such as 0.03, or remove the line".to_owned()
-            };
-            Err(DataError::new(format!("{place}: `{text}` is not a finite number"), mend))
-        }
-    }
-}
-
-fn unknown_column(name: &str, header: &csv::StringRecord) -> DataError {
-    let line = header.iter().collect::<Vec<_>>().join(", ");
-    for (separator, plural) in [(';', "semicolons"), ('\t', "tabs")] {
-        if line.split(separator).any(|title| title.trim() == name) {
-            let what = format!("line 1: the columns are separated by {plural}");
-            return DataError::new(what, "write commas between columns, and a decimal point in numbers: 1.5, not 1,5");
-        }
-    }
-    let mend = match similar(name, header.iter()) {
-        Some(known) => format!("did you mean `{known}`?"),
-        None => "correct the name of the column, here or in the scenario".to_owned(),
-    };
-    DataError::new(format!("has no column `{name}`; its columns are {line}"), mend)
-}
-
-/// What the reader of CSV cannot read, in our own words.
-fn unreadable(error: &csv::Error) -> DataError {
-    match error.kind() {
-        csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
-            let line = pos.as_ref().map_or(0, csv::Position::line);
-            let what = format!("line {line} has {len} values, line 1 names {expected_len} columns");
-            DataError::new(what, "give it one value per column, with a decimal point in numbers: 1.5, not 1,5")
-        }
-        _ => DataError::new(error.to_string(), AS_TEXT),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+pub(super) use crate::similar::similar;
 use crate::{experiment::ExperimentError, model::PriorError};
 
 /// One thing that is wrong in a scenario file.
@@ -102,14 +103,4 @@ fn list(file: &str, problems: &[Problem]) -> String {
 
 fn suggestion(name: &Option<String>) -> String {
     name.as_ref().map(|name| format!(" (did you mean `{name}`?)")).unwrap_or_default()
-}
-
-/// The most similar of `known`, if any is similar at all.
-pub(super) fn similar<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    known
-        .into_iter()
-        .map(|candidate| (strsim::jaro_winkler(name, candidate), candidate))
-        .filter(|(similarity, _)| *similarity > 0.8)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, candidate)| candidate)
 }

@@ -8,6 +8,7 @@ mod builtin;
 mod data;
 mod edit;
 mod error;
+mod examine;
 mod learners;
 mod raw;
 mod summary;
@@ -18,7 +19,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use nalgebra::DVector;
 
 pub use builtin::{BUILTIN, Builtin, builtin};
-pub use data::{DataError, Measurements};
+pub use data::Measurements;
 pub use edit::edited;
 pub use error::{Problem, ScenarioError};
 pub use learners::{EstimatorKind, LearnerSpec, PolicyKind};

@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use crate::{
     experiment::Outliers,
-    scenario::{DataError, InitialError, Measurements, Robot, WorldSpec},
+    scenario::{InitialError, Measurements, Robot, WorldSpec},
     sensing::{Equipment, Rig},
+    table::TableError,
 };
 
 impl Check<'_> {
@@ -163,7 +164,7 @@ impl Check<'_> {
         }
         let rows = match Measurements::from_csv(&text, &columns, &measurements.marker_columns_m.get_ref().0) {
             Ok(rows) => rows,
-            Err(DataError { what, mend }) => {
+            Err(TableError { what, mend }) => {
                 self.problem(measurements.file.span(), "measurements.file", format!("{file} {what}"), mend);
                 return None;
             }

@@ -1,0 +1,81 @@
+//! What is doubtful in a table of measurements, before anything is learned from it.
+//!
+//! Files are wrong in few ways, and each leaves a trace: [`examine`] looks for all of them and names row or column with the
+//! evidence. It corrects nothing.
+//!
+//! Whether numbers fit the description is judged by fits in which what nobody knows is free: where the base stands and
+//! where the target is on the last link (nine numbers), or the target alone where it was held in sockets (three). A column
+//! is doubted where reading it otherwise, in another unit, with the other sign, from another zero or in another's
+//! place, brings the fit's residual to less than half. The offset of the first joint moves the whole robot and that of
+//! the last may move the target with it: what the base and the target absorb cannot be seen.
+//!
+//! Time and memory grow with rows and joints: fits use rows spread evenly over the table, at most some hundreds.
+
+mod columns;
+mod doubt;
+mod fit;
+mod hypotheses;
+mod repeats;
+
+use nalgebra::Point3;
+
+pub use doubt::{Doubt, DoubtKind};
+
+use crate::kinematics::Joint;
+
+/// The robot as it is described.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    /// The columns of the joints, the one nearest the base first.
+    pub columns: &'a [String],
+    /// The joints at θ = 0.
+    pub joints: &'a [Joint],
+    /// By joint, rad or m; none where a joint turns without end.
+    pub limits: &'a [Option<(f64, f64)>],
+    /// Where the target may be at θ = 0, metres: on the last link, to within some decimetres.
+    pub target: Point3<f64>,
+    /// Parameters that are to be learned.
+    pub unknowns: usize,
+}
+
+/// What the table says.
+#[derive(Clone, Debug, Default)]
+pub struct Evidence<'a> {
+    /// By row: the line of the file.
+    pub lines: &'a [usize],
+    /// By row: joint positions, rad or m.
+    pub configurations: &'a [Vec<f64>],
+    /// Targets on the last link whose positions were measured.
+    pub targets: Vec<Seen>,
+    /// By row, where a target was held in sockets: which socket at which place.
+    pub sockets: Option<Vec<usize>>,
+    /// Columns that repeat another, with that other (see [`Rows::repeated_columns`](crate::table::Rows::repeated_columns)).
+    pub repeated: &'a [(String, String)],
+}
+
+/// Where a target was seen.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// Its name.
+    pub name: String,
+    /// By row, metres.
+    pub points: Vec<Option<Point3<f64>>>,
+}
+
+/// What came of an examination.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Examination {
+    /// All doubts, the weightiest first.
+    pub doubts: Vec<Doubt>,
+    /// The standard deviation of a measured position per coordinate, metres, as far as repeated postures tell.
+    pub sigma_m: Option<f64>,
+}
+
+/// Examines a table.
+pub fn examine(subject: &Subject, evidence: &Evidence) -> Examination {
+    let mut doubts = hypotheses::doubts(subject, evidence);
+    doubts.extend(columns::doubts(subject, evidence));
+    let (repeats, sigma_m) = repeats::doubts(evidence);
+    doubts.extend(repeats);
+    Examination { doubts, sigma_m }
+}

@@ -1,0 +1,172 @@
+//! One `<joint>` of a description.
+
+use std::ops::Range;
+
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use roxmltree::Node;
+
+use super::{
+    SegmentKind, UrdfError,
+    values::{error, number, numbers, only_child, required},
+};
+
+/// What a joint's element says besides its name and its links.
+#[derive(Clone, Debug)]
+pub struct Body {
+    pub kind: SegmentKind,
+    pub origin: Isometry3<f64>,
+    pub text: OriginText,
+    /// In the joint's frame; x of a fixed joint.
+    pub axis: UnitVector3<f64>,
+    /// Rad or m; none of a continuous or a fixed joint.
+    pub limits: Option<(f64, f64)>,
+    pub mimic: Option<Mimic>,
+}
+
+/// A joint that follows another: `θ = multiplier · q + offset`.
+#[derive(Clone, Debug)]
+pub struct Mimic {
+    pub joint: String,
+    pub multiplier: f64,
+    pub offset: f64,
+    /// Where it is named, as a byte.
+    pub at: usize,
+}
+
+/// Where in the text a joint's origin stands.
+#[derive(Clone, Debug)]
+pub struct OriginText {
+    /// The bytes of the value of `xyz`.
+    pub xyz: Option<Range<usize>>,
+    /// The bytes of the value of `rpy` or `quat_xyzw`.
+    pub rotation: Option<Range<usize>>,
+    /// Roll, pitch and yaw as written; `None` where a quaternion is.
+    pub rpy: Option<[f64; 3]>,
+    /// Where what is missing belongs.
+    pub insert: Insert,
+}
+
+/// Where a text goes that is not there yet.
+#[derive(Clone, Debug)]
+pub enum Insert {
+    /// Attributes, behind the name of the element.
+    Attribute(usize),
+    /// An element, followed by the white space that stands before the next.
+    Element { at: usize, space: String },
+}
+
+impl Body {
+    pub fn read(node: Node) -> Result<Self, UrdfError> {
+        let (kind, at) = required(node, "type")?;
+        let kind = match kind {
+            "revolute" => SegmentKind::Revolute,
+            "continuous" => SegmentKind::Continuous,
+            "prismatic" => SegmentKind::Prismatic,
+            "fixed" => SegmentKind::Fixed,
+            other => {
+                let mend = "a chain has revolute, continuous, prismatic and fixed joints; name links between which there \
+                            are no others";
+                return Err(error(node, at.start, format!("a joint of type `{other}` is not part of a chain"), mend));
+            }
+        };
+        let (origin, text) = origin(node)?;
+        let mimic = match only_child(node, "mimic")? {
+            Some(mimic) if kind != SegmentKind::Fixed => {
+                let (joint, at) = required(mimic, "joint")?;
+                let multiplier = number(mimic, "multiplier", 1.0)?;
+                let offset = number(mimic, "offset", 0.0)?;
+                Some(Mimic { joint: joint.to_owned(), multiplier, offset, at: at.start })
+            }
+            _ => None,
+        };
+        Ok(Self { kind, origin, text, axis: axis(node, kind)?, limits: limits(node, kind)?, mimic })
+    }
+}
+
+fn origin(joint: Node) -> Result<(Isometry3<f64>, OriginText), UrdfError> {
+    let Some(node) = only_child(joint, "origin")? else {
+        return Ok((
+            Isometry3::identity(),
+            OriginText { xyz: None, rotation: None, rpy: Some([0.0; 3]), insert: before_first_child(joint) },
+        ));
+    };
+    let (xyz, rpy, quaternion) =
+        (node.attribute_node("xyz"), node.attribute_node("rpy"), node.attribute_node("quat_xyzw"));
+    let at = match &xyz {
+        Some(xyz) => numbers::<3>(node, xyz)?,
+        None => [0.0; 3],
+    };
+    let (rotation, written) = match (&rpy, &quaternion) {
+        (Some(_), Some(quaternion)) => {
+            let mend = "leave one of them";
+            return Err(error(node, quaternion.range().start, "<origin> has `rpy` and `quat_xyzw`", mend));
+        }
+        (_, Some(quaternion)) => {
+            let [x, y, z, w] = numbers(node, quaternion)?;
+            let norm = Quaternion::new(w, x, y, z).norm();
+            if !(1e-6..1e6).contains(&norm) {
+                let what = format!("the quaternion `{}` has the length {norm}", quaternion.value());
+                return Err(error(node, quaternion.range_value().start, what, "write one of length 1: 0 0 0 1, say"));
+            }
+            (UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)), None)
+        }
+        (Some(rpy), None) => {
+            let angles @ [roll, pitch, yaw] = numbers(node, rpy)?;
+            (UnitQuaternion::from_euler_angles(roll, pitch, yaw), Some(angles))
+        }
+        (None, None) => (UnitQuaternion::identity(), Some([0.0; 3])),
+    };
+    let text = OriginText {
+        xyz: xyz.map(|attribute| attribute.range_value()),
+        rotation: rpy.or(quaternion).map(|attribute| attribute.range_value()),
+        rpy: written,
+        insert: Insert::Attribute(behind_name(node)),
+    };
+    Ok((Isometry3::from_parts(Translation3::from(Vector3::from(at)), rotation), text))
+}
+
+/// The byte behind the name in `<name …`.
+fn behind_name(node: Node) -> usize {
+    let start = node.range().start;
+    let text = &node.document().input_text()[start..];
+    start + text.find(|c: char| c.is_ascii_whitespace() || c == '/' || c == '>').unwrap_or(text.len())
+}
+
+fn before_first_child(joint: Node) -> Insert {
+    let text = joint.document().input_text();
+    // A joint has children: its parent and its child link.
+    let at = joint.first_element_child().map_or(joint.range().end, |child| child.range().start);
+    let before = text[..at].trim_end_matches(|c: char| c.is_ascii_whitespace()).len();
+    Insert::Element { at, space: text[before..at].to_owned() }
+}
+
+fn axis(joint: Node, kind: SegmentKind) -> Result<UnitVector3<f64>, UrdfError> {
+    let Some(node) = only_child(joint, "axis")?.filter(|_| kind != SegmentKind::Fixed) else {
+        return Ok(Vector3::x_axis());
+    };
+    let (_, at) = required(node, "xyz")?;
+    let Some(attribute) = node.attribute_node("xyz") else { return Ok(Vector3::x_axis()) };
+    let axis = Vector3::from(numbers::<3>(node, &attribute)?);
+    UnitVector3::try_new(axis, 1e-9).ok_or_else(|| {
+        let what = format!("the axis `{}` has no direction", attribute.value());
+        error(node, at.start, what, "write a direction, as 0 0 1, or make the joint `fixed`")
+    })
+}
+
+fn limits(joint: Node, kind: SegmentKind) -> Result<Option<(f64, f64)>, UrdfError> {
+    if matches!(kind, SegmentKind::Fixed | SegmentKind::Continuous) {
+        return Ok(None);
+    }
+    let Some(node) = only_child(joint, "limit")? else {
+        let what = format!("joint `{}` has no <limit>", joint.attribute("name").unwrap_or_default());
+        let mend = "add <limit lower=\"…\" upper=\"…\" effort=\"0\" velocity=\"0\"/>, in radians or metres; a joint that \
+                    turns without end is `continuous`";
+        return Err(error(joint, joint.range().start, what, mend));
+    };
+    let (lower, upper) = (number(node, "lower", 0.0)?, number(node, "upper", 0.0)?);
+    if lower > upper {
+        let what = format!("the lower limit {lower} is above the upper {upper}");
+        return Err(error(node, node.range().start, what, format!("write lower=\"{upper}\" upper=\"{lower}\"")));
+    }
+    Ok(Some((lower, upper)))
+}

@@ -1,0 +1,164 @@
+//! From the text of a description to its links and joints.
+
+use std::{collections::HashMap, ops::Range};
+
+use roxmltree::{Document, Error, Node, ParsingOptions};
+
+use super::{
+    UrdfError,
+    element::Body,
+    values::{EXPAND, error, only_child, required},
+};
+use crate::similar::similar;
+
+/// More elements than any robot has.
+const MOST_NODES: u32 = 2_000_000;
+
+/// A robot's description with its text.
+///
+/// Links and the joints between them are checked as a whole; what a joint says of itself, only where a chain contains it,
+/// so that a gripper that nobody asked for may be as odd as it likes.
+#[derive(Clone, Debug)]
+pub struct Urdf {
+    pub(super) text: String,
+    pub(super) links: Vec<String>,
+    pub(super) joints: Vec<JointElement>,
+    /// By link: the joint that carries it.
+    pub(super) carried_by: Vec<Option<usize>>,
+    /// Where `<robot>` begins, as a byte.
+    pub(super) start: usize,
+}
+
+/// A joint of the description.
+#[derive(Clone, Debug)]
+pub(super) struct JointElement {
+    pub name: String,
+    /// Indices of links.
+    pub parent: usize,
+    pub child: usize,
+    /// Where it begins, as a byte.
+    pub at: usize,
+    pub body: Result<Body, UrdfError>,
+}
+
+impl Urdf {
+    /// Reads a description. Unknown elements and attributes are passed over.
+    ///
+    /// # Errors
+    ///
+    /// [`UrdfError`] where the text is no XML, is xacro, or its links and joints form no tree.
+    pub fn parse(text: &str) -> Result<Self, UrdfError> {
+        let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
+        let document = Document::parse_with_options(text, options).map_err(|found| no_xml(text, &found))?;
+        let robot = document.root_element();
+        if robot.tag_name().name() != "robot" {
+            let what = format!("<{}> is not the description of a robot", robot.tag_name().name());
+            return Err(error(robot, robot.range().start, what, "give a URDF, whose first element is <robot>"));
+        }
+        refuse_xacro(robot)?;
+        let of_kind = |kind: &'static str| {
+            robot.children().filter(move |node| node.is_element() && node.tag_name().name() == kind)
+        };
+        let mut links = Names::new("link");
+        for node in of_kind("link") {
+            links.add(node)?;
+        }
+        let (mut names, mut joints) = (Names::new("joint"), Vec::new());
+        let mut carried_by = vec![None; links.names.len()];
+        for node in of_kind("joint") {
+            names.add(node)?;
+            let name = names.names[joints.len()].clone();
+            let (parent, _) = link_of(node, "parent", &name, &links)?;
+            let (child, place) = link_of(node, "child", &name, &links)?;
+            if let Some(other) = carried_by[child].replace(joints.len()) {
+                let JointElement { name: other, .. } = &joints[other];
+                let what = format!("link `{}` hangs on joint `{other}` already", links.names[child]);
+                return Err(error(node, place.start, what, "a link hangs on one joint; correct one of the two"));
+            }
+            joints.push(JointElement { name, parent, child, at: node.range().start, body: Body::read(node) });
+        }
+        let start = robot.range().start;
+        Ok(Self { text: text.to_owned(), links: links.names, joints, carried_by, start })
+    }
+
+    /// The names of its links, in the file's order.
+    pub fn links(&self) -> &[String] {
+        &self.links
+    }
+}
+
+/// The names of one kind of element, each used once.
+struct Names {
+    kind: &'static str,
+    names: Vec<String>,
+    index: HashMap<String, usize>,
+    places: Vec<usize>,
+}
+
+impl Names {
+    fn new(kind: &'static str) -> Self {
+        Self { kind, names: Vec::new(), index: HashMap::new(), places: Vec::new() }
+    }
+
+    fn add(&mut self, node: Node) -> Result<(), UrdfError> {
+        let (name, place) = required(node, "name")?;
+        if let Some(first) = self.index.insert(name.to_owned(), self.names.len()) {
+            let text = node.document().input_text();
+            let first = UrdfError::at(text, self.places[first], "", "").line;
+            let what = format!("a {} `{name}` is on line {first} already", self.kind);
+            return Err(error(node, place.start, what, format!("give each {} a name of its own", self.kind)));
+        }
+        self.names.push(name.to_owned());
+        self.places.push(place.start);
+        Ok(())
+    }
+}
+
+/// The link that a joint's `<parent>` or `<child>` names, and where.
+fn link_of(joint: Node, tag: &str, name: &str, links: &Names) -> Result<(usize, Range<usize>), UrdfError> {
+    let Some(node) = only_child(joint, tag)? else {
+        let mend = format!("add <{tag} link=\"…\"/>");
+        return Err(error(joint, joint.range().start, format!("joint `{name}` has no <{tag}>"), mend));
+    };
+    let (link, place) = required(node, "link")?;
+    if let Some(&index) = links.index.get(link) {
+        return Ok((index, place));
+    }
+    let mend = match similar(link, links.names.iter().map(String::as_str)) {
+        Some(known) => format!("did you mean `{known}`?"),
+        None => format!("add <link name=\"{link}\"/>"),
+    };
+    Err(error(node, place.start, format!("there is no link `{link}`, which joint `{name}` names"), mend))
+}
+
+fn refuse_xacro(robot: Node) -> Result<(), UrdfError> {
+    let is_xacro = |node: &Node| node.tag_name().namespace().is_some_and(|name| name.ends_with("/xacro"));
+    match robot.descendants().find(is_xacro) {
+        None => Ok(()),
+        Some(node) => {
+            let what = format!("<xacro:{}>: this is a template in xacro, not a URDF", node.tag_name().name());
+            Err(error(node, node.range().start, what, EXPAND))
+        }
+    }
+}
+
+fn no_xml(text: &str, found: &Error) -> UrdfError {
+    let position = found.pos();
+    let (what, mend) = match found {
+        Error::UnknownNamespace(prefix, _) if prefix == "xacro" => {
+            ("this is a template in xacro, not a URDF".to_owned(), EXPAND.to_owned())
+        }
+        Error::UnknownNamespace(prefix, _) => (
+            format!("the prefix `{prefix}:` is not declared"),
+            format!("declare it, <robot xmlns:{prefix}=\"…\" …>, or remove the element"),
+        ),
+        Error::DtdDetected => ("there is a <!DOCTYPE>".to_owned(), "remove it; a URDF needs none".to_owned()),
+        _ if text.trim().is_empty() => ("the file is empty".to_owned(), "give a URDF".to_owned()),
+        _ => {
+            let message = found.to_string();
+            let what = message.rsplit_once(" at ").map_or(message.as_str(), |(what, _)| what);
+            (format!("this is not XML: {what}"), "correct it, or write the file anew from its source".to_owned())
+        }
+    };
+    UrdfError { line: position.row as usize, column: position.col as usize, what, mend }
+}

@@ -1,0 +1,63 @@
+//! Tables of measurements: CSV in, rows of joint positions and readings out.
+//!
+//! A table is read as it streams by: what is kept is what its reader keeps. It has a line of titles, then one line per
+//! movement. Columns stand in any order and are found by title; those that nobody asks for are passed over.
+//!
+//! ```
+//! use body_schema::table::{Columns, Layout, Quantity, Table};
+//!
+//! let text = "shoulder_deg,lift,hand_x_mm,hand_y_mm,hand_z_mm\n90,0.2,100,0,1500\n45,0.1,,,\n";
+//! let table = Table::open(text.as_bytes())?;
+//! let titles = table.titles();
+//! let columns = Columns {
+//!     joints: vec![titles.find("shoulder", Quantity::Angle)?, titles.find("lift", Quantity::Length)?],
+//!     readings: vec![titles.reading(Layout::Position, "hand")?],
+//!     labels: vec![],
+//! };
+//! let rows: Vec<_> = table.rows(columns).collect::<Result<_, _>>()?;
+//! assert_eq!(rows[0].positions, [std::f64::consts::FRAC_PI_2, 0.2]);
+//! assert_eq!(rows[0].observation.readings, [Some(vec![0.1, 0.0, 1.5])]);
+//! assert_eq!((rows[1].line, rows[1].observation.is_miss()), (3, true));
+//! # Ok::<(), body_schema::table::TableError>(())
+//! ```
+//!
+//! # Units
+//!
+//! Inside there are metres and radians only. A title's end says what its numbers are: `_m` or `_mm`, `_rad` or `_deg`, `_px`;
+//! without one they are metres, radians or pixels, as in a URDF. A joint's column is titled with the joint's name.
+//!
+//! # Readings
+//!
+//! Titles begin with the name of the target (`hand` here), for pixels with the camera's and the target's (`cam_hand`);
+//! with nothing before them where there is no doubt. Titles of other kinds can be named one by one.
+//!
+//! | layout | titles | a line |
+//! |---|---|---|
+//! | [`Position`](Layout::Position) | `elbow,hand_x,hand_y,hand_z` | `0.5,0.31,-0.12,0.87` |
+//! | [`Pose`](Layout::Pose), rotation vector | `elbow_deg,hand_x_mm,hand_y_mm,hand_z_mm,hand_rx,hand_ry,hand_rz` | `30,310,-120,870,0,0,1.57` |
+//! | roll, pitch, yaw | `elbow,hand_x,hand_y,hand_z,hand_roll_deg,hand_pitch_deg,hand_yaw_deg` | `0.5,0.31,-0.12,0.87,0,0,90` |
+//! | quaternion | `elbow,hand_x,hand_y,hand_z,hand_qx,hand_qy,hand_qz,hand_qw` | `0.5,0.31,-0.12,0.87,0,0,0.707,0.707` |
+//! | [`Pixels`](Layout::Pixels) of a point | `elbow,cam_hand_u,cam_hand_v` | `0.5,412.3,208.9` |
+//! | of a body's points | `elbow,cam_tag_u1,cam_tag_v1,cam_tag_u2,cam_tag_v2` | `0.5,412.3,208.9,430.1,210.4` |
+//! | [`Distance`](Layout::Distance) | `elbow,hand_distance_mm` | `0.5,742.5` |
+//! | labels, as of sockets | `elbow,place,socket` | `0.5,front left,1` |
+//!
+//! Where a sensor had no reading its cells are empty, all of them.
+//!
+//! # Errors
+//!
+//! [`TableError`] names line and column. What is no text, what is longer than [`MOST_BYTES`], two columns with one title, a
+//! line with too few or too many cells, and what is no finite number are refused as soon as they are seen.
+
+mod error;
+mod guard;
+mod lines;
+mod reading;
+mod rows;
+mod titles;
+
+pub use error::TableError;
+pub use guard::{Guard, MOST_BYTES};
+pub use reading::{Layout, Reading};
+pub use rows::{Columns, Row, Rows, Table};
+pub use titles::{Column, Quantity, Titles};

@@ -1,0 +1,153 @@
+//! The titles of a table, and the columns that are found by them.
+
+use std::collections::HashMap;
+
+use super::{TableError, error::AS_TEXT};
+use crate::similar::similar;
+
+/// What a column's numbers measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Radians inside.
+    Angle,
+    /// Metres inside.
+    Length,
+    /// Pixels.
+    Pixels,
+    /// Without a unit.
+    Number,
+}
+
+impl Quantity {
+    /// Ends of titles, and what the numbers below them are multiplied by.
+    fn units(self) -> &'static [(&'static str, f64)] {
+        const DEGREE: f64 = std::f64::consts::PI / 180.0;
+        match self {
+            Self::Angle => &[("", 1.0), ("_rad", 1.0), ("_deg", DEGREE)],
+            Self::Length => &[("", 1.0), ("_m", 1.0), ("_mm", 1e-3)],
+            Self::Pixels => &[("", 1.0), ("_px", 1.0)],
+            Self::Number => &[("", 1.0)],
+        }
+    }
+}
+
+/// A column of numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// Counted from 0.
+    pub index: usize,
+    /// What its numbers are multiplied by to be metres or radians.
+    pub factor: f64,
+}
+
+/// The line of titles.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Titles {
+    titles: Vec<String>,
+}
+
+impl Titles {
+    pub(super) fn new(record: &csv::StringRecord) -> Result<Self, TableError> {
+        let titles: Vec<String> = record.iter().map(str::to_owned).collect();
+        let mut seen = HashMap::new();
+        // Spreadsheets leave columns without a title at the end.
+        for (index, title) in titles.iter().enumerate().filter(|(_, title)| !title.is_empty()) {
+            if let Some(first) = seen.insert(title.as_str(), index) {
+                let what = format!("line 1: columns {} and {} are both called `{title}`", first + 1, index + 1);
+                return Err(TableError::new(what, "give each column a title of its own"));
+            }
+        }
+        if titles.iter().all(String::is_empty) {
+            return Err(TableError::new("is empty", "begin it with a line of titles, one per column"));
+        }
+        if titles.len() > 1 && titles.iter().all(|title| title.parse::<f64>().is_ok()) {
+            let mend = "begin the table with a line of titles: the names of the joints, and of what is measured";
+            return Err(TableError::new("line 1 holds numbers, no titles", mend));
+        }
+        Ok(Self { titles })
+    }
+
+    /// All titles, in order.
+    pub fn all(&self) -> &[String] {
+        &self.titles
+    }
+
+    /// The column of `name`, alone or with the unit at its end.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`] where there is none, or more than one.
+    pub fn find(&self, name: &str, quantity: Quantity) -> Result<Column, TableError> {
+        let units = quantity.units().iter();
+        let mut found = units.filter_map(|(unit, factor)| {
+            let index = self.titles.iter().position(|title| title.strip_prefix(name) == Some(unit))?;
+            Some(Column { index, factor: *factor })
+        });
+        match (found.next(), found.next()) {
+            (Some(column), None) => Ok(column),
+            (Some(one), Some(other)) => {
+                let what =
+                    format!("line 1: `{}` and `{}` say the same", self.titles[one.index], self.titles[other.index]);
+                Err(TableError::new(what, "leave one of the two columns"))
+            }
+            (None, _) => Err(self.unknown(name)),
+        }
+    }
+
+    /// The column with exactly this title, whose end says the unit.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`] where there is none.
+    pub fn titled(&self, title: &str, quantity: Quantity) -> Result<Column, TableError> {
+        let factor = quantity.units().iter().rev().find(|(unit, _)| title.ends_with(unit)).map_or(1.0, |unit| unit.1);
+        Ok(Column { index: self.label(title)?, factor })
+    }
+
+    /// The index of the column with exactly this title, of any text.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`] where there is none.
+    pub fn label(&self, title: &str) -> Result<usize, TableError> {
+        self.titles.iter().position(|given| given == title).ok_or_else(|| self.unknown(title))
+    }
+
+    fn unknown(&self, name: &str) -> TableError {
+        let line = self.titles.join(", ");
+        for (separator, plural) in [(';', "semicolons"), ('\t', "tabs")] {
+            if line.split(separator).any(|title| title.trim().starts_with(name)) && line.contains(separator) {
+                let what = format!("line 1: the columns are separated by {plural}");
+                return TableError::new(
+                    what,
+                    "write commas between columns, and a decimal point in numbers: 1.5, not 1,5",
+                );
+            }
+        }
+        let mend = match similar(name, self.titles.iter().map(String::as_str)) {
+            Some(known) => format!("did you mean `{known}`?"),
+            None => "correct the name of the column, here or in the scenario".to_owned(),
+        };
+        TableError::new(format!("has no column `{name}`; its columns are {line}"), mend)
+    }
+}
+
+/// A finite number. A comma in it is refused: it may separate decimals or thousands.
+pub(super) fn number(text: &str, place: &dyn Fn() -> String) -> Result<f64, TableError> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ if text.is_empty() => {
+            Err(TableError::new(format!("{} is empty", place()), "write a number, or remove the line"))
+        }
+        _ if text.len() > 1000 => Err(TableError::new(format!("{} holds no number", place()), AS_TEXT)),
+        _ => {
+            let with_point = text.replacen(',', ".", 1);
+            let mend = if with_point != text && with_point.parse::<f64>().is_ok() {
+                format!("write a decimal point: {with_point}")
+            } else {
+                "write a number such as 0.03, or remove the line".to_owned()
+            };
+            Err(TableError::new(format!("{}: `{text}` is not a finite number", place()), mend))
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! For each way in which a file may be wrong, one made from a real robot's, and the sentence that comes out.
+
+use std::collections::BTreeMap;
+
+use body_schema::{
+    doubts::{Doubt, DoubtKind, Evidence, Examination, Subject, examine},
+    model::urdf::Urdf,
+    scenario::Scenario,
+    table::{Columns, Quantity, Table},
+};
+use nalgebra::Point3;
+
+const TIAGO: &str = include_str!("../scenarios/tiago-mocap.toml");
+const TIAGO_CSV: &str = include_str!("../scenarios/tiago-mocap.csv");
+const PANDA: &str = include_str!("urdf/robots/panda-mukca.urdf");
+const PANDA_CSV: &str = include_str!("doubts/panda-front-center.csv");
+
+/// A table that can be spoilt.
+struct Sheet {
+    titles: Vec<String>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Sheet {
+    fn new(text: &str) -> Self {
+        let mut lines = text.lines();
+        let titles = lines.next().expect("titles").split(',').map(str::to_owned).collect();
+        let rows = lines.map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect()).collect();
+        Self { titles, rows }
+    }
+
+    fn column(&self, title: &str) -> usize {
+        self.titles.iter().position(|given| given == title).expect(title)
+    }
+
+    fn change(&mut self, title: &str, change: impl Fn(f64) -> f64) {
+        let column = self.column(title);
+        self.rows.iter_mut().for_each(|row| row[column] = change(row[column]));
+    }
+
+    fn swap_titles(&mut self, one: &str, other: &str) {
+        let (one, other) = (self.column(one), self.column(other));
+        self.titles.swap(one, other);
+    }
+
+    fn text(&self) -> String {
+        let rows = self.rows.iter().map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(","));
+        std::iter::once(self.titles.join(",")).chain(rows).collect::<Vec<_>>().join("\n") + "\n"
+    }
+}
+
+fn tiago(toml: &str, csv: &str) -> Examination {
+    let scenario = Scenario::parse("my.toml", toml, &|_| Ok(csv.to_owned())).unwrap_or_else(|error| panic!("{error}"));
+    scenario.examine().expect("measured")
+}
+
+/// The doubts about TIAGo's table after a change.
+fn spoilt(spoil: impl FnOnce(&mut Sheet)) -> Vec<Doubt> {
+    let mut sheet = Sheet::new(TIAGO_CSV);
+    spoil(&mut sheet);
+    tiago(TIAGO, &sheet.text()).doubts
+}
+
+/// The doubts of these kinds, each with the words that its sentence must hold; nothing else but rows outside limits.
+#[track_caller]
+fn told(doubts: &[Doubt], wanted: &[(DoubtKind, &[&str])]) {
+    let listed = doubts.iter().map(|doubt| format!("{:?}: {doubt}", doubt.kind)).collect::<Vec<_>>().join("\n");
+    let found: Vec<&Doubt> = doubts.iter().filter(|doubt| doubt.kind != DoubtKind::Limits).collect();
+    assert_eq!(found.len(), wanted.len(), "{listed}");
+    for (doubt, (kind, words)) in found.iter().zip(wanted) {
+        assert_eq!(doubt.kind, *kind, "{listed}");
+        assert!(words.iter().all(|word| doubt.to_string().contains(word)), "{words:?}\n{listed}");
+    }
+}
+
+#[test]
+fn nothing_is_doubted_in_a_table_that_is_right() {
+    let examination = tiago(TIAGO, TIAGO_CSV);
+    assert_eq!(examination, Examination::default(), "{:?}", examination.doubts.iter().map(ToString::to_string));
+    assert_eq!(panda(|_| {}), []);
+}
+
+#[test]
+fn units_are_doubted() {
+    let millimetres = spoilt(|sheet| ["x1", "y1", "z1"].iter().for_each(|title| sheet.change(title, |x| x * 1e3)));
+    told(
+        &millimetres,
+        &[(DoubtKind::Unit, &["column `x1, y1, z1`: positions are millimetres", "fits to 4.", "`_mm`"])],
+    );
+    let metres = spoilt(|sheet| ["x1", "y1", "z1"].iter().for_each(|title| sheet.change(title, |x| x * 1e-3)));
+    told(&metres, &[(DoubtKind::Unit, &["positions are metres, read as millimetres"])]);
+    let degrees = spoilt(|sheet| sheet.change("arm_3_joint", f64::to_degrees));
+    told(&degrees, &[(DoubtKind::Unit, &["column `arm_3_joint`: degrees, read as radians", "`_deg`"])]);
+    assert!(degrees.iter().any(|doubt| doubt.kind == DoubtKind::Limits && doubt.lines.len() > 20), "{degrees:?}");
+    let all = spoilt(|sheet| (1..8).for_each(|k| sheet.change(&format!("arm_{k}_joint"), f64::to_degrees)));
+    told(&all, &[(DoubtKind::Unit, &["all joint angles are degrees, read as radians"])]);
+    let torso = spoilt(|sheet| sheet.change("torso_lift_joint", |x| x * 1e3));
+    told(&torso, &[(DoubtKind::Unit, &["column `torso_lift_joint`: millimetres, read as metres"])]);
+}
+
+#[test]
+fn signs_zeros_and_orders_are_doubted() {
+    let sign = spoilt(|sheet| sheet.change("arm_4_joint", |x| -x));
+    told(&sign, &[(DoubtKind::Sign, &["column `arm_4_joint`: its sign is reversed", "fits to 4."])]);
+    let zero = spoilt(|sheet| sheet.change("arm_2_joint", |x| x + 0.5));
+    told(&zero, &[(DoubtKind::Zero, &["column `arm_2_joint`: its zero is 2", "<origin>"])]);
+    let order = spoilt(|sheet| sheet.swap_titles("arm_5_joint", "arm_6_joint"));
+    told(&order, &[(DoubtKind::Order, &["column `arm_5_joint`: in the place of column `arm_6_joint`"])]);
+    let mirror = spoilt(|sheet| sheet.swap_titles("x1", "y1"));
+    told(&mirror, &[(DoubtKind::Mirror, &["positions are in a left-handed frame"])]);
+    let both = spoilt(|sheet| {
+        sheet.change("arm_4_joint", |x| -x);
+        ["x1", "y1", "z1"].iter().for_each(|title| sheet.change(title, |x| x * 1e3));
+    });
+    told(&both, &[(DoubtKind::Unit, &["millimetres"]), (DoubtKind::Sign, &["`arm_4_joint`"])]);
+}
+
+#[test]
+fn columns_are_doubted_by_themselves() {
+    let constant = spoilt(|sheet| sheet.change("arm_7_joint", |_| 0.25));
+    told(&constant, &[(DoubtKind::Constant, &["column `arm_7_joint`: this joint never moves (0.25 in all 34 rows)"])]);
+    let outside = spoilt(|sheet| {
+        let column = sheet.column("arm_7_joint");
+        sheet.rows[3][column] = 2.5;
+    });
+    let limits = outside.iter().find(|doubt| doubt.kind == DoubtKind::Limits).expect("doubted").to_string();
+    assert!(limits.contains("column `arm_7_joint`: line 5: outside the joint's limits (by up to 0.40"), "{limits}");
+    let repeated = tiago(&TIAGO.replace("\"x1\", \"y1\", \"z1\"", "\"x3\", \"y3\", \"z3\""), TIAGO_CSV).doubts;
+    told(&repeated, &[(DoubtKind::RepeatedColumn, &["column `x4, y4, z4`: a copy of `x3, y3, z3`"])]);
+    let twice = TIAGO_CSV.replacen("x2", "x1", 1);
+    let error = Scenario::parse("my.toml", TIAGO, &|_| Ok(twice.clone())).expect_err("a title twice");
+    assert!(error.to_string().contains("line 1: columns 1 and 4 are both called `x1`"), "{error}");
+}
+
+#[test]
+fn rows_are_doubted() {
+    let copied = spoilt(|sheet| sheet.rows.push(sheet.rows[2].clone()));
+    told(&copied, &[(DoubtKind::CopiedRow, &["line 36: a copy of an earlier row", "what line 4 said"])]);
+    let few = TIAGO.replace("held_out = 7", "held_out = 1");
+    let table: String = TIAGO_CSV.split_inclusive('\n').take(11).collect();
+    told(
+        &tiago(&few, &table).doubts,
+        &[(DoubtKind::TooFewRows, &["10 rows are too few (30 equations for 39 unknowns)"])],
+    );
+}
+
+#[test]
+fn repeats_tell_the_noise_and_what_had_not_settled() {
+    let mut sheet = Sheet::new(TIAGO_CSV);
+    let wave = |k: usize| (k as f64 * 2.4).sin();
+    for row in 0..6 {
+        for k in 0..4 {
+            let mut again = sheet.rows[row].clone();
+            (0..3).for_each(|axis| again[axis] += 1e-3 * wave(100 * row + 10 * k + 3 * axis));
+            sheet.rows.push(again);
+        }
+    }
+    let examination = tiago(TIAGO, &sheet.text());
+    told(&examination.doubts, &[(DoubtKind::RepeatedPosture, &["6 postures were measured more than once", "σ is 0."])]);
+    let sigma = examination.sigma_m.expect("repeats");
+    assert!((0.0004..0.0011).contains(&sigma), "a sine of 1 mm: {sigma}");
+    sheet.rows[40][1] += 0.05;
+    let doubts = tiago(TIAGO, &sheet.text()).doubts;
+    told(
+        &doubts,
+        &[
+            (DoubtKind::Unsettled, &["line 42: `x1, y1, z1` is not where it was in the same posture", "still moving"]),
+            (DoubtKind::RepeatedPosture, &["6 postures"]),
+        ],
+    );
+}
+
+/// The doubts about a table of a Panda whose ball was held in two sockets, and nothing measured but joint angles.
+fn panda(spoil: impl FnOnce(&mut Sheet)) -> Vec<Doubt> {
+    let mut sheet = Sheet::new(PANDA_CSV);
+    spoil(&mut sheet);
+    let text = sheet.text();
+    let chain = Urdf::parse(PANDA).and_then(|urdf| urdf.chain("panda_link0", "panda_link8")).expect("a chain");
+    let table = Table::open(text.as_bytes()).expect("a table");
+    let names = chain.names();
+    let joints = names.iter().map(|name| table.titles().find(name, Quantity::Angle).expect("a column")).collect();
+    let labels = vec![table.titles().label("socket").expect("a column")];
+    let rows: Vec<_> =
+        table.rows(Columns { joints, labels, ..Columns::default() }).map(|row| row.expect("a row")).collect();
+    let mut sockets = BTreeMap::new();
+    let state = chain.state();
+    let limits: Vec<_> = chain.moving().map(|segment| segment.limits).collect();
+    let subject =
+        Subject { columns: &names, joints: &state.joints, limits: &limits, target: Point3::origin(), unknowns: 40 };
+    let (lines, configurations): (Vec<usize>, Vec<Vec<f64>>) =
+        rows.iter().map(|row| (row.line, row.positions.clone())).unzip();
+    let socket = |label: &String| {
+        let next = sockets.len();
+        *sockets.entry(label.clone()).or_insert(next)
+    };
+    let sockets = Some(rows.iter().map(|row| &row.labels[0]).map(socket).collect());
+    let evidence = Evidence { lines: &lines, configurations: &configurations, sockets, ..Evidence::default() };
+    examine(&subject, &evidence).doubts
+}
+
+#[test]
+fn joint_angles_alone_are_evidence_where_sockets_held_the_target() {
+    let sign = panda(|sheet| sheet.change("panda_joint5", |x| -x));
+    told(&sign, &[(DoubtKind::Sign, &["column `panda_joint5`: its sign is reversed"])]);
+    let degrees = panda(|sheet| (1..8).for_each(|k| sheet.change(&format!("panda_joint{k}"), f64::to_degrees)));
+    told(&degrees, &[(DoubtKind::Unit, &["all joint angles are degrees"])]);
+    let zero = panda(|sheet| sheet.change("panda_joint4", |x| x - 0.3));
+    told(&zero, &[(DoubtKind::Zero, &["column `panda_joint4`: its zero is"])]);
+    let order = panda(|sheet| sheet.swap_titles("panda_joint2", "panda_joint6"));
+    told(&order, &[(DoubtKind::Order, &["`panda_joint2`", "`panda_joint6`"])]);
+}
+
+#[test]
+fn a_long_chain_takes_time_that_grows_with_its_joints() {
+    let chain = Urdf::parse(PANDA).and_then(|urdf| urdf.chain("panda_link0", "panda_link8")).expect("a chain");
+    let joints = [chain.state().joints, vec![chain.state().joints[6]; 793]].concat();
+    let names: Vec<String> = (0..800).map(|k| format!("j{k}")).collect();
+    let configurations: Vec<Vec<f64>> =
+        (0..300).map(|row| (0..800).map(|k| ((row * 31 + k * 17) as f64).sin() * 0.1).collect()).collect();
+    let lines: Vec<usize> = (2..302).collect();
+    let subject = Subject {
+        columns: &names,
+        joints: &joints,
+        limits: &vec![None; 800],
+        target: Point3::new(0.1, 0.0, 1.0),
+        unknowns: 9,
+    };
+    let sockets = Some((0..300).map(|row| row % 3).collect());
+    let started = std::time::Instant::now();
+    examine(&subject, &Evidence { lines: &lines, configurations: &configurations, sockets, ..Evidence::default() });
+    assert!(started.elapsed().as_secs() < 20, "{:?}", started.elapsed());
+}

@@ -1,0 +1,183 @@
+//! What is read, and what is refused with line, column and mend.
+
+use body_schema::{
+    kinematics::JointKind,
+    model::urdf::{Follows, SegmentKind, Urdf, UrdfError},
+};
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::ROBOTS;
+
+const ARM: &str = r#"<?xml version="1.0"?>
+<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <link name="base"/>
+  <link name="upper"/>
+  <link name="fore"/>
+  <link name="hand"/>
+  <joint name="shoulder" type="revolute">
+    <origin xyz="0 0 1" rpy="0 0 0"/>
+    <parent link="base"/> <child link="upper"/>
+    <axis xyz="0 1 0"/>
+    <limit lower="-1" upper="2"/>
+  </joint>
+  <joint name="elbow" type="continuous">
+    <parent link="upper"/> <child link="fore"/>
+    <axis xyz="0 0 3"/>
+    <mimic joint="shoulder" multiplier="-2" offset="0.5"/>
+  </joint>
+  <joint name="slide" type="prismatic">
+    <parent link="fore"/> <child link="hand"/>
+    <limit lower="0" upper="0.2"/>
+  </joint>
+</robot>
+"#;
+
+fn error(text: &str, base: &str, tip: &str) -> UrdfError {
+    Urdf::parse(text).and_then(|urdf| urdf.chain(base, tip)).expect_err(text)
+}
+
+/// Refused after a replacement on a line, with line, column, words of what is wrong and words of the mend.
+#[track_caller]
+fn refused(from: &str, to: &str, at: (usize, usize), what: &str, mend: &str) {
+    assert!(ARM.contains(from), "the test's own premise: {from}");
+    let error = error(&ARM.replacen(from, to, 1), "base", "hand");
+    assert!(error.what.contains(what) && error.mend.contains(mend), "{error}");
+    assert_eq!((error.line, error.column), at, "{error}");
+    assert!(error.to_string().starts_with(&format!("line {}, column {}: ", at.0, at.1)), "{error}");
+}
+
+#[test]
+fn a_chain_is_read() {
+    let chain = Urdf::parse(ARM).and_then(|urdf| urdf.chain("base", "hand")).expect("a chain");
+    assert_eq!((chain.names(), chain.tip()), (vec!["shoulder".into(), "elbow".into(), "slide".into()], "hand"));
+    let kinds: Vec<SegmentKind> = chain.segments.iter().map(|segment| segment.kind).collect();
+    assert_eq!(kinds, [SegmentKind::Revolute, SegmentKind::Continuous, SegmentKind::Prismatic]);
+    let readings: Vec<_> = chain.readings.iter().map(|reading| (reading.name.as_str(), reading.kind)).collect();
+    assert_eq!(readings, [("shoulder", JointKind::Revolute), ("slide", JointKind::Prismatic)]);
+    assert_eq!(chain.segments[1].follows, Some(Follows { reading: 0, multiplier: -2.0, offset: 0.5 }));
+    assert_eq!(chain.positions(&[1.0, 0.1]), [1.0, -1.5, 0.1]);
+    assert_eq!(chain.limits().expect("limits").joints()[2], (0.0, 0.2));
+    // Without an axis a joint has x.
+    assert_eq!(chain.state().joints[2].direction().into_inner(), Vector3::x());
+    let tip = chain.tip_at(&chain.positions(&[0.3, 0.1]));
+    let turned = UnitQuaternion::from_euler_angles(0.0, 0.3, 0.0) * UnitQuaternion::from_euler_angles(0.0, 0.0, -0.1);
+    assert!((tip.translation.vector - (Vector3::z() + turned * Vector3::x() * 0.1)).norm() < 1e-15);
+}
+
+#[test]
+fn a_state_moves_as_its_chain() {
+    for (name, text, base, tip, joints) in ROBOTS {
+        let chain = Urdf::parse(text).and_then(|urdf| urdf.chain(base, tip)).expect(name);
+        let state = chain.state();
+        let q: Vec<f64> = (0..joints).map(|joint| 0.1 + 0.2 * joint as f64).collect();
+        let found = state.frame_at(body_schema::model::Frame::Target(0), &q);
+        let wanted = chain.tip_at(&q);
+        assert!((found.translation.vector - wanted.translation.vector).norm() < 1e-12, "{name}");
+        assert!(found.rotation.angle_to(&wanted.rotation) < 1e-12, "{name}");
+        assert_eq!(chain.links(&q).len(), chain.segments.len() + 1, "{name}");
+    }
+}
+
+#[test]
+fn the_text_may_have_a_byte_order_mark_and_other_line_ends() {
+    let text = format!("\u{feff}{}", ARM.replace('\n', "\r\n"));
+    let urdf = Urdf::parse(&text).expect("a URDF");
+    let chain = urdf.chain("base", "hand").expect("a chain");
+    let mut moved = chain.clone();
+    moved.segments[0].origin.translation.vector.z = 1.5;
+    moved.segments[2].origin.translation.vector.z = -1e-7;
+    let written = urdf.written(&moved);
+    let inserted = "type=\"prismatic\">\r\n    <origin xyz=\"0 0 -1e-7\" rpy=\"0 0 0\"/>\r\n    <parent";
+    assert_eq!(written, text.replace("0 0 1\"", "0 0 1.5\"").replace("type=\"prismatic\">\r\n    <parent", inserted));
+    let error = error(&text.replace("0 1 0", "0 0 0"), "base", "hand");
+    assert_eq!((error.line, error.column), (10, 16));
+}
+
+#[test]
+fn what_is_wrong_has_line_column_and_mend() {
+    refused("0 1 0", "0 0 0", (10, 16), "the axis `0 0 0` has no direction", "`fixed`");
+    refused("0 0 1\"", "0 0\"", (8, 18), "`xyz` holds 2 numbers", "write 3");
+    refused("0 0 1\"", "0 0 1,5\"", (8, 18), "`1,5` in `xyz` is not a finite number", "0.03");
+    refused("0 0 1\"", "0 0 inf\"", (8, 18), "`inf` in `xyz` is not a finite number", "0.03");
+    refused("0 0 1\"", "0 0 ${height}\"", (8, 18), "expression of xacro", "xacro robot.urdf.xacro");
+    refused("type=\"revolute\"", "type=\"ball\"", (7, 32), "type `ball`", "revolute, continuous, prismatic and fixed");
+    refused(" type=\"revolute\"", "", (7, 3), "<joint> has no `type`", "add type");
+    refused("    <limit lower=\"-1\" upper=\"2\"/>\n", "", (7, 3), "joint `shoulder` has no <limit>", "`continuous`");
+    refused("lower=\"-1\"", "lower=\"3\"", (11, 5), "the lower limit 3 is above", "lower=\"2\" upper=\"3\"");
+    refused("name=\"elbow\"", "name=\"shoulder\"", (13, 16), "`shoulder` is on line 7 already", "name of its own");
+    refused(
+        "<link name=\"hand\"/>",
+        "<link name=\"fore\"/>",
+        (6, 15),
+        "`fore` is on line 5 already",
+        "name of its own",
+    );
+    refused("child link=\"hand\"", "child link=\"hnad\"", (19, 40), "no link `hnad`", "did you mean `hand`?");
+    refused(
+        "child link=\"hand\"",
+        "child link=\"fore\"",
+        (19, 40),
+        "`fore` hangs on joint `elbow`",
+        "hangs on one joint",
+    );
+    refused(
+        "joint=\"shoulder\"",
+        "joint=\"sholder\"",
+        (16, 19),
+        "no joint `sholder` to mimic",
+        "did you mean `shoulder`?",
+    );
+    refused("joint=\"shoulder\"", "joint=\"elbow\"", (16, 19), "which nothing moves", "moves by itself");
+    let two = "<axis xyz=\"0 1 0\"/><axis xyz=\"0 1 0\"/>";
+    refused("<axis xyz=\"0 1 0\"/>", two, (10, 24), "a second <axis>", "leave one");
+    let both = "rpy=\"0 0 0\" quat_xyzw=\"0 0 0 1\"";
+    refused("rpy=\"0 0 0\"", both, (8, 37), "`rpy` and `quat_xyzw`", "leave one");
+    refused("rpy=\"0 0 0\"", "quat_xyzw=\"0 0 0 0\"", (8, 36), "has the length 0", "0 0 0 1");
+    refused("<parent link=\"base\"/>", "<parent link=\"hand\"/>", (18, 3), "in a circle", "hang on nothing");
+}
+
+#[test]
+fn links_that_form_no_chain_are_refused() {
+    let apart = error(ARM, "hand", "fore");
+    assert!(apart.what.contains("`fore` does not hang on `hand`") && apart.mend.contains("upper, base"), "{apart}");
+    assert_eq!(apart.line, 13);
+    let root = error(ARM, "hand", "base");
+    assert!(root.mend.contains("`base` hangs on nothing"), "{root}");
+    assert!(error(ARM, "bse", "hand").mend.contains("did you mean `base`?"));
+    assert!(error(ARM, "elbow", "hand").mend.contains("the link that it carries is `fore`"));
+    assert!(error(ARM, "camera", "hand").mend.contains("its links are base, upper, fore, hand"));
+    assert!(error(ARM, "hand", "hand").what.contains("no joint moves between"));
+}
+
+#[test]
+fn what_is_no_urdf_is_refused() {
+    for (text, line, what, mend) in [
+        ("", 1, "the file is empty", "give a URDF"),
+        ("hello", 1, "not XML", "correct it"),
+        ("<robot>\n<link name=\"a\">\n</robot>", 3, "not XML", "correct it"),
+        ("<sdf/>", 1, "<sdf> is not the description of a robot", "give a URDF"),
+        ("<!DOCTYPE robot>\n<robot/>", 1, "<!DOCTYPE>", "remove it"),
+        ("<robot>\n<xacro:property name=\"a\"/></robot>", 2, "a template in xacro", "xacro robot.urdf.xacro"),
+        ("<robot>\n<gz:plugin/></robot>", 2, "`gz:` is not declared", "xmlns:gz"),
+        ("<robot>\n<link/></robot>", 2, "<link> has no `name`", "add name"),
+    ] {
+        let error = Urdf::parse(text).expect_err(text);
+        assert!(error.what.contains(what) && error.mend.contains(mend) && error.line == line, "{text}: {error}");
+    }
+    let template = ARM.replace("  <link name=\"hand\"/>", "  <xacro:include filename=\"hand.xacro\"/>");
+    let error = Urdf::parse(&template).expect_err("a template");
+    assert!(error.what.contains("<xacro:include>") && error.line == 6, "{error}");
+}
+
+#[test]
+fn depth_and_size_do_no_harm() {
+    let deep = "<a>".repeat(100_000);
+    Urdf::parse(&format!("<robot>{deep}")).expect_err("never closed");
+    let links: String = (0..20_000).map(|k| format!("<link name=\"l{k}\"/>")).collect();
+    let joint = |k: usize| {
+        format!("<joint name=\"j{k}\" type=\"continuous\"><parent link=\"l{k}\"/><child link=\"l{}\"/></joint>", k + 1)
+    };
+    let joints: String = (0..19_999).map(joint).collect();
+    let urdf = Urdf::parse(&format!("<robot>{links}{joints}</robot>")).expect("a long chain");
+    assert_eq!(urdf.chain("l0", "l19999").expect("a long chain").moving().count(), 19_999);
+}
