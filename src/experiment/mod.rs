@@ -21,6 +21,7 @@ mod learner;
 mod metrics;
 mod report;
 mod result;
+mod sight;
 mod streams;
 mod world;
 
@@ -42,6 +43,10 @@ pub use report::{
     StepReport,
 };
 pub use result::{JointModel, LearnerResult, MarkerModel, Model, OutlierReading, RunResult};
+pub use sight::{
+    CameraDescription, ChannelDescription, ChannelReading, CorrectionReport, PlaceReport, TargetDescription,
+};
+pub(crate) use sight::{channels, described};
 pub use streams::Stream;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};
 
@@ -176,7 +181,7 @@ impl Experiment {
             let (movement, update) = match proposal.zip(observation) {
                 Some((proposal, observation)) => {
                     let name = learner.description.name.clone();
-                    let learned = learner.learn(proposal, observation, &self.world);
+                    let learned = learner.learn(proposal, observation, &self.world, &self.description.channels);
                     let (movement, update) =
                         learned.map_err(|source| ExperimentError::Absorb { learner: name, source })?;
                     (Some(movement), update)
