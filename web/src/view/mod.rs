@@ -15,6 +15,7 @@ mod ending;
 mod game;
 mod learners;
 mod notices;
+mod readings;
 mod setup;
 mod share;
 mod slice;

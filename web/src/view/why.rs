@@ -18,6 +18,7 @@ pub(super) fn joint_value(panel: &Panel, joint: usize, value: f64) -> String {
 
 impl Panel {
     pub(super) fn why(&mut self, ui: &mut Ui) {
+        self.readings(ui);
         self.choose_learner(ui);
         let Some(search) = self.why.search.clone() else {
             let text = self.why.reason.clone().unwrap_or_else(|| match self.history.latest() {
