@@ -37,13 +37,13 @@ fn readings_are_told_beside_the_choice() {
     let page = after("scenario=arm-6dof&learners=active,global", 3);
     assert!(says(&page, "What was read at step 3"));
     assert!(says(&page, "marker "));
-    let mut page = after("scenario=arm-6dof-camera&learners=global,smoother-random&seed=2", 8);
+    let mut page = after("scenario=arm-6dof-camera&learners=global,smoother-random&seed=2", 12);
     let readings = |page: &Page| -> Vec<bool> {
         let panel = page.harness.state();
         (0..2).map(|learner| panel.history.readings(panel.cursor, learner)[0].residual_sigmas.is_some()).collect()
     };
     let mut seen = Vec::new();
-    for _ in 0..7 {
+    for _ in 0..11 {
         for is_seen in readings(&page) {
             seen.push(is_seen);
             assert!(says(&page, if is_seen { "tag seen by eye " } else { "tag seen by eye: not seen" }));
@@ -71,20 +71,17 @@ fn where_drawing_is_slow_a_panel_that_plays_is_drawn_sparingly() {
     page.make_steps(3);
     let panel = page.harness.state_mut();
     assert!(panel.playing);
-    let ctx = egui::Context::default();
-    let mut delay = |drawn_every: f64| {
-        panel.drawn_every = drawn_every;
-        let frames = (0..40).map(|frame| {
-            let input = egui::RawInput { time: Some(10.0 + 0.001 * f64::from(frame)), ..Default::default() };
-            let mut output = ctx.run_ui(input, |ui| panel.ui(ui));
-            output.textures_delta.clear();
-            output.viewport_output[&egui::ViewportId::ROOT].repaint_delay.as_secs_f64()
-        });
-        frames.last().expect("frames")
-    };
-    assert!(delay(0.0) <= 0.1, "drawn for every step");
-    assert!(delay(0.3) >= 0.3, "drawn less often than steps are made");
+    panel.drawn_every = 0.3;
     assert!(panel.draws_sparingly());
+    let ctx = egui::Context::default();
+    let delays = (0..40).map(|frame| {
+        let input = egui::RawInput { time: Some(100.0 + 0.05 * f64::from(frame)), ..Default::default() };
+        let mut output = ctx.run_ui(input, |ui| panel.ui(ui));
+        output.textures_delta.clear();
+        output.viewport_output[&egui::ViewportId::ROOT].repaint_delay.as_secs_f64()
+    });
+    let last = delays.last().expect("frames");
+    assert!(last >= 0.3, "drawn again after {last} s");
     panel.pause();
     assert!(!panel.draws_sparingly());
 }
