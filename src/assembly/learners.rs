@@ -46,7 +46,11 @@ impl Scenario {
             // They show no covariance, or add nothing to it.
             EstimatorKind::RlsSixNumbers | EstimatorKind::Smoother | EstimatorKind::Gradient => None,
         };
-        LearnerDescription { stabilised: spec.stabilising && noise.is_some(), ..spec.description() }
+        let stabilised = spec.stabilising && noise.is_some();
+        let robust = spec.estimator == EstimatorKind::Smoother
+            && spec.robust
+            && matches!(self.smoother.loss, Loss::Mixture { .. });
+        LearnerDescription { stabilised, robust, ..spec.description() }
     }
 
     fn estimator(

@@ -10,7 +10,10 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::{
     design::{Problem, Stretch, movements_by_counting},
-    experiment::{Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World},
+    experiment::{
+        Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World, channels,
+        described,
+    },
     kinematics::{Joint, JointBox},
     model::{Block, Correction, Element, Layout, State, Workspace, anywhere},
     scenario::{ErrorDraw, InitialError, Known, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
@@ -230,6 +233,7 @@ impl Scenario {
         let layout = &briefing.layout;
         let learners =
             specs.iter().map(|spec| self.learner(spec, seed, briefing)).collect::<Result<Vec<_>, ScenarioError>>()?;
+        let (cameras, targets) = described(&robot.equipment);
         let description = Description {
             scenario: self.name.clone(),
             title: self.title.clone(),
@@ -244,6 +248,10 @@ impl Scenario {
             truth: world.truth().map(ModelReport::of_state),
             change_at: world.change().map(|change| change.step),
             head: briefing.watch.as_ref().and_then(|watch| watch.head.as_ref().map(HeadDescription::of)),
+            channels: channels(&self.rig, &robot.equipment),
+            cameras,
+            targets,
+            base_learned: layout.block(Block::Base).is_some(),
             body: robot.body,
         };
         Ok(Experiment::new(description, world, learners, evaluation, self.design_problem()))

@@ -79,7 +79,7 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
         let estimator = Box::new(Rls::new(belief, covariance, Some(noise)));
         let agent = Agent::new(estimator, policy, Actions::Box(limits.clone()), limits.clone(), 5);
         let (name, estimator, policy) = (name.to_owned(), "rls".to_owned(), name.to_owned());
-        let description = LearnerDescription { name, estimator, policy, stabilised: true };
+        let description = LearnerDescription { name, estimator, policy, stabilised: true, robust: false };
         Learner::new(description, agent, weights.clone(), vec![vec![0.5; JOINTS]], 0.01)
     };
     let active = Active::new(weights.clone(), Minimiser::Random { evaluations: 20 });
@@ -102,6 +102,10 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
         truth: None,
         change_at: world.change().map(|change| change.step),
         head: None,
+        channels: Vec::new(),
+        cameras: Vec::new(),
+        targets: Vec::new(),
+        base_learned: false,
         body: None,
     };
     let evaluation = Evaluation::of_truth(vec![vec![0.2; JOINTS], vec![-0.4; JOINTS]], &truth(), 0.01);

@@ -9,12 +9,13 @@ use super::{
     judge::Judge,
     metrics::Metrics,
     report::{LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
+    sight::{ChannelDescription, readings},
     world::World,
 };
 use crate::{
     estimation::{Belief, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
-    model::{State, Workspace},
+    model::{Hand, State, Workspace},
     selection::{SelectionError, Weights},
     sensing::Observation,
 };
@@ -172,14 +173,20 @@ impl Learner {
         proposal: Proposal,
         observation: Observation,
         world: &World,
+        channels: &[ChannelDescription],
     ) -> Result<(MovementReport, Update), AbsorbError> {
         let truth = world.truth();
         let movement = proposal.selection.movement.clone();
         let configuration = movement.configuration.clone();
         let before = self.agent.standpoint().to_owned();
         let predicted = before.belief.state.marker_at(&configuration);
-        let measured = observation.marker(&before.belief.rig);
+        let measured = match before.belief.state.hand {
+            Hand::Target(hand) => observation.position(&before.belief.rig, hand),
+            // What it sees is elsewhere.
+            Hand::Device(_) => None,
+        };
         let seen = !observation.is_miss();
+        let observed = observation.clone();
         let executed = Executed { proposal: Some(proposal.id), movement, observation };
         let update = match self.agent.absorb(&[executed]) {
             Ok(updates) => updates.first().copied().unwrap_or_default(),
@@ -191,6 +198,10 @@ impl Learner {
         self.record.movements += 1;
         self.record.misses += u64::from(!seen);
         self.record.changes_noticed += u64::from(update.change_noticed);
+        let movements = self.record.movements;
+        let weighed: Vec<ReadingReport> =
+            self.readings().into_iter().filter(|reading| reading.movement == movements).collect();
+        let readings = readings(world, self.belief(), &configuration, &observed, channels, &weighed);
         let selection = &proposal.selection;
         let report = MovementReport {
             predicted_marker_m: array(&predicted.coords),
@@ -204,6 +215,7 @@ impl Learner {
             gain: selection.gain,
             evaluations: selection.evaluations,
             selection_ms: proposal.selection_ms,
+            readings,
             seen,
             partition: selection.search.as_ref().map(|search| search.partition.clone()),
         };

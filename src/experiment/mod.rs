@@ -24,6 +24,7 @@ mod metrics;
 mod remarks;
 mod report;
 mod result;
+mod sight;
 mod streams;
 mod world;
 
@@ -45,6 +46,10 @@ pub use report::{
     StepReport,
 };
 pub use result::{JointModel, LearnerResult, MarkerModel, Model, OutlierReading, RunResult};
+pub use sight::{
+    CameraDescription, ChannelDescription, ChannelReading, CorrectionReport, PlaceReport, TargetDescription,
+};
+pub(crate) use sight::{channels, described};
 pub use streams::Stream;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};
 
@@ -179,7 +184,7 @@ impl Experiment {
             let (movement, update) = match proposal.zip(observation) {
                 Some((proposal, observation)) => {
                     let name = learner.description.name.clone();
-                    let learned = learner.learn(proposal, observation, &self.world);
+                    let learned = learner.learn(proposal, observation, &self.world, &self.description.channels);
                     let (movement, update) =
                         learned.map_err(|source| ExperimentError::Absorb { learner: name, source })?;
                     (Some(movement), update)

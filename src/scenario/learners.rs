@@ -42,6 +42,7 @@ impl LearnerSpec {
             estimator: self.estimator.name().to_owned(),
             policy: self.policy.name().to_owned(),
             stabilised: self.stabilising,
+            robust: false,
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use std::{fmt, sync::Arc};
 
+use nalgebra::Point3;
+
 use crate::model::{Pass, State};
 
 /// One kind of reading: what a model predicts for it, and how predictions differ from what was measured.
@@ -54,6 +56,16 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// Whether [`clearance`](Self::clearance) is ever told.
     fn has_view(&self) -> bool {
         false
+    }
+
+    /// Where a reading says that a target is, if it says so: the target and its origin, metres.
+    fn position(&self, reading: &[f64]) -> Option<(usize, Point3<f64>)> {
+        Some((self.target()?, Point3::from_slice(reading.get(..3)?)))
+    }
+
+    /// The camera and the target whose known points are in its picture, two equations each, if that is what is read.
+    fn sight(&self) -> Option<(usize, usize)> {
+        None
     }
 
     /// The target whose position this channel measures, if it does.
