@@ -27,6 +27,7 @@ pub const BUILTIN: &[Builtin] = builtins![
     "arm-6dof-camera",
     "hand-eye-6dof",
     "arm-6dof-pose-gears",
+    "arm-7dof-socket",
     "arm-12dof",
     "arm-12dof-no-prior",
     "arm-20dof",

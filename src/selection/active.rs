@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::{
-    Actions, Appraisal, Criterion, Movement, Policy, Search, Selection, SelectionError, Sight, Situation, Watch,
-    Weights, search::direct,
+    Actions, Appraisal, Criterion, Policy, Search, Selection, SelectionError, Sight, Situation, Watch, Weights,
+    search::direct, sockets::Values,
 };
 use crate::{
     estimation::Belief,
@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Minimises the A-criterion: over a box of joint limits by DIRECT, normalised to the unit cube; over a pool of
-/// recorded movements by trying every one.
+/// recorded movements by trying every one; where targets are held in sockets, by the best of many draws, polished.
 ///
 /// Where a head watches ([`watched`](Self::watched)), the first movement goes to the pose that is known to be visible,
 /// the gain is weighed by the chance of being seen, and misses are remembered.
@@ -44,6 +44,16 @@ pub enum Minimiser {
         /// How many configurations are evaluated.
         evaluations: usize,
     },
+}
+
+impl Minimiser {
+    /// Configurations evaluated at most.
+    fn evaluations(&self) -> usize {
+        match *self {
+            Self::Direct(settings) => settings.max_evaluations,
+            Self::Random { evaluations } | Self::Bayesian { evaluations } => evaluations,
+        }
+    }
 }
 
 impl Active {
@@ -160,7 +170,7 @@ impl Active {
             gain: Some(before - value),
             evaluations,
             search,
-            ..Selection::of(Movement { configuration, row: None })
+            ..Selection::plain(configuration)
         })
     }
 }
@@ -172,6 +182,22 @@ impl Policy for Active {
                 Some(beginning) => Ok(beginning),
                 None => self.search_box(situation, limits, rng),
             },
+            Actions::Sockets(sockets) => {
+                if let Some(beginning) = sockets.beginning() {
+                    return Ok(Selection::of(beginning.clone()));
+                }
+                let belief = situation.belief;
+                let (before, held) = (Criterion::new(belief, &self.weights)?.before(), sockets.held(belief));
+                let values = |held| -> Result<Values<'_>, SelectionError> {
+                    let criterion = Criterion::new(held, &self.weights)?;
+                    Ok(Box::new(move |postures| criterion.evaluate(postures)))
+                };
+                let pool = sockets.pool(belief, self.minimiser.evaluations(), rng);
+                let mut evaluations = 0;
+                let (movement, value) = sockets.best(belief, &held, &pool, &mut evaluations, values)?;
+                let (criterion, gain) = (Some(value), Some(before - value));
+                Ok(Selection { criterion, gain, evaluations, ..Selection::of(movement) })
+            }
             Actions::Pool(pool) => {
                 let criterion = Criterion::new(situation.belief, &self.weights)?;
                 let candidates: Vec<&[f64]> = pool.iter().map(|movement| movement.configuration.as_slice()).collect();

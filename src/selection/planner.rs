@@ -68,10 +68,10 @@ impl Default for Planning {
 /// Over a pool of recorded movements every one is tried, and the best is taken.
 #[derive(Clone, Debug)]
 pub struct Planner {
-    weights: Weights,
-    search: Settings,
-    planning: Planning,
-    workspace: Workspace,
+    pub(super) weights: Weights,
+    pub(super) search: Settings,
+    pub(super) planning: Planning,
+    pub(super) workspace: Workspace,
     watch: Option<Watch>,
 }
 
@@ -133,7 +133,7 @@ impl Planner {
         let configuration = poses.remove(index);
         let chosen = limits.to_unit(&configuration);
         Ok(Selection {
-            movement: Movement { configuration, row: None },
+            movement: Movement::to(configuration),
             criterion: Some(value),
             gain: Some(outlook.before() - value),
             evaluations,
@@ -259,7 +259,7 @@ impl<'a> Scene<'a> {
 }
 
 impl Policy for Planner {
-    fn select(&self, situation: &Situation<'_>, _rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+    fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
         match situation.actions {
             Actions::Pool(pool) => {
                 let mut belief = situation.belief.clone();
@@ -268,6 +268,10 @@ impl Policy for Planner {
                 let candidates: Vec<&[f64]> = pool.iter().map(|movement| movement.configuration.as_slice()).collect();
                 Selection::of_pool(pool, outlook.evaluate(&candidates), outlook.before())
             }
+            Actions::Sockets(sockets) => match sockets.beginning() {
+                Some(beginning) => Ok(Selection::of(beginning.clone())),
+                None => self.select_in_sockets(situation.belief, sockets, rng),
+            },
             Actions::Box(limits) => match Watch::beginning(self.watch.as_ref(), situation.history) {
                 Some(beginning) => Ok(beginning),
                 None => self.select_in_box(situation, limits),

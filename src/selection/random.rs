@@ -6,7 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use super::{Actions, Appraisal, Criterion, Movement, Policy, Selection, SelectionError, Situation, Watch, Weights};
 use crate::kinematics::JointBox;
 
-/// Draws uniformly inside the limits, or from what is left of a pool (which shuffles it).
+/// Draws uniformly inside the limits, or from what is left of a pool (which shuffles it); where targets are held in sockets,
+/// inside the limits and then projected into one of them.
 ///
 /// Where a head watches, it is told as much as every learner, and ignores it: the paper's random movements. What a
 /// movement would have taught it tells by the A-criterion.
@@ -26,7 +27,11 @@ impl Random {
 impl Policy for Random {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
         let movement = match situation.actions {
-            Actions::Box(limits) => Movement { configuration: limits.draw(rng), row: None },
+            Actions::Box(limits) => Movement::to(limits.draw(rng)),
+            Actions::Sockets(sockets) => match sockets.beginning() {
+                Some(beginning) => beginning.clone(),
+                None => sockets.draw(situation.belief, rng)?,
+            },
             Actions::Pool(pool) if pool.is_empty() => return Err(SelectionError::Exhausted),
             Actions::Pool(pool) => pool[rng.random_range(0..pool.len())].clone(),
         };

@@ -18,7 +18,7 @@ mod loss;
 mod observation;
 mod rig;
 
-pub use channel::Channel;
+pub use channel::{Channel, Occasion};
 pub use head::{Gaze, Head};
 pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
 pub use loss::{Graduated, Loss};
@@ -34,5 +34,9 @@ channel::channels! {
     /// Where the points of a target are in a camera's picture.
     pixels::Pixels,
     /// How far a target is from a fixed point.
-    distance::Distance,
+    distance::Distance;
+    /// That a target is held in a socket.
+    socket::Socket,
+    /// How far two sockets are apart.
+    spacing::Spacing,
 }

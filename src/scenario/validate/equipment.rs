@@ -148,7 +148,7 @@ impl Check<'_> {
     }
 
     /// How well a place is known; `None` if it is known exactly, so that it is not learned.
-    fn known<T>(&mut self, key: &str, raw: &raw::Known, spanned: &Spanned<T>) -> Option<Known> {
+    pub(super) fn known<T>(&mut self, key: &str, raw: &raw::Known, spanned: &Spanned<T>) -> Option<Known> {
         let field = |field: &str| format!("{key}.{field}");
         if let Some(within) = &raw.anywhere_m {
             if raw.known_to_m.is_some() || raw.known_to_deg.is_some() {
@@ -165,7 +165,12 @@ impl Check<'_> {
         Some(Known::Within { length_m, angle_rad: angle.unwrap_or(EXACTLY), other: EXACTLY })
     }
 
-    fn free_name<'a>(&mut self, key: &str, name: &Spanned<String>, mut taken: impl Iterator<Item = &'a str>) {
+    pub(super) fn free_name<'a>(
+        &mut self,
+        key: &str,
+        name: &Spanned<String>,
+        mut taken: impl Iterator<Item = &'a str>,
+    ) {
         if name.get_ref().is_empty() || taken.any(|other| other == name.get_ref()) {
             let what = format!("{:?} is empty or taken", name.get_ref());
             self.problem(name.span(), key, what, "give each a name of its own");

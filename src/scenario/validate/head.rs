@@ -79,7 +79,7 @@ impl Check<'_> {
     }
 
     /// The positions of a pose (degrees or metres as the kind of each joint says), within the limits.
-    fn visible_pose(&mut self, key: &str, raw: &Spanned<Vec<f64>>, robot: &Robot) -> Option<Vec<f64>> {
+    pub(super) fn visible_pose(&mut self, key: &str, raw: &Spanned<Vec<f64>>, robot: &Robot) -> Option<Vec<f64>> {
         let (given, wanted) = (raw.get_ref(), robot.state.joints.len());
         if given.len() != wanted {
             let what = format!("it has {} positions, the robot {wanted} joints", given.len());
