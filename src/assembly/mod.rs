@@ -1,13 +1,13 @@
 //! From a scenario and a seed to an experiment: everything that is drawn is drawn here.
 
 mod learners;
+mod sockets;
 
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use rand::{RngExt, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 
 use crate::{
     design::{Problem, Stretch, movements_by_counting},
@@ -26,8 +26,6 @@ use crate::{
 
 /// Configurations over which the prediction error is judged in a simulated world.
 const EVALUATION_SIZE: usize = 200;
-/// Postures of every held-out socket.
-const HELD_OUT_SIZE: usize = 30;
 /// Configurations over which a learner judges itself.
 const WORKSPACE_SIZE: usize = 32;
 
@@ -145,34 +143,6 @@ impl Scenario {
             }
             WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, *held_out),
         }
-    }
-
-    /// What learners may do in a simulated world.
-    fn actions(&self) -> Actions {
-        let Robot { limits, sockets, .. } = &self.robot;
-        if sockets.is_empty() {
-            return Actions::Box(limits.clone());
-        }
-        Actions::Sockets(Sockets::new(limits.clone(), sockets.iter().map(|socket| socket.posture.clone()).collect()))
-    }
-
-    /// What is known of a simulated robot's equipment before any movement: with an error that is drawn by its σ.
-    fn beforehand(&self, seed: u64) -> Option<Observation> {
-        let mut rng = Stream::Beforehand.rng(seed);
-        let v: Vec<f64> = (0..self.rig.equations()).map(|_| rng.sample(StandardNormal)).collect();
-        self.rig.beforehand(&self.robot.state, &v)
-    }
-
-    /// Postures that truly hold the target in every socket that is held out, anywhere within the limits.
-    fn held_out(&self, seed: u64) -> Vec<HeldOut> {
-        let mut rng = Stream::HeldOutSockets.rng(seed);
-        let Robot { state, limits, held_out_sockets, .. } = &self.robot;
-        let of = |socket: &SocketSpec| {
-            let manifold = Manifold::new(state, socket.target, socket.at, limits);
-            let postures = (0..HELD_OUT_SIZE).filter_map(|_| manifold.draw(&mut rng)).collect();
-            HeldOut { target: socket.target, postures }
-        };
-        held_out_sockets.iter().map(of).collect()
     }
 
     fn workspace(&self, configurations: Vec<Vec<f64>>) -> Workspace {

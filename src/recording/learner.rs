@@ -13,6 +13,7 @@ use super::{
     partition::{self, Slice},
     posture::{ArmLook, Posture, bare},
     rows::Rows,
+    sockets::sockets,
     solid::{drum, quaternion, single, solid},
     stage::Stage,
     uncertainty::{Drawn, Uncertainty},
@@ -113,6 +114,9 @@ impl LearnerEntities {
             .with_radii([rerun::Radius::new_scene_units(1e-3)])
             .with_show_labels(true);
         rows.always(&self.entity("name"), &[&name]);
+        if let Some(points) = sockets(&description.sockets) {
+            rows.always(&self.entity("sockets"), &[&points]);
+        }
         if let Some(head) = &description.head {
             rows.always(&self.entity("head/frustum"), &[&head::frustum(head)]);
         }

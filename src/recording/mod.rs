@@ -79,6 +79,7 @@ mod partition;
 mod posture;
 mod recorder;
 mod rows;
+mod sockets;
 mod solid;
 mod stage;
 mod target;
