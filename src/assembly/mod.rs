@@ -11,16 +11,11 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::{
     design::{Problem, Stretch, movements_by_counting},
-    experiment::{
-        Agent, Change, Description, Evaluation, Experiment, HeadDescription, HeldOut, ModelReport, Stream, World,
-    },
+    experiment::{Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World},
     kinematics::{Joint, JointBox},
-    model::{Block, Element, Layout, Manifold, State, Workspace, anywhere},
-    scenario::{
-        ErrorDraw, InitialError, Known, LearnerSpec, Measurements, Robot, Scenario, ScenarioError, SocketSpec,
-        WorldSpec,
-    },
-    selection::{Actions, Movement, Sockets, Watch, Weights},
+    model::{Block, Element, Layout, State, Workspace, anywhere},
+    scenario::{ErrorDraw, InitialError, Known, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
+    selection::{Actions, Movement, Watch, Weights},
     sensing::Observation,
 };
 
