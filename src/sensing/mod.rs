@@ -1,6 +1,7 @@
 //! What is measured after a movement, and with what noise.
 //!
 //! * [`Channel`]: one kind of reading, whitened at the source; the list below names all there are.
+//! * [`Occasion`]: when a channel reads: always, while a target is held in a socket, or before any movement.
 //! * [`Rig`]: the channels of a robot together, and what they say at one posture.
 //! * [`Observation`]: the readings of one movement; a channel may have none.
 //! * [`Keys`]: what a scenario may say of a sensor; [`Equipment`]: what it can name.
