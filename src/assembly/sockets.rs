@@ -46,10 +46,15 @@ impl Scenario {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Isometry3, Vector3};
+
     use crate::{
-        experiment::{Agent, Event, Executed, NoiseSequence, World},
-        scenario::{Scenario, builtin},
+        design::movements_by_counting,
+        experiment::{Agent, Event, Executed, Gauge, NoiseSequence, World, location_m},
+        model::State,
+        scenario::{Robot, Scenario, builtin},
         selection::Movement,
+        sensing::{Occasion, Rig},
     };
 
     fn scenario() -> Scenario {
@@ -140,6 +145,27 @@ mod tests {
         assert!((0.7..1.4).contains(&squares), "{squares}");
         assert_eq!(scenario.beforehand(3), scenario.beforehand(3));
         assert_eq!(builtin("arm-6dof").expect("built in").beforehand(3), None);
+    }
+
+    /// Where the robot stands nobody can tell: moved with its sockets it is no error. How large it is the known distance tells alone.
+    #[test]
+    fn where_the_whole_stands_is_a_gauge_and_its_size_is_none() {
+        let scenario = scenario();
+        let Robot { state, layout, limits, .. } = &scenario.robot;
+        let gauge = Gauge::new(state, layout, &scenario.rig, limits);
+        let motion = Isometry3::new(Vector3::new(0.02, -0.01, 0.03), Vector3::new(0.05, 0.02, -0.04));
+        let mut moved = State { base: motion, ..state.clone() }.measured().into_owned();
+        moved.sockets.iter_mut().for_each(|socket| *socket = motion * *socket);
+        let aligned = gauge.aligned(state, &moved);
+        let error = |truth: &State| location_m(&moved, truth, layout).expect("lines");
+        assert!(error(state) > 1e-2 && error(&aligned) < 1e-6, "{} {}", error(state), error(&aligned));
+        assert!(gauge.undetermined() >= 6);
+        let channels = scenario.rig.channels().iter();
+        let without: Vec<_> = channels.filter(|it| it.occasion() != Occasion::Beforehand).cloned().collect();
+        let blind = Gauge::new(state, layout, &Rig::new(without), limits);
+        assert_eq!(blind.undetermined(), gauge.undetermined() + 1, "its size");
+        let counted = movements_by_counting(state, layout, &scenario.rig, limits);
+        assert_eq!(counted, (gauge.rank() - 1).div_ceil(3), "three equations each, and the distance");
     }
 
     /// Nothing moves what is in a held-out socket, by the truth.
