@@ -16,7 +16,7 @@ use crate::{
     estimation::{Belief, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
     model::{Hand, State, Workspace},
-    selection::{SelectionError, Weights},
+    selection::{Movement, SelectionError, Weights},
     sensing::Observation,
 };
 
@@ -167,16 +167,17 @@ impl Learner {
         Some(self.agent.appraise(standpoint, &centre).ok()?.gain)
     }
 
-    /// Takes in what was seen after a proposal was carried out.
+    /// Takes in the movement by which a proposal was carried out, and what was seen after it.
     pub(super) fn learn(
         &mut self,
         proposal: Proposal,
+        movement: Movement,
         observation: Observation,
         world: &World,
         channels: &[ChannelDescription],
     ) -> Result<(MovementReport, Update), AbsorbError> {
         let truth = world.truth();
-        let movement = proposal.selection.movement.clone();
+        let row = movement.row;
         let configuration = movement.configuration.clone();
         let before = self.agent.standpoint().to_owned();
         let predicted = before.belief.state.marker_at(&configuration);
@@ -209,7 +210,8 @@ impl Learner {
             estimated_skeleton_m: arrays(&shown(&self.belief().state, truth).skeleton(&configuration)),
             true_skeleton_m: truth.map(|truth| arrays(&truth.skeleton(&configuration))),
             gaze: gaze(world, &configuration),
-            row: selection.movement.row,
+            row,
+            socket: None,
             configuration,
             criterion: selection.criterion,
             gain: selection.gain,

@@ -62,6 +62,9 @@ pub struct Description {
     /// Whether the place of the robot's base in the frame of the measurements is learned.
     #[serde(default)]
     pub base_learned: bool,
+    /// The sockets in which a target is held; those that learners may use first, in the order of their numbers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sockets: Vec<SocketDescription>,
     /// What the robot is drawn as; null for one that is drawn as its own joints and links.
     #[serde(default)]
     pub body: Option<Body>,
@@ -75,6 +78,27 @@ pub enum Body {
     /// A human figure of the arm's proportions, whose right arm it is: x ahead, y to the left, z up. Joints whose names
     /// begin with `torso` or `chest` carry its trunk.
     Humanoid,
+}
+
+/// A socket as the scenario describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct SocketDescription {
+    /// Its name, among those of one place.
+    pub name: String,
+    /// The place where it stands, with others; null if there is but one place.
+    pub place: Option<String>,
+    /// Where it truly is, metres; null where no truth is known.
+    pub at_m: Option<[f64; 3]>,
+    /// Whether it is held out: nobody learns from it, and the scatter of the predicted target there is judged.
+    pub held_out: bool,
+}
+
+impl SocketDescription {
+    /// Its place and its name.
+    pub fn label(&self) -> String {
+        self.place.as_ref().map_or_else(|| self.name.clone(), |place| format!("{place}/{}", self.name))
+    }
 }
 
 /// A joint as the scenario describes it.
@@ -145,6 +169,9 @@ pub struct MovementReport {
     pub configuration: Vec<f64>,
     /// The row of the recorded data set; null in a simulated world.
     pub row: Option<usize>,
+    /// The socket in which a target was held, by its place, if it has one, and its name; null without sockets.
+    #[serde(default)]
+    pub socket: Option<String>,
     /// Where the head that watches looks then; null without a head.
     pub gaze: Option<GazeReport>,
     /// The marker as predicted before the measurement, metres.

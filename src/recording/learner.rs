@@ -17,6 +17,7 @@ use super::{
     readings::Readings,
     rows::Rows,
     sight,
+    sockets::sockets,
     solid::{drum, quaternion, single, solid},
     stage::Stage,
     uncertainty::{Drawn, Uncertainty},
@@ -147,6 +148,9 @@ impl LearnerEntities {
                 .with_radii([rerun::Radius::new_scene_units(1e-3)])
                 .with_show_labels(true);
             rows.always(&self.entity(path), &[&name]);
+        }
+        if let Some(points) = sockets(&description.sockets) {
+            rows.always(&self.entity("sockets"), &[&points]);
         }
         let name = description.learners.get(self.index).map_or("", |learner| learner.name.as_str());
         self.readings.begin(rows, name, self.colour, description);

@@ -90,6 +90,7 @@ mod recorder;
 mod room;
 mod rows;
 mod sight;
+mod sockets;
 mod solid;
 mod stage;
 mod target;

@@ -72,12 +72,36 @@ pub trait Channel: fmt::Debug + Send + Sync {
     fn target(&self) -> Option<usize> {
         None
     }
+
+    /// When it has a reading.
+    fn occasion(&self) -> Occasion {
+        Occasion::Always
+    }
 }
 
-/// Lists the channels: a module and its type each. The module's name is the channel's name in scenarios.
+/// When a channel has a reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Occasion {
+    /// After every movement of which it sees what it measures.
+    Always,
+    /// After a movement that holds a target in a socket.
+    Held {
+        /// The socket.
+        socket: usize,
+        /// The target.
+        target: usize,
+    },
+    /// Once, before any movement: what is known of the equipment.
+    Beforehand,
+}
+
+/// Lists the channels: a module and its type each. The module's name is the channel's name in scenarios. Those behind
+/// the semicolon come with what stands beside the robot, and no sensor is written for them.
 macro_rules! channels {
-    ($($(#[$doc:meta])* $module:ident::$Type:ident),* $(,)?) => {
+    ($($(#[$doc:meta])* $module:ident::$Type:ident),* $(,)?;
+     $($(#[$beside_doc:meta])* $beside:ident::$Beside:ident),* $(,)?) => {
         $(mod $module; pub use $module::$Type;)*
+        $(mod $beside; pub use $beside::$Beside;)*
 
         /// The names of all channels, as scenarios write them.
         pub const CHANNELS: &[&str] = &[$(stringify!($module)),*];
@@ -102,7 +126,7 @@ macro_rules! channels {
         #[cfg(test)]
         pub(crate) fn examples(rng: &mut rand_chacha::ChaCha8Rng, state: &crate::model::State)
             -> Vec<std::sync::Arc<dyn Channel>> {
-            vec![$(std::sync::Arc::new($Type::example(rng, state))),*]
+            vec![$(std::sync::Arc::new($Type::example(rng, state)),)* $(std::sync::Arc::new($Beside::example(rng, state))),*]
         }
     };
 }
