@@ -102,12 +102,12 @@ impl<'a> Manifold<'a> {
             if slide.amax() < STILL {
                 break;
             }
-            let shares = [1.0, 0.5, 0.25, 0.125];
-            let trials = shares.iter().filter_map(|share| {
-                let moved = self.within_vector(&positions, &(&slide * *share));
+            let shares = (0..20).map(|halvings| 0.5_f64.powi(halvings));
+            let mut trials = shares.filter_map(|share| {
+                let moved = self.within_vector(&positions, &(&slide * share));
                 self.project(&moved).filter(|next| distance(next) < distance(&positions))
             });
-            let Some(next) = trials.into_iter().next() else { break };
+            let Some(next) = trials.next() else { break };
             positions = next;
         }
         Some(positions)
@@ -158,22 +158,21 @@ impl<'a> Manifold<'a> {
         along.unwrap_or_else(|| DVector::zeros(way.len()))
     }
 
-    /// A step by the free joints alone, all of them at first; those that it presses against their limits are held.
+    /// A step by the free joints alone, all of them at first; those that it presses against their limits are held, the one that
+    /// presses most first: without it others may no longer press.
     fn unpressed(&self, positions: &[f64], step: impl Fn(&[bool]) -> Option<DVector<f64>>) -> Option<DVector<f64>> {
         let mut free = vec![true; positions.len()];
         loop {
             let found = step(&free)?;
-            let mut all = true;
-            for (joint, position) in positions.iter().enumerate() {
-                let presses = (*position <= self.limits.lower(joint) && found[joint] < 0.0)
-                    || (*position >= self.limits.upper(joint) && found[joint] > 0.0);
-                if presses && free[joint] {
-                    free[joint] = false;
-                    all = false;
-                }
-            }
-            if all {
-                return Some(found);
+            let presses = |joint: &usize| {
+                let (position, step) = (positions[*joint], found[*joint]);
+                (position <= self.limits.lower(*joint) && step < 0.0)
+                    || (position >= self.limits.upper(*joint) && step > 0.0)
+            };
+            let pressing = (0..positions.len()).filter(|joint| free[*joint] && presses(joint));
+            match pressing.max_by(|a, b| found[*a].abs().total_cmp(&found[*b].abs())) {
+                Some(joint) => free[joint] = false,
+                None => return Some(found),
             }
         }
     }
