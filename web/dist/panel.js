@@ -25,6 +25,15 @@ export class PanelHandle {
         }
     }
     /**
+     * Does what is due between two frames of a panel that is drawn sparingly, and returns after how many seconds it is to
+     * be called again, if nothing happens before; nothing if all is done in frames.
+     * @returns {number | undefined}
+     */
+    attend() {
+        const ret = wasm.panelhandle_attend(this.__wbg_ptr);
+        return ret[0] === 0 ? undefined : ret[1];
+    }
+    /**
      * The elements that the page is to have, as JSON; nothing if they are those that it was given last.
      * @returns {string | undefined}
      */
@@ -91,13 +100,14 @@ export class PanelHandle {
         wasm.panelhandle_release(this.__wbg_ptr);
     }
     /**
-     * Draws on a canvas from now on.
+     * Draws on a canvas from now on; sparingly where that is slow.
      * @param {HTMLCanvasElement} canvas
      * @param {Function} command
+     * @param {boolean} slow
      * @returns {Promise<void>}
      */
-    start(canvas, command) {
-        const ret = wasm.panelhandle_start(this.__wbg_ptr, canvas, command);
+    start(canvas, command, slow) {
+        const ret = wasm.panelhandle_start(this.__wbg_ptr, canvas, command, slow);
         return ret;
     }
 }
@@ -1373,22 +1383,22 @@ function __wbg_get_imports() {
             return ret;
         },
         __wbindgen_generic_0000000000000001: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 900, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 916, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
             const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___wasm_bindgen_2e5cde4e98ad3f85___JsValue__core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsError___true_);
             return ret;
         },
         __wbindgen_generic_0000000000000002: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 518, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 534, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
             const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true_);
             return ret;
         },
         __wbindgen_generic_0000000000000003: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 518, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__11);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 534, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__12);
             return ret;
         },
         __wbindgen_generic_0000000000000004: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 521, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 537, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
             const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsValue___true_);
             return ret;
         },
@@ -1458,8 +1468,8 @@ function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2
     wasm.wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true_(arg0, arg1, arg2);
 }
 
-function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__11(arg0, arg1, arg2) {
-    wasm.wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__11(arg0, arg1, arg2);
+function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__12(arg0, arg1, arg2) {
+    wasm.wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___js_sys_2aa85d35161d4623___Array______true__12(arg0, arg1, arg2);
 }
 
 function wasm_bindgen_2e5cde4e98ad3f85___convert__closures_____invoke___wasm_bindgen_2e5cde4e98ad3f85___JsValue__core_12f89f2d8a73214f___result__Result_____wasm_bindgen_2e5cde4e98ad3f85___JsError___true_(arg0, arg1, arg2) {
