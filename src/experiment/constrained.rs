@@ -202,3 +202,24 @@ fn several_proposals_follow_one_another() {
         assert_eq!(constraints.violation(Some(&configuration), &anew[0].selection.movement.configuration), None);
     }
 }
+
+/// Postures that hold a target in a socket are bound too; what is carried out is the nearest that truly holds it there.
+#[test]
+fn postures_in_sockets_are_bound_too() {
+    let scenario = bound("arm-7dof-socket", "[constraints]\nlimits_deg = { panda_joint3 = [-30.0, 30.0] }\n");
+    let names = ["global", "random", "rls:active"].map(str::to_owned);
+    let mut experiment = scenario.experiment(1003, Some(&names)).expect("starts");
+    for step in 0..8 {
+        let report = experiment.step().expect("a step");
+        for learner in &report.learners {
+            let Some(movement) = &learner.movement else { panic!("{}: {:?}", learner.name, learner.failure) };
+            let angle = movement.configuration[2].to_degrees();
+            assert!(angle.abs() < 32.0, "step {step}, {}: {angle} degrees", learner.name);
+        }
+    }
+    let text = format!("{}\n[constraints]\nminimum_height_m = 0.5\n", scenario.source);
+    let text = text.replacen("[constraints]\nlimits_deg = { panda_joint3 = [-30.0, 30.0] }\n", "", 1);
+    let error =
+        Scenario::parse("low.toml", &text, &|_| Err("no data".to_owned())).expect_err("excludes the beginnings");
+    assert!(error.to_string().contains("with which socket 0 begins"), "{error}");
+}

@@ -128,6 +128,7 @@ impl Active {
         &self,
         belief: &Belief,
         sockets: &Sockets,
+        scope: &Scope<'_>,
         rng: &mut ChaCha8Rng,
     ) -> Result<Selection, SelectionError> {
         if let Some(beginning) = sockets.beginning() {
@@ -138,9 +139,9 @@ impl Active {
             let criterion = Criterion::new(held, &self.weights)?;
             Ok(Box::new(move |postures| criterion.evaluate(postures)))
         };
-        let pool = sockets.pool(belief, self.minimiser.evaluations(), rng);
+        let pool = sockets.pool(belief, scope, self.minimiser.evaluations(), rng);
         let mut evaluations = 0;
-        let (movement, value) = sockets.best(belief, &held, &pool, &mut evaluations, values)?;
+        let (movement, value) = sockets.best((belief, scope), &held, &pool, &mut evaluations, values)?;
         let (criterion, gain) = (Some(value), Some(before - value));
         Ok(Selection { criterion, gain, evaluations, ..Selection::of(movement) })
     }
@@ -213,7 +214,7 @@ impl Active {
 impl Policy for Active {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
         if let Actions::Sockets(sockets) = situation.actions {
-            return self.select_in_sockets(situation.belief, sockets, rng);
+            return self.select_in_sockets(situation.belief, sockets, &Scope::of(situation)?, rng);
         }
         let scope = Scope::of(situation)?;
         if let Some(beginning) = Watch::beginning(self.watch.as_ref(), situation.history, &scope)? {

@@ -9,7 +9,7 @@ use std::{mem::replace, sync::Arc};
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Movement, Outlook, Planner, Selection, SelectionError, Sockets,
+    Movement, Outlook, Planner, Scope, Selection, SelectionError, Sockets,
     plan::{Plan, condition},
     sockets::Values,
 };
@@ -58,11 +58,12 @@ impl Planner {
         &self,
         belief: &Belief,
         sockets: &Sockets,
+        scope: &Scope<'_>,
         rng: &mut ChaCha8Rng,
     ) -> Result<Selection, SelectionError> {
         let mut now = belief.clone();
         now.truncate(self.planning.considered);
-        let pool = sockets.pool(&now, self.search.max_evaluations, rng);
+        let pool = sockets.pool(&now, scope, self.search.max_evaluations, rng);
         let mut evaluations = 0;
         let mut ahead = Ahead { after: now.clone(), now, movements: Vec::new() };
         let horizon = self.horizon(&ahead.now, &pool)?;
@@ -95,7 +96,8 @@ impl Planner {
         };
         let first = ahead.remove(first);
         let without = sockets.held(&ahead.after);
-        let (movement, _) = sockets.best(&ahead.now, &without, &[first], &mut evaluations, |held| self.values(held))?;
+        let (movement, _) =
+            sockets.best((&ahead.now, scope), &without, &[first], &mut evaluations, |held| self.values(held))?;
         let value = sockets.evaluate(&held, std::slice::from_ref(&movement), |held| self.values(held))?[0];
         let (criterion, gain) = (Some(value), Some(self.outlook(&ahead.now)?.before() - value));
         Ok(Selection { criterion, gain, evaluations, ..Selection::of(movement) })

@@ -187,7 +187,7 @@ pub enum SelectionError {
     #[error("no configuration is feasible: {0}")]
     Infeasible(#[from] Infeasible),
     /// No socket can be reached.
-    #[error("no posture within the limits brings a target to its socket, as far as is believed")]
+    #[error("no posture within the limits and constraints brings a target to its socket, as far as is believed")]
     OutOfReach,
     /// No configuration has a finite criterion.
     #[error("no configuration has a finite criterion: the belief has diverged")]

@@ -328,7 +328,7 @@ impl Policy for Planner {
         if let Actions::Sockets(sockets) = situation.actions {
             return match sockets.beginning() {
                 Some(beginning) => Ok(Selection::of(beginning.clone())),
-                None => self.select_in_sockets(situation.belief, sockets, rng),
+                None => self.select_in_sockets(situation.belief, sockets, &Scope::of(situation)?, rng),
             };
         }
         let scope = Scope::of(situation)?;

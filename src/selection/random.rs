@@ -32,7 +32,7 @@ impl Policy for Random {
         if let Actions::Sockets(sockets) = situation.actions {
             return Ok(Selection::of(match sockets.beginning() {
                 Some(beginning) => beginning.clone(),
-                None => sockets.draw(situation.belief, rng)?,
+                None => sockets.draw(situation.belief, &Scope::of(situation)?, rng)?,
             }));
         }
         let scope = Scope::of(situation)?;

@@ -6,7 +6,7 @@
 
 use rand::{Rng, RngExt};
 
-use super::{Movement, SelectionError};
+use super::{Movement, Scope, SelectionError};
 use crate::{
     estimation::Belief,
     kinematics::JointBox,
@@ -72,24 +72,36 @@ impl Sockets {
         Movement { configuration, row: None, socket }
     }
 
-    /// A uniform draw of the joint box, projected into a socket chosen at random.
-    pub(super) fn draw<R: Rng + ?Sized>(&self, belief: &Belief, rng: &mut R) -> Result<Movement, SelectionError> {
+    /// A uniform draw of the joint box, projected into a socket chosen at random, and within a scope.
+    pub(super) fn draw<R: Rng + ?Sized>(
+        &self,
+        belief: &Belief,
+        scope: &Scope<'_>,
+        rng: &mut R,
+    ) -> Result<Movement, SelectionError> {
         let first = rng.random_range(0..self.count.max(1));
         let sockets = (0..self.count).map(|index| (first + index) % self.count);
         let drawn = sockets.into_iter().find_map(|socket| {
-            let configuration = self.manifold(belief, socket)?.draw(rng)?;
+            let manifold = self.manifold(belief, socket)?;
+            let configuration = drawn_within(&manifold, scope, rng)?;
             Some(Movement { configuration, row: None, socket: Some(socket) })
         });
         drawn.ok_or(SelectionError::OutOfReach)
     }
 
-    /// So many draws, in all sockets in turn; fewer where a socket is out of reach.
-    pub(super) fn pool<R: Rng + ?Sized>(&self, belief: &Belief, count: usize, rng: &mut R) -> Vec<Movement> {
+    /// So many draws within a scope, in all sockets in turn; fewer where a socket is out of reach.
+    pub(super) fn pool<R: Rng + ?Sized>(
+        &self,
+        belief: &Belief,
+        scope: &Scope<'_>,
+        count: usize,
+        rng: &mut R,
+    ) -> Vec<Movement> {
         let mut pool = Vec::with_capacity(count);
         for socket in 0..self.count {
             let Some(manifold) = self.manifold(belief, socket) else { continue };
             for _ in 0..count.div_ceil(self.count) {
-                let Some(configuration) = manifold.draw(rng) else { break };
+                let Some(configuration) = drawn_within(&manifold, scope, rng) else { break };
                 pool.push(Movement { configuration, row: None, socket: Some(socket) });
             }
         }
@@ -124,7 +136,7 @@ impl Sockets {
     /// manifolds are, and `held` what movements in each socket are valued by.
     pub(super) fn best<'b>(
         &self,
-        belief: &Belief,
+        (belief, scope): (&Belief, &Scope<'_>),
         held: &'b [Belief],
         pool: &[Movement],
         evaluations: &mut usize,
@@ -145,7 +157,7 @@ impl Sockets {
                 let values = values(&held[socket])?;
                 for _ in 0..TANGENTS {
                     let (configuration, lower) =
-                        along_tangent(&manifold, &movement.configuration, value, evaluations, &values);
+                        along_tangent((&manifold, scope), &movement.configuration, value, evaluations, &values);
                     (movement.configuration, value) = (configuration, lower);
                 }
             }
@@ -155,9 +167,16 @@ impl Sockets {
     }
 }
 
-/// A better posture of the manifold near this one, and its value; this one, where there is none.
+/// Draws on a manifold before none within a scope is believed in.
+const PATIENCE: usize = 100;
+
+fn drawn_within<R: Rng + ?Sized>(manifold: &Manifold<'_>, scope: &Scope<'_>, rng: &mut R) -> Option<Vec<f64>> {
+    (0..PATIENCE).map_while(|_| manifold.draw(rng)).find(|posture| scope.is_feasible(posture))
+}
+
+/// A better posture of the manifold near this one and within the scope, and its value; this one, where there is none.
 fn along_tangent(
-    manifold: &Manifold<'_>,
+    (manifold, scope): (&Manifold<'_>, &Scope<'_>),
     start: &[f64],
     value: f64,
     evaluations: &mut usize,
@@ -169,7 +188,7 @@ fn along_tangent(
         for (x, along) in point.iter().zip(tangent.column_iter()) {
             posture.iter_mut().zip(along.iter()).for_each(|(q, along)| *q += REACH * (2.0 * x - 1.0) * along);
         }
-        manifold.project(&posture)
+        manifold.project(&posture).filter(|posture| scope.is_feasible(posture))
     };
     let evaluate = |points: &[Vec<f64>]| {
         let postures: Vec<Option<Vec<f64>>> = points.iter().map(at).collect();

@@ -264,6 +264,8 @@ pub struct Smoother {
     pub loss: Option<Loss>,
     pub outlier_fraction: Option<Spanned<f64>>,
     pub outlier_spread: Option<Spanned<f64>>,
+    /// Also written `sigma = "unknown"`.
+    #[serde(alias = "sigma")]
     pub noise: Option<NoiseKnowledge>,
 }
 

@@ -48,6 +48,12 @@ impl Check<'_> {
             let what = format!("they exclude the pose that is known to be in view: {violation}");
             self.problem(spanned.span(), "constraints", what, "name another `visible_pose_deg`, or allow this one");
         }
+        for (index, socket) in robot.sockets.iter().enumerate() {
+            if let Some(violation) = constraints.violation(None, &socket.posture) {
+                let what = format!("they exclude the posture with which socket {index} begins: {violation}");
+                self.problem(spanned.span(), "constraints", what, "name another `posture_deg`, or allow this one");
+            }
+        }
         if let Err(nothing) = feasible(&constraints, world) {
             let mend = "widen it, or remove it";
             self.problem(spanned.span(), "constraints", format!("no posture is feasible: {nothing}"), mend);

@@ -136,15 +136,6 @@ impl Check<'_> {
         let learners = self.learners(&raw.learners, setting);
         let filter = self.filter("filter", &raw.filter);
         let constraints = raw.constraints.as_ref();
-        if let (Some(given), false) = (constraints, raw.sockets.is_empty()) {
-            let mend = "leave [constraints] out, or the sockets";
-            self.problem(
-                given.span(),
-                "constraints",
-                "postures that hold a target in a socket know no constraints yet",
-                mend,
-            );
-        }
         let constraints = constraints.and_then(|given| self.constraints(given, &robot, world.as_ref()));
         Some(Scenario {
             name: name.clone(),
