@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
-use super::{Channel, Equipment, KeyError, Keys};
+use super::{Apart, Channel, Equipment, KeyError, Keys};
 use crate::model::{Block, Frame, Pass, State};
 
 /// A camera's view of a target.
@@ -163,6 +163,11 @@ impl Channel for Pixels {
             }
         }
         true
+    }
+
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        let points = y.chunks_exact(2).zip(h.chunks_exact(2)).map(|(y, h)| (y[0] - h[0]).hypot(y[1] - h[1]));
+        Apart { pixels: Some(points.sum::<f64>() / (y.len() / 2).max(1) as f64), ..Apart::default() }
     }
 
     fn disturb(&self, reading: &mut [f64], v: &[f64]) {
