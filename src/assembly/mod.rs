@@ -17,7 +17,9 @@ use crate::{
     },
     kinematics::{Joint, JointBox},
     model::{Block, Correction, Element, Layout, State, Workspace, anywhere},
-    scenario::{ErrorDraw, HeldOut, InitialError, Known, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
+    scenario::{
+        ErrorDraw, HeldOut, InitialError, Known, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec,
+    },
     selection::{Actions, Movement, Watch, Weights},
     sensing::Observation,
 };

@@ -62,7 +62,8 @@ impl Measurements {
         for row in rows.by_ref() {
             let row = row?;
             if is_measured && row.observation.is_miss() {
-                let what = format!("line {}: nothing was measured, {} are empty", row.line, measurements.readings.join(", "));
+                let what =
+                    format!("line {}: nothing was measured, {} are empty", row.line, measurements.readings.join(", "));
                 return Err(TableError::new(what, "write numbers, or remove the line"));
             }
             for (title, label) in labels.iter().zip(row.labels) {
@@ -110,7 +111,8 @@ mod tests {
 
     #[test]
     fn reads_columns_by_name() {
-        let measurements = read(TEXT.split_inclusive('\n').take(2).collect::<String>().as_str(), &["b", "a"]).expect("a valid table");
+        let measurements =
+            read(TEXT.split_inclusive('\n').take(2).collect::<String>().as_str(), &["b", "a"]).expect("a valid table");
         assert_eq!(measurements.configurations, vec![vec![0.25, 0.5]]);
         assert_eq!(measurements.observations, [Observation::of([1.0, 2.0, 3.0])]);
     }
