@@ -124,6 +124,15 @@ fn joints_are_held_and_columns_have_units() {
     let csv = positions(&postures(9));
     let held = valid(&LEAST.replace("tip", "hold = [\"elbow_joint\", \"wrist_3_joint\"]\ntip"), &csv);
     assert_eq!((0..6).filter(|joint| !held.robot.layout.is_learned(*joint)).collect::<Vec<_>>(), [2, 5]);
+    // Of an axis its direction or its place alone.
+    let partly = valid(&LEAST.replace("tip", "hold = [\"elbow_joint.direction\", \"wrist_1_joint.point\"]\ntip"), &csv);
+    let deviations = partly.prior.standard_deviations(&partly.robot.layout);
+    let of = |joint: usize| partly.robot.layout.block(Block::Axis(joint)).expect("learned").map(|k| deviations[k]);
+    assert_eq!(of(1).collect::<Vec<_>>(), [0.005, 0.005, 0.01, 0.01]);
+    assert_eq!(of(2).collect::<Vec<_>>(), [0.005, 0.005, 1e-6, 1e-6]);
+    assert_eq!(of(3).collect::<Vec<_>>(), [1e-6, 1e-6, 0.01, 0.01]);
+    let mut experiment = partly.experiment(1, Some(&["global".to_owned()])).expect("starts");
+    (0..6).for_each(|_| assert!(experiment.step().is_ok()));
     // The first joint in degrees.
     let in_degrees: Vec<String> = csv
         .lines()
