@@ -63,6 +63,12 @@ pub trait Channel: fmt::Debug + Send + Sync {
         Some((self.target()?, Point3::from_slice(reading.get(..3)?)))
     }
 
+    /// How far two readings are apart, for whoever reads of it: nothing of what is known to be 0.
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        let _ = (y, h);
+        Apart::default()
+    }
+
     /// The camera and the target whose known points are in its picture, two equations each, if that is what is read.
     fn sight(&self) -> Option<(usize, usize)> {
         None
@@ -76,6 +82,24 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// When it has a reading.
     fn occasion(&self) -> Occasion {
         Occasion::Always
+    }
+}
+
+/// How far two readings of a channel are apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Apart {
+    /// Metres, of what is a place or a length.
+    pub length_m: Option<f64>,
+    /// Radians, of what is a rotation.
+    pub angle_rad: Option<f64>,
+    /// Pixels, mean over the points of a picture.
+    pub pixels: Option<f64>,
+}
+
+impl Apart {
+    pub(super) fn lengths(y: &[f64], h: &[f64]) -> Self {
+        let squares: f64 = y.iter().zip(h).map(|(y, h)| (y - h) * (y - h)).sum();
+        Self { length_m: Some(squares.sqrt()), ..Self::default() }
     }
 }
 

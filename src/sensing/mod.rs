@@ -19,7 +19,7 @@ mod loss;
 mod observation;
 mod rig;
 
-pub use channel::{Channel, Occasion};
+pub use channel::{Apart, Channel, Occasion};
 pub use head::{Gaze, Head};
 pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
 pub use loss::{Graduated, Loss};

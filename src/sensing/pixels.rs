@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
-use super::{Channel, Equipment, KeyError, Keys};
+use super::{Apart, Channel, Equipment, KeyError, Keys};
 use crate::model::{Block, Frame, Pass, State};
 
 /// A camera's view of a target.
@@ -138,8 +138,9 @@ impl Channel for Pixels {
         let into_eye = eye.rotation.inverse().to_rotation_matrix();
         let own = pass.layout().block(Block::Intrinsics(self.camera));
         let (m, weight) = (of_eye.ncols(), self.sigma_px.recip());
-        let pictures = reading.chunks_exact_mut(2).zip(rows.chunks_exact_mut(2 * m));
-        for (point, (picture, rows)) in self.points.iter().zip(pictures) {
+        // Nothing may be learned: then there are no rows to cut into pieces.
+        for (k, (point, picture)) in self.points.iter().zip(reading.chunks_exact_mut(2)).enumerate() {
+            let rows = &mut rows[2 * m * k..2 * m * (k + 1)];
             let x = body * point;
             let from_eye = x.coords - eye.translation.vector;
             let Seen { at, slope, picture: found } = Self::see(&lens, &(into_eye * from_eye));
@@ -163,6 +164,11 @@ impl Channel for Pixels {
             }
         }
         true
+    }
+
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        let points = y.chunks_exact(2).zip(h.chunks_exact(2)).map(|(y, h)| (y[0] - h[0]).hypot(y[1] - h[1]));
+        Apart { pixels: Some(points.sum::<f64>() / (y.len() / 2).max(1) as f64), ..Apart::default() }
     }
 
     fn disturb(&self, reading: &mut [f64], v: &[f64]) {

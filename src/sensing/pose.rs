@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::{Channel, Equipment, KeyError, Keys};
+use super::{Apart, Channel, Equipment, KeyError, Keys};
 use crate::{
     kinematics::rotation,
     model::{Frame, Pass, State},
@@ -107,10 +107,15 @@ impl Channel for Pose {
         Self::write(&pass.pose(frame), reading);
         let twists = pass.frame_twists(frame);
         let weights = [self.sigma_m.recip(), self.sigma_rad.recip()];
-        for (row, columns) in rows.chunks_exact_mut(twists.ncols()).enumerate() {
+        for (row, columns) in rows.chunks_exact_mut(twists.ncols().max(1)).enumerate() {
             columns.iter_mut().zip(twists.row(row).iter()).for_each(|(to, x)| *to = x * weights[row / 3]);
         }
         true
+    }
+
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        let turned = Self::read(y).rotation.angle_to(&Self::read(h).rotation);
+        Apart { angle_rad: Some(turned), ..Apart::lengths(&y[..3], &h[..3]) }
     }
 
     fn disturb(&self, reading: &mut [f64], v: &[f64]) {
