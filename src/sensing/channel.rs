@@ -38,6 +38,11 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// What is read where `reading` would be without noise: y = h ⊕ L v, with v standard normal (d numbers).
     fn disturb(&self, reading: &mut [f64], v: &[f64]);
 
+    /// How far two readings are apart; metres, unless this channel measures something else.
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        Apart { metres: Some(y.iter().zip(h).map(|(y, h)| (y - h).powi(2)).sum::<f64>().sqrt()), ..Apart::default() }
+    }
+
     /// How many kinds of noise a reading has, each with a σ of its own in proportion to [`sigma`](Self::sigma): the equations
     /// are so many equal parts, one after the other. A scale of the noise is learned for each.
     fn noises(&self) -> usize {
@@ -60,6 +65,17 @@ pub trait Channel: fmt::Debug + Send + Sync {
     fn target(&self) -> Option<usize> {
         None
     }
+}
+
+/// How far two readings are apart, in units that people think in; `None` where a channel does not measure any.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Apart {
+    /// The distance of what was measured, metres.
+    pub metres: Option<f64>,
+    /// The angle of the rotation from one to the other, radians.
+    pub radians: Option<f64>,
+    /// Root mean square distance of points in the picture, pixels.
+    pub pixels: Option<f64>,
 }
 
 /// Lists the channels: a module and its type each. The module's name is the channel's name in scenarios.

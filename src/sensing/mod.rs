@@ -18,7 +18,7 @@ mod loss;
 mod observation;
 mod rig;
 
-pub use channel::Channel;
+pub use channel::{Apart, Channel};
 pub use head::{Gaze, Head};
 pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
 pub use loss::{Graduated, Loss};

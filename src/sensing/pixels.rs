@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
-use super::{Channel, Equipment, KeyError, Keys};
+use super::{Apart, Channel, Equipment, KeyError, Keys};
 use crate::model::{Block, Frame, Pass, State};
 
 /// A camera's view of a target.
@@ -127,6 +127,11 @@ impl Channel for Pixels {
     fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
         let weight = self.sigma_px.recip();
         whitened.iter_mut().zip(y).zip(h).for_each(|((whitened, y), h)| *whitened = (y - h) * weight);
+    }
+
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        let squares: f64 = y.iter().zip(h).map(|(y, h)| (y - h).powi(2)).sum();
+        Apart { pixels: Some((squares / self.points.len().max(1) as f64).sqrt()), ..Apart::default() }
     }
 
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {

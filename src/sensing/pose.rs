@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::{Channel, Equipment, KeyError, Keys};
+use super::{Apart, Channel, Equipment, KeyError, Keys};
 use crate::{
     kinematics::rotation,
     model::{Frame, Pass, State},
@@ -96,6 +96,12 @@ impl Channel for Pose {
         let turn = rotation::between(&h.rotation, &y.rotation) / self.sigma_rad;
         whitened[..3].copy_from_slice(shift.as_slice());
         whitened[3..].copy_from_slice(turn.as_slice());
+    }
+
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        let (y, h) = (Self::read(y), Self::read(h));
+        let metres = (y.translation.vector - h.translation.vector).norm();
+        Apart { metres: Some(metres), radians: Some(h.rotation.angle_to(&y.rotation)), pixels: None }
     }
 
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
