@@ -38,6 +38,12 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// What is read where `reading` would be without noise: y = h ⊕ L v, with v standard normal (d numbers).
     fn disturb(&self, reading: &mut [f64], v: &[f64]);
 
+    /// σ of the noise of an equation, and its unit: m, rad or px.
+    fn nominal(&self, equation: usize) -> (f64, &'static str) {
+        let _ = equation;
+        (self.sigma(), "m")
+    }
+
     /// How far two readings are apart; metres, unless this channel measures something else.
     fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
         Apart { metres: Some(y.iter().zip(h).map(|(y, h)| (y - h).powi(2)).sum::<f64>().sqrt()), ..Apart::default() }

@@ -129,6 +129,10 @@ impl Channel for Pixels {
         whitened.iter_mut().zip(y).zip(h).for_each(|((whitened, y), h)| *whitened = (y - h) * weight);
     }
 
+    fn nominal(&self, _: usize) -> (f64, &'static str) {
+        (self.sigma_px, "px")
+    }
+
     fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
         let squares: f64 = y.iter().zip(h).map(|(y, h)| (y - h).powi(2)).sum();
         Apart { pixels: Some((squares / self.points.len().max(1) as f64).sqrt()), ..Apart::default() }

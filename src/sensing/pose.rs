@@ -98,6 +98,10 @@ impl Channel for Pose {
         whitened[3..].copy_from_slice(turn.as_slice());
     }
 
+    fn nominal(&self, equation: usize) -> (f64, &'static str) {
+        if equation < 3 { (self.sigma_m, "m") } else { (self.sigma_rad, "rad") }
+    }
+
     fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
         let (y, h) = (Self::read(y), Self::read(h));
         let metres = (y.translation.vector - h.translation.vector).norm();

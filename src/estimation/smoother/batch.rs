@@ -203,7 +203,8 @@ mod tests {
             }
             let scale = smoother.noise()[0].scale;
             assert!((8.0..12.5).contains(&scale), "seed {seed}: {scale}");
-            let outliers = smoother.readings().iter().filter(|reading| reading.weight < 0.5).map(|it| it.movement).collect();
+            let outliers =
+                smoother.readings().iter().filter(|reading| reading.weight < 0.5).map(|it| it.movement).collect();
             let planted: Vec<u64> = (1..=rows as u64).filter(|movement| movement % 10 == 4).collect();
             let missed = |list: &Vec<u64>| list.iter().filter(|movement| !planted.contains(movement)).count();
             assert!(missed(&outliers) <= rows / 100, "seed {seed}: {outliers:?}");

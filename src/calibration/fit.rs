@@ -1,0 +1,127 @@
+//! One fit: a layout and the rows that it is learned from.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Point3};
+
+use super::{CalibrationError, Case};
+use crate::{
+    estimation::{Belief, Estimator, HypothesisSettings, NoiseFit, ReadingReport, Smoother},
+    experiment::Stream,
+    model::{Block, Layout, Prior, State, best_motion},
+    scenario::Known,
+};
+
+/// What explains some rows.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The state, with its covariance.
+    pub belief: Belief,
+    /// What is made of every reading: `movement` counts the rows that it was learned from, from 1.
+    pub readings: Vec<ReadingReport>,
+    /// How well they are fitted, by kind of noise.
+    pub noise: Vec<NoiseFit>,
+    /// The rows that it was learned from.
+    pub rows: Vec<usize>,
+}
+
+impl Fit {
+    /// What was learned.
+    pub fn state(&self) -> &State {
+        &self.belief.state
+    }
+
+    /// By row that it was learned from: the probability that one of its readings is an outlier; empty where outliers are
+    /// not looked for.
+    pub fn outliers(&self) -> Vec<(usize, f64)> {
+        if self.readings.is_empty() {
+            return Vec::new();
+        }
+        let mut by_row: Vec<(usize, f64)> = self.rows.iter().map(|row| (*row, 0.0)).collect();
+        for reading in &self.readings {
+            let index = usize::try_from(reading.movement).ok().and_then(|movement| movement.checked_sub(1));
+            if let (Some((_, most)), Some(probability)) =
+                (index.and_then(|index| by_row.get_mut(index)), reading.outlier_probability)
+            {
+                *most = most.max(probability);
+            }
+        }
+        by_row
+    }
+}
+
+/// Where the search for an unknown base begins beside the guess: so many draws of the prior.
+const DRAWS: usize = 16;
+/// Hypotheses kept while it is searched.
+const KEPT: usize = 16;
+
+/// Random numbers of the search; fits of one table differ by nothing else than rows and layout.
+const SEED: u64 = 1;
+
+impl Case<'_> {
+    /// What explains `rows`, as far as `layout` can, from a start near which it is to be found; without one it is searched for
+    /// wherever the prior allows.
+    pub fn fit(&self, layout: &Layout, rows: &[usize], near: Option<&State>) -> Result<Fit, CalibrationError> {
+        let mut smoother = self.smoother(layout, if near.is_some() { 0 } else { DRAWS })?;
+        let movements: Vec<_> = rows.iter().map(|row| &self.rows[*row]).collect();
+        let movements: Vec<_> = movements.iter().map(|row| (row.positions.as_slice(), &row.observation)).collect();
+        let starts = match near {
+            Some(state) => vec![state.clone()],
+            None => vec![self.guess().clone(), self.placed(rows)],
+        };
+        if !movements.is_empty() {
+            smoother.absorb_all(&movements, &starts)?;
+        }
+        Ok(Fit {
+            belief: smoother.belief().clone(),
+            readings: smoother.readings(),
+            noise: smoother.fits(),
+            rows: rows.to_vec(),
+        })
+    }
+
+    /// The chain as described with base, targets, cameras and sockets where `rows` put them.
+    pub fn nominal(&self, rows: &[usize]) -> Result<Fit, CalibrationError> {
+        self.fit(&self.placing(), rows, None)
+    }
+
+    fn smoother(&self, layout: &Layout, spawned: usize) -> Result<Smoother, CalibrationError> {
+        let deviations = self.deviations(layout);
+        let covariance = DMatrix::from_diagonal(&deviations.map(|sd| sd * sd));
+        let within = |block: Block| match self.scenario.prior.of(block) {
+            Some(Known::Anywhere { within_m }) => Some(within_m),
+            _ => None,
+        };
+        let prior = Prior::new(self.guess().clone(), layout, covariance, within)?;
+        let settings = HypothesisSettings { kept: KEPT, spawned };
+        let unknown = vec![self.scenario.smoother.noise_unknown; self.rig.noises().len()];
+        let rng = Stream::Hypotheses.rng(SEED);
+        Ok(Smoother::new(prior, Arc::new(layout.clone()), self.rig.clone(), settings, rng)
+            .with_loss(self.loss)
+            .with_unknown_noise(unknown)
+            .never_forgetting())
+    }
+
+    /// The prior's standard deviations.
+    pub(super) fn deviations(&self, layout: &Layout) -> DVector<f64> {
+        self.scenario.prior.standard_deviations(layout)
+    }
+
+    /// The guess with its base where the rigid motion that fits best puts it, by the targets that were seen in `rows`.
+    fn placed(&self, rows: &[usize]) -> State {
+        let mut state = self.guess().clone();
+        let (mut predicted, mut seen) = (Vec::new(), Vec::new());
+        for row in rows.iter().map(|row| &self.rows[*row]) {
+            for (channel, reading) in self.rig.channels().iter().zip(&row.observation.readings) {
+                if let (Some(target), Some(reading)) = (channel.target(), reading) {
+                    predicted.push(state.target_at(target, &row.positions));
+                    seen.push(Point3::from_slice(reading));
+                }
+            }
+        }
+        if self.placing().block(Block::Base).is_some() && predicted.len() > 2 {
+            state.base = best_motion(&predicted, &seen) * state.base;
+        }
+        state
+    }
+}
