@@ -2,8 +2,12 @@
 
 #![cfg(feature = "app")]
 
+#[path = "recording/channels.rs"]
+mod channels;
 #[path = "recording/checks.rs"]
 mod checks;
+#[path = "recording/live.rs"]
+mod live;
 #[path = "recording/reading.rs"]
 mod reading;
 
@@ -13,7 +17,7 @@ use body_schema::{
     design::best_designs,
     experiment::{Comparison, Description, StepReport, Trace},
     recording::{
-        EllipsoidSize, LiveLog, Recorder, RecordingError, StepsCsv, Target, Theme, comparison_csv, learner_color,
+        EllipsoidSize, LiveLog, Recorder, RecordingError, StepsCsv, Target, comparison_csv, learner_color,
         learner_slots,
     },
     scenario::{Scenario, builtin},
@@ -81,7 +85,8 @@ fn the_entities_are_the_documented_ones() {
     let live = LiveLog::new();
     record(&description, &reports, Target::live(live.clone()));
     let reading = Reading::of(&live.complete().unwrap());
-    let mut expected: Vec<String> = ["/", "/__properties", "/note", "/key"].map(str::to_owned).into();
+    let mut expected: Vec<String> =
+        ["/", "/__properties", "/note", "/key", "/ground/light", "/ground/dark"].map(str::to_owned).into();
     for (learner, estimator, policy) in [("active", "rls", "active"), ("random", "rls", "r"), ("gradient", "g", "r")] {
         let mut entities = vec![
             "body",
@@ -91,6 +96,10 @@ fn the_entities_are_the_documented_ones() {
             "marker/predicted",
             "marker/measured",
             "marker/error",
+            "on_dark/name",
+            "on_dark/error",
+            "readings/residuals/marker",
+            "readings/outliers/marker",
             "zero/links",
             "zero/axes",
             "zero/truth/links",
@@ -202,26 +211,6 @@ fn the_arrangement_comes_with_the_recording() {
 }
 
 #[test]
-fn a_page_with_curves_of_its_own_takes_the_scene_alone() {
-    let (description, reports) = run("arm-6dof", 2);
-    let live = LiveLog::new();
-    record(&description, &reports, Target::live(live.clone()));
-    let (whole, scene) = (live.parts_from(0), live.scene_parts_from(0));
-    assert_eq!(whole.len(), scene.len());
-    let differing: Vec<usize> = (0..whole.len()).filter(|index| whole[*index] != scene[*index]).collect();
-    assert_eq!(differing.len(), 1, "only the arrangement differs");
-    let place = differing[0];
-    let views = |part: &bytes::Bytes| {
-        let messages = reading::messages(&[live.header(), part.clone()].concat());
-        assert!(messages.iter().all(|message| message.store_id().is_blueprint()));
-        format!("{messages:?}").matches("TimeSeries").count()
-    };
-    assert!(views(&whole[place]) > 0 && views(&scene[place]) == 0);
-    assert_eq!(live.scene_parts_from(place)[0], scene[place]);
-    assert_eq!(live.scene_parts_from(place + 1), live.parts_from(place + 1));
-}
-
-#[test]
 fn ellipsoids_are_as_large_as_was_asked() {
     let (description, reports) = run("arm-6dof", 1);
     let half_sizes = |size: EllipsoidSize| {
@@ -239,53 +228,6 @@ fn ellipsoids_are_as_large_as_was_asked() {
             assert!((large / small - factor).abs() < 1e-4, "{size:?}: {large} / {small}");
         }
     }
-}
-
-#[test]
-fn a_live_log_is_followed_part_by_part() {
-    let (description, reports) = run("arm-6dof", 2);
-    let live = LiveLog::new();
-    let woken = live.subscribe();
-    assert_eq!((live.len(), live.header().len(), *woken.borrow()), (1, 12, 1));
-    let mut recorder = Recorder::new(&description, Target::live(live.clone())).unwrap();
-    recorder.log(&reports[0]).unwrap();
-    recorder.flush().unwrap();
-    assert!(woken.has_changed().unwrap());
-    let seen = live.len();
-    recorder.log(&reports[1]).unwrap();
-    assert_eq!(live.len(), seen, "steps wait for the flush");
-    recorder.flush().unwrap();
-    let new = live.parts_from(seen);
-    assert_eq!(new.len(), live.len() - seen);
-    // Each part can be sent alone, behind the header.
-    for part in &new {
-        assert_eq!(reading::messages(&[live.header(), part.clone()].concat()).len(), 1);
-    }
-    assert!(live.parts_from(live.len()).is_empty() && live.parts_from(usize::MAX).is_empty());
-    assert_eq!(live.bytes(), live.parts_from(0).concat().len());
-    assert!(!live.is_closed());
-    drop(recorder);
-    assert!(live.is_closed());
-    let length = live.len();
-    live.append(&reading::messages(&live.parts_from(0).concat())).unwrap();
-    assert_eq!(live.len(), length, "nothing is appended to a closed log");
-}
-
-#[test]
-fn what_no_view_shows_can_wait() {
-    let (description, reports) = run("arm-6dof", 2);
-    let live = LiveLog::new();
-    let mut recorder = Recorder::new(&description, Target::live(live.clone())).unwrap();
-    for report in &reports {
-        recorder.log(report).unwrap();
-        recorder.flush_shown().unwrap();
-    }
-    let shown = Reading::of(&live.complete().unwrap());
-    let leaves = "/active/direct/leaves";
-    assert_eq!(shown.steps("/random/metrics/location_m"), [i64::MIN, 0, 1, 2], "static, then every step");
-    assert!(shown.steps(leaves).is_empty() && shown.steps("/random/metrics/nis").is_empty());
-    recorder.flush().unwrap();
-    check(&Reading::of(&live.complete().unwrap()), &description, &reports);
 }
 
 #[test]
@@ -319,76 +261,6 @@ fn a_long_recording_is_small() {
 }
 
 #[test]
-fn those_who_watch_live_see_the_way_from_step_to_step() {
-    let (description, reports) = run("arm-6dof", 2);
-    let (file, live) = (path("moving.rrd"), LiveLog::new());
-    let mut recorder = Recorder::new(&description, Target::live(live.clone()).and_file(&file)).unwrap();
-    for report in &reports {
-        recorder.log_moving(report, 3).unwrap();
-    }
-    recorder.finish().unwrap();
-    let moving = Reading::of(&live.parts_from(0).concat());
-    assert_eq!(moving.times("/active/arm/estimate", "motion"), [0, 8, 16, 24, 32, 40, 48, 56, 64]);
-    assert_eq!(moving.times("/active/point_ellipsoids", "motion"), [0, 8, 16, 24, 32, 40, 48, 56, 64]);
-    // What was seen after a movement is gone as soon as the next begins.
-    assert_eq!(moving.times("/active/marker/error", "motion"), [0, 1, 32, 33, 64]);
-    check(&moving, &description, &reports);
-    for steps in [Reading::of(&fs::read(&file).unwrap()), Reading::of(&live.complete().unwrap())] {
-        assert_eq!(steps.timelines(), ["step"]);
-        assert_eq!(steps.steps("/active/arm/estimate"), [0, 1, 2]);
-        check(&steps, &description, &reports);
-    }
-}
-
-#[test]
-fn a_step_is_said_to_be_complete_when_all_of_it_has_come() {
-    let (description, reports) = run("arm-6dof", 3);
-    let live = LiveLog::new();
-    let mut recorder = Recorder::new(&description, Target::live(live.clone())).unwrap();
-    let mut seen = live.len();
-    let follow = |parts: &[bytes::Bytes]| Reading::of(&[live.header(), parts.concat().into()].concat());
-    for report in &reports {
-        recorder.log_moving(report, 2).unwrap();
-        recorder.flush_shown().unwrap();
-        let new = live.parts_from(seen);
-        seen = live.len();
-        let step = report.step as i64;
-        let (before, last) = new.split_at(new.len() - 1);
-        assert!(follow(before).times("/complete", "complete").is_empty(), "nothing says so earlier");
-        assert_eq!(follow(last).times("/complete", "complete"), [step]);
-        for learner in &description.learners {
-            assert!(follow(before).steps(&format!("/{}/arm/estimate", learner.name)).contains(&step));
-        }
-    }
-    // So it is for those who take many parts at once.
-    let together = live.put_together(&live.parts_from(1)).unwrap();
-    let entities: Vec<String> = reading::entities_in_order(&[live.header(), together].concat());
-    assert_eq!(entities.iter().position(|entity| entity == "/complete"), Some(entities.len() - 1));
-}
-
-#[test]
-fn a_posture_that_is_tried_out_stays_until_the_next_step() {
-    let (description, reports) = run("arm-6dof", 2);
-    let (file, live) = (path("ghost.rrd"), LiveLog::new());
-    let mut recorder = Recorder::new(&description, Target::live(live.clone()).and_file(&file)).unwrap();
-    recorder.log(&reports[0]).unwrap();
-    recorder.log(&reports[1]).unwrap();
-    let skeleton = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.2, 0.0]];
-    let before = live.len();
-    recorder.log_ghost(1, 1, Some(&skeleton)).unwrap();
-    let shown = Reading::of(&[live.header(), live.parts_from(before).concat().into()].concat());
-    assert_eq!(shown.times("/random/arm/ghost", "motion"), [32], "it is there at once");
-    recorder.log(&reports[2]).unwrap();
-    recorder.finish().unwrap();
-    let whole = Reading::of(&live.parts_from(0).concat());
-    assert_eq!(whole.times("/random/arm/ghost", "motion"), [32, 33], "drawn after step 1, and cleared on the way to 2");
-    assert!(whole.times("/active/arm/ghost", "motion").is_empty());
-    for steps in [Reading::of(&fs::read(&file).unwrap()), Reading::of(&live.complete().unwrap())] {
-        assert!(!steps.entities().iter().any(|entity| entity.ends_with("ghost")));
-    }
-}
-
-#[test]
 fn what_a_learner_no_longer_knows_does_not_stay_in_sight() {
     let (description, mut reports) = run("arm-6dof", 3);
     for joint in &mut reports[2].learners[0].estimate.joints {
@@ -402,21 +274,6 @@ fn what_a_learner_no_longer_knows_does_not_stay_in_sight() {
     assert_eq!(reading.steps("/active/point_ellipsoids"), [0, 1, 2, 3]);
     assert!(reading.ellipsoids("/active/point_ellipsoids", 2).is_empty());
     assert_eq!(reading.ellipsoids("/active/point_ellipsoids", 3).len(), 6);
-}
-
-#[test]
-fn an_arrangement_can_be_had_anew_for_any_shape_and_colours() {
-    let (description, reports) = run("arm-6dof", 1);
-    let live = LiveLog::new();
-    assert!(live.blueprint(Theme::Dark, 1.0).unwrap().is_none(), "nothing is arranged before step 0");
-    record(&description, &reports, Target::live(live.clone()));
-    let [light, dark] =
-        [Theme::Light, Theme::Dark].map(|theme| Reading::of(&live.blueprint(theme, 1.0).unwrap().unwrap()));
-    for reading in [&light, &dark] {
-        assert!(reading.activated && reading.entities().is_empty());
-        assert_eq!(reading.views, ["Scene"]);
-    }
-    assert_ne!(light.background, dark.background);
 }
 
 #[test]

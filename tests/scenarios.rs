@@ -409,3 +409,39 @@ fn constraints_are_held_to_the_robot() {
         problems(&fov.replacen("[filter]", "[constraints]\nminimum_height_m = 0.3\n[filter]", 1), Err("no data"));
     assert!(found.iter().any(|problem| problem.what.contains("known to be in view")), "{found:?}");
 }
+
+/// What is wrong with a socket is said with its key, and how to mend it.
+#[test]
+fn sockets_that_hold_nothing_are_refused() {
+    const SOCKETS: &str = include_str!("../scenarios/arm-7dof-socket.toml");
+    let left = "posture_deg = [3.0, 2.3, 0.1, -128.2, 0.0, 122.1, 44.9]";
+    for (from, to, key, mend) in [
+        ("to = \"right\"", "to = \"rihgt\"", "socket[0].to", "write one of right"),
+        ("to = \"right\"", "to = \"left\"", "socket[0].to", "write one of right"),
+        ("distance_m = 0.05\n", "distance_m = 0.06\n", "socket[0].distance_m", "correct it"),
+        ("distance_m = 0.05\n", "distance_m = -0.05\n", "socket[0].distance_m", "above 0"),
+        ("sigma_distance_m = 0.00005\n", "", "socket[0].distance_m", "sigma_distance_m"),
+        ("sigma_m = 0.0002\n", "", "socket[0].sigma_m", "add `sigma_m"),
+        ("sigma_m = 0.0002\n", "sigma_m = 0.0\n", "socket[0].sigma_m", "above 0"),
+        (left, "posture_deg = [3.0, 2.3]", "socket[0].posture_deg", "one position per joint"),
+        (left, "posture_deg = [3.0, 2.3, 0.1, 30.0, 0.0, 122.1, 44.9]", "socket[0].posture_deg", "for this joint"),
+        (left, "posture_deg = [30.0, 2.3, 0.1, -128.2, 0.0, 122.1, 44.9]", "socket[0].posture_deg", "leave `at_m` out"),
+        (left, "", "socket[0].posture_deg", "add `posture_deg"),
+        ("place = \"front\"\n", "place = \"front\"\ntarget = \"cube\"\n", "socket[0].target", "write one of ball"),
+        ("name = \"right\"", "name = \"left\"", "socket[1].name", "a name of its own"),
+        ("place = \"high\"\n", "place = \"high\"\nsigma_m = 0.001\n", "socket[4].sigma_m", "remove it"),
+        ("policy = \"active-planned\"", "policy = \"active-bayesian\"", "learner[0].policy", "`policy = \"active\"`"),
+    ] {
+        assert!(SOCKETS.contains(from), "the test's own premise: {from}");
+        let found = problems(&SOCKETS.replacen(from, to, 1), Err("has no data"));
+        assert_eq!(found[0].key, key, "{to}: {found:?}");
+        assert!(found[0].mend.contains(mend), "{to}: {found:?}");
+    }
+    // Rows of a table are at no socket.
+    let text = TIAGO.replacen(
+        "[measurements]",
+        "[[socket]]\nname = \"cup\"\nposture_deg = [0.0]\nsigma_m = 0.001\n\n[measurements]",
+        1,
+    );
+    assert_eq!(problems(&text, Ok(TIAGO_CSV))[0].key, "socket");
+}

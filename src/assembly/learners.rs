@@ -13,7 +13,7 @@ use crate::{
         SmootherSpec, WorldSpec,
     },
     selection::{Active, Human, Minimiser, Planner, Policy, Random},
-    sensing::Loss,
+    sensing::{Loss, Noise, Occasion},
 };
 
 /// States drawn from the posterior for one Monte Carlo evaluation of (7).
@@ -46,7 +46,11 @@ impl Scenario {
             // They show no covariance, or add nothing to it.
             EstimatorKind::RlsSixNumbers | EstimatorKind::Smoother | EstimatorKind::Gradient => None,
         };
-        LearnerDescription { stabilised: spec.stabilising && noise.is_some(), ..spec.description() }
+        let stabilised = spec.stabilising && noise.is_some();
+        let robust = spec.estimator == EstimatorKind::Smoother
+            && spec.robust
+            && matches!(self.smoother.loss, Loss::Mixture { .. });
+        LearnerDescription { stabilised, robust, ..spec.description() }
     }
 
     fn estimator(
@@ -94,7 +98,14 @@ impl Scenario {
             )));
         }
         let belief = Belief::new(briefing.initial.clone(), briefing.layout.clone(), rig);
-        Ok(begin(belief, briefing.covariance.clone()))
+        let mut estimator = begin(belief, briefing.covariance.clone());
+        if let Some(known) = &briefing.beforehand {
+            // Whatever the posture.
+            let anywhere = vec![0.0; self.robot.names.len()];
+            let told = estimator.correct(&anywhere, known);
+            told.map_err(|source| ScenarioError::Beforehand { scenario: self.name.clone(), source })?;
+        }
+        Ok(estimator)
     }
 
     /// Learned places of which next to nothing is known, so that a filter cannot begin at the guess: all that an unknown base
@@ -136,10 +147,17 @@ impl Scenario {
         let prior = Prior::new(briefing.initial.clone(), layout, covariance, within)
             .map_err(|source| ScenarioError::Prior { scenario: self.name.clone(), source })?;
         let (rig, rng) = (Arc::new(self.rig.assuming(sigma)), Stream::Hypotheses.rng(seed));
-        let unknown = vec![noise_unknown; self.rig.noises().len()];
+        // What is known beforehand is one equation: its own σ says how well.
+        let channels = self.rig.channels();
+        let is_measured = |noise: &Noise| channels[noise.channel].occasion() != Occasion::Beforehand;
+        let unknown = self.rig.noises().iter().map(|noise| noise_unknown && is_measured(noise)).collect();
         let smoother = Smoother::new(prior, layout.clone(), rig, hypotheses, rng)
             .with_loss(if spec.robust { loss } else { Loss::None })
             .with_unknown_noise(unknown);
+        let smoother = match &briefing.beforehand {
+            Some(known) => smoother.knowing(known.clone()),
+            None => smoother,
+        };
         // Recorded bodies do not change: what looks like it is an outlier or a model that does not hold.
         let changes = matches!(self.world, WorldSpec::Simulated { .. });
         Ok(if changes { smoother } else { smoother.never_forgetting() })

@@ -1,6 +1,7 @@
 //! From a scenario and a seed to an experiment: everything that is drawn is drawn here.
 
 mod learners;
+mod sockets;
 
 use std::sync::Arc;
 
@@ -10,7 +11,10 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::{
     design::{Problem, Stretch, movements_by_counting},
-    experiment::{Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World},
+    experiment::{
+        Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World, channels,
+        described,
+    },
     kinematics::{Joint, JointBox},
     model::{Block, Correction, Element, Layout, State, Workspace, anywhere},
     scenario::{ErrorDraw, InitialError, Known, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
@@ -35,6 +39,8 @@ struct Briefing {
     actions: Actions,
     workspace: Workspace,
     watch: Option<Watch>,
+    /// What is known before any movement, with its error.
+    beforehand: Option<Observation>,
 }
 
 impl Briefing {
@@ -51,6 +57,7 @@ impl Briefing {
             actions: self.actions.clone(),
             workspace: self.workspace.clone(),
             watch: self.watch.clone(),
+            beforehand: self.beforehand.clone(),
         }
     }
 }
@@ -69,10 +76,12 @@ impl Scenario {
         self.agent_of(learner, seed, &briefing)
     }
 
-    /// What designs are sought for here; `None` where no truth is known or a sensor has no noise.
+    /// What designs are sought for here; `None` where no truth is known, a sensor has no noise or targets are held in
+    /// sockets.
     pub fn design_problem(&self) -> Option<Problem> {
         let WorldSpec::Simulated { watch, .. } = &self.world else { return None };
-        if self.rig.channels().iter().any(|channel| channel.sigma() <= 0.0) {
+        // Designs are sought for in the joint box, of which sockets leave a part without a volume.
+        if !self.robot.sockets.is_empty() || self.rig.channels().iter().any(|channel| channel.sigma() <= 0.0) {
             return None;
         }
         let layout = self.robot.layout.clone();
@@ -110,10 +119,11 @@ impl Scenario {
                     weights: self.weights(),
                     initial: self.perturbed(initial_error, &mut Stream::InitialEstimate.rng(seed)),
                     covariance: self.prior_covariance(),
-                    actions: Actions::Box(limits.clone()),
+                    actions: self.actions(),
                     // Uniform in the joint box, seen or not: what a head can see depends on the truth.
                     workspace: self.workspace(drawn(limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true)),
                     watch: watch.clone(),
+                    beforehand: self.beforehand(seed),
                 };
                 let head = watch.as_ref().and_then(|watch| watch.head);
                 let seen = |theta: &[f64]| head.is_none_or(|head| head.sees(&truth.marker_at(theta)));
@@ -121,11 +131,13 @@ impl Scenario {
                 if configurations.is_empty() {
                     configurations.extend(watch.as_ref().map(|watch| watch.visible_pose.clone()));
                 }
-                let evaluation = Evaluation::of_truth(self.workspace(configurations), &truth, self.marker_sigma());
+                let evaluation = Evaluation::of_truth(self.workspace(configurations), &truth, self.marker_sigma())
+                    .with_sockets(self.held_out(seed));
                 let change = change.as_ref();
                 let change = change.map(|change| Box::new(Change { step: change.step, truth: change.truth.clone() }));
                 let (truth, rig, outliers) = (Box::new(truth), self.rig.clone(), *outliers);
-                (World::Simulated { truth, rig, head, change, outliers }, evaluation, briefing)
+                let limits = limits.clone();
+                (World::Simulated { truth, rig, limits, head, change, outliers }, evaluation, briefing)
             }
             WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, *held_out),
         }
@@ -151,8 +163,11 @@ impl Scenario {
         rows.shuffle(&mut Stream::HeldOut.rng(seed));
         let (test, training) = rows.split_at_mut(held_out);
         training.sort_unstable();
-        let movement =
-            |row: &usize| Movement { configuration: measurements.configurations[*row].clone(), row: Some(*row) };
+        let movement = |row: &usize| Movement {
+            configuration: measurements.configurations[*row].clone(),
+            row: Some(*row),
+            socket: None,
+        };
         let workspace = training.iter().map(|row| measurements.configurations[*row].clone()).collect();
         let mut pool: Vec<Movement> = training.iter().map(movement).collect();
         if let Some(constraints) = &self.constraints {
@@ -168,6 +183,7 @@ impl Scenario {
             actions: Actions::Pool(pool),
             workspace: self.workspace(workspace),
             watch: None,
+            beforehand: None,
         };
         let held_out = test.iter().map(|row| (measurements.configurations[*row].clone(), measurements.markers_m[*row]));
         let (held_out, markers) = held_out.unzip();
@@ -205,7 +221,11 @@ impl Scenario {
             let marker = state.marker() + error.draw(error.marker_m, rng);
             state = state.with_marker(marker);
         }
-        for (block, _) in layout.blocks() {
+        let held = |block: Block| match block {
+            Block::Socket(socket) => self.robot.sockets.get(socket).filter(|socket| !socket.is_guessed),
+            _ => None,
+        };
+        for (block, _) in layout.blocks().filter(|(block, _)| held(*block).is_none()) {
             let Some(known) = self.prior.of(block) else { continue };
             let guess = match (block, known) {
                 (Block::Base, _) => known.displaced(&block.of(&state), rng),
@@ -214,6 +234,12 @@ impl Scenario {
                 (_, known) => known.displaced(&block.of(&state), rng),
             };
             block.put(&mut state, guess);
+        }
+        // What is held there at first tells where a socket is that nobody has guessed.
+        for (block, _) in layout.blocks() {
+            if let (Block::Socket(socket), Some(spec)) = (block, held(block)) {
+                state.sockets[socket] = state.target_at(spec.target, &spec.posture);
+            }
         }
         state
     }
@@ -230,6 +256,7 @@ impl Scenario {
         let layout = &briefing.layout;
         let learners =
             specs.iter().map(|spec| self.learner(spec, seed, briefing)).collect::<Result<Vec<_>, ScenarioError>>()?;
+        let (cameras, targets) = described(&robot.equipment);
         let description = Description {
             scenario: self.name.clone(),
             title: self.title.clone(),
@@ -244,6 +271,11 @@ impl Scenario {
             truth: world.truth().map(ModelReport::of_state),
             change_at: world.change().map(|change| change.step),
             head: briefing.watch.as_ref().and_then(|watch| watch.head.as_ref().map(HeadDescription::of)),
+            channels: channels(&self.rig, &robot.equipment),
+            cameras,
+            targets,
+            base_learned: layout.block(Block::Base).is_some(),
+            sockets: robot.socket_descriptions(),
             body: robot.body,
         };
         Ok(Experiment::new(description, world, learners, evaluation, self.design_problem()))

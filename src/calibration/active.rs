@@ -97,7 +97,7 @@ impl Case<'_> {
         let mut active = Vec::new();
         for split in splits {
             let (_, fits) = self.choose(&split.training, count, progress)?;
-            active.push(fits.iter().map(|fit| self.held_out(fit.state(), split)).collect::<Vec<Figures>>());
+            active.push(fits.iter().map(|fit| self.held_out(fit, split)).collect::<Vec<Figures>>());
         }
         let sizes: Vec<usize> = (1..=count).collect();
         let random = self.random(splits, &sizes, ORDERS, progress)?;
@@ -157,14 +157,14 @@ impl Case<'_> {
         for size in sizes {
             let start = last.as_ref().and_then(|fit| near(fit, *size));
             let fit = self.fit(layout, &order[..*size], start)?;
-            figures.push(self.held_out(fit.state(), split));
+            figures.push(self.held_out(&fit, split));
             last = Some(fit);
         }
         Ok(figures)
     }
 
-    fn held_out(&self, state: &State, split: &Split) -> Figures {
-        Figures::of(&self.residuals(state, &split.held_out))
+    fn held_out(&self, fit: &Fit, split: &Split) -> Figures {
+        Figures::of(&self.residuals(fit, &split.held_out))
     }
 }
 

@@ -89,10 +89,10 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         learning = case.learning(&splits, progress)?;
     }
 
-    let training_residuals = |state| case.residuals(state, &training);
+    let training_residuals = |fit: &Fit| case.residuals(fit, &training);
     let comparison = Comparison {
-        before: Figures::of(&training_residuals(nominal.state())),
-        after: Figures::of(&training_residuals(fit.state())),
+        before: Figures::of(&training_residuals(&nominal)),
+        after: Figures::of(&training_residuals(&fit)),
     };
     let all = |of: fn(&Judged) -> &Vec<Residual>| Figures::of(judged.iter().flat_map(of));
     let held_out = if judged.is_empty() {
@@ -136,7 +136,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
 
 impl Case<'_> {
     fn judge(&self, split: &Split, nominal: &Fit, fit: &Fit, fuller: &Fit) -> Result<Judged, CalibrationError> {
-        let judged = |fit: &Fit| self.residuals(fit.state(), &split.held_out);
+        let judged = |fit: &Fit| self.residuals(fit, &split.held_out);
         let tried = TRIED.iter().map(|extras| {
             let fit = self.fit(&self.extended(extras), &split.training, Some(fit.state()))?;
             Ok(judged(&fit))
@@ -198,7 +198,7 @@ impl Case<'_> {
         let held_out = judged.iter().enumerate().flat_map(|(fold, judged)| {
             judged.after.iter().map(move |residual| (residual.clone(), true, has_folds.then_some(fold)))
         });
-        let trained = self.residuals(fit.state(), if has_folds { &[] } else { &fit.rows });
+        let trained = self.residuals(fit, if has_folds { &[] } else { &fit.rows });
         let mut all: Vec<_> = held_out.chain(trained.into_iter().map(|residual| (residual, false, None))).collect();
         all.sort_by_key(|(residual, ..)| (residual.row, residual.channel));
         let reading = |(residual, held_out, fold): (Residual, bool, Option<usize>)| Reading {

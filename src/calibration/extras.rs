@@ -110,7 +110,7 @@ impl Case<'_> {
     fn inner(&self, layout: &Layout, folds: &[Split], near: &State) -> Result<Vec<Residual>, CalibrationError> {
         let judged = |fold: &Split| -> Result<Vec<Residual>, CalibrationError> {
             let fit = self.fit(layout, &fold.training, Some(near))?;
-            Ok(self.residuals(fit.state(), &fold.held_out))
+            Ok(self.residuals(&fit, &fold.held_out))
         };
         let found = mapped(folds, judged).into_iter().collect::<Result<Vec<_>, _>>()?;
         Ok(found.into_iter().flatten().collect())

@@ -1,9 +1,13 @@
 //! Errors of predictions, row by row and in figures.
 
+use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::Case;
-use crate::{model::State, sensing::Apart};
+use super::{Case, Fit};
+use crate::{
+    model::State,
+    sensing::{Apart, Occasion},
+};
 
 /// A reading beside what was predicted for it.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,8 +95,10 @@ impl Figures {
 }
 
 impl Case<'_> {
-    /// The residuals of `rows` under a state.
-    pub fn residuals(&self, state: &State, rows: &[usize]) -> Vec<Residual> {
+    /// The residuals of `rows` by what was learned from others, or from them. A target that was held in a socket which no
+    /// row was learned from is compared with its mean over the rows there: where the socket is nobody knows.
+    pub fn residuals(&self, fit: &Fit, rows: &[usize]) -> Vec<Residual> {
+        let state = &self.with_unseen_sockets(fit, rows);
         let mut residuals = Vec::new();
         for &index in rows {
             let row = &self.rows[index];
@@ -107,6 +113,28 @@ impl Case<'_> {
         }
         residuals
     }
+
+    fn with_unseen_sockets(&self, fit: &Fit, rows: &[usize]) -> State {
+        let mut state = fit.state().clone();
+        for (channel, sensor) in self.rig.channels().iter().enumerate() {
+            let Occasion::Held { socket, target } = sensor.occasion() else { continue };
+            let has_reading = |row: &&usize| self.rows[**row].observation.readings[channel].is_some();
+            if fit.rows.iter().any(|row| has_reading(&row)) {
+                continue;
+            }
+            let held = rows.iter().filter(has_reading);
+            if let Some(mean) = mean(held.map(|row| state.target_at(target, &self.rows[*row].positions))) {
+                state.sockets[socket] = mean;
+            }
+        }
+        state
+    }
+}
+
+/// The mean of points; `None` of none.
+pub fn mean(points: impl Iterator<Item = Point3<f64>>) -> Option<Point3<f64>> {
+    let (sum, count) = points.fold((Vector3::zeros(), 0.0), |(sum, count), point| (sum + point.coords, count + 1.0));
+    (count > 0.0).then(|| Point3::from(sum / count))
 }
 
 #[cfg(test)]

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Point3};
 
-use super::{CalibrationError, Case};
+use super::{CalibrationError, Case, figures::mean};
 use crate::{
     estimation::{Belief, Estimator, HypothesisSettings, NoiseFit, ReadingReport, Smoother},
     experiment::Stream,
     model::{Block, Layout, Prior, State, best_motion},
     scenario::Known,
+    sensing::{Noise, Occasion},
 };
 
 /// What explains some rows.
@@ -94,7 +95,12 @@ impl Case<'_> {
         };
         let prior = Prior::new(self.guess().clone(), layout, covariance, within)?;
         let settings = HypothesisSettings { kept: KEPT, spawned };
-        let unknown = vec![self.scenario.smoother.noise_unknown; self.rig.noises().len()];
+        // What is known of the equipment is known as well as the file says: there is one reading of it.
+        let is_unknown = |noise: &Noise| {
+            self.scenario.smoother.noise_unknown
+                && self.rig.channels()[noise.channel].occasion() != Occasion::Beforehand
+        };
+        let unknown = self.rig.noises().iter().map(is_unknown).collect();
         let rng = Stream::Hypotheses.rng(SEED);
         Ok(Smoother::new(prior, Arc::new(layout.clone()), self.rig.clone(), settings, rng)
             .with_loss(self.loss)
@@ -107,7 +113,8 @@ impl Case<'_> {
         self.scenario.prior.standard_deviations(layout)
     }
 
-    /// The guess with its base where the rigid motion that fits best puts it, by the targets that were seen in `rows`.
+    /// The guess with its base where the rigid motion that fits best puts it, by the targets that were seen in `rows`, and
+    /// with sockets where they held their targets in the mean.
     fn placed(&self, rows: &[usize]) -> State {
         let mut state = self.guess().clone();
         let (mut predicted, mut seen) = (Vec::new(), Vec::new());
@@ -121,6 +128,13 @@ impl Case<'_> {
         }
         if self.placing().block(Block::Base).is_some() && predicted.len() > 2 {
             state.base = best_motion(&predicted, &seen) * state.base;
+        }
+        for (channel, sensor) in self.rig.channels().iter().enumerate() {
+            let Occasion::Held { socket, target } = sensor.occasion() else { continue };
+            let held = rows.iter().map(|row| &self.rows[*row]).filter(|row| row.observation.readings[channel].is_some());
+            if let Some(mean) = mean(held.map(|row| state.target_at(target, &row.positions))) {
+                state.sockets[socket] = mean;
+            }
         }
         state
     }

@@ -6,6 +6,7 @@ use super::{CalibrationError, Case, Correction, Correlation, Fit, Joint, MoreRow
 use crate::{
     kinematics::{self, JointKind, chart},
     model::{Block, Place, State, Workspace},
+    sensing::Occasion,
 };
 
 /// Correlations above this are told, and so many at most.
@@ -150,8 +151,14 @@ impl Case<'_> {
 
     /// What a channel measures, in words.
     pub(super) fn sensor(&self, channel: usize) -> String {
-        let target = self.rig.channels()[channel].target().and_then(|target| self.names.targets.get(target));
-        target.cloned().unwrap_or_else(|| format!("sensor {}", channel + 1))
+        let sensor = &self.rig.channels()[channel];
+        let name = match (sensor.occasion(), sensor.target(), self.names.targets.as_slice()) {
+            (Occasion::Held { socket, .. }, ..) => self.names.sockets.get(socket),
+            (_, Some(target), targets) => targets.get(target),
+            (_, None, [target]) => Some(target),
+            _ => None,
+        };
+        name.cloned().unwrap_or_else(|| format!("sensor {}", channel + 1))
     }
 
     /// What more rows would bring.

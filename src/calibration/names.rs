@@ -3,7 +3,7 @@
 use crate::{
     kinematics::JointKind,
     model::{Block, Layout, State},
-    scenario::Robot,
+    scenario::{Robot, SocketSpec},
 };
 
 /// The names of everything that can be learned.
@@ -26,7 +26,7 @@ impl Names {
             joints: robot.names.clone(),
             targets: robot.equipment.targets.iter().map(|target| target.name.clone()).collect(),
             cameras: robot.equipment.cameras.iter().map(|camera| camera.name.clone()).collect(),
-            sockets: Vec::new(),
+            sockets: robot.sockets.iter().map(label).collect(),
         }
     }
 
@@ -68,4 +68,9 @@ impl Names {
         };
         layout.blocks().flat_map(named).collect()
     }
+}
+
+/// A socket by its place and its name.
+fn label(socket: &SocketSpec) -> String {
+    socket.place.as_ref().map_or_else(|| socket.name.clone(), |place| format!("{place}/{}", socket.name))
 }

@@ -6,9 +6,47 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::{
     kinematics::JointBox,
-    model::{Layout, State, rank},
+    model::{Layout, Manifold, State, rank},
     sensing::Rig,
 };
+
+/// A movement in general position.
+#[derive(Clone, Debug)]
+pub struct General {
+    /// The channels through which it is seen.
+    pub rig: Rig,
+    /// Joint positions, rad or m.
+    pub posture: Vec<f64>,
+}
+
+/// Movements that stand for all, twice as many as there can be need of: to postures anywhere in the joint box; where targets are
+/// held in sockets, anywhere on their manifolds in turn. What is known before any movement comes first, as if it were one.
+pub fn general_movements(state: &State, layout: &Layout, rig: &Rig, limits: &JointBox) -> Vec<General> {
+    // A fixed stream of its own: what is general needs no seed.
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let held: Vec<(Rig, Option<usize>)> = match state.sockets.len() {
+        0 => vec![(rig.held_in(None), None)],
+        count => {
+            (0..count).filter_map(|socket| Some((rig.held_in(Some(socket)), Some(rig.holds(socket)?.1)))).collect()
+        }
+    };
+    let equations = held.iter().map(|(rig, _)| rig.equations()).min().unwrap_or_default();
+    if layout.dimension() == 0 || equations == 0 {
+        return Vec::new();
+    }
+    let count = (2 * layout.dimension().div_ceil(equations) + 8) * held.len();
+    let known = rig.known_beforehand().map(|rig| General { rig, posture: vec![0.0; state.joints.len()] });
+    let movement = |index: usize| {
+        let socket = index % held.len();
+        let (rig, target) = &held[socket];
+        let posture = match target {
+            None => Some(limits.draw(&mut rng)),
+            Some(target) => Manifold::new(state, *target, state.sockets[socket], limits).draw(&mut rng),
+        };
+        Some(General { rig: rig.clone(), posture: posture? })
+    };
+    known.into_iter().chain((0..count).filter_map(movement)).collect()
+}
 
 /// Movements in general position after which there are as many independent equations as there can be: the least N for
 /// which the Jacobian of N of them has the rank that it has for many. It is the rank that counts, not the number of
@@ -16,21 +54,27 @@ use crate::{
 ///
 /// A yardstick to draw beside curves, not a bound: a prior or loose thresholds can beat it.
 pub fn movements_by_counting(state: &State, layout: &Layout, rig: &Rig, limits: &JointBox) -> usize {
-    let (m, d) = (layout.dimension(), rig.equations());
-    if m == 0 || d == 0 {
-        return 0;
+    let movements = general_movements(state, layout, rig, limits);
+    let Some(last) = movements.last() else { return 0 };
+    let equations: usize = movements.iter().map(|movement| movement.rig.equations()).sum();
+    let mut stacked = DMatrix::zeros(equations, layout.dimension());
+    // By number of movements: how many equations there are.
+    let (mut ends, mut end) = (Vec::new(), 0);
+    for General { rig, posture } in &movements {
+        let rows = rig.jacobian(state, layout, posture);
+        stacked.rows_mut(end, rows.ncols()).copy_from(&rows.transpose());
+        end += rows.ncols();
+        ends.push(end);
     }
-    // A fixed stream of its own: what is general needs no seed.
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let many = 2 * m.div_ceil(d) + 8;
-    let mut stacked = DMatrix::zeros(many * d, m);
-    for index in 0..many {
-        let rows = rig.jacobian(state, layout, &limits.draw(&mut rng));
-        stacked.rows_mut(index * d, d).copy_from(&rows.transpose());
+    // What is known before any movement is none.
+    if rig.known_beforehand().is_none() {
+        ends.insert(0, 0);
     }
     let greatest = rank(&stacked);
-    let reaches = |count: &usize| rank(&stacked.rows(0, count * d).into_owned()) >= greatest;
-    (greatest.div_ceil(d).max(1)..many).find(reaches).unwrap_or(many)
+    let least = greatest.div_ceil(last.rig.equations().max(1)).saturating_sub(1).max(1);
+    let reaches =
+        |count: &usize| ends[*count] >= greatest && rank(&stacked.rows(0, ends[*count]).into_owned()) >= greatest;
+    (least..ends.len()).find(reaches).unwrap_or(ends.len() - 1)
 }
 
 #[cfg(test)]

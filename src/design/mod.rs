@@ -26,7 +26,7 @@ mod counting;
 mod search;
 
 pub use best::{BestDesign, Stretch, best_designs};
-pub use counting::movements_by_counting;
+pub use counting::{General, general_movements, movements_by_counting};
 pub use search::Design;
 
 use std::sync::Arc;

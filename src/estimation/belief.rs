@@ -1,6 +1,6 @@
 //! An estimated state and its covariance.
 
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
 
@@ -65,6 +65,14 @@ impl Belief {
         let total = own + self.alternatives.iter().map(|alternative| alternative.weight).sum::<f64>();
         if total > 0.0 {
             self.alternatives.iter_mut().for_each(|alternative| alternative.weight /= total);
+        }
+    }
+
+    /// The same seen through the channels that read while a target is held in `socket`; itself, where none is.
+    pub fn held_in(&self, socket: Option<usize>) -> Cow<'_, Self> {
+        match socket {
+            None => Cow::Borrowed(self),
+            Some(_) => Cow::Owned(Self { rig: Arc::new(self.rig.held_in(socket)), ..self.clone() }),
         }
     }
 

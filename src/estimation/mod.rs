@@ -62,7 +62,7 @@ pub trait Estimator: Send {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
 pub struct ReadingReport {
-    /// The movement, counted from 1.
+    /// The movement, counted from 1; 0 for what was known before the first.
     pub movement: u64,
     /// The channel, counted from 0.
     pub channel: usize,

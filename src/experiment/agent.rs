@@ -18,7 +18,6 @@ use crate::{
     kinematics::JointBox,
     selection::{
         Actions, Appraisal, Constraints, History, Movement, Policy, Search, Selection, SelectionError, Situation,
-        condition,
     },
     sensing::{Observation, Refused},
 };
@@ -191,12 +190,15 @@ impl Agent {
         }
         let mut standpoint = self.standpoint().to_owned();
         for Proposal { selection, .. } in &self.pending {
-            let configuration = &selection.movement.configuration;
+            let Movement { configuration, socket, .. } = &selection.movement;
+            let belief = standpoint.belief.held_in(*socket);
+            let situation = Situation { belief: &belief, ..standpoint.borrowed().situation() };
             // What is not expected to be seen is not expected to teach.
-            let appraisal = self.policy.appraise(&standpoint.borrowed().situation(), &self.limits, configuration);
+            let appraisal = self.policy.appraise(&situation, &self.limits, configuration);
             let chance = appraisal.map_or(1.0, |appraisal| appraisal.chance);
-            condition(&mut standpoint.belief, configuration, |_| chance);
-            standpoint.history.expect(configuration);
+            drop(belief);
+            standpoint.belief.after(&selection.movement, |_| chance);
+            standpoint.history.expect(&selection.movement.configuration);
             standpoint.actions.use_up(&selection.movement);
         }
         self.policy.select(&standpoint.borrowed().situation(), &mut rng)
@@ -221,7 +223,7 @@ impl Agent {
         let selection = Selection {
             criterion: Some(appraisal.criterion),
             gain: Some(appraisal.gain),
-            ..Selection::plain(configuration.to_vec())
+            ..Selection::of(self.actions.movement_to(self.belief(), configuration))
         };
         if self.failure.is_none() {
             self.pending.clear();
@@ -312,12 +314,19 @@ impl Agent {
         if configuration.len() != self.limits.dimension() {
             return Err(SelectionError::NoConfiguration(configuration.len()));
         }
-        self.policy.appraise(&standpoint.situation(), &self.limits, configuration)
+        let socket = standpoint.actions.movement_to(standpoint.belief, configuration).socket;
+        let belief = standpoint.belief.held_in(socket);
+        let situation = Situation { belief: &belief, ..standpoint.situation() };
+        self.policy.appraise(&situation, &self.limits, configuration)
     }
 
     /// How the criterion of the next movement looked over the joint box at `standpoint`, if its policy plans.
     pub fn explain(&self, standpoint: Standpoint<'_>) -> Result<Option<Search>, SelectionError> {
-        self.policy.explain(&standpoint.situation(), &self.limits)
+        // Of manifolds there is no partition of the joint box to show.
+        match standpoint.actions {
+            Actions::Sockets(_) => Ok(None),
+            _ => self.policy.explain(&standpoint.situation(), &self.limits),
+        }
     }
 }
 

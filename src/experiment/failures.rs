@@ -54,6 +54,10 @@ fn truth() -> State {
     random_arm(&mut ChaCha8Rng::seed_from_u64(8), JOINTS)
 }
 
+fn limits() -> JointBox {
+    JointBox::new(vec![(-1.0, 1.0); JOINTS]).expect("limits")
+}
+
 /// The truth with its marker at a distance that is no number.
 fn beyond_all_numbers() -> State {
     truth().with_marker(Point3::new(f64::INFINITY, 0.0, 0.0))
@@ -61,7 +65,8 @@ fn beyond_all_numbers() -> State {
 
 fn world(change: Option<Change>) -> World {
     let rig = Arc::new(Rig::tracker(0.01));
-    World::Simulated { truth: Box::new(truth()), rig, head: None, change: change.map(Box::new), outliers: None }
+    let (truth, limits) = (Box::new(truth()), limits());
+    World::Simulated { truth, rig, limits, head: None, change: change.map(Box::new), outliers: None }
 }
 
 /// Two learners, the first active and the other random; the flag makes the second falter.
@@ -70,7 +75,7 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
     let deviations = DVector::from_element(layout.dimension(), 0.3);
     let weights = Weights::new(CriterionUnits::CharacteristicLength(1.0), &layout, &deviations);
     let initial = truth().retract(&layout, &DVector::from_element(layout.dimension(), 0.1));
-    let limits = JointBox::new(vec![(-1.0, 1.0); JOINTS]).expect("limits");
+    let limits = limits();
     let falters = Arc::new(AtomicBool::new(false));
     let learner = |name: &str, policy: Box<dyn Policy>| {
         let belief = Belief::new(initial.clone(), layout.clone(), Arc::new(Rig::tracker(0.02)));
@@ -79,7 +84,7 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
         let estimator = Box::new(Rls::new(belief, covariance, Some(noise)));
         let agent = Agent::new(estimator, policy, Actions::Box(limits.clone()), limits.clone(), 5);
         let (name, estimator, policy) = (name.to_owned(), "rls".to_owned(), name.to_owned());
-        let description = LearnerDescription { name, estimator, policy, stabilised: true };
+        let description = LearnerDescription { name, estimator, policy, stabilised: true, robust: false };
         Learner::new(description, agent, weights.clone(), vec![vec![0.5; JOINTS]], 0.01)
     };
     let active = Active::new(weights.clone(), Minimiser::Random { evaluations: 20 });
@@ -102,6 +107,11 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
         truth: None,
         change_at: world.change().map(|change| change.step),
         head: None,
+        channels: Vec::new(),
+        cameras: Vec::new(),
+        targets: Vec::new(),
+        base_learned: false,
+        sockets: Vec::new(),
         body: None,
     };
     let evaluation = Evaluation::of_truth(vec![vec![0.2; JOINTS], vec![-0.4; JOINTS]], &truth(), 0.01);
@@ -145,9 +155,9 @@ fn a_world_that_has_nothing_to_show_changes_nothing() {
     let (mut steady, _) = experiment(world(None));
     let (mut broken, _) = experiment(world(None));
     (0..2).for_each(|_| assert_eq!(step(&mut steady), step(&mut broken)));
-    let World::Simulated { rig, .. } = world(None) else { unreachable!("simulated") };
-    let nowhere =
-        World::Simulated { truth: Box::new(beyond_all_numbers()), rig, head: None, change: None, outliers: None };
+    let mut nowhere = world(None);
+    let World::Simulated { truth, .. } = &mut nowhere else { unreachable!("simulated") };
+    **truth = beyond_all_numbers();
     let whole = std::mem::replace(&mut broken.world, nowhere);
     for _ in 0..2 {
         let before = timeless(broken.latest());

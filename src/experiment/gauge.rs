@@ -10,10 +10,9 @@
 //! where it predicts what it predicted before.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 use crate::{
+    design::{General, general_movements},
     kinematics::JointBox,
     model::{Layout, State},
     sensing::Rig,
@@ -24,8 +23,9 @@ use crate::{
 pub struct Gauge {
     layout: Layout,
     rig: Rig,
-    /// The postures that stand for all.
-    postures: Vec<Vec<f64>>,
+    limits: JointBox,
+    /// The movements that stand for all, and through which channels each is seen.
+    movements: Vec<General>,
     undetermined: usize,
 }
 
@@ -35,21 +35,19 @@ const NEGLIGIBLE: f64 = 1e-12;
 const STEPS: usize = 30;
 
 impl Gauge {
-    /// The gauge at `truth`, judged by postures anywhere in the joint box, twice as many as there can be need of.
+    /// The gauge at `truth`, judged by movements in general position.
     pub fn new(truth: &State, layout: &Layout, rig: &Rig, limits: &JointBox) -> Self {
-        let count = 2 * layout.dimension().div_ceil(rig.equations().max(1)) + 8;
-        // A fixed stream of its own: what is general needs no seed.
-        let mut rng = ChaCha8Rng::seed_from_u64(0);
-        let postures = (0..count).map(|_| limits.draw(&mut rng)).collect();
         // Noise may be none: what can be told does not depend on it.
         let rig = if rig.sigma() > 0.0 { rig.clone() } else { rig.assuming(1.0) };
-        let mut gauge = Self { layout: layout.clone(), rig, postures, undetermined: 0 };
+        let (layout, limits) = (layout.clone(), limits.clone());
+        let mut gauge = Self { layout, rig, limits, movements: Vec::new(), undetermined: 0 };
         gauge.study(truth);
         gauge
     }
 
     /// Judges another truth.
     pub fn study(&mut self, truth: &State) {
+        self.movements = general_movements(truth, &self.layout, &self.rig, &self.limits);
         self.undetermined = self.null_space(truth).ncols();
     }
 
@@ -73,8 +71,8 @@ impl Gauge {
     fn null_space(&self, state: &State) -> DMatrix<f64> {
         let m = self.layout.dimension();
         let mut information = DMatrix::zeros(m, m);
-        for posture in &self.postures {
-            let rows = self.rig.jacobian(state, &self.layout, posture);
+        for General { rig, posture } in &self.movements {
+            let rows = rig.jacobian(state, &self.layout, posture);
             information += &rows * rows.transpose();
         }
         let scale = information.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 1.0 });
@@ -118,12 +116,11 @@ impl Gauge {
     /// `moved` with its predictions restored to those of the truth, by steps across the undetermined directions.
     fn restored(&self, mut moved: State, truth: &State) -> State {
         let m = self.layout.dimension();
-        let d = self.rig.equations();
         for _ in 0..3 {
             let (mut information, mut descent) = (DMatrix::zeros(m, m), DVector::zeros(m));
-            for posture in &self.postures {
-                let wanted = self.rig.observe(truth, posture, &vec![0.0; d]);
-                let equations = self.rig.equations_of(&moved, &self.layout, posture, &wanted);
+            for General { rig, posture } in &self.movements {
+                let wanted = rig.observe(truth, posture, &vec![0.0; rig.equations()]);
+                let equations = rig.equations_of(&moved, &self.layout, posture, &wanted);
                 information += &equations.rows * equations.rows.transpose();
                 descent += &equations.rows * &equations.residual;
             }
@@ -166,7 +163,8 @@ impl Gauge {
 mod tests {
     use std::sync::Arc;
 
-    use rand::RngExt;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
     use super::*;

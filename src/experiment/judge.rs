@@ -101,6 +101,7 @@ impl Judge {
             location_m: truth.and_then(|truth| metrics::location_m(&estimate, truth, layout)),
             prediction_m: prediction.map(|(rms, _)| rms),
             prediction_mean_m: prediction.map(|(_, mean)| mean),
+            scatter_m: self.evaluation.scatter_m(&belief.state),
             nees: nees.map(|(nees, _)| nees),
             nees_dof: nees.map(|(_, dof)| dof),
             joints: self.evaluation.joints(&estimate, truth, layout),

@@ -83,7 +83,7 @@ fn live(scenario: &Scenario, agent: &mut Agent, seed: u64) -> Vec<Event> {
             0 => Observation::missed(scenario.rig.channels().len()),
             _ => scenario.rig.observe(&scenario.robot.state, &configuration, &noise),
         };
-        let executed = Executed { proposal, movement: Movement { configuration, row: None }, observation };
+        let executed = Executed { proposal, movement: Movement::to(configuration), observation };
         refuses_what_does_not_fit(agent, &executed);
         agent.absorb(std::slice::from_ref(&executed)).expect("a measurement");
         events.push(Event::Executed(executed));
@@ -104,7 +104,7 @@ fn refuses_what_does_not_fit(agent: &mut Agent, good: &Executed) {
         bad.push(Executed { observation, ..good.clone() });
     }
     for configuration in [Vec::new(), vec![f64::NAN; good.movement.configuration.len()]] {
-        bad.push(Executed { movement: Movement { configuration, row: None }, ..good.clone() });
+        bad.push(Executed { movement: Movement::to(configuration), ..good.clone() });
     }
     for bad in bad {
         for list in [vec![bad.clone()], vec![good.clone(), bad.clone()]] {
@@ -187,7 +187,7 @@ fn an_absurd_reading_ends_nobody() {
         let configuration = vec![0.1; 6];
         let good = scenario.rig.observe(&scenario.robot.state, &configuration, &[0.0; 3]);
         let executed = |observation| {
-            let movement = Movement { configuration: configuration.clone(), row: None };
+            let movement = Movement::to(configuration.clone());
             [Executed { proposal: None, movement, observation }]
         };
         let refused = agent.absorb(&executed(Observation::of([1e160, 0.0, 0.0])));

@@ -9,13 +9,14 @@ use super::{
     judge::Judge,
     metrics::Metrics,
     report::{LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
+    sight::{ChannelDescription, readings},
     world::World,
 };
 use crate::{
     estimation::{Belief, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
-    model::{State, Workspace},
-    selection::{SelectionError, Weights},
+    model::{Hand, State, Workspace},
+    selection::{Movement, SelectionError, Weights},
     sensing::Observation,
 };
 
@@ -166,20 +167,27 @@ impl Learner {
         Some(self.agent.appraise(standpoint, &centre).ok()?.gain)
     }
 
-    /// Takes in what was seen after a proposal was carried out.
+    /// Takes in the movement by which a proposal was carried out, and what was seen after it.
     pub(super) fn learn(
         &mut self,
         proposal: Proposal,
+        movement: Movement,
         observation: Observation,
         world: &World,
+        channels: &[ChannelDescription],
     ) -> Result<(MovementReport, Update), AbsorbError> {
         let truth = world.truth();
-        let movement = proposal.selection.movement.clone();
+        let row = movement.row;
         let configuration = movement.configuration.clone();
         let before = self.agent.standpoint().to_owned();
         let predicted = before.belief.state.marker_at(&configuration);
-        let measured = observation.marker(&before.belief.rig);
+        let measured = match before.belief.state.hand {
+            Hand::Target(hand) => observation.position(&before.belief.rig, hand),
+            // What it sees is elsewhere.
+            Hand::Device(_) => None,
+        };
         let seen = !observation.is_miss();
+        let observed = observation.clone();
         let executed = Executed { proposal: Some(proposal.id), movement, observation };
         let update = match self.agent.absorb(&[executed]) {
             Ok(updates) => updates.first().copied().unwrap_or_default(),
@@ -191,6 +199,10 @@ impl Learner {
         self.record.movements += 1;
         self.record.misses += u64::from(!seen);
         self.record.changes_noticed += u64::from(update.change_noticed);
+        let movements = self.record.movements;
+        let weighed: Vec<ReadingReport> =
+            self.readings().into_iter().filter(|reading| reading.movement == movements).collect();
+        let readings = readings(world, self.belief(), &configuration, &observed, channels, &weighed);
         let selection = &proposal.selection;
         let report = MovementReport {
             predicted_marker_m: array(&predicted.coords),
@@ -198,12 +210,14 @@ impl Learner {
             estimated_skeleton_m: arrays(&shown(&self.belief().state, truth).skeleton(&configuration)),
             true_skeleton_m: truth.map(|truth| arrays(&truth.skeleton(&configuration))),
             gaze: gaze(world, &configuration),
-            row: selection.movement.row,
+            row,
+            socket: None,
             configuration,
             criterion: selection.criterion,
             gain: selection.gain,
             evaluations: selection.evaluations,
             selection_ms: proposal.selection_ms,
+            readings,
             seen,
             partition: selection.search.as_ref().map(|search| search.partition.clone()),
         };

@@ -3,7 +3,7 @@
 //! Axes are compared in the frame of the measurements ([`State::measured`]); where the measurements leave a gauge, with the
 //! truth moved along it onto the estimate (see [`Gauge`](super::gauge::Gauge)).
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -25,6 +25,10 @@ pub struct Metrics {
     pub prediction_m: Option<f64>,
     /// Mean of that distance, metres.
     pub prediction_mean_m: Option<f64>,
+    /// With sockets: mean distance of the predicted target from its mean over the postures that hold it in the same socket, over
+    /// sockets that were not trained on, metres; null where there are none.
+    #[serde(default)]
+    pub scatter_m: Option<f64>,
     /// The prediction error that the learner itself expects over its workspace: mean of √(tr(H P Hᵀ) + e²), e the model error,
     /// metres.
     pub expected_prediction_m: Option<f64>,
@@ -112,6 +116,26 @@ pub struct Evaluation {
     markers: Vec<Point3<f64>>,
     /// σ of the sensor per coordinate, metres; `None` for measurements.
     sigma_m: Option<f64>,
+    /// What is held in sockets that nobody learns from.
+    held: Vec<HeldOut>,
+}
+
+/// Postures that hold a target in one socket.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeldOut {
+    /// The target.
+    pub target: usize,
+    /// Joint positions, rad or m.
+    pub postures: Vec<Vec<f64>>,
+}
+
+impl HeldOut {
+    /// The distances of the predicted target from its mean, metres.
+    fn distances(&self, estimate: &State) -> impl Iterator<Item = f64> {
+        let points: Vec<_> = self.postures.iter().map(|theta| estimate.target_at(self.target, theta).coords).collect();
+        let mean = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+        points.into_iter().map(move |point| (point - mean).norm())
+    }
 }
 
 /// Configurations of the evaluation set that serve for the signal-to-noise ratios.
@@ -121,12 +145,22 @@ impl Evaluation {
     /// Against the noise-free markers of the truth.
     pub fn of_truth(workspace: impl Into<Workspace>, truth: &State, sigma_m: f64) -> Self {
         let workspace = workspace.into();
-        Self { markers: workspace.points(truth), workspace, sigma_m: Some(sigma_m) }
+        Self { markers: workspace.points(truth), workspace, sigma_m: Some(sigma_m), held: Vec::new() }
     }
 
     /// Against held-out measurements, one at each configuration.
     pub fn of_measurements(workspace: impl Into<Workspace>, markers: Vec<Point3<f64>>) -> Self {
-        Self { workspace: workspace.into(), markers, sigma_m: None }
+        Self { workspace: workspace.into(), markers, sigma_m: None, held: Vec::new() }
+    }
+
+    /// Also by what is held in these sockets.
+    pub fn with_sockets(self, held: Vec<HeldOut>) -> Self {
+        Self { held, ..self }
+    }
+
+    /// Mean distance of the predicted target from its mean over the same socket, metres; `None` without held-out sockets.
+    pub fn scatter_m(&self, estimate: &State) -> Option<f64> {
+        mean(self.held.iter().flat_map(|held| held.distances(estimate)))
     }
 
     /// The same configurations, against another truth.
@@ -184,7 +218,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{UnitVector3, Vector3};
+    use nalgebra::UnitVector3;
 
     use super::*;
     use crate::kinematics::Line;
@@ -210,6 +244,23 @@ mod tests {
         assert_eq!(evaluation.joints(&estimate, None, &layout), [JointMetrics::default()]);
         let known = Layout::of_arm(&truth, &[false], true);
         assert_eq!(evaluation.joints(&estimate, Some(&truth), &known), [JointMetrics::default()]);
+    }
+
+    /// An arm about z, a metre long, that is believed to turn about an axis 1 cm beside the true one.
+    #[test]
+    fn the_scatter_at_sockets_worked_by_hand() {
+        let truth = State::arm(vec![line([0., 0., 1.], [0., 0., 0.])], Point3::new(1., 0., 0.));
+        let evaluation = Evaluation::of_truth(Vec::new(), &truth, 0.05);
+        assert_eq!(evaluation.scatter_m(&truth), None);
+        let estimate = State { joints: vec![line([0., 0., 1.], [0.01, 0., 0.])], ..truth.clone() };
+        let turned =
+            |degrees: [f64; 2]| HeldOut { target: 0, postures: degrees.map(|x| vec![x.to_radians()]).to_vec() };
+        // The marker at 0 and 360 degrees is at one place whatever is believed.
+        let evaluation = evaluation.with_sockets(vec![turned([0., 360.]), turned([90., -270.])]);
+        assert!(evaluation.scatter_m(&estimate).expect("sockets") < 1e-12);
+        // At 0 and 180 degrees it is at 1 and at 0.02 − 1: far apart, as no socket would have it.
+        let scatter = evaluation.with_sockets(vec![turned([0., 180.])]).scatter_m(&estimate).expect("a socket");
+        assert!((scatter - 0.99).abs() < 1e-12, "{scatter}");
     }
 
     #[test]

@@ -24,6 +24,7 @@ mod metrics;
 mod remarks;
 mod report;
 mod result;
+mod sight;
 mod streams;
 mod world;
 
@@ -39,12 +40,16 @@ pub use gauge::Gauge;
 pub use head::{GazeReport, HeadDescription};
 pub use judge::{Judge, Verdict};
 pub use learner::{Learner, SETTLING_STEPS};
-pub use metrics::{Evaluation, JointMetrics, Metrics, axis_deg, location_m, orientation_deg};
+pub use metrics::{Evaluation, HeldOut, JointMetrics, Metrics, axis_deg, location_m, orientation_deg};
 pub use report::{
     Body, Description, JointDescription, JointReport, LearnerDescription, LearnerReport, ModelReport, MovementReport,
-    StepReport,
+    SocketDescription, StepReport,
 };
 pub use result::{JointModel, LearnerResult, MarkerModel, Model, OutlierReading, RunResult};
+pub use sight::{
+    CameraDescription, ChannelDescription, ChannelReading, CorrectionReport, PlaceReport, TargetDescription,
+};
+pub(crate) use sight::{channels, described};
 pub use streams::Stream;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};
 
@@ -149,20 +154,22 @@ impl Experiment {
         let draw = noise.draw(&self.world);
         let changed = self.world.changed_after(self.latest.step);
         let world = changed.as_ref().unwrap_or(&self.world);
-        let mut observations = Vec::with_capacity(self.learners.len());
+        let mut executed = Vec::with_capacity(self.learners.len());
         for (learner, proposal) in self.learners.iter().zip(&proposals) {
             let Some(proposal) = proposal else {
-                observations.push(None);
+                executed.push(None);
                 continue;
             };
             let name = || learner.description.name.clone();
-            let movement = &proposal.selection.movement;
-            let observation =
-                world.observe(movement, &draw).map_err(|source| ExperimentError::World { learner: name(), source })?;
+            let shown = world.execute(&proposal.selection.movement, &draw).and_then(|movement| {
+                let observation = world.observe(&movement, &draw)?;
+                Ok((movement, observation))
+            });
+            let (movement, observation) = shown.map_err(|source| ExperimentError::World { learner: name(), source })?;
             learner.belief().accepts(&movement.configuration, &observation).map_err(|refused| {
                 ExperimentError::Absorb { learner: name(), source: AbsorbError::Refused(refused) }
             })?;
-            observations.push(Some(observation));
+            executed.push(Some((movement, observation)));
         }
         self.noise = noise;
         let (movement, channels) = (self.latest.step + 1, 0..draw.outliers.len());
@@ -175,14 +182,17 @@ impl Experiment {
         }
         let truth = self.world.truth();
         let mut reports = Vec::with_capacity(self.learners.len());
-        for ((learner, proposal), observation) in self.learners.iter_mut().zip(proposals).zip(observations) {
-            let (movement, update) = match proposal.zip(observation) {
-                Some((proposal, observation)) => {
+        for ((learner, proposal), executed) in self.learners.iter_mut().zip(proposals).zip(executed) {
+            let (movement, update) = match proposal.zip(executed) {
+                Some((proposal, (movement, observation))) => {
                     let name = learner.description.name.clone();
-                    let learned = learner.learn(proposal, observation, &self.world);
-                    let (movement, update) =
+                    let socket = movement.socket.and_then(|socket| self.description.sockets.get(socket));
+                    let socket = socket.map(SocketDescription::label);
+                    let learned =
+                        learner.learn(proposal, movement, observation, &self.world, &self.description.channels);
+                    let (report, update) =
                         learned.map_err(|source| ExperimentError::Absorb { learner: name, source })?;
-                    (Some(movement), update)
+                    (Some(MovementReport { socket, ..report }), update)
                 }
                 None => (None, Update::default()),
             };

@@ -3,13 +3,14 @@
 //! Everything that shows or stores (recordings, tables, HTTP, the page) reads these and nothing else. Lengths are in
 //! metres, angles in radians unless a name says otherwise, all positions in the frame of the measurements.
 
-use nalgebra::{Matrix3, Point3, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{
     convergence::Thresholds,
     head::{GazeReport, HeadDescription},
     metrics::Metrics,
+    sight::{CameraDescription, ChannelDescription, ChannelReading, CorrectionReport, PlaceReport, TargetDescription},
 };
 use crate::{
     estimation::Belief,
@@ -49,6 +50,21 @@ pub struct Description {
     pub change_at: Option<u64>,
     /// The head that watches; null if the marker is always seen.
     pub head: Option<HeadDescription>,
+    /// What is read after every movement.
+    #[serde(default)]
+    pub channels: Vec<ChannelDescription>,
+    /// The cameras.
+    #[serde(default)]
+    pub cameras: Vec<CameraDescription>,
+    /// What can be looked at, the marker first.
+    #[serde(default)]
+    pub targets: Vec<TargetDescription>,
+    /// Whether the place of the robot's base in the frame of the measurements is learned.
+    #[serde(default)]
+    pub base_learned: bool,
+    /// The sockets in which a target is held; those that learners may use first, in the order of their numbers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sockets: Vec<SocketDescription>,
     /// What the robot is drawn as; null for one that is drawn as its own joints and links.
     #[serde(default)]
     pub body: Option<Body>,
@@ -62,6 +78,27 @@ pub enum Body {
     /// A human figure of the arm's proportions, whose right arm it is: x ahead, y to the left, z up. Joints whose names
     /// begin with `torso` or `chest` carry its trunk.
     Humanoid,
+}
+
+/// A socket as the scenario describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct SocketDescription {
+    /// Its name, among those of one place.
+    pub name: String,
+    /// The place where it stands, with others; null if there is but one place.
+    pub place: Option<String>,
+    /// Where it truly is, metres; null where no truth is known.
+    pub at_m: Option<[f64; 3]>,
+    /// Whether it is held out: nobody learns from it, and the scatter of the predicted target there is judged.
+    pub held_out: bool,
+}
+
+impl SocketDescription {
+    /// Its place and its name.
+    pub fn label(&self) -> String {
+        self.place.as_ref().map_or_else(|| self.name.clone(), |place| format!("{place}/{}", self.name))
+    }
 }
 
 /// A joint as the scenario describes it.
@@ -91,6 +128,9 @@ pub struct LearnerDescription {
     /// Whether stabilising noise, added to its covariance step by step, keeps that larger than its data allow.
     #[serde(default)]
     pub stabilised: bool,
+    /// Whether its loss knows of outliers, and tells for each reading how likely it is one.
+    #[serde(default)]
+    pub robust: bool,
 }
 
 /// All learners after one step. Step 0 is the start: no movement yet, the initial estimate.
@@ -129,11 +169,14 @@ pub struct MovementReport {
     pub configuration: Vec<f64>,
     /// The row of the recorded data set; null in a simulated world.
     pub row: Option<usize>,
+    /// The socket in which a target was held, by its place, if it has one, and its name; null without sockets.
+    #[serde(default)]
+    pub socket: Option<String>,
     /// Where the head that watches looks then; null without a head.
     pub gaze: Option<GazeReport>,
     /// The marker as predicted before the measurement, metres.
     pub predicted_marker_m: [f64; 3],
-    /// The measured marker, metres; null for a miss.
+    /// The measured marker, metres; null where no reading says where it was: after a miss, and in the picture of a camera.
     pub measured_marker_m: Option<[f64; 3]>,
     /// The arm in this configuration as estimated after the update: axis points in order, then the marker, metres.
     pub estimated_skeleton_m: Vec<[f64; 3]>,
@@ -147,6 +190,9 @@ pub struct MovementReport {
     pub evaluations: usize,
     /// How long the choice took, milliseconds of wall time.
     pub selection_ms: f64,
+    /// Every channel's reading beside the estimate after the update.
+    #[serde(default)]
+    pub readings: Vec<ChannelReading>,
     /// Whether any channel had a reading.
     #[serde(skip, default)]
     pub seen: bool,
@@ -165,6 +211,15 @@ pub struct ModelReport {
     pub marker_m: [f64; 3],
     /// Covariance of the marker, m², row by row; null if it is known or no covariance is kept.
     pub marker_covariance_m2: Option<[[f64; 3]; 3]>,
+    /// The robot's base in the frame of the measurements; null where the two are one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base: Option<PlaceReport>,
+    /// The cameras.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<PlaceReport>,
+    /// What can be looked at; empty where that is a marker alone, and a point.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub targets: Vec<PlaceReport>,
 }
 
 /// The axis of one joint at θ = 0.
@@ -184,30 +239,44 @@ pub struct JointReport {
     pub allowed_point_covariance_m2: Option<[[f64; 3]; 3]>,
     /// Covariance of the direction, rad², row by row: rank 2, flat along the axis.
     pub direction_covariance_rad2: Option<[[f64; 3]; 3]>,
+    /// What its readings are corrected by; null where they are taken for what they say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub correction: Option<CorrectionReport>,
 }
 
 impl ModelReport {
     /// A state without uncertainty, in the frame of the measurements.
     pub fn of_state(state: &State) -> Self {
+        let base = PlaceReport::of_base(state);
         let state = state.measured();
         let joints = state
             .joints
             .iter()
-            .map(|joint| JointReport {
+            .zip(&state.corrections)
+            .map(|(joint, correction)| JointReport {
                 axis: array(&joint.direction()),
                 point_m: joint.line().map(|line| array(&line.point.coords)),
                 point_covariance_m2: None,
                 allowed_point_covariance_m2: None,
                 direction_covariance_rad2: None,
+                correction: CorrectionReport::of(correction),
             })
             .collect();
-        Self { joints, marker_m: array(&state.marker().coords), marker_covariance_m2: None }
+        Self {
+            joints,
+            marker_m: array(&state.marker().coords),
+            marker_covariance_m2: None,
+            base,
+            cameras: PlaceReport::of_cameras(&state),
+            targets: PlaceReport::of_targets(&state),
+        }
     }
 
     /// A belief with what it holds of uncertainty; points on axes are those nearest to the truth's, where it is known.
     pub fn of_belief(belief: &Belief, truth: Option<&State>) -> Self {
         let (shown, estimate) = (shown(&belief.state, truth), belief.state.measured());
-        let mut model = Self::of_state(&shown);
+        let base = PlaceReport::of_base(&belief.state);
+        let mut model = Self { base, ..Self::of_state(&shown) };
         for (index, joint) in model.joints.iter_mut().enumerate() {
             let along = match (shown.joints[index].line(), estimate.joints[index].line()) {
                 (Some(shown), Some(line)) => line.direction.dot(&(shown.point - line.point)),
@@ -229,7 +298,8 @@ impl ModelReport {
         }
     }
 
-    /// The chain that it describes, in the frame of the measurements; `None` if a number in it is not finite.
+    /// The chain that it describes with its cameras, in the frame of the measurements; `None` if a number in it is not
+    /// finite. The first target is the marker, the others are those of the report.
     pub fn state(&self) -> Option<State> {
         let finite = |vector: &[f64; 3]| vector.iter().all(|x| x.is_finite());
         let joint = |joint: &JointReport| {
@@ -241,7 +311,18 @@ impl ModelReport {
             }
         };
         let joints = self.joints.iter().map(joint).collect::<Option<Vec<_>>>()?;
-        finite(&self.marker_m).then(|| State::arm(joints, self.marker_m.into()))
+        let mut state = finite(&self.marker_m).then(|| State::arm(joints, self.marker_m.into()))?;
+        for (correction, joint) in state.corrections.iter_mut().zip(&self.joints) {
+            *correction = joint.correction.map_or(*correction, |report| report.correction());
+        }
+        state.devices = self.cameras.iter().map(PlaceReport::device).collect::<Option<_>>()?;
+        state.targets.extend(self.targets.iter().map(PlaceReport::target).collect::<Option<Vec<_>>>()?);
+        Some(state)
+    }
+
+    /// Where the robot's base is in the frame of the measurements; `None` if a number in it is not finite.
+    pub fn base_frame(&self) -> Option<Isometry3<f64>> {
+        self.base.as_ref().map_or(Some(Isometry3::identity()), PlaceReport::frame)
     }
 
     /// The arm at θ = 0: axis points in order, then the marker, metres.

@@ -22,6 +22,10 @@ pub enum Stream {
     Hypotheses = 7,
     /// Which readings are outliers, and where they lie; one draw per movement.
     Outliers = 8,
+    /// The postures that hold a target in sockets that are held out.
+    HeldOutSockets = 9,
+    /// The error of what is known before any movement.
+    Beforehand = 10,
 }
 
 impl Stream {

@@ -10,7 +10,8 @@ use rand_distr::StandardNormal;
 
 use super::streams::Stream;
 use crate::{
-    model::State,
+    kinematics::JointBox,
+    model::{Manifold, State},
     selection::Movement,
     sensing::{Head, Observation, Refused, Rig},
 };
@@ -24,6 +25,8 @@ pub enum World {
         truth: Box<State>,
         /// The channels, with their true noise.
         rig: Arc<Rig>,
+        /// The joint limits.
+        limits: JointBox,
         /// The head that watches; without one every marker is seen.
         head: Option<Head>,
         /// How the body will change.
@@ -79,6 +82,12 @@ pub enum WorldError {
     /// A movement that is no row of the data set.
     #[error("recorded data hold what was measured at their own rows, not at other configurations")]
     NotRecorded,
+    /// Nothing can be held where it was to be held.
+    #[error("no posture near the proposed one brings a target into socket {socket} (counted from 0)")]
+    OutOfReach {
+        /// The socket.
+        socket: usize,
+    },
     /// What was measured is no measurement.
     #[error("what the world shows is no measurement: {0}")]
     NoMeasurement(#[from] Refused),
@@ -133,10 +142,11 @@ impl World {
 
     /// The world with the body changed, if that is due after so many movements.
     pub(super) fn changed_after(&self, movements: u64) -> Option<Self> {
-        let Self::Simulated { rig, head, change: Some(change), outliers, .. } = self else { return None };
+        let Self::Simulated { rig, limits, head, change: Some(change), outliers, .. } = self else { return None };
         (change.step <= movements).then(|| Self::Simulated {
             truth: Box::new(change.truth.clone()),
             rig: rig.clone(),
+            limits: limits.clone(),
             head: *head,
             change: None,
             outliers: *outliers,
@@ -149,6 +159,22 @@ impl World {
         draw.outliers.get(channel).is_some_and(|[chance, ..]| *chance < outliers.fraction)
     }
 
+    /// A movement as it is carried out, under a draw of chance: what is to be held in a socket is pushed into it. The joints then
+    /// read the nearest posture in which the target is there, but for what play and their noise, which are σ at the target,
+    /// make of it.
+    pub fn execute(&self, movement: &Movement, draw: &Draw) -> Result<Movement, WorldError> {
+        let (Self::Simulated { truth, rig, limits, .. }, Some(socket)) = (self, movement.socket) else {
+            return Ok(movement.clone());
+        };
+        let out_of_reach = || WorldError::OutOfReach { socket };
+        let (channel, target) = rig.holds(socket).ok_or_else(out_of_reach)?;
+        Observation::missed(rig.channels().len()).check(rig, truth.joints.len(), &movement.configuration)?;
+        let mut place = truth.sockets[socket];
+        rig.channels()[channel].disturb(place.coords.as_mut_slice(), rig.part(channel, &draw.noise));
+        let nearest = Manifold::new(truth, target, place, limits).nearest(&movement.configuration);
+        Ok(Movement { configuration: nearest.ok_or_else(out_of_reach)?, ..movement.clone() })
+    }
+
     /// What is seen after `movement`, under a draw of chance.
     pub fn observe(&self, movement: &Movement, draw: &Draw) -> Result<Observation, WorldError> {
         match self {
@@ -157,7 +183,7 @@ impl World {
                 Observation::missed(rig.channels().len()).check(rig, truth.joints.len(), theta)?;
                 let mut observation = match head {
                     Some(head) if !head.sees(&truth.marker_at(theta)) => Observation::missed(rig.channels().len()),
-                    _ => rig.observe(truth, theta, &draw.noise),
+                    _ => rig.observe_in(movement.socket, truth, theta, &draw.noise),
                 };
                 for (channel, reading) in observation.readings.iter_mut().enumerate() {
                     if let (Some(reading), Some(outliers), true) = (reading, outliers, self.is_outlier(draw, channel)) {
@@ -181,15 +207,56 @@ mod tests {
     use rand::SeedableRng;
 
     use super::*;
-    use crate::model::laws::random_arm;
+    use crate::{
+        model::laws::random_arm,
+        sensing::{Channel, Socket},
+    };
 
     #[test]
     fn an_unknown_row_is_no_miss() {
         let world = World::Measured { observations: vec![Observation::of([1.0, 2.0, 3.0])] };
-        let at = |row| world.observe(&Movement { configuration: vec![0.0], row }, &Draw::default());
+        let at = |row| world.observe(&Movement { row, ..Movement::to(vec![0.0]) }, &Draw::default());
         assert_eq!(at(Some(0)), Ok(Observation::of([1.0, 2.0, 3.0])));
         assert_eq!(at(Some(1)), Err(WorldError::NoSuchRow { row: 1, rows: 1 }));
         assert_eq!(at(None), Err(WorldError::NotRecorded));
+    }
+
+    /// What is held in a socket is where the socket is, but for the noise, at the posture nearest to the one proposed.
+    #[test]
+    fn what_is_held_is_pushed_into_its_socket() {
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let mut truth = random_arm(&mut rng, 6);
+        let limits = JointBox::new(vec![(-1.5, 1.5); 6]).expect("limits");
+        let inside = vec![0.2; 6];
+        truth.sockets = vec![nalgebra::Point3::origin(), truth.marker_at(&inside)];
+        let socket = |socket| Arc::new(Socket { target: 0, socket, sigma_m: 2e-4 }) as Arc<dyn Channel>;
+        let rig = Arc::new(Rig::new(vec![socket(0), socket(1)]));
+        let (robot, wanted) = (truth.clone(), truth.sockets[1]);
+        let world = World::Simulated {
+            truth: Box::new(truth),
+            rig,
+            limits: limits.clone(),
+            head: None,
+            change: None,
+            outliers: None,
+        };
+        let proposed = Movement { socket: Some(1), ..Movement::to(vec![0.21, 0.19, 0.2, 0.22, 0.18, 0.2]) };
+        for noise in [0.0, 1.0] {
+            let draw = Draw { noise: vec![noise; 6], outliers: Vec::new() };
+            let made = world.execute(&proposed, &draw).expect("in reach");
+            let away = robot.marker_at(&made.configuration) - wanted;
+            assert!((away - nalgebra::Vector3::repeat(2e-4 * noise)).norm() < 1e-9, "{away}");
+            let observation = world.observe(&made, &draw).expect("held");
+            assert_eq!(observation.readings, [None, Some(vec![0.0; 3])]);
+            if noise == 0.0 {
+                let nearest = Manifold::new(&robot, 0, wanted, &limits).nearest(&proposed.configuration);
+                assert_eq!(Some(made.configuration), nearest);
+            }
+        }
+        let elsewhere = Movement { socket: Some(2), ..proposed.clone() };
+        assert_eq!(world.execute(&elsewhere, &Draw::default()), Err(WorldError::OutOfReach { socket: 2 }));
+        let free = Movement { socket: None, ..proposed };
+        assert_eq!(world.execute(&free, &Draw::default()), Ok(free.clone()), "nothing is held");
     }
 
     #[test]
@@ -197,9 +264,10 @@ mod tests {
         let mut truth = random_arm(&mut ChaCha8Rng::seed_from_u64(1), 2);
         truth = truth.with_marker(nalgebra::Point3::new(f64::INFINITY, 0.0, 0.0));
         let (truth, rig) = (Box::new(truth), Arc::new(Rig::tracker(0.1)));
-        let world = World::Simulated { truth, rig, head: None, change: None, outliers: None };
+        let limits = JointBox::new(vec![(-1.0, 1.0); 2]).expect("limits");
+        let world = World::Simulated { truth, rig, limits, head: None, change: None, outliers: None };
         let draw = Draw { noise: vec![0.0; 3], outliers: Vec::new() };
-        let shown = world.observe(&Movement { configuration: vec![0.1; 2], row: None }, &draw);
+        let shown = world.observe(&Movement::to(vec![0.1; 2]), &draw);
         assert!(matches!(shown, Err(WorldError::NoMeasurement(_))), "{shown:?}");
     }
 }

@@ -60,7 +60,7 @@ pub(crate) fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
         intrinsics: Some([500.0, 510.0, 320.0, 240.0]),
     });
     state.devices.push(Device { link: None, pose: random_pose(rng), intrinsics: None });
-    state.sockets.push(random_point(rng));
+    state.sockets.extend([random_point(rng), random_point(rng)]);
     state
 }
 

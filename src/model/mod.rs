@@ -8,10 +8,12 @@
 //!   and not among the kinematics since it is the layout that says which parameters there are.
 //! * [`Workspace`]: where predictions of the hand count.
 //! * [`urdf`]: robot descriptions, read into a chain and written with the axes that were learned.
+//! * [`Manifold`]: the postures in which a target is at a given place.
 
 mod block;
 mod element;
 mod layout;
+mod manifold;
 mod pass;
 mod prior;
 mod rank;
@@ -22,6 +24,7 @@ mod workspace;
 pub use block::Block;
 pub use element::{Displacement, Element};
 pub use layout::{Layout, Quantity};
+pub use manifold::Manifold;
 pub use pass::{Frame, Motion, Pass, jacobian};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
 pub use rank::rank;

@@ -86,6 +86,12 @@ impl Correction {
         let (sin, cos) = reading.sin_cos();
         proportional + self.sine * sin + self.cosine * cos
     }
+
+    /// ∂θ/∂q at a reading.
+    pub fn slope(&self, reading: f64) -> f64 {
+        let (sin, cos) = reading.sin_cos();
+        self.ratio + self.sine * cos - self.cosine * sin
+    }
 }
 
 /// Something fixed to a link.

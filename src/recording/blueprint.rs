@@ -2,8 +2,7 @@
 
 use rerun::{
     blueprint::components::{BackgroundKind, Corner2D, VisualBounds2D},
-    components::Plane3D,
-    datatypes::{Plane3D as Plane, Range2D},
+    datatypes::Range2D,
     external::{
         re_log_types::{ApplicationId, EntityPath, LogMsg},
         re_sdk_types::blueprint::archetypes::{
@@ -18,7 +17,7 @@ use super::{
     charts::{BEST_DESIGN, CHARTS, CHARTS_WITHOUT_TRUTH, TRACE},
     layout::{Container, Part, Time, View},
     solid::single,
-    stage::Stage,
+    stage::{GROUNDS, Stage},
 };
 use crate::experiment::{Description, LearnerDescription};
 
@@ -55,11 +54,19 @@ impl Shape {
 }
 
 impl Theme {
-    /// The background, and the lines of the ground.
-    fn colours(self) -> [[u8; 3]; 2] {
+    /// The background.
+    fn background(self) -> [u8; 3] {
         match self {
-            Self::Light => [[0xF4, 0xF5, 0xF7], [0xC6, 0xCA, 0xD2]],
-            Self::Dark => [[0x1B, 0x1C, 0x1F], [0x3E, 0x42, 0x4A]],
+            Self::Light => [0xF4, 0xF5, 0xF7],
+            Self::Dark => [0x1B, 0x1C, 0x1F],
+        }
+    }
+
+    /// The lines of the ground.
+    pub(super) fn lines(self) -> [u8; 3] {
+        match self {
+            Self::Light => [0xC6, 0xCA, 0xD2],
+            Self::Dark => [0x3E, 0x42, 0x4A],
         }
     }
 }
@@ -80,7 +87,7 @@ impl Arranger {
         let scene = self.view(Theme::default(), Shape::default().aspect(), true).into();
         let mut below = self.charts();
         let note = View::new("TextDocument", "Note", &EntityPath::from("note")).into();
-        let tabs = self.partitions().into_iter().chain(self.limits()).chain([note]);
+        let tabs = self.partitions().into_iter().chain(self.limits()).chain(self.readings()).chain([note]);
         below.push(Container::tabs(tabs).into());
         let root = Container::vertical([scene, Container::horizontal(below).into()], [3.0, 1.0]);
         root.messages(self.application.clone(), Time::Shown)
@@ -96,28 +103,28 @@ impl Arranger {
     /// at θ = 0 can be switched on.
     fn view(&self, theme: Theme, aspect: f64, details: bool) -> View {
         let [target, eye] = self.stage.camera(aspect).map(|point| single(point.coords.into()));
-        let [ground, lines] = theme.colours();
-        let figure = &self.stage.figure;
-        let mut contents = Vec::new();
+        let (ground, labels): (_, &[&str]) = match theme {
+            Theme::Light => (GROUNDS[0], &["on_dark/**"]),
+            Theme::Dark => (GROUNDS[1], &["name", "marker/error", "marker/missed"]),
+        };
+        let mut contents = vec![format!("+ /{ground}")];
         for root in &self.roots {
             contents.push(format!("+ {root}/**"));
-            contents.extend(["direct", "metrics", "failure"].map(|hidden| format!("- {root}/{hidden}/**")));
+            let hidden = ["direct/**", "metrics/**", "readings/**", "failure/**"];
+            contents.extend(hidden.iter().chain(labels).map(|hidden| format!("- {root}/{hidden}")));
             contents.extend((!details).then(|| format!("- {root}/zero/**")));
         }
         contents.extend(details.then(|| "+ /key".to_owned()));
-        let plane = Plane3D(Plane::new([0.0, 0.0, 1.0], figure.ground_m as f32));
         let mut view = View::new("3D", "Scene", &EntityPath::root())
             .with_contents(contents)
             .with(&EyeControls3D::new().with_position(eye).with_look_target(target).with_eye_up([0.0, 0.0, 1.0]))
-            .with(&Background::new(BackgroundKind::SolidColor).with_color(ground))
-            .with(
-                &LineGrid3D::new()
-                    .with_visible(true)
-                    .with_spacing((0.5 * figure.reach_m) as f32)
-                    .with_plane(plane)
-                    .with_stroke_width(1.0)
-                    .with_color(lines),
-            );
+            .with(&Background::new(BackgroundKind::SolidColor).with_color(theme.background()))
+            // The lines of the ground are an entity: the viewer's own grid costs a tenth of a frame where software draws.
+            .with(&LineGrid3D::new().with_visible(false));
+        if !details {
+            let ground = EntityPath::from(ground);
+            view = view.with_behavior(&ground, &EntityBehavior::new().with_interactive(false));
+        }
         for root in &self.roots {
             if details {
                 let zero = root.join(&EntityPath::from("zero"));
@@ -143,6 +150,16 @@ impl Arranger {
         self.description.truth.as_ref()?;
         let of_learner = |root: &EntityPath| TRACE.1.map(|metric| format!("+ {root}/metrics/{metric}"));
         Some(chart(TRACE.0, self.roots.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")])))
+    }
+
+    /// How far readings are from the estimates, and where a learner weighs them, how likely they are outliers.
+    fn readings(&self) -> Vec<Part> {
+        let series = |kind: &'static str| self.roots.iter().map(move |root| format!("+ {root}/readings/{kind}/**"));
+        let mut views = vec![chart("Residual per reading (σ)", series("residuals"))];
+        if self.description.learners.iter().any(|learner| learner.robust) {
+            views.push(chart("Probability of an outlier", series("outliers")));
+        }
+        views
     }
 
     /// The partitions of those who have any: the joint box is divided by DIRECT, recorded movements are tried one by one.

@@ -101,8 +101,8 @@ impl Figure {
             self.fixed.append(&mut self.trunk);
         }
         self.ground_m = hips.z - 1.3 * a;
-        // Before the thighs, where the hand does not reach: above the head it would lie over raised arms.
-        self.name = at(hips, 0.1, 0.0, -0.55);
+        // On the ground before the feet, where nothing is behind it: above the head it would lie over raised arms.
+        self.name = at(hips, 0.3, -0.35, -1.26);
         self
     }
 
@@ -126,7 +126,7 @@ impl Figure {
             self.fixed = vec![column(-0.85, -0.14, 0.12)];
         }
         self.ground_m = shoulder.z - 1.0 * a;
-        self.name = shoulder + Vector3::new(0.3, 0.0, -0.95) * a;
+        self.name = shoulder + Vector3::new(0.3, -0.42, -0.97) * a;
         self
     }
 }

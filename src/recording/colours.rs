@@ -22,9 +22,38 @@ pub(super) fn tint(colour: [u8; 3], amount: f64) -> [u8; 3] {
     mix(colour, [0xFF; 3], amount)
 }
 
+/// A colour as a label on light ground takes it: the viewer writes labels in their entity's colour.
+pub(super) fn label_on_light(colour: [u8; 3]) -> [u8; 3] {
+    /// So far towards black even the palest can be read.
+    const DARKER: f64 = 0.4;
+    mix(colour, [0; 3], DARKER)
+}
+
+/// The same on dark ground.
+pub(super) fn label_on_dark(colour: [u8; 3]) -> [u8; 3] {
+    /// So far towards white even the darkest can be read.
+    const LIGHTER: f64 = 0.6;
+    tint(colour, LIGHTER)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What is behind labels before the scene's background, as measured in screenshots: the viewer lays a veil of its own
+    /// theme behind them.
+    const LABEL_GROUNDS: [[u8; 3]; 2] = [[0xEA, 0xEA, 0xEB], [0x24, 0x24, 0x26]];
+
+    #[test]
+    fn labels_can_be_read_on_light_and_dark_ground() {
+        for colour in (0..12).map(learner_color).chain([super::super::movement::ERROR]) {
+            let labels = [label_on_light(colour), label_on_dark(colour)];
+            for (label, ground) in labels.into_iter().zip(LABEL_GROUNDS) {
+                let contrast = palette::contrast(label, ground);
+                assert!(contrast >= 4.5, "{colour:02X?} on {ground:02X?}: {contrast:.2}");
+            }
+        }
+    }
 
     #[test]
     fn colours_are_written_in_hexadecimal() {

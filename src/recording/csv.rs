@@ -77,6 +77,7 @@ pub fn comparison_csv(comparison: &Comparison, output: impl io::Write) -> Result
                 ("location_m", point.location_m),
                 ("prediction_m", point.prediction_m),
                 ("prediction_mean_m", point.prediction_mean_m),
+                ("scatter_m", point.scatter_m),
                 ("trace", point.trace),
                 ("bound_trace", point.bound_trace),
             ];

@@ -7,6 +7,7 @@ use super::{
     learner::{LearnerEntities, Scenery, TRUE_ARM},
     posture::{Posture, between},
     rows::Rows,
+    sight,
     solid::moved,
     uncertainty::{Cloud, carried},
 };
@@ -20,6 +21,8 @@ pub(super) struct Shown {
     pub(super) estimate: Option<State>,
     pub(super) points: Option<Vec<Cloud>>,
     pub(super) allowed: Option<Vec<Cloud>>,
+    /// Whether a reading is marked as an outlier.
+    pub(super) has_outlier: bool,
 }
 
 impl Shown {
@@ -40,9 +43,16 @@ impl Shown {
             rows.after(step, 1, &learner.entity(marker), &[&nothing]);
         }
         let no_line = LineStrips3D::update_fields().with_strips([[[0.0_f32; 3]; 0]; 0]);
-        rows.after(step, 1, &learner.entity("marker/error"), &[&no_line]);
+        for line in ["marker/error", "on_dark/error"] {
+            rows.after(step, 1, &learner.entity(line), &[&no_line]);
+        }
+        if self.has_outlier {
+            rows.after(step, 1, &learner.entity("marker/outlier"), &[&no_line]);
+        }
         if scenery.description.head.is_some() {
-            rows.after(step, 1, &learner.entity("marker/missed"), &[&nothing]);
+            for marker in ["marker/missed", "on_dark/missed"] {
+                rows.after(step, 1, &learner.entity(marker), &[&nothing]);
+            }
         }
         let reach_m = scenery.stage.figure.reach_m;
         for frame in 1..=scenery.frames {
@@ -62,6 +72,10 @@ impl Shown {
             if let Some(posture) = &truth {
                 let arm = moved(&posture.capsules(reach_m, TRUE_ARM));
                 rows.after(step, ticks, &learner.entity("arm/truth"), &[&arm]);
+            }
+            if sight::is_drawn(scenery) {
+                let arms = [scenery.truth.zip(truth.as_ref()), self.estimate.as_ref().zip(estimate.as_ref())];
+                sight::log(rows, (step, ticks), learner, arms, None, scenery);
             }
             if let Some(posture) = truth.as_ref().or(estimate.as_ref()) {
                 learner.log_trunk(rows, step, ticks, posture, scenery.stage);

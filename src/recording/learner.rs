@@ -1,5 +1,6 @@
 //! What one learner's reports become.
 
+use nalgebra::{Isometry3, Translation3};
 use rerun::{
     Points3D, Scalars, TextLog, Transform3D,
     external::re_log_types::{EntityPath, EntityPathPart},
@@ -7,18 +8,22 @@ use rerun::{
 
 use super::{
     EllipsoidSize, charts,
+    colours::{label_on_dark, label_on_light},
     frames::Shown,
     head, metrics, model,
     movement::Movement,
     partition::{self, Slice},
     posture::{ArmLook, Posture, bare},
+    readings::Readings,
     rows::Rows,
+    sight,
+    sockets::sockets,
     solid::{drum, quaternion, single, solid},
     stage::Stage,
     uncertainty::{Drawn, Uncertainty},
 };
 use crate::{
-    experiment::{Description, LearnerReport, MovementReport},
+    experiment::{ChannelReading, Description, LearnerReport, MovementReport},
     model::State,
     optimize::Plane,
 };
@@ -53,39 +58,58 @@ pub(super) struct LearnerEntities {
     pub(super) root: EntityPath,
     pub(super) metrics: Vec<EntityPath>,
     uncertainty: Uncertainty,
+    readings: Readings,
+    /// Its place in the row.
+    index: usize,
+    /// Where the robot's base was thought to be at first, if it is learned: there bodies are drawn.
+    base: Option<Isometry3<f64>>,
+    /// What has moved it since.
+    moved: Isometry3<f64>,
     /// What slices show: chosen at the first partition and kept, so that the picture does not jump from step to step.
     plane: Option<Plane>,
     /// What the last step left to see.
     shown: Option<Shown>,
     /// Whether a posture that was tried out is drawn.
     has_ghost: bool,
+    /// What its name says.
+    label: String,
     stopped: bool,
     failed: bool,
 }
 
 impl LearnerEntities {
     /// Those of a learner, in its colour.
-    pub(super) fn new(colour: [u8; 3], name: &str, joints: usize, ellipsoids: EllipsoidSize) -> Self {
+    pub(super) fn new(
+        (index, colour, name): (usize, [u8; 3], &str),
+        description: &Description,
+        ellipsoids: EllipsoidSize,
+    ) -> Self {
         let root = EntityPath::new(vec![EntityPathPart::new(name)]);
         let metrics = root.join(&EntityPath::from("metrics"));
         Self {
             colour,
             metrics: metrics::NAMES.iter().map(|name| metrics.join(&EntityPath::from(*name))).collect(),
+            readings: Readings::new(&root, description),
             root,
-            uncertainty: Uncertainty::new(joints, ellipsoids),
+            uncertainty: Uncertainty::new(description.joints.len(), ellipsoids),
+            index,
+            base: None,
+            moved: Isometry3::identity(),
             plane: None,
             shown: None,
             has_ghost: false,
+            label: String::new(),
             stopped: false,
             failed: false,
         }
     }
 
-    /// What no view of the arrangement shows.
+    /// What no view of the arrangement shows, and the series behind the tabs.
     pub(super) fn hidden(&self) -> impl Iterator<Item = EntityPath> {
         let series = self.metrics.iter().zip(metrics::NAMES).filter(|(_, name)| !charts::shows(name));
         let others = ["direct/leaves", "zero/links", "zero/axes", "zero/directions"];
-        series.map(|(series, _)| series.clone()).chain(others.map(|path| self.entity(path)))
+        let readings = self.readings.series().cloned();
+        series.map(|(series, _)| series.clone()).chain(others.map(|path| self.entity(path))).chain(readings)
     }
 
     pub(super) fn entity(&self, path: &str) -> EntityPath {
@@ -97,10 +121,20 @@ impl LearnerEntities {
         ArmLook { links: [red, green, blue, alpha], pins: [red, green, blue, 255], girth }
     }
 
-    /// Logs what stays: the place of the learner at this place in the row, and its body.
-    pub(super) fn begin(&self, rows: &mut Rows, index: usize, stage: &Stage, description: &Description) {
-        let place = Transform3D::from_translation(single(stage.place(index).into()));
-        rows.always(&self.root, &[&place]);
+    /// Logs what stays: the place of the learner in the row, and its body. With a base that is learned, `base`, the place is
+    /// that of the first step.
+    pub(super) fn begin(
+        &mut self,
+        rows: &mut Rows,
+        stage: &Stage,
+        description: &Description,
+        base: Option<Isometry3<f64>>,
+    ) {
+        self.base = base;
+        if base.is_none() {
+            let place = Transform3D::from_translation(single(stage.place(self.index).into()));
+            rows.always(&self.root, &[&place]);
+        }
         rows.always(&self.entity("body"), &[&solid(&stage.figure.fixed)]);
         if let Some(base) = &stage.figure.base {
             rows.always(&self.entity("body/base"), &[&drum(base)]);
@@ -108,11 +142,18 @@ impl LearnerEntities {
         if !stage.figure.trunk.is_empty() {
             rows.always(&self.entity("body/trunk"), &[&solid(&stage.figure.trunk)]);
         }
-        let name = Points3D::new([single(stage.figure.name.coords.into())])
-            .with_colors([rerun::Color::from(self.colour)])
-            .with_radii([rerun::Radius::new_scene_units(1e-3)])
-            .with_show_labels(true);
-        rows.always(&self.entity("name"), &[&name]);
+        for (path, colour) in [("name", label_on_light(self.colour)), ("on_dark/name", label_on_dark(self.colour))] {
+            let name = Points3D::new([single(stage.figure.name.coords.into())])
+                .with_colors([rerun::Color::from(colour)])
+                .with_radii([rerun::Radius::new_scene_units(1e-3)])
+                .with_show_labels(true);
+            rows.always(&self.entity(path), &[&name]);
+        }
+        if let Some(points) = sockets(&description.sockets) {
+            rows.always(&self.entity("sockets"), &[&points]);
+        }
+        let name = description.learners.get(self.index).map_or("", |learner| learner.name.as_str());
+        self.readings.begin(rows, name, self.colour, description);
         if let Some(head) = &description.head {
             rows.always(&self.entity("head/frustum"), &[&head::frustum(head)]);
         }
@@ -124,6 +165,7 @@ impl LearnerEntities {
             rows.after(step - 1, 1, &self.entity("arm/ghost"), &[&solid(&[])]);
         }
         self.log_between(rows, step, report.movement.as_ref(), scenery);
+        self.log_base(rows, step, report, scenery);
         self.log_at_zero(rows, step, report, scenery);
         self.log_arms(rows, step, report, scenery);
         self.log_movement(rows, step, report, scenery);
@@ -135,6 +177,21 @@ impl LearnerEntities {
         if let (Some(failure), false) = (&report.failure, self.failed) {
             self.failed = true;
             rows.at(step, &self.entity("failure"), &[&TextLog::new(failure.as_str()).with_level("ERROR")]);
+        }
+    }
+
+    /// Where the robot stands, if that is learned: it stays in its place in the row, and the frame of the measurements moves.
+    fn log_base(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
+        let Some(first) = self.base else { return };
+        let Some(base) = report.estimate.base_frame() else { return };
+        let moved = base * first.inverse();
+        self.moved = moved;
+        let place = Translation3::from(scenery.stage.place(self.index)) * moved.inverse();
+        for (entity, pose) in [(self.root.clone(), place), (self.entity("body"), moved)] {
+            rows.at(step, &entity, &[&transform(&pose)]);
+        }
+        for path in ["name", "on_dark/name"] {
+            rows.at(step, &self.entity(path), &[&transform(&moved)]);
         }
     }
 
@@ -180,6 +237,10 @@ impl LearnerEntities {
         if let Some(posture) = truth.as_ref().or(links.as_ref()) {
             self.log_trunk(rows, step, 0, posture, scenery.stage);
         }
+        if sight::is_drawn(scenery) {
+            let arms = [scenery.truth.zip(truth.as_ref()), estimate.as_ref().zip(links.as_ref())];
+            sight::log(rows, (step, 0), self, arms, report.movement.as_ref(), scenery);
+        }
         let links = links.map(|posture| posture.links).unwrap_or_default();
         let cloud = opacity(joints.len());
         let points = self.uncertainty.of_points(model, joints);
@@ -197,7 +258,9 @@ impl LearnerEntities {
                 rows.at(step, &self.entity(name), &Drawn::new(clouds, &links, self.colour, alpha).parts());
             }
         }
-        self.shown = Some(Shown { step, configuration, estimate, points, allowed });
+        let mut readings = report.movement.iter().flat_map(|movement| &movement.readings);
+        let has_outlier = readings.any(ChannelReading::is_outlier);
+        self.shown = Some(Shown { step, configuration, estimate, points, allowed, has_outlier });
     }
 
     /// The trunk, if joints of the chain carry it; so many ticks after the step.
@@ -205,9 +268,8 @@ impl LearnerEntities {
         let Some(link) = posture.links.get(stage.figure.carried_by).filter(|_| !stage.figure.trunk.is_empty()) else {
             return;
         };
-        let pose = Transform3D::update_fields()
-            .with_translation(single(link.translation.vector.into()))
-            .with_quaternion(quaternion(&link.rotation));
+        // Bodies stand where the base was at first, and so does what the links carry.
+        let pose = transform(&(self.moved.inverse() * link * self.moved));
         if ticks == 0 {
             rows.at(step, &self.entity("body/trunk"), &[&pose]);
         } else {
@@ -231,16 +293,27 @@ impl LearnerEntities {
         }
         self.stopped = failure.is_some() && report.is_none();
         let label = if self.stopped { format!("{name} · has stopped") } else { name.clone() };
-        rows.at(step, &self.entity("name"), &[&Points3D::update_fields().with_labels([label])]);
+        if label != self.label {
+            for path in ["name", "on_dark/name"] {
+                rows.at(step, &self.entity(path), &[&Points3D::update_fields().with_labels([label.as_str()])]);
+            }
+            self.label = label;
+        }
         // Of a learner that has stopped they are cleared.
         let movement = Movement::of(report, self.colour, stage.figure.reach_m);
         rows.at(step, &self.entity("marker/predicted"), &[&movement.predicted]);
         rows.at(step, &self.entity("marker/measured"), &[&movement.measured]);
         rows.at(step, &self.entity("marker/error"), &[&movement.error]);
+        rows.at(step, &self.entity("on_dark/error"), &[&movement.error_on_dark]);
+        if let Some(outlier) = &movement.outlier {
+            rows.at(step, &self.entity("marker/outlier"), &[outlier]);
+        }
+        self.readings.log(rows, step, report.map_or(&[], |report| report.readings.as_slice()));
         if let Some(head) = &description.head {
             let gaze = report.and_then(|report| report.gaze.as_ref());
             rows.at(step, &self.entity("head/gaze"), &[&head::gaze(head, gaze, self.colour)]);
             rows.at(step, &self.entity("marker/missed"), &[&movement.missed]);
+            rows.at(step, &self.entity("on_dark/missed"), &[&movement.missed_on_dark]);
         }
         let Some(partition) = report.and_then(|report| report.partition.as_ref()) else { return };
         if self.plane.is_none()
@@ -259,6 +332,12 @@ impl LearnerEntities {
         }
         rows.at(step, &self.entity("direct/leaves"), &[&partition::data(partition)]);
     }
+}
+
+fn transform(pose: &Isometry3<f64>) -> Transform3D {
+    Transform3D::update_fields()
+        .with_translation(single(pose.translation.vector.into()))
+        .with_quaternion(quaternion(&pose.rotation))
 }
 
 /// Opacity of the clouds of an arm of so many joints.

@@ -3,13 +3,14 @@
 use crate::experiment::LearnerReport;
 
 /// Names, in the order of [`values`].
-pub(super) const NAMES: [&str; 19] = [
+pub(super) const NAMES: [&str; 20] = [
     "orientation_deg",
     "axis_deg",
     "location_m",
     "prediction_m",
     "prediction_mean_m",
     "expected_prediction_m",
+    "scatter_m",
     "trace",
     "bound_trace",
     "nis",
@@ -37,6 +38,7 @@ pub(super) fn values(report: &LearnerReport) -> [Option<f64>; NAMES.len()] {
         metrics.prediction_m,
         metrics.prediction_mean_m,
         metrics.expected_prediction_m,
+        metrics.scatter_m,
         metrics.trace,
         metrics.bound_trace,
         metrics.nis,

@@ -14,8 +14,9 @@
 //! |---|---|---|
 //! | `/note` | TextDocument, static | scenario, seed, version, learners, units, how to read and reproduce it |
 //! | `/key` | Points3D, static | what the colours mean, in a sentence |
-//! | `/{learner}` | Transform3D, static | where the frame of its measurements stands in the row |
-//! | `/{learner}/body` | Capsules3D, static | a human figure around the arm, or a pedestal |
+//! | `/ground/light`, `/ground/dark` | LineStrips3D, static | the lines of the ground, one of them by the theme of the view |
+//! | `/{learner}` | Transform3D, static | where the frame of its measurements stands in the row; in time if the base is learned, so that the robot stays in its place |
+//! | `/{learner}/body` | Capsules3D, static | a human figure around the arm, or a pedestal; Transform3D in time if the base is learned: where the learner takes it to be |
 //! | `/{learner}/body/base` | Cylinders3D, static | what a pedestal stands on |
 //! | `/{learner}/body/trunk` | Capsules3D, static; Transform3D | the part of figure or pedestal that joints of the chain carry; absent if they carry none |
 //! | `/{learner}/name` | Points3D, static; labels in time | its name before its thighs or its base, and whether it has stopped |
@@ -25,7 +26,12 @@
 //! | `/{learner}/allowed_ellipsoids` | Ellipsoids3D | what its data allow of them, where its own standard deviations are 1.5 times as large; absent without a truth |
 //! | `/{learner}/marker/predicted`, `…/measured` | Points3D | the marker before the update; measured is empty after a miss |
 //! | `/{learner}/marker/error` | LineStrips3D | from the one to the other, labelled with its length; empty after a miss |
+//! | `/{learner}/marker/outlier` | LineStrips3D | a cross where the marker was measured, if the learner takes that for an outlier; absent if it weighs no readings |
 //! | `/{learner}/marker/missed` | Points3D | the true marker after a miss, otherwise empty; absent without a head |
+//! | `/{learner}/on_dark/{name, error, missed}` | as `name`, `marker/error`, `marker/missed` | the same with colours to be read on dark ground, in their place where the view is dark |
+//! | `/{learner}/sight/truth`, `…/estimate` | LineStrips3D | every camera as its eye and its picture at a fixed distance, and the outlines of tags; an estimated camera is absent where it is the true one; absent without cameras |
+//! | `/{learner}/sight/truth/points`, `…/estimate/points` | Points3D | the known points of targets, corners of tags or of boards |
+//! | `/{learner}/sight/rays` | LineStrips3D | from the true camera, or without a truth the estimated one, to the points that it saw in the movement; empty after a miss |
 //! | `/{learner}/head/frustum` | LineStrips3D, static | the cone of the lens at rest, and the range over which it can turn; absent without a head |
 //! | `/{learner}/head/gaze` | LineStrips3D | the cones of the eyes after the head has followed the marker |
 //! | `/{learner}/zero/links`, `…/axes` | LineStrips3D, Arrows3D | the estimate at θ = 0, after the update; hidden at first, as all of `zero` |
@@ -36,6 +42,8 @@
 //! | `/{learner}/direct/axes` | LineStrips2D, Points2D, static | frame and labels of the slice: joints and limits |
 //! | `/{learner}/direct/leaves` | plain data | the whole partition, see [`Recorder`] |
 //! | `/{learner}/metrics/{name}` | Scalars, SeriesLines | every metric, and what is known of the choice |
+//! | `/{learner}/readings/residuals/{channel}` | Scalars, SeriesLines | the reading of the movement beside the updated estimate: root mean square over its equations, in standard deviations of its noise; nothing for a miss |
+//! | `/{learner}/readings/outliers/{channel}` | Scalars, SeriesLines | the probability that it is an outlier, for a learner whose loss knows of outliers |
 //! | `/limits/best_design_trace` | Scalars, SeriesLines | the best designs of 5, 10, 20, … movements, beside the traces; only with `run --limits` |
 //! | `/{learner}/failure` | TextLog | why the learner stopped, once, if it did |
 //!
@@ -77,8 +85,12 @@ mod movement;
 mod note;
 mod partition;
 mod posture;
+mod readings;
 mod recorder;
+mod room;
 mod rows;
+mod sight;
+mod sockets;
 mod solid;
 mod stage;
 mod target;

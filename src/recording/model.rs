@@ -49,10 +49,18 @@ mod tests {
             point_covariance_m2: None,
             allowed_point_covariance_m2: None,
             direction_covariance_rad2: None,
+            correction: None,
         };
         let (a, b, marker_m) = ([1.0; 3], [2.0; 3], [3.0; 3]);
         let joints = vec![joint(None), joint(None), joint(Some(a)), joint(Some(b)), joint(None)];
-        let model = ModelReport { joints, marker_m, marker_covariance_m2: None };
+        let model = ModelReport {
+            joints,
+            marker_m,
+            marker_covariance_m2: None,
+            base: None,
+            cameras: Vec::new(),
+            targets: Vec::new(),
+        };
         assert_eq!(origins(&model), [a, a, a, b, marker_m]);
     }
 }

@@ -2,16 +2,21 @@
 
 use rerun::{Color, LineStrips3D, Points3D, Radius};
 
-use super::solid::single;
-use crate::experiment::MovementReport;
+use super::{
+    colours::{label_on_dark, label_on_light},
+    solid::single,
+};
+use crate::experiment::{ChannelReading, MovementReport};
 
 /// The colour of a measurement; no learner's, and it shows on dark and on light ground.
 const MEASURED: [u8; 3] = [0xE6, 0xB4, 0x22];
 /// The colour of an error, and of a marker that was not seen.
-const ERROR: [u8; 3] = [0xD6, 0x3B, 0x3B];
+pub(super) const ERROR: [u8; 3] = [0xD6, 0x3B, 0x3B];
 /// Radius of a marker and of the line of an error, as parts of the arm's reach.
 const MARKER: f64 = 0.048;
 const LINE: f64 = 0.011;
+/// Half the width of the cross at an outlier.
+const CROSS: f64 = 0.1;
 
 /// The entities of a movement, all of them at each step: what a step does not have is empty, not the last step's.
 pub(super) struct Movement {
@@ -19,8 +24,13 @@ pub(super) struct Movement {
     pub(super) measured: Points3D,
     /// From the one to the other, labelled with its length.
     pub(super) error: LineStrips3D,
+    /// A cross where the learner takes what was measured for an outlier; `None` if it weighs no readings.
+    pub(super) outlier: Option<LineStrips3D>,
     /// The true marker after a miss.
     pub(super) missed: Points3D,
+    /// The labelled ones with colours for dark ground.
+    pub(super) error_on_dark: LineStrips3D,
+    pub(super) missed_on_dark: Points3D,
 }
 
 impl Movement {
@@ -31,7 +41,19 @@ impl Movement {
         let truth = report.and_then(|report| report.true_skeleton_m.as_ref()?.last().copied());
         let missed = truth.filter(|_| measured.is_none());
         let ends = predicted.zip(measured);
-        let label = ends.map(|(from, to)| off((0..3).map(|i| (to[i] - from[i]).powi(2)).sum::<f64>().sqrt()));
+        let reading = report.and_then(|report| report.readings.iter().find(|reading| reading.weight.is_some()));
+        let is_outlier = reading.is_some_and(ChannelReading::is_outlier);
+        let label = ends.map(|(from, to)| {
+            let distance = off((0..3).map(|i| (to[i] - from[i]).powi(2)).sum::<f64>().sqrt());
+            if is_outlier { format!("outlier, {distance}") } else { distance }
+        });
+        let error = |colour: [u8; 3]| {
+            LineStrips3D::new(ends.map(|(from, to)| [from, to].map(single)))
+                .with_colors([Color::from(colour)])
+                .with_radii([Radius::new_scene_units((LINE * reach_m) as f32)])
+                .with_labels(label.clone())
+                .with_show_labels(true)
+        };
         let marker = |place: Option<[f64; 3]>, colour: [u8; 3], label: &'static str| {
             Points3D::new(place.map(single))
                 .with_colors([Color::from(colour)])
@@ -41,14 +63,26 @@ impl Movement {
         Self {
             predicted: marker(predicted, colour, "predicted").with_show_labels(false),
             measured: marker(measured, MEASURED, "seen").with_show_labels(false),
-            error: LineStrips3D::new(ends.map(|(from, to)| [from, to].map(single)))
-                .with_colors([Color::from(ERROR)])
-                .with_radii([Radius::new_scene_units((LINE * reach_m) as f32)])
-                .with_labels(label)
-                .with_show_labels(true),
-            missed: marker(missed, ERROR, "not seen").with_show_labels(true),
+            error: error(label_on_light(ERROR)),
+            outlier: reading.map(|_| cross(measured.filter(|_| is_outlier), reach_m)),
+            missed: marker(missed, label_on_light(ERROR), "not seen").with_show_labels(true),
+            error_on_dark: error(label_on_dark(ERROR)),
+            missed_on_dark: marker(missed, label_on_dark(ERROR), "not seen").with_show_labels(true),
         }
     }
+}
+
+/// Three lines that cross.
+fn cross(place: Option<[f64; 3]>, reach_m: f64) -> LineStrips3D {
+    let arm = CROSS * reach_m;
+    let strips = place.into_iter().flat_map(|place| {
+        (0..3).map(move |axis| {
+            [-arm, arm].map(|way| single(std::array::from_fn(|i| place[i] + if i == axis { way } else { 0.0 })))
+        })
+    });
+    LineStrips3D::new(strips)
+        .with_colors([Color::from(ERROR)])
+        .with_radii([Radius::new_scene_units((1.4 * LINE * reach_m) as f32)])
 }
 
 fn finite(point: &[f64; 3]) -> bool {

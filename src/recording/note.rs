@@ -17,6 +17,17 @@ const HEAD: &str = "- **Head**: in pale grey the cone of the lens at rest, and t
                     learner's pale colour the cone after the head has followed the marker. A marker outside it is missed: red, where \
                     it truly was.\n";
 
+const CAMERAS: &str = "- **Cameras** as an eye and the outline of its picture at a fixed distance, a notch where it is up: grey where they \
+                       truly are, in the learner's colour where it takes them to be, if that is another place. Small balls: the \
+                       known points of what they look at; yellow rays: to what they saw in the step's movement.\n";
+
+const READINGS: &str = "- **Residual per reading**: how far the step's reading is from the updated estimate, as root mean square over \
+                        its coordinates in standard deviations σ of the noise: about 1 where only noise is left. Nothing after a \
+                        miss.\n";
+
+const OUTLIERS: &str = "- **Outliers**: a red cross where a reading was that its learner rather takes for an outlier; its probability \
+                        is a curve of its own.\n";
+
 const LIMITS: &str = "- **Limits** beside the trace: `bound_trace`, pale, is the least that a learner's data allow; the best design, grey, \
                       the least that any so many movements allow, if it was computed (`run --limits`).\n";
 
@@ -72,6 +83,13 @@ fn markdown(description: &Description, ellipsoids: EllipsoidSize) -> String {
     }
     if description.truth.is_some() && description.learners.iter().any(|learner| learner.stabilised) {
         text.push_str(ALLOWED);
+    }
+    if !description.cameras.is_empty() {
+        text.push_str(CAMERAS);
+    }
+    text.push_str(READINGS);
+    if description.learners.iter().any(|learner| learner.robust) {
+        text.push_str(OUTLIERS);
     }
     let limits = description.truth.as_ref().map_or("", |_| LIMITS);
     let _ = write!(

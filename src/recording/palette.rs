@@ -77,6 +77,20 @@ pub fn mix(from: [u8; 3], to: [u8; 3], amount: f64) -> [u8; 3] {
     std::array::from_fn(|i| (f64::from(from[i]) + amount * (f64::from(to[i]) - f64::from(from[i]))).round() as u8)
 }
 
+/// The contrast of two colours by WCAG 2.1, from 1 to 21.
+#[cfg(test)]
+pub fn contrast(one: [u8; 3], other: [u8; 3]) -> f64 {
+    let luminance = |colour: [u8; 3]| {
+        let linear = colour.map(|channel| {
+            let value = f64::from(channel) / 255.0;
+            if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+        });
+        0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    };
+    let (a, b) = (luminance(one), luminance(other));
+    (a.max(b) + 0.05) / (a.min(b) + 0.05)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,18 +126,10 @@ mod tests {
 
     #[test]
     fn every_colour_stands_out_from_light_and_dark_ground() {
-        // WCAG 2.1: relative luminance, and the contrast of graphical objects, at least 3:1.
-        let luminance = |colour: [u8; 3]| {
-            let linear = colour.map(|channel| {
-                let value = f64::from(channel) / 255.0;
-                if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
-            });
-            0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-        };
+        // Of graphical objects, at least 3:1.
         for ground in [[0xF8; 3], [0x1B; 3]] {
             for colour in LEARNERS {
-                let (a, b) = (luminance(ground), luminance(colour));
-                let contrast = (a.max(b) + 0.05) / (a.min(b) + 0.05);
+                let contrast = contrast(ground, colour);
                 assert!(contrast >= 3.0, "{colour:02X?} on {ground:02X?}: {contrast:.2}");
             }
         }

@@ -49,6 +49,11 @@ impl Posture {
         Self { links, joints, marker }
     }
 
+    /// The points on the axes in order, then the marker.
+    pub(super) fn points(&self) -> Vec<Point3<f64>> {
+        self.joints.iter().map(|(point, _)| *point).chain([self.marker]).collect()
+    }
+
     /// Links from joint to joint and on to the marker, and a pin through each joint along its axis.
     pub(super) fn capsules(&self, reach_m: f64, look: ArmLook) -> Vec<Capsule> {
         let count = self.joints.len();

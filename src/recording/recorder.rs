@@ -9,7 +9,7 @@ use rerun::{
 };
 
 use super::{
-    EllipsoidSize, LiveLog, MOST_FRAMES, RecordingError, TRUTH_COLOR, Target,
+    EllipsoidSize, LiveLog, MOST_FRAMES, RecordingError, TRUTH_COLOR, Target, Theme,
     blueprint::Arranger,
     body::Figure,
     charts::BEST_DESIGN,
@@ -18,8 +18,9 @@ use super::{
     learner::{LearnerEntities, Scenery},
     message, metrics, model,
     note::{key, note},
+    room::Room,
     rows::{Rows, by_steps, complete},
-    stage::Stage,
+    stage::{GROUNDS, Stage},
 };
 use crate::{
     design::BestDesign,
@@ -87,9 +88,9 @@ impl Recorder {
             rows: Rows::default(),
             file: file.as_deref().map(RrdFile::create).transpose()?,
             live,
-            learners: (names.iter().zip(learner_slots(names.iter().copied())))
-                .map(|(name, slot)| {
-                    LearnerEntities::new(learner_color(slot), name, description.joints.len(), ellipsoids)
+            learners: (names.iter().zip(learner_slots(names.iter().copied())).enumerate())
+                .map(|(index, (name, slot))| {
+                    LearnerEntities::new((index, learner_color(slot), name), description, ellipsoids)
                 })
                 .collect(),
             stage: None,
@@ -185,7 +186,7 @@ impl Recorder {
         self.write(|_| true)
     }
 
-    /// Writes only what the arrangement of views shows; the rest waits for the next [`flush`](Self::flush), at most 64
+    /// Writes only what the arrangement of views shows at first; the rest waits for the next [`flush`](Self::flush), at most 64
     /// steps. Every message costs about a kilobyte, and most entities are series that no view shows: a live view that
     /// is up to date at every step needs half the messages this way.
     pub fn flush_shown(&mut self) -> Result<(), RecordingError> {
@@ -280,11 +281,18 @@ impl Recorder {
 
     /// What needs the size of the arm: places, bodies, the truth's arrows and the cameras.
     fn arrange(&mut self, first: &StepReport) -> Result<Stage, RecordingError> {
-        let believed = || first.learners.first().and_then(|learner| learner.estimate.state());
-        let figure = self.truth.clone().or_else(believed).map(|arm| Figure::of(&self.description, &arm));
-        let stage = Stage::new(figure.unwrap_or_default(), self.learners.len());
-        for (index, learner) in self.learners.iter().enumerate() {
-            learner.begin(&mut self.rows, index, &stage, &self.description);
+        let first_estimate = first.learners.first().map(|learner| &learner.estimate);
+        let believed = || first_estimate.and_then(ModelReport::state);
+        let arm = self.truth.clone().or_else(believed);
+        let figure = arm.as_ref().map(|arm| Figure::of(&self.description, arm)).unwrap_or_default();
+        let room = arm.map_or_else(|| Room::around(&figure), |arm| Room::of(&arm, &figure, &self.description));
+        let stage = Stage::new(figure, room, self.learners.len());
+        let base = first_estimate.filter(|_| self.description.base_learned).and_then(ModelReport::base_frame);
+        for learner in &mut self.learners {
+            learner.begin(&mut self.rows, &stage, &self.description, base);
+        }
+        for (path, colour) in GROUNDS.into_iter().zip([Theme::Light, Theme::Dark].map(Theme::lines)) {
+            self.rows.always(&EntityPath::from(path), &[&stage.ground(colour)]);
         }
         self.rows.always(&EntityPath::from("key"), &[&key(&self.description, stage.key())]);
         if let Some(truth) = self.description.truth.clone() {

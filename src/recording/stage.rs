@@ -2,7 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::body::Figure;
+use rerun::{Color, LineStrips3D, Radius};
+
+use super::{body::Figure, room::Room, solid::single};
 
 /// The direction in which the camera is, as seen from the middle of the learners, by its angles from straight ahead of
 /// the robots and above the ground, radians: in a wide view and in a tall one. Robots stand in a row across the wide
@@ -15,30 +17,27 @@ const TALL_BELOW: f64 = 0.8;
 const SPACING: f64 = 1.3;
 /// The viewer's vertical field of view, radians.
 const FIELD_OF_VIEW: f64 = 0.96;
-/// What of it is left free at each edge, as a part of its half: labels need some pixels.
-const MARGIN: f64 = 0.04;
-/// What the view takes in of each learner, from its shoulder, in lengths of the arm: where the arm mostly is. x is ahead,
-/// y to the left, z up.
-const TAKEN_IN: [[f64; 3]; 7] = [
-    [0.8, -0.1, 0.2],
-    [0.5, -0.55, 0.7],
-    [0.5, -0.55, -0.4],
-    [0.3, 0.5, -0.6],
-    [0.0, -0.7, 0.0],
-    [0.0, -0.3, -0.75],
-    [0.0, 0.55, -0.6],
-];
+/// What of it is left free at the edges, as a part of its half: at either side for half a label, above for its height, below
+/// for the page's legend.
+const SIDES: f64 = 0.12;
+const ABOVE: f64 = 0.06;
+const BELOW: f64 = 0.25;
+/// From one line of the ground to the next, and how far they go beyond the row, in lengths of the arm.
+const GROUND: [f64; 2] = [0.5, 3.0];
+/// The entities of the lines of the ground, for light and for dark views.
+pub(super) const GROUNDS: [&str; 2] = ["ground/light", "ground/dark"];
 
 /// The figures of all learners, side by side.
 #[derive(Clone, Debug)]
 pub(super) struct Stage {
     pub(super) figure: Figure,
+    room: Room,
     learners: usize,
 }
 
 impl Stage {
-    pub(super) fn new(figure: Figure, learners: usize) -> Self {
-        Self { figure, learners }
+    pub(super) fn new(figure: Figure, room: Room, learners: usize) -> Self {
+        Self { figure, room, learners }
     }
 
     /// Where the frame of a learner's measurements stands, metres: the row is centred, the first one on the left.
@@ -56,26 +55,39 @@ impl Stage {
         let back = Vector3::new(along * cos, along * sin, rise);
         let right = Vector3::new(-sin, cos, 0.0);
         let up = back.cross(&right);
-        let half_height = (0.5 * FIELD_OF_VIEW).tan() * (1.0 - MARGIN);
-        let Figure { shoulder, reach_m, name, .. } = self.figure;
-        let around = TAKEN_IN.map(|offset| shoulder + Vector3::from(offset) * reach_m);
-        let points: Vec<Vector3<f64>> = (0..self.learners.max(1))
-            .flat_map(|learner| around.into_iter().chain([name]).map(move |point| (learner, point)))
-            .map(|(learner, point)| point - shoulder + self.place(learner))
-            .collect();
-        // A point is in sight if it is at most `half` times as far aside as it is before the camera. Towards either side
-        // one point needs the camera farthest away; between the two the camera looks straight ahead.
-        let fit = |axis: &Vector3<f64>, half: f64| {
-            let ends = |side: f64| {
-                let needs = points.iter().map(|point| side * point.dot(axis) + half * point.dot(&back));
-                needs.fold(f64::NEG_INFINITY, f64::max)
-            };
-            let (one, other) = (ends(1.0), ends(-1.0));
-            (0.5 * (one - other), 0.5 * (one + other) / half)
+        let half = (0.5 * FIELD_OF_VIEW).tan();
+        let across = [half * aspect * (1.0 - SIDES); 2];
+        let upright = [half * (1.0 - BELOW), half * (1.0 - ABOVE)];
+        let Figure { shoulder, .. } = self.figure;
+        let places: Vec<Vector3<f64>> = (0..self.learners.max(1)).map(|learner| self.place(learner)).collect();
+        // A point is in sight if it is at most `half` times as far aside as it is before the camera. Towards either side one
+        // point needs the camera farthest away: so far, and beyond that in the middle of what both leave free.
+        let needs = |axis: &Vector3<f64>, side: f64, half: f64| {
+            let need = |point: Vector3<f64>| side * point.dot(axis) + half * point.dot(&back);
+            places.iter().map(|place| self.room.needs(|point| need(point + place))).fold(f64::NEG_INFINITY, f64::max)
         };
-        let ((aside, by_width), (above, by_height)) = (fit(&right, half_height * aspect), fit(&up, half_height));
-        let target = shoulder + right * aside + up * above;
-        [target, target + back * f64::max(by_width, by_height)]
+        let ends = |axis: &Vector3<f64>, [low, high]: [f64; 2]| [needs(axis, -1.0, low), needs(axis, 1.0, high)];
+        let (wide, tall) = (ends(&right, across), ends(&up, upright));
+        let distance = |[low, high]: [f64; 2], halves: [f64; 2]| (low + high) / (halves[0] + halves[1]);
+        let distance = f64::max(distance(wide, across), distance(tall, upright));
+        let middle = |[low, high]: [f64; 2], halves: [f64; 2]| 0.5 * (high - low + (halves[0] - halves[1]) * distance);
+        let target = shoulder + right * middle(wide, across) + up * middle(tall, upright);
+        [target, target + back * distance]
+    }
+
+    /// The lines of the ground, in a circle about the row.
+    pub(super) fn ground(&self, colour: [u8; 3]) -> LineStrips3D {
+        let Figure { shoulder, reach_m, ground_m, .. } = self.figure;
+        let [spacing, beyond] = GROUND.map(|lengths| lengths * reach_m);
+        let radius = self.place(0).norm() + beyond;
+        let count = (radius / spacing) as i32;
+        let strips = (-count..=count).flat_map(|line| {
+            let aside = f64::from(line) * spacing;
+            let half = (radius * radius - aside * aside).max(0.0).sqrt();
+            let point = |x: f64, y: f64| single([shoulder.x + x, shoulder.y + y, ground_m]);
+            [[point(aside, -half), point(aside, half)], [point(-half, aside), point(half, aside)]]
+        });
+        LineStrips3D::new(strips).with_colors([Color::from(colour)]).with_radii([Radius::new_ui_points(1.0)])
     }
 
     /// Where the key to the colours stands: on the ground, before the middle.
@@ -96,27 +108,33 @@ mod tests {
         let figure = Figure { reach_m: 0.7, shoulder: Point3::new(0.1, -0.2, 1.3), ..Figure::default() };
         let figure = Figure { name: figure.shoulder + Vector3::z(), ..figure };
         for (learners, aspect) in [(1, 1.4), (2, 1.4), (3, 1.0), (4, 0.9), (2, 0.5)] {
-            let stage = Stage::new(figure.clone(), learners);
+            let room = Room::around(&figure);
+            let stage = Stage::new(figure.clone(), room.clone(), learners);
             let [target, eye] = stage.camera(aspect);
             let ahead = (target - eye).normalize();
             let right = ahead.cross(&Vector3::z()).normalize();
             let half = (0.5 * FIELD_OF_VIEW).tan();
-            let mut most: f64 = 0.0;
-            for learner in 0..learners {
-                for offset in TAKEN_IN
-                    .map(|offset| figure.shoulder + Vector3::from(offset) * figure.reach_m)
-                    .into_iter()
-                    .chain([figure.name])
-                {
-                    let way = offset + stage.place(learner) - eye;
-                    let depth = way.dot(&ahead);
-                    let aside = (way.dot(&right) / (depth * half * aspect)).abs();
-                    let above = (way.dot(&right.cross(&ahead)) / (depth * half)).abs();
-                    assert!(depth > 0.0 && aside < 1.0 && above < 1.0, "{learners} in {aspect}: {aside}, {above}");
-                    most = most.max(aside).max(above);
-                }
-            }
-            assert!(most > 0.9 * (1.0 - MARGIN), "{learners} in {aspect}: {most}");
+            // How far what is in sight reaches towards an edge, as a part of the way to it.
+            let reaches = |axis: Vector3<f64>, half: f64| {
+                let of = |learner: usize| {
+                    room.needs(|point| {
+                        let way = figure.shoulder + point + stage.place(learner) - eye;
+                        assert!(way.dot(&ahead) > 0.0, "before the camera");
+                        way.dot(&axis) / (way.dot(&ahead) * half)
+                    })
+                };
+                (0..learners).map(of).fold(0.0, f64::max)
+            };
+            let up = right.cross(&ahead);
+            let parts = [
+                reaches(right, half * aspect) / (1.0 - SIDES),
+                reaches(-right, half * aspect) / (1.0 - SIDES),
+                reaches(up, half) / (1.0 - ABOVE),
+                reaches(-up, half) / (1.0 - BELOW),
+            ];
+            let most = parts.into_iter().fold(0.0, f64::max);
+            assert!(most < 1.0 + 1e-9, "{learners} in {aspect}: {parts:?}");
+            assert!(most > 0.9, "{learners} in {aspect}: {most}");
         }
     }
 }

@@ -29,6 +29,7 @@ pub const BUILTIN: &[Builtin] = builtins![
     "hand-eye-6dof",
     "arm-6dof-pose-gears",
     "arm-7dof-eccentric",
+    "arm-7dof-socket",
     "arm-12dof",
     "arm-12dof-no-prior",
     "arm-20dof",

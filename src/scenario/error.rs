@@ -3,7 +3,7 @@
 use std::fmt;
 
 pub(super) use crate::similar::similar;
-use crate::{experiment::ExperimentError, model::PriorError};
+use crate::{estimation::EstimationError, experiment::ExperimentError, model::PriorError};
 
 /// One thing that is wrong in a scenario file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -84,6 +84,14 @@ pub enum ScenarioError {
         scenario: String,
         /// Why.
         source: PriorError,
+    },
+    /// A learner cannot take in what is known before any movement.
+    #[error("scenario `{scenario}`: what is known before any movement: {source}")]
+    Beforehand {
+        /// The scenario.
+        scenario: String,
+        /// Why.
+        source: EstimationError,
     },
     /// A run failed.
     #[error(transparent)]

@@ -42,6 +42,7 @@ impl LearnerSpec {
             estimator: self.estimator.name().to_owned(),
             policy: self.policy.name().to_owned(),
             stabilised: self.stabilising,
+            robust: false,
         }
     }
 }
@@ -220,6 +221,7 @@ impl Scenario {
         Setting {
             learns_marker: self.robot.layout.marker().is_some(),
             is_measured: matches!(self.world, WorldSpec::Measured { .. }),
+            has_sockets: !self.robot.sockets.is_empty(),
             sees_markers_alone: self.rig.channels().iter().all(|channel| channel.target() == Some(0)),
         }
     }
@@ -259,6 +261,8 @@ pub(super) struct Setting {
     pub learns_marker: bool,
     /// Whether recorded rows are replayed.
     pub is_measured: bool,
+    /// Whether targets are held in sockets.
+    pub has_sockets: bool,
     /// Whether nothing but the marker's position is measured.
     pub sees_markers_alone: bool,
 }
@@ -295,6 +299,11 @@ pub(super) fn misfit(estimator: EstimatorKind, policy: PolicyKind, setting: Sett
     }
     if setting.is_measured && policy == PolicyKind::Human {
         let what = "nobody moves a robot of which there are only recorded rows".to_owned();
+        return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
+    }
+    if setting.has_sockets && policy.varies_the_search() {
+        let what =
+            format!("`{}` searches the joint box, and sockets leave a part of it without a volume", policy.name());
         return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
     }
     if setting.is_measured && policy.varies_the_search() {

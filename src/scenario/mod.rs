@@ -16,7 +16,7 @@ mod validate;
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Point3};
 
 pub use builtin::{BUILTIN, Builtin, builtin};
 pub use data::Measurements;
@@ -32,7 +32,7 @@ use crate::{
     model::{Block, Layout, Quantity, State},
     optimize::Settings,
     selection::{Constraints, CriterionUnits, Planning, Watch, Weights},
-    sensing::{Equipment, Loss, Rig},
+    sensing::{Equipment, Loss, Rig, Spacing},
 };
 
 /// A validated scenario.
@@ -119,8 +119,33 @@ pub struct Robot {
     pub known: Vec<(Block, Known)>,
     /// What its sensors can name.
     pub equipment: Equipment,
+    /// The sockets in which targets are held, in the order of the state's.
+    pub sockets: Vec<SocketSpec>,
+    /// Those that nobody learns from.
+    pub held_out_sockets: Vec<SocketSpec>,
+    /// What is known of distances between sockets.
+    pub spacings: Vec<Spacing>,
     /// Whether predictions are judged after the rigid motion that fits best.
     pub up_to_motion: bool,
+}
+
+/// A place beside the robot in which a target is held.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SocketSpec {
+    /// Its name, among those of one place.
+    pub name: String,
+    /// The place where it stands, with others.
+    pub place: Option<String>,
+    /// The target.
+    pub target: usize,
+    /// Where it truly is, frame of the measurements, metres.
+    pub at: Point3<f64>,
+    /// A posture that holds the target there; of sockets that are learned from the first movement, which everybody is told.
+    pub posture: Vec<f64>,
+    /// Whether there is a guess of where it is. Otherwise it is taken to be where the guessed robot has the target in `posture`.
+    pub is_guessed: bool,
+    /// What play and the noise of the joints amount to at the target, metres per coordinate.
+    pub sigma_m: f64,
 }
 
 /// The world of a scenario.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Scenario, WorldSpec};
-use crate::experiment::{JointDescription, LearnerDescription, Thresholds};
+use crate::experiment::{JointDescription, LearnerDescription, SocketDescription, Thresholds};
 
 /// A scenario in brief.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -85,6 +85,17 @@ impl Scenario {
 }
 
 impl super::Robot {
+    pub(crate) fn socket_descriptions(&self) -> Vec<SocketDescription> {
+        let of = |socket: &super::SocketSpec, held_out| SocketDescription {
+            name: socket.name.clone(),
+            place: socket.place.clone(),
+            at_m: Some(socket.at.into()),
+            held_out,
+        };
+        let learned = self.sockets.iter().map(|socket| of(socket, false));
+        learned.chain(self.held_out_sockets.iter().map(|socket| of(socket, true))).collect()
+    }
+
     pub(crate) fn joint_descriptions(&self) -> Vec<JointDescription> {
         (self.names.iter().zip(&self.state.joints).zip(self.limits.joints()).enumerate())
             .map(|(index, ((name, joint), &(lower, upper)))| JointDescription {

@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::{
-    Appraisal, Criterion, Domain, Movement, Policy, Scope, Search, Selection, SelectionError, Sight, Situation, Watch,
-    Weights, search::direct,
+    Actions, Appraisal, Criterion, Domain, Policy, Scope, Search, Selection, SelectionError, Sight, Situation, Sockets,
+    Watch, Weights, search::direct, sockets::Values,
 };
 use crate::{
     estimation::Belief,
@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Minimises the A-criterion: over a box of joint limits by DIRECT, normalised to the unit cube; over a pool of
-/// recorded movements by trying every one.
+/// recorded movements by trying every one; where targets are held in sockets, by the best of many draws, polished.
 ///
 /// Where a head watches ([`watched`](Self::watched)), the first movement goes to the pose that is known to be visible,
 /// the gain is weighed by the chance of being seen, and misses are remembered.
@@ -44,6 +44,16 @@ pub enum Minimiser {
         /// How many configurations are evaluated.
         evaluations: usize,
     },
+}
+
+impl Minimiser {
+    /// Configurations evaluated at most.
+    fn evaluations(&self) -> usize {
+        match *self {
+            Self::Direct(settings) => settings.max_evaluations,
+            Self::Random { evaluations } | Self::Bayesian { evaluations } => evaluations,
+        }
+    }
 }
 
 impl Active {
@@ -114,6 +124,27 @@ impl Active {
         Ok(Some(Search { settings, partition: direct(&scope, &searched, settings, at)? }))
     }
 
+    fn select_in_sockets(
+        &self,
+        belief: &Belief,
+        sockets: &Sockets,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Selection, SelectionError> {
+        if let Some(beginning) = sockets.beginning() {
+            return Ok(Selection::of(beginning.clone()));
+        }
+        let (before, held) = (Criterion::new(belief, &self.weights)?.before(), sockets.held(belief));
+        let values = |held| -> Result<Values<'_>, SelectionError> {
+            let criterion = Criterion::new(held, &self.weights)?;
+            Ok(Box::new(move |postures| criterion.evaluate(postures)))
+        };
+        let pool = sockets.pool(belief, self.minimiser.evaluations(), rng);
+        let mut evaluations = 0;
+        let (movement, value) = sockets.best(belief, &held, &pool, &mut evaluations, values)?;
+        let (criterion, gain) = (Some(value), Some(before - value));
+        Ok(Selection { criterion, gain, evaluations, ..Selection::of(movement) })
+    }
+
     fn search_box(
         &self,
         situation: &Situation<'_>,
@@ -174,13 +205,16 @@ impl Active {
             gain: Some(before - value),
             evaluations,
             search,
-            ..Selection::of(Movement { configuration, row: None })
+            ..Selection::plain(configuration)
         })
     }
 }
 
 impl Policy for Active {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+        if let Actions::Sockets(sockets) = situation.actions {
+            return self.select_in_sockets(situation.belief, sockets, rng);
+        }
         let scope = Scope::of(situation)?;
         if let Some(beginning) = Watch::beginning(self.watch.as_ref(), situation.history, &scope)? {
             return Ok(beginning);

@@ -1,7 +1,8 @@
 //! Which movement to make next.
 //!
 //! * [`Criterion`]: the expected posterior error of (7) and its kin, in the form that never builds a posterior.
-//! * [`Policy`]: chooses among [`Actions`], the whole joint box or a list of recorded movements, in a [`Situation`].
+//! * [`Policy`]: chooses among [`Actions`], the whole joint box, a list of recorded movements or sockets, in a [`Situation`].
+//! * [`Sockets`]: movements that hold a target in a socket.
 //! * [`Outlook`]: the criterion under several hypotheses.
 //! * [`Active`]: minimises the criterion, by DIRECT over a box or by trying all of a list.
 //! * [`Planner`]: plans the movements that are still needed together, under all hypotheses.
@@ -14,6 +15,7 @@
 
 mod active;
 mod criterion;
+mod exchange;
 mod feasible;
 mod herding;
 mod human;
@@ -28,6 +30,7 @@ mod prediction;
 mod random;
 mod search;
 mod situation;
+mod sockets;
 mod views;
 mod visibility;
 mod weights;
@@ -41,15 +44,16 @@ pub use human::Human;
 pub use optimality::Optimality;
 pub use outlook::Outlook;
 pub use partition::{Leaf, Partition};
-pub(crate) use plan::condition;
 pub use planner::{Planner, Planning};
 pub use random::Random;
 pub use search::Search;
 pub use situation::{History, Planned, Situation};
+pub use sockets::Sockets;
 pub use visibility::{Visibility, Watch};
 pub use weights::{CriterionUnits, Weights};
 
 use crate::{
+    estimation::Belief,
     kinematics::JointBox,
     optimize::{DirectError, least},
 };
@@ -61,24 +65,37 @@ pub enum Actions {
     Box(JointBox),
     /// One of a list, each at most once: a recorded data set.
     Pool(Vec<Movement>),
+    /// Any in which a target is held in one of these sockets.
+    Sockets(Sockets),
 }
 
 impl Actions {
-    /// Takes a movement of the pool out of it; a box stays as it is.
+    /// Takes a movement of the pool out of it, and the posture that its socket begins with; a box stays as it is.
     pub fn use_up(&mut self, movement: &Movement) {
-        if let Self::Pool(pool) = self {
-            pool.retain(|candidate| match (candidate.row, movement.row) {
+        match self {
+            Self::Box(_) => {}
+            Self::Pool(pool) => pool.retain(|candidate| match (candidate.row, movement.row) {
                 (Some(row), Some(used)) => row != used,
                 _ => candidate.configuration != movement.configuration,
-            });
+            }),
+            Self::Sockets(sockets) => sockets.use_up(movement),
         }
     }
 
-    /// How many movements are left; `None` for a box, which has no end.
+    /// How many movements are left; `None` for a box and for sockets, which have no end.
     pub fn remaining(&self) -> Option<usize> {
         match self {
-            Self::Box(_) => None,
+            Self::Box(_) | Self::Sockets(_) => None,
             Self::Pool(pool) => Some(pool.len()),
+        }
+    }
+
+    /// The movement to a configuration (rad or m) that somebody else chose; where there are sockets, into the one that it is
+    /// nearest to, as believed.
+    pub fn movement_to(&self, belief: &Belief, configuration: &[f64]) -> Movement {
+        match self {
+            Self::Box(_) | Self::Pool(_) => Movement::to(configuration.to_vec()),
+            Self::Sockets(sockets) => sockets.movement_to(belief, configuration.to_vec()),
         }
     }
 }
@@ -90,6 +107,15 @@ pub struct Movement {
     pub configuration: Vec<f64>,
     /// The row of the data set, counted from 0; `None` in a simulated world.
     pub row: Option<usize>,
+    /// The socket in which a target is held then, counted from 0.
+    pub socket: Option<usize>,
+}
+
+impl Movement {
+    /// To a configuration, rad or m per joint, with nothing held in a socket.
+    pub fn to(configuration: Vec<f64>) -> Self {
+        Self { configuration, row: None, socket: None }
+    }
 }
 
 /// A chosen movement and what the choice rested on.
@@ -118,7 +144,7 @@ impl Selection {
 
     /// A configuration chosen without a criterion.
     pub(crate) fn plain(configuration: Vec<f64>) -> Self {
-        Self::of(Movement { configuration, row: None })
+        Self::of(Movement::to(configuration))
     }
 
     /// The best of listed movements by the values of their criterion, which was `before` before, and by what the travel to
@@ -160,6 +186,9 @@ pub enum SelectionError {
     /// The constraints exclude everything.
     #[error("no configuration is feasible: {0}")]
     Infeasible(#[from] Infeasible),
+    /// No socket can be reached.
+    #[error("no posture within the limits brings a target to its socket, as far as is believed")]
+    OutOfReach,
     /// No configuration has a finite criterion.
     #[error("no configuration has a finite criterion: the belief has diverged")]
     NoFiniteCriterion,

@@ -100,7 +100,7 @@ impl Plan {
 
 /// Changes the covariance of every hypothesis of `belief` as an observation after moving to `pose` would, counted `weight`
 /// times, by hypothesis; a negative weight takes it out again. Whether that was sound.
-pub(crate) fn condition(belief: &mut Belief, pose: &[f64], weight: impl Fn(usize) -> f64) -> bool {
+pub(super) fn condition(belief: &mut Belief, pose: &[f64], weight: impl Fn(usize) -> f64) -> bool {
     let Belief { state, layout, rig, covariance, alternatives, .. } = belief;
     let mut sound = true;
     if let Some(covariance) = covariance {

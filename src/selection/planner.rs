@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Appraisal, Domain, Movement, Optimality, Outlook, Partition, Planned, Policy, Scope, Search, Selection,
+    Actions, Appraisal, Domain, Movement, Optimality, Outlook, Partition, Planned, Policy, Scope, Search, Selection,
     SelectionError, Sight, Situation, Watch, Weights, herding::herd, plan::Plan, search::direct, views::Views,
 };
 use crate::{
@@ -73,10 +73,10 @@ impl Default for Planning {
 /// that counts (Box and Draper, *J. Am. Stat. Assoc.* 54, 1959).
 #[derive(Clone, Debug)]
 pub struct Planner {
-    weights: Weights,
-    search: Settings,
-    planning: Planning,
-    workspace: Workspace,
+    pub(super) weights: Weights,
+    pub(super) search: Settings,
+    pub(super) planning: Planning,
+    pub(super) workspace: Workspace,
     watch: Option<Watch>,
 }
 
@@ -187,7 +187,7 @@ impl Planner {
         let chosen = searched.to_unit(&configuration);
         let Ground { evaluations, partition, .. } = ground;
         Ok(Selection {
-            movement: Movement { configuration, row: None },
+            movement: Movement::to(configuration),
             criterion: Some(value),
             gain: Some(outlook.before() - value),
             evaluations,
@@ -325,6 +325,12 @@ impl<'a> Ground<'a> {
 
 impl Policy for Planner {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+        if let Actions::Sockets(sockets) = situation.actions {
+            return match sockets.beginning() {
+                Some(beginning) => Ok(Selection::of(beginning.clone())),
+                None => self.select_in_sockets(situation.belief, sockets, rng),
+            };
+        }
         let scope = Scope::of(situation)?;
         if let Some(beginning) = Watch::beginning(self.watch.as_ref(), situation.history, &scope)? {
             return Ok(beginning);

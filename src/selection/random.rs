@@ -4,11 +4,13 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Appraisal, Criterion, Domain, Movement, Policy, Scope, Selection, SelectionError, Situation, Watch, Weights,
+    Actions, Appraisal, Criterion, Domain, Movement, Policy, Scope, Selection, SelectionError, Situation, Watch,
+    Weights,
 };
 use crate::kinematics::JointBox;
 
-/// Draws uniformly among what is feasible: inside the limits, or from what is left of a pool (which shuffles it).
+/// Draws uniformly among what is feasible: inside the limits, or from what is left of a pool (which shuffles it); where targets are held
+/// in sockets, inside the limits and then projected into one of them.
 ///
 /// Where a head watches, it is told as much as every learner, and ignores it: the paper's random movements. What a
 /// movement would have taught it tells by the A-criterion.
@@ -27,9 +29,15 @@ impl Random {
 
 impl Policy for Random {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+        if let Actions::Sockets(sockets) = situation.actions {
+            return Ok(Selection::of(match sockets.beginning() {
+                Some(beginning) => beginning.clone(),
+                None => sockets.draw(situation.belief, rng)?,
+            }));
+        }
         let scope = Scope::of(situation)?;
         let movement = match &scope.domain {
-            Domain::Box { searched, .. } => Movement { configuration: scope.draw(searched, rng)?, row: None },
+            Domain::Box { searched, .. } => Movement::to(scope.draw(searched, rng)?),
             Domain::List { movements, .. } => movements[rng.random_range(0..movements.len())].clone(),
         };
         Ok(Selection::of(movement))

@@ -127,7 +127,7 @@ mod tests {
             baseline: None,
         };
         let mut history = History::default();
-        let movement = |at: f64| Movement { configuration: vec![at, 0.5], row: None };
+        let movement = |at: f64| Movement::to(vec![at, 0.5]);
         let limits = JointBox::new(vec![(0.0, 1.0); 2]).expect("limits");
         let miss = |history: &mut History, at: f64| {
             history.moved(&movement(at), &Actions::Box(limits.clone()), &Observation::missed(1));

@@ -2,6 +2,8 @@
 
 use std::{fmt, sync::Arc};
 
+use nalgebra::Point3;
+
 use crate::model::{Pass, State};
 
 /// One kind of reading: what a model predicts for it, and how predictions differ from what was measured.
@@ -67,9 +69,24 @@ pub trait Channel: fmt::Debug + Send + Sync {
         false
     }
 
+    /// Where a reading says that a target is, if it says so: the target and its origin, metres.
+    fn position(&self, reading: &[f64]) -> Option<(usize, Point3<f64>)> {
+        Some((self.target()?, Point3::from_slice(reading.get(..3)?)))
+    }
+
+    /// The camera and the target whose known points are in its picture, two equations each, if that is what is read.
+    fn sight(&self) -> Option<(usize, usize)> {
+        None
+    }
+
     /// The target whose position this channel measures, if it does.
     fn target(&self) -> Option<usize> {
         None
+    }
+
+    /// When it has a reading.
+    fn occasion(&self) -> Occasion {
+        Occasion::Always
     }
 }
 
@@ -84,10 +101,29 @@ pub struct Apart {
     pub pixels: Option<f64>,
 }
 
-/// Lists the channels: a module and its type each. The module's name is the channel's name in scenarios.
+/// When a channel has a reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Occasion {
+    /// After every movement of which it sees what it measures.
+    Always,
+    /// After a movement that holds a target in a socket.
+    Held {
+        /// The socket.
+        socket: usize,
+        /// The target.
+        target: usize,
+    },
+    /// Once, before any movement: what is known of the equipment.
+    Beforehand,
+}
+
+/// Lists the channels: a module and its type each. The module's name is the channel's name in scenarios. Those behind
+/// the semicolon come with what stands beside the robot, and no sensor is written for them.
 macro_rules! channels {
-    ($($(#[$doc:meta])* $module:ident::$Type:ident),* $(,)?) => {
+    ($($(#[$doc:meta])* $module:ident::$Type:ident),* $(,)?;
+     $($(#[$beside_doc:meta])* $beside:ident::$Beside:ident),* $(,)?) => {
         $(mod $module; pub use $module::$Type;)*
+        $(mod $beside; pub use $beside::$Beside;)*
 
         /// The names of all channels, as scenarios write them.
         pub const CHANNELS: &[&str] = &[$(stringify!($module)),*];
@@ -112,7 +148,7 @@ macro_rules! channels {
         #[cfg(test)]
         pub(crate) fn examples(rng: &mut rand_chacha::ChaCha8Rng, state: &crate::model::State)
             -> Vec<std::sync::Arc<dyn Channel>> {
-            vec![$(std::sync::Arc::new($Type::example(rng, state))),*]
+            vec![$(std::sync::Arc::new($Type::example(rng, state)),)* $(std::sync::Arc::new($Beside::example(rng, state))),*]
         }
     };
 }

@@ -1,12 +1,14 @@
 //! What every channel in the list must keep.
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{CHANNELS, Observation, Rig, examples};
+use super::{CHANNELS, Channel, Observation, Position, Rig, Socket, Spacing, examples};
 use crate::model::{
     Layout, Pass,
     laws::{all_blocks, random_state},
@@ -120,5 +122,30 @@ fn a_rig_stacks_its_channels() {
     let missing = rig.channels()[0].equations();
     assert_eq!(fewer.residual.len(), rig.equations() - missing);
     assert_eq!(fewer.rows, equations.rows.columns(missing, rig.equations() - missing));
-    assert_eq!(CHANNELS.len() * 2, rig.channels().len());
+    assert_eq!((CHANNELS.len() + 2) * 2, rig.channels().len(), "those of sensors, and of sockets");
+}
+
+/// Sockets are read when something is held in them, and what is known beforehand is read then alone.
+#[test]
+fn a_rig_reads_what_there_is_an_occasion_for() {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let state = random_state(&mut rng, 5);
+    let socket = |socket, target| Arc::new(Socket { target, socket, sigma_m: 0.01 }) as Arc<dyn Channel>;
+    let spacing = Arc::new(Spacing { sockets: [0, 1], sigma_m: 0.001 });
+    let tracker = Arc::new(Position::of(1, 0.02));
+    let rig = Rig::new(vec![tracker, socket(0, 2), socket(1, 0), spacing]);
+    let (positions, v) = ([0.3, -0.2, 0.9, 1.1, -0.4], [0.5; 10]);
+    for (held, equations) in [(None, [true, false, false, false]), (Some(1), [true, false, true, false])] {
+        let observation = rig.observe_in(held, &state, &positions, &v);
+        assert_eq!(observation.readings.iter().map(Option::is_some).collect::<Vec<_>>(), equations);
+        assert!(held.is_none() || observation.readings[2] == Some(vec![0.0; 3]), "it is there");
+        assert_eq!(rig.held_in(held).equations(), observation.equations());
+    }
+    assert_eq!(rig.holds(1), Some((2, 0)));
+    assert_eq!(rig.holds(2), None);
+    let known = rig.beforehand(&state, &v).expect("a spacing");
+    let apart = (state.sockets[0] - state.sockets[1]).norm();
+    assert_eq!(known.readings[3], Some(vec![apart + 0.001 * 0.5]));
+    assert_eq!(known.equations(), 1);
+    assert_eq!(Rig::tracker(0.1).beforehand(&state, &v), None);
 }

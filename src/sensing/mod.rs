@@ -1,6 +1,7 @@
 //! What is measured after a movement, and with what noise.
 //!
 //! * [`Channel`]: one kind of reading, whitened at the source; the list below names all there are.
+//! * [`Occasion`]: when a channel reads: always, while a target is held in a socket, or before any movement.
 //! * [`Rig`]: the channels of a robot together, and what they say at one posture.
 //! * [`Observation`]: the readings of one movement; a channel may have none.
 //! * [`Keys`]: what a scenario may say of a sensor; [`Equipment`]: what it can name.
@@ -18,7 +19,7 @@ mod loss;
 mod observation;
 mod rig;
 
-pub use channel::{Apart, Channel};
+pub use channel::{Apart, Channel, Occasion};
 pub use head::{Gaze, Head};
 pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
 pub use loss::{Graduated, Loss};
@@ -34,5 +35,9 @@ channel::channels! {
     /// Where the points of a target are in a camera's picture.
     pixels::Pixels,
     /// How far a target is from a fixed point.
-    distance::Distance,
+    distance::Distance;
+    /// That a target is held in a socket.
+    socket::Socket,
+    /// How far two sockets are apart.
+    spacing::Spacing,
 }

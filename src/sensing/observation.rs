@@ -93,6 +93,16 @@ impl Observation {
         Some(Point3::new(*reading.first()?, *reading.get(1)?, *reading.get(2)?))
     }
 
+    /// Where a target was measured to be, by the first channel of `rig` whose reading says so, metres.
+    pub fn position(&self, rig: &Rig, target: usize) -> Option<Point3<f64>> {
+        let mut positions = rig
+            .channels()
+            .iter()
+            .zip(&self.readings)
+            .filter_map(|(channel, reading)| channel.position(reading.as_ref()?));
+        positions.find_map(|(of, position)| (of == target).then_some(position))
+    }
+
     /// Whether it can be an observation of `rig` after a movement of so many `joints` to `positions`.
     pub fn check(&self, rig: &Rig, joints: usize, positions: &[f64]) -> Result<(), Refused> {
         if positions.len() != joints {

@@ -182,6 +182,10 @@ impl Channel for Pixels {
         true
     }
 
+    fn sight(&self) -> Option<(usize, usize)> {
+        Some((self.camera, self.target))
+    }
+
     /// The least angle between a point and the four planes that bound the picture, and that by which the target still faces
     /// the camera. All four are positive in front of the camera alone.
     fn clearance(&self, state: &State, positions: &[f64]) -> Option<f64> {

@@ -11,7 +11,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::{Apart, Channel, Equipment, KeyError, Keys};
 use crate::{
@@ -61,6 +61,10 @@ impl Pose {
 impl Channel for Pose {
     fn equations(&self) -> usize {
         6
+    }
+
+    fn position(&self, reading: &[f64]) -> Option<(usize, Point3<f64>)> {
+        Some((self.target, Point3::from_slice(reading.get(..3)?)))
     }
 
     fn noises(&self) -> usize {

@@ -4,7 +4,7 @@ use std::{ops::Range, sync::Arc};
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use super::{Channel, Observation, Position};
+use super::{Channel, Observation, Occasion, Position};
 use crate::model::{Layout, Pass, State};
 
 /// All channels through which a robot is observed. What it hands out is whitened: R = I.
@@ -63,6 +63,50 @@ impl Rig {
     /// The channels in order.
     pub fn channels(&self) -> &[Arc<dyn Channel>] {
         &self.channels
+    }
+
+    /// The channels that read after a movement: all for which there is an occasion when a target is held in `socket`, or in none.
+    pub fn held_in(&self, socket: Option<usize>) -> Self {
+        let reads = |channel: &&Arc<dyn Channel>| match channel.occasion() {
+            Occasion::Always => true,
+            Occasion::Held { socket: other, .. } => socket == Some(other),
+            Occasion::Beforehand => false,
+        };
+        Self::new(self.channels.iter().filter(reads).cloned().collect())
+    }
+
+    /// The channel that reads while a target is held in `socket`, and that target.
+    pub fn holds(&self, socket: usize) -> Option<(usize, usize)> {
+        self.channels.iter().enumerate().find_map(|(index, channel)| match channel.occasion() {
+            Occasion::Held { socket: other, target } if other == socket => Some((index, target)),
+            _ => None,
+        })
+    }
+
+    /// The channels that read before any movement; `None` if there are none.
+    pub fn known_beforehand(&self) -> Option<Self> {
+        let reads = |channel: &&Arc<dyn Channel>| channel.occasion() == Occasion::Beforehand;
+        let channels: Vec<_> = self.channels.iter().filter(reads).cloned().collect();
+        (!channels.is_empty()).then(|| Self::new(channels))
+    }
+
+    /// What is known before any movement of a robot's equipment that is as `state` says, with `v` (d standard normal numbers)
+    /// as noise; `None` if nothing is.
+    pub fn beforehand(&self, state: &State, v: &[f64]) -> Option<Observation> {
+        // It has nothing to do with the robot's posture.
+        let anywhere = vec![0.0; state.joints.len()];
+        let mut known = self.observe(state, &anywhere, v);
+        for (channel, reading) in self.channels.iter().zip(&mut known.readings) {
+            if channel.occasion() != Occasion::Beforehand {
+                *reading = None;
+            }
+        }
+        (!known.is_miss()).then_some(known)
+    }
+
+    /// A channel's part of `v`, one number per equation of all.
+    pub fn part<'a>(&self, channel: usize, v: &'a [f64]) -> &'a [f64] {
+        &v[self.places[channel].clone()]
     }
 
     /// All kinds of noise, channel by channel.
@@ -265,6 +309,22 @@ impl Rig {
             })
         };
         Observation { readings: self.channels.iter().zip(&self.places).map(reading).collect() }
+    }
+
+    /// As [`observe`](Self::observe), after a movement that holds a target in `socket`, or in none: that it is there is read of
+    /// its socket, and nothing of the others.
+    pub fn observe_in(&self, socket: Option<usize>, state: &State, positions: &[f64], v: &[f64]) -> Observation {
+        let mut observation = self.observe(state, positions, v);
+        for (channel, reading) in self.channels.iter().zip(&mut observation.readings) {
+            match channel.occasion() {
+                Occasion::Always => {}
+                Occasion::Held { socket: other, .. } => {
+                    *reading = (socket == Some(other)).then(|| vec![0.0; channel.equations()]);
+                }
+                Occasion::Beforehand => *reading = None,
+            }
+        }
+        observation
     }
 }
 

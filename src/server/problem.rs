@@ -125,7 +125,10 @@ impl From<ScenarioError> for Problem {
             | ScenarioError::Misfit { .. }
             | ScenarioError::RepeatedLearner(_)
             | ScenarioError::NoLearner => "learners",
-            ScenarioError::Invalid { .. } | ScenarioError::Prior { .. } | ScenarioError::Experiment(_) => {
+            ScenarioError::Invalid { .. }
+            | ScenarioError::Prior { .. }
+            | ScenarioError::Beforehand { .. }
+            | ScenarioError::Experiment(_) => {
                 return Self::new(Kind::EngineFailed, error.to_string());
             }
         };

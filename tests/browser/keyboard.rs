@@ -45,6 +45,14 @@ pub async fn visit(page: &Browser, server: Server) {
     page.wait_for("the mirrored table", "document.querySelectorAll('#controls tr').length === 4").await;
     assert_eq!(page.focus().await, "controls", "the focus begins on the panel");
 
+    // What vanishes under the focus leaves it to its neighbour, so that Tab goes on from there either way.
+    tab_to(page, "Close").await;
+    page.press(ENTER).await;
+    let gone = "![...document.querySelectorAll('#controls button')].some((one) => one.textContent === 'Close')";
+    page.wait_for("the closed card", gone).await;
+    let focus = page.evaluate("document.activeElement.dataset.kind ?? ''").await;
+    assert!(focus.as_str().is_some_and(|kind| !kind.is_empty()), "a control has the focus: {focus}");
+
     // Another seed, without one of the learners.
     tab_to(page, "Seed").await;
     page.press('7').await;

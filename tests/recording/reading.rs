@@ -193,6 +193,20 @@ impl Reading {
             .collect()
     }
 
+    /// Where a transform puts the origin, and its quaternion (x, y, z, w).
+    pub fn pose(&self, entity: &str, step: u64) -> ([f64; 3], [f64; 4]) {
+        let step = Some(step);
+        let shift: Vec<Translation3D> = self.components(entity, "Transform3D:translation", step).unwrap();
+        let turn: Vec<RotationQuat> = self.components(entity, "Transform3D:quaternion", step).unwrap();
+        (shift[0].0.0.map(f64::from), turn[0].0.0.map(f64::from))
+    }
+
+    /// The labels of an entity in the row of a step, or the last row before it that has any.
+    pub fn labels(&self, entity: &str, component: &'static str, step: u64) -> Vec<String> {
+        let found = (0..=step).rev().find_map(|step| self.components::<Text>(entity, component, Some(step)));
+        found.unwrap_or_default().iter().map(|text| text.as_str().to_owned()).collect()
+    }
+
     pub fn points(&self, entity: &str, step: u64) -> Option<Vec<f64>> {
         let points: Vec<Position3D> = self.components(entity, "Points3D:positions", Some(step))?;
         Some(points.iter().flat_map(|point| point.0.0).map(f64::from).collect())

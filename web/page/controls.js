@@ -13,6 +13,8 @@ const TAGS = {
 };
 const TYPES = { button: "button", combobox: "button", checkbox: "checkbox", radio: "radio", range: "range", number: "number", field: "text" };
 
+const FOCUSABLE = "button, input, a";
+
 export class Controls {
   #root;
   #act;
@@ -85,6 +87,8 @@ export class Controls {
 
   #show(list) {
     const had = this.#root.contains(document.activeElement) ? document.activeElement : null;
+    const order = had === null ? [] : [...this.#root.querySelectorAll(FOCUSABLE)];
+    const wasInList = had?.closest("[data-kind=group]") != null;
     const groups = new Set([...this.#elements].filter(([, one]) => one.dataset.kind === "group").map(([id]) => id));
     const alive = new Set();
     this.#fill(this.#root, list, alive);
@@ -99,8 +103,17 @@ export class Controls {
       const group = this.#elements.get(opened.id);
       (group.querySelector("[aria-pressed=true]") ?? group.querySelector("button, input, a"))?.focus();
     } else if (had !== null && !had.isConnected) {
-      this.focus();
+      if (wasInList) this.focus();
+      else this.#focusBeside(had, order);
     }
+  }
+
+  /** Gives the focus of an element that is no more to the next that was behind it, or else to the last before it: whoever goes
+   * through the controls goes on from there, whichever way. */
+  #focusBeside(gone, order) {
+    const index = order.indexOf(gone);
+    const others = [...order.slice(index + 1), ...order.slice(0, Math.max(index, 0)).reverse()];
+    (others.find((one) => one.isConnected && !one.disabled) ?? this.#root).focus();
   }
 
   /** Makes the children of an element those of the list, without moving what has the focus. */

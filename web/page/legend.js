@@ -6,6 +6,8 @@ export class Legend {
   #list;
   #learners;
   #ellipsoids;
+  #truth;
+  #seen;
   /** What it says of the session, as text: it is built anew only for another. */
   #said = "";
 
@@ -14,15 +16,21 @@ export class Legend {
     this.#list = list;
     this.#learners = list.querySelector("[data-line=learner]");
     this.#ellipsoids = list.querySelector("[data-line=ellipsoids] span");
+    this.#truth = list.querySelector("[data-line=truth]");
+    this.#seen = list.querySelector("[data-line=seen] span");
     this.#learners.remove();
   }
 
-  /** @param {{learners: {name: string, colour: number[]}[], ellipsoids: string}} caption */
-  show({ learners, ellipsoids }) {
-    const said = JSON.stringify([learners.map(({ name, colour }) => [name, colour]), ellipsoids]);
+  /** @param {{learners: {name: string, colour: number[]}[], ellipsoids: string, truth: boolean, seen: string}} caption */
+  show({ learners, ellipsoids, truth, seen }) {
+    const said = JSON.stringify([learners.map(({ name, colour }) => [name, colour]), ellipsoids, truth, seen]);
     if (said === this.#said) return;
     this.#said = said;
     this.#ellipsoids.textContent = ellipsoids;
+    this.#seen.textContent = seen;
+    // Of measured data there is no true arm.
+    if (truth) this.#seen.closest("li").before(this.#truth);
+    else this.#truth.remove();
     this.#list.querySelectorAll("[data-line=learner]").forEach((line) => line.remove());
     this.#list.prepend(...learners.map((learner) => this.#line(learner)));
     this.#list.hidden = learners.length === 0;

@@ -8,7 +8,7 @@ import { save, saveBlob } from "./save.js";
 import { Legend } from "./legend.js";
 import { SeedRuns } from "./seeds.js";
 import { copied, identity } from "./links.js";
-import { startViewer } from "./viewer.js";
+import { drawsInSoftware, startViewer } from "./viewer.js";
 
 /** Where runs come from: a server, or files beside the page. */
 const source = await import(document.documentElement.dataset.source === "files" ? "./files.js" : "./session.js");
@@ -36,12 +36,27 @@ let arriving = true;
 /** Parts that came before the viewer was there, and the step to show then. */
 let waiting = [];
 let sought = null;
+/** When the panel has something to do between its frames. */
+let due = 0;
 /** The steps to which the recording holds postures on the way. */
 const ways = new Set();
 
-const tell = (event) => panel.receive(JSON.stringify(event));
+const tell = (event) => pass(JSON.stringify(event));
 const seeds = new SeedRuns(tell, ask);
 const legend = new Legend(element("legend"));
+
+/** Tells the panel of an event, and has it do what follows from that now if it is drawn sparingly. */
+function pass(event) {
+  panel.receive(event);
+  attend();
+}
+
+/** Has the panel do what is due between two of its frames. */
+function attend() {
+  clearTimeout(due);
+  const seconds = panel.attend();
+  if (seconds !== undefined) due = setTimeout(attend, 1000 * seconds);
+}
 
 /** Asks the server and tells the panel what became of it. */
 async function request(asked, method, path, body, answer) {
@@ -166,7 +181,7 @@ function follow(resource) {
   show();
   follower = new Follower(session, {
     part: (part) => (viewer === null ? waiting.push(part) : viewer.feed(part)),
-    message: (text) => panel.receive(`{"is":"live","message":${text}}`),
+    message: (text) => pass(`{"is":"live","message":${text}}`),
     connected: () => tell({ is: "connected" }),
     lost: (seconds) => tell({ is: "lost", seconds }),
     ended: (failure, unseen) => tell({ is: "ended", failure, unseen }),
@@ -213,10 +228,11 @@ async function openPanel() {
     ]);
     await module.default({ module_or_path: response });
     const handle = new module.PanelHandle();
-    await handle.start(element("panel-canvas"), (json) => {
+    const obey = (json) => {
       const command = JSON.parse(json);
       commands[command.do]?.(command);
-    });
+    };
+    await handle.start(element("panel-canvas"), obey, drawsInSoftware());
     panel = handle;
     element("panel-cover").hidden = true;
     // The canvas cannot be left by keys; the controls that lie over it can.

@@ -140,7 +140,7 @@ class Resolution {
 }
 
 /** Whether there is no graphics card to draw with, as far as the browser tells. */
-function drawsInSoftware() {
+export function drawsInSoftware() {
   const context = document.createElement("canvas").getContext("webgl2");
   const names = context?.getExtension("WEBGL_debug_renderer_info");
   const name = names ? context.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";

@@ -1,6 +1,6 @@
 //! What the learners have done so far: a few numbers per learner and step, small enough to keep them all.
 
-use body_schema::experiment::{Convergence, Description, LearnerReport, StepReport};
+use body_schema::experiment::{ChannelReading, Convergence, Description, LearnerReport, StepReport};
 
 /// One learner after one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -93,6 +93,8 @@ pub struct History {
     first: u64,
     /// Step by step, all learners.
     rows: Vec<Vec<Row>>,
+    /// The same of what was read; empty where nothing was moved.
+    readings: Vec<Vec<Vec<ChannelReading>>>,
     /// Per learner, the reason why it stopped.
     failures: Vec<Option<String>>,
 }
@@ -105,6 +107,7 @@ impl History {
             convergence: vec![Convergence::new(description.thresholds); description.learners.len()],
             first: 0,
             rows: Vec::new(),
+            readings: Vec::new(),
             failures: vec![None; description.learners.len()],
         }
     }
@@ -155,6 +158,8 @@ impl History {
             Row::of(learner, convergence, begin)
         });
         self.rows.push(rows.collect());
+        let read = |learner: &LearnerReport| learner.movement.as_ref().map(|movement| movement.readings.clone());
+        self.readings.push(report.learners.iter().map(|learner| read(learner).unwrap_or_default()).collect());
         true
     }
 
@@ -176,6 +181,12 @@ impl History {
     /// A learner's row at a step.
     pub fn row(&self, step: u64, learner: usize) -> Option<&Row> {
         self.rows.get(usize::try_from(step.checked_sub(self.first)?).ok()?)?.get(learner)
+    }
+
+    /// What a learner read at a step, channel by channel.
+    pub fn readings(&self, step: u64, learner: usize) -> &[ChannelReading] {
+        let at = step.checked_sub(self.first).and_then(|index| self.readings.get(usize::try_from(index).ok()?));
+        at.and_then(|learners| learners.get(learner)).map_or(&[], Vec::as_slice)
     }
 
     /// One number of a learner over all steps; those that are not finite are left out.

@@ -304,6 +304,10 @@ pub struct Caption {
     pub learners: Vec<Captioned>,
     /// What the translucent ellipsoids are.
     pub ellipsoids: String,
+    /// Whether there is a true arm to be seen.
+    pub truth: bool,
+    /// What is drawn of the measurements.
+    pub seen: String,
 }
 
 /// A learner, as a caption names it.

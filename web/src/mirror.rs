@@ -12,7 +12,7 @@ const SAY_EVERY: f64 = 1.0;
 
 impl Panel {
     /// What the legend over the scene says, and what stands under a picture of it.
-    fn caption(&self) -> Caption {
+    pub fn caption(&self) -> Caption {
         let Some(description) = self.description() else { return Caption::default() };
         let title = format!("{}, seed {}, step {}", description.scenario, description.seed, self.cursor);
         let slots = colours::slots(description);
@@ -29,7 +29,10 @@ impl Panel {
         });
         let size = ELLIPSOIDS.iter().find(|(name, _)| *name == self.settings.ellipsoids).map_or("", |(_, size)| size);
         let ellipsoids = format!("where a learner thinks a joint may be ({size})");
-        Caption { title, learners: learners.collect(), ellipsoids }
+        let sees =
+            if description.cameras.is_empty() { "where the hand was seen" } else { "from a camera to what it saw" };
+        let (truth, seen) = (description.truth.is_some(), sees.to_owned());
+        Caption { title, learners: learners.collect(), ellipsoids, truth, seen }
     }
 
     pub(crate) fn phase(&self) -> &'static str {

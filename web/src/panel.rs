@@ -110,6 +110,8 @@ pub struct Panel {
     pub(crate) scene: Side,
     /// By how much a swipe over what stays in place has moved what scrolls.
     pub(crate) swiped: f32,
+    /// While it plays, seconds from one frame to the next where drawing is slow; 0 where it is not.
+    pub drawn_every: f64,
     pub(crate) opening: bool,
     /// A request for steps is under way.
     pub(crate) busy: bool,
@@ -163,6 +165,7 @@ impl Default for Panel {
             touch: false,
             scene: Side::default(),
             swiped: 0.0,
+            drawn_every: 0.0,
             opening: false,
             busy: false,
             awaited: None,
@@ -224,6 +227,11 @@ impl Panel {
     /// The story of the chosen scenario, if there is one.
     pub(crate) fn story_of_scenario(&self) -> Option<usize> {
         STORIES.iter().position(|story| story.scenario == self.settings.scenario)
+    }
+
+    /// Whether it goes on between its frames, and is drawn less often than it does something.
+    pub fn draws_sparingly(&self) -> bool {
+        self.playing && self.drawn_every > 0.0
     }
 
     /// Whether steps can be made.

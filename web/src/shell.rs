@@ -4,6 +4,7 @@ use std::{
     cell::RefCell,
     rc::Rc,
     sync::{Arc, Mutex},
+    time::Duration,
 };
 
 use egui::accesskit::TreeUpdate;
@@ -11,15 +12,21 @@ use wasm_bindgen::prelude::*;
 
 use crate::{
     access::{self, Act, Element},
-    host::Event,
+    host::{Command, Event},
     panel::Panel,
 };
+
+/// Where drawing is slow, seconds from one frame of a panel that plays to the next, unless the visitor does something: the
+/// scene beside it gets the time.
+const SPARING: f64 = 0.3;
 
 /// The panel on its canvas.
 #[wasm_bindgen]
 pub struct PanelHandle {
     runner: eframe::WebRunner,
+    panel: Rc<RefCell<Panel>>,
     inbox: Rc<RefCell<Inbox>>,
+    command: RefCell<Option<js_sys::Function>>,
     tree: Tree,
     /// The elements that the page has.
     elements: RefCell<Vec<Element>>,
@@ -34,6 +41,8 @@ struct Inbox {
     /// The focus is elsewhere on the page.
     released: bool,
     context: Option<egui::Context>,
+    /// When the panel was drawn last, seconds as egui counts them.
+    drawn_at: f64,
 }
 
 /// The latest accessibility tree, until the page takes it.
@@ -53,7 +62,7 @@ impl egui::Plugin for Tree {
 }
 
 struct Shell {
-    panel: Panel,
+    panel: Rc<RefCell<Panel>>,
     inbox: Rc<RefCell<Inbox>>,
     command: js_sys::Function,
     /// Acts whose events egui has, and which it has not finished.
@@ -68,21 +77,30 @@ impl PanelHandle {
     pub fn new() -> Self {
         Self {
             runner: eframe::WebRunner::new(),
+            panel: Rc::default(),
             inbox: Rc::default(),
+            command: RefCell::default(),
             tree: Tree::default(),
             elements: RefCell::default(),
         }
     }
 
-    /// Draws on a canvas from now on.
-    pub async fn start(&self, canvas: web_sys::HtmlCanvasElement, command: js_sys::Function) -> Result<(), JsValue> {
-        let (inbox, tree) = (self.inbox.clone(), self.tree.clone());
+    /// Draws on a canvas from now on; sparingly where that is slow.
+    pub async fn start(
+        &self,
+        canvas: web_sys::HtmlCanvasElement,
+        command: js_sys::Function,
+        slow: bool,
+    ) -> Result<(), JsValue> {
+        self.panel.borrow_mut().drawn_every = if slow { SPARING } else { 0.0 };
+        *self.command.borrow_mut() = Some(command.clone());
+        let (panel, inbox, tree) = (self.panel.clone(), self.inbox.clone(), self.tree.clone());
         let create: eframe::AppCreator<'static> = Box::new(move |creation| {
             inbox.borrow_mut().context = Some(creation.egui_ctx.clone());
             creation.egui_ctx.set_theme(egui::ThemePreference::System);
             creation.egui_ctx.enable_accesskit();
             creation.egui_ctx.add_plugin(tree);
-            Ok(Box::new(Shell { panel: Panel::default(), inbox, command, acts: Vec::new() }))
+            Ok(Box::new(Shell { panel, inbox, command, acts: Vec::new() }))
         });
         self.runner.start(canvas, eframe::WebOptions::default(), create).await
     }
@@ -90,8 +108,32 @@ impl PanelHandle {
     /// Takes in an event, as JSON. What the panel does not know is refused with a reason.
     pub fn receive(&self, event: &str) -> Result<(), JsValue> {
         let event = serde_json::from_str(event).map_err(|error| JsValue::from_str(&error.to_string()))?;
-        self.push(|inbox| inbox.events.push(event));
+        self.inbox.borrow_mut().events.push(event);
+        if !self.is_sparing() {
+            self.repaint_after(0.0);
+        }
         Ok(())
+    }
+
+    /// Does what is due between two frames of a panel that is drawn sparingly, and returns after how many seconds it is to
+    /// be called again, if nothing happens before; nothing if all is done in frames.
+    pub fn attend(&self) -> Option<f64> {
+        if !self.is_sparing() {
+            return None;
+        }
+        let events = std::mem::take(&mut self.inbox.borrow_mut().events);
+        let (again, plays, commands) = {
+            let mut panel = self.panel.try_borrow_mut().ok()?;
+            events.into_iter().for_each(|event| panel.receive(event));
+            let again = panel.tick(now());
+            (again, panel.playing, panel.take_commands())
+        };
+        if let Some(command) = self.command.borrow().as_ref() {
+            tell(command, commands);
+        }
+        let rest = self.inbox.borrow().drawn_at + SPARING - now();
+        self.repaint_after(if plays { rest.max(0.0) } else { 0.0 });
+        again.filter(|_| plays)
     }
 
     /// Presses a key that was pressed elsewhere on the page; false if it means nothing here.
@@ -141,11 +183,34 @@ impl PanelHandle {
     }
 
     fn push(&self, add: impl FnOnce(&mut Inbox)) {
-        let mut inbox = self.inbox.borrow_mut();
-        add(&mut inbox);
-        if let Some(context) = &inbox.context {
-            context.request_repaint();
+        add(&mut self.inbox.borrow_mut());
+        self.repaint_after(0.0);
+    }
+
+    fn repaint_after(&self, seconds: f64) {
+        if let Some(context) = &self.inbox.borrow().context {
+            context.request_repaint_after(Duration::from_secs_f64(seconds));
         }
+    }
+
+    /// Whether the panel goes on without being drawn each time. Not while it is at work itself.
+    fn is_sparing(&self) -> bool {
+        self.panel.try_borrow().is_ok_and(|panel| panel.draws_sparingly())
+    }
+}
+
+/// Now, as egui counts it, seconds.
+fn now() -> f64 {
+    web_sys::window().and_then(|window| window.performance()).map_or(0.0, |clock| clock.now() / 1e3)
+}
+
+/// Has the page do what the panel asks for.
+fn tell(page: &js_sys::Function, commands: Vec<Command>) {
+    for command in commands {
+        // Commands are plain data: they can always be written.
+        let json = serde_json::to_string(&command).unwrap_or_default();
+        // What the page throws is the page's to report.
+        drop(page.call1(&JsValue::NULL, &JsValue::from_str(&json)));
     }
 }
 
@@ -159,6 +224,7 @@ impl eframe::App for Shell {
         let mut inbox = self.inbox.borrow_mut();
         let (events, acts) = (std::mem::take(&mut inbox.events), std::mem::take(&mut inbox.acts));
         let released = std::mem::take(&mut inbox.released);
+        inbox.drawn_at = now();
         drop(inbox);
         if released {
             access::release_focus(&ctx);
@@ -167,13 +233,12 @@ impl eframe::App for Shell {
         if !self.acts.is_empty() {
             ctx.request_repaint();
         }
-        events.into_iter().for_each(|event| self.panel.receive(event));
-        self.panel.ui(ui);
-        for command in self.panel.take_commands() {
-            // Commands are plain data: they can always be written.
-            let json = serde_json::to_string(&command).unwrap_or_default();
-            // What the page throws is the page's to report.
-            drop(self.command.call1(&JsValue::NULL, &JsValue::from_str(&json)));
-        }
+        let commands = {
+            let mut panel = self.panel.borrow_mut();
+            events.into_iter().for_each(|event| panel.receive(event));
+            panel.ui(ui);
+            panel.take_commands()
+        };
+        tell(&self.command, commands);
     }
 }

@@ -83,6 +83,8 @@ const NOISE_WEIGHT: f64 = 3.0;
 const NOISE_ROUNDS: usize = 4;
 /// The least scale of a noise that is not known, in nominal σ.
 const LEAST_SCALE: f64 = 1e-3;
+/// The number of what is known before the first movement.
+const BEFOREHAND: u64 = 0;
 /// Measurements that are kept as they are; beyond these the older half is compressed.
 const KEPT: usize = 60;
 
@@ -135,6 +137,17 @@ impl Smoother {
     pub fn with_unknown_noise(mut self, unknown: Vec<bool>) -> Self {
         self.unknown = unknown;
         self.unknown.resize(self.nominal.noises().len(), false);
+        self
+    }
+
+    /// The same with what is known before any movement, which no posture has to do with: of the robot's equipment.
+    pub fn knowing(mut self, observation: Observation) -> Self {
+        let positions = vec![0.0; self.belief.state.joints.len()];
+        self.posterior.measurements.push(Measurement { positions, observation, movement: BEFOREHAND });
+        let layout = self.belief.layout.clone();
+        self.hypotheses.follow(&self.posterior, &layout);
+        self.hypotheses.condense(self.settings.kept, &layout);
+        self.publish();
         self
     }
 
@@ -264,7 +277,8 @@ impl Smoother {
     /// the prior had; of the measurements the latest stay, those that the old body does not explain.
     fn forget(&mut self) {
         let Some(changed) = self.since_change() else { return };
-        let first = changed.measurements.first().map_or(u64::MAX, |seen| seen.movement);
+        let latest = changed.measurements.iter().map(|seen| seen.movement);
+        let first = latest.filter(|movement| *movement != BEFOREHAND).min().unwrap_or(u64::MAX);
         let dropped = self.posterior.readings(&self.belief.state).take_while(|reading| reading.movement < first);
         self.past.extend(dropped.collect::<Vec<_>>());
         self.posterior = changed;
@@ -285,7 +299,10 @@ impl Smoother {
         let surprising = self.changes.since().unwrap_or(surprising).min(measurements.len());
         let covariance = self.prior_here() * 0.25;
         let prior = Prior::around(self.belief.state.clone(), &self.belief.layout, covariance).ok()?;
-        Some(self.posterior.anew(prior, measurements[measurements.len() - surprising..].to_vec()))
+        // What is known of the equipment has nothing to do with the body.
+        let (old, latest) = measurements.split_at(measurements.len() - surprising);
+        let known = old.iter().filter(|seen| seen.movement == BEFOREHAND);
+        Some(self.posterior.anew(prior, known.chain(latest).cloned().collect()))
     }
 
     /// The prior's covariance in the chart at the estimate; without what correlates its parameters where the estimate has

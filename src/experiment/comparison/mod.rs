@@ -83,6 +83,9 @@ pub struct RunSummary {
     pub prediction_m: Option<f64>,
     /// See [`Metrics::prediction_mean_m`].
     pub prediction_mean_m: Option<f64>,
+    /// See [`Metrics::scatter_m`].
+    #[serde(default)]
+    pub scatter_m: Option<f64>,
     /// See [`Metrics::trace`].
     #[serde(default)]
     pub trace: Option<f64>,
@@ -99,6 +102,7 @@ impl From<&Metrics> for RunSummary {
             location_m: metrics.location_m,
             prediction_m: metrics.prediction_m,
             prediction_mean_m: metrics.prediction_mean_m,
+            scatter_m: metrics.scatter_m,
             trace: metrics.trace,
             bound_trace: metrics.bound_trace,
         }
@@ -138,6 +142,9 @@ pub struct Curve {
     pub prediction_m: Option<Quantiles>,
     /// See [`Metrics::prediction_mean_m`].
     pub prediction_mean_m: Option<Quantiles>,
+    /// See [`Metrics::scatter_m`].
+    #[serde(default)]
+    pub scatter_m: Option<Quantiles>,
     /// See [`Metrics::trace`].
     #[serde(default)]
     pub trace: Option<Quantiles>,
@@ -226,6 +233,7 @@ impl LearnerComparison {
                     location_m: over_runs(|errors| errors.location_m),
                     prediction_m: over_runs(|errors| errors.prediction_m),
                     prediction_mean_m: over_runs(|errors| errors.prediction_mean_m),
+                    scatter_m: over_runs(|errors| errors.scatter_m),
                     trace: over_runs(|errors| errors.trace),
                     bound_trace: over_runs(|errors| errors.bound_trace),
                     joints: (0..joints).map(|joint| of_joint(movements as usize, joint)).collect(),

@@ -35,6 +35,8 @@ pub struct Scenario {
     pub targets: Vec<Spanned<Target>>,
     #[serde(rename = "camera", default)]
     pub cameras: Vec<Spanned<Camera>>,
+    #[serde(rename = "socket", default)]
+    pub sockets: Vec<Spanned<Socket>>,
     pub prediction: Option<Spanned<Prediction>>,
     pub change: Option<Spanned<Change>>,
     pub outliers: Option<Spanned<Outliers>>,
@@ -120,6 +122,24 @@ pub struct Camera {
     #[serde(default)]
     pub known: Known,
     pub known_to_px: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Socket {
+    pub name: Spanned<String>,
+    pub place: Option<Spanned<String>>,
+    pub target: Option<Spanned<String>>,
+    pub at_m: Option<Spanned<Exactly<f64, 3>>>,
+    #[serde(default)]
+    pub known: Known,
+    pub posture_deg: Option<Spanned<Vec<f64>>>,
+    pub sigma_m: Option<Spanned<f64>>,
+    pub to: Option<Spanned<String>>,
+    pub distance_m: Option<Spanned<f64>>,
+    pub sigma_distance_m: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub held_out: bool,
 }
 
 /// Where the robot stands in the frame of the measurements.

@@ -78,7 +78,7 @@ impl Check<'_> {
                 state.hand = hand;
             }
         }
-        let layout = Layout::new(&state, blocks);
+        let layout = Layout::new(&state, blocks.iter().copied());
         if layout.dimension() == 0 {
             let mend = "set `learned = true` on a joint, or `learn_marker = true`";
             self.problem(raw.joints.span(), "robot.joint", "nothing is to be learned", mend);
@@ -88,7 +88,24 @@ impl Check<'_> {
             self.problem(raw.joints.span(), "robot.joint", error.to_string(), "write limits that a robot can have");
         });
         let limits = limits.ok().filter(|_| complete)?;
-        Some(Robot { names, state, layout, limits, body: raw.body, known, equipment, up_to_motion })
+        let (sockets, held_out_sockets, spacings) = Default::default();
+        let mut robot = Robot {
+            names,
+            state,
+            layout,
+            limits,
+            body: raw.body,
+            known,
+            equipment,
+            sockets,
+            held_out_sockets,
+            spacings,
+            up_to_motion,
+        };
+        self.sockets(scenario, &mut robot);
+        blocks.extend((0..robot.sockets.len()).map(Block::Socket));
+        robot.layout = Layout::new(&robot.state, blocks);
+        Some(robot)
     }
 
     /// What a joint's readings are truly corrected by.

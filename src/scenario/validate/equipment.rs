@@ -148,7 +148,7 @@ impl Check<'_> {
     }
 
     /// How well a place is known; `None` if it is known exactly, so that it is not learned.
-    fn known<T>(&mut self, key: &str, raw: &raw::Known, spanned: &Spanned<T>) -> Option<Known> {
+    pub(super) fn known<T>(&mut self, key: &str, raw: &raw::Known, spanned: &Spanned<T>) -> Option<Known> {
         let field = |field: &str| format!("{key}.{field}");
         if let Some(within) = &raw.anywhere_m {
             if raw.known_to_m.is_some() || raw.known_to_deg.is_some() {

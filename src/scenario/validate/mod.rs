@@ -6,6 +6,7 @@ mod constraints;
 mod equipment;
 mod head;
 mod learners;
+mod sockets;
 mod world;
 
 use std::{collections::BTreeMap, ops::Range};
@@ -124,16 +125,26 @@ impl Check<'_> {
             self.problem(raw.name.span(), "name", format!("{name:?} cannot be a name"), mend);
         }
         let robot = self.robot(raw)?;
-        let rig = self.rig(raw, &robot.equipment);
+        let rig = self.rig(raw, &robot);
         let world = self.world(raw, &robot, rig.as_deref(), open);
         let setting = Setting {
             learns_marker: raw.robot.learn_marker,
             is_measured: raw.measurements.is_some(),
+            has_sockets: !robot.sockets.is_empty(),
             sees_markers_alone: rig.iter().flat_map(|rig| rig.channels()).all(|channel| channel.target() == Some(0)),
         };
         let learners = self.learners(&raw.learners, setting);
         let filter = self.filter("filter", &raw.filter);
         let constraints = raw.constraints.as_ref();
+        if let (Some(given), false) = (constraints, raw.sockets.is_empty()) {
+            let mend = "leave [constraints] out, or the sockets";
+            self.problem(
+                given.span(),
+                "constraints",
+                "postures that hold a target in a socket know no constraints yet",
+                mend,
+            );
+        }
         let constraints = constraints.and_then(|given| self.constraints(given, &robot, world.as_ref()));
         Some(Scenario {
             name: name.clone(),
@@ -294,10 +305,11 @@ impl Check<'_> {
                 location_m: self.positive("thresholds.location_m", &thresholds.location_m),
             };
         }
-        if let Some(sensor) = &raw.sensor {
+        let socket = raw.sockets.first().map(Spanned::span);
+        if let Some(span) = raw.sensor.as_ref().map(Spanned::span).or(socket) {
             let what = "missing: a simulated world is judged by them";
             let mend = "add `[thresholds]` with `orientation_deg = …` and `location_m = …`";
-            self.problem(sensor.span(), "thresholds", what, mend);
+            self.problem(span, "thresholds", what, mend);
         }
         Scenario::THRESHOLDS
     }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::{
     experiment::Outliers,
     scenario::{InitialError, Measurements, Robot, WorldSpec},
-    sensing::{Equipment, Rig},
+    sensing::{Channel, Rig, Socket},
     table::TableError,
 };
 
@@ -20,8 +20,11 @@ impl Check<'_> {
         rig: Option<&Rig>,
         open: &dyn Fn(&str) -> Result<String, String>,
     ) -> Option<WorldSpec> {
-        match (&raw.sensor, &raw.initial_error, &raw.measurements) {
-            (Some(_), Some(error), None) => {
+        let socket = raw.sockets.first().map(Spanned::span);
+        let is_replayed = raw.measurements.is_some();
+        let senses = raw.sensor.is_some() || (socket.is_some() && !is_replayed);
+        match (senses, &raw.initial_error, &raw.measurements) {
+            (true, Some(error), None) => {
                 let marker_m = error.get_ref().marker_m.as_ref();
                 if raw.robot.learn_marker && marker_m.is_none() {
                     let mend = "add `marker_m = …`, or set `learn_marker = false`";
@@ -57,24 +60,30 @@ impl Check<'_> {
                     outliers: raw.outliers.as_ref().map(|outliers| self.outliers(outliers.get_ref())),
                 })
             }
-            (None, None, Some(measurements)) => {
+            (false, None, Some(measurements)) => {
                 let head = raw.head.as_ref().map(|head| ("head", head.span()));
                 let change = raw.change.as_ref().map(|change| ("change", change.span()));
                 let outliers = raw.outliers.as_ref().map(|outliers| ("outliers", outliers.span()));
-                for (key, span) in head.into_iter().chain(change).chain(outliers) {
+                let sockets = socket.map(|span| ("socket", span));
+                for (key, span) in head.into_iter().chain(change).chain(outliers).chain(sockets) {
                     let mend = "remove it; it belongs to a simulated world";
-                    self.problem(span, key, "recorded measurements cannot be watched, changed or spoilt", mend);
+                    self.problem(
+                        span,
+                        key,
+                        "recorded measurements cannot be watched, changed, spoilt or held in sockets",
+                        mend,
+                    );
                 }
                 self.measured(raw, measurements.get_ref(), open)
             }
-            (sensor, error, measurements) => {
-                let span = [sensor.as_ref().map(Spanned::span), error.as_ref().map(Spanned::span)]
+            (_, error, measurements) => {
+                let span = [raw.sensor.as_ref().map(Spanned::span), error.as_ref().map(Spanned::span)]
                     .into_iter()
                     .chain([measurements.as_ref().map(Spanned::span)])
                     .flatten()
                     .next();
                 let what = "a scenario is either simulated or measured";
-                let mend = "write [sensor] and [initial_error] for a simulated world, or [measurements] alone for a \
+                let mend = "write [sensor] (or [[socket]]s) and [initial_error] for a simulated world, or [measurements] alone for a \
                             measured one";
                 self.problem(span.unwrap_or(0..0), "sensor, initial_error, measurements", what, mend);
                 None
@@ -92,8 +101,13 @@ impl Check<'_> {
 
     /// What is measured: the sensors of a simulated world; where measurements are replayed a tracker with the noise that
     /// the filter assumes.
-    pub(super) fn rig(&mut self, raw: &raw::Scenario, equipment: &Equipment) -> Option<Arc<Rig>> {
+    pub(super) fn rig(&mut self, raw: &raw::Scenario, robot: &Robot) -> Option<Arc<Rig>> {
+        let equipment = &robot.equipment;
+        let held = socket_channels(robot);
         let Some(sensors) = &raw.sensor else {
+            if !held.is_empty() {
+                return Some(Arc::new(Rig::new(held)));
+            }
             return Some(Arc::new(Rig::tracker(raw.filter.measurement_variance_m2.get_ref().sqrt())));
         };
         let given = sensors.get_ref();
@@ -102,7 +116,7 @@ impl Check<'_> {
             let section = if given.0.len() > 1 { format!("sensor[{index}]") } else { "sensor".to_owned() };
             let span = if given.0.len() > 1 { keys.span() } else { sensors.span() };
             match keys.get_ref().channel(equipment) {
-                Ok(channel) if given.0.len() > 1 && channel.sigma() == 0.0 => {
+                Ok(channel) if given.0.len() + held.len() > 1 && channel.sigma() == 0.0 => {
                     let what = "several sensors are weighed by their noise, and this one has none";
                     self.problem(span, format!("{section}.sigma_m"), what, "write a number above 0");
                 }
@@ -116,7 +130,9 @@ impl Check<'_> {
         if given.0.is_empty() {
             self.problem(sensors.span(), "sensor", "there is no sensor", "add `sigma_m = 0.01`, say");
         }
-        if let Some(head) = raw.head.as_ref().filter(|_| channels.iter().any(|channel| channel.target() != Some(0))) {
+        if let Some(head) =
+            raw.head.as_ref().filter(|_| channels.iter().any(|channel| channel.target() != Some(0)) || !held.is_empty())
+        {
             let mend = "leave [head] out, or use sensors of the marker's position alone";
             self.problem(head.span(), "head", "a head watches the marker, and not what another sensor measures", mend);
         }
@@ -131,7 +147,9 @@ impl Check<'_> {
                 mend,
             );
         }
-        (channels.len() == given.0.len() && !channels.is_empty()).then(|| Arc::new(Rig::new(channels)))
+        let complete = channels.len() == given.0.len() && !channels.is_empty();
+        channels.extend(held);
+        complete.then(|| Arc::new(Rig::new(channels)))
     }
 
     fn measured(
@@ -180,4 +198,12 @@ impl Check<'_> {
         self.data = Some((file.clone(), text));
         Some(WorldSpec::Measured { measurements: rows, held_out })
     }
+}
+
+/// The channels that come with the sockets of a robot.
+fn socket_channels(robot: &Robot) -> Vec<Arc<dyn Channel>> {
+    let held = robot.sockets.iter().enumerate().map(|(socket, spec)| {
+        Arc::new(Socket { target: spec.target, socket, sigma_m: spec.sigma_m }) as Arc<dyn Channel>
+    });
+    held.chain(robot.spacings.iter().map(|spacing| Arc::new(*spacing) as _)).collect()
 }

@@ -53,10 +53,14 @@ impl<'a> Scope<'a> {
                 movements: Cow::Owned(constraints.of(from, pool.iter().cloned(), |movement| &movement.configuration)?),
                 joints: None,
             },
+            (Actions::Sockets(sockets), _) => {
+                let joints = sockets.limits();
+                Domain::Box { searched: Cow::Borrowed(joints), joints }
+            }
             (Actions::Box(joints), None) => Domain::Box { searched: Cow::Borrowed(joints), joints },
             (Actions::Box(joints), Some(constraints)) => match &constraints.allowed {
                 Some(allowed) => {
-                    let movement = |posture: &Vec<f64>| Movement { configuration: posture.clone(), row: None };
+                    let movement = |posture: &Vec<f64>| Movement::to(posture.clone());
                     let movements =
                         constraints.of(from, allowed.iter().map(movement), |movement| &movement.configuration)?;
                     Domain::List { movements: Cow::Owned(movements), joints: Some(joints) }

@@ -205,7 +205,7 @@ fn who_excludes_everything_is_named() {
     }
     // In a pool, too, where rows are left that cannot be reached.
     let mut case = Case::new(0.3);
-    case.actions = Actions::Pool(vec![Movement { configuration: vec![1.0; JOINTS], row: Some(0) }]);
+    case.actions = Actions::Pool(vec![Movement { configuration: vec![1.0; JOINTS], row: Some(0), socket: None }]);
     let constraints = excluding(&|constraints| {
         constraints.start = Some(vec![0.0; JOINTS]);
         constraints.greatest_travel = vec![0.5; JOINTS];

@@ -73,7 +73,7 @@ impl Case {
     fn with_pool(mut self, count: usize) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let limits = self.limits();
-        let movement = |row| Movement { configuration: limits.draw(&mut rng), row: Some(row) };
+        let movement = |row| Movement { row: Some(row), ..Movement::to(limits.draw(&mut rng)) };
         self.actions = Actions::Pool((0..count).map(movement).collect());
         self
     }
@@ -81,7 +81,7 @@ impl Case {
     fn limits(&self) -> JointBox {
         match &self.actions {
             Actions::Box(limits) => limits.clone(),
-            Actions::Pool(_) => JointBox::new(vec![(-1.5, 1.5); JOINTS]).expect("limits"),
+            Actions::Pool(_) | Actions::Sockets(_) => JointBox::new(vec![(-1.5, 1.5); JOINTS]).expect("limits"),
         }
     }
 

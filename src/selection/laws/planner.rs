@@ -3,7 +3,9 @@
 use nalgebra::DVector;
 
 use super::{Case, JOINTS, PARAMETERS, apart, needs_a_covariance, search, takes_the_best_of_a_pool, watch};
-use crate::selection::{CriterionUnits, Planned, Planner, Planning, Policy, Selection, Situation, Weights, condition};
+use crate::selection::{
+    CriterionUnits, Planned, Planner, Planning, Policy, Selection, Situation, Weights, plan::condition,
+};
 
 fn planner(case: &Case, planning: Planning) -> Planner {
     let short = Planning { sweeps: 1, ..planning };

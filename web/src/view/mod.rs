@@ -15,6 +15,7 @@ mod ending;
 mod game;
 mod learners;
 mod notices;
+mod readings;
 mod setup;
 mod share;
 mod slice;
@@ -47,7 +48,8 @@ impl Panel {
         self.spots = crate::stories::Spots::default();
         self.take_keys(&ctx);
         let again = self.tick(ctx.input(|input| input.time));
-        ctx.request_repaint_after(std::time::Duration::from_secs_f64(again.unwrap_or(1.0).clamp(0.005, 1.0)));
+        let least = if self.draws_sparingly() { self.drawn_every } else { 0.005 };
+        ctx.request_repaint_after(std::time::Duration::from_secs_f64(again.unwrap_or(1.0).clamp(least, 1.0)));
 
         let margin = egui::Margin::symmetric(10, 6);
         let frame = Frame::new().fill(ui.visuals().window_fill).inner_margin(margin);
@@ -73,7 +75,7 @@ impl Panel {
         self.notices_above(&ctx);
         self.point(&ctx);
         // What was just clicked is to be done now, not at the next movement of the mouse.
-        if self.has_commands() {
+        if self.has_commands() && !self.draws_sparingly() {
             ctx.request_repaint();
         }
     }

@@ -18,6 +18,12 @@ pub(super) fn joint_value(panel: &Panel, joint: usize, value: f64) -> String {
 
 impl Panel {
     pub(super) fn why(&mut self, ui: &mut Ui) {
+        self.choice(ui);
+        ui.add_space(8.0);
+        self.readings(ui);
+    }
+
+    fn choice(&mut self, ui: &mut Ui) {
         self.choose_learner(ui);
         let Some(search) = self.why.search.clone() else {
             let text = self.why.reason.clone().unwrap_or_else(|| match self.history.latest() {

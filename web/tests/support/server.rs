@@ -28,8 +28,8 @@ impl Server {
 
     /// What there is to choose from: as many scenarios as a test needs.
     pub fn scenarios() -> Value {
-        let summaries = ["arm-6dof", "head-fov", "body-change", "tiago-mocap"]
-            .map(|name| builtin(name).expect("a built-in scenario").summary());
+        let names = ["arm-6dof", "head-fov", "body-change", "tiago-mocap", "arm-6dof-camera", "arm-6dof-outliers"];
+        let summaries = names.map(|name| builtin(name).expect("a built-in scenario").summary());
         json!({ "is": "scenarios", "scenarios": summaries })
     }
 

@@ -1,0 +1,78 @@
+//! A target held in a socket: `0 = p(θ) − s + v`, `v ~ N(0, σ² I)`, three equations. A printed ball that is put back into its
+//! cup again and again calibrates an arm of which nothing is measured but its joints.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use super::{Channel, Occasion};
+use crate::model::{Block, Pass, State};
+
+/// That a target is in a socket, as far as play and the joints' readings let it be. A reading is where the target is, seen from
+/// the socket, metres: 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Socket {
+    /// Which target.
+    pub target: usize,
+    /// Which socket, s.
+    pub socket: usize,
+    /// Standard deviation of the noise per coordinate, metres: what play, and the noise of the joints, amount to at the target.
+    pub sigma_m: f64,
+}
+
+impl Socket {
+    #[cfg(test)]
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Self {
+        use rand::RngExt;
+        let target = rng.random_range(0..state.targets.len());
+        let socket = rng.random_range(0..state.sockets.len());
+        Self { target, socket, sigma_m: rng.random_range(0.001..0.1) }
+    }
+}
+
+impl Channel for Socket {
+    fn equations(&self) -> usize {
+        3
+    }
+
+    fn sigma(&self) -> f64 {
+        self.sigma_m
+    }
+
+    fn with_sigma(&self, sigma_m: f64) -> Arc<dyn Channel> {
+        Arc::new(Self { sigma_m, ..*self })
+    }
+
+    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
+        let away = state.target_at(self.target, positions) - state.sockets[self.socket];
+        reading.copy_from_slice(away.as_slice());
+        true
+    }
+
+    fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
+        for (whitened, (y, h)) in whitened.iter_mut().zip(y.iter().zip(h)) {
+            *whitened = (y - h) / self.sigma_m;
+        }
+    }
+
+    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+        let m = rows.len() / 3;
+        let mut put = |coordinate: usize, column: Vector3<f64>| {
+            (0..3).for_each(|k| rows[k * m + coordinate] = column[k] / self.sigma_m);
+        };
+        let target = pass.point_columns(self.target, &mut put);
+        if let Some(place) = pass.layout().block(Block::Socket(self.socket)) {
+            place.enumerate().for_each(|(k, coordinate)| put(coordinate, -Vector3::ith(k, 1.0)));
+        }
+        reading.copy_from_slice((target - pass.state().sockets[self.socket].coords).as_slice());
+        true
+    }
+
+    fn disturb(&self, reading: &mut [f64], v: &[f64]) {
+        reading.iter_mut().zip(v).for_each(|(reading, v)| *reading += self.sigma_m * v);
+    }
+
+    fn occasion(&self) -> Occasion {
+        Occasion::Held { socket: self.socket, target: self.target }
+    }
+}
