@@ -6,7 +6,7 @@ mod sockets;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, Isometry3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3};
-use rand::{RngExt, seq::SliceRandom};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::{
@@ -17,7 +17,9 @@ use crate::{
     },
     kinematics::{Joint, JointBox},
     model::{Block, Correction, Element, Layout, State, Workspace, anywhere},
-    scenario::{ErrorDraw, InitialError, Known, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
+    scenario::{
+        ErrorDraw, HeldOut, InitialError, Known, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec,
+    },
     selection::{Actions, Movement, Watch, Weights},
     sensing::Observation,
 };
@@ -139,7 +141,7 @@ impl Scenario {
                 let limits = limits.clone();
                 (World::Simulated { truth, rig, limits, head, change, outliers }, evaluation, briefing)
             }
-            WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, *held_out),
+            WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, held_out),
         }
     }
 
@@ -158,17 +160,20 @@ impl Scenario {
     }
 
     /// Holds rows out; learners begin with the robot's description, and find where it stands from the rows that they choose.
-    fn draw_measured(&self, seed: u64, measurements: &Measurements, held_out: usize) -> (World, Evaluation, Briefing) {
-        let mut rows: Vec<usize> = (0..measurements.markers_m.len()).collect();
-        rows.shuffle(&mut Stream::HeldOut.rng(seed));
-        let (test, training) = rows.split_at_mut(held_out);
-        training.sort_unstable();
+    fn draw_measured(
+        &self,
+        seed: u64,
+        measurements: &Measurements,
+        held_out: &HeldOut,
+    ) -> (World, Evaluation, Briefing) {
+        let (training, test) = held_out.split(seed);
+        let configurations =
+            |rows: &[usize]| rows.iter().map(|row| measurements.configurations[*row].clone()).collect::<Vec<_>>();
         let movement = |row: &usize| Movement {
             configuration: measurements.configurations[*row].clone(),
             row: Some(*row),
-            socket: None,
+            socket: measurements.sockets.get(*row).copied().flatten(),
         };
-        let workspace = training.iter().map(|row| measurements.configurations[*row].clone()).collect();
         let mut pool: Vec<Movement> = training.iter().map(movement).collect();
         if let Some(constraints) = &self.constraints {
             // What no movement can reach does not count as left. Where that is all, whoever chooses names the constraint.
@@ -181,15 +186,14 @@ impl Scenario {
             layout: Arc::new(self.robot.layout.clone()),
             covariance: self.prior_covariance(),
             actions: Actions::Pool(pool),
-            workspace: self.workspace(workspace),
+            workspace: self.workspace(configurations(&training)),
             watch: None,
-            beforehand: None,
+            beforehand: measurements.beforehand.clone(),
         };
-        let held_out = test.iter().map(|row| (measurements.configurations[*row].clone(), measurements.markers_m[*row]));
-        let (held_out, markers) = held_out.unzip();
-        let evaluation = Evaluation::of_measurements(self.workspace(held_out), markers);
-        let observations = measurements.markers_m.iter().map(|marker| Observation::seen(*marker)).collect();
-        (World::Measured { observations }, evaluation, briefing)
+        let seen = test.iter().map(|row| measurements.observations[*row].clone()).collect();
+        let evaluation = Evaluation::of_measurements(self.workspace(configurations(&test)), seen)
+            .with_sockets(self.held_out_rows(measurements, &test));
+        (World::Measured { observations: measurements.observations.clone() }, evaluation, briefing)
     }
 
     /// The true state with the error of the initial estimate: for each learned joint three Euler angles, then for a

@@ -4,9 +4,9 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 
 use crate::{
-    experiment::{HeldOut, Stream},
+    experiment::{HeldInSocket, Stream},
     model::Manifold,
-    scenario::{Robot, Scenario, SocketSpec},
+    scenario::{Measurements, Robot, Scenario, SocketSpec},
     selection::{Actions, Sockets},
     sensing::Observation,
 };
@@ -32,15 +32,27 @@ impl Scenario {
     }
 
     /// Postures that truly hold the target in every socket that is held out, anywhere within the limits.
-    pub(super) fn held_out(&self, seed: u64) -> Vec<HeldOut> {
+    pub(super) fn held_out(&self, seed: u64) -> Vec<HeldInSocket> {
         let mut rng = Stream::HeldOutSockets.rng(seed);
         let Robot { state, limits, held_out_sockets, .. } = &self.robot;
         let of = |socket: &SocketSpec| {
             let manifold = Manifold::new(state, socket.target, socket.at, limits);
             let postures = (0..HELD_OUT_SIZE).filter_map(|_| manifold.draw(&mut rng)).collect();
-            HeldOut { target: socket.target, postures }
+            HeldInSocket { target: socket.target, postures }
         };
         held_out_sockets.iter().map(of).collect()
+    }
+
+    /// The held-out rows of a table in which a target was held in one socket; of a single row there is nothing to compare.
+    pub(super) fn held_out_rows(&self, measurements: &Measurements, rows: &[usize]) -> Vec<HeldInSocket> {
+        let Robot { sockets, held_out_sockets, .. } = &self.robot;
+        let of = |(number, socket): (usize, &SocketSpec)| {
+            let is_there = |row: &&usize| measurements.sockets.get(**row) == Some(&Some(number));
+            let postures: Vec<Vec<f64>> =
+                rows.iter().filter(is_there).map(|row| measurements.configurations[*row].clone()).collect();
+            (postures.len() > 1).then_some(HeldInSocket { target: socket.target, postures })
+        };
+        sockets.iter().chain(held_out_sockets).enumerate().filter_map(of).collect()
     }
 }
 

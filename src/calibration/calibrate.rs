@@ -47,7 +47,12 @@ struct Judged {
 pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) -> Result<Calibration, CalibrationError> {
     let splits = case.splits(options.folds)?;
     let has_folds = splits.len() > 1;
-    let training = if has_folds { (0..case.rows.len()).collect() } else { splits[0].training.clone() };
+    let Some(first) = splits.first() else { return Err(CalibrationError::NoRows) };
+    let mut training = first.training.clone();
+    if has_folds {
+        training.extend(&first.held_out);
+        training.sort_unstable();
+    }
     if training.is_empty() {
         return Err(CalibrationError::NoRows);
     }
@@ -112,7 +117,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         version: env!("CARGO_PKG_VERSION").to_owned(),
         rows: case.rows.len(),
         training_rows: training.len(),
-        held_out_by: case.held_out_by(options.folds, &splits),
+        held_out_by: case.held_out_by(&splits),
         doubts: scenario.examine().map_or_else(Vec::new, |it| it.doubts.iter().map(ToString::to_string).collect()),
         parameters: case.determined(&fit),
         training: comparison,
@@ -176,12 +181,14 @@ impl Case<'_> {
         })
     }
 
-    fn held_out_by(&self, folds: Option<usize>, splits: &[Split]) -> String {
+    fn held_out_by(&self, splits: &[Split]) -> String {
         let held_out = splits.iter().map(|split| split.held_out.len()).sum::<usize>();
-        match (folds, held_out) {
-            (Some(folds), _) => format!("{folds} folds: fold f holds out the rows f, f + {folds}, …, counted from 0"),
-            (None, 0) => "no row is held out: how good the model is on new data is not known".to_owned(),
-            (None, _) => format!("{held_out} of {} rows, as the file says", self.rows.len()),
+        match splits.len() {
+            folds @ 2.. => {
+                format!("every row once, in {folds} folds: fold f holds out rows f, f + {folds}, …, counted from 0")
+            }
+            _ if held_out == 0 => "no row, so how good the model is on new data is not known".to_owned(),
+            _ => format!("{held_out} of {} rows, as the file says", self.rows.len()),
         }
     }
 
@@ -200,16 +207,16 @@ impl Case<'_> {
         });
         let trained = self.residuals(fit, if has_folds { &[] } else { &fit.rows });
         let mut all: Vec<_> = held_out.chain(trained.into_iter().map(|residual| (residual, false, None))).collect();
-        all.sort_by_key(|(residual, ..)| (residual.row, residual.channel));
+        all.sort_by_key(|(residual, ..)| (residual.row, residual.sensor));
         let reading = |(residual, held_out, fold): (Residual, bool, Option<usize>)| Reading {
             row: residual.row + 1,
             line: self.rows[residual.row].line,
-            sensor: self.sensor(residual.channel),
+            sensor: self.sensor(residual.sensor),
             held_out,
             fold,
             chosen: choice.and_then(|choice| Some(choice.rows.iter().position(|row| *row == residual.row + 1)? + 1)),
-            residual_mm: residual.apart.metres.map(|metres| metres * 1e3),
-            residual_deg: residual.apart.radians.map(f64::to_degrees),
+            residual_mm: residual.apart.length_m.map(|metres| metres * 1e3),
+            residual_deg: residual.apart.angle_rad.map(f64::to_degrees),
             residual_px: residual.apart.pixels,
             outlier_probability: probabilities.get(&residual.row).copied(),
             predicted: residual.predicted,

@@ -2,16 +2,9 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
-use rand::seq::SliceRandom;
-
 use crate::{
-    experiment::Stream,
-    model::{
-        Block, Layout, State,
-        urdf::{Chain, Urdf},
-    },
-    scenario::{Scenario, WorldSpec},
+    model::{Block, Layout, State},
+    scenario::{Described, HeldOutRule, Scenario, WorldSpec},
     sensing::{Loss, Observation, Rig},
 };
 
@@ -26,15 +19,8 @@ pub struct Row {
     pub positions: Vec<f64>,
     /// What was measured.
     pub observation: Observation,
-}
-
-/// A robot's description and its chain.
-#[derive(Clone, Debug)]
-pub struct Description {
-    /// The file.
-    pub urdf: Urdf,
-    /// The chain that is calibrated.
-    pub chain: Chain,
+    /// The socket in which a target was held: its number among the robot's, those that are held out after the others.
+    pub socket: Option<usize>,
 }
 
 /// A robot as it is described, and what was measured of it.
@@ -46,7 +32,9 @@ pub struct Case<'a> {
     /// What everything is called.
     pub names: Names,
     /// The URDF, where the robot comes from one.
-    pub description: Option<Description>,
+    pub described: Option<&'a Described>,
+    /// What is known before any row, as the distance between two sockets.
+    pub(super) known: Option<&'a Observation>,
     pub(super) rig: Arc<Rig>,
     pub(super) loss: Loss,
 }
@@ -64,17 +52,18 @@ impl<'a> Case<'a> {
         let WorldSpec::Measured { measurements, .. } = &scenario.world else {
             return Err(CalibrationError::Simulated { scenario: scenario.name.clone() });
         };
-        let seen = measurements.configurations.iter().zip(&measurements.markers_m).zip(&measurements.lines);
-        let row = |((positions, marker), line): ((&Vec<f64>, &Point3<f64>), &usize)| Row {
-            line: *line,
-            positions: positions.clone(),
-            observation: Observation::seen(*marker),
+        let row = |index: usize| Row {
+            line: measurements.lines[index],
+            positions: measurements.configurations[index].clone(),
+            observation: measurements.observations[index].clone(),
+            socket: measurements.sockets.get(index).copied().flatten(),
         };
         Ok(Self {
             scenario,
-            rows: seen.map(row).collect(),
+            rows: (0..measurements.rows()).map(row).collect(),
             names: Names::new(&scenario.robot),
-            description: None,
+            described: scenario.robot.described.as_deref(),
+            known: measurements.beforehand.as_ref(),
             rig: Arc::new(scenario.rig.assuming(scenario.smoother.sigma)),
             loss: if scenario.smoother.loss == Loss::None { Loss::MIXTURE } else { scenario.smoother.loss },
         })
@@ -109,17 +98,6 @@ impl<'a> Case<'a> {
         Layout::new(self.guess(), blocks.into_iter().chain(extras.iter().flat_map(|extra| extra.blocks(self))))
     }
 
-    /// What the scenario holds out itself.
-    fn split(&self) -> Split {
-        let WorldSpec::Measured { held_out, .. } = &self.scenario.world else { return Split::default() };
-        let mut rows: Vec<usize> = (0..self.rows.len()).collect();
-        rows.shuffle(&mut Stream::HeldOut.rng(SEED));
-        let (held_out, training) = rows.split_at_mut(*held_out);
-        held_out.sort_unstable();
-        training.sort_unstable();
-        Split { training: training.to_vec(), held_out: held_out.to_vec() }
-    }
-
     fn layout(&self, wanted: impl Fn(Block) -> bool) -> Layout {
         let learned = self.scenario.robot.layout.blocks().map(|(block, _)| block);
         Layout::new(self.guess(), learned.filter(|block| wanted(*block)))
@@ -131,13 +109,26 @@ impl<'a> Case<'a> {
     ///
     /// [`CalibrationError::Folds`] where there are fewer rows than folds, or fewer than two folds.
     pub fn splits(&self, folds: Option<usize>) -> Result<Vec<Split>, CalibrationError> {
-        let count = self.rows.len();
         let Some(folds) = folds else {
-            return Ok(vec![self.split()]);
+            let WorldSpec::Measured { held_out, .. } = &self.scenario.world else { return Ok(Vec::new()) };
+            let splits = match held_out.rule {
+                HeldOutRule::Folds(_) => held_out.folds(),
+                _ => vec![held_out.split(SEED)],
+            };
+            return Ok(splits.into_iter().map(|(training, held_out)| Split { training, held_out }).collect());
         };
-        if folds < 2 || folds > count {
-            return Err(CalibrationError::Folds { folds, rows: count });
+        // Of sockets that the file holds out there is nothing to learn.
+        let rows: Vec<usize> = (0..self.rows.len()).filter(|row| !self.rows[*row].observation.is_miss()).collect();
+        if folds < 2 || folds > rows.len() {
+            return Err(CalibrationError::Folds { folds, rows: rows.len() });
         }
-        Ok(Split::folds(&(0..count).collect::<Vec<_>>(), folds))
+        Ok(Split::folds(&rows, folds))
+    }
+
+    /// The target that a row held in a socket.
+    pub(super) fn held(&self, row: &Row) -> Option<(usize, usize)> {
+        let robot = &self.scenario.robot;
+        let number = row.socket?;
+        robot.sockets.iter().chain(&robot.held_out_sockets).nth(number).map(|socket| (number, socket.target))
     }
 }

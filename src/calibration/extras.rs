@@ -129,7 +129,7 @@ impl Case<'_> {
 fn standard_error(before: &[Residual], after: &[Residual]) -> Option<f64> {
     let error = |residual: &Residual| {
         let apart = &residual.apart;
-        apart.metres.map(|metres| metres * 1e3).or(apart.pixels).or(apart.radians.map(f64::to_degrees))
+        apart.length_m.map(|metres| metres * 1e3).or(apart.pixels).or(apart.angle_rad.map(f64::to_degrees))
     };
     let differences: Vec<f64> = before.iter().zip(after).filter_map(|(a, b)| Some(error(a)? - error(b)?)).collect();
     let count = differences.len() as f64;

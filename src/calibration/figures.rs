@@ -1,27 +1,35 @@
 //! Errors of predictions, row by row and in figures.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{Case, Fit};
-use crate::{
-    model::State,
-    sensing::{Apart, Occasion},
-};
+use crate::sensing::{Apart, Occasion};
 
 /// A reading beside what was predicted for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Residual {
     /// The row.
     pub row: usize,
-    /// The channel.
-    pub channel: usize,
+    /// What was sensed.
+    pub sensor: Sensed,
     /// What was predicted, in the channel's own units.
     pub predicted: Vec<f64>,
     /// What was measured.
     pub measured: Vec<f64>,
     /// How far they are apart.
     pub apart: Apart,
+}
+
+/// What a residual is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Sensed {
+    /// A channel of the rig, by its number.
+    Channel(usize),
+    /// A socket that held a target, by its number.
+    Socket(usize),
 }
 
 /// Mean, root mean square and maximum of errors.
@@ -62,8 +70,8 @@ impl Figures {
                 (mean, rms, errors.iter().copied().fold(0.0, f64::max))
             })
         };
-        let mm = figures(&|apart| apart.metres.map(|metres| metres * 1e3));
-        let deg = figures(&|apart| apart.radians.map(f64::to_degrees));
+        let mm = figures(&|apart| apart.length_m.map(|metres| metres * 1e3));
+        let deg = figures(&|apart| apart.angle_rad.map(f64::to_degrees));
         let px = figures(&|apart| apart.pixels);
         Self {
             readings: residuals.len(),
@@ -95,39 +103,51 @@ impl Figures {
 }
 
 impl Case<'_> {
-    /// The residuals of `rows` by what was learned from others, or from them. A target that was held in a socket which no
-    /// row was learned from is compared with its mean over the rows there: where the socket is nobody knows.
+    /// The residuals of `rows` by what was learned from others, or from them.
+    ///
+    /// A target that was held in a socket is compared with where the socket was found to be; with its own mean over `rows`
+    /// there, where no row was learned from that socket.
     pub fn residuals(&self, fit: &Fit, rows: &[usize]) -> Vec<Residual> {
-        let state = &self.with_unseen_sockets(fit, rows);
+        let state = fit.state();
+        let sockets = self.sockets(fit, rows);
         let mut residuals = Vec::new();
         for &index in rows {
             let row = &self.rows[index];
             for (channel, (sensor, reading)) in self.rig.channels().iter().zip(&row.observation.readings).enumerate() {
-                let Some(measured) = reading else { continue };
+                let (Some(measured), Occasion::Always) = (reading, sensor.occasion()) else { continue };
                 let mut predicted = vec![0.0; measured.len()];
                 if sensor.predict(state, &row.positions, &mut predicted) {
-                    let apart = sensor.apart(measured, &predicted);
-                    residuals.push(Residual { row: index, channel, predicted, measured: measured.clone(), apart });
+                    let (sensor, apart) = (Sensed::Channel(channel), sensor.apart(measured, &predicted));
+                    residuals.push(Residual { row: index, sensor, predicted, measured: measured.clone(), apart });
                 }
             }
+            let Some((socket, target)) = self.held(row) else { continue };
+            let Some(place) = sockets.get(&socket) else { continue };
+            let predicted = state.target_at(target, &row.positions);
+            residuals.push(Residual {
+                row: index,
+                sensor: Sensed::Socket(socket),
+                predicted: predicted.coords.as_slice().to_vec(),
+                measured: place.coords.as_slice().to_vec(),
+                apart: Apart { length_m: Some((predicted - place).norm()), ..Apart::default() },
+            });
         }
         residuals
     }
 
-    fn with_unseen_sockets(&self, fit: &Fit, rows: &[usize]) -> State {
-        let mut state = fit.state().clone();
-        for (channel, sensor) in self.rig.channels().iter().enumerate() {
-            let Occasion::Held { socket, target } = sensor.occasion() else { continue };
-            let has_reading = |row: &&usize| self.rows[**row].observation.readings[channel].is_some();
-            if fit.rows.iter().any(|row| has_reading(&row)) {
-                continue;
+    /// By number: where the sockets of `rows` are.
+    fn sockets(&self, fit: &Fit, rows: &[usize]) -> BTreeMap<usize, Point3<f64>> {
+        let of = |row: &usize| self.held(&self.rows[*row]);
+        let learned: BTreeSet<usize> = fit.rows.iter().filter_map(of).map(|(socket, _)| socket).collect();
+        let held: BTreeSet<(usize, usize)> = rows.iter().filter_map(of).collect();
+        let place = |(socket, target): (usize, usize)| {
+            if let (true, Some(place)) = (learned.contains(&socket), fit.state().sockets.get(socket)) {
+                return Some((socket, *place));
             }
-            let held = rows.iter().filter(has_reading);
-            if let Some(mean) = mean(held.map(|row| state.target_at(target, &self.rows[*row].positions))) {
-                state.sockets[socket] = mean;
-            }
-        }
-        state
+            let there = rows.iter().map(|row| &self.rows[*row]).filter(|row| row.socket == Some(socket));
+            Some((socket, mean(there.map(|row| fit.state().target_at(target, &row.positions)))?))
+        };
+        held.into_iter().filter_map(place).collect()
     }
 }
 
@@ -145,10 +165,10 @@ mod tests {
     fn figures_worked_by_hand() {
         let residual = |mm: f64, deg: Option<f64>| Residual {
             row: 0,
-            channel: 0,
+            sensor: Sensed::Channel(0),
             predicted: vec![],
             measured: vec![],
-            apart: Apart { metres: Some(mm / 1e3), radians: deg.map(f64::to_radians), pixels: None },
+            apart: Apart { length_m: Some(mm / 1e3), angle_rad: deg.map(f64::to_radians), pixels: None },
         };
         let figures = Figures::of(&[residual(3.0, Some(1.0)), residual(4.0, None)]);
         let near = |found: Option<f64>, wanted: f64| (found.expect("measured") - wanted).abs() < 1e-12;

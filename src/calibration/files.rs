@@ -55,7 +55,7 @@ impl Calibration {
             let _ = writeln!(text, "  {}:\n    offset: {offset:?}\n    ratio: {ratio:?}", quoted(name));
             let _ = writeln!(text, "    sine: {sine:?}\n    cosine: {cosine:?}");
         }
-        match &case.description {
+        match &case.described {
             Some(description) => {
                 let chain = description.chain.fitted(&self.fuller.fitted_part().without_offsets())?.chain;
                 text.push_str(&chain.kinematics_yaml());
@@ -67,7 +67,7 @@ impl Calibration {
 }
 
 fn described(folder: &str, case: &Case<'_>, fit: &Fit) -> Result<Vec<File>, CalibrationError> {
-    let Some(description) = &case.description else { return Ok(Vec::new()) };
+    let Some(description) = &case.described else { return Ok(Vec::new()) };
     let chain = description.chain.fitted(&fit.fitted_part())?.chain;
     Ok(vec![
         File::new(format!("{folder}calibrated.urdf"), description.urdf.written(&chain)),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, Point3};
+use nalgebra::{DMatrix, DVector};
 
 use super::{CalibrationError, Case, figures::mean};
 use crate::{
@@ -102,10 +102,14 @@ impl Case<'_> {
         };
         let unknown = self.rig.noises().iter().map(is_unknown).collect();
         let rng = Stream::Hypotheses.rng(SEED);
-        Ok(Smoother::new(prior, Arc::new(layout.clone()), self.rig.clone(), settings, rng)
+        let smoother = Smoother::new(prior, Arc::new(layout.clone()), self.rig.clone(), settings, rng)
             .with_loss(self.loss)
             .with_unknown_noise(unknown)
-            .never_forgetting())
+            .never_forgetting();
+        Ok(match self.known {
+            Some(known) => smoother.knowing(known.clone()),
+            None => smoother,
+        })
     }
 
     /// The prior's standard deviations.
@@ -120,9 +124,9 @@ impl Case<'_> {
         let (mut predicted, mut seen) = (Vec::new(), Vec::new());
         for row in rows.iter().map(|row| &self.rows[*row]) {
             for (channel, reading) in self.rig.channels().iter().zip(&row.observation.readings) {
-                if let (Some(target), Some(reading)) = (channel.target(), reading) {
+                if let Some((target, place)) = reading.as_ref().and_then(|reading| channel.position(reading)) {
                     predicted.push(state.target_at(target, &row.positions));
-                    seen.push(Point3::from_slice(reading));
+                    seen.push(place);
                 }
             }
         }
@@ -131,7 +135,8 @@ impl Case<'_> {
         }
         for (channel, sensor) in self.rig.channels().iter().enumerate() {
             let Occasion::Held { socket, target } = sensor.occasion() else { continue };
-            let held = rows.iter().map(|row| &self.rows[*row]).filter(|row| row.observation.readings[channel].is_some());
+            let held =
+                rows.iter().map(|row| &self.rows[*row]).filter(|row| row.observation.readings[channel].is_some());
             if let Some(mean) = mean(held.map(|row| state.target_at(target, &row.positions))) {
                 state.sockets[socket] = mean;
             }

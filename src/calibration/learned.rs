@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Vector3};
 
-use super::{CalibrationError, Case, Correction, Correlation, Fit, Joint, MoreRows, Noise, Placement, Target};
+use super::{CalibrationError, Case, Correction, Correlation, Fit, Joint, MoreRows, Noise, Placement, Sensed, Target};
 use crate::{
     kinematics::{self, JointKind, chart},
     model::{Block, Place, State, Workspace},
@@ -69,7 +69,7 @@ impl Case<'_> {
 
     /// Where the targets are: in the frames of their links where there is a URDF.
     pub(super) fn targets(&self, fit: &Fit) -> Result<Vec<Target>, CalibrationError> {
-        let frames = match &self.description {
+        let frames = match &self.described {
             Some(description) => Some(description.chain.fitted(&fit.fitted_part())?.frames),
             None => None,
         };
@@ -90,7 +90,7 @@ impl Case<'_> {
 
     /// The name of what moves with the joint of this number, counted from 1; 0 is the base.
     pub(super) fn link(&self, link: usize) -> String {
-        match &self.description {
+        match &self.described {
             Some(description) => {
                 let chain = &description.chain;
                 let is_last = link == chain.moving().count();
@@ -138,7 +138,7 @@ impl Case<'_> {
             let degrees = (noise.equations - noise.absorbed).max(0.0);
             let (sigma, unit) = sensor.nominal(noise.first);
             Noise {
-                sensor: self.sensor(noise.channel),
+                sensor: self.sensor(Sensed::Channel(noise.channel)),
                 unit: unit.to_owned(),
                 sigma,
                 chi2: noise.squared,
@@ -149,16 +149,22 @@ impl Case<'_> {
         fit.noise.iter().filter(|noise| noise.equations > 0.0).map(of).collect()
     }
 
-    /// What a channel measures, in words.
-    pub(super) fn sensor(&self, channel: usize) -> String {
-        let sensor = &self.rig.channels()[channel];
-        let name = match (sensor.occasion(), sensor.target(), self.names.targets.as_slice()) {
-            (Occasion::Held { socket, .. }, ..) => self.names.sockets.get(socket),
-            (_, Some(target), targets) => targets.get(target),
-            (_, None, [target]) => Some(target),
-            _ => None,
+    /// What was sensed, in words.
+    pub(super) fn sensor(&self, sensed: Sensed) -> String {
+        let (name, number) = match sensed {
+            Sensed::Socket(socket) => (self.names.sockets.get(socket), socket),
+            Sensed::Channel(channel) => {
+                let sensor = &self.rig.channels()[channel];
+                let name = match (sensor.occasion(), sensor.target(), self.names.targets.as_slice()) {
+                    (Occasion::Held { socket, .. }, ..) => self.names.sockets.get(socket),
+                    (_, Some(target), targets) => targets.get(target),
+                    (_, None, [target]) => Some(target),
+                    _ => None,
+                };
+                (name, channel)
+            }
         };
-        name.cloned().unwrap_or_else(|| format!("sensor {}", channel + 1))
+        name.cloned().unwrap_or_else(|| format!("sensor {}", number + 1))
     }
 
     /// What more rows would bring.

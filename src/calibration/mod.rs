@@ -46,10 +46,10 @@ mod undetermined;
 
 pub use active::{ActivePoint, ORDERS};
 pub use calibrate::{Calibration, Options, calibrate};
-pub use case::{Case, Description, Row};
+pub use case::{Case, Row};
 pub use error::CalibrationError;
 pub use extras::{Extra, Trial};
-pub use figures::{Figures, Residual};
+pub use figures::{Figures, Residual, Sensed};
 pub use files::File;
 pub use fit::Fit;
 pub use names::Names;

@@ -26,7 +26,7 @@ impl Names {
             joints: robot.names.clone(),
             targets: robot.equipment.targets.iter().map(|target| target.name.clone()).collect(),
             cameras: robot.equipment.cameras.iter().map(|camera| camera.name.clone()).collect(),
-            sockets: robot.sockets.iter().map(label).collect(),
+            sockets: robot.sockets.iter().chain(&robot.held_out_sockets).map(label).collect(),
         }
     }
 

@@ -87,7 +87,7 @@ impl Judge {
             Some(gauge) => gauge.aligned(truth, &belief.state),
             None => truth.clone(),
         });
-        let prediction = self.evaluation.prediction_m(&belief.state);
+        let held_out = self.evaluation.error(&belief.state, &belief.rig);
         let nees = aligned.as_ref().and_then(|truth| {
             let (gauge, covariance) = (self.gauge.as_ref()?, belief.covariance.as_ref()?);
             gauge.nees(&belief.state, covariance, truth)
@@ -99,8 +99,10 @@ impl Judge {
             orientation_deg: truth.and_then(|truth| metrics::orientation_deg(&estimate, truth, layout)),
             axis_deg: truth.and_then(|truth| metrics::axis_deg(&estimate, truth, layout)),
             location_m: truth.and_then(|truth| metrics::location_m(&estimate, truth, layout)),
-            prediction_m: prediction.map(|(rms, _)| rms),
-            prediction_mean_m: prediction.map(|(_, mean)| mean),
+            prediction_m: held_out.prediction_m.map(|(rms, _)| rms),
+            prediction_mean_m: held_out.prediction_m.map(|(_, mean)| mean),
+            prediction_mean_deg: held_out.prediction_mean_deg,
+            prediction_mean_px: held_out.prediction_mean_px,
             scatter_m: self.evaluation.scatter_m(&belief.state),
             nees: nees.map(|(nees, _)| nees),
             nees_dof: nees.map(|(_, dof)| dof),

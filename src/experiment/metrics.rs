@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     kinematics::Joint,
     model::{Layout, State, Workspace},
+    sensing::{Observation, Rig},
 };
 
 /// The metrics of one learner after one step. What needs the truth is null where none is known.
@@ -25,6 +26,12 @@ pub struct Metrics {
     pub prediction_m: Option<f64>,
     /// Mean of that distance, metres.
     pub prediction_mean_m: Option<f64>,
+    /// Mean angle between predicted and measured rotations of held-out poses, degrees; null where none were measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prediction_mean_deg: Option<f64>,
+    /// Mean distance between predicted and measured points of held-out pictures, pixels; null where there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prediction_mean_px: Option<f64>,
     /// With sockets: mean distance of the predicted target from its mean over the postures that hold it in the same socket, over
     /// sockets that were not trained on, metres; null where there are none.
     #[serde(default)]
@@ -117,19 +124,33 @@ pub struct Evaluation {
     /// σ of the sensor per coordinate, metres; `None` for measurements.
     sigma_m: Option<f64>,
     /// What is held in sockets that nobody learns from.
-    held: Vec<HeldOut>,
+    held: Vec<HeldInSocket>,
+    /// What was measured in reality at each configuration.
+    measured: Vec<Observation>,
+}
+
+/// How far predictions are from what was measured and not learned from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HeldOutError {
+    /// Root mean square and mean of the distances of predicted targets from where they were measured, metres; of measured
+    /// distances, of their differences.
+    pub prediction_m: Option<(f64, f64)>,
+    /// Mean angle between predicted and measured rotations, degrees.
+    pub prediction_mean_deg: Option<f64>,
+    /// Mean distance of predicted from measured points in pictures, pixels.
+    pub prediction_mean_px: Option<f64>,
 }
 
 /// Postures that hold a target in one socket.
 #[derive(Clone, Debug, PartialEq)]
-pub struct HeldOut {
+pub struct HeldInSocket {
     /// The target.
     pub target: usize,
     /// Joint positions, rad or m.
     pub postures: Vec<Vec<f64>>,
 }
 
-impl HeldOut {
+impl HeldInSocket {
     /// The distances of the predicted target from its mean, metres.
     fn distances(&self, estimate: &State) -> impl Iterator<Item = f64> {
         let points: Vec<_> = self.postures.iter().map(|theta| estimate.target_at(self.target, theta).coords).collect();
@@ -145,16 +166,17 @@ impl Evaluation {
     /// Against the noise-free markers of the truth.
     pub fn of_truth(workspace: impl Into<Workspace>, truth: &State, sigma_m: f64) -> Self {
         let workspace = workspace.into();
-        Self { markers: workspace.points(truth), workspace, sigma_m: Some(sigma_m), held: Vec::new() }
+        let markers = workspace.points(truth);
+        Self { workspace, markers, sigma_m: Some(sigma_m), held: Vec::new(), measured: Vec::new() }
     }
 
     /// Against held-out measurements, one at each configuration.
-    pub fn of_measurements(workspace: impl Into<Workspace>, markers: Vec<Point3<f64>>) -> Self {
-        Self { workspace: workspace.into(), markers, sigma_m: None, held: Vec::new() }
+    pub fn of_measurements(workspace: impl Into<Workspace>, measured: Vec<Observation>) -> Self {
+        Self { workspace: workspace.into(), markers: Vec::new(), sigma_m: None, held: Vec::new(), measured }
     }
 
     /// Also by what is held in these sockets.
-    pub fn with_sockets(self, held: Vec<HeldOut>) -> Self {
+    pub fn with_sockets(self, held: Vec<HeldInSocket>) -> Self {
         Self { held, ..self }
     }
 
@@ -176,6 +198,33 @@ impl Evaluation {
     /// Root mean square and mean of the distances between predicted and true marker, metres.
     pub fn prediction_m(&self, estimate: &State) -> Option<(f64, f64)> {
         self.workspace.distance(&self.workspace.points(estimate), &self.markers)
+    }
+
+    /// How far the predictions of an estimate through `rig` are from held-out measurements; where a truth is known, from its
+    /// markers.
+    pub fn error(&self, estimate: &State, rig: &Rig) -> HeldOutError {
+        if self.measured.is_empty() {
+            return HeldOutError { prediction_m: self.prediction_m(estimate), ..HeldOutError::default() };
+        }
+        let (mut lengths, mut angles, mut pixels) = (Vec::new(), Vec::new(), Vec::new());
+        for (theta, observation) in self.workspace.configurations.iter().zip(&self.measured) {
+            for (channel, reading) in rig.channels().iter().zip(&observation.readings) {
+                let Some(reading) = reading else { continue };
+                let mut predicted = vec![0.0; reading.len()];
+                if channel.predict(estimate, theta, &mut predicted) {
+                    let apart = channel.apart(reading, &predicted);
+                    lengths.extend(apart.length_m);
+                    angles.extend(apart.angle_rad.map(f64::to_degrees));
+                    pixels.extend(apart.pixels);
+                }
+            }
+        }
+        let squares = mean(lengths.iter().map(|length| length * length));
+        HeldOutError {
+            prediction_m: squares.map(f64::sqrt).zip(mean(lengths.into_iter())),
+            prediction_mean_deg: mean(angles.into_iter()),
+            prediction_mean_px: mean(pixels.into_iter()),
+        }
     }
 
     /// Every joint by itself.
@@ -254,7 +303,7 @@ mod tests {
         assert_eq!(evaluation.scatter_m(&truth), None);
         let estimate = State { joints: vec![line([0., 0., 1.], [0.01, 0., 0.])], ..truth.clone() };
         let turned =
-            |degrees: [f64; 2]| HeldOut { target: 0, postures: degrees.map(|x| vec![x.to_radians()]).to_vec() };
+            |degrees: [f64; 2]| HeldInSocket { target: 0, postures: degrees.map(|x| vec![x.to_radians()]).to_vec() };
         // The marker at 0 and 360 degrees is at one place whatever is believed.
         let evaluation = evaluation.with_sockets(vec![turned([0., 360.]), turned([90., -270.])]);
         assert!(evaluation.scatter_m(&estimate).expect("sockets") < 1e-12);

@@ -40,7 +40,9 @@ pub use gauge::Gauge;
 pub use head::{GazeReport, HeadDescription};
 pub use judge::{Judge, Verdict};
 pub use learner::{Learner, SETTLING_STEPS};
-pub use metrics::{Evaluation, HeldOut, JointMetrics, Metrics, axis_deg, location_m, orientation_deg};
+pub use metrics::{
+    Evaluation, HeldInSocket, HeldOutError, JointMetrics, Metrics, axis_deg, location_m, orientation_deg,
+};
 pub use report::{
     Body, Description, JointDescription, JointReport, LearnerDescription, LearnerReport, ModelReport, MovementReport,
     SocketDescription, StepReport,

@@ -1,86 +1,127 @@
 //! Recorded measurements, read from CSV.
 
-use nalgebra::Point3;
+use std::collections::BTreeMap;
 
-use crate::table::{Column, Columns, Layout, Quantity, Table, TableError};
+use crate::{
+    sensing::Observation,
+    table::{Columns, Table, TableError, Titles},
+};
 
-/// Recorded joint positions and marker positions, row by row.
+/// Recorded joint positions and readings, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measurements {
-    /// Joint positions, rad or m per joint.
+    /// Joint positions, rad or m per joint that moves.
     pub configurations: Vec<Vec<f64>>,
-    /// Measured markers, metres.
-    pub markers_m: Vec<Point3<f64>>,
-    /// The line of the file that each row stands on, counted from 1.
+    /// What was observed: the readings of the scenario's rig. That something was held in a socket is one of them, unless
+    /// nobody learns from that socket.
+    pub observations: Vec<Observation>,
+    /// The line of its file that each row stands on, counted from 1.
     pub lines: Vec<usize>,
+    /// By row the socket in which a target was held: its number among the robot's sockets, those that are held out after the
+    /// others. Empty where there are none.
+    pub sockets: Vec<Option<usize>>,
+    /// Columns of text by their titles, row by row.
+    pub labels: BTreeMap<String, Vec<String>>,
+    /// What is known before any movement, as the distance between two sockets.
+    pub beforehand: Option<Observation>,
     /// The titles of the joints' columns.
     pub columns: Vec<String>,
-    /// The titles of the marker's.
-    pub marker: String,
+    /// The titles of each channel's columns.
+    pub readings: Vec<String>,
     /// Columns that repeat another in every row, with that other; only where one of the two is used here.
     pub repeated: Vec<(String, String)>,
 }
 
 impl Measurements {
-    /// Reads the named columns of a CSV text with a header line: columns are separated by commas, and a number has a
-    /// decimal point if anything (`0.03`, `.03`, `3e-2`). Titles may end with a unit (see [`table`](crate::table)). An error says which line or column is at fault.
-    pub fn from_csv(text: &str, joint_columns: &[&str], marker_columns: &[String; 3]) -> Result<Self, TableError> {
+    /// Reads the columns that `wanted` finds among the titles of a CSV text: columns are separated by commas, and a number has
+    /// a decimal point if anything (`0.03`, `.03`, `3e-2`). Titles may end with a unit (see [`table`](crate::table)). An
+    /// error says which line or column is at fault.
+    pub fn from_csv(
+        text: &str,
+        wanted: impl FnOnce(&Titles) -> Result<Columns, TableError>,
+    ) -> Result<Self, TableError> {
         let table = Table::open(text.as_bytes())?;
-        let titles = table.titles();
-        // A title's end says its unit, as everywhere; without one it is rad or m.
-        let joint = |title: &&str| {
-            let (angle, length) = (titles.titled(title, Quantity::Angle)?, titles.titled(title, Quantity::Length)?);
-            Ok(Column { factor: angle.factor * length.factor, ..angle })
+        let titles = table.titles().clone();
+        let title = |index: usize| titles.all()[index].clone();
+        let columns = wanted(&titles)?;
+        let readings = columns.readings.iter().map(|reading| {
+            let titles: Vec<String> = reading.columns.iter().map(|column| title(column.index)).collect();
+            titles.join(", ")
+        });
+        let mut measurements = Self {
+            columns: columns.joints.iter().map(|column| title(column.index)).collect(),
+            readings: readings.collect(),
+            labels: columns.labels.iter().map(|index| (title(*index), Vec::new())).collect(),
+            ..Self::default()
         };
-        let joints = joint_columns.iter().map(joint).collect::<Result<_, TableError>>()?;
-        let readings = vec![titles.reading_titled(Layout::Position, marker_columns)?];
-        let columns = joint_columns.iter().map(|title| (*title).to_owned()).collect();
-        let mut measurements = Self { columns, marker: marker_columns.join(", "), ..Self::default() };
-        let mut rows = table.rows(Columns { joints, readings, labels: Vec::new() });
+        let of_readings = columns.readings.iter().flat_map(|reading| &reading.columns);
+        let used: Vec<String> = columns.joints.iter().chain(of_readings).map(|column| title(column.index)).collect();
+        let is_measured = !columns.readings.is_empty() && columns.labels.is_empty();
+        let labels: Vec<String> = columns.labels.iter().map(|index| title(*index)).collect();
+        let mut rows = table.rows(columns);
         for row in rows.by_ref() {
             let row = row?;
-            let Some(Some(marker)) = row.observation.readings.first() else {
-                let what = format!("line {}, column `{}` is empty", row.line, marker_columns[0]);
-                return Err(TableError::new(what, "write a number, or remove the line"));
-            };
-            measurements.markers_m.push(Point3::from_slice(marker));
+            if is_measured && row.observation.is_miss() {
+                let what =
+                    format!("line {}: nothing was measured, {} are empty", row.line, measurements.readings.join(", "));
+                return Err(TableError::new(what, "write numbers, or remove the line"));
+            }
+            for (title, label) in labels.iter().zip(row.labels) {
+                measurements.labels.entry(title.clone()).or_default().push(label);
+            }
+            measurements.observations.push(row.observation);
             measurements.configurations.push(row.positions);
             measurements.lines.push(row.line);
         }
-        let is_used = |title: &String| marker_columns.contains(title) || joint_columns.contains(&title.as_str());
         measurements.repeated = rows.repeated_columns();
-        measurements.repeated.retain(|(repeating, repeated)| is_used(repeating) || is_used(repeated));
+        measurements.repeated.retain(|(repeating, repeated)| used.contains(repeating) || used.contains(repeated));
         Ok(measurements)
+    }
+
+    /// How many rows there are.
+    pub fn rows(&self) -> usize {
+        self.configurations.len()
+    }
+
+    /// Adds the rows of another file with the same columns.
+    pub(super) fn append(&mut self, other: Self) {
+        self.configurations.extend(other.configurations);
+        self.observations.extend(other.observations);
+        self.lines.extend(other.lines);
+        for (title, labels) in other.labels {
+            self.labels.entry(title).or_default().extend(labels);
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::table::{Layout, Quantity};
 
     const TEXT: &str = "x,y,z,a,b\n1,2,3,0.5,0.25\n4,5,6,nan,1\n";
 
-    fn marker() -> [String; 3] {
-        ["x", "y", "z"].map(String::from)
+    fn read(text: &str, joints: &[&str]) -> Result<Measurements, TableError> {
+        Measurements::from_csv(text, |titles| {
+            let joints = joints.iter().map(|joint| titles.titled(joint, Quantity::Angle));
+            let readings = vec![titles.reading(Layout::Position, "")?];
+            Ok(Columns { joints: joints.collect::<Result<_, _>>()?, readings, labels: Vec::new() })
+        })
     }
 
     #[test]
     fn reads_columns_by_name() {
-        let measurements = Measurements::from_csv(
-            TEXT.split_inclusive('\n').take(2).collect::<String>().as_str(),
-            &["b", "a"],
-            &marker(),
-        )
-        .expect("a valid table");
+        let measurements =
+            read(TEXT.split_inclusive('\n').take(2).collect::<String>().as_str(), &["b", "a"]).expect("a valid table");
         assert_eq!(measurements.configurations, vec![vec![0.25, 0.5]]);
-        assert_eq!(measurements.markers_m, vec![Point3::new(1.0, 2.0, 3.0)]);
+        assert_eq!(measurements.observations, [Observation::of([1.0, 2.0, 3.0])]);
     }
 
     #[test]
     fn numbers_may_leave_out_the_zero_before_the_point() {
         let text = "\u{feff}x,y,z,a\n.03,-.5,+1.,3e-2\n";
-        let measurements = Measurements::from_csv(text, &["a"], &marker()).expect("a valid table");
-        assert_eq!(measurements.markers_m, vec![Point3::new(0.03, -0.5, 1.0)]);
+        let measurements = read(text, &["a"]).expect("a valid table");
+        assert_eq!(measurements.observations, [Observation::of([0.03, -0.5, 1.0])]);
         assert_eq!(measurements.configurations, vec![vec![0.03]]);
     }
 
@@ -92,6 +133,7 @@ mod tests {
             ("x,y,z,elbow\n1,2,3,4\n", "elbo", "has no column `elbo`", "did you mean `elbow`"),
             ("x,y,z,a\n1,2\n", "a", "line 2 has 2 values, line 1 names 4 columns", "one value per column"),
             ("x,y,z,a\n1,2,,4\n", "a", "line 2, column `z` is empty", "write a number"),
+            ("x,y,z,a\n,,,4\n", "a", "line 2: nothing was measured, x, y, z are empty", "remove the line"),
             // What spreadsheets write where the comma is decimal.
             ("x;y;z;a\n1;2;3;4\n", "a", "line 1: the columns are separated by semicolons", "write commas"),
             ("x;y;z;a\n1,5;2,5;3,5;4,5\n", "a", "line 1: the columns are separated by semicolons", "1.5, not 1,5"),
@@ -102,7 +144,7 @@ mod tests {
             ("x,y,z,a\n1,2,3,\0\n", "a", "is not text: its byte 15 is 0", "export the table as CSV"),
             ("\0\0\0\0", "a", "is not text: its byte 1 is 0", "export the table as CSV"),
         ] {
-            let error = Measurements::from_csv(text, &[joint], &marker()).expect_err(text);
+            let error = read(text, &[joint]).expect_err(text);
             assert!(error.what.contains(what) && error.mend.contains(mend), "{text:?}: {error}");
         }
     }

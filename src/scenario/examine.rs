@@ -1,9 +1,10 @@
 //! What is doubtful in a scenario's data, and in its prior.
 
-use super::{Scenario, ScenarioError, WorldSpec};
+use super::{Measurements, Scenario, ScenarioError, WorldSpec};
 use crate::{
     doubts::{Evidence, Examination, Seen, Subject, examine},
     model::PriorError,
+    sensing::Observation,
 };
 
 impl Scenario {
@@ -11,7 +12,11 @@ impl Scenario {
     pub fn examine(&self) -> Option<Examination> {
         let WorldSpec::Measured { measurements, .. } = &self.world else { return None };
         let robot = &self.robot;
-        let limits: Vec<_> = robot.limits.joints().iter().copied().map(Some).collect();
+        let limits = match &robot.described {
+            Some(described) => described.chain.moving().map(|segment| segment.limits).collect(),
+            None => robot.limits.joints().iter().copied().map(Some).collect::<Vec<_>>(),
+        };
+        let held_in: Option<Vec<usize>> = measurements.sockets.iter().copied().collect();
         let subject = Subject {
             columns: &measurements.columns,
             joints: &robot.state.joints,
@@ -19,15 +24,28 @@ impl Scenario {
             target: robot.state.marker(),
             unknowns: robot.layout.dimension(),
         };
-        let points = measurements.markers_m.iter().copied().map(Some).collect();
         let evidence = Evidence {
             lines: &measurements.lines,
             configurations: &measurements.configurations,
-            targets: vec![Seen { name: measurements.marker.clone(), points }],
-            sockets: None,
+            targets: self.seen(measurements),
+            sockets: held_in.filter(|sockets| !sockets.is_empty()),
             repeated: &measurements.repeated,
         };
         Some(examine(&subject, &evidence))
+    }
+
+    /// Where targets on the last link were seen.
+    fn seen(&self, measurements: &Measurements) -> Vec<Seen> {
+        let state = &self.robot.state;
+        let channels = self.rig.channels().iter().zip(&measurements.readings).enumerate();
+        let seen = channels.filter_map(|(index, (channel, name))| {
+            let position = |observation: &Observation| channel.position(observation.readings.get(index)?.as_ref()?);
+            let (target, _) = measurements.observations.iter().find_map(position)?;
+            let points = measurements.observations.iter().map(|observation| position(observation).map(|seen| seen.1));
+            (state.targets[target].link == state.joints.len())
+                .then(|| Seen { name: name.clone(), points: points.collect() })
+        });
+        seen.collect()
     }
 
     /// Whether learners can begin from the prior, without building any: the standard deviations may be so small or so

@@ -9,6 +9,7 @@ mod data;
 mod edit;
 mod error;
 mod examine;
+mod held_out;
 mod learners;
 mod raw;
 mod summary;
@@ -22,6 +23,7 @@ pub use builtin::{BUILTIN, Builtin, builtin};
 pub use data::Measurements;
 pub use edit::edited;
 pub use error::{Problem, ScenarioError};
+pub use held_out::{HeldOut, HeldOutRule};
 pub use learners::{EstimatorKind, LearnerSpec, PolicyKind};
 pub use summary::{ScenarioSummary, WorldKind};
 
@@ -29,7 +31,10 @@ use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
     experiment::{Body, Outliers, Thresholds},
     kinematics::JointBox,
-    model::{Block, Layout, Quantity, State},
+    model::{
+        Block, Layout, Quantity, State,
+        urdf::{Chain, Urdf},
+    },
     optimize::Settings,
     selection::{Constraints, CriterionUnits, Planning, Watch, Weights},
     sensing::{Equipment, Loss, Rig, Spacing},
@@ -76,8 +81,8 @@ pub struct Scenario {
     pub promises: BTreeMap<String, u64>,
     /// The text it was read from.
     pub source: String,
-    /// The data file that it names, and its text.
-    pub data: Option<(String, String)>,
+    /// The files that it names, a robot's description among them, and their texts.
+    pub data: Vec<(String, String)>,
 }
 
 impl Scenario {
@@ -95,10 +100,8 @@ impl Scenario {
 
     /// The text of a data file that this scenario has already read.
     pub fn data_file(&self, file: &str) -> Result<String, String> {
-        match &self.data {
-            Some((name, text)) if name == file => Ok(text.clone()),
-            _ => Err("is not a data file of this scenario".to_owned()),
-        }
+        let found = self.data.iter().find(|(name, _)| name == file).map(|(_, text)| text.clone());
+        found.ok_or_else(|| "is not a data file of this scenario".to_owned())
     }
 }
 
@@ -127,6 +130,19 @@ pub struct Robot {
     pub spacings: Vec<Spacing>,
     /// Whether predictions are judged after the rigid motion that fits best.
     pub up_to_motion: bool,
+    /// The description that the joints are from, if they are not written in the scenario.
+    pub described: Option<Arc<Described>>,
+}
+
+/// A robot's description, and what of it the scenario is about.
+#[derive(Clone, Debug)]
+pub struct Described {
+    /// The file, as the scenario names it.
+    pub file: String,
+    /// The description with its text.
+    pub urdf: Urdf,
+    /// The chain from the base to the tip.
+    pub chain: Chain,
 }
 
 /// A place beside the robot in which a target is held.
@@ -166,8 +182,8 @@ pub enum WorldSpec {
     Measured {
         /// The rows.
         measurements: Measurements,
-        /// How many rows, drawn by seed, are held out for the prediction error.
-        held_out: usize,
+        /// Which of them are held out.
+        held_out: HeldOut,
     },
 }
 

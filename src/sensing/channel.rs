@@ -46,11 +46,6 @@ pub trait Channel: fmt::Debug + Send + Sync {
         (self.sigma(), "m")
     }
 
-    /// How far two readings are apart; metres, unless this channel measures something else.
-    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
-        Apart { metres: Some(y.iter().zip(h).map(|(y, h)| (y - h).powi(2)).sum::<f64>().sqrt()), ..Apart::default() }
-    }
-
     /// How many kinds of noise a reading has, each with a σ of its own in proportion to [`sigma`](Self::sigma): the equations
     /// are so many equal parts, one after the other. A scale of the noise is learned for each.
     fn noises(&self) -> usize {
@@ -74,6 +69,12 @@ pub trait Channel: fmt::Debug + Send + Sync {
         Some((self.target()?, Point3::from_slice(reading.get(..3)?)))
     }
 
+    /// How far two readings are apart, for whoever reads of it: nothing of what is known to be 0.
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        let _ = (y, h);
+        Apart::default()
+    }
+
     /// The camera and the target whose known points are in its picture, two equations each, if that is what is read.
     fn sight(&self) -> Option<(usize, usize)> {
         None
@@ -90,15 +91,22 @@ pub trait Channel: fmt::Debug + Send + Sync {
     }
 }
 
-/// How far two readings are apart, in units that people think in; `None` where a channel does not measure any.
+/// How far two readings of a channel are apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Apart {
-    /// The distance of what was measured, metres.
-    pub metres: Option<f64>,
-    /// The angle of the rotation from one to the other, radians.
-    pub radians: Option<f64>,
-    /// Root mean square distance of points in the picture, pixels.
+    /// Metres, of what is a place or a length.
+    pub length_m: Option<f64>,
+    /// Radians, of what is a rotation.
+    pub angle_rad: Option<f64>,
+    /// Pixels, mean over the points of a picture.
     pub pixels: Option<f64>,
+}
+
+impl Apart {
+    pub(super) fn lengths(y: &[f64], h: &[f64]) -> Self {
+        let squares: f64 = y.iter().zip(h).map(|(y, h)| (y - h) * (y - h)).sum();
+        Self { length_m: Some(squares.sqrt()), ..Self::default() }
+    }
 }
 
 /// When a channel has a reading.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use super::{Channel, Equipment, KeyError, Keys};
+use super::{Apart, Channel, Equipment, KeyError, Keys};
 use crate::model::{Pass, State};
 
 /// The distance of a target from a point whose place is known, metres.
@@ -66,6 +66,10 @@ impl Channel for Distance {
         let slope = away / (reading[0] * self.sigma_m);
         pass.point_columns(self.target, |coordinate, column| rows[coordinate] = slope.dot(&column));
         true
+    }
+
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        Apart::lengths(y, h)
     }
 
     fn disturb(&self, reading: &mut [f64], v: &[f64]) {

@@ -129,15 +129,6 @@ impl Channel for Pixels {
         whitened.iter_mut().zip(y).zip(h).for_each(|((whitened, y), h)| *whitened = (y - h) * weight);
     }
 
-    fn nominal(&self, _: usize) -> (f64, &'static str) {
-        (self.sigma_px, "px")
-    }
-
-    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
-        let squares: f64 = y.iter().zip(h).map(|(y, h)| (y - h).powi(2)).sum();
-        Apart { pixels: Some((squares / self.points.len().max(1) as f64).sqrt()), ..Apart::default() }
-    }
-
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let (camera, target) = (Frame::Device(self.camera), Frame::Target(self.target));
         let (eye, body) = (pass.pose(camera), pass.pose(target));
@@ -172,6 +163,15 @@ impl Channel for Pixels {
             }
         }
         true
+    }
+
+    fn nominal(&self, _: usize) -> (f64, &'static str) {
+        (self.sigma_px, "px")
+    }
+
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        let points = y.chunks_exact(2).zip(h.chunks_exact(2)).map(|(y, h)| (y[0] - h[0]).hypot(y[1] - h[1]));
+        Apart { pixels: Some(points.sum::<f64>() / (y.len() / 2).max(1) as f64), ..Apart::default() }
     }
 
     fn disturb(&self, reading: &mut [f64], v: &[f64]) {

@@ -102,16 +102,6 @@ impl Channel for Pose {
         whitened[3..].copy_from_slice(turn.as_slice());
     }
 
-    fn nominal(&self, equation: usize) -> (f64, &'static str) {
-        if equation < 3 { (self.sigma_m, "m") } else { (self.sigma_rad, "rad") }
-    }
-
-    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
-        let (y, h) = (Self::read(y), Self::read(h));
-        let metres = (y.translation.vector - h.translation.vector).norm();
-        Apart { metres: Some(metres), radians: Some(h.rotation.angle_to(&y.rotation)), pixels: None }
-    }
-
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let frame = Frame::Target(self.target);
         Self::write(&pass.pose(frame), reading);
@@ -121,6 +111,15 @@ impl Channel for Pose {
             columns.iter_mut().zip(twists.row(row).iter()).for_each(|(to, x)| *to = x * weights[row / 3]);
         }
         true
+    }
+
+    fn nominal(&self, equation: usize) -> (f64, &'static str) {
+        if equation < 3 { (self.sigma_m, "m") } else { (self.sigma_rad, "rad") }
+    }
+
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        let turned = Self::read(y).rotation.angle_to(&Self::read(h).rotation);
+        Apart { angle_rad: Some(turned), ..Apart::lengths(&y[..3], &h[..3]) }
     }
 
     fn disturb(&self, reading: &mut [f64], v: &[f64]) {

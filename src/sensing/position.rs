@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Channel, Equipment, KeyError, Keys};
+use super::{Apart, Channel, Equipment, KeyError, Keys};
 use crate::model::{Pass, State};
 
 /// A tracker of a target's position in space, metres, in the frame of the measurements.
@@ -109,6 +109,10 @@ impl Channel for Position {
         });
         reading.copy_from_slice(point.as_slice());
         true
+    }
+
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        Apart::lengths(y, h)
     }
 
     fn disturb(&self, reading: &mut [f64], v: &[f64]) {

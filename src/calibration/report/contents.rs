@@ -173,7 +173,7 @@ fn placements(document: &mut Document, report: &Report, case: &Case<'_>) {
     let base = [format!("{frame} in the frame of the measurements"), mm(xyz_m), sd(xyz_sd_m), deg(rpy_rad)];
     let target = |target: &crate::calibration::Target| {
         let rpy = target.rpy_rad.as_ref().map_or_else(|| "–".to_owned(), deg);
-        let place = if case.description.is_some() { "in the frame of" } else { "behind" };
+        let place = if case.described.is_some() { "in the frame of" } else { "behind" };
         [format!("{} {place} {}", target.name, target.link), mm(&target.xyz_m), sd(&target.xyz_sd_m), rpy]
     };
     let rows = std::iter::once(base).chain(report.targets.iter().map(target));
@@ -308,7 +308,7 @@ fn folds(document: &mut Document, report: &Report) {
 
 fn written(document: &mut Document, report: &Report, case: &Case<'_>) {
     document.heading("The files");
-    if case.description.is_none() {
+    if case.described.is_none() {
         document.text(
             "The robot was given joint by joint, not as a URDF, so none is written: the learned axes are in readings.yaml and \
              report.json. Name a URDF by `urdf` under [robot] to have it corrected.",

@@ -101,6 +101,7 @@ impl Check<'_> {
             held_out_sockets,
             spacings,
             up_to_motion,
+            described: None,
         };
         self.sockets(scenario, &mut robot);
         blocks.extend((0..robot.sockets.len()).map(Block::Socket));

@@ -39,7 +39,7 @@ impl Scenario {
     pub fn parse(file: &str, text: &str, open: &dyn Fn(&str) -> Result<String, String>) -> Result<Self, ScenarioError> {
         let invalid = |problems| ScenarioError::Invalid { file: file.to_owned(), problems };
         let raw = raw::read(text).map_err(|problem| invalid(vec![problem]))?;
-        let mut check = Check { text, data: None, problems: Vec::new() };
+        let mut check = Check { text, data: Vec::new(), problems: Vec::new() };
         let scenario = check.scenario(&raw, open);
         match scenario {
             Some(scenario) if check.problems.is_empty() => Ok(scenario),
@@ -51,7 +51,7 @@ impl Scenario {
 /// Collects problems while it converts. A value that cannot be converted is `None` and has left a problem behind.
 struct Check<'a> {
     text: &'a str,
-    data: Option<(String, String)>,
+    data: Vec<(String, String)>,
     problems: Vec<Problem>,
 }
 
@@ -165,7 +165,7 @@ impl Check<'_> {
             world: world?,
             rig: rig?,
             source: self.text.to_owned(),
-            data: self.data.take(),
+            data: std::mem::take(&mut self.data),
         })
     }
 

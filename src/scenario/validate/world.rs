@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use crate::{
     experiment::Outliers,
-    scenario::{InitialError, Measurements, Robot, WorldSpec},
+    scenario::{HeldOut, HeldOutRule, InitialError, Measurements, Robot, WorldSpec},
     sensing::{Channel, Rig, Socket},
-    table::TableError,
+    table::{Column, Columns, Layout, Quantity, TableError, Titles},
 };
 
 impl Check<'_> {
@@ -180,14 +180,25 @@ impl Check<'_> {
         if columns.len() < raw.robot.joints.get_ref().len() {
             return None;
         }
-        let rows = match Measurements::from_csv(&text, &columns, &measurements.marker_columns_m.get_ref().0) {
+        let wanted = |titles: &Titles| {
+            // A title's end says its unit, as everywhere; without one it is rad or m.
+            let joint = |title: &&str| {
+                let (angle, length) = (titles.titled(title, Quantity::Angle)?, titles.titled(title, Quantity::Length)?);
+                Ok(Column { factor: angle.factor * length.factor, ..angle })
+            };
+            let joints = columns.iter().map(joint).collect::<Result<_, TableError>>()?;
+            let marker = &measurements.marker_columns_m.get_ref().0;
+            let readings = vec![titles.reading_titled(Layout::Position, marker)?];
+            Ok(Columns { joints, readings, labels: Vec::new() })
+        };
+        let rows = match Measurements::from_csv(&text, wanted) {
             Ok(rows) => rows,
             Err(TableError { what, mend }) => {
                 self.problem(measurements.file.span(), "measurements.file", format!("{file} {what}"), mend);
                 return None;
             }
         };
-        let (count, held_out) = (rows.markers_m.len(), *measurements.held_out.get_ref());
+        let (count, held_out) = (rows.rows(), *measurements.held_out.get_ref());
         // Base and marker take four rows at least.
         if held_out == 0 || held_out + 4 > count {
             let what = format!("{held_out} of {count} rows cannot be held out");
@@ -195,7 +206,8 @@ impl Check<'_> {
             self.problem(measurements.held_out.span(), "measurements.held_out", what, mend);
             return None;
         }
-        self.data = Some((file.clone(), text));
+        self.data.push((file.clone(), text));
+        let held_out = HeldOut { rows: count, rule: HeldOutRule::Count(held_out) };
         Some(WorldSpec::Measured { measurements: rows, held_out })
     }
 }
