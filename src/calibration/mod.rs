@@ -10,6 +10,7 @@
 //! * [`Split`]: rows to learn from and rows to judge by.
 //! * [`Extra`]: what axes cannot explain, kept where folds within the training rows say that it predicts better.
 //! * [`ActivePoint`]: few rows that are chosen, beside random ones.
+//! * [`begin`]: a first calibration file from a URDF and a table, with what was guessed.
 //! * [`Report`]: everything that was found, as JSON; `report` writes it for readers.
 //!
 //! # What is fitted
@@ -34,6 +35,7 @@ mod extras;
 mod figures;
 mod files;
 mod fit;
+mod init;
 mod learned;
 mod names;
 mod outcome;
@@ -52,6 +54,7 @@ pub use extras::{Extra, Trial};
 pub use figures::{Figures, Residual, Sensed};
 pub use files::File;
 pub use fit::Fit;
+pub use init::{Begun, InitError, Sources, begin};
 pub use names::Names;
 pub use outcome::*;
 pub use progress::{Progress, Silent};

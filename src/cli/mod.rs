@@ -4,6 +4,7 @@ mod calibrate;
 mod compare;
 mod designs;
 mod export;
+mod init;
 mod input;
 mod output;
 mod paper;
@@ -49,6 +50,8 @@ enum Command {
     Sweep(sweep::Arguments),
     /// Calibrate a robot by a table of measurements: a corrected URDF, and a report on data that it has not seen
     Calibrate(calibrate::Arguments),
+    /// Begin a calibration file from a URDF and a table, and say what was guessed
+    Init(init::Arguments),
     /// Rerun the paper's experiments, and set the outcome beside its figures and numbers
     Paper(paper::Arguments),
     /// Write the page with recorded runs to a folder that any static host serves
@@ -103,6 +106,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Some(Command::Compare(arguments)) => compare::compare(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Calibrate(arguments)) => calibrate::calibrate(&arguments),
+        Some(Command::Init(arguments)) => init::init(&arguments),
         Some(Command::Paper(arguments)) => paper::paper(&arguments),
         Some(Command::Export(arguments)) => export::export(&arguments),
         Some(Command::Scenarios(arguments)) => scenarios::list(&arguments),

@@ -75,7 +75,7 @@ fn headline(document: &mut Document, report: &Report) {
     };
     document.parts.push(Part::Lead(said));
     document.text(format!(
-        "{} rows, {} of them learned from. Held out: {}. As described means the chain as the file has it, with base, targets, \
+        "The table has {} rows; the calibrated model is learned from {} of them. Held out: {}. As described means the chain as the file has it, with base, targets, \
          cameras and sockets fitted to the same rows: what can be reached without touching the description. Errors are the \
          distances of what was measured from what is predicted, reading by reading.",
         report.rows, report.training_rows, report.held_out_by
@@ -114,7 +114,7 @@ fn figures<'a>(document: &mut Document, rows: impl Iterator<Item = (&'a str, &'a
         [(*name).to_owned(), figures.readings.to_string()].into_iter().chain(numbers).collect()
     };
     let rows = rows.iter().map(cells).collect();
-    document.parts.push(Part::Table(super::document::Table { head, rows }));
+    document.parts.push(Part::Table(super::document::Table { words: 1, head, rows }));
 }
 
 fn doubts(document: &mut Document, report: &Report) {
@@ -136,7 +136,7 @@ fn outliers(document: &mut Document, report: &Report) {
     let row = |outlier: &crate::calibration::Outlier| {
         [outlier.row.to_string(), outlier.line.to_string(), format!("{:.3}", outlier.probability)]
     };
-    document.table(["row", "line of the file", "probability"], report.outliers.iter().map(row));
+    document.table(0, ["row", "line of the file", "probability"], report.outliers.iter().map(row));
 }
 
 fn noise(document: &mut Document, report: &Report) {
@@ -159,8 +159,10 @@ fn noise(document: &mut Document, report: &Report) {
         ))
     });
     let said: Vec<String> = said.collect();
-    if !said.is_empty() {
-        document.parts.push(Part::List(said));
+    match said.as_slice() {
+        [] => {}
+        [only] => document.text(only.clone()),
+        _ => document.parts.push(Part::List(said)),
     }
 }
 
@@ -177,7 +179,7 @@ fn placements(document: &mut Document, report: &Report, case: &Case<'_>) {
         [format!("{} {place} {}", target.name, target.link), mm(&target.xyz_m), sd(&target.xyz_sd_m), rpy]
     };
     let rows = std::iter::once(base).chain(report.targets.iter().map(target));
-    document.table(["where", "x, y, z (mm)", "standard deviations (mm)", "roll, pitch, yaw (deg)"], rows);
+    document.table(1, ["where", "x, y, z (mm)", "standard deviations (mm)", "roll, pitch, yaw (deg)"], rows);
 }
 
 fn corrections(document: &mut Document, report: &Report, case: &Case<'_>) {
@@ -201,15 +203,18 @@ fn corrections(document: &mut Document, report: &Report, case: &Case<'_>) {
         };
         [name, shift, triple(&joint.turn_deg, &joint.turn_sd_deg, 3)]
     };
-    document
-        .table(["joint", "shift x, y, z (mm)", "turn about x, y, z (deg)"], report.joints.iter().enumerate().map(row));
+    document.table(
+        1,
+        ["joint", "shift x, y, z (mm)", "turn about x, y, z (deg)"],
+        report.joints.iter().enumerate().map(row),
+    );
     let offsets: Vec<_> = report.joints.iter().filter_map(|joint| Some((joint, joint.offset?))).collect();
     if !offsets.is_empty() {
         let unit = |joint: &crate::calibration::Joint| if joint.kind == "prismatic" { "mm" } else { "deg" };
         let row = |(joint, offset): (&crate::calibration::Joint, crate::calibration::Correction)| {
             [joint.name.clone(), format!("{:+.3} ± {:.3} {}", offset.value, offset.sd, unit(joint))]
         };
-        document.table(["joint", "offset of its reading"], offsets.into_iter().map(row));
+        document.table(1, ["joint", "offset of its reading"], offsets.into_iter().map(row));
     }
 }
 
@@ -229,7 +234,7 @@ fn undetermined(document: &mut Document, report: &Report) {
     document.text("Pairs of parameters that the rows hardly tell apart; what is known is their sum or difference. b₁ and b₂ are the two directions across an axis.");
     let row =
         |it: &crate::calibration::Correlation| [it.first.clone(), it.second.clone(), format!("{:+.3}", it.correlation)];
-    document.table(["one", "other", "correlation"], report.correlations.iter().map(row));
+    document.table(2, ["one", "other", "correlation"], report.correlations.iter().map(row));
 }
 
 fn by_number(document: &mut Document, report: &Report) {
@@ -255,7 +260,7 @@ fn by_number(document: &mut Document, report: &Report) {
     document.text("Mean error on held-out rows after so many rows:");
     let title = |name: &str| format!("{name} ({unit})");
     let (chosen, median) = (title("chosen"), title("random, median"));
-    document.table(["rows", &chosen, &median, "lower quartile", "upper quartile"], shown.map(row));
+    document.table(0, ["rows", &chosen, &median, "lower quartile", "upper quartile"], shown.map(row));
 }
 
 fn extras(document: &mut Document, report: &Report) {
@@ -283,9 +288,10 @@ fn extras(document: &mut Document, report: &Report) {
             if trial.kept { "yes" } else { "no" }.to_owned(),
         ]
     };
-    let inner = format!("without, inner folds ({unit})");
+    let inner = format!("without ({unit})");
     document.table(
-        ["added", "parameters", &inner, "with", "± of the difference", "held out, with", "kept"],
+        1,
+        ["added", "parameters", &inner, "with", "± difference", "held out", "kept"],
         report.extras.iter().map(row),
     );
 }
@@ -303,7 +309,7 @@ fn folds(document: &mut Document, report: &Report) {
         [fold.fold.to_string(), fold.rows.len().to_string(), before, after, full]
     };
     let described = format!("as described ({unit})");
-    document.table(["fold", "rows held out", &described, "calibrated", "fuller model"], folds.iter().map(row));
+    document.table(0, ["fold", "rows held out", &described, "calibrated", "fuller model"], folds.iter().map(row));
 }
 
 fn written(document: &mut Document, report: &Report, case: &Case<'_>) {
@@ -357,6 +363,7 @@ fn readings(document: &mut Document, report: &Report) {
     };
     let error = format!("residual ({unit})");
     document.table(
+        3,
         ["row", "line", "of", "held out", "chosen as", "measured", "predicted", &error, "outlier"],
         shown.into_iter().map(row),
     );

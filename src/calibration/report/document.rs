@@ -24,9 +24,11 @@ pub enum Part {
     },
 }
 
-/// A table: the first column to the left, the others to the right.
+/// A table.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
+    /// How many columns are aligned to the left, as words are; the others to the right, as numbers.
+    pub words: usize,
     /// Titles of the columns.
     pub head: Vec<String>,
     /// Cells by row.
@@ -53,8 +55,14 @@ impl Document {
         self.parts.push(Part::Text(text.into()));
     }
 
-    pub(super) fn table<const N: usize>(&mut self, head: [&str; N], rows: impl IntoIterator<Item = [String; N]>) {
+    /// A table whose first `words` columns hold words.
+    pub(super) fn table<const N: usize>(
+        &mut self,
+        words: usize,
+        head: [&str; N],
+        rows: impl IntoIterator<Item = [String; N]>,
+    ) {
         let head = head.map(str::to_owned).to_vec();
-        self.parts.push(Part::Table(Table { head, rows: rows.into_iter().map(|row| row.to_vec()).collect() }));
+        self.parts.push(Part::Table(Table { words, head, rows: rows.into_iter().map(|row| row.to_vec()).collect() }));
     }
 }

@@ -44,7 +44,11 @@ pub fn page(document: &Document) -> String {
 
 fn rows(table: &Table) -> String {
     let line = |cells: &[String], tag: &str| {
-        let cells: String = cells.iter().map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell))).collect();
+        let cell = |(column, cell): (usize, &String)| {
+            let class = if column < table.words { " class=\"words\"" } else { "" };
+            format!("<{tag}{class}>{}</{tag}>", escaped(cell))
+        };
+        let cells: String = cells.iter().enumerate().map(cell).collect();
         format!("<tr>{cells}</tr>\n")
     };
     let rows: String = table.rows.iter().map(|row| line(row, "td")).collect();

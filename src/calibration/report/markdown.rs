@@ -28,7 +28,8 @@ pub fn text(document: &Document) -> String {
 fn rows(table: &Table) -> String {
     let line =
         |cells: &[String]| format!("| {} |\n", cells.iter().map(|cell| escaped(cell)).collect::<Vec<_>>().join(" | "));
-    let rule: Vec<&str> = (0..table.head.len()).map(|column| if column == 0 { "---" } else { "---:" }).collect();
+    let rule: Vec<&str> =
+        (0..table.head.len()).map(|column| if column < table.words { "---" } else { "---:" }).collect();
     let rows: String = table.rows.iter().map(|row| line(row)).collect();
     format!("{}| {} |\n{rows}", line(&table.head), rule.join(" | "))
 }
@@ -53,7 +54,7 @@ mod tests {
     #[test]
     fn names_cannot_break_out() {
         let mut document = Document { title: "a|b".into(), subtitle: "*x*".into(), parts: Vec::new() };
-        document.table(["joint", "mm"], [["arm_1\n|<b>".to_owned(), "1.0".to_owned()]]);
+        document.table(1, ["joint", "mm"], [["arm_1\n|<b>".to_owned(), "1.0".to_owned()]]);
         let expected = "# a\\|b\n\n\\*x\\*\n\n| joint | mm |\n| --- | ---: |\n| arm\\_1 \\|\\<b\\> | 1.0 |\n";
         assert_eq!(text(&document), expected);
     }

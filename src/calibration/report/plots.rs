@@ -22,7 +22,10 @@ fn residuals(report: &Report) -> Option<Part> {
         return None;
     }
     let has_numbers = panels.len() > 1;
-    let mut legend = vec![("row learned from".to_owned(), Style::points(Marker::Circle, trained()))];
+    let mut legend = Vec::new();
+    if report.residuals.iter().any(|reading| !reading.held_out) {
+        legend.push(("row learned from".to_owned(), Style::points(Marker::Circle, trained())));
+    }
     if report.held_out.is_some() {
         legend.push(("row held out".to_owned(), Style::points(Marker::Diamond, held_out())));
     }
@@ -36,8 +39,8 @@ fn residuals(report: &Report) -> Option<Part> {
         legend.push(("chosen rows".to_owned(), chosen_style()));
     }
     let chart = Chart {
-        title: "Residuals".to_owned(),
-        subtitle: format!("{}: what was measured less what the calibrated model predicts", report.scenario),
+        title: "How far predictions miss".to_owned(),
+        subtitle: "the distance of what was measured from what the calibrated model predicts".to_owned(),
         legend,
         rows: vec![panels],
         notes: Vec::new(),
@@ -54,11 +57,11 @@ fn residuals(report: &Report) -> Option<Part> {
 }
 
 fn trained() -> Colour {
-    learner_color(0)
+    learner_color(5)
 }
 
 fn held_out() -> Colour {
-    learner_color(1)
+    learner_color(2)
 }
 
 fn outlier() -> Colour {
@@ -140,7 +143,7 @@ fn by_number(report: &Report, unit: &str) -> Option<Panel> {
         y,
         layers: vec![
             Layer::Band { points: band, colour: learner_color(1) },
-            Layer::Level { y: before, label: "as described, base and targets fitted".to_owned() },
+            Layer::Level { y: before, label: "as described".to_owned() },
             Layer::Curve { points: median, style: random_style() },
             Layer::Curve { points: active, style: chosen_style() },
         ],
@@ -182,9 +185,8 @@ fn corrections(report: &Report) -> Option<Part> {
         }
     };
     let chart = Chart {
-        title: "Corrections".to_owned(),
-        subtitle: "of the axes, in the base link's frame with all joints at 0; bars are one standard deviation"
-            .to_owned(),
+        title: "How the axes were corrected".to_owned(),
+        subtitle: "in the base link's frame with all joints at 0; bars are one standard deviation".to_owned(),
         legend: (0..3).map(|k| (axes[k].to_owned(), Style::points(markers[k], colours[k]))).collect(),
         rows: vec![vec![
             panel("shift of the axis", "shift (mm)", &|joint| (joint.shift_mm, joint.shift_sd_mm)),
