@@ -1,8 +1,8 @@
 //! From a case to everything that its report says.
 
 use super::{
-    CalibrationError, Case, Choice, Comparison, Extra, Figures, Fit, Fold, HeldOut, Outlier, Progress, Reading, Report,
-    Residual, Split, extras::TRIED,
+    CalibrationError, Case, Chain, Choice, Comparison, Extra, Figures, Fit, Fold, HeldOut, Outlier, Progress, Reading,
+    Report, Residual, Split, extras::TRIED,
 };
 use crate::selection::Optimality;
 
@@ -115,6 +115,11 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         scenario: scenario.name.clone(),
         title: scenario.title.clone(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
+        chain: case.described.map(|described| Chain {
+            urdf: described.file.clone(),
+            base: described.chain.base.clone(),
+            tip: described.chain.tip().to_owned(),
+        }),
         rows: case.rows.len(),
         training_rows: training.len(),
         held_out_by: case.held_out_by(&splits),

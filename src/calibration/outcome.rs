@@ -13,6 +13,8 @@ pub struct Report {
     pub title: String,
     /// The version of this program.
     pub version: String,
+    /// The chain of the URDF that is calibrated; null where joints are given one by one.
+    pub chain: Option<Chain>,
     /// Rows of the table.
     pub rows: usize,
     /// Rows that the calibrated model was learned from.
@@ -51,6 +53,17 @@ pub struct Report {
     pub learning: Vec<ActivePoint>,
     /// Every reading.
     pub residuals: Vec<Reading>,
+}
+
+/// Which links of which description.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Chain {
+    /// The file, as the scenario names it.
+    pub urdf: String,
+    /// The link that stands still.
+    pub base: String,
+    /// The link that carries the targets.
+    pub tip: String,
 }
 
 /// What was learned, and what could not be.
