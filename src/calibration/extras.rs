@@ -28,6 +28,8 @@ pub(super) const TRIED: [&[Extra]; 3] =
 /// Folds among the training rows, and how many rows there must be for any.
 const FOLDS: usize = 5;
 const FEWEST: usize = 10;
+/// Rows of the inner folds at most, spread evenly over the table: that many decide.
+const MOST: usize = 2000;
 
 /// What came of adding something.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -87,7 +89,9 @@ impl Case<'_> {
         if rows.len() < FEWEST {
             return Ok(trials);
         }
-        let folds = Split::folds(rows, FOLDS);
+        let count = rows.len().min(MOST);
+        let spread: Vec<usize> = (0..count).map(|index| rows[index * rows.len() / count]).collect();
+        let folds = Split::folds(&spread, FOLDS);
         let without = self.inner(&plain, &folds, near)?;
         for (trial, layout) in trials.iter_mut().zip(&layouts) {
             let with = self.inner(layout, &folds, near)?;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{Calibration, CalibrationError, Case, Fit, learned::axis};
-use crate::model::State;
+use crate::model::{Correction, State};
 
 /// A file of the output, by its path below the folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,14 +50,14 @@ impl Calibration {
         }
         text.push_str("readings:\n");
         for (name, correction) in case.names.joints.iter().zip(&self.fuller.state().corrections) {
-            let crate::model::Correction { offset, ratio, sine, cosine } = correction;
+            let Correction { offset, ratio, sine, cosine } = correction;
             // Writing to a string does not fail.
             let _ = writeln!(text, "  {}:\n    offset: {offset:?}\n    ratio: {ratio:?}", quoted(name));
             let _ = writeln!(text, "    sine: {sine:?}\n    cosine: {cosine:?}");
         }
         match &case.described {
             Some(description) => {
-                let chain = description.chain.fitted(&self.fuller.fitted_part().without_offsets())?.chain;
+                let chain = description.chain.fitted(&without_corrections(self.fuller.state()))?.chain;
                 text.push_str(&chain.kinematics_yaml());
             }
             None => text.push_str(&axes_yaml(case, self.fuller.state())),
@@ -94,9 +94,8 @@ fn quoted(name: &str) -> String {
     serde_json::Value::from(name).to_string()
 }
 
-impl State {
-    fn without_offsets(mut self) -> Self {
-        self.corrections.fill(crate::model::Correction::default());
-        self
-    }
+fn without_corrections(state: &State) -> State {
+    let mut state = state.clone();
+    state.corrections.fill(Correction::default());
+    state
 }

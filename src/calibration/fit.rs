@@ -51,11 +51,6 @@ impl Fit {
     }
 }
 
-/// Where the search for an unknown base begins beside the guess: so many draws of the prior.
-const DRAWS: usize = 16;
-/// Hypotheses kept while it is searched.
-const KEPT: usize = 16;
-
 /// Random numbers of the search; fits of one table differ by nothing else than rows and layout.
 const SEED: u64 = 1;
 
@@ -63,7 +58,7 @@ impl Case<'_> {
     /// What explains `rows`, as far as `layout` can, from a start near which it is to be found; without one it is searched for
     /// wherever the prior allows.
     pub fn fit(&self, layout: &Layout, rows: &[usize], near: Option<&State>) -> Result<Fit, CalibrationError> {
-        let mut smoother = self.smoother(layout, if near.is_some() { 0 } else { DRAWS })?;
+        let mut smoother = self.smoother(layout, near.is_none())?;
         let movements: Vec<_> = rows.iter().map(|row| &self.rows[*row]).collect();
         let movements: Vec<_> = movements.iter().map(|row| (row.positions.as_slice(), &row.observation)).collect();
         let starts = match near {
@@ -86,7 +81,7 @@ impl Case<'_> {
         self.fit(&self.placing(), rows, None)
     }
 
-    fn smoother(&self, layout: &Layout, spawned: usize) -> Result<Smoother, CalibrationError> {
+    fn smoother(&self, layout: &Layout, searches: bool) -> Result<Smoother, CalibrationError> {
         let deviations = self.deviations(layout);
         let covariance = DMatrix::from_diagonal(&deviations.map(|sd| sd * sd));
         let within = |block: Block| match self.scenario.prior.of(block) {
@@ -94,7 +89,8 @@ impl Case<'_> {
             _ => None,
         };
         let prior = Prior::new(self.guess().clone(), layout, covariance, within)?;
-        let settings = HypothesisSettings { kept: KEPT, spawned };
+        let given = self.scenario.smoother.hypotheses;
+        let settings = HypothesisSettings { spawned: if searches { given.spawned } else { 0 }, ..given };
         // What is known of the equipment is known as well as the file says: there is one reading of it.
         let is_unknown = |noise: &Noise| {
             self.scenario.smoother.noise_unknown

@@ -7,7 +7,7 @@
 use super::{EstimationError, Measurement, NoiseFit, Smoother, mode::Effort};
 use crate::{
     model::State,
-    sensing::{Graduated, Observation},
+    sensing::{Loss, Observation},
 };
 
 /// Movements by which modes are searched.
@@ -73,9 +73,7 @@ impl Smoother {
         let layout = self.belief.layout.clone();
         let guess = [self.posterior.prior.guess().clone()];
         let starts: Vec<&State> = if starts.is_empty() { guess.iter().collect() } else { starts.iter().collect() };
-        if self.unknown.contains(&true) {
-            self.begin_noise_at(&starts);
-        }
+        let starts = self.begin_noise_from(&starts);
         let modes = starts.iter().filter_map(|start| self.posterior.mode_from_afar(start, &layout, THOROUGH));
         self.hypotheses.modes = modes.collect();
         self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
@@ -83,28 +81,20 @@ impl Smoother {
         self.settle_noise();
     }
 
-    /// Scales as least squares leaves them from the best start: no reading counts as an outlier before it is known how far
-    /// normal ones scatter.
-    fn begin_noise_at(&mut self, starts: &[&State]) {
+    /// Where least squares with the nominal noise leads, and the scales of the noise as its residuals have them: no reading
+    /// counts as an outlier before it is known how far normal ones scatter, and what parameters explain is no noise.
+    fn begin_noise_from(&mut self, starts: &[&State]) -> Vec<State> {
+        if !self.unknown.contains(&true) {
+            return starts.iter().map(|start| (*start).clone()).collect();
+        }
         let layout = self.belief.layout.clone();
-        let wide = Graduated { loss: self.posterior.loss, width: f64::INFINITY };
-        let cost = |state: &State| self.posterior.cost_by(wide, state, &layout);
-        let Some(best) = starts.iter().min_by(|a, b| cost(a).total_cmp(&cost(b))) else { return };
-        let mut squares = vec![(0.0, 0.0); self.unknown.len()];
-        for seen in &self.posterior.measurements {
-            self.nominal.residuals(best, &seen.positions, &seen.observation, |channel, whitened| {
-                let noises = self.nominal.noises().iter().zip(&mut squares);
-                for (noise, (square, count)) in noises.filter(|(noise, _)| noise.channel == channel) {
-                    *square += whitened[noise.part.clone()].iter().map(|x| x * x).sum::<f64>();
-                    *count += noise.part.len() as f64;
-                }
-            });
-        }
-        for (noise, (square, count)) in squares.into_iter().enumerate() {
-            if self.unknown[noise] && count > 0.0 {
-                self.posterior.scales[noise] = (square / count).sqrt().max(super::LEAST_SCALE);
-            }
-        }
+        let loss = std::mem::replace(&mut self.posterior.loss, Loss::None);
+        let modes = starts.iter().filter_map(|start| self.posterior.mode(start, &layout, THOROUGH));
+        self.hypotheses.modes = modes.collect();
+        self.hypotheses.condense(self.settings.kept, &layout);
+        self.learn_noise();
+        self.posterior.loss = loss;
+        self.hypotheses.modes.iter().map(|mode| mode.state.clone()).collect()
     }
 
     fn settle_noise(&mut self) {
