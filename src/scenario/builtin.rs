@@ -39,10 +39,35 @@ pub const BUILTIN: &[Builtin] = builtins![
     "head-fov-doubled-error-up-to",
     "body-change",
     "tiago-mocap",
+    "tiago-mocap-3",
+    "talos-contact",
+    "ur10-camera",
+    "positioner",
+    "panda-sockets",
+    "kinova-sockets",
 ];
 
-/// The data files that they name.
-const DATA: &[(&str, &str)] = &[("tiago-mocap.csv", include_str!("../../scenarios/tiago-mocap.csv"))];
+macro_rules! files {
+    ($($name:literal),* $(,)?) => {
+        &[$(($name, include_str!(concat!("../../scenarios/", $name)))),*]
+    };
+}
+
+/// The files that they name: tables of measurements, and descriptions of robots.
+const DATA: &[(&str, &str)] = files![
+    "tiago-mocap.csv",
+    "tiago.urdf",
+    "talos-contact.csv",
+    "talos.urdf",
+    "ur10-camera.csv",
+    "ur10.urdf",
+    "positioner.csv",
+    "positioner.urdf",
+    "panda-sockets.csv",
+    "panda.urdf",
+    "kinova-sockets.csv",
+    "gen3lite.urdf",
+];
 
 /// The built-in scenario of that name.
 pub fn builtin(name: &str) -> Result<Scenario, ScenarioError> {

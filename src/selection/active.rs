@@ -7,7 +7,9 @@ use rand_distr::StandardNormal;
 
 use super::{
     Actions, Appraisal, Criterion, Domain, Policy, Scope, Search, Selection, SelectionError, Sight, Situation, Sockets,
-    Watch, Weights, search::direct, sockets::Values,
+    Watch, Weights,
+    held::{Values, evaluate, held_by},
+    search::direct,
 };
 use crate::{
     estimation::Belief,
@@ -124,6 +126,12 @@ impl Active {
         Ok(Some(Search { settings, partition: direct(&scope, &searched, settings, at)? }))
     }
 
+    /// The criterion in one socket.
+    fn values<'a>(&'a self, held: &'a Belief) -> Result<Values<'a>, SelectionError> {
+        let criterion = Criterion::new(held, &self.weights)?;
+        Ok(Box::new(move |postures| criterion.evaluate(postures)))
+    }
+
     fn select_in_sockets(
         &self,
         belief: &Belief,
@@ -134,13 +142,9 @@ impl Active {
             return Ok(Selection::of(beginning.clone()));
         }
         let (before, held) = (Criterion::new(belief, &self.weights)?.before(), sockets.held(belief));
-        let values = |held| -> Result<Values<'_>, SelectionError> {
-            let criterion = Criterion::new(held, &self.weights)?;
-            Ok(Box::new(move |postures| criterion.evaluate(postures)))
-        };
         let pool = sockets.pool(belief, self.minimiser.evaluations(), rng);
         let mut evaluations = 0;
-        let (movement, value) = sockets.best(belief, &held, &pool, &mut evaluations, values)?;
+        let (movement, value) = sockets.best(belief, &held, &pool, &mut evaluations, |held| self.values(held))?;
         let (criterion, gain) = (Some(value), Some(before - value));
         Ok(Selection { criterion, gain, evaluations, ..Selection::of(movement) })
     }
@@ -221,15 +225,19 @@ impl Policy for Active {
         }
         match &scope.domain {
             Domain::Box { searched, joints } => self.search_box(situation, joints, &scope, searched, rng),
-            Domain::List { movements, joints } => {
-                let criterion = match joints {
-                    Some(joints) => self.criterion(situation.belief, situation, joints)?,
-                    None => Criterion::new(situation.belief, &self.weights)?,
-                };
+            Domain::List { movements, joints: Some(joints) } => {
+                let criterion = self.criterion(situation.belief, situation, joints)?;
                 let candidates: Vec<&[f64]> =
                     movements.iter().map(|movement| movement.configuration.as_slice()).collect();
                 let best = Selection::of_list(&scope, movements, criterion.evaluate(&candidates), criterion.before());
                 best.map_or_else(|| Watch::fallback(self.watch.as_ref(), criterion.before(), &scope), Ok)
+            }
+            Domain::List { movements, joints: None } => {
+                let before = Criterion::new(situation.belief, &self.weights)?.before();
+                let held = held_by(situation.belief, movements);
+                let values = evaluate(&held, movements, |held| self.values(held))?;
+                let best = Selection::of_list(&scope, movements, values, before);
+                best.map_or_else(|| Watch::fallback(self.watch.as_ref(), before, &scope), Ok)
             }
         }
     }

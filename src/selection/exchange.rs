@@ -10,8 +10,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{
     Movement, Outlook, Planner, Selection, SelectionError, Sockets,
+    held::{Values, evaluate},
     plan::{Plan, condition},
-    sockets::Values,
 };
 use crate::{estimation::Belief, optimize::least};
 
@@ -70,7 +70,7 @@ impl Planner {
             let held = sockets.held(&ahead.after);
             let candidates = [others, &pool].concat();
             evaluations += candidates.len();
-            let found = sockets.evaluate(&held, &candidates, |held| self.values(held))?;
+            let found = evaluate(&held, &candidates, |held| self.values(held))?;
             least(candidates.into_iter().zip(found))
                 .map(|(movement, _)| movement)
                 .ok_or(SelectionError::NoFiniteCriterion)
@@ -89,24 +89,24 @@ impl Planner {
         }
         // Of the plan, what teaches most at once comes first.
         let held = sockets.held(&ahead.now);
-        let at_once = sockets.evaluate(&held, &ahead.movements, |held| self.values(held))?;
+        let at_once = evaluate(&held, &ahead.movements, |held| self.values(held))?;
         let Some((first, _)) = least(at_once.into_iter().enumerate()) else {
             return Err(SelectionError::NoFiniteCriterion);
         };
         let first = ahead.remove(first);
         let without = sockets.held(&ahead.after);
         let (movement, _) = sockets.best(&ahead.now, &without, &[first], &mut evaluations, |held| self.values(held))?;
-        let value = sockets.evaluate(&held, std::slice::from_ref(&movement), |held| self.values(held))?[0];
+        let value = evaluate(&held, std::slice::from_ref(&movement), |held| self.values(held))?[0];
         let (criterion, gain) = (Some(value), Some(self.outlook(&ahead.now)?.before() - value));
         Ok(Selection { criterion, gain, evaluations, ..Selection::of(movement) })
     }
 
-    fn values<'a>(&'a self, held: &'a Belief) -> Result<Values<'a>, SelectionError> {
+    pub(super) fn values<'a>(&'a self, held: &'a Belief) -> Result<Values<'a>, SelectionError> {
         let outlook = self.outlook(held)?;
         Ok(Box::new(move |postures| outlook.evaluate(postures)))
     }
 
-    fn outlook<'a>(&'a self, belief: &'a Belief) -> Result<Outlook<'a>, SelectionError> {
+    pub(super) fn outlook<'a>(&'a self, belief: &'a Belief) -> Result<Outlook<'a>, SelectionError> {
         Outlook::new(belief, &self.weights, self.planning.optimality, &self.workspace)
     }
 

@@ -17,6 +17,7 @@ mod active;
 mod criterion;
 mod exchange;
 mod feasible;
+mod held;
 mod herding;
 mod human;
 #[cfg(test)]
@@ -94,7 +95,11 @@ impl Actions {
     /// nearest to, as believed.
     pub fn movement_to(&self, belief: &Belief, configuration: &[f64]) -> Movement {
         match self {
-            Self::Box(_) | Self::Pool(_) => Movement::to(configuration.to_vec()),
+            Self::Box(_) => Movement::to(configuration.to_vec()),
+            Self::Pool(pool) => {
+                let recorded = pool.iter().find(|movement| movement.configuration == configuration);
+                recorded.cloned().unwrap_or_else(|| Movement::to(configuration.to_vec()))
+            }
             Self::Sockets(sockets) => sockets.movement_to(belief, configuration.to_vec()),
         }
     }

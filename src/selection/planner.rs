@@ -6,7 +6,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{
     Actions, Appraisal, Domain, Movement, Optimality, Outlook, Partition, Planned, Policy, Scope, Search, Selection,
-    SelectionError, Sight, Situation, Watch, Weights, herding::herd, plan::Plan, search::direct, views::Views,
+    SelectionError, Sight, Situation, Watch, Weights,
+    held::{evaluate, held_by},
+    herding::herd,
+    plan::Plan,
+    search::direct,
+    views::Views,
 };
 use crate::{
     estimation::Belief,
@@ -347,18 +352,21 @@ impl Policy for Planner {
                 let index = herd(&candidates, &all, made).ok_or(SelectionError::Exhausted)?;
                 Ok(Selection::of(movements[index].clone()))
             }
-            Domain::List { movements, joints } => {
-                let scene = joints.map(|joints| Scene::new(self, situation, joints));
-                let mut belief = situation.belief.clone();
-                belief.truncate(self.planning.considered);
-                let outlook = match &scene {
-                    Some(scene) => scene.outlook(&scene.now)?,
-                    None => Outlook::new(&belief, &self.weights, self.planning.optimality, &self.workspace)?,
-                };
+            Domain::List { movements, joints: Some(joints) } => {
+                let scene = Scene::new(self, situation, joints);
+                let outlook = scene.outlook(&scene.now)?;
                 let candidates: Vec<&[f64]> =
                     movements.iter().map(|movement| movement.configuration.as_slice()).collect();
                 let best = Selection::of_list(&scope, movements, outlook.evaluate(&candidates), outlook.before());
                 best.map_or_else(|| Watch::fallback(self.watch.as_ref(), outlook.before(), &scope), Ok)
+            }
+            Domain::List { movements, joints: None } => {
+                let mut belief = situation.belief.clone();
+                belief.truncate(self.planning.considered);
+                let (before, held) = (self.outlook(&belief)?.before(), held_by(&belief, movements));
+                let values = evaluate(&held, movements, |held| self.values(held))?;
+                let best = Selection::of_list(&scope, movements, values, before);
+                best.map_or_else(|| Watch::fallback(self.watch.as_ref(), before, &scope), Ok)
             }
         }
     }

@@ -6,7 +6,10 @@
 
 use rand::{Rng, RngExt};
 
-use super::{Movement, SelectionError};
+use super::{
+    Movement, SelectionError,
+    held::{Held, Values, evaluate, held},
+};
 use crate::{
     estimation::Belief,
     kinematics::JointBox,
@@ -22,9 +25,6 @@ pub struct Sockets {
     /// By socket the posture that it begins with, for as long as nothing was held there.
     beginnings: Vec<Movement>,
 }
-
-/// The criterion of postures in one socket, all at once.
-pub(super) type Values<'a> = Box<dyn Fn(&[Vec<f64>]) -> Vec<f64> + 'a>;
 
 /// How many of the best draws are polished, how far, and how often the tangent is taken anew.
 const POLISHED: usize = 3;
@@ -96,28 +96,9 @@ impl Sockets {
         pool
     }
 
-    /// The values of movements by what `values` makes of the belief in each socket.
-    pub(super) fn evaluate<'b>(
-        &self,
-        held: &'b [Belief],
-        movements: &[Movement],
-        values: impl Fn(&'b Belief) -> Result<Values<'b>, SelectionError>,
-    ) -> Result<Vec<f64>, SelectionError> {
-        let mut all = vec![f64::INFINITY; movements.len()];
-        for (socket, held) in held.iter().enumerate() {
-            let places: Vec<usize> = (0..movements.len()).filter(|k| movements[*k].socket == Some(socket)).collect();
-            if places.is_empty() {
-                continue;
-            }
-            let postures: Vec<Vec<f64>> = places.iter().map(|k| movements[*k].configuration.clone()).collect();
-            places.into_iter().zip(values(held)?(&postures)).for_each(|(place, value)| all[place] = value);
-        }
-        Ok(all)
-    }
-
     /// The belief as it is in each socket: through the channels that read there.
-    pub(super) fn held(&self, belief: &Belief) -> Vec<Belief> {
-        (0..self.count).map(|socket| belief.held_in(Some(socket)).into_owned()).collect()
+    pub(super) fn held(&self, belief: &Belief) -> Vec<Held> {
+        held(belief, (0..self.count).map(Some))
     }
 
     /// The best of a pool of movements, its best polished along their tangents; and its value. `belief` says where the
@@ -125,7 +106,7 @@ impl Sockets {
     pub(super) fn best<'b>(
         &self,
         belief: &Belief,
-        held: &'b [Belief],
+        held: &'b [Held],
         pool: &[Movement],
         evaluations: &mut usize,
         values: impl Fn(&'b Belief) -> Result<Values<'b>, SelectionError>,
@@ -134,7 +115,7 @@ impl Sockets {
             return Err(SelectionError::OutOfReach);
         }
         *evaluations += pool.len();
-        let found = self.evaluate(held, pool, &values)?;
+        let found = evaluate(held, pool, &values)?;
         let mut order: Vec<usize> = (0..pool.len()).filter(|index| found[*index].is_finite()).collect();
         order.sort_by(|a, b| found[*a].total_cmp(&found[*b]));
         let mut polished = Vec::new();
@@ -142,7 +123,7 @@ impl Sockets {
             let mut movement = pool[index].clone();
             let mut value = found[index];
             if let Some((socket, manifold)) = movement.socket.and_then(|k| Some((k, self.manifold(belief, k)?))) {
-                let values = values(&held[socket])?;
+                let values = values(&held[socket].1)?;
                 for _ in 0..TANGENTS {
                     let (configuration, lower) =
                         along_tangent(&manifold, &movement.configuration, value, evaluations, &values);

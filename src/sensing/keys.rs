@@ -23,6 +23,8 @@ pub struct Keys {
     pub sigma_px: Option<f64>,
     /// The covariance of the noise of a position, 3 × 3, m².
     pub covariance_m2: Option<Vec<Vec<f64>>>,
+    /// Where recorded measurements are a table, the titles of its columns, unless they begin with the target's name.
+    pub columns: Option<Vec<String>>,
     /// A fixed point in the frame of the measurements, three coordinates in metres.
     pub to_m: Option<Vec<f64>>,
 }
@@ -127,7 +129,9 @@ impl Keys {
     pub(super) fn only(&self, known: &[&str]) -> Result<(), KeyError> {
         let given = serde_json::to_value(self).unwrap_or_default();
         let given = given.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
-        let unknown = given.map(|(key, _)| key).find(|key| *key != "channel" && !known.contains(&key.as_str()));
+        let unknown = given
+            .map(|(key, _)| key)
+            .find(|key| !["channel", "columns"].contains(&key.as_str()) && !known.contains(&key.as_str()));
         unknown.map_or(Ok(()), |key| {
             let mend = format!("remove it; the keys here are {}", known.join(", "));
             Err(KeyError::new(key, "this channel has no use for it", mend))

@@ -152,6 +152,17 @@ impl Chain {
         links
     }
 
+    /// Of every link, from the base to the tip: how many joints before it move, and its frame at θ = 0 in the base link's.
+    pub fn frames(&self) -> Vec<(usize, Isometry3<f64>)> {
+        let mut moving = 0;
+        let counted = std::iter::once(0).chain(self.segments.iter().map(|segment| {
+            moving += usize::from(segment.kind.moves().is_some());
+            moving
+        }));
+        let frames = self.links(&vec![0.0; self.moving().count()]);
+        counted.zip(frames).collect()
+    }
+
     /// The pose of the tip link in the base link's frame.
     pub fn tip_at(&self, positions: &[f64]) -> Isometry3<f64> {
         self.links(positions).pop().unwrap_or_default()

@@ -1,7 +1,9 @@
 //! The keys of a scenario file.
 
 mod constraints;
+mod defaults;
 mod exactly;
+mod measurements;
 mod read;
 mod sensors;
 
@@ -15,6 +17,7 @@ use crate::{experiment::Body, kinematics::JointKind, selection::Optimality};
 
 pub use constraints::{Constraints, ForbiddenBox};
 pub use exactly::Exactly;
+pub use measurements::{HeldOut, Measurements, Sockets};
 pub use read::{key_in, line_of, read};
 pub use sensors::Sensors;
 
@@ -28,6 +31,9 @@ pub struct Scenario {
     pub sensor: Option<Spanned<Sensors>>,
     pub initial_error: Option<Spanned<InitialError>>,
     pub measurements: Option<Spanned<Measurements>>,
+    pub held_out: Option<Spanned<HeldOut>>,
+    #[serde(rename = "sockets")]
+    pub held: Option<Spanned<Sockets>>,
     pub base: Option<Spanned<Base>>,
     pub head: Option<Spanned<Head>>,
     pub view: Option<Spanned<View>>,
@@ -41,8 +47,8 @@ pub struct Scenario {
     pub change: Option<Spanned<Change>>,
     pub outliers: Option<Spanned<Outliers>>,
     pub prior: Spanned<Prior>,
-    pub filter: Filter,
-    pub unscented: Option<Filter>,
+    pub filter: Spanned<Filter>,
+    pub unscented: Option<Spanned<Filter>>,
     pub smoother: Option<Smoother>,
     pub gradient: Option<Gradient>,
     pub selection: Selection,
@@ -62,6 +68,11 @@ pub struct Robot {
     #[serde(default)]
     pub learn_marker: bool,
     pub body: Option<Body>,
+    pub urdf: Option<Spanned<String>>,
+    pub base: Option<Spanned<String>>,
+    pub tip: Option<Spanned<String>>,
+    #[serde(default)]
+    pub hold: Vec<Spanned<String>>,
     #[serde(rename = "joint")]
     pub joints: Spanned<Vec<Spanned<Joint>>>,
 }
@@ -99,7 +110,7 @@ fn yes() -> bool {
 pub struct Target {
     pub name: Spanned<String>,
     pub link: Option<Spanned<String>>,
-    pub at_m: Spanned<Exactly<f64, 3>>,
+    pub at_m: Option<Spanned<Exactly<f64, 3>>>,
     pub rpy_deg: Option<Spanned<Exactly<f64, 3>>>,
     pub points_m: Option<Spanned<Vec<Exactly<f64, 3>>>>,
     pub facing: Option<Spanned<Exactly<f64, 3>>>,
@@ -182,14 +193,6 @@ pub struct InitialError {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Measurements {
-    pub file: Spanned<String>,
-    pub marker_columns_m: Spanned<Exactly<String, 3>>,
-    pub held_out: Spanned<usize>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Head {
     pub position_m: Spanned<Exactly<f64, 3>>,
     pub look: Spanned<Exactly<f64, 3>>,
@@ -251,7 +254,7 @@ pub struct Prior {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Filter {
-    pub measurement_variance_m2: Spanned<f64>,
+    pub measurement_variance_m2: Option<Spanned<f64>>,
     pub stabilising_noise: Option<StabilisingNoise>,
 }
 

@@ -2,12 +2,16 @@
 
 use std::ops::Range;
 
-use super::Scenario;
+use toml::de::DeTable;
+
+use super::{Scenario, defaults::complete};
 use crate::scenario::error::{Problem, similar};
 
 /// Reads the keys of `text`.
 pub fn read(text: &str) -> Result<Scenario, Problem> {
-    let deserializer = toml::Deserializer::parse(text).map_err(|error| problem(text, "", &error))?;
+    let mut document = DeTable::parse(text).map_err(|error| problem(text, "", &error))?;
+    complete(document.get_mut()).map_err(|error| problem(text, "", &error))?;
+    let deserializer = toml::Deserializer::from(document);
     serde_path_to_error::deserialize(deserializer).map_err(|error| {
         let path = readable_path(&error.path().to_string());
         problem(text, &path, error.inner())

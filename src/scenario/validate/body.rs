@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use nalgebra::Point3;
+use toml::Spanned;
 
-use super::{Check, equipment::Outfit, raw};
+use super::{Check, described::Links, equipment::Outfit, raw};
 use crate::{
     kinematics::{Joint, JointBox, JointKind, Line},
     model::{Block, Correction, Layout, State},
@@ -15,6 +16,11 @@ use crate::{
 impl Check<'_> {
     pub(super) fn robot(&mut self, scenario: &raw::Scenario) -> Option<Robot> {
         let raw = &scenario.robot;
+        let described = self.described(scenario);
+        if raw.urdf.is_some() && described.is_none() {
+            return None;
+        }
+        let place = raw.urdf.as_ref().map_or_else(|| raw.joints.span(), Spanned::span);
         let marker = match (&raw.marker_m, scenario.targets.first()) {
             (Some(marker), None) => self.point("robot.marker_m", marker),
             (None, Some(_)) if !raw.learn_marker => Point3::origin(),
@@ -30,7 +36,7 @@ impl Check<'_> {
             }
             (None, None) => {
                 let mend = "add `marker_m = [x, y, z]`, where the marker on the hand is at θ = 0, or a [[target]]";
-                self.problem(raw.joints.span(), "robot.marker_m", "missing", mend);
+                self.problem(place.clone(), "robot.marker_m", "missing", mend);
                 Point3::origin()
             }
         };
@@ -49,10 +55,26 @@ impl Check<'_> {
             joints.extend(self.joint(joint, spanned.span(), &key));
             limits.extend(self.limits(joint, spanned.span(), &key));
         }
-        if names.is_empty() {
-            self.problem(raw.joints.span(), "robot.joint", "there is no joint", "add a [[robot.joint]]");
+        if let Some(described) = &described {
+            let chain = &described.chain;
+            names = chain.names();
+            joints = chain.state().joints;
+            match chain.limits() {
+                Ok(within) => limits.extend_from_slice(within.joints()),
+                Err(error) => {
+                    let what = format!("{}: {error}", described.file);
+                    self.problem(place.clone(), "robot.urdf", what, "correct its <limit>s");
+                    return None;
+                }
+            }
         }
-        let outfit = self.outfit(scenario, &names);
+        let held = self.learned(raw, &names);
+        learned.resize(names.len(), true);
+        learned.iter_mut().zip(held).for_each(|(learned, held)| *learned &= held);
+        if names.is_empty() {
+            self.problem(place.clone(), "robot.joint", "there is no joint", "add a [[robot.joint]]");
+        }
+        let outfit = self.outfit(scenario, Links { joints: &names, described: described.as_deref() });
         let mut state = State::arm(joints, marker);
         let is_whole = state.joints.len() == names.len();
         let mut blocks: Vec<Block> = (0..names.len()).filter(|joint| learned[*joint]).map(Block::Axis).collect();
@@ -81,11 +103,11 @@ impl Check<'_> {
         let layout = Layout::new(&state, blocks.iter().copied());
         if layout.dimension() == 0 {
             let mend = "set `learned = true` on a joint, or `learn_marker = true`";
-            self.problem(raw.joints.span(), "robot.joint", "nothing is to be learned", mend);
+            self.problem(place.clone(), "robot.joint", "nothing is to be learned", mend);
         }
         let complete = state.joints.len() == names.len() && limits.len() == names.len() && !names.is_empty();
         let limits = JointBox::new(limits).map_err(|error| {
-            self.problem(raw.joints.span(), "robot.joint", error.to_string(), "write limits that a robot can have");
+            self.problem(place.clone(), "robot.joint", error.to_string(), "write limits that a robot can have");
         });
         let limits = limits.ok().filter(|_| complete)?;
         let (sockets, held_out_sockets, spacings) = Default::default();
@@ -101,7 +123,7 @@ impl Check<'_> {
             held_out_sockets,
             spacings,
             up_to_motion,
-            described: None,
+            described,
         };
         self.sockets(scenario, &mut robot);
         blocks.extend((0..robot.sockets.len()).map(Block::Socket));

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use toml::Spanned;
 
-use super::{Check, raw};
+use super::{Check, described::Links, raw};
 use crate::{
     model::{Block, Device, Hand, Place, State, Target},
     scenario::Known,
@@ -26,8 +26,8 @@ pub(super) struct Outfit {
 }
 
 impl Check<'_> {
-    /// The targets and cameras of a file, `joints` being the joints' names.
-    pub(super) fn outfit(&mut self, raw: &raw::Scenario, joints: &[String]) -> Outfit {
+    /// The targets and cameras of a file, on these links.
+    pub(super) fn outfit(&mut self, raw: &raw::Scenario, links: Links<'_>) -> Outfit {
         let mut outfit = Outfit::default();
         if let Some(spanned) = &raw.base {
             let base = spanned.get_ref();
@@ -37,21 +37,29 @@ impl Check<'_> {
             outfit.known.extend(self.known("base", &base.known, spanned).map(|known| (Block::Base, known)));
         }
         for (index, target) in raw.targets.iter().enumerate() {
-            self.target(&format!("target[{index}]"), target, joints, &mut outfit);
+            self.target(&format!("target[{index}]"), target, links, &mut outfit);
         }
         for (index, camera) in raw.cameras.iter().enumerate() {
-            self.camera(&format!("camera[{index}]"), camera, joints, &mut outfit);
+            self.camera(&format!("camera[{index}]"), camera, links, &mut outfit);
         }
         outfit
     }
 
-    fn target(&mut self, key: &str, spanned: &Spanned<raw::Target>, joints: &[String], outfit: &mut Outfit) {
+    fn target(&mut self, key: &str, spanned: &Spanned<raw::Target>, links: Links<'_>, outfit: &mut Outfit) {
         let raw = spanned.get_ref();
         let field = |field: &str| format!("{key}.{field}");
         let kinds = &outfit.equipment.targets;
         self.free_name(&field("name"), &raw.name, kinds.iter().map(|kind| kind.name.as_str()));
-        let link = raw.link.as_ref().map_or(Some(joints.len()), |link| self.link(&field("link"), link, joints));
-        let at = self.point(&field("at_m"), &raw.at_m);
+        let link = raw.link.as_ref().map_or(Some(links.last()), |link| self.link(&field("link"), link, links));
+        let (link, frame) = link.unwrap_or_default();
+        let at = match &raw.at_m {
+            Some(at) => self.point(&field("at_m"), at),
+            None => {
+                let mend = "add `at_m = [x, y, z]`, where it is at θ = 0, in metres";
+                self.problem(spanned.span(), field("at_m"), "missing", mend);
+                Point3::origin()
+            }
+        };
         let is_body = raw.rpy_deg.is_some() || raw.points_m.is_some();
         let rotation =
             raw.rpy_deg.as_ref().map_or(UnitQuaternion::identity(), |rpy| self.rotation(&field("rpy_deg"), rpy));
@@ -82,23 +90,24 @@ impl Check<'_> {
             self.problem(facing.span(), field("facing"), "a point faces nothing", mend);
         }
         let place = if is_body {
-            Place::Pose(Isometry3::from_parts(Translation3::from(at.coords), rotation))
+            Place::Pose(frame * Isometry3::from_parts(Translation3::from(at.coords), rotation))
         } else {
-            Place::Point(at)
+            Place::Point(frame * at)
         };
         if let Some(known) = self.known(key, &raw.known, spanned) {
             outfit.known.push((Block::Target(outfit.targets.len()), known));
         }
-        outfit.targets.push(Target { link: link.unwrap_or_default(), place });
+        outfit.targets.push(Target { link, place });
         outfit.equipment.targets.push(TargetKind { name: raw.name.get_ref().clone(), points, facing });
     }
 
-    fn camera(&mut self, key: &str, spanned: &Spanned<raw::Camera>, joints: &[String], outfit: &mut Outfit) {
+    fn camera(&mut self, key: &str, spanned: &Spanned<raw::Camera>, links: Links<'_>, outfit: &mut Outfit) {
         let raw = spanned.get_ref();
         let field = |field: &str| format!("{key}.{field}");
         let kinds = &outfit.equipment.cameras;
         self.free_name(&field("name"), &raw.name, kinds.iter().map(|kind| kind.name.as_str()));
-        let link = raw.link.as_ref().map(|link| self.link(&field("link"), link, joints).unwrap_or_default());
+        let carried = raw.link.as_ref().map(|link| self.link(&field("link"), link, links).unwrap_or_default());
+        let (link, frame) = carried.map_or((None, Isometry3::identity()), |(link, frame)| (Some(link), frame));
         let at = self.point(&field("at_m"), &raw.at_m);
         let rotation = match (&raw.rpy_deg, &raw.looks_at_m) {
             (Some(rpy), None) => self.rotation(&field("rpy_deg"), rpy),
@@ -141,7 +150,7 @@ impl Check<'_> {
                 .known
                 .push((Block::Intrinsics(number), Known::Within { length_m: EXACTLY, angle_rad: EXACTLY, other: px }));
         }
-        let pose = Isometry3::from_parts(Translation3::from(at.coords), rotation);
+        let pose = frame * Isometry3::from_parts(Translation3::from(at.coords), rotation);
         let intrinsics = Some([focal[0], focal[1], centre[0], centre[1]]);
         outfit.devices.push(Device { link, pose, intrinsics });
         outfit.equipment.cameras.push(CameraKind { name: raw.name.get_ref().clone(), size_px });
@@ -177,17 +186,18 @@ impl Check<'_> {
         }
     }
 
-    /// The link behind the joint of a name; `base` is the link before all.
-    fn link(&mut self, key: &str, name: &Spanned<String>, joints: &[String]) -> Option<usize> {
-        if name.get_ref() == "base" {
-            return Some(0);
-        }
-        let found = joints.iter().position(|joint| joint == name.get_ref());
+    /// The link of a name, with the frame in which places on it are written.
+    fn link(&mut self, key: &str, name: &Spanned<String>, links: Links<'_>) -> Option<(usize, Isometry3<f64>)> {
+        let found = links.find(name.get_ref());
         if found.is_none() {
-            let mend = format!("write `base`, or the joint that moves it: {}", joints.join(", "));
-            self.problem(name.span(), key, format!("there is no joint `{}`", name.get_ref()), mend);
+            let (what, write) = match links.described {
+                Some(_) => ("link", "one of the links"),
+                None => ("joint", "`base`, or the joint that moves it"),
+            };
+            let what = format!("there is no {what} `{}`", name.get_ref());
+            self.problem(name.span(), key, what, format!("write {write}: {}", links.names().join(", ")));
         }
-        found.map(|index| index + 1)
+        found
     }
 
     fn rotation(&mut self, key: &str, value: &Spanned<raw::Exactly<f64, 3>>) -> UnitQuaternion<f64> {

@@ -2,10 +2,15 @@
 
 mod body;
 mod change;
+mod completed;
 mod constraints;
+mod described;
 mod equipment;
 mod head;
+mod held_out;
 mod learners;
+mod measured;
+mod recorded_sockets;
 mod sockets;
 mod world;
 
@@ -39,8 +44,8 @@ impl Scenario {
     pub fn parse(file: &str, text: &str, open: &dyn Fn(&str) -> Result<String, String>) -> Result<Self, ScenarioError> {
         let invalid = |problems| ScenarioError::Invalid { file: file.to_owned(), problems };
         let raw = raw::read(text).map_err(|problem| invalid(vec![problem]))?;
-        let mut check = Check { text, data: Vec::new(), problems: Vec::new() };
-        let scenario = check.scenario(&raw, open);
+        let mut check = Check { text, open, data: Vec::new(), problems: Vec::new() };
+        let scenario = check.scenario(raw);
         match scenario {
             Some(scenario) if check.problems.is_empty() => Ok(scenario),
             _ => Err(invalid(check.problems)),
@@ -48,14 +53,28 @@ impl Scenario {
     }
 }
 
+/// Where the file says nothing, σ that filters assume, in those of the first sensor: a chain has errors that no axis explains.
+const FILTER_SIGMAS: f64 = 2.0;
+
 /// Collects problems while it converts. A value that cannot be converted is `None` and has left a problem behind.
 struct Check<'a> {
     text: &'a str,
+    open: &'a dyn Fn(&str) -> Result<String, String>,
     data: Vec<(String, String)>,
     problems: Vec<Problem>,
 }
 
 impl Check<'_> {
+    /// The text of a file that the scenario names, or why there is none.
+    fn opened(&mut self, file: &str) -> Result<String, String> {
+        if let Some((_, text)) = self.data.iter().find(|(name, _)| name == file) {
+            return Ok(text.clone());
+        }
+        let text = (self.open)(file)?;
+        self.data.push((file.to_owned(), text.clone()));
+        Ok(text)
+    }
+
     fn problem(
         &mut self,
         span: Range<usize>,
@@ -118,15 +137,23 @@ impl Check<'_> {
         None
     }
 
-    fn scenario(&mut self, raw: &raw::Scenario, open: &dyn Fn(&str) -> Result<String, String>) -> Option<Scenario> {
+    fn scenario(&mut self, mut raw: raw::Scenario) -> Option<Scenario> {
+        let is_recorded = raw.initial_error.is_none();
+        if let (Some(measurements), Some(_), true) = (&raw.measurements, &raw.robot.urdf, is_recorded) {
+            let titles = self.titles(measurements.get_ref())?;
+            completed::complete(&mut raw, &titles);
+        }
+        let raw = &raw;
         let name = raw.name.get_ref();
         if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
             let mend = "use letters, digits, '-', '_' and '.'; the name becomes part of file names and addresses";
             self.problem(raw.name.span(), "name", format!("{name:?} cannot be a name"), mend);
         }
-        let robot = self.robot(raw)?;
+        let mut robot = self.robot(raw)?;
+        let recorded = if is_recorded { self.recorded(raw, &mut robot) } else { None };
         let rig = self.rig(raw, &robot);
-        let world = self.world(raw, &robot, rig.as_deref(), open);
+        let rows = recorded.as_ref().map(|(_, held_out)| held_out.split(0).0.len() as u64);
+        let world = self.world(raw, &robot, rig.as_deref(), recorded);
         let setting = Setting {
             learns_marker: raw.robot.learn_marker,
             is_measured: raw.measurements.is_some(),
@@ -134,9 +161,11 @@ impl Check<'_> {
             sees_markers_alone: rig.iter().flat_map(|rig| rig.channels()).all(|channel| channel.target() == Some(0)),
         };
         let learners = self.learners(&raw.learners, setting);
-        let filter = self.filter("filter", &raw.filter);
+        let usual = rig.as_deref().filter(|_| robot.described.is_some() && raw.measurements.is_some());
+        let usual = usual.map(|rig| (FILTER_SIGMAS * rig.sigma()).powi(2));
+        let filter = self.filter("filter", &raw.filter, usual);
         let constraints = raw.constraints.as_ref();
-        if let (Some(given), false) = (constraints, raw.sockets.is_empty()) {
+        if let (Some(given), false) = (constraints, raw.sockets.is_empty() && raw.held.is_none()) {
             let mend = "leave [constraints] out, or the sockets";
             self.problem(
                 given.span(),
@@ -149,10 +178,10 @@ impl Check<'_> {
         Some(Scenario {
             name: name.clone(),
             title: raw.title.clone(),
-            steps: self.at_least_one("steps", &raw.steps),
+            steps: self.at_least_one("steps", &raw.steps).min(rows.unwrap_or(u64::MAX)),
             prior: self.prior(raw, &robot),
             filter,
-            unscented: raw.unscented.as_ref().map_or(filter, |unscented| self.filter("unscented", unscented)),
+            unscented: raw.unscented.as_ref().map_or(filter, |given| self.filter("unscented", given, usual)),
             smoother: self.smoother(raw, rig.as_deref()),
             gradient_rate: self.gradient_rate(raw),
             selection: self.selection(&raw.selection),
@@ -227,14 +256,25 @@ impl Check<'_> {
         known
     }
 
-    fn filter(&mut self, section: &str, raw: &raw::Filter) -> Filter {
+    /// The values of a filter; `usual` is the variance where there is one that need not be given.
+    fn filter(&mut self, section: &str, raw: &Spanned<raw::Filter>, usual: Option<f64>) -> Filter {
+        let (span, raw) = (raw.span(), raw.get_ref());
         let key = |key: &str| format!("{section}.{key}");
         let stabilising = raw.stabilising_noise.as_ref().map(|noise| StabilisingNoise {
             variance: self.not_negative(&key("stabilising_noise.variance"), &noise.variance),
             first_step: self.at_least_one(&key("stabilising_noise.first_step"), &noise.first_step),
             every: self.at_least_one(&key("stabilising_noise.every"), &noise.every),
         });
-        let variance = self.positive(&key("measurement_variance_m2"), &raw.measurement_variance_m2);
+        let name = "measurement_variance_m2";
+        let variance = match (&raw.measurement_variance_m2, usual) {
+            (Some(variance), _) => self.positive(&key(name), variance),
+            (None, Some(usual)) => usual,
+            (None, None) => {
+                let mend = format!("add `{name} = …`, σ² of the noise that the filter assumes");
+                self.problem(span, key(name), "missing", mend);
+                1.0
+            }
+        };
         Filter { variance, stabilising }
     }
 
@@ -306,6 +346,9 @@ impl Check<'_> {
             };
         }
         let socket = raw.sockets.first().map(Spanned::span);
+        if raw.measurements.is_some() && raw.initial_error.is_none() {
+            return Scenario::THRESHOLDS;
+        }
         if let Some(span) = raw.sensor.as_ref().map(Spanned::span).or(socket) {
             let what = "missing: a simulated world is judged by them";
             let mend = "add `[thresholds]` with `orientation_deg = …` and `location_m = …`";

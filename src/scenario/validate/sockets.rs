@@ -17,10 +17,15 @@ const PUSHED_M: f64 = 0.02;
 /// How many of its standard deviations a distance that is told may be wrong by.
 const HONEST: f64 = 4.0;
 
+/// What is known of a socket of which there is no guess.
+pub(super) fn unguessed() -> Known {
+    Known::Within { length_m: UNGUESSED_M, angle_rad: UNGUESSED_M, other: UNGUESSED_M }
+}
+
 impl Check<'_> {
     /// Adds the sockets of a file to a robot.
     pub(super) fn sockets(&mut self, scenario: &raw::Scenario, robot: &mut Robot) {
-        // Of recorded data they are refused elsewhere.
+        // Those of recorded data are told by columns.
         let sockets = if scenario.measurements.is_none() { &scenario.sockets[..] } else { &[] };
         // Those that something is known of the distance to.
         let mut distances = Vec::new();
@@ -34,8 +39,7 @@ impl Check<'_> {
             }
             let number = robot.sockets.len();
             let known = self.known(&key, &raw.known, spanned);
-            let unguessed = Known::Within { length_m: UNGUESSED_M, angle_rad: UNGUESSED_M, other: UNGUESSED_M };
-            robot.known.push((Block::Socket(number), known.unwrap_or(unguessed)));
+            robot.known.push((Block::Socket(number), known.unwrap_or_else(unguessed)));
             robot.state.sockets.push(socket.at);
             robot.sockets.push(SocketSpec { is_guessed: known.is_some(), ..socket });
             distances.push((key, spanned, number));
@@ -143,7 +147,7 @@ impl Check<'_> {
         Some(Spacing { sockets: [number, other], sigma_m })
     }
 
-    fn target_named(&mut self, key: &str, name: &Spanned<String>, robot: &Robot) -> Option<usize> {
+    pub(super) fn target_named(&mut self, key: &str, name: &Spanned<String>, robot: &Robot) -> Option<usize> {
         let targets = &robot.equipment.targets;
         let found = targets.iter().position(|target| target.name == *name.get_ref());
         if found.is_none() {

@@ -7,9 +7,8 @@ use std::sync::Arc;
 
 use crate::{
     experiment::Outliers,
-    scenario::{HeldOut, HeldOutRule, InitialError, Measurements, Robot, WorldSpec},
+    scenario::{HeldOut, InitialError, Measurements, Robot, WorldSpec},
     sensing::{Channel, Rig, Socket},
-    table::{Column, Columns, Layout, Quantity, TableError, Titles},
 };
 
 impl Check<'_> {
@@ -18,11 +17,17 @@ impl Check<'_> {
         raw: &raw::Scenario,
         robot: &Robot,
         rig: Option<&Rig>,
-        open: &dyn Fn(&str) -> Result<String, String>,
+        recorded: Option<(Measurements, HeldOut)>,
     ) -> Option<WorldSpec> {
         let socket = raw.sockets.first().map(Spanned::span);
         let is_replayed = raw.measurements.is_some();
         let senses = raw.sensor.is_some() || (socket.is_some() && !is_replayed);
+        let of_tables =
+            [("sockets", raw.held.as_ref().map(Spanned::span)), ("held_out", raw.held_out.as_ref().map(Spanned::span))];
+        for (key, span) in of_tables.into_iter().filter_map(|(key, span)| Some((key, span?))).filter(|_| !is_replayed) {
+            let mend = "remove it, or add [measurements] with a file";
+            self.problem(span, key, "it tells of a table, and there is none", mend);
+        }
         match (senses, &raw.initial_error, &raw.measurements) {
             (true, Some(error), None) => {
                 let marker_m = error.get_ref().marker_m.as_ref();
@@ -60,7 +65,7 @@ impl Check<'_> {
                     outliers: raw.outliers.as_ref().map(|outliers| self.outliers(outliers.get_ref())),
                 })
             }
-            (false, None, Some(measurements)) => {
+            (_, None, Some(_)) => {
                 let head = raw.head.as_ref().map(|head| ("head", head.span()));
                 let change = raw.change.as_ref().map(|change| ("change", change.span()));
                 let outliers = raw.outliers.as_ref().map(|outliers| ("outliers", outliers.span()));
@@ -74,7 +79,7 @@ impl Check<'_> {
                         mend,
                     );
                 }
-                self.measured(raw, measurements.get_ref(), open)
+                recorded.map(|(measurements, held_out)| WorldSpec::Measured { measurements, held_out })
             }
             (_, error, measurements) => {
                 let span = [raw.sensor.as_ref().map(Spanned::span), error.as_ref().map(Spanned::span)]
@@ -83,8 +88,8 @@ impl Check<'_> {
                     .flatten()
                     .next();
                 let what = "a scenario is either simulated or measured";
-                let mend = "write [sensor] (or [[socket]]s) and [initial_error] for a simulated world, or [measurements] alone for a \
-                            measured one";
+                let mend = "write [sensor] (or [[socket]]s) and [initial_error] for a simulated world, or [measurements] without \
+                            [initial_error] for a measured one";
                 self.problem(span.unwrap_or(0..0), "sensor, initial_error, measurements", what, mend);
                 None
             }
@@ -108,11 +113,16 @@ impl Check<'_> {
             if !held.is_empty() {
                 return Some(Arc::new(Rig::new(held)));
             }
-            return Some(Arc::new(Rig::tracker(raw.filter.measurement_variance_m2.get_ref().sqrt())));
+            let variance = raw.filter.get_ref().measurement_variance_m2.as_ref().map(|variance| *variance.get_ref());
+            return variance.map(|variance| Arc::new(Rig::tracker(variance.sqrt())));
         };
         let given = sensors.get_ref();
         let mut channels = Vec::new();
         for (index, keys) in given.0.iter().enumerate() {
+            if let (Some(_), None) = (&keys.get_ref().columns, &raw.measurements) {
+                let mend = "remove it, or add [measurements] with a file";
+                self.problem(keys.span(), format!("sensor[{index}].columns"), "there is no table", mend);
+            }
             let section = if given.0.len() > 1 { format!("sensor[{index}]") } else { "sensor".to_owned() };
             let span = if given.0.len() > 1 { keys.span() } else { sensors.span() };
             match keys.get_ref().channel(equipment) {
@@ -150,65 +160,6 @@ impl Check<'_> {
         let complete = channels.len() == given.0.len() && !channels.is_empty();
         channels.extend(held);
         complete.then(|| Arc::new(Rig::new(channels)))
-    }
-
-    fn measured(
-        &mut self,
-        raw: &raw::Scenario,
-        measurements: &raw::Measurements,
-        open: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Option<WorldSpec> {
-        let mut columns = Vec::new();
-        for (index, joint) in raw.robot.joints.get_ref().iter().enumerate() {
-            match &joint.get_ref().column {
-                Some(column) => columns.push(column.get_ref().as_str()),
-                None => {
-                    let mend = "add `column = \"…\"`, the column of the data file with this joint's position";
-                    self.problem(joint.span(), format!("robot.joint[{index}].column"), "missing", mend);
-                }
-            }
-        }
-        let file = measurements.file.get_ref();
-        let text = match open(file) {
-            Ok(text) => text,
-            Err(error) => {
-                let mend = "name a file beside the scenario that can be read, CSV as text in UTF-8";
-                self.problem(measurements.file.span(), "measurements.file", format!("{file} {error}"), mend);
-                return None;
-            }
-        };
-        if columns.len() < raw.robot.joints.get_ref().len() {
-            return None;
-        }
-        let wanted = |titles: &Titles| {
-            // A title's end says its unit, as everywhere; without one it is rad or m.
-            let joint = |title: &&str| {
-                let (angle, length) = (titles.titled(title, Quantity::Angle)?, titles.titled(title, Quantity::Length)?);
-                Ok(Column { factor: angle.factor * length.factor, ..angle })
-            };
-            let joints = columns.iter().map(joint).collect::<Result<_, TableError>>()?;
-            let marker = &measurements.marker_columns_m.get_ref().0;
-            let readings = vec![titles.reading_titled(Layout::Position, marker)?];
-            Ok(Columns { joints, readings, labels: Vec::new() })
-        };
-        let rows = match Measurements::from_csv(&text, wanted) {
-            Ok(rows) => rows,
-            Err(TableError { what, mend }) => {
-                self.problem(measurements.file.span(), "measurements.file", format!("{file} {what}"), mend);
-                return None;
-            }
-        };
-        let (count, held_out) = (rows.rows(), *measurements.held_out.get_ref());
-        // Base and marker take four rows at least.
-        if held_out == 0 || held_out + 4 > count {
-            let what = format!("{held_out} of {count} rows cannot be held out");
-            let mend = format!("write a number from 1 to {}", count.saturating_sub(4));
-            self.problem(measurements.held_out.span(), "measurements.held_out", what, mend);
-            return None;
-        }
-        self.data.push((file.clone(), text));
-        let held_out = HeldOut { rows: count, rule: HeldOutRule::Count(held_out) };
-        Some(WorldSpec::Measured { measurements: rows, held_out })
     }
 }
 
