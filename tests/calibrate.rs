@@ -110,6 +110,41 @@ fn another_library_recomputes_the_held_out_figure() {
     assert!(apart_mm.abs() < 1e-3, "{apart_mm} mm");
 }
 
+/// A robot that calibrates itself by a ball in two sockets: what it learned at one place holds at the seven others, and chosen
+/// rows do with few.
+#[test]
+fn a_ball_in_two_sockets_calibrates_a_panda() {
+    let output = done(&["calibrate", "panda-sockets", "--active", "12", "--json", "-"]);
+    let report: Report = serde_json::from_str(&output).expect("JSON");
+    let held_out = report.held_out.expect("seven places");
+    let (before, after) = (held_out.before.mean_mm.expect("lengths"), held_out.after.mean_mm.expect("lengths"));
+    assert!((7.5..8.7).contains(&before) && after <= 0.40, "{before} {after}");
+    let last = report.active.last().expect("twelve");
+    let (chosen, random) = (last.active_mm.expect("judged"), last.random_median_mm.expect("judged"));
+    assert!(chosen <= 0.45 && random >= 1.4 * chosen, "{last:?}");
+}
+
+/// Other robots: held-out errors in mm that the description has at least, and that are left at most.
+#[test]
+fn held_out_errors_of_other_robots_fall() {
+    for (name, before_mm, after_mm) in [
+        ("kinova-sockets", 4.0, 3.2),
+        ("tiago-mocap-3", 4.1, 3.05),
+        ("ur10-camera", 10.0, 4.5),
+        ("talos-contact", 4.0, 0.8),
+        ("positioner", 0.40, 0.40),
+    ] {
+        let scenario = builtin(name).expect("built in");
+        let case = Case::new(&scenario).expect("measured");
+        let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
+        let held_out = found.report.held_out.as_ref().expect("held out");
+        let (before, after) = (held_out.before.mean_mm.expect("lengths"), held_out.after.mean_mm.expect("lengths"));
+        println!("{name}: {before:.3} {after:.3} {:.3}", held_out.full_model.mean_mm.expect("lengths"));
+        assert!(before > before_mm && after < after_mm, "{name}: {before} {after}");
+        assert!(!found.files(&case).expect("writable").is_empty());
+    }
+}
+
 /// Every file is there, the report says the same everywhere, and needs nothing from the network.
 #[test]
 fn a_calibration_writes_its_report() {
@@ -209,6 +244,10 @@ fn init_says_what_it_guessed() {
     for line in ["urdf = \"tiago.urdf\"", "tip = \"arm_tool_link\"", "file = \"hand.csv\"", "folds = 5"] {
         assert!(written.contains(line), "{line}: {written}");
     }
+    // It is a valid file, and calibrates.
+    let report: Report = serde_json::from_str(&done(&["calibrate", &place("hand.toml"), "--json", "-"])).expect("JSON");
+    let held_out = report.held_out.expect("folds");
+    assert!(held_out.after.mean_mm < held_out.before.mean_mm, "{held_out:?}");
     let (code, error) = failure(&["init", &place("tiago.urdf"), &place("hand.csv")]);
     assert!(code == 2 && error.contains("is there already"), "{error}");
     std::fs::write(place("none.csv"), "x,y,z,elbow\n1,2,3,4\n").expect("written");

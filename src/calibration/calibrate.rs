@@ -127,6 +127,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         parameters: case.determined(&fit),
         training: comparison,
         held_out,
+        sockets: if has_folds { Vec::new() } else { case.distances(&fit, &first.held_out) },
         extras: trials.clone(),
         outliers: case.outliers(&fit),
         noise: case.noise(&fit),

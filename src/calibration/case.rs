@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     model::{Block, Layout, State},
     scenario::{Described, HeldOutRule, Scenario, WorldSpec},
-    sensing::{Loss, Observation, Rig},
+    sensing::{Loss, Observation, Occasion, Rig},
 };
 
 use super::{CalibrationError, Extra, Names, Split};
@@ -123,6 +123,11 @@ impl<'a> Case<'a> {
             return Err(CalibrationError::Folds { folds, rows: rows.len() });
         }
         Ok(Split::folds(&rows, folds))
+    }
+
+    /// Whether nothing is measured but that targets are where they were before.
+    pub fn meets_itself(&self) -> bool {
+        self.rig.channels().iter().all(|channel| channel.occasion() != Occasion::Always)
     }
 
     /// The target that a row held in a socket.

@@ -1,7 +1,7 @@
 //! What axes cannot explain, learned as far as rows that were not learned from say that it predicts better.
 //!
 //! The rows that are held out decide nothing. Within the training rows there are folds of their own: what is added stays
-//! where the mean error over them falls by more than its standard error, taken from the differences reading by reading.
+//! where the mean error over them falls by more than two standard errors, taken from the differences reading by reading.
 
 use serde::{Deserialize, Serialize};
 
@@ -100,7 +100,8 @@ impl Case<'_> {
             trial.standard_error = standard_error(&without, &with);
         }
         let gain = |trial: &Trial| Some(trial.inner_without? - trial.inner?);
-        let is_worth = |trial: &Trial| gain(trial).zip(trial.standard_error).is_some_and(|(gain, error)| gain > error);
+        let is_worth =
+            |trial: &Trial| gain(trial).zip(trial.standard_error).is_some_and(|(gain, error)| gain > 2.0 * error);
         let best = trials
             .iter_mut()
             .filter(|trial| is_worth(trial))

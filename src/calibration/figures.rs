@@ -151,6 +151,39 @@ impl Case<'_> {
     }
 }
 
+impl Case<'_> {
+    /// How far the two sockets of every place are apart that `rows` know, as predicted.
+    pub fn distances(&self, fit: &Fit, rows: &[usize]) -> Vec<SocketDistance> {
+        let robot = &self.scenario.robot;
+        let place = |number: usize| robot.sockets.iter().chain(&robot.held_out_sockets).nth(number)?.place.clone();
+        let mut by_place: BTreeMap<String, Vec<Point3<f64>>> = BTreeMap::new();
+        for (number, point) in self.sockets(fit, rows) {
+            by_place.entry(place(number).unwrap_or_default()).or_default().push(point);
+        }
+        let known_m = self.known.and_then(|known| known.readings.iter().flatten().flatten().next().copied());
+        let distance = |(place, points): (String, Vec<Point3<f64>>)| match points[..] {
+            [one, other] => Some(SocketDistance {
+                place,
+                predicted_mm: (one - other).norm() * 1e3,
+                known_mm: known_m.map(|m| m * 1e3),
+            }),
+            _ => None,
+        };
+        by_place.into_iter().filter_map(distance).collect()
+    }
+}
+
+/// The distance of the two sockets of one place: what a scatter alone is blind to, how large the robot is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SocketDistance {
+    /// The place.
+    pub place: String,
+    /// As the calibrated model predicts it, millimetres.
+    pub predicted_mm: f64,
+    /// As it is known, millimetres.
+    pub known_mm: Option<f64>,
+}
+
 /// The mean of points; `None` of none.
 pub fn mean(points: impl Iterator<Item = Point3<f64>>) -> Option<Point3<f64>> {
     let (sum, count) = points.fold((Vector3::zeros(), 0.0), |(sum, count), point| (sum + point.coords, count + 1.0));

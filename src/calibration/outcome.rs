@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{ActivePoint, Figures, Trial};
+use super::{ActivePoint, Figures, SocketDistance, Trial};
 
 /// Everything that a report says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,6 +29,8 @@ pub struct Report {
     pub training: Comparison,
     /// Errors on rows that were not; null where none are held out.
     pub held_out: Option<HeldOut>,
+    /// With sockets: how far the two of every place are apart that nothing was learned from; empty otherwise.
+    pub sockets: Vec<SocketDistance>,
     /// What adding to the axes changes.
     pub extras: Vec<Trial>,
     /// Rows that are likelier outliers than not.

@@ -4,7 +4,7 @@ use super::{
     document::{Document, Part},
     plots::{self, residual},
 };
-use crate::calibration::{Case, Extra, Figures, Placement, Reading, Report, undetermined::listed};
+use crate::calibration::{Case, Extra, Figures, Placement, Reading, Report, SocketDistance, undetermined::listed};
 
 /// Readings listed at most; of more the worst.
 const LISTED: usize = 200;
@@ -17,7 +17,7 @@ pub fn document(report: &Report, case: &Case<'_>) -> Document {
         subtitle: format!("{}. body-schema {}.", report.title, report.version),
         parts: Vec::new(),
     };
-    headline(&mut document, report);
+    headline(&mut document, report, case);
     doubts(&mut document, report);
     let mut drawings = plots::plots(report).into_iter();
     document.heading("Residuals");
@@ -52,21 +52,26 @@ fn sentence(said: &str) -> String {
     format!("{first}{}.", letters.as_str().trim_end_matches('.'))
 }
 
-fn headline(document: &mut Document, report: &Report) {
+fn headline(document: &mut Document, report: &Report, case: &Case<'_>) {
     let unit = plots::unit(report);
-    let said = match &report.held_out {
-        Some(held_out) => match (held_out.before.mean(), held_out.after.mean()) {
-            (Some(before), Some(after)) => {
-                let change = 100.0 * (1.0 - after / before);
-                let verdict =
-                    if change >= 0.0 { format!("{change:.0} % less") } else { format!("{:.0} % more", -change) };
+    let means = report.held_out.as_ref().map(|held_out| (held_out.before.mean(), held_out.after.mean()));
+    let said = match means {
+        Some((Some(before), Some(after))) => {
+            let change = 100.0 * (1.0 - after / before);
+            let verdict = if change >= 0.0 { format!("{change:.0} % less") } else { format!("{:.0} % more", -change) };
+            if case.meets_itself() {
+                format!(
+                    "Where it has not been before, the calibrated robot meets itself within {after:.2} {unit} on average; as \
+                     it is described, within {before:.2} {unit}: {verdict}."
+                )
+            } else {
                 format!(
                     "On rows that it has not seen the calibrated robot misses by {after:.2} {unit} on average; as it is \
                      described, by {before:.2} {unit}: {verdict}."
                 )
             }
-            _ => "The rows that were held out predict nothing.".to_owned(),
-        },
+        }
+        Some(_) => "The rows that were held out predict nothing.".to_owned(),
         None => {
             "No row was held out: how good this calibration is on new data is not known. Hold some out in the file, or \
                  by --folds 5."
@@ -90,6 +95,14 @@ fn headline(document: &mut Document, report: &Report) {
     let training =
         [("learned from, as described", &report.training.before), ("learned from, calibrated", &report.training.after)];
     figures(document, held_out.chain(training));
+    if !report.sockets.is_empty() {
+        document.text(
+            "That a ball meets itself says nothing of how large the robot is. So here is how far the two sockets of every place \
+             are apart, places that nothing was learned from:",
+        );
+        let row = |it: &SocketDistance| [it.place.clone(), number(Some(it.predicted_mm)), number(it.known_mm)];
+        document.table(1, ["place", "predicted (mm)", "known (mm)"], report.sockets.iter().map(row));
+    }
 }
 
 fn same(one: &Figures, other: &Figures) -> bool {
@@ -271,7 +284,7 @@ fn extras(document: &mut Document, report: &Report) {
     }
     let kept = report.extras.iter().any(|trial| trial.kept);
     document.text(format!(
-        "What is added must predict rows better that it has not seen: five folds among the training rows decide, by more than \
+        "What is added must predict rows better that it has not seen: five folds among the training rows decide, by more than twice \
          the standard error of the difference. Rows that are held out decide nothing. {}",
         if kept { "What stays is in readings.yaml, with axes of its own." } else { "Nothing stays." }
     ));
