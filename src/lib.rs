@@ -24,6 +24,7 @@
 //! | [`experiment`] | agents that propose and absorb, a world, a judge; the reports that everything outside reads |
 //! | [`scenario`] | scenario files, strictly read |
 //! | [`assembly`] | the experiments that are drawn from them |
+//! | [`calibration`] | a robot calibrated by a table: fits, folds, figures, corrected descriptions |
 //!
 //! These do no input or output, know no threads but those of the feature `parallel`, and build without default
 //! features for `wasm32-unknown-unknown`. With the feature `app` (on by default) come `recording` (Rerun and CSV
@@ -58,6 +59,7 @@
 //! the same machine, whatever the number of threads.
 
 pub mod assembly;
+pub mod calibration;
 #[cfg(feature = "app")]
 mod chart;
 pub mod design;

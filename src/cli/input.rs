@@ -31,7 +31,7 @@ pub fn load_scenario(name: &str) -> Result<Scenario> {
 
 /// The text of a file. An error continues a sentence that begins with the file's name. What has no end, or is no text, is
 /// refused as soon as that is seen.
-fn read_text(path: &Path) -> Result<String, String> {
+pub(super) fn read_text(path: &Path) -> Result<String, String> {
     let file = File::open(path).map_err(|error| format!("cannot be read: {error}"))?;
     let mut bytes = Vec::new();
     Guard::new(file, MOST_BYTES).read_to_end(&mut bytes).map_err(|error| match error.kind() {

@@ -1,8 +1,10 @@
 //! Commands, their arguments, and what becomes of their errors.
 
+mod calibrate;
 mod compare;
 mod designs;
 mod export;
+mod init;
 mod input;
 mod output;
 mod paper;
@@ -16,6 +18,7 @@ mod until;
 
 use anyhow::{Context, Result};
 use body_schema::{
+    calibration::CalibrationError,
     export::ExportError,
     paper::PaperError,
     scenario::{LearnerSpec, PolicyKind, Scenario, ScenarioError},
@@ -45,6 +48,10 @@ enum Command {
     Compare(compare::Arguments),
     /// Try a grid of values in a scenario, and rank them by a learner's own median
     Sweep(sweep::Arguments),
+    /// Calibrate a robot by a table of measurements: a corrected URDF, and a report on data that it has not seen
+    Calibrate(calibrate::Arguments),
+    /// Begin a calibration file from a URDF and a table, and say what was guessed
+    Init(init::Arguments),
     /// Rerun the paper's experiments, and set the outcome beside its figures and numbers
     Paper(paper::Arguments),
     /// Write the page with recorded runs to a folder that any static host serves
@@ -98,6 +105,8 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Compare(arguments)) => compare::compare(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
+        Some(Command::Calibrate(arguments)) => calibrate::calibrate(&arguments),
+        Some(Command::Init(arguments)) => init::init(&arguments),
         Some(Command::Paper(arguments)) => paper::paper(&arguments),
         Some(Command::Export(arguments)) => export::export(&arguments),
         Some(Command::Scenarios(arguments)) => scenarios::list(&arguments),
@@ -127,6 +136,7 @@ pub fn is_bad_input(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.is::<BadInput>()
             || cause.downcast_ref::<ExportError>().is_some_and(ExportError::is_bad_input)
+            || cause.downcast_ref::<CalibrationError>().is_some_and(CalibrationError::is_bad_input)
             || cause.downcast_ref::<PaperError>().is_some_and(PaperError::is_bad_input)
             || cause.downcast_ref::<ScenarioError>().is_some_and(|error| !matches!(error, ScenarioError::Experiment(_)))
     })

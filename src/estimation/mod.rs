@@ -88,6 +88,23 @@ pub struct NoiseReport {
     pub scale: f64,
 }
 
+/// How well readings with one kind of noise are fitted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseFit {
+    /// The channel, counted from 0.
+    pub channel: usize,
+    /// The first of its equations that this noise is of.
+    pub first: usize,
+    /// Σ w ‖r‖² in nominal standard deviations: χ², outliers not counted.
+    pub squared: f64,
+    /// Σ w d: how many equations.
+    pub equations: f64,
+    /// How many of them the parameters account for.
+    pub absorbed: f64,
+    /// The standard deviation that is assumed, in nominal ones.
+    pub scale: f64,
+}
+
 /// What an update found before it changed the belief.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Update {

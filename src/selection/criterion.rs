@@ -172,6 +172,23 @@ impl<'a> Criterion<'a> {
         }
     }
 
+    /// By how much readings whose whitened rows are Hᵀ (m × d) would lower the criterion: of a movement of which some are
+    /// missing, as a row of a table. NaN where that is no number.
+    pub fn gain_of(&self, rows: &DMatrix<f64>) -> f64 {
+        let gains = self.covariance * rows;
+        let s = rows.tr_mul(&gains) + DMatrix::identity(rows.ncols(), rows.ncols());
+        let Some(s) = s.cholesky() else { return f64::NAN };
+        match (self.optimality, &self.metric) {
+            (Optimality::D, _) => s.l_dirty().diagonal().iter().map(|x| x.ln()).sum(),
+            (Optimality::E, _) => {
+                let update = (gains, s.inverse());
+                self.value - optimality::greatest_eigenvalue(self.covariance, self.weights, Some(&update))
+            }
+            (_, Some(metric)) => s.solve(&gains.tr_mul(&(metric * &gains))).trace(),
+            (_, None) => s.solve(&gains.tr_mul(&self.weights.scale(&gains))).trace(),
+        }
+    }
+
     /// C(θ) of every candidate, in order. Chunks run on several cores with the feature `parallel`; the values do not
     /// depend on how many.
     pub fn evaluate<C: AsRef<[f64]> + Sync>(&self, candidates: &[C]) -> Vec<f64> {
@@ -325,6 +342,8 @@ mod tests {
                             workspace.configurations.iter().map(spread).sum::<f64>() / 10.0
                         }
                     };
+                    let gain = criterion.gain_of(&belief.rig.jacobian(&belief.state, &belief.layout, theta));
+                    assert!((criterion.before() - gain - value).abs() < 1e-9 * value.abs().max(1e-3), "{optimality:?}");
                     // Lanczos' iteration comes near from below.
                     let tolerance = if optimality == Optimality::E { 1e-3 } else { 1e-6 };
                     let scale = expected.abs().max(1e-3);

@@ -40,6 +40,12 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// What is read where `reading` would be without noise: y = h ⊕ L v, with v standard normal (d numbers).
     fn disturb(&self, reading: &mut [f64], v: &[f64]);
 
+    /// σ of the noise of an equation, and its unit: m, rad or px.
+    fn nominal(&self, equation: usize) -> (f64, &'static str) {
+        let _ = equation;
+        (self.sigma(), "m")
+    }
+
     /// How many kinds of noise a reading has, each with a σ of its own in proportion to [`sigma`](Self::sigma): the equations
     /// are so many equal parts, one after the other. A scale of the noise is learned for each.
     fn noises(&self) -> usize {

@@ -166,6 +166,10 @@ impl Channel for Pixels {
         true
     }
 
+    fn nominal(&self, _: usize) -> (f64, &'static str) {
+        (self.sigma_px, "px")
+    }
+
     fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
         let points = y.chunks_exact(2).zip(h.chunks_exact(2)).map(|(y, h)| (y[0] - h[0]).hypot(y[1] - h[1]));
         Apart { pixels: Some(points.sum::<f64>() / (y.len() / 2).max(1) as f64), ..Apart::default() }

@@ -113,6 +113,10 @@ impl Channel for Pose {
         true
     }
 
+    fn nominal(&self, equation: usize) -> (f64, &'static str) {
+        if equation < 3 { (self.sigma_m, "m") } else { (self.sigma_rad, "rad") }
+    }
+
     fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
         let turned = Self::read(y).rotation.angle_to(&Self::read(h).rotation);
         Apart { angle_rad: Some(turned), ..Apart::lengths(&y[..3], &h[..3]) }

@@ -15,6 +15,7 @@
 //! Once only one hypothesis is left and the old measurements are as good as linear within its spread, they are
 //! compressed into a quadratic, so that a step costs the same whatever the number of movements.
 
+mod batch;
 #[cfg(test)]
 mod changes;
 mod hypotheses;
@@ -36,7 +37,7 @@ use mode::Effort;
 use posterior::{Measurement, Posterior};
 
 use super::{
-    Alternative, Belief, ChangeDetector, EstimationError, Estimator, NoiseReport, ReadingReport, Update,
+    Alternative, Belief, ChangeDetector, EstimationError, Estimator, NoiseFit, NoiseReport, ReadingReport, Update,
     change::quantile,
 };
 use crate::{

@@ -59,6 +59,13 @@ impl Quadratic {
         Self { information: DMatrix::zeros(m, m), vector: DVector::zeros(m), misfit: 0.0, equations: 0.0 }
     }
 
+    fn add(&mut self, other: Self) {
+        self.information += other.information;
+        self.vector += other.vector;
+        self.misfit += other.misfit;
+        self.equations += other.equations;
+    }
+
     fn misfit_at(&self, delta: &DVector<f64>) -> f64 {
         self.misfit + 0.5 * delta.dot(&(&self.information * delta)) - self.vector.dot(delta)
     }
@@ -92,6 +99,9 @@ pub(super) struct Fit {
     /// Σ w d.
     pub equations: f64,
 }
+
+/// Measurements whose rows are stacked at a time: memory does not grow with their number.
+const STACKED: usize = 1024;
 
 fn norm_squared(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
@@ -248,8 +258,14 @@ impl Posterior {
 
     /// The same by another loss.
     pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout) -> Option<Normal> {
-        let (stacked, residuals, mut cost) = self.stacked(loss, state, layout, &self.measurements);
-        let (mut information, mut descent) = (&stacked * stacked.transpose(), stacked * residuals);
+        let m = layout.dimension();
+        let (mut information, mut descent, mut cost) = (DMatrix::zeros(m, m), DVector::zeros(m), 0.0);
+        for measurements in self.measurements.chunks(STACKED) {
+            let (stacked, residuals, errors) = self.stacked(loss, state, layout, measurements);
+            information += &stacked * stacked.transpose();
+            descent += stacked * residuals;
+            cost += errors;
+        }
         cost += self.prior.cost(state, Some((&mut information, &mut descent)));
         if let Some(settled) = &self.settled {
             let (noises, excess) = settled.carried(state, layout)?;
@@ -362,10 +378,7 @@ impl Posterior {
             && let Some((carried, more)) = before.carried(state, layout)
         {
             for (into, of) in noises.iter_mut().zip(carried) {
-                into.information += of.information;
-                into.vector += of.vector;
-                into.misfit += of.misfit;
-                into.equations += of.equations;
+                into.add(of);
             }
             excess += more;
             total += before.count;
@@ -375,7 +388,11 @@ impl Posterior {
 
     /// By kind of noise, how many of its equations the parameters account for: tr(Λₙ P), with Λₙ its share of the information.
     pub fn absorbed(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
-        let (mut noises, _) = self.quadratics(&mode.state, layout, &self.measurements);
+        let mut noises = vec![Quadratic::nothing(layout.dimension()); self.scales.len()];
+        for measurements in self.measurements.chunks(STACKED) {
+            let (of, _) = self.quadratics(&mode.state, layout, measurements);
+            noises.iter_mut().zip(of).for_each(|(into, of)| into.add(of));
+        }
         if let Some(settled) = &self.settled {
             let (carried, _) = settled.carried(&mode.state, layout)?;
             noises.iter_mut().zip(carried).for_each(|(into, of)| into.information += of.information);

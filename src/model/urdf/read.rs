@@ -81,6 +81,18 @@ impl Urdf {
         Ok(Self { text: text.to_owned(), links: links.names, joints, carried_by, start })
     }
 
+    /// The link that hangs on nothing, the first if there are several.
+    pub fn root(&self) -> Option<&str> {
+        let root = self.carried_by.iter().position(Option::is_none)?;
+        Some(&self.links[root])
+    }
+
+    /// The links on which nothing hangs, in the file's order.
+    pub fn leaves(&self) -> impl Iterator<Item = &str> {
+        let is_leaf = |link: &usize| self.joints.iter().all(|joint| joint.parent != *link);
+        (0..self.links.len()).filter(is_leaf).map(|link| self.links[link].as_str())
+    }
+
     /// The names of its links, in the file's order.
     pub fn links(&self) -> &[String] {
         &self.links

@@ -1,0 +1,294 @@
+//! From a case to everything that its report says.
+
+use super::{
+    CalibrationError, Case, Chain, Choice, Comparison, Extra, Figures, Fit, Fold, HeldOut, Outlier, Progress, Reading,
+    Report, Residual, Split, extras::TRIED,
+};
+use crate::selection::Optimality;
+
+/// What is asked beside the fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Hold out every row once, in so many folds, whatever the file says.
+    pub folds: Option<usize>,
+    /// Choose so many rows one by one, and judge them beside random ones.
+    pub active: Option<usize>,
+}
+
+/// What came of a calibration.
+#[derive(Clone, Debug)]
+pub struct Calibration {
+    /// The report.
+    pub report: Report,
+    /// What a URDF can hold.
+    pub fit: Fit,
+    /// What was added to it.
+    pub extras: Vec<Extra>,
+    /// With that; the same where nothing was.
+    pub fuller: Fit,
+    /// Fold by fold what a URDF can hold; empty without folds.
+    pub folds: Vec<Fit>,
+}
+
+/// What a split says.
+struct Judged {
+    before: Vec<Residual>,
+    after: Vec<Residual>,
+    fuller: Vec<Residual>,
+    /// By what is tried.
+    tried: Vec<Vec<Residual>>,
+}
+
+/// Calibrates a case.
+///
+/// # Errors
+///
+/// [`CalibrationError`] where the options do not fit the table, and where nothing explains it.
+pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) -> Result<Calibration, CalibrationError> {
+    let splits = case.splits(options.folds)?;
+    let has_folds = splits.len() > 1;
+    let Some(first) = splits.first() else { return Err(CalibrationError::NoRows) };
+    let mut training = first.training.clone();
+    if has_folds {
+        training.extend(&first.held_out);
+        training.sort_unstable();
+    }
+    if training.is_empty() {
+        return Err(CalibrationError::NoRows);
+    }
+    progress.stage("all training rows", 3);
+    let nominal = case.nominal(&training)?;
+    progress.tick();
+    let fit = case.fit(&case.writable(), &training, Some(nominal.state()))?;
+    progress.tick();
+    let mut trials = case.trials(&training, fit.state())?;
+    let fuller = case.fuller(&trials, &fit)?;
+    progress.tick();
+
+    progress.stage(if has_folds { "folds" } else { "held-out rows" }, splits.len() as u64);
+    let (mut folds, mut judged) = (Vec::new(), Vec::new());
+    for split in splits.iter().filter(|split| !split.held_out.is_empty()) {
+        let (fold, verdict) = if has_folds {
+            let nominal = case.nominal(&split.training)?;
+            let fit = case.fit(&case.writable(), &split.training, Some(nominal.state()))?;
+            let trials = case.trials(&split.training, fit.state())?;
+            let fuller = case.fuller(&trials, &fit)?;
+            let verdict = case.judge(split, &nominal, &fit, &fuller)?;
+            (fit, verdict)
+        } else {
+            (fit.clone(), case.judge(split, &nominal, &fit, &fuller)?)
+        };
+        folds.push(fold);
+        judged.push(verdict);
+        progress.tick();
+    }
+    for (index, trial) in trials.iter_mut().enumerate().filter(|_| !judged.is_empty()) {
+        trial.held_out = Some(Figures::of(judged.iter().flat_map(|judged| &judged.tried[index])));
+    }
+
+    let (mut active, mut selection, mut learning) = (Vec::new(), None, Vec::new());
+    if let Some(count) = options.active {
+        active = case.active(&splits, count, progress)?;
+        selection = Some(case.choice(&training, count, progress)?);
+    } else {
+        learning = case.learning(&splits, progress)?;
+    }
+
+    let training_residuals = |fit: &Fit| case.residuals(fit, &training);
+    let comparison = Comparison {
+        before: Figures::of(&training_residuals(&nominal)),
+        after: Figures::of(&training_residuals(&fit)),
+    };
+    let all = |of: fn(&Judged) -> &Vec<Residual>| Figures::of(judged.iter().flat_map(of));
+    let held_out = if judged.is_empty() {
+        None
+    } else {
+        Some(HeldOut {
+            before: all(|it| &it.before),
+            after: all(|it| &it.after),
+            full_model: all(|it| &it.fuller),
+            folds: if has_folds { case.folds(&splits, &folds, &judged)? } else { Vec::new() },
+        })
+    };
+    let scenario = case.scenario;
+    let report = Report {
+        scenario: scenario.name.clone(),
+        title: scenario.title.clone(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        chain: case.described.map(|described| Chain {
+            urdf: described.file.clone(),
+            base: described.chain.base.clone(),
+            tip: described.chain.tip().to_owned(),
+        }),
+        rows: case.rows.len(),
+        training_rows: training.len(),
+        held_out_by: case.held_out_by(&splits),
+        doubts: scenario.examine().map_or_else(Vec::new, |it| it.doubts.iter().map(ToString::to_string).collect()),
+        parameters: case.determined(&fit),
+        training: comparison,
+        held_out,
+        sockets: if has_folds { Vec::new() } else { case.distances(&fit, &first.held_out) },
+        extras: trials.clone(),
+        outliers: case.outliers(&fit),
+        noise: case.noise(&fit),
+        base: case.base(&fit),
+        targets: case.targets(&fit)?,
+        joints: case.joints(&fit),
+        correlations: case.correlations(&fit),
+        more_rows: case.more_rows(&fit),
+        residuals: case.readings(&fit, &splits, &judged, selection.as_ref()),
+        selection,
+        active,
+        learning,
+    };
+    let extras = trials.iter().find(|trial| trial.kept).map(|trial| trial.extras.clone()).unwrap_or_default();
+    Ok(Calibration { report, fit, extras, fuller, folds: if has_folds { folds } else { Vec::new() } })
+}
+
+impl Case<'_> {
+    fn judge(&self, split: &Split, nominal: &Fit, fit: &Fit, fuller: &Fit) -> Result<Judged, CalibrationError> {
+        let judged = |fit: &Fit| self.residuals(fit, &split.held_out);
+        let tried = TRIED.iter().map(|extras| {
+            let fit = self.fit(&self.extended(extras), &split.training, Some(fit.state()))?;
+            Ok(judged(&fit))
+        });
+        let tried = tried.collect::<Result<_, CalibrationError>>()?;
+        Ok(Judged { before: judged(nominal), after: judged(fit), fuller: judged(fuller), tried })
+    }
+
+    fn folds(&self, splits: &[Split], fits: &[Fit], judged: &[Judged]) -> Result<Vec<Fold>, CalibrationError> {
+        let of = |(fold, ((split, fit), judged)): (usize, ((&Split, &Fit), &Judged))| {
+            Ok(Fold {
+                fold,
+                rows: split.held_out.iter().map(|row| row + 1).collect(),
+                before: Figures::of(&judged.before),
+                after: Figures::of(&judged.after),
+                full_model: Figures::of(&judged.fuller),
+                base: self.base(fit),
+                targets: self.targets(fit)?,
+            })
+        };
+        splits.iter().zip(fits).zip(judged).enumerate().map(of).collect()
+    }
+
+    fn choice(&self, training: &[usize], count: usize, progress: &dyn Progress) -> Result<Choice, CalibrationError> {
+        progress.stage("the rows that would be chosen of all", count as u64);
+        let (rows, _) = self.choose(training, count, progress)?;
+        let criterion = match self.scenario.selection.planning.optimality {
+            Optimality::A => "A: the mean squared error of the parameters",
+            Optimality::D => "D: the volume of what is not known of the parameters",
+            Optimality::E => "E: the error of the parameters that are known worst",
+            Optimality::I => "I: the mean squared error of predictions over the training rows",
+        };
+        Ok(Choice {
+            criterion: criterion.to_owned(),
+            start: "no row: the prior around the description".to_owned(),
+            rows: rows.into_iter().map(|row| row + 1).collect(),
+        })
+    }
+
+    fn held_out_by(&self, splits: &[Split]) -> String {
+        let held_out = splits.iter().map(|split| split.held_out.len()).sum::<usize>();
+        match splits.len() {
+            folds @ 2.. => {
+                format!("every row once, in {folds} folds: fold f holds out rows f, f + {folds}, …, counted from 0")
+            }
+            _ if held_out == 0 => "no row, so how good the model is on new data is not known".to_owned(),
+            _ => format!("{held_out} of {} rows, as the file says", self.rows.len()),
+        }
+    }
+
+    fn outliers(&self, fit: &Fit) -> Vec<Outlier> {
+        let suspected = fit.outliers().into_iter().filter(|(_, probability)| *probability > 0.5);
+        let told = |(row, probability): (usize, f64)| Outlier { row: row + 1, line: self.rows[row].line, probability };
+        suspected.map(told).collect()
+    }
+
+    /// Every reading by the model that had not learned from its row, if there is one, else by the calibrated one.
+    fn readings(&self, fit: &Fit, splits: &[Split], judged: &[Judged], choice: Option<&Choice>) -> Vec<Reading> {
+        let probabilities: std::collections::HashMap<usize, f64> = fit.outliers().into_iter().collect();
+        let has_folds = splits.len() > 1;
+        let held_out = judged.iter().enumerate().flat_map(|(fold, judged)| {
+            judged.after.iter().map(move |residual| (residual.clone(), true, has_folds.then_some(fold)))
+        });
+        let trained = self.residuals(fit, if has_folds { &[] } else { &fit.rows });
+        let mut all: Vec<_> = held_out.chain(trained.into_iter().map(|residual| (residual, false, None))).collect();
+        all.sort_by_key(|(residual, ..)| (residual.row, residual.sensor));
+        let reading = |(residual, held_out, fold): (Residual, bool, Option<usize>)| Reading {
+            row: residual.row + 1,
+            line: self.rows[residual.row].line,
+            sensor: self.sensor(residual.sensor),
+            held_out,
+            fold,
+            chosen: choice.and_then(|choice| Some(choice.rows.iter().position(|row| *row == residual.row + 1)? + 1)),
+            residual_mm: residual.apart.length_m.map(|metres| metres * 1e3),
+            residual_deg: residual.apart.angle_rad.map(f64::to_degrees),
+            residual_px: residual.apart.pixels,
+            outlier_probability: probabilities.get(&residual.row).copied(),
+            predicted: residual.predicted,
+            measured: residual.measured,
+        };
+        all.into_iter().map(reading).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        calibration::Silent,
+        scenario::{Scenario, builtin},
+    };
+
+    fn tiago() -> Scenario {
+        builtin("tiago-mocap").expect("built in")
+    }
+
+    /// A real TIAGo: axes that are learned predict rows that were held out better than the description does.
+    #[test]
+    fn held_out_rows_are_predicted_better_than_by_the_description() {
+        let scenario = tiago();
+        let case = Case::new(&scenario).expect("measured");
+        let options = Options { folds: Some(5), active: None };
+        let Calibration { report, folds, .. } = calibrate(&case, &options, &Silent).expect("calibrated");
+        let held_out = report.held_out.expect("folds");
+        let mean = |figures: &Figures| figures.mean_mm.expect("lengths");
+        assert!((3.9..4.5).contains(&mean(&held_out.before)), "{held_out:?}");
+        assert!(mean(&held_out.after) < 3.1, "{held_out:?}");
+        assert!(mean(&report.training.after) < mean(&report.training.before));
+        assert_eq!((folds.len(), held_out.folds.len(), held_out.after.readings), (5, 5, 34));
+        let rows: Vec<usize> = report.residuals.iter().map(|reading| reading.row).collect();
+        assert_eq!(rows, (1..=34).collect::<Vec<_>>());
+        // Means of folds are the mean of all.
+        let sum: f64 = held_out.folds.iter().map(|fold| mean(&fold.after) * fold.after.readings as f64).sum();
+        assert!((sum / 34.0 - mean(&held_out.after)).abs() < 1e-9);
+    }
+
+    /// What rows that are held out say changes nothing that is learned.
+    #[test]
+    fn held_out_rows_decide_nothing() {
+        let scenario = tiago();
+        let mut case = Case::new(&scenario).expect("measured");
+        let split = case.splits(None).expect("as the file says").remove(0);
+        let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
+        for row in &split.held_out {
+            case.rows[*row].observation.readings[0].as_mut().expect("seen")[0] += 0.1;
+        }
+        let spoilt = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
+        assert_eq!(found.fit.state(), spoilt.fit.state());
+        assert_eq!(found.fuller.state(), spoilt.fuller.state());
+        assert_ne!(found.report.held_out, spoilt.report.held_out);
+    }
+
+    #[test]
+    fn what_cannot_be_asked_is_refused() {
+        let scenario = tiago();
+        let case = Case::new(&scenario).expect("measured");
+        let refused = |folds, active| calibrate(&case, &Options { folds, active }, &Silent).expect_err("refused");
+        assert_eq!(refused(Some(1), None), CalibrationError::Folds { folds: 1, rows: 34 });
+        assert_eq!(refused(Some(35), None), CalibrationError::Folds { folds: 35, rows: 34 });
+        assert_eq!(refused(None, Some(28)), CalibrationError::Active { asked: 28, rows: 27 });
+        let simulated = builtin("arm-6dof").expect("built in");
+        assert!(matches!(Case::new(&simulated), Err(CalibrationError::Simulated { .. })));
+    }
+}

@@ -1,0 +1,139 @@
+//! What is to be calibrated, and by what.
+
+use std::sync::Arc;
+
+use crate::{
+    model::{Block, Layout, State},
+    scenario::{Described, HeldOutRule, Scenario, WorldSpec},
+    sensing::{Loss, Observation, Occasion, Rig},
+};
+
+use super::{CalibrationError, Extra, Names, Split};
+
+/// A row of the table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// The line of the file, counted from 1.
+    pub line: usize,
+    /// Joint positions, rad or m.
+    pub positions: Vec<f64>,
+    /// What was measured.
+    pub observation: Observation,
+    /// The socket in which a target was held: its number among the robot's, those that are held out after the others.
+    pub socket: Option<usize>,
+}
+
+/// A robot as it is described, and what was measured of it.
+#[derive(Clone, Debug)]
+pub struct Case<'a> {
+    pub(super) scenario: &'a Scenario,
+    /// The rows, in the order of the table.
+    pub rows: Vec<Row>,
+    /// What everything is called.
+    pub names: Names,
+    /// The URDF, where the robot comes from one.
+    pub described: Option<&'a Described>,
+    /// What is known before any row, as the distance between two sockets.
+    pub(super) known: Option<&'a Observation>,
+    pub(super) rig: Arc<Rig>,
+    pub(super) loss: Loss,
+}
+
+/// Rows held out under this seed, where the scenario draws them by one.
+const SEED: u64 = 1;
+
+impl<'a> Case<'a> {
+    /// The case of a scenario that replays a table.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Simulated`] where it simulates its world.
+    pub fn new(scenario: &'a Scenario) -> Result<Self, CalibrationError> {
+        let WorldSpec::Measured { measurements, .. } = &scenario.world else {
+            return Err(CalibrationError::Simulated { scenario: scenario.name.clone() });
+        };
+        let row = |index: usize| Row {
+            line: measurements.lines[index],
+            positions: measurements.configurations[index].clone(),
+            observation: measurements.observations[index].clone(),
+            socket: measurements.sockets.get(index).copied().flatten(),
+        };
+        Ok(Self {
+            scenario,
+            rows: (0..measurements.rows()).map(row).collect(),
+            names: Names::new(&scenario.robot),
+            described: scenario.robot.described.as_deref(),
+            known: measurements.beforehand.as_ref(),
+            rig: Arc::new(scenario.rig.assuming(scenario.smoother.sigma)),
+            loss: if scenario.smoother.loss == Loss::None { Loss::MIXTURE } else { scenario.smoother.loss },
+        })
+    }
+
+    /// The robot as it is described.
+    pub fn guess(&self) -> &State {
+        &self.scenario.robot.state
+    }
+
+    /// The sensors with their nominal noise.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// What a URDF can hold, and where base, targets, cameras and sockets are: no ratios and no eccentricity.
+    pub fn writable(&self) -> Layout {
+        let holds = |block: &Block| !matches!(block, Block::Ratio(_) | Block::Eccentricity(_));
+        self.layout(|block| holds(&block))
+    }
+
+    /// Where base, targets, cameras and sockets are, with the chain as described.
+    pub fn placing(&self) -> Layout {
+        use Block::{Axis, Eccentricity, Offset, Ratio};
+        self.layout(|block| !matches!(block, Axis(_) | Offset(_) | Ratio(_) | Eccentricity(_)))
+    }
+
+    /// What a URDF can hold, and more.
+    pub fn extended(&self, extras: &[Extra]) -> Layout {
+        let learned = self.writable();
+        let blocks: Vec<Block> = learned.blocks().map(|(block, _)| block).collect();
+        Layout::new(self.guess(), blocks.into_iter().chain(extras.iter().flat_map(|extra| extra.blocks(self))))
+    }
+
+    fn layout(&self, wanted: impl Fn(Block) -> bool) -> Layout {
+        let learned = self.scenario.robot.layout.blocks().map(|(block, _)| block);
+        Layout::new(self.guess(), learned.filter(|block| wanted(*block)))
+    }
+
+    /// Rows to learn from and rows to judge by, as the scenario says, or by `folds`: fold f holds out rows f, f + K, …
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Folds`] where there are fewer rows than folds, or fewer than two folds.
+    pub fn splits(&self, folds: Option<usize>) -> Result<Vec<Split>, CalibrationError> {
+        let Some(folds) = folds else {
+            let WorldSpec::Measured { held_out, .. } = &self.scenario.world else { return Ok(Vec::new()) };
+            let splits = match held_out.rule {
+                HeldOutRule::Folds(_) => held_out.folds(),
+                _ => vec![held_out.split(SEED)],
+            };
+            return Ok(splits.into_iter().map(|(training, held_out)| Split { training, held_out }).collect());
+        };
+        // Of sockets that the file holds out there is nothing to learn.
+        let rows: Vec<usize> = (0..self.rows.len()).filter(|row| !self.rows[*row].observation.is_miss()).collect();
+        if folds < 2 || folds > rows.len() {
+            return Err(CalibrationError::Folds { folds, rows: rows.len() });
+        }
+        Ok(Split::folds(&rows, folds))
+    }
+
+    /// Whether nothing is measured but that targets are where they were before.
+    pub fn meets_itself(&self) -> bool {
+        self.rig.channels().iter().all(|channel| channel.occasion() != Occasion::Always)
+    }
+
+    /// The target that a row held in a socket.
+    pub(super) fn held(&self, row: &Row) -> Option<(usize, usize)> {
+        let robot = &self.scenario.robot;
+        let number = row.socket?;
+        robot.sockets.iter().chain(&robot.held_out_sockets).nth(number).map(|socket| (number, socket.target))
+    }
+}

@@ -1,0 +1,97 @@
+//! What the rows cannot determine, in words.
+//!
+//! With Λ the information of the rows alone, scaled to a unit diagonal, directions whose eigenvalue is less than 10⁻¹² of the
+//! greatest are told by no row: the estimate stays there where the description has it. Beside these stand parameters that the
+//! rows tell so little of that their deviation has hardly fallen from the prior's.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use super::{Case, Fit, Parameters};
+use crate::model::{Block, Layout};
+
+/// Eigenvalues below this share of the greatest count as none.
+const NEGLIGIBLE: f64 = 1e-12;
+/// The share of a parameter that undetermined directions must hold for it to be named.
+const NAMED: f64 = 0.05;
+/// A deviation above this share of the prior's has hardly fallen.
+const HARDLY: f64 = 0.9;
+
+impl Case<'_> {
+    /// How much of what was learned the rows determine.
+    pub(super) fn determined(&self, fit: &Fit) -> Parameters {
+        let layout = &*fit.belief.layout;
+        let free = self.undetermined(fit);
+        let mut undetermined = Vec::new();
+        if free.ncols() > 0 {
+            undetermined.push(self.gauge(layout, &free));
+        }
+        undetermined.extend(self.hardly(fit, &free));
+        Parameters { learned: layout.dimension(), rank: layout.dimension() - free.ncols(), undetermined }
+    }
+
+    /// An orthonormal basis of what no row tells (m × k).
+    fn undetermined(&self, fit: &Fit) -> DMatrix<f64> {
+        let belief = &fit.belief;
+        let m = belief.layout.dimension();
+        let mut information = DMatrix::zeros(m, m);
+        for row in fit.rows.iter().map(|row| &self.rows[*row]) {
+            let rows = belief.rig.equations_of(&belief.state, &belief.layout, &row.positions, &row.observation).rows;
+            information += &rows * rows.transpose();
+        }
+        let scale = information.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 1.0 });
+        let scaled = information.component_mul(&(&scale * scale.transpose()));
+        if !scaled.iter().all(|x| x.is_finite()) {
+            return DMatrix::zeros(m, 0);
+        }
+        let eigen = SymmetricEigen::new(scaled);
+        let greatest = eigen.eigenvalues.amax().max(f64::MIN_POSITIVE);
+        let free: Vec<_> = (0..m)
+            .filter(|k| eigen.eigenvalues[*k] < NEGLIGIBLE * greatest)
+            .map(|k| eigen.eigenvectors.column(k).component_mul(&scale))
+            .collect();
+        if free.is_empty() { DMatrix::zeros(m, 0) } else { DMatrix::from_columns(&free).qr().q() }
+    }
+
+    fn gauge(&self, layout: &Layout, free: &DMatrix<f64>) -> String {
+        let count = free.ncols();
+        let share = |coordinate: usize| free.row(coordinate).norm_squared();
+        let named = layout.blocks().filter(|(_, range)| range.clone().any(|coordinate| share(coordinate) > NAMED));
+        let names = listed(named.map(|(block, _)| self.names.block(block)).collect());
+        let (directions, they) = if count == 1 { ("direction", "it moves") } else { ("directions", "they move") };
+        format!(
+            "{count} {directions} among the {} parameters cannot be told by these rows, and stay as described: {they} {names} so \
+             that nothing that was measured changes",
+            layout.dimension()
+        )
+    }
+
+    /// Blocks of which every coordinate is known hardly better than before.
+    fn hardly(&self, fit: &Fit, free: &DMatrix<f64>) -> Option<String> {
+        let layout = &*fit.belief.layout;
+        let covariance = fit.belief.covariance.as_ref()?;
+        let prior = self.deviations(layout);
+        let share = |coordinate: usize| covariance[(coordinate, coordinate)].sqrt() / prior[coordinate];
+        let is_told = |coordinate: usize| free.ncols() > 0 && free.row(coordinate).norm_squared() > NAMED;
+        let hardly = |(block, range): (Block, std::ops::Range<usize>)| {
+            let untold = range.clone().all(|coordinate| share(coordinate) > HARDLY) && !range.clone().all(is_told);
+            untold.then(|| self.names.block(block))
+        };
+        let names: Vec<String> = layout.blocks().filter_map(hardly).collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "these rows say next to nothing of {}: what is known has hardly grown beyond the prior; add rows in which the \
+                 joints behind it move farther",
+                listed(names)
+            )
+        })
+    }
+}
+
+/// "a, b and c".
+pub fn listed(mut names: Vec<String>) -> String {
+    match names.pop() {
+        Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),
+        Some(last) => last,
+        None => String::new(),
+    }
+}

@@ -1,0 +1,160 @@
+//! `calibrate`: a robot's description and a table in, a corrected description and a report out.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Mutex,
+};
+
+use anyhow::{Context, Result};
+use body_schema::calibration::{self, Calibration, Case, Figures, File, Options, Progress, Report, report};
+use indicatif::ProgressBar;
+
+use super::{load_scenario, output, progress};
+
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The path of a calibration file (`body-schema init` writes one), or a built-in scenario with measured data
+    #[arg(value_name = "FILE")]
+    file: String,
+    /// Hold every row out once, in K folds, whatever the file holds out: fold f holds out rows f, f + K, …
+    #[arg(long, value_name = "K")]
+    folds: Option<usize>,
+    /// Also choose the N most informative training rows one by one, and set them beside 20 random orders
+    #[arg(long, value_name = "N")]
+    active: Option<usize>,
+    /// Write the files to DIR [default: NAME-calibration; with `--json -` none]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write the report as JSON to FILE as well, or to standard output for `-`
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// One bar for each stage.
+#[derive(Default)]
+struct Bars(Mutex<Option<ProgressBar>>);
+
+impl Bars {
+    fn bar(&self) -> std::sync::MutexGuard<'_, Option<ProgressBar>> {
+        // A bar is only a bar: one left by a thread that panicked still is.
+        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    fn finish(&self) {
+        if let Some(bar) = self.bar().take() {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Progress for Bars {
+    fn stage(&self, what: &str, steps: u64) {
+        self.finish();
+        *self.bar() = Some(progress::bar(steps, what));
+    }
+
+    fn tick(&self) {
+        if let Some(bar) = &*self.bar() {
+            bar.inc(1);
+        }
+    }
+}
+
+pub fn calibrate(arguments: &Arguments) -> Result<()> {
+    let scenario = load_scenario(&arguments.file)?;
+    scenario.check_prior()?;
+    let case = Case::new(&scenario)?;
+    let doubts = scenario.examine().map(|examination| examination.doubts).unwrap_or_default();
+    for doubt in &doubts {
+        eprintln!("warning: {doubt}");
+    }
+    let bars = Bars::default();
+    let options = Options { folds: arguments.folds, active: arguments.active };
+    let found = calibration::calibrate(&case, &options, &bars);
+    bars.finish();
+    let found = found?;
+    let to_stdout = arguments.json.as_deref().is_some_and(output::is_stdout);
+    let folder = match &arguments.out {
+        Some(folder) => Some(folder.clone()),
+        None if to_stdout => None,
+        None => Some(PathBuf::from(format!("{}-calibration", scenario.name))),
+    };
+    let mut written = Vec::new();
+    if let Some(folder) = &folder {
+        written = write(folder, &found, &case)?;
+    }
+    if let Some(path) = &arguments.json {
+        output::write_json(path, &found.report)?;
+    }
+    if to_stdout {
+        return Ok(());
+    }
+    summarise(&found.report)?;
+    for path in written.iter().chain(&arguments.json) {
+        output::say(format!("wrote {}", path.display()))?;
+    }
+    Ok(())
+}
+
+/// Writes all files below a folder, and tells those that lie in it.
+fn write(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<PathBuf>> {
+    let mut told = Vec::new();
+    for File { path, text } in found.files(case)?.into_iter().chain(report::files(found, case)) {
+        let place = folder.join(&path);
+        let parent = place.parent().unwrap_or(folder);
+        std::fs::create_dir_all(parent).with_context(|| {
+            format!("cannot create {}; name a folder that may be written to with --out", parent.display())
+        })?;
+        std::fs::write(&place, text).with_context(|| {
+            format!("cannot write {}; name a folder that may be written to with --out", place.display())
+        })?;
+        if !path.contains('/') && !path.ends_with(".svg") {
+            told.push(place);
+        }
+    }
+    Ok(told)
+}
+
+fn summarise(report: &Report) -> Result<()> {
+    output::say(format!(
+        "{}: {} rows, {} learned from; held out: {}",
+        report.scenario, report.rows, report.training_rows, report.held_out_by
+    ))?;
+    let mut rows = Vec::new();
+    if let Some(held_out) = &report.held_out {
+        rows.push(line("held out, as described", &held_out.before));
+        rows.push(line("held out, calibrated", &held_out.after));
+        if held_out.full_model != held_out.after {
+            rows.push(line("held out, fuller model", &held_out.full_model));
+        }
+    }
+    rows.push(line("learned from, as described", &report.training.before));
+    rows.push(line("learned from, calibrated", &report.training.after));
+    let unit = report.training.after.unit();
+    let [mean, rms, max] = ["mean", "rms", "max"].map(|name| format!("{name} ({unit})"));
+    output::say(output::table(["errors", "readings", &mean, &rms, &max, "mean (deg)"], rows))?;
+    for said in &report.parameters.undetermined {
+        output::say(said)?;
+    }
+    if !report.outliers.is_empty() {
+        let lines: Vec<String> = report.outliers.iter().take(8).map(|outlier| outlier.line.to_string()).collect();
+        let more = if report.outliers.len() > lines.len() { ", …" } else { "" };
+        output::say(format!(
+            "{} rows are likelier outliers than not: lines {}{more}",
+            report.outliers.len(),
+            lines.join(", ")
+        ))?;
+    }
+    output::say(&report.more_rows.said)
+}
+
+fn line(name: &str, figures: &Figures) -> [String; 6] {
+    let (rms, max) = match figures.unit() {
+        "px" => (figures.rms_px, figures.max_px),
+        "deg" => (figures.rms_deg, figures.max_deg),
+        _ => (figures.rms_mm, figures.max_mm),
+    };
+    let [mean, rms, max] = [figures.mean(), rms, max].map(|value| output::number(value, 2));
+    let deg = output::number(figures.mean_deg, 3);
+    [name.to_owned(), figures.readings.to_string(), mean, rms, max, deg]
+}

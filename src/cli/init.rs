@@ -1,0 +1,82 @@
+//! `init`: a first calibration file from a URDF and a table.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use body_schema::calibration::{Sources, begin};
+
+use super::{BadInput, input::read_text, output};
+
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The robot's description
+    #[arg(value_name = "URDF")]
+    urdf: PathBuf,
+    /// The table: a line of titles, then one line per posture
+    #[arg(value_name = "CSV")]
+    csv: PathBuf,
+    /// The link that stands still [default: the one that hangs on nothing]
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+    /// The link that carries the targets [default: the end of the longest chain whose joints all have columns]
+    #[arg(long, value_name = "LINK")]
+    tip: Option<String>,
+    /// Write to FILE, or to standard output for `-` [default: the table's name, with .toml]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+pub fn init(arguments: &Arguments) -> Result<()> {
+    let read = |what: &str, path: &Path| {
+        read_text(path).map_err(|error| BadInput(format!("the {what} {} {error}", path.display())))
+    };
+    let (urdf, table) = (read("URDF", &arguments.urdf)?, read("table", &arguments.csv)?);
+    let out = arguments.out.clone().unwrap_or_else(|| arguments.csv.with_extension("toml"));
+    let to_stdout = output::is_stdout(&out);
+    if !to_stdout && out.exists() {
+        return Err(BadInput(format!(
+            "{} is there already; remove it, or name another file with --out",
+            out.display()
+        ))
+        .into());
+    }
+    let stem = if to_stdout { &arguments.csv } else { &out };
+    let begun = begin(&Sources {
+        name: &name(stem),
+        urdf_file: &beside(&arguments.urdf, &out),
+        urdf: &urdf,
+        table_file: &beside(&arguments.csv, &out),
+        table: &table,
+        base: arguments.base.as_deref(),
+        tip: arguments.tip.as_deref(),
+    });
+    let begun = begun.map_err(|error| BadInput(error.to_string()))?;
+    if to_stdout {
+        return output::say(begun.text.trim_end());
+    }
+    std::fs::write(&out, &begun.text).with_context(|| format!("cannot write {}", out.display()))?;
+    for guess in &begun.guesses {
+        output::say(guess)?;
+    }
+    output::say(format!("wrote {}; look it over, then: body-schema calibrate {}", out.display(), out.display()))
+}
+
+/// What the calibration is called: letters, digits and what else a name may have.
+fn name(file: &Path) -> String {
+    let stem = file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let name: String =
+        stem.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
+    if name.is_empty() { "robot".to_owned() } else { name }
+}
+
+/// How a file is named from another's folder: by its name where it lies there, else by its whole path.
+fn beside(file: &Path, other: &Path) -> String {
+    let folder = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
+        folder.canonicalize().unwrap_or(folder)
+    };
+    let (here, there) = (folder(file), folder(other));
+    let name = file.file_name().map(PathBuf::from).unwrap_or_default();
+    let path = here.strip_prefix(&there).map_or_else(|_| here.join(&name), |below| below.join(&name));
+    path.to_string_lossy().into_owned()
+}

@@ -1,0 +1,263 @@
+//! Calibration as a user meets it: files in, files out.
+#![cfg(feature = "app")]
+
+use std::{
+    path::Path,
+    process::{Command, Output},
+    sync::Arc,
+};
+
+use body_schema::{
+    calibration::{Calibration, Case, File, Options, Report, Silent, calibrate},
+    model::urdf::Urdf,
+    scenario::{Described, Scenario, builtin},
+};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+
+const TIAGO: &str = include_str!("urdf/robots/tiago.urdf");
+
+fn body_schema(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_body-schema")).args(arguments).output().expect("the program starts")
+}
+
+fn done(arguments: &[&str]) -> String {
+    let output = body_schema(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// Exit code and standard error.
+fn failure(arguments: &[&str]) -> (i32, String) {
+    let output = body_schema(arguments);
+    (output.status.code().expect("an exit code"), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// TIAGo's table with the URDF that its axes are from.
+fn tiago() -> Scenario {
+    let mut scenario = builtin("tiago-mocap").expect("built in");
+    let urdf = Urdf::parse(TIAGO).expect("a URDF");
+    let chain = urdf.chain("base_footprint", "arm_tool_link").expect("a chain");
+    scenario.robot.state.joints = chain.state().joints;
+    scenario.robot.described = Some(Arc::new(Described { file: "tiago.urdf".to_owned(), urdf, chain }));
+    scenario
+}
+
+/// Its calibration by five folds, with all files.
+fn by_folds(scenario: &Scenario) -> (Report, Vec<File>) {
+    let case = Case::new(scenario).expect("measured");
+    let found = calibrate(&case, &Options { folds: Some(5), active: None }, &Silent).expect("calibrated");
+    let files = found.files(&case).expect("writable");
+    (found.report, files)
+}
+
+fn text<'a>(files: &'a [File], path: &str) -> &'a str {
+    &files.iter().find(|file| file.path == path).unwrap_or_else(|| panic!("{path}")).text
+}
+
+fn placed(placement: &body_schema::calibration::Placement) -> Isometry3<f64> {
+    let [roll, pitch, yaw] = placement.rpy_rad;
+    let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+    Isometry3::from_parts(Translation3::from(placement.xyz_m), rotation)
+}
+
+/// The headline is the written files': read back, with base and target of the report, they miss by the same.
+#[test]
+fn the_written_urdf_predicts_what_the_report_says() {
+    let scenario = tiago();
+    let (report, files) = by_folds(&scenario);
+    let case = Case::new(&scenario).expect("measured");
+    let held_out = report.held_out.expect("folds");
+    let (mut sum, mut count) = (0.0, 0.0);
+    for fold in &held_out.folds {
+        let written = Urdf::parse(text(&files, &format!("folds/{}/calibrated.urdf", fold.fold))).expect("a URDF");
+        let chain = written.chain("base_footprint", "arm_tool_link").expect("the same chain");
+        assert_eq!(fold.targets[0].link, "arm_tool_link");
+        for row in fold.rows.iter().map(|row| &case.rows[row - 1]) {
+            let target = chain.tip_at(&row.positions) * Point3::from(fold.targets[0].xyz_m);
+            let measured = Point3::from_slice(row.observation.readings[0].as_ref().expect("seen"));
+            sum += (placed(&fold.base) * target - measured).norm() * 1e3;
+            count += 1.0;
+        }
+    }
+    assert!((sum / count - held_out.after.mean_mm.expect("lengths")).abs() < 1e-9, "{}", sum / count);
+    assert_eq!(count, 34.0);
+    assert!(text(&files, "kinematics.yaml").contains("arm_4_joint:\n    x: "));
+    assert!(text(&files, "readings.yaml").contains("kinematics:\n"));
+    assert_ne!(text(&files, "calibrated.urdf"), TIAGO);
+}
+
+/// Another library recomputes the figure from the written files, where Python (`BODY_SCHEMA_PYTHON`, or `python3`) has it:
+/// `pip install yourdfpy`.
+#[test]
+fn another_library_recomputes_the_held_out_figure() {
+    let (report, files) = by_folds(&tiago());
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("calibrated");
+    for File { path, text } in files {
+        let place = folder.join(path);
+        std::fs::create_dir_all(place.parent().expect("a folder")).expect("created");
+        std::fs::write(place, text).expect("written");
+    }
+    let python = std::env::var("BODY_SCHEMA_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let has_library = Command::new(&python).args(["-c", "import yourdfpy"]).output();
+    if !has_library.is_ok_and(|output| output.status.success()) {
+        eprintln!("{python} has no yourdfpy: not recomputed");
+        return;
+    }
+    let output = Command::new(&python)
+        .arg("tests/calibrate/held_out.py")
+        .arg(&folder)
+        .args(["scenarios/tiago-mocap.csv", "x1", "y1", "z1"])
+        .output()
+        .expect("it starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let theirs: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let after = report.held_out.expect("folds").after;
+    assert_eq!(theirs["readings"].as_u64(), Some(after.readings as u64));
+    let apart_mm = theirs["mean_mm"].as_f64().expect("a number") - after.mean_mm.expect("lengths");
+    assert!(apart_mm.abs() < 1e-3, "{apart_mm} mm");
+}
+
+/// A robot that calibrates itself by a ball in two sockets: what it learned at one place holds at the seven others, and chosen
+/// rows do with few.
+#[test]
+fn a_ball_in_two_sockets_calibrates_a_panda() {
+    let output = done(&["calibrate", "panda-sockets", "--active", "12", "--json", "-"]);
+    let report: Report = serde_json::from_str(&output).expect("JSON");
+    let held_out = report.held_out.expect("seven places");
+    let (before, after) = (held_out.before.mean_mm.expect("lengths"), held_out.after.mean_mm.expect("lengths"));
+    assert!((7.5..8.7).contains(&before) && after <= 0.40, "{before} {after}");
+    let last = report.active.last().expect("twelve");
+    let (chosen, random) = (last.active_mm.expect("judged"), last.random_median_mm.expect("judged"));
+    assert!(chosen <= 0.45 && random >= 1.4 * chosen, "{last:?}");
+}
+
+/// Other robots: held-out errors in mm that the description has at least, and that are left at most.
+#[test]
+fn held_out_errors_of_other_robots_fall() {
+    for (name, before_mm, after_mm) in [
+        ("kinova-sockets", 4.0, 3.2),
+        ("tiago-mocap-3", 4.1, 3.05),
+        ("ur10-camera", 10.0, 4.5),
+        ("talos-contact", 4.0, 0.8),
+        ("positioner", 0.40, 0.40),
+    ] {
+        let scenario = builtin(name).expect("built in");
+        let case = Case::new(&scenario).expect("measured");
+        let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
+        let held_out = found.report.held_out.as_ref().expect("held out");
+        let (before, after) = (held_out.before.mean_mm.expect("lengths"), held_out.after.mean_mm.expect("lengths"));
+        println!("{name}: {before:.3} {after:.3} {:.3}", held_out.full_model.mean_mm.expect("lengths"));
+        assert!(before > before_mm && after < after_mm, "{name}: {before} {after}");
+        assert!(!found.files(&case).expect("writable").is_empty());
+    }
+}
+
+/// Every file is there, the report says the same everywhere, and needs nothing from the network.
+#[test]
+fn a_calibration_writes_its_report() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let path = out.to_str().expect("text");
+    let said = done(&["calibrate", "tiago-mocap", "--folds", "5", "--active", "6", "--out", path]);
+    assert!(said.contains("held out, calibrated") && said.contains("report.html"), "{said}");
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
+    let report: serde_json::Value = serde_json::from_str(&read("report.json")).expect("JSON");
+    for key in ["rows", "parameters", "training", "held_out", "outliers", "base", "targets", "joints", "active"] {
+        assert!(!report[key].is_null(), "{key}");
+    }
+    for (part, figures) in [("training", ["before", "after", "after"]), ("held_out", ["before", "after", "full_model"])]
+    {
+        for figure in figures {
+            for number in ["mean_mm", "rms_mm", "max_mm"] {
+                assert!(report[part][figure][number].is_f64(), "{part}.{figure}.{number}");
+            }
+        }
+    }
+    assert_eq!(report["parameters"]["learned"], 39);
+    assert!(report["parameters"]["rank"].as_u64() < Some(39) && report["parameters"]["undetermined"][0].is_string());
+    let active = report["active"].as_array().expect("points");
+    assert_eq!(
+        active.iter().map(|point| point["rows"].as_u64()).collect::<Vec<_>>(),
+        (1..=6).map(Some).collect::<Vec<_>>()
+    );
+    for key in ["active_mm", "random_median_mm", "random_q25_mm", "random_q75_mm"] {
+        assert!(active.iter().all(|point| point[key].is_f64()), "{key}");
+    }
+    // Chosen rows are worth more than random ones once there are enough to place the robot.
+    assert!(active[5]["active_mm"].as_f64() < active[5]["random_median_mm"].as_f64(), "{active:?}");
+    assert_eq!(report["residuals"].as_array().map(Vec::len), Some(34));
+    let mean = format!("{:.2}", report["held_out"]["after"]["mean_mm"].as_f64().expect("a number"));
+    let (html, markdown) = (read("report.html"), read("report.md"));
+    assert!(html.contains(&mean) && markdown.contains(&mean) && said.contains(&mean));
+    assert!(html.contains("<svg") && markdown.contains("residuals.svg") && out.join("residuals.svg").exists());
+    for outside in ["<script", "<link", "src=", "@import", "url(http"] {
+        assert!(!html.contains(outside), "{outside}");
+    }
+    // Joints written one by one: no URDF, and the report says so.
+    assert!(!out.join("calibrated.urdf").exists() && html.contains("so none is written"));
+}
+
+#[test]
+fn with_json_on_standard_output_there_is_nothing_else() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = Command::new(env!("CARGO_BIN_EXE_body-schema"))
+        .args(["calibrate", "tiago-mocap", "--json", "-"])
+        .current_dir(folder.path())
+        .output()
+        .expect("the program starts");
+    let report: Report = serde_json::from_slice(&output.stdout).expect("JSON alone");
+    assert_eq!((report.rows, report.training_rows), (34, 27));
+    assert_eq!(report.held_out.expect("seven rows").after.readings, 7);
+    assert_eq!(std::fs::read_dir(folder.path()).expect("readable").count(), 0, "no folder that nobody asked for");
+}
+
+#[test]
+fn what_cannot_be_calibrated_is_said() {
+    for (arguments, said) in [
+        (&["calibrate", "arm-6dof"][..], "there is no table to calibrate by"),
+        (&["calibrate", "nowhere.toml"], "nowhere.toml cannot be read"),
+        (&["calibrate", "tiago-mocap", "--folds", "1"], "34 rows cannot be held out in 1 folds"),
+        (&["calibrate", "tiago-mocap", "--active", "40"], "40 rows cannot be chosen from 27 training rows"),
+    ] {
+        let (code, error) = failure(arguments);
+        assert!(code == 2 && error.contains(said), "{arguments:?}: {code} {error}");
+    }
+}
+
+/// Three rows are fitted, and the report says what they cannot tell.
+#[test]
+fn three_rows_say_what_they_cannot_tell() {
+    let scenario = tiago();
+    let mut case = Case::new(&scenario).expect("measured");
+    case.rows.truncate(3);
+    let Calibration { report, .. } =
+        calibrate(&case, &Options { folds: Some(3), active: None }, &Silent).expect("calibrated");
+    assert!(report.parameters.rank <= 9, "{:?}", report.parameters);
+    assert!(report.parameters.undetermined[0].contains("cannot be told by these rows"), "{:?}", report.parameters);
+    assert!(report.extras.iter().all(|trial| trial.inner.is_none() && !trial.kept));
+}
+
+/// A first file from a URDF and a table: what was guessed is said, and nothing is overwritten.
+#[test]
+fn init_says_what_it_guessed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
+    std::fs::write(place("tiago.urdf"), TIAGO).expect("written");
+    std::fs::copy("scenarios/tiago-mocap.csv", place("hand.csv")).expect("copied");
+    let said = done(&["init", &place("tiago.urdf"), &place("hand.csv"), "--tip", "arm_tool_link"]);
+    assert!(said.contains("base: `base_footprint`, the link that hangs on nothing"), "{said}");
+    assert!(said.contains("`marker1`: a position, from the columns x1, y1, z1"), "{said}");
+    let written = std::fs::read_to_string(place("hand.toml")).expect("written");
+    for line in ["urdf = \"tiago.urdf\"", "tip = \"arm_tool_link\"", "file = \"hand.csv\"", "folds = 5"] {
+        assert!(written.contains(line), "{line}: {written}");
+    }
+    // It is a valid file, and calibrates.
+    let report: Report = serde_json::from_str(&done(&["calibrate", &place("hand.toml"), "--json", "-"])).expect("JSON");
+    let held_out = report.held_out.expect("folds");
+    assert!(held_out.after.mean_mm < held_out.before.mean_mm, "{held_out:?}");
+    let (code, error) = failure(&["init", &place("tiago.urdf"), &place("hand.csv")]);
+    assert!(code == 2 && error.contains("is there already"), "{error}");
+    std::fs::write(place("none.csv"), "x,y,z,elbow\n1,2,3,4\n").expect("written");
+    let (code, error) = failure(&["init", &place("tiago.urdf"), &place("none.csv")]);
+    assert!(code == 2 && error.contains("title columns with the joints' names: torso_lift_joint"), "{error}");
+}
