@@ -279,7 +279,7 @@ impl Scenario {
             cameras,
             targets,
             base_learned: layout.block(Block::Base).is_some(),
-            sockets: robot.socket_descriptions(),
+            sockets: robot.socket_descriptions(world.truth().is_some()),
             body: robot.body,
         };
         Ok(Experiment::new(description, world, learners, evaluation, self.design_problem()))

@@ -322,11 +322,11 @@ impl Agent {
 
     /// How the criterion of the next movement looked over the joint box at `standpoint`, if its policy plans.
     pub fn explain(&self, standpoint: Standpoint<'_>) -> Result<Option<Search>, SelectionError> {
-        // Of manifolds there is no partition of the joint box to show.
-        match standpoint.actions {
-            Actions::Sockets(_) => Ok(None),
-            _ => self.policy.explain(&standpoint.situation(), &self.limits),
+        // Of manifolds there is no partition of the joint box to show, recorded or not.
+        if standpoint.belief.rig.holds(0).is_some() {
+            return Ok(None);
         }
+        self.policy.explain(&standpoint.situation(), &self.limits)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use rand::seq::SliceRandom;
 
+use super::{Scenario, ScenarioError};
 use crate::experiment::Stream;
 
 /// Which rows of a table are held out: they say how good a model is on data that it has not seen, and touch nothing else.
@@ -57,6 +58,25 @@ impl HeldOut {
         let mut is_held_out = vec![false; self.rows];
         held_out.iter().for_each(|row| is_held_out[*row] = true);
         (0..self.rows).partition(|row| !is_held_out[*row])
+    }
+}
+
+impl Scenario {
+    /// The same with its table held out in so many folds, whatever its file holds out; sockets that nobody learned from are
+    /// learned from in most folds then.
+    ///
+    /// # Errors
+    ///
+    /// Where the table has fewer rows than folds, or there is no table.
+    pub fn in_folds(&self, folds: usize) -> Result<Self, ScenarioError> {
+        let (mut document, file) =
+            (self.source.parse::<toml::Table>().unwrap_or_default(), format!("{}.toml", self.name));
+        if let Some(measurements) = document.get_mut("measurements").and_then(toml::Value::as_table_mut) {
+            measurements.remove("held_out");
+        }
+        let folds = i64::try_from(folds).unwrap_or(i64::MAX);
+        document.insert("held_out".to_owned(), toml::Table::from_iter([("folds".to_owned(), folds.into())]).into());
+        Self::parse(&file, &document.to_string(), &|file| self.data_file(file))
     }
 }
 

@@ -85,11 +85,12 @@ impl Scenario {
 }
 
 impl super::Robot {
-    pub(crate) fn socket_descriptions(&self) -> Vec<SocketDescription> {
+    /// The sockets, and where a known truth has them.
+    pub(crate) fn socket_descriptions(&self, is_true: bool) -> Vec<SocketDescription> {
         let of = |socket: &super::SocketSpec, held_out| SocketDescription {
             name: socket.name.clone(),
             place: socket.place.clone(),
-            at_m: Some(socket.at.into()),
+            at_m: is_true.then(|| socket.at.into()),
             held_out,
         };
         let learned = self.sockets.iter().map(|socket| of(socket, false));

@@ -138,8 +138,9 @@ impl Channel for Pixels {
         let into_eye = eye.rotation.inverse().to_rotation_matrix();
         let own = pass.layout().block(Block::Intrinsics(self.camera));
         let (m, weight) = (of_eye.ncols(), self.sigma_px.recip());
-        let pictures = reading.chunks_exact_mut(2).zip(rows.chunks_exact_mut(2 * m));
-        for (point, (picture, rows)) in self.points.iter().zip(pictures) {
+        // Nothing may be learned: then there are no rows to cut into pieces.
+        for (k, (point, picture)) in self.points.iter().zip(reading.chunks_exact_mut(2)).enumerate() {
+            let rows = &mut rows[2 * m * k..2 * m * (k + 1)];
             let x = body * point;
             let from_eye = x.coords - eye.translation.vector;
             let Seen { at, slope, picture: found } = Self::see(&lens, &(into_eye * from_eye));

@@ -107,7 +107,7 @@ impl Channel for Pose {
         Self::write(&pass.pose(frame), reading);
         let twists = pass.frame_twists(frame);
         let weights = [self.sigma_m.recip(), self.sigma_rad.recip()];
-        for (row, columns) in rows.chunks_exact_mut(twists.ncols()).enumerate() {
+        for (row, columns) in rows.chunks_exact_mut(twists.ncols().max(1)).enumerate() {
             columns.iter_mut().zip(twists.row(row).iter()).for_each(|(to, x)| *to = x * weights[row / 3]);
         }
         true

@@ -138,6 +138,14 @@ fn arms_with_gears_stand_as_reported() {
     recorded("arm-6dof-pose-gears", 4);
 }
 
+/// Rows of poses, of positions and of what was held in sockets, of robots that a URDF describes.
+#[test]
+fn robots_of_descriptions_stand_as_reported() {
+    for name in ["panda-sockets", "ur10-camera", "positioner", "tiago-mocap-3"] {
+        recorded(name, 4);
+    }
+}
+
 #[test]
 fn a_long_recording_with_a_camera_is_small() {
     let text = builtin("arm-6dof-camera").unwrap().source;

@@ -68,7 +68,7 @@ impl Check<'_> {
                 }
             }
         }
-        let held = self.learned(raw, &names);
+        let (held, partly) = self.learned(scenario, &names);
         learned.resize(names.len(), true);
         learned.iter_mut().zip(held).for_each(|(learned, held)| *learned &= held);
         if names.is_empty() {
@@ -87,7 +87,8 @@ impl Check<'_> {
         outfit.equip(&mut state);
         blocks.extend(outfit.known.iter().map(|(block, _)| *block));
         blocks.extend(raw.learn_marker.then_some(Block::Target(0)));
-        let Outfit { mut equipment, known, .. } = outfit;
+        let Outfit { mut equipment, mut known, .. } = outfit;
+        known.extend(partly);
         if equipment.targets.is_empty() {
             let (name, points) = ("marker".to_owned(), vec![Point3::origin()]);
             equipment.targets.push(TargetKind { name, points, facing: None });

@@ -5,10 +5,13 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use toml::Spanned;
 
-use super::{Check, raw};
+use super::{Check, equipment::EXACTLY, raw};
 use crate::{
-    model::urdf::{Chain, Urdf, UrdfError},
-    scenario::{Described, error::similar},
+    model::{
+        Block,
+        urdf::{Chain, Urdf, UrdfError},
+    },
+    scenario::{Described, Known, error::similar},
 };
 
 /// What links are called: by the joints that move them, or by a description.
@@ -110,21 +113,31 @@ impl Check<'_> {
         Some(Arc::new(Described { file: name, urdf, chain }))
     }
 
-    /// By joint, whether it is learned: all that are not held.
-    pub(super) fn learned(&mut self, raw: &raw::Robot, names: &[String]) -> Vec<bool> {
-        let mut learned = vec![true; names.len()];
-        for held in &raw.hold {
-            match names.iter().position(|name| name == held.get_ref()) {
-                Some(joint) => learned[joint] = false,
-                None => {
-                    let mend = match similar(held.get_ref(), names.iter().map(String::as_str)) {
-                        Some(known) => format!("did you mean `{known}`?"),
-                        None => format!("write some of {}", names.join(", ")),
-                    };
-                    self.problem(held.span(), "robot.hold", format!("there is no joint `{}`", held.get_ref()), mend);
-                }
+    /// By joint, whether it is learned: all that are not held. An axis of which `joint.direction` or `joint.point` is held is
+    /// learned, with that known.
+    pub(super) fn learned(&mut self, scenario: &raw::Scenario, names: &[String]) -> (Vec<bool>, Vec<(Block, Known)>) {
+        let prior = scenario.prior.get_ref();
+        let (point_m, direction_rad) = (*prior.point_m.get_ref(), *prior.direction_rad.get_ref());
+        let (mut learned, mut known) = (vec![true; names.len()], Vec::new());
+        for held in &scenario.robot.hold {
+            let given = held.get_ref();
+            let joint = |name: &str| names.iter().position(|joint| joint == name);
+            let within = |length_m, angle_rad| Known::Within { length_m, angle_rad, other: EXACTLY };
+            let part = |end: &str| given.strip_suffix(end).and_then(joint);
+            if let Some(joint) = joint(given) {
+                learned[joint] = false;
+            } else if let Some(joint) = part(".direction") {
+                known.push((Block::Axis(joint), within(point_m, EXACTLY)));
+            } else if let Some(joint) = part(".point") {
+                known.push((Block::Axis(joint), within(EXACTLY, direction_rad)));
+            } else {
+                let mend = match similar(given, names.iter().map(String::as_str)) {
+                    Some(known) => format!("did you mean `{known}`?"),
+                    None => format!("write some of {}, or `….direction` or `….point` of one", names.join(", ")),
+                };
+                self.problem(held.span(), "robot.hold", format!("there is no joint `{given}`"), mend);
             }
         }
-        learned
+        (learned, known)
     }
 }

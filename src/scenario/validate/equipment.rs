@@ -13,7 +13,7 @@ use crate::{
 /// How far from the direction that it faces a target is seen, unless the file says otherwise, degrees.
 const FACING_WITHIN_DEG: f64 = 80.0;
 /// How well what is said to be known is known in the other respect.
-const EXACTLY: f64 = 1e-6;
+pub(super) const EXACTLY: f64 = 1e-6;
 
 /// Base, targets, cameras, and how well their places are known where they are learned.
 #[derive(Default)]

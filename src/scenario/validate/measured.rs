@@ -60,7 +60,7 @@ impl Check<'_> {
             let labels: BTreeSet<&String> = labels.collect();
             Ok(Columns {
                 joints: columns.iter().map(|column| column.find(titles)).collect::<Result<_, TableError>>()?,
-                readings: self_readings(raw, robot, titles)?,
+                readings: readings(raw, robot, titles)?,
                 labels: labels.into_iter().map(|title| titles.label(title)).collect::<Result<_, _>>()?,
             })
         };
@@ -137,7 +137,7 @@ impl JointColumn {
 }
 
 /// The columns of every sensor.
-fn self_readings(raw: &raw::Scenario, robot: &Robot, titles: &Titles) -> Result<Vec<Reading>, TableError> {
+fn readings(raw: &raw::Scenario, robot: &Robot, titles: &Titles) -> Result<Vec<Reading>, TableError> {
     let marker = raw.measurements.as_ref().and_then(|given| given.get_ref().marker_columns_m.as_ref());
     if let Some(columns) = marker {
         return Ok(vec![titles.reading_titled(Layout::Position, &columns.get_ref().0)?]);
