@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector};
 
 use super::{CalibrationError, Case, figures::mean};
 use crate::{
@@ -57,26 +57,8 @@ const SEED: u64 = 1;
 impl Case<'_> {
     /// What explains `rows`, as far as `layout` can, from a start near which it is to be found; without one it is searched for
     /// wherever the prior allows.
-    ///
-    /// Targets on one hand miss together where the chain before them does. Three of them are then not three times the
-    /// evidence: the noise is taken to be as much larger as the [design effect](Self::design_effect) of a row says.
     pub fn fit(&self, layout: &Layout, rows: &[usize], near: Option<&State>) -> Result<Fit, CalibrationError> {
-        let fit = self.fit_with(layout, rows, near, None)?;
-        let Some(effect) = self.design_effect(&fit) else { return Ok(fit) };
-        let mut together = self.fit_with(layout, rows, Some(fit.state()), Some((&fit, effect)))?;
-        together.noise = fit.noise;
-        together.belief.model_error_m = fit.belief.model_error_m;
-        Ok(together)
-    }
-
-    fn fit_with(
-        &self,
-        layout: &Layout,
-        rows: &[usize],
-        near: Option<&State>,
-        effect: Option<(&Fit, f64)>,
-    ) -> Result<Fit, CalibrationError> {
-        let mut smoother = self.smoother(layout, near.is_none(), effect)?;
+        let mut smoother = self.smoother(layout, near.is_none())?;
         let movements: Vec<_> = rows.iter().map(|row| &self.rows[*row]).collect();
         let movements: Vec<_> = movements.iter().map(|row| (row.positions.as_slice(), &row.observation)).collect();
         let starts = match near {
@@ -94,49 +76,12 @@ impl Case<'_> {
         })
     }
 
-    /// By how much the variance of the sum of a row's residuals exceeds that of independent ones (Kish 1965),
-    ///
-    /// ```text
-    /// Σ ‖Σⱼ rᵢⱼ‖² / Σ Σⱼ ‖rᵢⱼ‖²      rᵢⱼ the whitened residual of target j in row i
-    /// ```
-    ///
-    /// `None` where rows have one reading, readings are of several kinds, or they miss independently.
-    fn design_effect(&self, fit: &Fit) -> Option<f64> {
-        let (mut of_sums, mut sum_of, mut most) = (0.0, 0.0, 0);
-        for row in fit.rows.iter().map(|row| &self.rows[*row]) {
-            let (mut sum, mut count) = (Vector3::zeros(), 0);
-            let mut is_alike = true;
-            fit.belief.rig.residuals(fit.state(), &row.positions, &row.observation, |channel, whitened| {
-                if self.rig.channels()[channel].target().is_none() || whitened.len() != 3 {
-                    is_alike = false;
-                    return;
-                }
-                let residual = Vector3::from_column_slice(whitened);
-                sum += residual;
-                sum_of += residual.norm_squared();
-                count += 1;
-            });
-            if !is_alike {
-                return None;
-            }
-            of_sums += sum.norm_squared();
-            most = most.max(count);
-        }
-        let effect = of_sums / sum_of;
-        (self.scenario.smoother.noise_unknown && most > 1 && effect > 1.0).then_some(effect)
-    }
-
     /// The chain as described with base, targets, cameras and sockets where `rows` put them.
     pub fn nominal(&self, rows: &[usize]) -> Result<Fit, CalibrationError> {
         self.fit(&self.placing(), rows, None)
     }
 
-    fn smoother(
-        &self,
-        layout: &Layout,
-        searches: bool,
-        effect: Option<(&Fit, f64)>,
-    ) -> Result<Smoother, CalibrationError> {
+    fn smoother(&self, layout: &Layout, searches: bool) -> Result<Smoother, CalibrationError> {
         let deviations = self.deviations(layout);
         let covariance = DMatrix::from_diagonal(&deviations.map(|sd| sd * sd));
         let within = |block: Block| match self.scenario.prior.of(block) {
@@ -151,16 +96,9 @@ impl Case<'_> {
             self.scenario.smoother.noise_unknown
                 && self.rig.channels()[noise.channel].occasion() != Occasion::Beforehand
         };
-        let unknown = self.rig.noises().iter().map(|noise| effect.is_none() && is_unknown(noise)).collect();
-        let rig = match effect {
-            None => self.rig.clone(),
-            Some((fit, effect)) => {
-                let scales: Vec<f64> = fit.noise.iter().map(|noise| noise.scale * effect.sqrt()).collect();
-                Arc::new(self.rig.scaled(&scales))
-            }
-        };
+        let unknown = self.rig.noises().iter().map(is_unknown).collect();
         let rng = Stream::Hypotheses.rng(SEED);
-        let smoother = Smoother::new(prior, Arc::new(layout.clone()), rig, settings, rng)
+        let smoother = Smoother::new(prior, Arc::new(layout.clone()), self.rig.clone(), settings, rng)
             .with_loss(self.loss)
             .with_unknown_noise(unknown)
             .never_forgetting();
