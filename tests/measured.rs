@@ -281,6 +281,9 @@ fn pairs_of_places_and_sockets_are_sockets() {
     let folds = scenario.in_folds(3).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((folds.robot.sockets.len(), folds.robot.held_out_sockets.len()), (6, 0));
     assert!(scenario.in_folds(13).is_err(), "of 12 rows");
+    // A seed may draw any row, so that every socket may be learned from.
+    let drawn = valid(&format!("{LEAST}[held_out]\ncount = 7\n"), &csv);
+    assert_eq!((drawn.robot.sockets.len(), drawn.robot.held_out_sockets.len()), (6, 0));
     // A distance is between two.
     let three = csv.replace(",b,1", ",a,1").replace(",c,0", ",a,2");
     let found = problem(&format!("{LEAST}[sockets]\ndistance_m = 0.05\n"), &three);

@@ -3,7 +3,7 @@
 use super::{Check, measured::SocketColumns, raw, sockets::unguessed};
 use crate::{
     model::{Block, Layout},
-    scenario::{HeldOut, Measurements, Robot, SocketSpec},
+    scenario::{HeldOut, HeldOutRule, Measurements, Robot, SocketSpec},
     sensing::{Observation, Spacing},
 };
 
@@ -34,7 +34,8 @@ impl Check<'_> {
             let of = |title: &String| rows.labels[title][row].clone();
             (columns.place.as_ref().map(of), of(&columns.socket))
         };
-        let mut is_trained = vec![false; rows.rows()];
+        // What seeds draw may be any row.
+        let mut is_trained = vec![matches!(held_out.rule, HeldOutRule::Count(_)); rows.rows()];
         held_out.folds().iter().flat_map(|(training, _)| training).for_each(|row| is_trained[*row] = true);
         let order =
             (0..rows.rows()).filter(|row| is_trained[*row]).chain((0..rows.rows()).filter(|row| !is_trained[*row]));
@@ -110,5 +111,4 @@ fn complete_observations(rows: &mut Measurements, robot: &Robot, distance_m: f64
         known.readings.resize(sensors + sockets + spacings, Some(vec![distance_m]));
         rows.beforehand = Some(known);
     }
-    rows.readings.resize(sensors, String::new());
 }
