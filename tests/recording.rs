@@ -121,7 +121,7 @@ fn the_entities_are_the_documented_ones() {
         expected.push(format!("/{learner}"));
         expected.extend(entities.iter().map(|entity| format!("/{learner}/{entity}")));
         for metric in
-            "orientation_deg axis_deg location_m prediction_m prediction_mean_m expected_prediction_m trace bound_trace nis \
+            "orientation_deg axis_deg location_m prediction_m prediction_mean_m scatter_m expected_prediction_m trace bound_trace nis \
                        nis_dof nees nees_dof movements misses settled selection_ms criterion gain evaluations"
                 .split_whitespace()
         {
