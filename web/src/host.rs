@@ -158,7 +158,7 @@ pub enum Live {
     /// The first; the session's resource has said it already.
     Description(serde::de::IgnoredAny),
     /// A step.
-    Step(StepReport),
+    Step(Box<StepReport>),
 }
 
 /// What the page is to do.

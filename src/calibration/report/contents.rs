@@ -109,9 +109,12 @@ fn same(one: &Figures, other: &Figures) -> bool {
     one == other
 }
 
+/// What stands in a column: mean, root mean square and greatest.
+type Column = fn(&Figures) -> [Option<f64>; 3];
+
 fn figures<'a>(document: &mut Document, rows: impl Iterator<Item = (&'a str, &'a Figures)>) {
     let rows: Vec<_> = rows.collect();
-    let columns: [(&str, fn(&Figures) -> [Option<f64>; 3]); 3] = [
+    let columns: [(&str, Column); 3] = [
         ("mm", |it| [it.mean_mm, it.rms_mm, it.max_mm]),
         ("deg", |it| [it.mean_deg, it.rms_deg, it.max_deg]),
         ("px", |it| [it.mean_px, it.rms_px, it.max_px]),

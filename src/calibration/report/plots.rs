@@ -150,6 +150,9 @@ fn by_number(report: &Report, unit: &str) -> Option<Panel> {
     })
 }
 
+/// A joint's correction and its standard deviation, by coordinate.
+type Correction = fn(&crate::calibration::Joint) -> ([f64; 3], [f64; 3]);
+
 fn corrections(report: &Report) -> Option<Part> {
     if !report.joints.iter().any(|joint| joint.learned) {
         return None;
@@ -157,7 +160,7 @@ fn corrections(report: &Report) -> Option<Part> {
     let axes = ["x", "y", "z"];
     let colours = [learner_color(1), learner_color(2), learner_color(0)];
     let markers = [Marker::Triangle, Marker::Square, Marker::Circle];
-    let panel = |title: &str, label: &str, of: &dyn Fn(&crate::calibration::Joint) -> ([f64; 3], [f64; 3])| {
+    let panel = |title: &str, label: &str, of: Correction| {
         let (mut layers, mut extent) = (vec![Layer::Level { y: 0.0, label: String::new() }], vec![0.0]);
         for k in 0..3 {
             let mut points = Vec::new();
@@ -189,8 +192,8 @@ fn corrections(report: &Report) -> Option<Part> {
         subtitle: "in the base link's frame with all joints at 0; bars are one standard deviation".to_owned(),
         legend: (0..3).map(|k| (axes[k].to_owned(), Style::points(markers[k], colours[k]))).collect(),
         rows: vec![vec![
-            panel("shift of the axis", "shift (mm)", &|joint| (joint.shift_mm, joint.shift_sd_mm)),
-            panel("turn of the axis", "turn (deg)", &|joint| (joint.turn_deg, joint.turn_sd_deg)),
+            panel("shift of the axis", "shift (mm)", |joint| (joint.shift_mm, joint.shift_sd_mm)),
+            panel("turn of the axis", "turn (deg)", |joint| (joint.turn_deg, joint.turn_sd_deg)),
         ]],
         notes: Vec::new(),
     };
