@@ -4,13 +4,11 @@
 //! greatest are told by no row: the estimate stays there where the description has it. Beside these stand parameters that the
 //! rows tell so little of that their deviation has hardly fallen from the prior's.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
 
 use super::{Case, Fit, Parameters};
-use crate::model::{Block, Layout};
+use crate::model::{Block, Layout, null_space};
 
-/// Eigenvalues below this share of the greatest count as none.
-const NEGLIGIBLE: f64 = 1e-12;
 /// The share of a parameter that undetermined directions must hold for it to be named.
 const NAMED: f64 = 0.05;
 /// A deviation above this share of the prior's has hardly fallen.
@@ -38,18 +36,7 @@ impl Case<'_> {
             let rows = belief.rig.equations_of(&belief.state, &belief.layout, &row.positions, &row.observation).rows;
             information += &rows * rows.transpose();
         }
-        let scale = information.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 1.0 });
-        let scaled = information.component_mul(&(&scale * scale.transpose()));
-        if !scaled.iter().all(|x| x.is_finite()) {
-            return DMatrix::zeros(m, 0);
-        }
-        let eigen = SymmetricEigen::new(scaled);
-        let greatest = eigen.eigenvalues.amax().max(f64::MIN_POSITIVE);
-        let free: Vec<_> = (0..m)
-            .filter(|k| eigen.eigenvalues[*k] < NEGLIGIBLE * greatest)
-            .map(|k| eigen.eigenvectors.column(k).component_mul(&scale))
-            .collect();
-        if free.is_empty() { DMatrix::zeros(m, 0) } else { DMatrix::from_columns(&free).qr().q() }
+        null_space(&information)
     }
 
     fn gauge(&self, layout: &Layout, free: &DMatrix<f64>) -> String {

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use crate::{
     design::{General, general_movements},
     kinematics::JointBox,
-    model::{Layout, State},
+    model::{Layout, State, null_space},
     sensing::Rig,
 };
 
@@ -29,9 +29,6 @@ pub struct Gauge {
     undetermined: usize,
 }
 
-/// Eigenvalues of the scaled information HᵀH below this share of the greatest count as none: singular values of H below a
-/// millionth.
-const NEGLIGIBLE: f64 = 1e-12;
 const STEPS: usize = 30;
 
 impl Gauge {
@@ -75,21 +72,7 @@ impl Gauge {
             let rows = rig.jacobian(state, &self.layout, posture);
             information += &rows * rows.transpose();
         }
-        let scale = information.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 1.0 });
-        let scaled = information.component_mul(&(&scale * scale.transpose()));
-        if !scaled.iter().all(|x| x.is_finite()) {
-            return DMatrix::zeros(m, 0);
-        }
-        let eigen = SymmetricEigen::new(scaled);
-        let greatest = eigen.eigenvalues.amax().max(f64::MIN_POSITIVE);
-        let free: Vec<DVector<f64>> = (0..m)
-            .filter(|k| eigen.eigenvalues[*k] < NEGLIGIBLE * greatest)
-            .map(|k| eigen.eigenvectors.column(k).component_mul(&scale))
-            .collect();
-        if free.is_empty() {
-            return DMatrix::zeros(m, 0);
-        }
-        DMatrix::from_columns(&free).qr().q()
+        null_space(&information)
     }
 
     /// The member of the truth's family that is nearest to `estimate`; the truth itself where all is determined, and as near

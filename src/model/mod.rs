@@ -27,7 +27,7 @@ pub use layout::{Layout, Quantity};
 pub use manifold::Manifold;
 pub use pass::{Frame, Motion, Pass, jacobian};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
-pub use rank::rank;
+pub use rank::{null_space, rank};
 pub use state::{Correction, Device, Hand, Place, State, Target};
 pub use workspace::{Workspace, best_motion};
 

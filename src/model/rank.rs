@@ -1,6 +1,6 @@
-//! How many independent equations there are.
+//! How many independent equations there are, and what they leave open.
 
-use nalgebra::{DMatrix, SVD};
+use nalgebra::{DMatrix, DVector, SVD, SymmetricEigen};
 
 /// Singular values of the scaled Jacobian below this share of the greatest count as none.
 const NEGLIGIBLE: f64 = 1e-7;
@@ -20,6 +20,28 @@ pub fn rank(h: &DMatrix<f64>) -> usize {
     let singular = SVD::new(scaled, false, false).singular_values;
     let greatest = singular.amax();
     singular.iter().filter(|value| greatest > 0.0 && **value > NEGLIGIBLE * greatest).count()
+}
+
+/// Eigenvalues of the scaled information HᵀH below this share of the greatest count as none: singular values of H below a
+/// millionth.
+const NO_INFORMATION: f64 = 1e-12;
+
+/// N, an orthonormal basis of what an information (m × m) does not determine (m × k), found with its diagonal scaled to 1;
+/// without columns where the information is no number.
+pub fn null_space(information: &DMatrix<f64>) -> DMatrix<f64> {
+    let m = information.nrows();
+    let scale = information.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 1.0 });
+    let scaled = information.component_mul(&(&scale * scale.transpose()));
+    if !scaled.iter().all(|x| x.is_finite()) {
+        return DMatrix::zeros(m, 0);
+    }
+    let eigen = SymmetricEigen::new(scaled);
+    let greatest = eigen.eigenvalues.amax().max(f64::MIN_POSITIVE);
+    let free: Vec<DVector<f64>> = (0..m)
+        .filter(|k| eigen.eigenvalues[*k] < NO_INFORMATION * greatest)
+        .map(|k| eigen.eigenvectors.column(k).component_mul(&scale))
+        .collect();
+    if free.is_empty() { DMatrix::zeros(m, 0) } else { DMatrix::from_columns(&free).qr().q() }
 }
 
 #[cfg(test)]

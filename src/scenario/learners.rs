@@ -1,6 +1,10 @@
 //! The learners of a scenario: those that its file names, and any estimator with any policy.
 
-use super::{Scenario, ScenarioError, WorldSpec, error::similar};
+use super::{
+    Scenario, ScenarioError, WorldSpec,
+    error::similar,
+    misfit::{Misfit, Setting, misfit},
+};
 use crate::experiment::LearnerDescription;
 
 /// A learner that a scenario offers.
@@ -138,7 +142,7 @@ impl PolicyKind {
     }
 
     /// Whether it is `Active` but for how a box of joint limits is searched; over recorded rows they are all the same.
-    fn varies_the_search(self) -> bool {
+    pub(super) fn varies_the_search(self) -> bool {
         matches!(
             self,
             Self::ActiveNaive
@@ -252,65 +256,6 @@ fn composed(estimator: EstimatorKind, policy: PolicyKind) -> String {
         return HUMAN.to_owned();
     }
     format!("{}{SEPARATOR}{}", estimator.name(), policy.name())
-}
-
-/// What of a scenario decides which learners fit it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Setting {
-    /// Whether the marker is learned.
-    pub learns_marker: bool,
-    /// Whether recorded rows are replayed.
-    pub is_measured: bool,
-    /// Whether targets are held in sockets.
-    pub has_sockets: bool,
-    /// Whether nothing but the marker's position is measured.
-    pub sees_markers_alone: bool,
-}
-
-/// What of a learner is at fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fault {
-    Estimator,
-    Policy,
-}
-
-/// Why an estimator cannot learn by a policy, or not here.
-#[derive(Clone, Debug)]
-pub(super) struct Misfit {
-    pub fault: Fault,
-    pub what: String,
-    /// The same with the fault mended.
-    pub instead: (EstimatorKind, PolicyKind),
-}
-
-/// Why an estimator cannot learn by a policy in such a scenario, if it cannot.
-pub(super) fn misfit(estimator: EstimatorKind, policy: PolicyKind, setting: Setting) -> Option<Misfit> {
-    if policy != PolicyKind::Random && !estimator.keeps_covariance() {
-        let what = format!("`{}` keeps no covariance to choose by", estimator.name());
-        return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Random) });
-    }
-    if estimator == EstimatorKind::RlsSixNumbers && setting.learns_marker {
-        let what = "six numbers per joint leave no place for a learned marker".to_owned();
-        return Some(Misfit { fault: Fault::Estimator, what, instead: (EstimatorKind::Rls, policy) });
-    }
-    if estimator == EstimatorKind::RlsSixNumbers && !setting.sees_markers_alone {
-        let what = "six numbers per joint read nothing but the marker's position".to_owned();
-        return Some(Misfit { fault: Fault::Estimator, what, instead: (EstimatorKind::Rls, policy) });
-    }
-    if setting.is_measured && policy == PolicyKind::Human {
-        let what = "nobody moves a robot of which there are only recorded rows".to_owned();
-        return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
-    }
-    if setting.has_sockets && policy.varies_the_search() {
-        let what =
-            format!("`{}` searches the joint box, and sockets leave a part of it without a volume", policy.name());
-        return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
-    }
-    if setting.is_measured && policy.varies_the_search() {
-        let what = format!("over recorded rows `{}` has nothing to search: every row is tried", policy.name());
-        return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
-    }
-    None
 }
 
 #[cfg(test)]

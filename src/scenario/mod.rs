@@ -14,6 +14,7 @@ mod error;
 mod examine;
 mod held_out;
 mod learners;
+mod misfit;
 mod raw;
 mod summary;
 mod validate;

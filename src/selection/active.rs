@@ -231,15 +231,14 @@ impl Policy for Active {
                 let criterion = self.criterion(situation.belief, situation, joints)?;
                 let candidates: Vec<&[f64]> =
                     movements.iter().map(|movement| movement.configuration.as_slice()).collect();
-                let best = Selection::of_list(&scope, movements, criterion.evaluate(&candidates), criterion.before());
-                best.map_or_else(|| Watch::fallback(self.watch.as_ref(), criterion.before(), &scope), Ok)
+                let (values, before) = (criterion.evaluate(&candidates), criterion.before());
+                Selection::of_list(self.watch.as_ref(), &scope, movements, values, before)
             }
             Domain::List { movements, joints: None } => {
                 let before = Criterion::new(situation.belief, &self.weights)?.before();
                 let held = held_by(situation.belief, movements);
                 let values = evaluate(&held, movements, |held| self.values(held))?;
-                let best = Selection::of_list(&scope, movements, values, before);
-                best.map_or_else(|| Watch::fallback(self.watch.as_ref(), before, &scope), Ok)
+                Selection::of_list(self.watch.as_ref(), &scope, movements, values, before)
             }
         }
     }

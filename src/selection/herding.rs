@@ -12,10 +12,10 @@
 //! in similar postures, and k says how similar they are.
 
 /// The index of the candidate that makes `made` most like `wanted`; `None` without candidates.
-pub(super) fn herd<C: AsRef<[f64]>, W: AsRef<[f64]>>(
+pub(super) fn herd<C: AsRef<[f64]>, W: AsRef<[f64]>, M: AsRef<[f64]>>(
     candidates: &[C],
     wanted: &[W],
-    made: &[Vec<f64>],
+    made: &[M],
 ) -> Option<usize> {
     let joints = candidates.first()?.as_ref().len();
     let count = wanted.len().max(1) as f64;
@@ -33,7 +33,7 @@ pub(super) fn herd<C: AsRef<[f64]>, W: AsRef<[f64]>>(
     };
     let score = |candidate: &[f64]| {
         let attraction: f64 = wanted.iter().map(|of| likeness(candidate, of.as_ref())).sum();
-        let repulsion: f64 = made.iter().map(|of| likeness(candidate, of)).sum();
+        let repulsion: f64 = made.iter().map(|of| likeness(candidate, of.as_ref())).sum();
         attraction / count - repulsion / (made.len() + 1) as f64
     };
     let scores = candidates.iter().map(|candidate| score(candidate.as_ref())).enumerate();
@@ -73,6 +73,6 @@ mod tests {
     fn a_joint_that_stands_still_and_nothing_to_choose_from() {
         let rows = [vec![0.0, 1.0], vec![1.0, 1.0], vec![2.0, 1.0]];
         assert_eq!(herd(&rows, &rows, &[rows[1].clone()]).map(|index| index == 1), Some(false));
-        assert_eq!(herd::<Vec<f64>, Vec<f64>>(&[], &rows, &[]), None);
+        assert_eq!(herd::<Vec<f64>, Vec<f64>, Vec<f64>>(&[], &rows, &[]), None);
     }
 }

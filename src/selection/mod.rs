@@ -153,12 +153,20 @@ impl Selection {
     }
 
     /// The best of listed movements by the values of their criterion, which was `before` before, and by what the travel to
-    /// them costs; `None` if no value is finite.
-    pub(crate) fn of_list(scope: &Scope<'_>, list: &[Movement], values: Vec<f64>, before: f64) -> Option<Self> {
+    /// them costs; where no value is finite the [fallback](Watch::fallback).
+    pub(crate) fn of_list(
+        watch: Option<&Watch>,
+        scope: &Scope<'_>,
+        list: &[Movement],
+        values: Vec<f64>,
+        before: f64,
+    ) -> Result<Self, SelectionError> {
         let priced = |(movement, value): (&Movement, &f64)| value + scope.price(&movement.configuration);
         let priced: Vec<f64> = list.iter().zip(&values).map(priced).collect();
-        let ((movement, value), _) = least(list.iter().zip(values).zip(priced))?;
-        Some(Self {
+        let Some(((movement, value), _)) = least(list.iter().zip(values).zip(priced)) else {
+            return Watch::fallback(watch, before, scope);
+        };
+        Ok(Self {
             criterion: Some(value),
             gain: Some(before - value),
             evaluations: list.len(),

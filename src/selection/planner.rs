@@ -348,7 +348,7 @@ impl Policy for Planner {
                 let listed = movements.iter().map(|movement| movement.configuration.as_slice());
                 let made = situation.history.made();
                 let candidates: Vec<&[f64]> = listed.clone().collect();
-                let all: Vec<&[f64]> = listed.chain(made.iter().map(Vec::as_slice)).collect();
+                let all: Vec<&[f64]> = listed.chain(made.iter().map(AsRef::as_ref)).collect();
                 let index = herd(&candidates, &all, made).ok_or(SelectionError::Exhausted)?;
                 Ok(Selection::of(movements[index].clone()))
             }
@@ -357,16 +357,15 @@ impl Policy for Planner {
                 let outlook = scene.outlook(&scene.now)?;
                 let candidates: Vec<&[f64]> =
                     movements.iter().map(|movement| movement.configuration.as_slice()).collect();
-                let best = Selection::of_list(&scope, movements, outlook.evaluate(&candidates), outlook.before());
-                best.map_or_else(|| Watch::fallback(self.watch.as_ref(), outlook.before(), &scope), Ok)
+                let (values, before) = (outlook.evaluate(&candidates), outlook.before());
+                Selection::of_list(self.watch.as_ref(), &scope, movements, values, before)
             }
             Domain::List { movements, joints: None } => {
                 let mut belief = situation.belief.clone();
                 belief.truncate(self.planning.considered);
                 let (before, held) = (self.outlook(&belief)?.before(), held_by(&belief, movements));
                 let values = evaluate(&held, movements, |held| self.values(held))?;
-                let best = Selection::of_list(&scope, movements, values, before);
-                best.map_or_else(|| Watch::fallback(self.watch.as_ref(), before, &scope), Ok)
+                Selection::of_list(self.watch.as_ref(), &scope, movements, values, before)
             }
         }
     }

@@ -1,6 +1,6 @@
 //! What a choice rests on.
 
-use std::collections::VecDeque;
+use std::{collections::VecDeque, sync::Arc};
 
 use super::{Actions, Constraints, Movement, visibility::MEMORY};
 use crate::{estimation::Belief, sensing::Observation};
@@ -22,7 +22,8 @@ pub struct Situation<'a> {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
     has_moved: bool,
-    made: Vec<Vec<f64>>,
+    /// Shared, since a history is copied at every step.
+    made: Vec<Arc<[f64]>>,
     posture: Option<Vec<f64>>,
     misses: VecDeque<Vec<f64>>,
     seen: VecDeque<Vec<f64>>,
@@ -49,7 +50,7 @@ impl History {
     /// A movement was made.
     pub fn moved(&mut self, movement: &Movement, actions: &Actions, observation: &Observation) {
         self.expect(&movement.configuration);
-        self.made.push(movement.configuration.clone());
+        self.made.push(movement.configuration.as_slice().into());
         if let Actions::Box(limits) = actions {
             let latest = if observation.is_miss() { &mut self.misses } else { &mut self.seen };
             latest.push_back(limits.to_unit(&movement.configuration));
@@ -71,7 +72,7 @@ impl History {
     }
 
     /// All movements made, rad or m.
-    pub fn made(&self) -> &[Vec<f64>] {
+    pub fn made(&self) -> &[Arc<[f64]>] {
         &self.made
     }
 

@@ -23,17 +23,16 @@ const LOOKED_AT: usize = 8;
 impl Smoother {
     /// e, metres; 0 where the noise is known, and while there are fewer equations than parameters: what none explains cannot be told yet.
     pub(super) fn model_error_m(&self) -> f64 {
-        let (state, layout) = (&self.belief.state, &self.belief.layout);
-        if !self.unknown.contains(&true) || self.posterior.equations(state, layout) < layout.dimension() as f64 {
-            return 0.0;
-        }
         let excess: Vec<f64> = (self.posterior.scales.iter().zip(&self.spare).zip(&self.unknown))
             .map(|((scale, spare), unknown)| {
                 let by_chance = 1.0 + CHANCE * (2.0 / spare).sqrt();
                 if *unknown && *spare > 0.0 { (scale * scale - by_chance).max(0.0) } else { 0.0 }
             })
             .collect();
-        if excess.iter().all(|excess| *excess == 0.0) {
+        let (state, layout) = (&self.belief.state, &self.belief.layout);
+        if excess.iter().all(|excess| *excess == 0.0)
+            || self.posterior.equations(state, layout) < layout.dimension() as f64
+        {
             return 0.0;
         }
         let (squares, equations) = self.shifts();

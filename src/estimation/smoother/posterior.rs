@@ -13,7 +13,10 @@ use std::{ops::Range, sync::Arc};
 
 use nalgebra::{DMatrix, DVector};
 
-use super::mode::Mode;
+use super::{
+    mode::Mode,
+    settled::{Quadratic, Settled},
+};
 use crate::{
     estimation::ReadingReport,
     model::{Layout, Pass, Prior, State, rank},
@@ -27,48 +30,6 @@ pub(super) struct Measurement {
     pub observation: Observation,
     /// Its number among all movements, from 1.
     pub movement: u64,
-}
-
-/// Measurements as a quadratic in the chart at `state`.
-#[derive(Clone, Debug)]
-pub(super) struct Settled {
-    pub state: State,
-    /// By kind of noise, in nominal σ.
-    pub noises: Vec<Quadratic>,
-    /// What the readings cost at δ = 0 beyond their weighted squares: of outliers.
-    pub excess: f64,
-    /// How many measurements.
-    pub count: usize,
-}
-
-/// Σ w HᵀH and its kin of one kind of noise.
-#[derive(Clone, Debug)]
-pub(super) struct Quadratic {
-    /// Λ, m × m.
-    pub information: DMatrix<f64>,
-    /// Λ δ̂.
-    pub vector: DVector<f64>,
-    /// ½ Σ w ‖r‖² at δ = 0.
-    pub misfit: f64,
-    /// Σ w d: how many equations it holds, outliers not counted.
-    pub equations: f64,
-}
-
-impl Quadratic {
-    fn nothing(m: usize) -> Self {
-        Self { information: DMatrix::zeros(m, m), vector: DVector::zeros(m), misfit: 0.0, equations: 0.0 }
-    }
-
-    fn add(&mut self, other: Self) {
-        self.information += other.information;
-        self.vector += other.vector;
-        self.misfit += other.misfit;
-        self.equations += other.equations;
-    }
-
-    fn misfit_at(&self, delta: &DVector<f64>) -> f64 {
-        self.misfit + 0.5 * delta.dot(&(&self.information * delta)) - self.vector.dot(delta)
-    }
 }
 
 /// Everything that is known.
@@ -399,34 +360,5 @@ impl Posterior {
         }
         let of = |(noise, scale): (&Quadratic, &f64)| noise.information.dot(&mode.covariance) / (scale * scale);
         Some(noises.iter().zip(&self.scales).map(of).collect())
-    }
-}
-
-impl Settled {
-    /// Equations that it holds, outliers not counted.
-    fn equations(&self) -> f64 {
-        self.noises.iter().map(|of| of.equations).sum()
-    }
-
-    /// The quadratics in the chart at `state`: their information there, their descent and their misfit.
-    ///
-    /// A change of chart moves δ by `D = ∂ local(settled, retract(state, ε))/∂ε` at ε = 0. It is not the inverse of the
-    /// transport at δ: a line is pinned, and its pivot in `state` need not be where a retraction from the settled state
-    /// would leave it, so that turning it also shifts it.
-    fn carried(&self, state: &State, layout: &Layout) -> Option<(Vec<Quadratic>, f64)> {
-        let delta = self.state.local(layout, state)?;
-        let change = self.state.change_of_chart(layout, state)?;
-        let carry = |of: &Quadratic| {
-            if of.equations == 0.0 {
-                return Quadratic::nothing(delta.len());
-            }
-            Quadratic {
-                information: change.transpose() * &of.information * &change,
-                vector: change.transpose() * (&of.vector - &of.information * &delta),
-                misfit: of.misfit_at(&delta),
-                equations: of.equations,
-            }
-        };
-        Some((self.noises.iter().map(carry).collect(), self.excess))
     }
 }

@@ -8,7 +8,8 @@ use super::{Check, raw};
 use crate::scenario::{
     EstimatorKind, LearnerSpec, PolicyKind,
     error::similar,
-    learners::{Fault, HUMAN, Misfit, Setting, misfit},
+    learners::HUMAN,
+    misfit::{Fault, Misfit, Setting, misfit},
 };
 
 impl Check<'_> {

@@ -22,7 +22,7 @@ use toml::Spanned;
 use super::{
     EstimatorKind, Filter, Known, Prior, Robot, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError},
-    learners::Setting,
+    misfit::Setting,
     raw,
 };
 use crate::{
