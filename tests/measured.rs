@@ -131,6 +131,8 @@ fn joints_are_held_and_columns_have_units() {
     assert_eq!(of(1).collect::<Vec<_>>(), [0.005, 0.005, 0.01, 0.01]);
     assert_eq!(of(2).collect::<Vec<_>>(), [0.005, 0.005, 1e-6, 1e-6]);
     assert_eq!(of(3).collect::<Vec<_>>(), [1e-6, 1e-6, 0.01, 0.01]);
+    let both = valid(&LEAST.replace("tip", "hold = [\"elbow_joint.direction\", \"elbow_joint.point\"]\ntip"), &csv);
+    assert!(!both.robot.layout.is_learned(2), "a held direction and a held point are a held axis");
     let mut experiment = partly.experiment(1, Some(&["global".to_owned()])).expect("starts");
     (0..6).for_each(|_| assert!(experiment.step().is_ok()));
     // The first joint in degrees.

@@ -41,6 +41,26 @@ fn every_layout_is_read() {
     reads("elbow,hand_distance_mm\n0.5,742.5\n", Layout::Distance, "hand", &[0.7425]);
 }
 
+/// A target's name may have an angle's name in it.
+#[test]
+fn a_rotation_is_what_all_three_of_its_titles_say() {
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    for (titles, rotation, wanted) in [
+        ("roller_rx_deg,roller_ry,roller_rz", "90,0,0", [FRAC_PI_2, 0.0, 0.0]),
+        ("Roll_deg,Pitch,Yaw_deg", "180,0,90", [2.0 * half * FRAC_PI_2, 2.0 * half * FRAC_PI_2, 0.0]),
+    ] {
+        let text = format!("elbow,x,y,z,{titles}\n0.5,1,2,3,{rotation}\n");
+        let table = Table::open(text.as_bytes()).expect("titles");
+        let names: Vec<String> = "x,y,z".split(',').chain(titles.split(',')).map(str::to_owned).collect();
+        let reading = table.titles().reading_titled(Layout::Pose, &names).expect("a pose");
+        let joints = vec![table.titles().find("elbow", Quantity::Angle).expect("a column")];
+        let columns = Columns { joints, readings: vec![reading], labels: Vec::new() };
+        let row = table.rows(columns).next().expect("a row").expect("numbers");
+        let found = row.observation.readings[0].as_ref().expect("a reading");
+        assert!(found[3..].iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{titles}: {found:?}");
+    }
+}
+
 #[test]
 fn titles_of_any_kind_can_be_named() {
     let table = Table::open("phix1,x1,y1,z1,phiy1,phiz1\n".as_bytes()).expect("titles");

@@ -18,22 +18,30 @@ impl Scenario {
         let layout = &self.robot.layout;
         // Readings are taken for what they say, whether what they are truly corrected by is learned or not.
         state.corrections.fill(Correction::default());
-        for (_, joint) in state.joints.iter_mut().enumerate().filter(|(index, _)| layout.is_learned(*index)) {
+        for (index, joint) in state.joints.iter_mut().enumerate().filter(|(index, _)| layout.is_learned(*index)) {
+            let truth = *joint;
             if error.draw == ErrorDraw::Anywhere {
                 if let Element::Axis(drawn) = anywhere(&Element::Axis(*joint), error.point_m, rng) {
                     *joint = drawn;
                 }
-                continue;
+            } else {
+                error.mislead(joint, rng);
             }
-            let angles = error.draw(error.angle_rad, rng);
-            let turn = Rotation3::from_euler_angles(angles.x, angles.y, angles.z);
-            let turned = |w: &UnitVector3<f64>| UnitVector3::new_normalize(turn * w.into_inner());
-            match joint {
-                Joint::Revolute(line) => {
-                    line.direction = turned(&line.direction);
-                    line.point += error.draw(error.point_m, rng);
+            // What of an axis is held is right.
+            let Some(Known::Within { length_m, angle_rad, .. }) = self.prior.of(Block::Axis(index)) else { continue };
+            match (joint, truth) {
+                (Joint::Revolute(line), Joint::Revolute(truth)) => {
+                    if angle_rad <= Known::EXACTLY {
+                        line.direction = truth.direction;
+                    }
+                    if length_m <= Known::EXACTLY {
+                        line.point = truth.point;
+                    }
                 }
-                Joint::Prismatic(direction) => *direction = turned(direction),
+                (Joint::Prismatic(direction), Joint::Prismatic(truth)) if angle_rad <= Known::EXACTLY => {
+                    *direction = truth;
+                }
+                _ => {}
             }
         }
         if layout.block(Block::Target(0)).is_some() && self.prior.of(Block::Target(0)).is_none() {
@@ -85,6 +93,20 @@ impl Known {
 }
 
 impl InitialError {
+    /// Turns an axis, and moves a line.
+    fn mislead(&self, joint: &mut Joint, rng: &mut ChaCha8Rng) {
+        let angles = self.draw(self.angle_rad, rng);
+        let turn = Rotation3::from_euler_angles(angles.x, angles.y, angles.z);
+        let turned = |w: &UnitVector3<f64>| UnitVector3::new_normalize(turn * w.into_inner());
+        match joint {
+            Joint::Revolute(line) => {
+                line.direction = turned(&line.direction);
+                line.point += self.draw(self.point_m, rng);
+            }
+            Joint::Prismatic(direction) => *direction = turned(direction),
+        }
+    }
+
     fn draw(&self, size: f64, rng: &mut ChaCha8Rng) -> Vector3<f64> {
         Vector3::from_fn(|_, _| match self.draw {
             ErrorDraw::UpTo | ErrorDraw::Anywhere => size * rng.random_range(-1.0..=1.0),

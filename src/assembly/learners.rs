@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Briefing;
 use crate::{
     estimation::{Begin, Begun, Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls},
-    experiment::{Agent, Learner, LearnerDescription, Stream},
+    experiment::{Agent, Learner, Stream},
     model::{Block, Layout, Prior},
     optimize::{Settings, Variant},
     scenario::{
@@ -37,20 +37,6 @@ impl Scenario {
             Some(constraints) => agent.bound_to(constraints.clone()),
             None => agent,
         })
-    }
-
-    pub(super) fn learner_description(&self, spec: &LearnerSpec) -> LearnerDescription {
-        let noise = match spec.estimator {
-            EstimatorKind::Rls => self.filter.stabilising,
-            EstimatorKind::Unscented => self.unscented.stabilising,
-            // They show no covariance, or add nothing to it.
-            EstimatorKind::RlsSixNumbers | EstimatorKind::Smoother | EstimatorKind::Gradient => None,
-        };
-        let stabilised = spec.stabilising && noise.is_some();
-        let robust = spec.estimator == EstimatorKind::Smoother
-            && spec.robust
-            && matches!(self.smoother.loss, Loss::Mixture { .. });
-        LearnerDescription { stabilised, robust, ..spec.description() }
     }
 
     fn estimator(

@@ -246,6 +246,7 @@ mod tests {
     use super::*;
     use crate::{
         experiment::{Draw, Executed},
+        kinematics::Joint,
         scenario::{ErrorDraw, InitialError, builtin},
     };
 
@@ -262,6 +263,29 @@ mod tests {
             briefing.workspace.configurations.iter().any(|theta| !head.sees(&truth.marker_at(theta))),
             "without truth"
         );
+    }
+
+    /// What of an axis is held is known: in a simulated world the guess has it from the truth.
+    #[test]
+    fn what_is_held_of_an_axis_is_not_guessed() {
+        let plain = builtin("arm-6dof").expect("built in");
+        let names = &plain.robot.names;
+        let hold = format!("[robot]\nhold = [\"{}.direction\", \"{}.point\"]", names[1], names[2]);
+        let text = plain.source.replacen("[robot]", &hold, 1);
+        let scenario = Scenario::parse("held.toml", &text, &|_| Err("no data".to_owned())).expect("valid");
+        let (world, _, briefing) = scenario.draw(1003);
+        let truth = world.truth().expect("simulated");
+        let lines = |joint: usize| match (&truth.joints[joint], &briefing.initial.joints[joint]) {
+            (Joint::Revolute(truth), Joint::Revolute(guess)) => {
+                ((truth.point - guess.point).norm(), truth.direction.angle(&guess.direction))
+            }
+            _ => unreachable!("revolute"),
+        };
+        let is_off = |x: f64| x > 0.01;
+        for (joint, point, direction) in [(0, true, true), (1, true, false), (2, false, true), (3, true, true)] {
+            let (apart, angle) = lines(joint);
+            assert_eq!((is_off(apart), is_off(angle)), (point, direction), "joint {joint}: {apart} m, {angle} rad");
+        }
     }
 
     /// No truth leaks: with the truth swapped behind the learners' backs, their first choices stay as they were, and

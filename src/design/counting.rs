@@ -24,10 +24,16 @@ pub struct General {
 pub fn general_movements(state: &State, layout: &Layout, rig: &Rig, limits: &JointBox) -> Vec<General> {
     // A fixed stream of its own: what is general needs no seed.
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let held: Vec<(Rig, Option<usize>)> = match state.sockets.len() {
+    // The rig of each socket that a channel reads, and the manifold on which the target is in it.
+    let held: Vec<(Rig, Option<Manifold<'_>>)> = match state.sockets.len() {
         0 => vec![(rig.held_in(None), None)],
         count => {
-            (0..count).filter_map(|socket| Some((rig.held_in(Some(socket)), Some(rig.holds(socket)?.1)))).collect()
+            let manifold = |socket: usize| {
+                let (_, target) = rig.holds(socket)?;
+                let manifold = Manifold::new(state, target, state.sockets[socket], limits);
+                Some((rig.held_in(Some(socket)), Some(manifold)))
+            };
+            (0..count).filter_map(manifold).collect()
         }
     };
     let equations = held.iter().map(|(rig, _)| rig.equations()).min().unwrap_or_default();
@@ -37,11 +43,10 @@ pub fn general_movements(state: &State, layout: &Layout, rig: &Rig, limits: &Joi
     let count = (2 * layout.dimension().div_ceil(equations) + 8) * held.len();
     let known = rig.known_beforehand().map(|rig| General { rig, posture: vec![0.0; state.joints.len()] });
     let movement = |index: usize| {
-        let socket = index % held.len();
-        let (rig, target) = &held[socket];
-        let posture = match target {
+        let (rig, manifold) = &held[index % held.len()];
+        let posture = match manifold {
             None => Some(limits.draw(&mut rng)),
-            Some(target) => Manifold::new(state, *target, state.sockets[socket], limits).draw(&mut rng),
+            Some(manifold) => manifold.draw(&mut rng),
         };
         Some(General { rig: rig.clone(), posture: posture? })
     };
@@ -84,6 +89,24 @@ mod tests {
         model::{Block, laws::random_arm},
         scenario::builtin,
     };
+
+    /// A socket that no channel reads is no place to hold anything, and shifts no other.
+    #[test]
+    fn sockets_that_nothing_reads_count_for_nothing() {
+        let scenario = builtin("arm-7dof-socket").expect("built in");
+        let (robot, rig) = (&scenario.robot, &scenario.rig);
+        let channels = rig.channels().iter().filter(|channel| {
+            !matches!(channel.occasion(), crate::sensing::Occasion::Held { socket: 0, .. })
+        });
+        let rig = Rig::new(channels.cloned().collect());
+        for General { rig, posture } in general_movements(&robot.state, &robot.layout, &rig, &robot.limits) {
+            for channel in rig.channels() {
+                let crate::sensing::Occasion::Held { socket, target } = channel.occasion() else { continue };
+                let away = robot.state.target_at(target, &posture) - robot.state.sockets[socket];
+                assert!(away.norm() < 1e-6, "socket {socket}: {away}");
+            }
+        }
+    }
 
     /// As PAPER.md's counting has it where every parameter can be determined; and by rank where some cannot.
     #[test]

@@ -10,6 +10,8 @@ use super::{Doubt, DoubtKind, Evidence, doubt::length};
 const SAME: f64 = 1e-4;
 /// A row so many robust standard deviations from its posture's others had not settled.
 const FAR: f64 = 6.0;
+/// Deviations, in coordinates, below which none is far from the others.
+const TELLING: usize = 9;
 
 /// The doubts, and σ per coordinate.
 pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
@@ -24,9 +26,9 @@ pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
     doubts.extend(copies(&mut repeated, evidence));
     repeated.retain(|rows| rows.len() > 1);
     let Some(seen) = evidence.targets.first().filter(|_| !repeated.is_empty()) else { return (doubts, None) };
-    let deviations = deviations(&repeated, &seen.points);
-    let degrees: f64 = deviations.iter().map(|_| 1.0).sum::<f64>() - repeated.len() as f64;
-    if deviations.len() < 2 || degrees < 1.0 {
+    let (deviations, postures) = deviations(&repeated, &seen.points);
+    let degrees = deviations.len().saturating_sub(postures);
+    if degrees < 1 {
         return (doubts, None);
     }
     let mut sizes: Vec<f64> =
@@ -34,10 +36,10 @@ pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
     sizes.sort_by(f64::total_cmp);
     // The median of absolute deviations, as a standard deviation.
     let robust = 1.4826 * sizes[sizes.len() / 2];
-    let (far, near): (Vec<_>, Vec<_>) = deviations.iter().partition(|(_, by)| by.norm() > FAR * robust.max(1e-9));
-    let far: Vec<_> = if sizes.len() >= 9 { far } else { Vec::new() };
+    let is_far = |by: &Vector3<f64>| sizes.len() >= TELLING && by.norm() > FAR * robust.max(1e-9);
+    let (far, near): (Vec<_>, Vec<_>) = deviations.iter().partition(|(_, by)| is_far(by));
     let sum: f64 = near.iter().map(|(_, by)| by.norm_squared()).sum();
-    let sigma = (sum / (3.0 * (degrees - far.len() as f64).max(1.0))).sqrt();
+    let sigma = (sum / (3.0 * degrees.saturating_sub(far.len()).max(1) as f64)).sqrt();
     if !far.is_empty() {
         let worst = far.iter().map(|(_, by)| by.norm()).fold(0.0, f64::max);
         doubts.push(Doubt {
@@ -96,14 +98,16 @@ fn copies(repeated: &mut [Vec<usize>], evidence: &Evidence) -> Option<Doubt> {
     })
 }
 
-/// By row of a repeated posture that saw the target: how far from the median of its posture.
-fn deviations(repeated: &[Vec<usize>], points: &[Option<Point3<f64>>]) -> Vec<(usize, Vector3<f64>)> {
-    let mut deviations = Vec::new();
+/// By row of a posture that saw the target more than once: how far from the median of its posture; and how many such postures
+/// there are.
+fn deviations(repeated: &[Vec<usize>], points: &[Option<Point3<f64>>]) -> (Vec<(usize, Vector3<f64>)>, usize) {
+    let (mut deviations, mut postures) = (Vec::new(), 0);
     for rows in repeated {
         let seen: Vec<(usize, Point3<f64>)> = rows.iter().filter_map(|row| Some((*row, points[*row]?))).collect();
         if seen.len() < 2 {
             continue;
         }
+        postures += 1;
         let median = Vector3::from_fn(|k, _| {
             let mut values: Vec<f64> = seen.iter().map(|(_, point)| point[k]).collect();
             values.sort_by(f64::total_cmp);
@@ -111,5 +115,26 @@ fn deviations(repeated: &[Vec<usize>], points: &[Option<Point3<f64>>]) -> Vec<(u
         });
         deviations.extend(seen.iter().map(|(row, point)| (*row, point.coords - median)));
     }
-    deviations
+    (deviations, postures)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::doubts::Seen;
+
+    /// One posture was seen twice, 2 mm apart; in four others that were measured twice nothing was seen.
+    #[test]
+    fn repeats_tell_the_noise_where_the_target_was_seen() {
+        let configurations: Vec<Vec<f64>> = (0..10).map(|row| vec![f64::from(row / 2)]).collect();
+        let lines: Vec<usize> = (2..12).collect();
+        let at = |x: f64| Some(Point3::new(x, 0.0, 0.0));
+        let points = [vec![at(0.0), at(0.002)], vec![None; 8]].concat();
+        let targets = vec![Seen { name: "hand".to_owned(), points }];
+        let evidence = Evidence { lines: &lines, configurations: &configurations, targets, ..Evidence::default() };
+        let (_, sigma) = doubts(&evidence);
+        // 1 mm to either side: of one coordinate of three, with one degree of freedom each.
+        let expected = (2e-6_f64 / 3.0).sqrt();
+        assert!((sigma.expect("repeats") - expected).abs() < 1e-9, "{sigma:?}");
+    }
 }

@@ -22,8 +22,8 @@ pub struct Begun {
     smoother: Smoother,
     /// What the first measurements must determine.
     blocks: Vec<Block>,
-    /// Where the robot was when it was seen.
-    postures: Vec<Vec<f64>>,
+    /// Where the robot was when it was seen, and what of it.
+    seen: Vec<(Vec<f64>, Observation)>,
     rig: Arc<Rig>,
     begin: Begin,
     filter: Option<Box<dyn Estimator>>,
@@ -35,22 +35,23 @@ const MARGIN: usize = 2;
 impl Begun {
     /// Smooths until `blocks` are determined, and goes on with what `begin` makes of the belief, whitened by `rig`.
     pub fn new(smoother: Smoother, blocks: Vec<Block>, rig: Arc<Rig>, begin: Begin) -> Self {
-        Self { smoother, blocks, postures: Vec::new(), rig, begin, filter: None }
+        Self { smoother, blocks, seen: Vec::new(), rig, begin, filter: None }
     }
 
     /// Whether what was seen so far determines the blocks, everything else held.
     fn is_determined(&self) -> bool {
         let Belief { state, layout, rig, .. } = self.smoother.belief();
         let columns: Vec<usize> = self.blocks.iter().filter_map(|block| layout.block(*block)).flatten().collect();
-        if self.postures.len() * rig.equations() < MARGIN * columns.len() {
+        let count: usize = self.seen.iter().map(|(_, observation)| observation.equations()).sum();
+        if count < MARGIN * columns.len() {
             return false;
         }
-        let mut stacked = DMatrix::zeros(columns.len(), 0);
-        for posture in &self.postures {
-            let rows = rig.jacobian(state, layout, posture).select_rows(&columns);
-            let start = stacked.ncols();
-            stacked = stacked.resize_horizontally(start + rows.ncols(), 0.0);
-            stacked.columns_mut(start, rows.ncols()).copy_from(&rows);
+        let mut stacked = DMatrix::zeros(columns.len(), count);
+        let mut end = 0;
+        for (posture, observation) in &self.seen {
+            let rows = rig.equations_of(state, layout, posture, observation).rows.select_rows(&columns);
+            stacked.columns_mut(end, rows.ncols()).copy_from(&rows);
+            end += rows.ncols();
         }
         rank(&stacked.transpose()) == columns.len()
     }
@@ -67,7 +68,7 @@ impl Estimator for Begun {
         }
         let update = self.smoother.correct(positions, observation)?;
         if !observation.is_miss() {
-            self.postures.push(positions.to_vec());
+            self.seen.push((positions.to_vec(), observation.clone()));
         }
         if self.is_determined() {
             let belief = self.smoother.belief();
@@ -89,6 +90,31 @@ mod tests {
         estimation::{HypothesisSettings, Rls},
         model::{Layout, Prior, laws::random_arm},
     };
+
+    /// A second sensor that never reads brings no equation.
+    #[test]
+    fn readings_that_there_were_not_determine_nothing() {
+        use crate::sensing::{Channel, Position};
+        let truth = random_arm(&mut ChaCha8Rng::seed_from_u64(4), 4);
+        let layout = Arc::new(Layout::new(&truth, [Block::Base]));
+        let prior = Prior::around(truth.clone(), &layout, DMatrix::identity(6, 6)).expect("a prior");
+        let tracker = || Arc::new(Position::of_marker(0.001)) as Arc<dyn Channel>;
+        let rig = Arc::new(Rig::new(vec![tracker(), tracker()]));
+        let (settings, rng) = (HypothesisSettings::default(), ChaCha8Rng::seed_from_u64(1));
+        let smoother = Smoother::new(prior, layout, rig.clone(), settings, rng);
+        let begin: Begin = Box::new(|belief, covariance| Box::new(Rls::new(belief, covariance, None)));
+        let mut begun = Begun::new(smoother, vec![Block::Base], rig, begin);
+        for (index, theta) in
+            [[0.3, -0.7, 1.0, 0.2], [-0.9, 0.4, -0.3, 1.1], [1.2, 0.8, 0.5, -0.6], [0.6, -0.2, -0.9, -1.0]]
+                .iter()
+                .enumerate()
+        {
+            assert!(begun.filter.is_none(), "after {index} readings: 12 equations are wanted");
+            let marker = truth.marker_at(theta).coords.as_slice().to_vec();
+            begun.update(theta, &Observation { readings: vec![Some(marker), None] }).expect("absorbed");
+        }
+        assert!(begun.filter.is_some());
+    }
 
     /// A base a radian off: after four positions of a marker the filter takes over, and stands where the robot does.
     #[test]

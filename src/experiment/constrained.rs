@@ -1,6 +1,6 @@
 //! What experiments and agents promise where movements are bound.
 
-use super::{Agent, ChoiceError, Event, Executed, Experiment};
+use super::{Agent, ChoiceError, Event, Executed, Experiment, NoiseSequence};
 use crate::{
     estimation::HypothesisSettings,
     scenario::{Scenario, builtin},
@@ -70,6 +70,19 @@ fn every_movement_of_a_run_is_feasible() {
         assert!(joint.limits[1] - joint.limits[0] <= 50_f64.to_radians() + 1e-9 && !joint.name.is_empty());
         assert!((joint.limits[0]..=joint.limits[1]).contains(x));
     }
+}
+
+/// Sockets that cannot be reached any more end a learner, and the others go on.
+#[test]
+fn sockets_out_of_reach_end_one_learner() {
+    let limits = "[constraints]\ngreatest_travel_deg = 1e-5\n";
+    let scenario = bound("arm-7dof-socket", limits);
+    let names = ["global", "random"].map(str::to_owned);
+    let mut experiment = scenario.experiment(1003, Some(&names)).expect("starts");
+    for _ in 0..6 {
+        experiment.step().expect("a step, whoever has ended");
+    }
+    assert!(experiment.latest().learners.iter().all(|learner| learner.failure.is_some()));
 }
 
 /// A head's visible pose may be out of reach at first.
@@ -207,14 +220,19 @@ fn several_proposals_follow_one_another() {
 #[test]
 fn postures_in_sockets_are_bound_too() {
     let scenario = bound("arm-7dof-socket", "[constraints]\nlimits_deg = { panda_joint3 = [-30.0, 30.0] }\n");
-    let names = ["global", "random", "rls:active"].map(str::to_owned);
-    let mut experiment = scenario.experiment(1003, Some(&names)).expect("starts");
-    for step in 0..8 {
-        let report = experiment.step().expect("a step");
-        for learner in &report.learners {
-            let Some(movement) = &learner.movement else { panic!("{}: {:?}", learner.name, learner.failure) };
-            let angle = movement.configuration[2].to_degrees();
-            assert!(angle.abs() < 32.0, "step {step}, {}: {angle} degrees", learner.name);
+    for name in ["global", "random", "rls:active"] {
+        let experiment = scenario.experiment(1003, Some(&[name.to_owned()])).expect("starts");
+        let world = experiment.world();
+        let (mut agent, mut noise) = (agent(&scenario, name), NoiseSequence::new(1003));
+        for step in 0..8 {
+            let proposal = agent.propose(1).expect("a movement")[0].clone();
+            let angle = proposal.selection.movement.configuration[2].to_degrees();
+            assert!(angle.abs() < 30.0 + 1e-9, "step {step}, {name}: {angle} degrees");
+            let draw = noise.draw(world);
+            // Where it is pushed into the socket, which need not be where it was sent.
+            let movement = world.execute(&proposal.selection.movement, &draw).expect("carried out");
+            let observation = world.observe(&movement, &draw).expect("measured");
+            agent.absorb(&[Executed { proposal: Some(proposal.id), movement, observation }]).expect("absorbed");
         }
     }
     let text = format!("{}\n[constraints]\nminimum_height_m = 0.5\n", scenario.source);

@@ -109,7 +109,8 @@ impl Learner {
         self.agent.actions().remaining()
     }
 
-    /// Its next movement; `None` once it has ended, or found no finite criterion or nothing feasible: nothing more can come of
+    /// Its next movement; `None` once it has ended, or found no finite criterion, nothing feasible or no socket within
+    /// reach: nothing more can come of
     /// it then.
     pub(super) fn propose(&mut self) -> Result<Option<Proposal>, SelectionError> {
         if self.stopped.is_some() {
@@ -117,7 +118,9 @@ impl Learner {
         }
         match self.agent.propose(1) {
             Ok(proposals) => Ok(proposals.first().cloned()),
-            Err(error @ (SelectionError::NoFiniteCriterion | SelectionError::Infeasible(_))) => {
+            Err(
+                error @ (SelectionError::NoFiniteCriterion | SelectionError::Infeasible(_) | SelectionError::OutOfReach),
+            ) => {
                 self.stopped = Some(error);
                 Ok(None)
             }

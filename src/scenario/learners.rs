@@ -5,7 +5,7 @@ use super::{
     error::similar,
     misfit::{Misfit, Setting, misfit},
 };
-use crate::experiment::LearnerDescription;
+use crate::{experiment::LearnerDescription, sensing::Loss};
 
 /// A learner that a scenario offers.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,16 +37,6 @@ impl LearnerSpec {
             robust: true,
             holds_axes: false,
             by_default: false,
-        }
-    }
-
-    pub(crate) fn description(&self) -> LearnerDescription {
-        LearnerDescription {
-            name: self.name.clone(),
-            estimator: self.estimator.name().to_owned(),
-            policy: self.policy.name().to_owned(),
-            stabilised: self.stabilising,
-            robust: false,
         }
     }
 }
@@ -202,6 +192,26 @@ impl Scenario {
             .collect()
     }
 
+    /// A learner as reports describe it.
+    pub(crate) fn learner_description(&self, spec: &LearnerSpec) -> LearnerDescription {
+        let noise = match spec.estimator {
+            EstimatorKind::Rls => self.filter.stabilising,
+            EstimatorKind::Unscented => self.unscented.stabilising,
+            // They show no covariance, or add nothing to it.
+            EstimatorKind::RlsSixNumbers | EstimatorKind::Smoother | EstimatorKind::Gradient => None,
+        };
+        let robust = spec.estimator == EstimatorKind::Smoother
+            && spec.robust
+            && matches!(self.smoother.loss, Loss::Mixture { .. });
+        LearnerDescription {
+            name: spec.name.clone(),
+            estimator: spec.estimator.name().to_owned(),
+            policy: spec.policy.name().to_owned(),
+            stabilised: spec.stabilising && noise.is_some(),
+            robust,
+        }
+    }
+
     fn compose(&self, name: &str) -> Result<LearnerSpec, ScenarioError> {
         let unknown = || ScenarioError::UnknownLearner {
             scenario: self.name.clone(),
@@ -222,12 +232,7 @@ impl Scenario {
     }
 
     fn setting(&self) -> Setting {
-        Setting {
-            learns_marker: self.robot.layout.marker().is_some(),
-            is_measured: matches!(self.world, WorldSpec::Measured { .. }),
-            has_sockets: !self.robot.sockets.is_empty(),
-            sees_markers_alone: self.rig.channels().iter().all(|channel| channel.target() == Some(0)),
-        }
+        Setting::of(&self.robot, Some(&self.rig), matches!(self.world, WorldSpec::Measured { .. }))
     }
 
     /// The name of the pair nearest to these two that fits.

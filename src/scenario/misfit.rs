@@ -1,6 +1,7 @@
 //! Which learners fit a scenario, and why others do not.
 
-use super::{EstimatorKind, PolicyKind};
+use super::{EstimatorKind, PolicyKind, Robot};
+use crate::sensing::Rig;
 
 /// What of a scenario decides which learners fit it.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +14,19 @@ pub(super) struct Setting {
     pub has_sockets: bool,
     /// Whether nothing but the marker's position is measured.
     pub sees_markers_alone: bool,
+}
+
+impl Setting {
+    /// Of a robot whose sensors are known, unless they are at fault themselves.
+    pub(super) fn of(robot: &Robot, rig: Option<&Rig>, is_measured: bool) -> Self {
+        let mut channels = rig.into_iter().flat_map(Rig::channels);
+        Self {
+            learns_marker: robot.layout.marker().is_some(),
+            is_measured,
+            has_sockets: !robot.sockets.is_empty(),
+            sees_markers_alone: channels.all(|channel| channel.target() == Some(0)),
+        }
+    }
 }
 
 /// What of a learner is at fault.

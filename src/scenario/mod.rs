@@ -246,6 +246,11 @@ pub enum Known {
     },
 }
 
+impl Known {
+    /// How well what is said to be known, or held, is known: in metres, radians or as a number.
+    pub(crate) const EXACTLY: f64 = 1e-6;
+}
+
 /// Prior standard deviations in tangent coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {

@@ -66,8 +66,8 @@ impl Scenario {
             joints: self.robot.joint_descriptions(),
             parameters: self.robot.layout.dimension(),
             steps: self.steps,
-            learners: self.learners.iter().map(super::LearnerSpec::description).collect(),
-            compositions: self.compositions().iter().map(super::LearnerSpec::description).collect(),
+            learners: self.learners.iter().map(|spec| self.learner_description(spec)).collect(),
+            compositions: self.compositions().iter().map(|spec| self.learner_description(spec)).collect(),
             explorer: self.explorer(),
             thresholds: self.thresholds,
         }
@@ -112,6 +112,17 @@ impl super::Robot {
 #[cfg(test)]
 mod tests {
     use crate::scenario::{Scenario, builtin};
+
+    /// As a session of theirs describes them.
+    #[test]
+    fn learners_are_described_as_they_learn() {
+        let outliers = builtin("arm-6dof-outliers").unwrap().summary();
+        let of = |name: &str| outliers.offered().find(|learner| learner.name == name).expect("offered");
+        assert!(of("global").robust && !of("global").stabilised);
+        let (plain, stabilised) = (builtin("tiago-mocap").unwrap(), builtin("arm-6dof").unwrap());
+        assert_eq!(plain.summary().learners[0].stabilised, plain.filter.stabilising.is_some());
+        assert_eq!(stabilised.summary().learners[0].stabilised, stabilised.filter.stabilising.is_some());
+    }
 
     #[test]
     fn a_page_compares_what_tells_most() {

@@ -139,7 +139,7 @@ impl Active {
         scope: &Scope<'_>,
         rng: &mut ChaCha8Rng,
     ) -> Result<Selection, SelectionError> {
-        if let Some(beginning) = sockets.beginning() {
+        if let Some(beginning) = sockets.beginning(scope) {
             return Ok(Selection::of(beginning.clone()));
         }
         let (before, held) = (Criterion::new(belief, &self.weights)?.before(), sockets.held(belief));

@@ -71,7 +71,11 @@ impl Planner {
             let held = sockets.held(&ahead.after);
             let candidates = [others, &pool].concat();
             evaluations += candidates.len();
-            let found = evaluate(&held, &candidates, |held| self.values(held))?;
+            let mut found = evaluate(&held, &candidates, |held| self.values(held))?;
+            for (value, candidate) in found.iter_mut().zip(&candidates) {
+                let planned = ahead.movements.iter().map(|movement| movement.configuration.as_slice());
+                *value += scope.toll(planned, &candidate.configuration);
+            }
             least(candidates.into_iter().zip(found))
                 .map(|(movement, _)| movement)
                 .ok_or(SelectionError::NoFiniteCriterion)
@@ -90,7 +94,8 @@ impl Planner {
         }
         // Of the plan, what teaches most at once comes first.
         let held = sockets.held(&ahead.now);
-        let at_once = evaluate(&held, &ahead.movements, |held| self.values(held))?;
+        let mut at_once = evaluate(&held, &ahead.movements, |held| self.values(held))?;
+        at_once.iter_mut().zip(&ahead.movements).for_each(|(value, it)| *value += scope.price(&it.configuration));
         let Some((first, _)) = least(at_once.into_iter().enumerate()) else {
             return Err(SelectionError::NoFiniteCriterion);
         };

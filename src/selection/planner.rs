@@ -330,13 +330,13 @@ impl<'a> Ground<'a> {
 
 impl Policy for Planner {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+        let scope = Scope::of(situation)?;
         if let Actions::Sockets(sockets) = situation.actions {
-            return match sockets.beginning() {
+            return match sockets.beginning(&scope) {
                 Some(beginning) => Ok(Selection::of(beginning.clone())),
-                None => self.select_in_sockets(situation.belief, sockets, &Scope::of(situation)?, rng),
+                None => self.select_in_sockets(situation.belief, sockets, &scope, rng),
             };
         }
-        let scope = Scope::of(situation)?;
         if let Some(beginning) = Watch::beginning(self.watch.as_ref(), situation.history, &scope)? {
             return Ok(beginning);
         }

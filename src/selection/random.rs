@@ -29,13 +29,13 @@ impl Random {
 
 impl Policy for Random {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+        let scope = Scope::of(situation)?;
         if let Actions::Sockets(sockets) = situation.actions {
-            return Ok(Selection::of(match sockets.beginning() {
+            return Ok(Selection::of(match sockets.beginning(&scope) {
                 Some(beginning) => beginning.clone(),
-                None => sockets.draw(situation.belief, &Scope::of(situation)?, rng)?,
+                None => sockets.draw(situation.belief, &scope, rng)?,
             }));
         }
-        let scope = Scope::of(situation)?;
         let movement = match &scope.domain {
             Domain::Box { searched, .. } => Movement::to(scope.draw(searched, rng)?),
             Domain::List { movements, .. } => movements[rng.random_range(0..movements.len())].clone(),

@@ -41,9 +41,10 @@ impl Sockets {
         Self { limits, count, beginnings: beginnings.into_iter().enumerate().map(beginning).collect() }
     }
 
-    /// The posture that a socket begins with, of the first one in which nothing was held yet.
-    pub fn beginning(&self) -> Option<&Movement> {
-        self.beginnings.first()
+    /// The posture that a socket begins with, of the first one in which nothing was held yet and of which that posture is
+    /// within a scope. The others are gone to where they are believed to be.
+    pub(super) fn beginning(&self, scope: &Scope<'_>) -> Option<&Movement> {
+        self.beginnings.iter().find(|movement| scope.is_feasible(&movement.configuration))
     }
 
     /// Something was held in the socket of this movement.
@@ -51,10 +52,12 @@ impl Sockets {
         self.beginnings.retain(|beginning| beginning.socket != movement.socket);
     }
 
-    /// The believed postures in which the target is in a socket; `None` for a socket that no channel reads.
-    pub fn manifold<'a>(&'a self, belief: &'a Belief, socket: usize) -> Option<Manifold<'a>> {
+    /// The believed postures in which the target is in a socket, in the box of a scope; `None` for a socket that no channel
+    /// reads.
+    fn manifold<'a>(&'a self, belief: &'a Belief, scope: &'a Scope<'_>, socket: usize) -> Option<Manifold<'a>> {
         let (_, target) = belief.rig.holds(socket)?;
-        Some(Manifold::new(&belief.state, target, *belief.state.sockets.get(socket)?, &self.limits))
+        let limits = scope.searched().unwrap_or(&self.limits);
+        Some(Manifold::new(&belief.state, target, *belief.state.sockets.get(socket)?, limits))
     }
 
     /// The joint limits.
@@ -82,7 +85,7 @@ impl Sockets {
         let first = rng.random_range(0..self.count.max(1));
         let sockets = (0..self.count).map(|index| (first + index) % self.count);
         let drawn = sockets.into_iter().find_map(|socket| {
-            let manifold = self.manifold(belief, socket)?;
+            let manifold = self.manifold(belief, scope, socket)?;
             let configuration = drawn_within(&manifold, scope, rng)?;
             Some(Movement { configuration, row: None, socket: Some(socket) })
         });
@@ -99,7 +102,7 @@ impl Sockets {
     ) -> Vec<Movement> {
         let mut pool = Vec::with_capacity(count);
         for socket in 0..self.count {
-            let Some(manifold) = self.manifold(belief, socket) else { continue };
+            let Some(manifold) = self.manifold(belief, scope, socket) else { continue };
             for _ in 0..count.div_ceil(self.count) {
                 let Some(configuration) = drawn_within(&manifold, scope, rng) else { break };
                 pool.push(Movement { configuration, row: None, socket: Some(socket) });
@@ -113,8 +116,8 @@ impl Sockets {
         held(belief, (0..self.count).map(Some))
     }
 
-    /// The best of a pool of movements, its best polished along their tangents; and its value. `belief` says where the
-    /// manifolds are, and `held` what movements in each socket are valued by.
+    /// The best of a pool of movements, its best polished along their tangents; and its value, without the price of the travel
+    /// there. `belief` says where the manifolds are, and `held` what movements in each socket are valued by.
     pub(super) fn best<'b>(
         &self,
         (belief, scope): (&Belief, &Scope<'_>),
@@ -127,24 +130,30 @@ impl Sockets {
             return Err(SelectionError::OutOfReach);
         }
         *evaluations += pool.len();
-        let found = evaluate(held, pool, &values)?;
+        let mut found = evaluate(held, pool, &values)?;
+        found.iter_mut().zip(pool).for_each(|(value, movement)| *value += scope.price(&movement.configuration));
         let mut order: Vec<usize> = (0..pool.len()).filter(|index| found[*index].is_finite()).collect();
         order.sort_by(|a, b| found[*a].total_cmp(&found[*b]));
         let mut polished = Vec::new();
         for index in order.into_iter().take(POLISHED) {
             let mut movement = pool[index].clone();
             let mut value = found[index];
-            if let Some((socket, manifold)) = movement.socket.and_then(|k| Some((k, self.manifold(belief, k)?))) {
+            if let Some((socket, manifold)) = movement.socket.and_then(|k| Some((k, self.manifold(belief, scope, k)?))) {
                 let values = values(&held[socket].1)?;
                 for _ in 0..TANGENTS {
                     let (configuration, lower) =
                         along_tangent((&manifold, scope), &movement.configuration, value, evaluations, &values);
+                    if lower >= value {
+                        break;
+                    }
                     (movement.configuration, value) = (configuration, lower);
                 }
             }
             polished.push((movement, value));
         }
-        least(polished).ok_or(SelectionError::NoFiniteCriterion)
+        let (movement, value) = least(polished).ok_or(SelectionError::NoFiniteCriterion)?;
+        let price = scope.price(&movement.configuration);
+        Ok((movement, value - price))
     }
 }
 
@@ -175,7 +184,8 @@ fn along_tangent(
         let postures: Vec<Option<Vec<f64>>> = points.iter().map(at).collect();
         let landed: Vec<Vec<f64>> = postures.iter().flatten().cloned().collect();
         *evaluations += landed.len();
-        let mut found = values(&landed).into_iter();
+        let priced = values(&landed).into_iter().zip(&landed).map(|(value, posture)| value + scope.price(posture));
+        let mut found = priced.collect::<Vec<f64>>().into_iter();
         postures.iter().map(|posture| posture.as_ref().and_then(|_| found.next()).unwrap_or(f64::INFINITY)).collect()
     };
     let (point, lower) = polish(&vec![0.5; tangent.ncols()], POLISH, evaluate);

@@ -30,15 +30,21 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// where there is none, as for a point behind a camera.
     fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool;
 
-    /// Writes L⁻¹ (y ⊖ h), the difference of two readings, whitened (d numbers).
-    fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]);
+    /// Writes L⁻¹ (y ⊖ h), the difference of two readings, whitened (d numbers); (y − h)/σ unless a channel says otherwise.
+    fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
+        let sigma = self.sigma();
+        whitened.iter_mut().zip(y.iter().zip(h)).for_each(|(whitened, (y, h))| *whitened = (y - h) / sigma);
+    }
 
     /// Writes the predicted reading and L⁻¹ ∂h/∂δ, transposed: `rows` holds d columns of m numbers each, all zero at
     /// first. False where there is no prediction; the rows then stay zero.
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool;
 
-    /// What is read where `reading` would be without noise: y = h ⊕ L v, with v standard normal (d numbers).
-    fn disturb(&self, reading: &mut [f64], v: &[f64]);
+    /// What is read where `reading` would be without noise: y = h ⊕ L v, with v standard normal (d numbers); h + σ v unless a
+    /// channel says otherwise.
+    fn disturb(&self, reading: &mut [f64], v: &[f64]) {
+        reading.iter_mut().zip(v).for_each(|(reading, v)| *reading += self.sigma() * v);
+    }
 
     /// σ of the noise of an equation, and its unit: m, rad or px.
     fn nominal(&self, equation: usize) -> (f64, &'static str) {

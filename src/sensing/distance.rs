@@ -52,10 +52,6 @@ impl Channel for Distance {
         reading[0] > 0.0
     }
 
-    fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
-        whitened[0] = (y[0] - h[0]) / self.sigma_m;
-    }
-
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let away = pass.target(self.target) - self.to.coords;
         reading[0] = away.norm();
@@ -70,9 +66,5 @@ impl Channel for Distance {
 
     fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
         Apart::lengths(y, h)
-    }
-
-    fn disturb(&self, reading: &mut [f64], v: &[f64]) {
-        reading[0] += self.sigma_m * v[0];
     }
 }

@@ -175,10 +175,6 @@ impl Channel for Pixels {
         Apart { pixels: Some(points.sum::<f64>() / (y.len() / 2).max(1) as f64), ..Apart::default() }
     }
 
-    fn disturb(&self, reading: &mut [f64], v: &[f64]) {
-        reading.iter_mut().zip(v).for_each(|(reading, v)| *reading += self.sigma_px * v);
-    }
-
     fn has_view(&self) -> bool {
         true
     }

@@ -49,12 +49,6 @@ impl Channel for Socket {
         true
     }
 
-    fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
-        for (whitened, (y, h)) in whitened.iter_mut().zip(y.iter().zip(h)) {
-            *whitened = (y - h) / self.sigma_m;
-        }
-    }
-
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let m = rows.len() / 3;
         let mut put = |coordinate: usize, column: Vector3<f64>| {
@@ -66,10 +60,6 @@ impl Channel for Socket {
         }
         reading.copy_from_slice((target - pass.state().sockets[self.socket].coords).as_slice());
         true
-    }
-
-    fn disturb(&self, reading: &mut [f64], v: &[f64]) {
-        reading.iter_mut().zip(v).for_each(|(reading, v)| *reading += self.sigma_m * v);
     }
 
     fn occasion(&self) -> Occasion {

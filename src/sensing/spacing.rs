@@ -42,10 +42,6 @@ impl Channel for Spacing {
         reading[0] > 0.0
     }
 
-    fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
-        whitened[0] = (y[0] - h[0]) / self.sigma_m;
-    }
-
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let [one, other] = self.sockets.map(|socket| pass.state().sockets[socket]);
         let apart = one - other;
@@ -60,10 +56,6 @@ impl Channel for Spacing {
             place.into_iter().flatten().zip(&slope).for_each(|(coordinate, slope)| rows[coordinate] = sign * slope);
         }
         true
-    }
-
-    fn disturb(&self, reading: &mut [f64], v: &[f64]) {
-        reading[0] += self.sigma_m * v[0];
     }
 
     fn occasion(&self) -> Occasion {

@@ -99,10 +99,12 @@ impl Titles {
             return Err(TableError::new(what, format!("name {said}")));
         }
         let columns = titles.iter().zip(wanted).map(|(title, quantity)| self.titled(title, quantity));
-        let rotation = match (layout, titles.get(3)) {
-            (Layout::Pose, _) if titles.len() == 7 => Rotation::Quaternion,
-            (Layout::Pose, Some(title)) if title.contains("roll") => Rotation::RollPitchYaw,
-            (Layout::Pose, _) => Rotation::Vector,
+        let says = |title: &String, angle: &str| title.to_lowercase().contains(angle);
+        let is_roll_pitch_yaw = || titles[3..].iter().zip(["roll", "pitch", "yaw"]).all(|(title, of)| says(title, of));
+        let rotation = match layout {
+            Layout::Pose if titles.len() == 7 => Rotation::Quaternion,
+            Layout::Pose if is_roll_pitch_yaw() => Rotation::RollPitchYaw,
+            Layout::Pose => Rotation::Vector,
             _ => Rotation::None,
         };
         Ok(Reading { columns: columns.collect::<Result<_, _>>()?, rotation })

@@ -43,7 +43,7 @@ pub struct Begun {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InitError {
     /// The description cannot be used.
-    #[error("{file}:{source}")]
+    #[error("{file}, {source}")]
     Urdf {
         /// Its file.
         file: String,

@@ -4,7 +4,7 @@
 //! order; one by one every row would cost a search of its own. Among many rows the modes are searched by a sample of them,
 //! spread evenly, and then followed to where all rows are explained.
 
-use super::{EstimationError, Measurement, NoiseFit, Smoother, mode::Effort};
+use super::{EstimationError, Measurement, NoiseFit, Smoother, THOROUGH};
 use crate::{
     model::State,
     sensing::{Loss, Observation},
@@ -16,8 +16,6 @@ const SEARCHED: usize = 200;
 const ROUNDS: usize = 12;
 /// Scales that change by less than this have been found.
 const FOUND: f64 = 1e-3;
-
-const THOROUGH: Effort = Effort { steps: 60, tolerance: 1e-6, hopeless: f64::INFINITY };
 
 impl Smoother {
     /// Takes in movements to `positions` (rad or m) with what was observed after them, all at once. Modes are searched from

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use toml::Spanned;
 
-use super::{Check, equipment::EXACTLY, raw};
+use super::{Check, raw};
 use crate::{
     model::{
         Block,
@@ -55,6 +55,13 @@ impl Links<'_> {
             None => std::iter::once("base").chain(self.joints.iter().map(String::as_str)).collect(),
         }
     }
+}
+
+/// What of an axis is held.
+#[derive(Clone, Copy, Default)]
+struct HeldParts {
+    direction: bool,
+    point: bool,
 }
 
 impl Check<'_> {
@@ -118,24 +125,38 @@ impl Check<'_> {
     pub(super) fn learned(&mut self, scenario: &raw::Scenario, names: &[String]) -> (Vec<bool>, Vec<(Block, Known)>) {
         let prior = scenario.prior.get_ref();
         let (point_m, direction_rad) = (*prior.point_m.get_ref(), *prior.direction_rad.get_ref());
-        let (mut learned, mut known) = (vec![true; names.len()], Vec::new());
+        let mut learned = vec![true; names.len()];
+        let mut held_parts = vec![HeldParts::default(); names.len()];
         for held in &scenario.robot.hold {
             let given = held.get_ref();
             let joint = |name: &str| names.iter().position(|joint| joint == name);
-            let within = |length_m, angle_rad| Known::Within { length_m, angle_rad, other: EXACTLY };
             let part = |end: &str| given.strip_suffix(end).and_then(joint);
             if let Some(joint) = joint(given) {
                 learned[joint] = false;
             } else if let Some(joint) = part(".direction") {
-                known.push((Block::Axis(joint), within(point_m, EXACTLY)));
+                held_parts[joint].direction = true;
             } else if let Some(joint) = part(".point") {
-                known.push((Block::Axis(joint), within(EXACTLY, direction_rad)));
+                held_parts[joint].point = true;
             } else {
                 let mend = match similar(given, names.iter().map(String::as_str)) {
                     Some(known) => format!("did you mean `{known}`?"),
                     None => format!("write some of {}, or `….direction` or `….point` of one", names.join(", ")),
                 };
                 self.problem(held.span(), "robot.hold", format!("there is no joint `{given}`"), mend);
+            }
+        }
+        let mut known = Vec::new();
+        for (joint, held) in held_parts.iter().enumerate() {
+            let within = |length_m, angle_rad| Known::Within { length_m, angle_rad, other: Known::EXACTLY };
+            match held {
+                HeldParts { direction: true, point: true } => learned[joint] = false,
+                HeldParts { direction: true, point: false } => {
+                    known.push((Block::Axis(joint), within(point_m, Known::EXACTLY)));
+                }
+                HeldParts { direction: false, point: true } => {
+                    known.push((Block::Axis(joint), within(Known::EXACTLY, direction_rad)));
+                }
+                HeldParts { direction: false, point: false } => {}
             }
         }
         (learned, known)

@@ -12,8 +12,6 @@ use crate::{
 
 /// How far from the direction that it faces a target is seen, unless the file says otherwise, degrees.
 const FACING_WITHIN_DEG: f64 = 80.0;
-/// How well what is said to be known is known in the other respect.
-pub(super) const EXACTLY: f64 = 1e-6;
 
 /// Base, targets, cameras, and how well their places are known where they are learned.
 #[derive(Default)]
@@ -148,7 +146,7 @@ impl Check<'_> {
             let px = self.positive(&field("known_to_px"), px);
             outfit
                 .known
-                .push((Block::Intrinsics(number), Known::Within { length_m: EXACTLY, angle_rad: EXACTLY, other: px }));
+                .push((Block::Intrinsics(number), Known::Within { length_m: Known::EXACTLY, angle_rad: Known::EXACTLY, other: px }));
         }
         let pose = frame * Isometry3::from_parts(Translation3::from(at.coords), rotation);
         let intrinsics = Some([focal[0], focal[1], centre[0], centre[1]]);
@@ -169,9 +167,9 @@ impl Check<'_> {
         if raw.known_to_m.is_none() && raw.known_to_deg.is_none() {
             return None;
         }
-        let length_m = raw.known_to_m.as_ref().map_or(EXACTLY, |x| self.positive(&field("known_to_m"), x));
+        let length_m = raw.known_to_m.as_ref().map_or(Known::EXACTLY, |x| self.positive(&field("known_to_m"), x));
         let angle = raw.known_to_deg.as_ref().map(|x| self.positive(&field("known_to_deg"), x).to_radians());
-        Some(Known::Within { length_m, angle_rad: angle.unwrap_or(EXACTLY), other: EXACTLY })
+        Some(Known::Within { length_m, angle_rad: angle.unwrap_or(Known::EXACTLY), other: Known::EXACTLY })
     }
 
     pub(super) fn free_name<'a>(

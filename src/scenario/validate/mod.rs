@@ -154,12 +154,7 @@ impl Check<'_> {
         let rig = self.rig(raw, &robot);
         let rows = recorded.as_ref().map(|(_, held_out)| held_out.split(0).0.len() as u64);
         let world = self.world(raw, &robot, rig.as_deref(), recorded);
-        let setting = Setting {
-            learns_marker: raw.robot.learn_marker,
-            is_measured: raw.measurements.is_some(),
-            has_sockets: !robot.sockets.is_empty(),
-            sees_markers_alone: rig.iter().flat_map(|rig| rig.channels()).all(|channel| channel.target() == Some(0)),
-        };
+        let setting = Setting::of(&robot, rig.as_deref(), raw.measurements.is_some());
         let learners = self.learners(&raw.learners, setting);
         let usual = rig.as_deref().filter(|_| robot.described.is_some() && raw.measurements.is_some());
         let usual = usual.map(|rig| (FILTER_SIGMAS * rig.sigma()).powi(2));

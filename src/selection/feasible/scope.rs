@@ -53,9 +53,11 @@ impl<'a> Scope<'a> {
                 movements: Cow::Owned(constraints.of(from, pool.iter().cloned(), |movement| &movement.configuration)?),
                 joints: None,
             },
-            (Actions::Sockets(sockets), _) => {
-                let joints = sockets.limits();
-                Domain::Box { searched: Cow::Borrowed(joints), joints }
+            (Actions::Sockets(sockets), None) => {
+                Domain::Box { searched: Cow::Borrowed(sockets.limits()), joints: sockets.limits() }
+            }
+            (Actions::Sockets(sockets), Some(constraints)) => {
+                Domain::Box { searched: Cow::Owned(constraints.reach(from)?), joints: sockets.limits() }
             }
             (Actions::Box(joints), None) => Domain::Box { searched: Cow::Borrowed(joints), joints },
             (Actions::Box(joints), Some(constraints)) => match &constraints.allowed {
@@ -90,6 +92,14 @@ impl<'a> Scope<'a> {
         Ok(Some((Self { domain: Domain::Box { searched: searched.clone(), joints }, constraints, from }, searched)))
     }
 
+    /// The box to search; `None` where there is a list.
+    pub fn searched(&self) -> Option<&JointBox> {
+        match &self.domain {
+            Domain::List { .. } => None,
+            Domain::Box { searched, .. } => Some(searched),
+        }
+    }
+
     /// Whether anything is constrained.
     pub fn is_constrained(&self) -> bool {
         self.constraints.is_some()
@@ -118,7 +128,7 @@ impl<'a> Scope<'a> {
         let is_feasible: Vec<bool> = candidates.iter().map(|posture| constraints.allow(self.from, posture)).collect();
         let kept = candidates.iter().zip(&is_feasible).filter(|(_, is_feasible)| **is_feasible);
         let kept: Vec<Vec<f64>> = kept.map(|(posture, _)| posture.clone()).collect();
-        let priced = values(&kept).into_iter().zip(&kept).map(|(value, posture)| value + self.toll(others, posture));
+        let priced = values(&kept).into_iter().zip(&kept).map(|(value, posture)| value + self.toll(others.iter().map(Vec::as_slice), posture));
         let mut priced = priced.collect::<Vec<f64>>().into_iter();
         let mut value = |is_feasible: &bool| if *is_feasible { priced.next() } else { None };
         is_feasible.iter().map(|is_feasible| value(is_feasible).unwrap_or(f64::INFINITY)).collect()
@@ -126,16 +136,18 @@ impl<'a> Scope<'a> {
 
     /// What the travel to a posture costs, in units of the criterion.
     pub fn price(&self, posture: &[f64]) -> f64 {
-        self.toll(&[], posture)
+        self.toll([], posture)
     }
 
-    fn toll(&self, others: &[Vec<f64>], posture: &[f64]) -> f64 {
+    /// The same beside other movements; see [`evaluate_beside`](Self::evaluate_beside).
+    pub fn toll<'p>(&self, others: impl IntoIterator<Item = &'p [f64]>, posture: &[f64]) -> f64 {
         let price = self.constraints.map_or(0.0, |constraints| constraints.price);
         if price == 0.0 {
             return 0.0;
         }
-        let places = self.from.into_iter().chain(others.iter().map(Vec::as_slice));
-        places.map(|place| price * travel(place, posture)).min_by(f64::total_cmp).unwrap_or(0.0)
+        let standing = self.from.map(|from| price * travel(from, posture));
+        let beside = others.into_iter().map(|place| price * travel(place, posture));
+        standing.into_iter().chain(beside).min_by(f64::total_cmp).unwrap_or(0.0)
     }
 
     /// A feasible posture, drawn uniformly.

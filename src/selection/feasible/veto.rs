@@ -1,5 +1,6 @@
 //! What a robot has refused: postures that it cannot take, though nothing that was told excludes them.
 
+use super::travel;
 use crate::kinematics::JointBox;
 
 /// The radius of the first veto in its neighbourhood, in sides of the unit joint box.
@@ -27,7 +28,7 @@ impl Vetoes {
     /// Excludes the neighbourhood of a posture (rad or m per joint). Tells its radius.
     pub fn add(&mut self, limits: &JointBox, posture: &[f64]) -> f64 {
         let centre = limits.to_unit(posture);
-        let near = self.0.iter().filter(|veto| apart(&veto.centre, &centre) <= veto.radius + FIRST_RADIUS);
+        let near = self.0.iter().filter(|veto| travel(&veto.centre, &centre) <= veto.radius + FIRST_RADIUS);
         let radius = near.map(|veto| 2.0 * veto.radius).fold(FIRST_RADIUS, f64::max).min(GREATEST_RADIUS);
         self.0.push(Veto { centre, radius });
         radius
@@ -39,23 +40,8 @@ impl Vetoes {
             return false;
         }
         let point = limits.to_unit(posture);
-        self.0.iter().any(|veto| apart(&veto.centre, &point) <= veto.radius)
+        self.0.iter().any(|veto| travel(&veto.centre, &point) <= veto.radius)
     }
-
-    /// How many there are.
-    pub fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-}
-
-/// The greatest distance along any joint.
-fn apart(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -75,6 +61,5 @@ mod tests {
         assert_eq!(vetoes.add(&limits, &[0.9, 0.25]), 0.02, "far from both");
         let radii: Vec<f64> = (0..5).map(|_| vetoes.add(&limits, &[0.05, 0.25])).collect();
         assert_eq!(radii, [0.08, 0.16, 0.25, 0.25, 0.25], "up to a bound");
-        assert_eq!(vetoes.len(), 8);
     }
 }
