@@ -20,6 +20,8 @@ pub struct Options {
 pub struct Calibration {
     /// The report.
     pub report: Report,
+    /// The chain as described, with base, targets, cameras and sockets fitted to the rows that are learned from.
+    pub nominal: Fit,
     /// What a URDF can hold.
     pub fit: Fit,
     /// What was added to it.
@@ -142,7 +144,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         learning,
     };
     let extras = trials.iter().find(|trial| trial.kept).map(|trial| trial.extras.clone()).unwrap_or_default();
-    Ok(Calibration { report, fit, extras, fuller, folds: if has_folds { folds } else { Vec::new() } })
+    Ok(Calibration { report, nominal, fit, extras, fuller, folds: if has_folds { folds } else { Vec::new() } })
 }
 
 impl Case<'_> {

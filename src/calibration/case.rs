@@ -26,7 +26,7 @@ pub struct Row {
 /// A robot as it is described, and what was measured of it.
 #[derive(Clone, Debug)]
 pub struct Case<'a> {
-    pub(super) scenario: &'a Scenario,
+    pub(crate) scenario: &'a Scenario,
     /// The rows, in the order of the table.
     pub rows: Vec<Row>,
     /// What everything is called.

@@ -6,7 +6,10 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use body_schema::calibration::{self, Calibration, Case, Figures, File, Options, Progress, Report, report};
+use body_schema::{
+    calibration::{self, Calibration, Case, Figures, File, Options, Progress, Report, report},
+    recording,
+};
 use indicatif::ProgressBar;
 
 use super::{load_scenario, output, progress};
@@ -112,6 +115,10 @@ fn write(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<Path
             told.push(place);
         }
     }
+    let markdown = report::markdown(found, case);
+    let recording = folder.join("calibration.rrd");
+    recording::calibration(&recording, found, case, &markdown)?;
+    told.push(recording);
     Ok(told)
 }
 

@@ -122,8 +122,11 @@ fn observe(experiment: &Experiment, recorder: Option<&mut Recorder>, csv: Option
 
 fn summarise(result: &RunResult) -> Result<()> {
     output::say(format!("{}, seed {}: {} movements each", result.scenario, result.seed, result.steps))?;
+    // Where nothing but sockets tells how good they are.
+    let meets_itself = result.learners.iter().any(|learner| learner.metrics.scatter_m.is_some());
     let rows = result.learners.iter().map(|learner| {
         let metrics = &learner.metrics;
+        let predicted = if meets_itself { metrics.scatter_m } else { metrics.prediction_mean_m };
         let verdict = match (&learner.failure, learner.converged_at) {
             (Some(failure), _) => failure.clone(),
             (None, Some(at)) => format!("converged at {at}"),
@@ -137,12 +140,13 @@ fn summarise(result: &RunResult) -> Result<()> {
             output::number(metrics.orientation_deg, 2),
             output::number(metrics.axis_deg, 2),
             output::number(metrics.location_m.map(|error| error * 1e3), 1),
-            output::number(metrics.prediction_mean_m.map(|error| error * 1e3), 2),
+            output::number(predicted.map(|error| error * 1e3), 2),
             metrics.misses.to_string(),
             verdict,
         ]
     });
-    let header = ["learner", "orient. (deg)", "axis (deg)", "location (mm)", "predict. (mm)", "misses", "verdict"];
+    let predicted = if meets_itself { "scatter (mm)" } else { "predict. (mm)" };
+    let header = ["learner", "orient. (deg)", "axis (deg)", "location (mm)", predicted, "misses", "verdict"];
     output::say(output::table(header, rows))?;
     for learner in &result.learners {
         for remark in &learner.remarks {

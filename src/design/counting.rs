@@ -95,9 +95,10 @@ mod tests {
     fn sockets_that_nothing_reads_count_for_nothing() {
         let scenario = builtin("arm-7dof-socket").expect("built in");
         let (robot, rig) = (&scenario.robot, &scenario.rig);
-        let channels = rig.channels().iter().filter(|channel| {
-            !matches!(channel.occasion(), crate::sensing::Occasion::Held { socket: 0, .. })
-        });
+        let channels = rig
+            .channels()
+            .iter()
+            .filter(|channel| !matches!(channel.occasion(), crate::sensing::Occasion::Held { socket: 0, .. }));
         let rig = Rig::new(channels.cloned().collect());
         for General { rig, posture } in general_movements(&robot.state, &robot.layout, &rig, &robot.limits) {
             for channel in rig.channels() {

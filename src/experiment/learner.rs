@@ -119,7 +119,8 @@ impl Learner {
         match self.agent.propose(1) {
             Ok(proposals) => Ok(proposals.first().cloned()),
             Err(
-                error @ (SelectionError::NoFiniteCriterion | SelectionError::Infeasible(_) | SelectionError::OutOfReach),
+                error
+                @ (SelectionError::NoFiniteCriterion | SelectionError::Infeasible(_) | SelectionError::OutOfReach),
             ) => {
                 self.stopped = Some(error);
                 Ok(None)

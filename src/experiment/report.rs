@@ -220,6 +220,10 @@ pub struct ModelReport {
     /// What can be looked at; empty where that is a marker alone, and a point.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub targets: Vec<PlaceReport>,
+    /// The sockets in which targets are held, metres, in the order of the description; those that are held out are none of
+    /// them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sockets_m: Vec<[f64; 3]>,
 }
 
 /// The axis of one joint at θ = 0.
@@ -269,6 +273,7 @@ impl ModelReport {
             base,
             cameras: PlaceReport::of_cameras(&state),
             targets: PlaceReport::of_targets(&state),
+            sockets_m: state.sockets.iter().map(|socket| array(&socket.coords)).collect(),
         }
     }
 

@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 
 pub use error::ExportError;
 
-use crate::scenario::{LearnerSpec, Scenario, ScenarioSummary, WorldSpec};
+use crate::scenario::{Scenario, ScenarioSummary, WorldSpec};
 use error::Doing;
 use run::Recorded;
 
@@ -168,7 +168,11 @@ impl Export<'_> {
         };
         let runs = self.seeds.par_iter().map(run).collect::<Result<Vec<_>, ExportError>>()?;
         let summary = ScenarioSummary {
-            learners: scenario.chosen(Some(&plan.learners))?.iter().map(LearnerSpec::description).collect(),
+            learners: scenario
+                .chosen(Some(&plan.learners))?
+                .iter()
+                .map(|spec| scenario.learner_description(spec))
+                .collect(),
             compositions: Vec::new(),
             explorer: plan.learners.clone(),
             steps: plan.steps,

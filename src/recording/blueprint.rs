@@ -6,7 +6,7 @@ use rerun::{
     external::{
         re_log_types::{ApplicationId, EntityPath, LogMsg},
         re_sdk_types::blueprint::archetypes::{
-            Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, VisualBounds2D as Bounds,
+            Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, VisualBounds2D as Bounds,
         },
     },
 };
@@ -139,9 +139,9 @@ impl Arranger {
     /// The curves of all learners, metric by metric.
     fn charts(&self) -> Vec<Part> {
         let charts: &[(&str, &str)] = if self.description.truth.is_some() { &CHARTS } else { &CHARTS_WITHOUT_TRUTH };
-        let views = charts
-            .iter()
-            .map(|(title, metric)| chart(title, self.roots.iter().map(|root| format!("+ {root}/metrics/{metric}"))));
+        let views = charts.iter().map(|(title, metric)| {
+            chart(title, self.roots.iter().map(|root| format!("+ {root}/metrics/{metric}")), None)
+        });
         views.collect()
     }
 
@@ -149,15 +149,15 @@ impl Arranger {
     fn limits(&self) -> Option<Part> {
         self.description.truth.as_ref()?;
         let of_learner = |root: &EntityPath| TRACE.1.map(|metric| format!("+ {root}/metrics/{metric}"));
-        Some(chart(TRACE.0, self.roots.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")])))
+        Some(chart(TRACE.0, self.roots.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")]), None))
     }
 
     /// How far readings are from the estimates, and where a learner weighs them, how likely they are outliers.
     fn readings(&self) -> Vec<Part> {
         let series = |kind: &'static str| self.roots.iter().map(move |root| format!("+ {root}/readings/{kind}/**"));
-        let mut views = vec![chart("Residual per reading (σ)", series("residuals"))];
+        let mut views = vec![chart("Residual per reading (σ)", series("residuals"), None)];
         if self.description.learners.iter().any(|learner| learner.robust) {
-            views.push(chart("Probability of an outlier", series("outliers")));
+            views.push(chart("Probability of an outlier", series("outliers"), Some([0.0, 1.0])));
         }
         views
     }
@@ -177,9 +177,35 @@ impl Arranger {
     }
 }
 
-fn chart(title: &str, contents: impl IntoIterator<Item = String>) -> Part {
-    View::new("TimeSeries", title, &EntityPath::root())
+/// For a calibration: the robot beside the report, the residuals of all rows below.
+pub(super) fn calibration(
+    stage: &Stage,
+    application: ApplicationId,
+    has_places: bool,
+) -> Result<Vec<LogMsg>, RecordingError> {
+    let [target, eye] = stage.camera(Shape::default().aspect()).map(|point| single(point.coords.into()));
+    let contents = ["robot/**", "body/**", GROUNDS[0], "key"].map(|entity| format!("+ /{entity}"));
+    let scene = View::new("3D", "The calibrated robot, row by row", &EntityPath::root())
         .with_contents(contents)
-        .with(&PlotLegend::new().with_corner(Corner2D::RightTop))
-        .into()
+        .with(&EyeControls3D::new().with_position(eye).with_look_target(target).with_eye_up([0.0, 0.0, 1.0]))
+        .with(&Background::new(BackgroundKind::SolidColor).with_color(Theme::Light.background()))
+        .with(&LineGrid3D::new().with_visible(false));
+    let report = View::new("TextDocument", "Report", &EntityPath::from("report"));
+    let unit = if has_places { "Distance from what was measured, by row (mm)" } else { "Residual, by row" };
+    let residuals = chart(unit, ["+ /residuals/**".to_owned()], None);
+    let outliers = chart("Probability of an outlier, by row", ["+ /outliers".to_owned()], Some([0.0, 1.0]));
+    let above = Container::horizontal([scene.into(), report.into()]);
+    let below = Container::horizontal([residuals, outliers]);
+    Container::vertical([above.into(), below.into()], [2.0, 1.0]).messages(application, Time::Shown)
+}
+
+/// Curves; the vertical axis shows `range`, or what it takes.
+fn chart(title: &str, contents: impl IntoIterator<Item = String>, range: Option<[f64; 2]>) -> Part {
+    let view = View::new("TimeSeries", title, &EntityPath::root())
+        .with_contents(contents)
+        .with(&PlotLegend::new().with_corner(Corner2D::RightTop));
+    match range {
+        Some(range) => view.with(&ScalarAxis::new().with_range(range)).into(),
+        None => view.into(),
+    }
 }

@@ -3,7 +3,10 @@
 use nalgebra::{Point3, Vector3};
 
 use super::solid::Capsule;
-use crate::{experiment::Description, model::State};
+use crate::{
+    experiment::{Description, JointDescription},
+    model::State,
+};
 
 /// The colour of a body: lighter than the true arm, and to be seen on light and on dark ground.
 const BODY: [u8; 3] = [0xD6, 0xDA, 0xE0];
@@ -36,7 +39,21 @@ pub(super) struct Figure {
 impl Figure {
     /// The body of a scenario's robot, whose arm is known or believed to be this one.
     pub(super) fn of(description: &Description, arm: &State) -> Self {
-        let name = |index: usize| description.joints.get(index).map_or("", |joint| joint.name.as_str());
+        let figure = Self::beginning(&description.joints, arm);
+        match description.body {
+            Some(crate::experiment::Body::Humanoid) => figure.humanoid(arm, description),
+            None => figure.pedestal(),
+        }
+    }
+
+    /// A pedestal for this arm.
+    pub(super) fn on_pedestal(joints: &[JointDescription], arm: &State) -> Self {
+        Self::beginning(joints, arm).pedestal()
+    }
+
+    /// Where an arm of these joints begins, and how far it reaches.
+    fn beginning(joints: &[JointDescription], arm: &State) -> Self {
+        let name = |index: usize| joints.get(index).map_or("", |joint| joint.name.as_str());
         let carried_by =
             (0..arm.joints.len()).take_while(|index| TRUNK.iter().any(|trunk| name(*index).starts_with(trunk))).count();
         let points: Vec<(usize, Point3<f64>)> =
@@ -49,11 +66,7 @@ impl Figure {
         let reach_m: f64 = arm_points.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum();
         // An arm of one joint may be a single point.
         let reach_m = if reach_m > 1e-3 { reach_m } else { 1.0 };
-        let figure = Self { carried_by, shoulder, reach_m, ..Self::default() };
-        match description.body {
-            Some(crate::experiment::Body::Humanoid) => figure.humanoid(arm, description),
-            None => figure.pedestal(),
-        }
+        Self { carried_by, shoulder, reach_m, ..Self::default() }
     }
 
     /// A figure of this arm's size, whose right arm it is: x ahead, y to the left, z up.

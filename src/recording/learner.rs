@@ -16,8 +16,7 @@ use super::{
     posture::{ArmLook, Posture, bare},
     readings::Readings,
     rows::Rows,
-    sight,
-    sockets::sockets,
+    sight, sockets,
     solid::{drum, quaternion, single, solid},
     stage::Stage,
     uncertainty::{Drawn, Uncertainty},
@@ -149,7 +148,7 @@ impl LearnerEntities {
                 .with_show_labels(true);
             rows.always(&self.entity(path), &[&name]);
         }
-        if let Some(points) = sockets(&description.sockets) {
+        if let Some(points) = sockets::known(&description.sockets, stage.figure.reach_m) {
             rows.always(&self.entity("sockets"), &[&points]);
         }
         let name = description.learners.get(self.index).map_or("", |learner| learner.name.as_str());
@@ -240,6 +239,10 @@ impl LearnerEntities {
         if sight::is_drawn(scenery) {
             let arms = [scenery.truth.zip(truth.as_ref()), estimate.as_ref().zip(links.as_ref())];
             sight::log(rows, (step, 0), self, arms, report.movement.as_ref(), scenery);
+        }
+        if scenery.truth.is_none() && !model.sockets_m.is_empty() {
+            let points = sockets::believed(&scenery.description.sockets, &model.sockets_m, reach_m);
+            rows.at(step, &self.entity("sockets"), &[&points]);
         }
         let links = links.map(|posture| posture.links).unwrap_or_default();
         let cloud = opacity(joints.len());

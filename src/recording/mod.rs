@@ -24,6 +24,7 @@
 //! | `/{learner}/arm/estimate` | Capsules3D | the estimated arm as shown, after the update |
 //! | `/{learner}/point_ellipsoids` | Ellipsoids3D | covariances of the axis points as shown, then of the marker if it is learned |
 //! | `/{learner}/allowed_ellipsoids` | Ellipsoids3D | what its data allow of them, where its own standard deviations are 1.5 times as large; absent without a truth |
+//! | `/{learner}/sockets` | Points3D | the sockets in which targets are held, labelled by their names: static where they truly are, else where the learner takes them to be |
 //! | `/{learner}/marker/predicted`, `…/measured` | Points3D | the marker before the update; measured is empty after a miss |
 //! | `/{learner}/marker/error` | LineStrips3D | from the one to the other, labelled with its length; empty after a miss |
 //! | `/{learner}/marker/outlier` | LineStrips3D | a cross where the marker was measured, if the learner takes that for an outlier; absent if it weighs no readings |
@@ -66,6 +67,7 @@
 
 mod blueprint;
 mod body;
+mod calibration;
 mod charts;
 mod colours;
 mod compact;
@@ -98,6 +100,7 @@ mod uncertainty;
 
 pub use self::{
     blueprint::{Shape, Theme},
+    calibration::calibration,
     colours::{TRUTH_COLOR, hex, learner_color, learner_slots},
     csv::{StepsCsv, comparison_csv},
     ellipsoid::EllipsoidSize,

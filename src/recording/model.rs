@@ -60,6 +60,7 @@ mod tests {
             base: None,
             cameras: Vec::new(),
             targets: Vec::new(),
+            sockets_m: Vec::new(),
         };
         assert_eq!(origins(&model), [a, a, a, b, marker_m]);
     }

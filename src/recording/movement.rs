@@ -9,7 +9,7 @@ use super::{
 use crate::experiment::{ChannelReading, MovementReport};
 
 /// The colour of a measurement; no learner's, and it shows on dark and on light ground.
-const MEASURED: [u8; 3] = [0xE6, 0xB4, 0x22];
+pub(super) const MEASURED: [u8; 3] = [0xE6, 0xB4, 0x22];
 /// The colour of an error, and of a marker that was not seen.
 pub(super) const ERROR: [u8; 3] = [0xD6, 0x3B, 0x3B];
 /// Radius of a marker and of the line of an error, as parts of the arm's reach.

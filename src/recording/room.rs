@@ -57,6 +57,13 @@ impl Room {
         room
     }
 
+    /// Of a figure whose arm takes these postures alone, by the points on its axes and its marker.
+    pub(super) fn of_postures(figure: &Figure, postures: Vec<Vec<Point3<f64>>>) -> Self {
+        let from_shoulder = |posture: Vec<Point3<f64>>| posture.iter().map(|point| point - figure.shoulder).collect();
+        let name = figure.name - figure.shoulder;
+        Self { always: vec![name], postures: postures.into_iter().map(from_shoulder).collect() }
+    }
+
     /// Of a figure whose arm is where arms mostly are.
     pub(super) fn around(figure: &Figure) -> Self {
         let mostly = MOSTLY.iter().map(|offset| Vector3::from(*offset) * figure.reach_m);

@@ -21,6 +21,8 @@ const KEPT_LARGE: f64 = 1.5;
 /// The ellipsoids of one learner, continuous from step to step.
 pub(super) struct Uncertainty {
     size: EllipsoidSize,
+    /// So many times as large those of points are drawn.
+    magnified: f64,
     points: Vec<Axes>,
     allowed: Vec<Axes>,
     marker: Axes,
@@ -63,7 +65,19 @@ impl Uncertainty {
     /// For an arm of so many joints.
     pub(super) fn new(joints: usize, size: EllipsoidSize) -> Self {
         let axes = vec![Axes::default(); joints];
-        Self { size, points: axes.clone(), allowed: axes.clone(), marker: Axes::default(), directions: axes }
+        Self {
+            size,
+            magnified: 1.0,
+            points: axes.clone(),
+            allowed: axes.clone(),
+            marker: Axes::default(),
+            directions: axes,
+        }
+    }
+
+    /// The same with the points' ellipsoids so many times as large.
+    pub(super) fn magnified(self, times: f64) -> Self {
+        Self { magnified: times, ..self }
     }
 
     /// The points on the axes, then the marker. `None` if the learner keeps no covariance of any.
@@ -73,14 +87,21 @@ impl Uncertainty {
             |(link, ((joint, axes), description))| {
                 let (point, covariance) = (joint.point_m?, joint.point_covariance_m2?);
                 any = true;
-                Cloud::new(point, link, &description.name, &covariance, axes, (self.size, 1.0))
+                Cloud::new(point, link, &description.name, &covariance, axes, (self.size, self.magnified))
             },
         );
         let mut clouds: Vec<Cloud> = points.collect();
         if let Some(covariance) = model.marker_covariance_m2 {
             any = true;
             let axes = &mut self.marker;
-            clouds.extend(Cloud::new(model.marker_m, joints.len(), "marker", &covariance, axes, (self.size, 1.0)));
+            clouds.extend(Cloud::new(
+                model.marker_m,
+                joints.len(),
+                "marker",
+                &covariance,
+                axes,
+                (self.size, self.magnified),
+            ));
         }
         any.then_some(clouds)
     }

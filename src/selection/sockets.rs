@@ -138,7 +138,8 @@ impl Sockets {
         for index in order.into_iter().take(POLISHED) {
             let mut movement = pool[index].clone();
             let mut value = found[index];
-            if let Some((socket, manifold)) = movement.socket.and_then(|k| Some((k, self.manifold(belief, scope, k)?))) {
+            if let Some((socket, manifold)) = movement.socket.and_then(|k| Some((k, self.manifold(belief, scope, k)?)))
+            {
                 let values = values(&held[socket].1)?;
                 for _ in 0..TANGENTS {
                     let (configuration, lower) =

@@ -109,9 +109,10 @@ impl Act {
 }
 
 const ELBOW: &str = "The elbow breaks";
+const OWN: &str = "Your own robot";
 
 /// All stories; the first is told to those who come for the first time.
-pub const STORIES: [Story; 4] = [
+pub const STORIES: [Story; 6] = [
     Story {
         title: "Ten movements are enough",
         teaser: "Three learners, one arm: who asks needs fewer movements",
@@ -229,6 +230,72 @@ pub const STORIES: [Story; 4] = [
                 title: "Choosing among what was recorded",
                 text: "In the end all have used every movement, so the curves meet. On this seed active predicts well \
                        sooner. Was that luck? There are few movements to choose among: ten other seeds hold out others.",
+                spot: Spot::Ending,
+                acts: &[Act::Seeds],
+            },
+        ],
+    },
+    Story {
+        title: "A real Franka without a camera",
+        teaser: "A ball in two sockets, and nothing measured but the joints",
+        scenario: "panda-sockets",
+        seed: 1,
+        learners: &[],
+        step: 1,
+        cards: &[
+            Card {
+                title: "Nothing is measured but the joints",
+                text: "A ball on the hand of a real Franka was put back into two sockets, 50 mm apart, in ever other \
+                       postures. Each time the model says where the ball is. If the model were right, it would be \
+                       where it was before. That is all there is to learn from.",
+                spot: Spot::Chart,
+                acts: &[Act::PlayTo(12, 2.0)],
+            },
+            Card {
+                title: "Judged where nobody has learned",
+                text: "The chart shows how far the predicted ball strays from itself in the sockets at seven other places. \
+                       nominal is the robot as its maker describes it, and strays by millimetres. global picks the rows \
+                       that should teach most, random takes any.",
+                spot: Spot::Chart,
+                acts: &[Act::PlayOn(5.0)],
+            },
+            Card {
+                title: "From here to a corrected robot",
+                text: "In the end both have seen every row, so the curves meet. Was it luck that global was sooner? Or see \
+                       how a robot of your own is calibrated.",
+                spot: Spot::Ending,
+                acts: &[Act::Seeds, Act::Story(OWN)],
+            },
+        ],
+    },
+    Story {
+        title: OWN,
+        teaser: "A URDF and a table are enough",
+        scenario: "ur10-camera",
+        seed: 1,
+        learners: &[],
+        step: 1,
+        cards: &[
+            Card {
+                title: "Two files are enough",
+                text: "A URDF says how the robot is meant to be, a table where its joints were and what was seen of its hand. \
+                       Here it is a real UR10 with a tag, before a camera. Nobody says where the camera stands, or where on the \
+                       hand the tag is: that is found first, by a few rows.",
+                spot: Spot::Chart,
+                acts: &[Act::PlayTo(6, 2.0)],
+            },
+            Card {
+                title: "The axes come after",
+                text: "nominal learns where camera and tag are and leaves the axes as described: it cannot get better than \
+                       they are. The others correct the axes too. All are judged on rows that they never saw.",
+                spot: Spot::Learners,
+                acts: &[Act::PlayOn(2.0)],
+            },
+            Card {
+                title: "Now yours",
+                text: "In a terminal: “body-schema init robot.urdf table.csv” writes a file that says what it guessed; \
+                       “body-schema calibrate” with that file writes the corrected URDF, and a report that says how good it is on \
+                       rows that it has not seen. docs/your-robot.md tells how the table looks for your sensor.",
                 spot: Spot::Ending,
                 acts: &[Act::Seeds],
             },

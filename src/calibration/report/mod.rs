@@ -9,6 +9,13 @@ mod plots;
 use super::{Calibration, Case, File};
 use document::Part;
 
+/// The report in Markdown without drawings: for where there are others beside it.
+pub fn markdown(calibration: &Calibration, case: &Case<'_>) -> String {
+    let mut document = contents::document(&calibration.report, case);
+    document.parts.retain(|part| !matches!(part, Part::Figure { .. }));
+    markdown::text(&document)
+}
+
 /// `report.md`, its drawings, and `report.html`.
 pub fn files(calibration: &Calibration, case: &Case<'_>) -> Vec<File> {
     let document = contents::document(&calibration.report, case);

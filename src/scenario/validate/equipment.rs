@@ -144,9 +144,10 @@ impl Check<'_> {
         }
         if let Some(px) = &raw.known_to_px {
             let px = self.positive(&field("known_to_px"), px);
-            outfit
-                .known
-                .push((Block::Intrinsics(number), Known::Within { length_m: Known::EXACTLY, angle_rad: Known::EXACTLY, other: px }));
+            outfit.known.push((
+                Block::Intrinsics(number),
+                Known::Within { length_m: Known::EXACTLY, angle_rad: Known::EXACTLY, other: px },
+            ));
         }
         let pose = frame * Isometry3::from_parts(Translation3::from(at.coords), rotation);
         let intrinsics = Some([focal[0], focal[1], centre[0], centre[1]]);

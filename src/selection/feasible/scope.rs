@@ -128,7 +128,10 @@ impl<'a> Scope<'a> {
         let is_feasible: Vec<bool> = candidates.iter().map(|posture| constraints.allow(self.from, posture)).collect();
         let kept = candidates.iter().zip(&is_feasible).filter(|(_, is_feasible)| **is_feasible);
         let kept: Vec<Vec<f64>> = kept.map(|(posture, _)| posture.clone()).collect();
-        let priced = values(&kept).into_iter().zip(&kept).map(|(value, posture)| value + self.toll(others.iter().map(Vec::as_slice), posture));
+        let priced = values(&kept)
+            .into_iter()
+            .zip(&kept)
+            .map(|(value, posture)| value + self.toll(others.iter().map(Vec::as_slice), posture));
         let mut priced = priced.collect::<Vec<f64>>().into_iter();
         let mut value = |is_feasible: &bool| if *is_feasible { priced.next() } else { None };
         is_feasible.iter().map(|is_feasible| value(is_feasible).unwrap_or(f64::INFINITY)).collect()
