@@ -123,7 +123,8 @@ fn observe(experiment: &Experiment, recorder: Option<&mut Recorder>, csv: Option
 fn summarise(result: &RunResult) -> Result<()> {
     output::say(format!("{}, seed {}: {} movements each", result.scenario, result.seed, result.steps))?;
     // Where nothing but sockets tells how good they are.
-    let meets_itself = result.learners.iter().any(|learner| learner.metrics.scatter_m.is_some());
+    let is_predicted = result.learners.iter().any(|learner| learner.metrics.prediction_mean_m.is_some());
+    let meets_itself = !is_predicted && result.learners.iter().any(|learner| learner.metrics.scatter_m.is_some());
     let rows = result.learners.iter().map(|learner| {
         let metrics = &learner.metrics;
         let predicted = if meets_itself { metrics.scatter_m } else { metrics.prediction_mean_m };

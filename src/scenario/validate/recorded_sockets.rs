@@ -1,5 +1,7 @@
 //! Sockets that the columns of a table name.
 
+use std::collections::HashMap;
+
 use super::{Check, measured::SocketColumns, raw, sockets::unguessed};
 use crate::{
     model::{Block, Layout},
@@ -39,14 +41,15 @@ impl Check<'_> {
         held_out.folds().iter().flat_map(|(training, _)| training).for_each(|row| is_trained[*row] = true);
         let order =
             (0..rows.rows()).filter(|row| is_trained[*row]).chain((0..rows.rows()).filter(|row| !is_trained[*row]));
-        let mut labels: Vec<(Option<String>, String)> = Vec::new();
+        let mut numbers: HashMap<(Option<String>, String), usize> = HashMap::new();
         for row in order {
             let (place, name) = label(row);
             // A row may hold nothing.
-            if name.is_empty() || labels.contains(&(place.clone(), name.clone())) {
+            let label = (place.clone(), name.clone());
+            if name.is_empty() || numbers.contains_key(&label) {
                 continue;
             }
-            labels.push((place.clone(), name.clone()));
+            numbers.insert(label, numbers.len());
             let posture = rows.configurations[row].clone();
             let at = robot.state.target_at(target, &posture);
             let socket = SocketSpec { name, place, target, at, posture, is_guessed: false, sigma_m };
@@ -58,7 +61,7 @@ impl Check<'_> {
                 robot.held_out_sockets.push(socket);
             }
         }
-        rows.sockets = (0..rows.rows()).map(|row| labels.iter().position(|known| *known == label(row))).collect();
+        rows.sockets = (0..rows.rows()).map(|row| numbers.get(&label(row)).copied()).collect();
         let blocks: Vec<Block> = robot.layout.blocks().map(|(block, _)| block).collect();
         let sockets = (0..robot.sockets.len()).map(Block::Socket);
         robot.layout = Layout::new(&robot.state, blocks.into_iter().chain(sockets));

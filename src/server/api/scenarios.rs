@@ -1,5 +1,7 @@
 //! What experiments there are.
 
+use std::sync::OnceLock;
+
 use axum::{Json, extract::Path};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -32,8 +34,18 @@ pub struct ScenarioResource {
     (status = 200, description = "All built-in scenarios, simplest first", body = ScenarioList)
 ))]
 pub(super) async fn list() -> Result<Json<ScenarioList>, Problem> {
-    let summaries = || BUILTIN.iter().map(|known| find(known.name).map(|scenario| scenario.summary())).collect();
     Ok(Json(ScenarioList { scenarios: aside(summaries).await? }))
+}
+
+/// They are part of the program: those that have been read once need not be read again.
+fn summaries() -> Result<Vec<ScenarioSummary>, Problem> {
+    static SUMMARIES: OnceLock<Vec<ScenarioSummary>> = OnceLock::new();
+    if let Some(known) = SUMMARIES.get() {
+        return Ok(known.clone());
+    }
+    let read = BUILTIN.iter().map(|known| find(known.name).map(|scenario| scenario.summary()));
+    let read = read.collect::<Result<Vec<_>, Problem>>()?;
+    Ok(SUMMARIES.get_or_init(|| read).clone())
 }
 
 /// One scenario with its source.
