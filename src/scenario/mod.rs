@@ -36,7 +36,7 @@ use crate::{
     experiment::{Body, Outliers, Thresholds},
     kinematics::JointBox,
     model::{
-        Block, Layout, Quantity, State,
+        Block, Layout, Names, Quantity, State,
         urdf::{Chain, Urdf},
     },
     optimize::Settings,
@@ -138,6 +138,18 @@ pub struct Robot {
     pub described: Option<Arc<Described>>,
 }
 
+impl Robot {
+    /// What everything that can be learned is called.
+    pub fn called(&self) -> Names {
+        Names {
+            joints: self.names.clone(),
+            targets: self.equipment.targets.iter().map(|target| target.name.clone()).collect(),
+            cameras: self.equipment.cameras.iter().map(|camera| camera.name.clone()).collect(),
+            sockets: self.sockets.iter().chain(&self.held_out_sockets).map(SocketSpec::label).collect(),
+        }
+    }
+}
+
 /// A robot's description, and what of it the scenario is about.
 #[derive(Clone, Debug)]
 pub struct Described {
@@ -166,6 +178,13 @@ pub struct SocketSpec {
     pub is_guessed: bool,
     /// What play and the noise of the joints amount to at the target, metres per coordinate.
     pub sigma_m: f64,
+}
+
+impl SocketSpec {
+    /// Its place and its name.
+    pub fn label(&self) -> String {
+        self.place.as_ref().map_or_else(|| self.name.clone(), |place| format!("{place}/{}", self.name))
+    }
 }
 
 /// The world of a scenario.

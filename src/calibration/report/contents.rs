@@ -4,7 +4,10 @@ use super::{
     document::{Document, Part},
     plots::{self, residual},
 };
-use crate::calibration::{Case, Extra, Figures, Placement, Reading, Report, SocketDistance, undetermined::listed};
+use crate::{
+    calibration::{Case, Extra, Figures, Placement, Reading, Report, SocketDistance},
+    model::listed,
+};
 
 /// Readings listed at most; of more the worst.
 const LISTED: usize = 200;
