@@ -42,6 +42,7 @@ mod parallel;
 mod progress;
 #[cfg(feature = "app")]
 pub mod report;
+mod span;
 mod split;
 mod undetermined;
 
