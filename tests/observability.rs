@@ -45,6 +45,32 @@ fn sockets_tell_all_but_where_the_robot_stands() {
     );
 }
 
+/// A robot that is still to be measured needs no table: its URDF, and what will measure it.
+#[test]
+fn a_robot_to_be_measured() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::copy("scenarios/ur10.urdf", folder.path().join("ur10.urdf")).expect("copied");
+    let file = folder.path().join("ur10.toml");
+    let sensor = |channel: &str| {
+        format!(
+            "name = \"ur10\"\n[robot]\nurdf = \"ur10.urdf\"\nbase = \"base_link\"\ntip = \"tool0\"\n[[target]]\nname = \"marker\"\n\
+             [[sensor]]\nchannel = \"{channel}\"\nsigma_m = 0.0005\n"
+        )
+    };
+    let of = |text: &str| {
+        std::fs::write(&file, text).expect("written");
+        report(&[file.to_str().expect("text"), "--postures", "20"])
+    };
+    let (position, pose) = (of(&sensor("position")), of(&sensor("pose")));
+    for found in [&position, &pose] {
+        assert!(found.parameters.undetermined[0].contains("the base"), "{:?}", found.parameters);
+        assert!(found.errors[19].best_mm < found.errors[19].random_median_mm, "{:?}", found.errors[19]);
+    }
+    assert!(pose.parameters.rank >= position.parameters.rank + 2, "{} {}", pose.parameters.rank, position.parameters.rank);
+    let held = sensor("position").replacen("tip =", "hold = [\"wrist_3_joint\"]\ntip =", 1);
+    assert_eq!(of(&held).parameters.learned, position.parameters.learned - 4);
+}
+
 #[test]
 fn a_table_for_people() {
     let output = observability(&["arm-6dof", "--postures", "4"]);

@@ -141,6 +141,26 @@ impl Scenario {
                 (World::Simulated { truth, rig, limits, head, change, outliers }, evaluation, briefing)
             }
             WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, held_out),
+            WorldSpec::Outside { watch, beforehand } => {
+                let briefing = Briefing {
+                    layout: Arc::new(self.robot.layout.clone()),
+                    weights: self.weights(),
+                    initial: self.robot.state.clone(),
+                    covariance: self.prior_covariance(),
+                    actions: self.actions(),
+                    workspace: self.workspace(drawn(
+                        &self.robot.limits,
+                        WORKSPACE_SIZE,
+                        Stream::Workspace,
+                        seed,
+                        |_| true,
+                    )),
+                    watch: watch.clone(),
+                    beforehand: beforehand.clone(),
+                };
+                let nothing = Evaluation::of_measurements(self.workspace(Vec::new()), Vec::new());
+                (World::Outside, nothing, briefing)
+            }
         }
     }
 

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use body_schema::design::observability::{ErrorPoint, IndexTable, Observability};
 
-use super::{BadInput, load_scenario, output, progress};
+use super::{BadInput, input::load_robot, output, progress};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The path of a scenario or calibration file, or a built-in scenario; recorded rows do not count
+    /// The path of a scenario or calibration file, with a table or without, or a built-in scenario; recorded rows do not count
     #[arg(value_name = "FILE")]
     file: String,
     /// Look at so many postures
@@ -24,7 +24,7 @@ pub struct Arguments {
 }
 
 pub fn observability(arguments: &Arguments) -> Result<()> {
-    let scenario = load_scenario(&arguments.file)?;
+    let scenario = load_robot(&arguments.file)?;
     scenario.check_prior()?;
     let wanted_m = match arguments.accuracy {
         Some(mm) if mm > 0.0 && mm.is_finite() => mm * 1e-3,

@@ -225,6 +225,7 @@ impl Scenario {
         Setting {
             learns_marker: self.robot.layout.marker().is_some(),
             is_measured: matches!(self.world, WorldSpec::Measured { .. }),
+            is_outside: matches!(self.world, WorldSpec::Outside { .. }),
             has_sockets: !self.robot.sockets.is_empty(),
             sees_markers_alone: self.rig.channels().iter().all(|channel| channel.target() == Some(0)),
         }

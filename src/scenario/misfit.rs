@@ -9,6 +9,8 @@ pub(super) struct Setting {
     pub learns_marker: bool,
     /// Whether recorded rows are replayed.
     pub is_measured: bool,
+    /// Whether the robot is elsewhere and asks where to move.
+    pub is_outside: bool,
     /// Whether targets are held in sockets.
     pub has_sockets: bool,
     /// Whether nothing but the marker's position is measured.
@@ -47,6 +49,10 @@ pub(super) fn misfit(estimator: EstimatorKind, policy: PolicyKind, setting: Sett
     }
     if setting.is_measured && policy == PolicyKind::Human {
         let what = "nobody moves a robot of which there are only recorded rows".to_owned();
+        return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
+    }
+    if setting.is_outside && policy == PolicyKind::Human {
+        let what = "a robot elsewhere asks where to move, and a person does not answer".to_owned();
         return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
     }
     if setting.has_sockets && policy.varies_the_search() {

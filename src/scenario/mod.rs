@@ -41,7 +41,7 @@ use crate::{
     },
     optimize::Settings,
     selection::{Constraints, CriterionUnits, Planning, Watch, Weights},
-    sensing::{Equipment, Loss, Rig, Spacing},
+    sensing::{Equipment, Loss, Observation, Rig, Spacing},
 };
 
 /// A validated scenario.
@@ -207,6 +207,14 @@ pub enum WorldSpec {
         measurements: Measurements,
         /// Which of them are held out.
         held_out: HeldOut,
+    },
+    /// A robot elsewhere, which is told where to move and tells what was observed; the initial estimate is its description,
+    /// wherever it may stand.
+    Outside {
+        /// What is known to be seen, where sensors see some postures only.
+        watch: Option<Watch>,
+        /// What is known before any movement, as the distance between two sockets.
+        beforehand: Option<Observation>,
     },
 }
 

@@ -41,6 +41,8 @@ pub enum WorldKind {
     Simulated,
     /// A recorded data set without a known truth.
     Measured,
+    /// A robot of one's own, which is asked to move and tells what was observed.
+    Outside,
 }
 
 /// The learners that tell most beside each other, in the order in which a page shows them.
@@ -62,6 +64,7 @@ impl Scenario {
             world: match self.world {
                 WorldSpec::Simulated { .. } => WorldKind::Simulated,
                 WorldSpec::Measured { .. } => WorldKind::Measured,
+                WorldSpec::Outside { .. } => WorldKind::Outside,
             },
             joints: self.robot.joint_descriptions(),
             parameters: self.robot.layout.dimension(),
