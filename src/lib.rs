@@ -25,6 +25,7 @@
 //! | [`scenario`] | scenario files, strictly read |
 //! | [`assembly`] | the experiments that are drawn from them |
 //! | [`calibration`] | a robot calibrated by a table: fits, folds, figures, corrected descriptions |
+//! | [`ask_tell`] | sessions with a robot elsewhere, which is asked to move and tells what it saw |
 //!
 //! These do no input or output, know no threads but those of the feature `parallel`, and build without default
 //! features for `wasm32-unknown-unknown`. With the feature `app` (on by default) come `recording` (Rerun and CSV
@@ -58,6 +59,7 @@
 //! *Randomness.* One ChaCha stream per purpose and seed ([`experiment::Stream`]). The same seed gives the same numbers on
 //! the same machine, whatever the number of threads.
 
+pub mod ask_tell;
 pub mod assembly;
 pub mod calibration;
 #[cfg(feature = "app")]

@@ -9,10 +9,14 @@ use std::{
 
 use body_schema::{
     calibration::{Calibration, Case, File, Options, Report, Silent, calibrate},
+    kinematics::Joint,
     model::urdf::Urdf,
     scenario::{Described, Scenario, builtin},
 };
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 
 const TIAGO: &str = include_str!("urdf/robots/tiago.urdf");
 
@@ -223,6 +227,69 @@ fn what_cannot_be_calibrated_is_said() {
     }
 }
 
+/// A scatter in sockets is blind to scale: how well that is known stands beside it, and only there.
+#[test]
+fn a_ball_in_sockets_says_how_large_the_robot_is() {
+    let calibrated = |name: &str| {
+        let scenario = builtin(name).expect("built in");
+        let case = Case::new(&scenario).expect("measured");
+        let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
+        let files = body_schema::calibration::report::files(&found, &case);
+        (text(&files, "report.md").to_owned(), found.report)
+    };
+    let (said, report) = calibrated("panda-sockets");
+    let sd_mm = report.span_1m_sd_mm.expect("sockets");
+    // 0.1 mm of the known 50 mm are 2 mm of a metre, and the prior of seven axes says no more than a little about that.
+    assert!((0.3..2.5).contains(&sd_mm), "{sd_mm}");
+    assert!(said.contains(&format!("right to ± {sd_mm:.2} mm")), "{said}");
+    assert_eq!(calibrated("tiago-mocap").1.span_1m_sd_mm, None, "a tracker has a scale of its own");
+}
+
+/// A long table: what is drawn is thinned, and what is worked out stays in proportion.
+#[test]
+fn five_thousand_rows_are_calibrated() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
+    generated(&place("long.csv"), 5000);
+    std::fs::copy("scenarios/panda.urdf", place("panda.urdf")).expect("copied");
+    done(&["init", &place("panda.urdf"), &place("long.csv"), "--tip", "panda_link8"]);
+    let out = place("out");
+    done(&["calibrate", &place("long.toml"), "--out", &out]);
+    let size = |name: &str| std::fs::metadata(format!("{out}/{name}")).expect(name).len();
+    let report: Report =
+        serde_json::from_str(&std::fs::read_to_string(format!("{out}/report.json")).expect("written")).expect("JSON");
+    assert_eq!((report.rows, report.residuals.len()), (5000, 5000));
+    let held_out = report.held_out.expect("folds");
+    let (before, after) = (held_out.before.mean_mm.expect("lengths"), held_out.after.mean_mm.expect("lengths"));
+    // Three coordinates of 0.5 mm each are 0.8 mm away on average.
+    assert!(before > 2.0 && (0.75..0.85).contains(&after), "{before} {after}");
+    assert!(size("report.html") < 600_000, "{} bytes: plots are thinned", size("report.html"));
+}
+
+/// Rows of a Panda whose third joint is 2 mm and 0.3 degrees off, its target seen to 0.5 mm.
+fn generated(file: &str, rows: usize) {
+    let text = std::fs::read_to_string("scenarios/panda.urdf").expect("there");
+    let chain = Urdf::parse(&text).expect("a URDF").chain("panda_link0", "panda_link8").expect("a chain");
+    let mut truth = chain.state();
+    if let Joint::Revolute(line) = &mut truth.joints[2] {
+        line.point.y += 0.002;
+        let turned = line.direction.into_inner() + nalgebra::Vector3::new(0.005, 0.0, 0.0);
+        line.direction = nalgebra::UnitVector3::new_normalize(turned);
+    }
+    let target = chain.frames().pop().expect("a tip").1 * Point3::new(0.05, 0.02, 0.1);
+    truth = truth.with_marker(target);
+    let limits = chain.limits().expect("limits");
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut table = chain.names().join(",") + ",x,y,z\n";
+    for _ in 0..rows {
+        let theta = limits.draw(&mut rng);
+        let seen = truth.marker_at(&theta).coords.map(|x| x + 0.0005 * rng.sample::<f64, _>(StandardNormal));
+        let cells: Vec<String> = theta.iter().chain(seen.iter()).map(|x| format!("{x:.7}")).collect();
+        table.push_str(&(cells.join(",") + "\n"));
+    }
+    std::fs::write(file, table).expect("written");
+}
+
 /// Three rows are fitted, and the report says what they cannot tell.
 #[test]
 fn three_rows_say_what_they_cannot_tell() {
@@ -234,6 +301,38 @@ fn three_rows_say_what_they_cannot_tell() {
     assert!(report.parameters.rank <= 9, "{:?}", report.parameters);
     assert!(report.parameters.undetermined[0].contains("cannot be told by these rows"), "{:?}", report.parameters);
     assert!(report.extras.iter().all(|trial| trial.inner.is_none() && !trial.kept));
+}
+
+/// Pictures and distances: what their titles say is written, what no table says is named, and the file is valid.
+#[test]
+fn init_knows_pictures_and_distances() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
+    std::fs::copy("scenarios/positioner.urdf", place("arm.urdf")).expect("copied");
+    let urdf = Urdf::parse(&std::fs::read_to_string(place("arm.urdf")).expect("there")).expect("a URDF");
+    let tip = urdf.leaves().next().expect("a link").to_owned();
+    let joints = urdf.chain(urdf.root().expect("one"), &tip).expect("a chain").names().join(",");
+    let begun = |name: &str, titles: &str, cells: &str| {
+        let rows: String = (0..12).map(|row| format!("0.{row},-0.{row},{cells}\n")).collect();
+        std::fs::write(place(&format!("{name}.csv")), format!("{joints},{titles}\n{rows}")).expect("written");
+        let said = done(&["init", &place("arm.urdf"), &place(&format!("{name}.csv")), "--tip", &tip]);
+        done(&["check", &place(&format!("{name}.toml"))]);
+        (said, std::fs::read_to_string(place(&format!("{name}.toml"))).expect("written"))
+    };
+    let (said, file) = begun("seen", "eye_tag_u1,eye_tag_v1,eye_tag_u2,eye_tag_v2", "700.5,320,710,330");
+    assert!(said.contains("`tag1`: a point in a picture, from the columns eye_tag_u1, eye_tag_v1"), "{said}");
+    assert!(said.contains("camera `eye`: a picture of 848 × 480, as its points lie in it"), "{said}");
+    for line in [
+        "camera = \"eye\"",
+        "target = \"tag2\"",
+        "size_px = [848.0, 480.0]",
+        "columns = [\"eye_tag_u1\", \"eye_tag_v1\"]",
+    ] {
+        assert!(file.contains(line), "{line}: {file}");
+    }
+    let (said, file) = begun("cable", "hand_distance_mm", "742.5");
+    assert!(said.contains("`hand`: the fixed point of its distance is taken for the origin"), "{said}");
+    assert!(file.contains("channel = \"distance\"") && file.contains("to_m = [0.0, 0.0, 0.0]"), "{file}");
 }
 
 /// A first file from a URDF and a table: what was guessed is said, and nothing is overwritten.

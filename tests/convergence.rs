@@ -6,6 +6,7 @@ mod sensors;
 use body_schema::{
     experiment::{Comparison, LearnerComparison, SeedRun, Trace},
     scenario::{BUILTIN, Scenario, builtin},
+    selection::Optimality,
 };
 
 /// Runs one learner over seeds on two threads; the outcome does not depend on that.

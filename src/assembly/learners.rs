@@ -53,24 +53,24 @@ impl Scenario {
             }
             EstimatorKind::Rls => {
                 let noise = stabilising(self.filter);
-                (self.filter.sigma(), Box::new(move |belief, covariance| Box::new(Rls::new(belief, covariance, noise))))
+                (self.filter.sigma(), Arc::new(move |belief, covariance| Box::new(Rls::new(belief, covariance, noise))))
             }
             EstimatorKind::Unscented => {
                 let noise = stabilising(self.unscented);
                 let begin: Begin =
-                    Box::new(move |belief, covariance| Box::new(UnscentedRls::new(belief, covariance, noise)));
+                    Arc::new(move |belief, covariance| Box::new(UnscentedRls::new(belief, covariance, noise)));
                 (self.unscented.sigma(), begin)
             }
             EstimatorKind::RlsSixNumbers => {
                 let (noise, direction, point) =
                     (stabilising(self.filter), self.prior.direction_rad, self.prior.point_m);
                 let begin: Begin =
-                    Box::new(move |belief, _| Box::new(SixNumbers::new(belief, direction, point, noise)));
+                    Arc::new(move |belief, _| Box::new(SixNumbers::new(belief, direction, point, noise)));
                 (self.filter.sigma(), begin)
             }
             EstimatorKind::Gradient => {
                 let rate = self.gradient_rate;
-                (1.0, Box::new(move |belief, _| Box::new(Gradient::new(belief, rate))))
+                (1.0, Arc::new(move |belief, _| Box::new(Gradient::new(belief, rate))))
             }
         };
         let rig = Arc::new(self.rig.assuming(sigma));
@@ -145,8 +145,8 @@ impl Scenario {
             None => smoother,
         };
         // Recorded bodies do not change: what looks like it is an outlier or a model that does not hold.
-        let changes = matches!(self.world, WorldSpec::Simulated { .. });
-        Ok(if changes { smoother } else { smoother.never_forgetting() })
+        let is_recorded = matches!(self.world, WorldSpec::Measured { .. });
+        Ok(if is_recorded { smoother.never_forgetting() } else { smoother })
     }
 
     fn policy(&self, spec: &LearnerSpec, briefing: &Briefing) -> Box<dyn Policy> {

@@ -2,6 +2,7 @@
 
 mod guess;
 mod learners;
+mod observability;
 mod sockets;
 
 use std::sync::Arc;
@@ -23,8 +24,9 @@ use crate::{
 
 /// Configurations over which the prediction error is judged in a simulated world.
 const EVALUATION_SIZE: usize = 200;
-/// Configurations over which a learner judges itself.
-const WORKSPACE_SIZE: usize = 32;
+/// Configurations over which a learner judges itself, and by which criterion I chooses. Over few it learns what predicts these few
+/// best: with 32 a Panda of 31 parameters ends with errors a twentieth greater than with 64, and with more than that no smaller ones.
+const WORKSPACE_SIZE: usize = 64;
 
 /// What learners are told at the start. Nothing in it comes from the truth but through the drawn initial estimate.
 struct Briefing {
@@ -139,6 +141,26 @@ impl Scenario {
                 (World::Simulated { truth, rig, limits, head, change, outliers }, evaluation, briefing)
             }
             WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, held_out),
+            WorldSpec::Outside { watch, beforehand } => {
+                let briefing = Briefing {
+                    layout: Arc::new(self.robot.layout.clone()),
+                    weights: self.weights(),
+                    initial: self.robot.state.clone(),
+                    covariance: self.prior_covariance(),
+                    actions: self.actions(),
+                    workspace: self.workspace(drawn(
+                        &self.robot.limits,
+                        WORKSPACE_SIZE,
+                        Stream::Workspace,
+                        seed,
+                        |_| true,
+                    )),
+                    watch: watch.clone(),
+                    beforehand: beforehand.clone(),
+                };
+                let nothing = Evaluation::of_measurements(self.workspace(Vec::new()), Vec::new());
+                (World::Outside, nothing, briefing)
+            }
         }
     }
 

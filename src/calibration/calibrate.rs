@@ -130,6 +130,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         training: comparison,
         held_out,
         sockets: if has_folds { Vec::new() } else { case.distances(&fit, &first.held_out) },
+        span_1m_sd_mm: if case.meets_itself() { case.span_sd_mm(&fit) } else { None },
         extras: trials.clone(),
         outliers: case.outliers(&fit),
         noise: case.noise(&fit),

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use crate::{
-    model::{Block, Layout, State},
+    model::{Block, Layout, Names, State},
     scenario::{Described, HeldOutRule, Scenario, WorldSpec},
     sensing::{Loss, Observation, Occasion, Rig},
 };
 
-use super::{CalibrationError, Extra, Names, Split};
+use super::{CalibrationError, Extra, Split};
 
 /// A row of the table.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +61,7 @@ impl<'a> Case<'a> {
         Ok(Self {
             scenario,
             rows: (0..measurements.rows()).map(row).collect(),
-            names: Names::new(&scenario.robot),
+            names: scenario.robot.called(),
             described: scenario.robot.described.as_deref(),
             known: measurements.beforehand.as_ref(),
             rig: Arc::new(scenario.rig.assuming(scenario.smoother.sigma)),

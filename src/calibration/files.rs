@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Calibration, CalibrationError, Case, Fit, learned::axis};
+use super::{Calibration, CalibrationError, Case, Fit, Progress, learned::axis};
 use crate::model::{Correction, State};
 
 /// A file of the output, by its path below the folder.
@@ -38,6 +38,31 @@ impl Calibration {
         let json = serde_json::to_string_pretty(&self.report).unwrap_or_default();
         files.push(File::new("report.json", json + "\n"));
         Ok(files)
+    }
+
+    /// `calibrated.urdf` and `kinematics.yaml` alone, the same as those of [`files`](Self::files), without what judges them: no
+    /// folds, and nothing beyond what a URDF can hold. None without a URDF.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError`] as of [`calibrate`](super::calibrate()).
+    pub fn description(case: &Case<'_>, progress: &dyn Progress) -> Result<Vec<File>, CalibrationError> {
+        let splits = case.splits(None)?;
+        let Some(first) = splits.first() else { return Err(CalibrationError::NoRows) };
+        let mut training = first.training.clone();
+        if splits.len() > 1 {
+            training.extend(&first.held_out);
+            training.sort_unstable();
+        }
+        if training.is_empty() {
+            return Err(CalibrationError::NoRows);
+        }
+        progress.stage("all training rows", 2);
+        let nominal = case.nominal(&training)?;
+        progress.tick();
+        let fit = case.fit(&case.writable(), &training, Some(nominal.state()))?;
+        progress.tick();
+        described("", case, &fit)
     }
 
     /// The fuller model: what corrects readings, and the axes that belong to it.

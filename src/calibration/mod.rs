@@ -37,12 +37,12 @@ mod files;
 mod fit;
 mod init;
 mod learned;
-mod names;
 mod outcome;
 mod parallel;
 mod progress;
 #[cfg(feature = "app")]
 pub mod report;
+mod span;
 mod split;
 mod undetermined;
 
@@ -55,7 +55,6 @@ pub use figures::{Figures, Residual, Sensed, SocketDistance};
 pub use files::File;
 pub use fit::Fit;
 pub use init::{Begun, InitError, Sources, begin};
-pub use names::Names;
 pub use outcome::*;
 pub use progress::{Progress, Silent};
 pub use split::Split;

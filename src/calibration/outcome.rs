@@ -31,6 +31,9 @@ pub struct Report {
     pub held_out: Option<HeldOut>,
     /// With sockets: how far the two of every place are apart that nothing was learned from; empty otherwise.
     pub sockets: Vec<SocketDistance>,
+    /// With sockets: the standard deviation of a span of 1 m of the calibrated robot, the scale that a scatter is blind to,
+    /// millimetres; null otherwise.
+    pub span_1m_sd_mm: Option<f64>,
     /// What adding to the axes changes.
     pub extras: Vec<Trial>,
     /// Rows that are likelier outliers than not.

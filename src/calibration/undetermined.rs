@@ -7,7 +7,7 @@
 use nalgebra::DMatrix;
 
 use super::{Case, Fit, Parameters};
-use crate::model::{Block, Layout, null_space};
+use crate::model::{Block, listed, null_space};
 
 /// The share of a parameter that undetermined directions must hold for it to be named.
 const NAMED: f64 = 0.05;
@@ -19,11 +19,8 @@ impl Case<'_> {
     pub(super) fn determined(&self, fit: &Fit) -> Parameters {
         let layout = &*fit.belief.layout;
         let free = self.undetermined(fit);
-        let mut undetermined = Vec::new();
-        if free.ncols() > 0 {
-            undetermined.push(self.gauge(layout, &free));
-        }
-        undetermined.extend(self.hardly(fit, &free));
+        let untold = self.names.untold(layout, &free, "these rows");
+        let undetermined = untold.into_iter().chain(self.hardly(fit, &free)).collect();
         Parameters { learned: layout.dimension(), rank: layout.dimension() - free.ncols(), undetermined }
     }
 
@@ -37,19 +34,6 @@ impl Case<'_> {
             information += &rows * rows.transpose();
         }
         null_space(&information)
-    }
-
-    fn gauge(&self, layout: &Layout, free: &DMatrix<f64>) -> String {
-        let count = free.ncols();
-        let share = |coordinate: usize| free.row(coordinate).norm_squared();
-        let named = layout.blocks().filter(|(_, range)| range.clone().any(|coordinate| share(coordinate) > NAMED));
-        let names = listed(named.map(|(block, _)| self.names.block(block)).collect());
-        let (directions, they) = if count == 1 { ("direction", "it moves") } else { ("directions", "they move") };
-        format!(
-            "{count} {directions} among the {} parameters cannot be told by these rows, and stay as described: {they} {names} so \
-             that nothing that was measured changes",
-            layout.dimension()
-        )
     }
 
     /// Blocks of which every coordinate is known hardly better than before.
@@ -71,14 +55,5 @@ impl Case<'_> {
                 listed(names)
             )
         })
-    }
-}
-
-/// "a, b and c".
-pub fn listed(mut names: Vec<String>) -> String {
-    match names.pop() {
-        Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),
-        Some(last) => last,
-        None => String::new(),
     }
 }

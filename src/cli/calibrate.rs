@@ -140,6 +140,9 @@ fn summarise(report: &Report) -> Result<()> {
     let unit = report.training.after.unit();
     let [mean, rms, max] = ["mean", "rms", "max"].map(|name| format!("{name} ({unit})"));
     output::say(output::table(["errors", "readings", &mean, &rms, &max, "mean (deg)"], rows))?;
+    if let Some(sd_mm) = report.span_1m_sd_mm {
+        output::say(format!("a span of 1 m is right to ± {sd_mm:.2} mm; how far a ball scatters does not tell"))?;
+    }
     for said in &report.parameters.undetermined {
         output::say(said)?;
     }

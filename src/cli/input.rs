@@ -8,14 +8,37 @@ use std::{
 
 use anyhow::Result;
 use body_schema::{
-    scenario::{BUILTIN, Scenario, builtin},
+    scenario::{BUILTIN, Scenario, ScenarioError, builtin},
     table::{Guard, MOST_BYTES},
 };
 
 use super::BadInput;
 
+/// Reads the text of a scenario, as [`Scenario::parse`] does.
+type Parse = fn(&str, &str, &dyn Fn(&str) -> Result<String, String>) -> Result<Scenario, ScenarioError>;
+
 /// A built-in scenario by name, or else a file by path.
 pub fn load_scenario(name: &str) -> Result<Scenario> {
+    load(name, Scenario::parse)
+}
+
+/// The same, or a calibration file without a table: of a robot that is still to be measured.
+pub fn load_robot(name: &str) -> Result<Scenario> {
+    load(name, |file, text, open| {
+        let is_unmeasured = |keys: toml::Table| {
+            let robot = keys.get("robot").and_then(toml::Value::as_table);
+            let is_described = robot.is_some_and(|robot| robot.contains_key("urdf"));
+            is_described && !keys.contains_key("measurements") && !keys.contains_key("initial_error")
+        };
+        // What is no TOML is told by whoever reads it.
+        match text.parse().is_ok_and(is_unmeasured) {
+            true => Scenario::parse_outside(file, text, open),
+            false => Scenario::parse(file, text, open),
+        }
+    })
+}
+
+fn load(name: &str, parse: Parse) -> Result<Scenario> {
     let path = PathBuf::from(name);
     if BUILTIN.iter().any(|builtin| builtin.name == name) {
         return Ok(builtin(name)?);
@@ -26,7 +49,7 @@ pub fn load_scenario(name: &str) -> Result<Scenario> {
     }
     let text = read_text(&path).map_err(|error| BadInput(format!("the scenario {} {error}", path.display())))?;
     let folder = path.parent().map(PathBuf::from).unwrap_or_default();
-    Ok(Scenario::parse(name, &text, &|file| read_text(&folder.join(file)))?)
+    Ok(parse(name, &text, &|file| read_text(&folder.join(file)))?)
 }
 
 /// The text of a file. An error continues a sentence that begins with the file's name. What has no end, or is no text, is

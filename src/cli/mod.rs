@@ -6,6 +6,7 @@ mod designs;
 mod export;
 mod init;
 mod input;
+mod observability;
 mod output;
 mod paper;
 mod progress;
@@ -52,6 +53,8 @@ enum Command {
     Calibrate(calibrate::Arguments),
     /// Begin a calibration file from a URDF and a table, and say what was guessed
     Init(init::Arguments),
+    /// Say before any measurement what can be determined, and how well by how many postures
+    Observability(observability::Arguments),
     /// Rerun the paper's experiments, and set the outcome beside its figures and numbers
     Paper(paper::Arguments),
     /// Write the page with recorded runs to a folder that any static host serves
@@ -107,6 +110,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Calibrate(arguments)) => calibrate::calibrate(&arguments),
         Some(Command::Init(arguments)) => init::init(&arguments),
+        Some(Command::Observability(arguments)) => observability::observability(&arguments),
         Some(Command::Paper(arguments)) => paper::paper(&arguments),
         Some(Command::Export(arguments)) => export::export(&arguments),
         Some(Command::Scenarios(arguments)) => scenarios::list(&arguments),

@@ -1,6 +1,6 @@
 //! Designs: which movements teach most, and what data allow.
 //!
-//! Judges only: all of this is computed at the true parameters.
+//! For judges, at the true parameters, but for the observability, which is told before anything is known of them.
 //!
 //! * *What the data allow.* With F = Λ₀ + Σ HᵀH (H whitened), the information of the prior and of the data collected,
 //!   linearised at the truth, F⁻¹ is the covariance that a learner with this prior and these data would have if the model
@@ -19,10 +19,13 @@
 //!   Torsney 1978). By the equivalence theorem (Kiefer and Wolfowitz 1960) the design is optimal where φ nowhere
 //!   exceeds Σ pᵢ φᵢ, and its trace is above the optimum by at most the difference.
 //!   Where a head watches, only movements after which it sees the marker are candidates.
+//! * *Before any measurement* ([`observability`]): what can be determined at all, and how well by how many movements, at the robot as
+//!   it is described.
 //! * *Counting.* As many independent equations as there are directions that can be determined. A yardstick, not a bound.
 
 mod best;
 mod counting;
+pub mod observability;
 mod search;
 
 pub use best::{BestDesign, Stretch, best_designs};

@@ -15,9 +15,10 @@ use crate::{
 };
 
 /// What begins a filter from a belief with a covariance.
-pub type Begin = Box<dyn Fn(Belief, DMatrix<f64>) -> Box<dyn Estimator> + Send>;
+pub type Begin = Arc<dyn Fn(Belief, DMatrix<f64>) -> Box<dyn Estimator> + Send + Sync>;
 
 /// A smoother, and after it a filter.
+#[derive(Clone)]
 pub struct Begun {
     smoother: Smoother,
     /// What the first measurements must determine.
@@ -58,6 +59,10 @@ impl Begun {
 }
 
 impl Estimator for Begun {
+    fn boxed(&self) -> Box<dyn Estimator> {
+        Box::new(self.clone())
+    }
+
     fn belief(&self) -> &Belief {
         self.filter.as_ref().map_or_else(|| self.smoother.belief(), |filter| filter.belief())
     }
@@ -102,7 +107,7 @@ mod tests {
         let rig = Arc::new(Rig::new(vec![tracker(), tracker()]));
         let (settings, rng) = (HypothesisSettings::default(), ChaCha8Rng::seed_from_u64(1));
         let smoother = Smoother::new(prior, layout, rig.clone(), settings, rng);
-        let begin: Begin = Box::new(|belief, covariance| Box::new(Rls::new(belief, covariance, None)));
+        let begin: Begin = Arc::new(|belief, covariance| Box::new(Rls::new(belief, covariance, None)));
         let mut begun = Begun::new(smoother, vec![Block::Base], rig, begin);
         for (index, theta) in
             [[0.3, -0.7, 1.0, 0.2], [-0.9, 0.4, -0.3, 1.1], [1.2, 0.8, 0.5, -0.6], [0.6, -0.2, -0.9, -1.0]]
@@ -129,7 +134,7 @@ mod tests {
         let rig = Arc::new(Rig::tracker(0.001));
         let (settings, rng) = (HypothesisSettings::default(), ChaCha8Rng::seed_from_u64(1));
         let smoother = Smoother::new(prior, layout, rig.clone(), settings, rng);
-        let begin: Begin = Box::new(|belief, covariance| Box::new(Rls::new(belief, covariance, None)));
+        let begin: Begin = Arc::new(|belief, covariance| Box::new(Rls::new(belief, covariance, None)));
         let mut begun = Begun::new(smoother, vec![Block::Base], rig, begin);
         for (index, theta) in
             [[0.3, -0.7, 1.0, 0.2], [-0.9, 0.4, -0.3, 1.1], [1.2, 0.8, 0.5, -0.6], [0.6, -0.2, -0.9, -1.0]]

@@ -37,6 +37,10 @@ impl Gradient {
 }
 
 impl Estimator for Gradient {
+    fn boxed(&self) -> Box<dyn Estimator> {
+        Box::new(self.clone())
+    }
+
     fn belief(&self) -> &Belief {
         &self.belief
     }

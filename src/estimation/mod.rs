@@ -32,7 +32,10 @@ pub use unscented::UnscentedRls;
 use crate::sensing::{Observation, Refused};
 
 /// Revises a belief after each movement.
-pub trait Estimator: Send {
+pub trait Estimator: Send + Sync {
+    /// A copy, to try an observation on.
+    fn boxed(&self) -> Box<dyn Estimator>;
+
     /// What is believed now.
     fn belief(&self) -> &Belief;
 
@@ -55,6 +58,12 @@ pub trait Estimator: Send {
     fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         self.belief().accepts(positions, observation)?;
         self.correct(positions, observation)
+    }
+}
+
+impl Clone for Box<dyn Estimator> {
+    fn clone(&self) -> Self {
+        (**self).boxed()
     }
 }
 

@@ -80,6 +80,10 @@ impl Rls {
 }
 
 impl Estimator for Rls {
+    fn boxed(&self) -> Box<dyn Estimator> {
+        Box::new(self.clone())
+    }
+
     fn belief(&self) -> &Belief {
         &self.belief
     }

@@ -117,6 +117,10 @@ impl SixNumbers {
 }
 
 impl Estimator for SixNumbers {
+    fn boxed(&self) -> Box<dyn Estimator> {
+        Box::new(self.clone())
+    }
+
     fn belief(&self) -> &Belief {
         &self.belief
     }

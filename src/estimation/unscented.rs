@@ -92,6 +92,10 @@ impl UnscentedRls {
 }
 
 impl Estimator for UnscentedRls {
+    fn boxed(&self) -> Box<dyn Estimator> {
+        Box::new(self.clone())
+    }
+
     fn belief(&self) -> &Belief {
         &self.belief
     }

@@ -22,10 +22,11 @@ use crate::{
     sensing::{Observation, Refused},
 };
 
-/// An estimator and a policy at work.
+/// An estimator and a policy at work. A copy of it lives on by itself.
+#[derive(Clone)]
 pub struct Agent {
     estimator: Box<dyn Estimator>,
-    policy: Box<dyn Policy>,
+    policy: Arc<dyn Policy>,
     actions: Actions,
     limits: JointBox,
     constraints: Option<Arc<Constraints>>,
@@ -93,7 +94,7 @@ impl Agent {
         seed: u64,
     ) -> Self {
         let (pending, history) = (Vec::new(), History::default());
-        let constraints = None;
+        let (constraints, policy) = (None, Arc::from(policy));
         Self { estimator, policy, actions, limits, constraints, seed, proposals: 0, pending, history, failure: None }
     }
 
@@ -149,19 +150,38 @@ impl Agent {
     pub fn propose(&mut self, count: usize) -> Result<&[Proposal], SelectionError> {
         self.drop_infeasible();
         while self.pending.len() < count && self.failure.is_none() {
-            let start = Instant::now();
-            let selection = self.select()?;
-            let selection_ms = start.elapsed().as_secs_f64() * 1e3;
-            self.proposed(Proposal { id: self.proposals, selection, selection_ms });
+            let proposal = self.next_proposal()?;
+            self.proposed(proposal);
         }
         Ok(&self.pending)
+    }
+
+    /// One more proposal, chosen given the pending ones, which is not proposed by that: whoever stores it first
+    /// [restores](Self::restore) it then.
+    pub fn next_proposal(&self) -> Result<Proposal, SelectionError> {
+        let start = Instant::now();
+        let selection = self.select()?;
+        let selection_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(Proposal { id: self.proposals, selection, selection_ms })
+    }
+
+    /// The pending proposals that are not feasible any more, each taken to follow the feasible ones before it.
+    pub fn infeasible(&self) -> Vec<u64> {
+        let (mut kept, mut refused): (Vec<Proposal>, Vec<u64>) = Default::default();
+        for proposal in &self.pending {
+            match self.refuse(&kept, &proposal.selection.movement.configuration) {
+                Ok(()) => kept.push(proposal.clone()),
+                Err(_) => refused.push(proposal.id),
+            }
+        }
+        refused
     }
 
     /// The constraint that a movement to `configuration` violates if it follows these proposals.
     fn refuse(&self, before: &[Proposal], configuration: &[f64]) -> Result<(), SelectionError> {
         let Some(constraints) = &self.constraints else { return Ok(()) };
         let last = before.last().map(|proposal| proposal.selection.movement.configuration.as_slice());
-        let from = last.or(self.history.posture()).or(constraints.start.as_deref());
+        let from = last.or(self.posture());
         constraints.violation(from, configuration).map_or(Ok(()), |violation| Err(SelectionError::Refused(violation)))
     }
 
@@ -188,20 +208,31 @@ impl Agent {
         if self.pending.is_empty() {
             return self.policy.select(&self.standpoint().situation(), &mut rng);
         }
+        self.policy.select(&self.foreseen().borrowed().situation(), &mut rng)
+    }
+
+    /// Where it expects to stand once all that is pending is carried out.
+    pub fn foreseen(&self) -> OwnedStandpoint {
         let mut standpoint = self.standpoint().to_owned();
         for Proposal { selection, .. } in &self.pending {
-            let Movement { configuration, socket, .. } = &selection.movement;
-            let belief = standpoint.belief.held_in(*socket);
-            let situation = Situation { belief: &belief, ..standpoint.borrowed().situation() };
-            // What is not expected to be seen is not expected to teach.
-            let appraisal = self.policy.appraise(&situation, &self.limits, configuration);
-            let chance = appraisal.map_or(1.0, |appraisal| appraisal.chance);
-            drop(belief);
-            standpoint.belief.after(&selection.movement, |_| chance);
-            standpoint.history.expect(&selection.movement.configuration);
-            standpoint.actions.use_up(&selection.movement);
+            self.foresee(&mut standpoint, &selection.movement);
         }
-        self.policy.select(&standpoint.borrowed().situation(), &mut rng)
+        standpoint
+    }
+
+    /// Goes on to where it expects to stand after a movement. Tells the chance that anything is seen there.
+    pub fn foresee(&self, standpoint: &mut OwnedStandpoint, movement: &Movement) -> f64 {
+        let Movement { configuration, socket, .. } = movement;
+        let belief = standpoint.belief.held_in(*socket);
+        let situation = Situation { belief: &belief, ..standpoint.borrowed().situation() };
+        // What is not expected to be seen is not expected to teach.
+        let appraisal = self.policy.appraise(&situation, &self.limits, configuration);
+        let chance = appraisal.map_or(1.0, |appraisal| appraisal.chance);
+        drop(belief);
+        standpoint.belief.after(movement, |_| chance);
+        standpoint.history.expect(configuration);
+        standpoint.actions.use_up(movement);
+        chance
     }
 
     fn proposed(&mut self, proposal: Proposal) {
@@ -246,9 +277,27 @@ impl Agent {
     }
 
     fn exclude(&mut self, configuration: &[f64]) {
-        let unbound = || Arc::new(Constraints::none(self.limits.clone()));
-        Arc::make_mut(self.constraints.get_or_insert_with(unbound)).veto(configuration);
+        self.forbid(configuration);
         self.drop_infeasible();
+    }
+
+    /// As [`veto`](Self::veto), but what is pending stays pending, and nothing is chosen. Not a position for every joint is no
+    /// posture to forbid.
+    pub fn forbid(&mut self, configuration: &[f64]) {
+        if configuration.len() == self.limits.dimension() {
+            let unbound = || Arc::new(Constraints::none(self.limits.clone()));
+            Arc::make_mut(self.constraints.get_or_insert_with(unbound)).veto(configuration);
+        }
+    }
+
+    /// The robot stands there now (rad or m per joint), by a movement of which nothing is to be learned.
+    pub fn stand_at(&mut self, configuration: &[f64]) {
+        self.history.expect(configuration);
+    }
+
+    /// Where the robot stands, as far as is known, rad or m per joint: where it moved last, or else where it starts.
+    pub fn posture(&self) -> Option<&[f64]> {
+        self.history.posture().or(self.constraints.as_deref()?.start.as_deref())
     }
 
     /// Takes a proposal back; false if it is not pending.

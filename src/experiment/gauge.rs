@@ -45,7 +45,7 @@ impl Gauge {
     /// Judges another truth.
     pub fn study(&mut self, truth: &State) {
         self.movements = general_movements(truth, &self.layout, &self.rig, &self.limits);
-        self.undetermined = self.null_space(truth).ncols();
+        self.undetermined = self.free(truth).ncols();
     }
 
     /// How many directions of parameter space no measurement determines.
@@ -58,14 +58,8 @@ impl Gauge {
         self.layout.dimension() - self.undetermined
     }
 
-    /// By parameter the share of it that undetermined directions hold, 0..1: the diagonal of N Nᵀ at `state`.
-    pub fn shares(&self, state: &State) -> DVector<f64> {
-        let free = self.null_space(state);
-        DVector::from_fn(free.nrows(), |row, _| free.row(row).norm_squared())
-    }
-
-    /// N at a state (m × k).
-    fn null_space(&self, state: &State) -> DMatrix<f64> {
+    /// N at a state (m × k): an orthonormal basis of what no measurement determines.
+    pub fn free(&self, state: &State) -> DMatrix<f64> {
         let m = self.layout.dimension();
         let mut information = DMatrix::zeros(m, m);
         for General { rig, posture } in &self.movements {
@@ -84,7 +78,7 @@ impl Gauge {
         }
         for _ in 0..STEPS {
             let Some(delta) = moved.local(&self.layout, estimate) else { break };
-            let free = self.null_space(&moved);
+            let free = self.free(&moved);
             let mut step = &free * free.tr_mul(&delta);
             let length = step.amax();
             if length < 1e-11 {
@@ -107,7 +101,7 @@ impl Gauge {
                 information += &equations.rows * equations.rows.transpose();
                 descent += &equations.rows * &equations.residual;
             }
-            let free = self.null_space(&moved);
+            let free = self.free(&moved);
             // The undetermined directions are held: there the information is nothing, and so is the step.
             let hold = information.diagonal().amax();
             information += &free * free.transpose() * hold;
@@ -126,7 +120,7 @@ impl Gauge {
         if self.undetermined == 0 {
             return Some((error.dot(&covariance.clone().cholesky()?.solve(&error)), error.len()));
         }
-        let free = self.null_space(estimate);
+        let free = self.free(estimate);
         let m = self.layout.dimension();
         let across = DMatrix::identity(m, m) - &free * free.transpose();
         let eigen = SymmetricEigen::new(across);

@@ -13,6 +13,7 @@ use super::{
 use crate::{design::Problem, estimation::Belief, kinematics::JointBox, model::State};
 
 /// What beliefs and runs are judged by.
+#[derive(Clone)]
 pub struct Judge {
     evaluation: Evaluation,
     gauge: Option<Gauge>,
@@ -22,6 +23,7 @@ pub struct Judge {
 }
 
 /// What the data of every learner allow.
+#[derive(Clone)]
 struct Bounds {
     problem: Problem,
     /// Λ₀ + Σ HᵀH at the truth, one per learner.

@@ -27,6 +27,7 @@ pub const SETTLING_STEPS: u32 = 5;
 const UNAMBIGUOUS: f64 = 0.99;
 
 /// An agent in a comparison.
+#[derive(Clone)]
 pub struct Learner {
     /// Its name, estimator and policy.
     pub description: LearnerDescription,
@@ -171,10 +172,25 @@ impl Learner {
         Some(self.agent.appraise(standpoint, &centre).ok()?.gain)
     }
 
-    /// Takes in the movement by which a proposal was carried out, and what was seen after it.
+    /// Its agent.
+    pub(super) fn agent(&self) -> &Agent {
+        &self.agent
+    }
+
+    /// Its agent, to be told of anything but observations.
+    pub(super) fn agent_mut(&mut self) -> &mut Agent {
+        &mut self.agent
+    }
+
+    /// The configurations over which it judges itself.
+    pub(super) fn workspace(&self) -> &Workspace {
+        &self.workspace
+    }
+
+    /// Takes in a movement, by which a proposal was carried out or which nobody proposed, and what was seen after it.
     pub(super) fn learn(
         &mut self,
-        proposal: Proposal,
+        proposal: Option<Proposal>,
         movement: Movement,
         observation: Observation,
         world: &World,
@@ -192,7 +208,8 @@ impl Learner {
         };
         let seen = !observation.is_miss();
         let observed = observation.clone();
-        let executed = Executed { proposal: Some(proposal.id), movement, observation };
+        let proposed = proposal.as_ref().map(|proposal| proposal.id);
+        let executed = Executed { proposal: proposed, movement, observation };
         let update = match self.agent.absorb(&[executed]) {
             Ok(updates) => updates.first().copied().unwrap_or_default(),
             Err(AbsorbError::Ended(_)) => Update::default(),
@@ -207,7 +224,7 @@ impl Learner {
         let weighed: Vec<ReadingReport> =
             self.readings().into_iter().filter(|reading| reading.movement == movements).collect();
         let readings = readings(world, self.belief(), &configuration, &observed, channels, &weighed);
-        let selection = &proposal.selection;
+        let selection = proposal.as_ref().map(|proposal| &proposal.selection);
         let report = MovementReport {
             predicted_marker_m: array(&predicted.coords),
             measured_marker_m: measured.map(|position| array(&position.coords)),
@@ -217,15 +234,15 @@ impl Learner {
             row,
             socket: None,
             configuration,
-            criterion: selection.criterion,
-            gain: selection.gain,
-            evaluations: selection.evaluations,
-            selection_ms: proposal.selection_ms,
+            criterion: selection.and_then(|selection| selection.criterion),
+            gain: selection.and_then(|selection| selection.gain),
+            evaluations: selection.map_or(0, |selection| selection.evaluations),
+            selection_ms: proposal.as_ref().map_or(0.0, |proposal| proposal.selection_ms),
             readings,
             seen,
-            partition: selection.search.as_ref().map(|search| search.partition.clone()),
+            partition: selection.and_then(|it| it.search.as_ref()).map(|search| search.partition.clone()),
         };
-        self.last = Some(proposal);
+        self.last = proposal;
         Ok((report, update))
     }
 

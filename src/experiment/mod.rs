@@ -26,6 +26,7 @@ mod report;
 mod result;
 mod sight;
 mod streams;
+mod told;
 mod world;
 
 pub use agent::{AbsorbError, Agent, Event, Executed, OwnedStandpoint, Proposal, Standpoint};
@@ -53,11 +54,13 @@ pub use sight::{
 };
 pub(crate) use sight::{channels, described};
 pub use streams::Stream;
+pub use told::Prospect;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};
 
 use crate::{design::Problem, estimation::Update, selection::SelectionError};
 
-/// A running comparison of learners.
+/// A running comparison of learners. A copy of it goes its own way.
+#[derive(Clone)]
 pub struct Experiment {
     description: Description,
     world: World,
@@ -191,7 +194,7 @@ impl Experiment {
                     let socket = movement.socket.and_then(|socket| self.description.sockets.get(socket));
                     let socket = socket.map(SocketDescription::label);
                     let learned =
-                        learner.learn(proposal, movement, observation, &self.world, &self.description.channels);
+                        learner.learn(Some(proposal), movement, observation, &self.world, &self.description.channels);
                     let (report, update) =
                         learned.map_err(|source| ExperimentError::Absorb { learner: name, source })?;
                     (Some(MovementReport { socket, ..report }), update)

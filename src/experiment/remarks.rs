@@ -4,11 +4,8 @@ use super::{World, gauge::Gauge, learner::Learner};
 use crate::{
     estimation::{NoiseReport, ReadingReport},
     experiment::{Description, Metrics},
-    model::Block,
 };
 
-/// The share of a parameter that undetermined directions must hold for it to be named.
-const NAMED: f64 = 0.05;
 /// Movements listed at most.
 const LISTED: usize = 8;
 /// A scale of the noise nearer to 1 than this is as promised.
@@ -35,33 +32,7 @@ pub(super) fn remarks(learner: &Learner, metrics: &Metrics, description: &Descri
 fn undetermined(learner: &Learner, description: &Description) -> Option<String> {
     let belief = learner.belief();
     let gauge = Gauge::new(&belief.state, &belief.layout, &belief.rig, learner.limits());
-    let count = gauge.undetermined();
-    if count == 0 {
-        return None;
-    }
-    let shares = gauge.shares(&belief.state);
-    let joint = |index: usize| description.joints.get(index).map_or("a joint", |joint| joint.name.as_str());
-    let named = belief.layout.blocks().filter(|(_, range)| range.clone().any(|coordinate| shares[coordinate] > NAMED));
-    let names: Vec<String> = named
-        .map(|(block, _)| match block {
-            Block::Base => "the base".to_owned(),
-            Block::Axis(index) => format!("the axis of {}", joint(index)),
-            Block::Offset(index) => format!("the offset of {}", joint(index)),
-            Block::Ratio(index) => format!("the ratio of {}", joint(index)),
-            Block::Eccentricity(index) => format!("the eccentricity of {}", joint(index)),
-            Block::Target(0) => "the marker".to_owned(),
-            Block::Target(index) => format!("target {index}"),
-            Block::Device(index) => format!("camera {index}"),
-            Block::Intrinsics(index) => format!("the lens of camera {index}"),
-            Block::Socket(index) => format!("socket {index}"),
-        })
-        .collect();
-    let (m, directions) = (belief.layout.dimension(), if count == 1 { "direction" } else { "directions" });
-    Some(format!(
-        "{count} {directions} among its {m} parameters cannot be told by any movement, and stay as described: they move {} together \
-         so that nothing that is measured changes",
-        names.join(", ")
-    ))
+    description.called().untold(&belief.layout, &gauge.free(&belief.state), "any movement")
 }
 
 fn noise(noise: &NoiseReport) -> Option<String> {

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     estimation::Belief,
     kinematics::{Joint, JointKind, Line},
-    model::State,
+    model::{Names, State},
     selection::Partition,
 };
 
@@ -92,6 +92,18 @@ pub struct SocketDescription {
     pub at_m: Option<[f64; 3]>,
     /// Whether it is held out: nobody learns from it, and the scatter of the predicted target there is judged.
     pub held_out: bool,
+}
+
+impl Description {
+    /// What everything that can be learned is called.
+    pub fn called(&self) -> Names {
+        Names {
+            joints: self.joints.iter().map(|joint| joint.name.clone()).collect(),
+            targets: self.targets.iter().map(|target| target.name.clone()).collect(),
+            cameras: self.cameras.iter().map(|camera| camera.name.clone()).collect(),
+            sockets: self.sockets.iter().map(SocketDescription::label).collect(),
+        }
+    }
 }
 
 impl SocketDescription {

@@ -162,7 +162,7 @@ pub(super) fn readings(
     let mut readings: Vec<ChannelReading> = (0..observation.readings.len()).map(miss).collect();
     let rig = match world {
         World::Simulated { rig, .. } => rig,
-        World::Measured { .. } => &belief.rig,
+        World::Measured { .. } | World::Outside => &belief.rig,
     };
     let root_mean_square = |part: &[f64]| (part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64).sqrt();
     rig.residuals(&belief.state, configuration, observation, |channel, whitened| {

@@ -16,7 +16,7 @@ use crate::{
     sensing::{Head, Observation, Refused, Rig},
 };
 
-/// A simulated arm, or a recorded data set.
+/// A simulated arm, a recorded data set, or a robot elsewhere.
 #[derive(Clone, Debug)]
 pub enum World {
     /// A robot that is known here and nowhere else, seen through noisy channels.
@@ -39,6 +39,8 @@ pub enum World {
         /// What was observed at every row of the data set.
         observations: Vec<Observation>,
     },
+    /// A robot that moves by itself, and of which one is [told](super::Experiment::tell).
+    Outside,
 }
 
 /// Readings of a tracker that show anything but the marker: each with a chance of its own, uniform in a cube about the origin.
@@ -82,6 +84,9 @@ pub enum WorldError {
     /// A movement that is no row of the data set.
     #[error("recorded data hold what was measured at their own rows, not at other configurations")]
     NotRecorded,
+    /// Nobody here can move the robot.
+    #[error("the robot is elsewhere and moves by itself; tell what was observed after it has moved")]
+    Outside,
     /// Nothing can be held where it was to be held.
     #[error("no posture near the proposed one brings a target into socket {socket} (counted from 0)")]
     OutOfReach {
@@ -120,7 +125,7 @@ impl World {
     pub fn truth(&self) -> Option<&State> {
         match self {
             Self::Simulated { truth, .. } => Some(truth),
-            Self::Measured { .. } => None,
+            Self::Measured { .. } | Self::Outside => None,
         }
     }
 
@@ -128,7 +133,7 @@ impl World {
     pub fn change(&self) -> Option<&Change> {
         match self {
             Self::Simulated { change, .. } => change.as_deref(),
-            Self::Measured { .. } => None,
+            Self::Measured { .. } | Self::Outside => None,
         }
     }
 
@@ -136,7 +141,7 @@ impl World {
     pub fn head(&self) -> Option<&Head> {
         match self {
             Self::Simulated { head, .. } => head.as_ref(),
-            Self::Measured { .. } => None,
+            Self::Measured { .. } | Self::Outside => None,
         }
     }
 
@@ -198,6 +203,7 @@ impl World {
                 let (row, rows) = (movement.row.ok_or(WorldError::NotRecorded)?, observations.len());
                 observations.get(row).cloned().ok_or(WorldError::NoSuchRow { row, rows })
             }
+            Self::Outside => Err(WorldError::Outside),
         }
     }
 }

@@ -8,12 +8,14 @@
 //!   and not among the kinematics since it is the layout that says which parameters there are.
 //! * [`Workspace`]: where predictions of the hand count.
 //! * [`urdf`]: robot descriptions, read into a chain and written with the axes that were learned.
+//! * [`Names`]: what blocks are called, and what is said of those that nothing determines.
 //! * [`Manifold`]: the postures in which a target is at a given place.
 
 mod block;
 mod element;
 mod layout;
 mod manifold;
+mod names;
 mod pass;
 mod prior;
 mod rank;
@@ -25,6 +27,7 @@ pub use block::Block;
 pub use element::{Displacement, Element};
 pub use layout::{Layout, Quantity};
 pub use manifold::Manifold;
+pub use names::{Names, listed};
 pub use pass::{Frame, Motion, Pass, jacobian};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
 pub use rank::{null_space, rank};

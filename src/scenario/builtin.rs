@@ -30,6 +30,7 @@ pub const BUILTIN: &[Builtin] = builtins![
     "arm-6dof-pose-gears",
     "arm-7dof-eccentric",
     "arm-7dof-socket",
+    "panda-calibration",
     "arm-12dof",
     "arm-12dof-no-prior",
     "arm-20dof",

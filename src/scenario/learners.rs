@@ -1,7 +1,7 @@
 //! The learners of a scenario: those that its file names, and any estimator with any policy.
 
 use super::{
-    Scenario, ScenarioError, WorldSpec,
+    Scenario, ScenarioError,
     error::similar,
     misfit::{Misfit, Setting, misfit},
 };
@@ -232,7 +232,7 @@ impl Scenario {
     }
 
     fn setting(&self) -> Setting {
-        Setting::of(&self.robot, Some(&self.rig), matches!(self.world, WorldSpec::Measured { .. }))
+        Setting::of(&self.robot, Some(&self.rig), self.world.kind())
     }
 
     /// The name of the pair nearest to these two that fits.
@@ -266,7 +266,7 @@ fn composed(estimator: EstimatorKind, policy: PolicyKind) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::{BUILTIN, builtin};
+    use crate::scenario::{BUILTIN, WorldSpec, builtin};
 
     #[test]
     fn any_estimator_learns_by_any_policy_that_fits() {

@@ -1,6 +1,6 @@
 //! Which learners fit a scenario, and why others do not.
 
-use super::{EstimatorKind, PolicyKind, Robot};
+use super::{EstimatorKind, PolicyKind, Robot, WorldKind};
 use crate::sensing::Rig;
 
 /// What of a scenario decides which learners fit it.
@@ -10,6 +10,8 @@ pub(super) struct Setting {
     pub learns_marker: bool,
     /// Whether recorded rows are replayed.
     pub is_measured: bool,
+    /// Whether the robot is elsewhere and asks where to move.
+    pub is_outside: bool,
     /// Whether targets are held in sockets.
     pub has_sockets: bool,
     /// Whether nothing but the marker's position is measured.
@@ -18,11 +20,12 @@ pub(super) struct Setting {
 
 impl Setting {
     /// Of a robot whose sensors are known, unless they are at fault themselves.
-    pub(super) fn of(robot: &Robot, rig: Option<&Rig>, is_measured: bool) -> Self {
+    pub(super) fn of(robot: &Robot, rig: Option<&Rig>, world: WorldKind) -> Self {
         let mut channels = rig.into_iter().flat_map(Rig::channels);
         Self {
             learns_marker: robot.layout.marker().is_some(),
-            is_measured,
+            is_measured: world == WorldKind::Measured,
+            is_outside: world == WorldKind::Outside,
             has_sockets: !robot.sockets.is_empty(),
             sees_markers_alone: channels.all(|channel| channel.target() == Some(0)),
         }
@@ -61,6 +64,10 @@ pub(super) fn misfit(estimator: EstimatorKind, policy: PolicyKind, setting: Sett
     }
     if setting.is_measured && policy == PolicyKind::Human {
         let what = "nobody moves a robot of which there are only recorded rows".to_owned();
+        return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
+    }
+    if setting.is_outside && policy == PolicyKind::Human {
+        let what = "a robot elsewhere asks where to move, and a person does not answer".to_owned();
         return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
     }
     if setting.has_sockets && policy.varies_the_search() {

@@ -36,12 +36,12 @@ use crate::{
     experiment::{Body, Outliers, Thresholds},
     kinematics::JointBox,
     model::{
-        Block, Layout, Quantity, State,
+        Block, Layout, Names, Quantity, State,
         urdf::{Chain, Urdf},
     },
     optimize::Settings,
     selection::{Constraints, CriterionUnits, Planning, Watch, Weights},
-    sensing::{Equipment, Loss, Rig, Spacing},
+    sensing::{Equipment, Loss, Observation, Rig, Spacing},
 };
 
 /// A validated scenario.
@@ -138,6 +138,18 @@ pub struct Robot {
     pub described: Option<Arc<Described>>,
 }
 
+impl Robot {
+    /// What everything that can be learned is called.
+    pub fn called(&self) -> Names {
+        Names {
+            joints: self.names.clone(),
+            targets: self.equipment.targets.iter().map(|target| target.name.clone()).collect(),
+            cameras: self.equipment.cameras.iter().map(|camera| camera.name.clone()).collect(),
+            sockets: self.sockets.iter().chain(&self.held_out_sockets).map(SocketSpec::label).collect(),
+        }
+    }
+}
+
 /// A robot's description, and what of it the scenario is about.
 #[derive(Clone, Debug)]
 pub struct Described {
@@ -168,6 +180,13 @@ pub struct SocketSpec {
     pub sigma_m: f64,
 }
 
+impl SocketSpec {
+    /// Its place and its name.
+    pub fn label(&self) -> String {
+        self.place.as_ref().map_or_else(|| self.name.clone(), |place| format!("{place}/{}", self.name))
+    }
+}
+
 /// The world of a scenario.
 #[derive(Clone, Debug)]
 pub enum WorldSpec {
@@ -188,6 +207,14 @@ pub enum WorldSpec {
         measurements: Measurements,
         /// Which of them are held out.
         held_out: HeldOut,
+    },
+    /// A robot elsewhere, which is told where to move and tells what was observed; the initial estimate is its description,
+    /// wherever it may stand.
+    Outside {
+        /// What is known to be seen, where sensors see some postures only.
+        watch: Option<Watch>,
+        /// What is known before any movement, as the distance between two sockets.
+        beforehand: Option<Observation>,
     },
 }
 

@@ -41,6 +41,19 @@ pub enum WorldKind {
     Simulated,
     /// A recorded data set without a known truth.
     Measured,
+    /// A robot of one's own, which is asked to move and tells what was observed.
+    Outside,
+}
+
+impl WorldSpec {
+    /// What kind it is.
+    pub fn kind(&self) -> WorldKind {
+        match self {
+            Self::Simulated { .. } => WorldKind::Simulated,
+            Self::Measured { .. } => WorldKind::Measured,
+            Self::Outside { .. } => WorldKind::Outside,
+        }
+    }
 }
 
 /// The learners that tell most beside each other, in the order in which a page shows them.
@@ -59,10 +72,7 @@ impl Scenario {
         ScenarioSummary {
             name: self.name.clone(),
             title: self.title.clone(),
-            world: match self.world {
-                WorldSpec::Simulated { .. } => WorldKind::Simulated,
-                WorldSpec::Measured { .. } => WorldKind::Measured,
-            },
+            world: self.world.kind(),
             joints: self.robot.joint_descriptions(),
             parameters: self.robot.layout.dimension(),
             steps: self.steps,

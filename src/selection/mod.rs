@@ -209,7 +209,7 @@ pub enum SelectionError {
 
 /// Chooses the next movement from what is believed. It keeps no state: the same situation and random numbers give the same
 /// choice.
-pub trait Policy: Send {
+pub trait Policy: Send + Sync {
     /// Chooses; `rng` is for this choice alone.
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError>;
 

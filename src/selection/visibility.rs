@@ -25,8 +25,10 @@ impl Watch {
         limits: &'a JointBox,
     ) -> Option<Sight<'a>> {
         let head = watch.and_then(|watch| watch.head.as_ref());
-        let matters = head.is_some() || situation.belief.rig.has_view();
-        matters.then(|| Sight::Chance(Visibility::new(head, situation.history.misses()), limits))
+        let misses = situation.history.misses();
+        // What has missed once can miss again, for whatever reason.
+        let matters = head.is_some() || situation.belief.rig.has_view() || !misses.is_empty();
+        matters.then(|| Sight::Chance(Visibility::new(head, misses), limits))
     }
 
     /// The first movement of all, where anybody watches: to where the marker is known to be seen, or as near to it as may be.

@@ -91,6 +91,11 @@ pub trait Channel: fmt::Debug + Send + Sync {
         None
     }
 
+    /// The target that a reading is about, if it is about one.
+    fn subject(&self) -> Option<usize> {
+        self.target().or(self.sight().map(|(_, target)| target))
+    }
+
     /// When it has a reading.
     fn occasion(&self) -> Occasion {
         Occasion::Always

@@ -39,6 +39,10 @@ impl Channel for Distance {
         1
     }
 
+    fn subject(&self) -> Option<usize> {
+        Some(self.target)
+    }
+
     fn sigma(&self) -> f64 {
         self.sigma_m
     }

@@ -71,6 +71,10 @@ impl Channel for Pose {
         2
     }
 
+    fn subject(&self) -> Option<usize> {
+        Some(self.target)
+    }
+
     fn sigma(&self) -> f64 {
         self.sigma_m
     }

@@ -201,3 +201,22 @@ fn what_no_parameter_explains_is_expected_and_not_chased() {
         }
     }
 }
+
+/// A Panda before a tracker: by the criterion that is its default, chosen movements predict better than random ones at every number
+/// of them, which those chosen by the error of the parameters do not.
+#[test]
+fn chosen_movements_calibrate_a_panda_better_than_random_ones_at_every_number() {
+    let scenario = builtin("panda-calibration").expect("built in");
+    assert_eq!(scenario.selection.planning.optimality, Optimality::I, "what a URDF's owner asks for");
+    let seeds: Vec<u64> = (1..=20).collect();
+    let medians = |learner: &str| -> Vec<f64> {
+        let curve = compare(&scenario, learner, &seeds, 60).curve;
+        curve.iter().map(|point| point.prediction_mean_m.expect("a truth").median * 1e3).collect()
+    };
+    let (chosen, random) = (medians("global"), medians("random"));
+    for movements in 11..=60 {
+        let (chosen, random) = (chosen[movements], random[movements]);
+        assert!(chosen < random, "after {movements}: {chosen} and {random} mm");
+    }
+    assert!(chosen[12] <= 0.9 && chosen[20] <= 0.6, "{} and {} mm", chosen[12], chosen[20]);
+}

@@ -9,7 +9,7 @@ const ROTATIONS: [&[&str]; 4] =
 /// What is measured beside the joints.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Measured {
-    /// Targets whose places or poses are.
+    /// Targets of which something is.
     pub sensors: Vec<Sensor>,
     /// The columns of place and socket.
     pub sockets: Option<(String, String)>,
@@ -24,6 +24,8 @@ pub struct Sensor {
     pub name: String,
     /// Its channel.
     pub channel: &'static str,
+    /// The camera in whose picture it is, if it is in one.
+    pub camera: Option<String>,
     /// The titles of its columns.
     pub columns: Vec<String>,
     /// The lines of its σ.
@@ -53,7 +55,8 @@ pub fn measured(titles: &[String], joints: &[String]) -> Measured {
             measured.sockets = Some((place, socket));
         }
     }
-    while let Some(sensor) = first_place(&others) {
+    while let Some(sensor) = first_picture(&others).or_else(|| first_distance(&others)).or_else(|| first_place(&others))
+    {
         others.retain(|title| !sensor.columns.contains(title));
         measured.sensors.push(sensor);
     }
@@ -61,11 +64,48 @@ pub fn measured(titles: &[String], joints: &[String]) -> Measured {
     measured
 }
 
+/// The first columns that are called u and v alike: a point in a picture. What stands before them is the camera and the target, as in
+/// `cam_tag_u`; of points with numbers, as in `cam_tag_u1`, each is a target of its own.
+fn first_picture(titles: &[String]) -> Option<Sensor> {
+    let find = |wanted: &str| titles.iter().find(|title| stem(title) == wanted).cloned();
+    titles.iter().find_map(|title| {
+        let (before, number) = around('u', stem(title))?;
+        let columns = vec![find(&format!("{before}u{number}"))?, find(&format!("{before}v{number}"))?];
+        let (camera, target) = match before.trim_end_matches('_').rsplit_once('_') {
+            Some((camera, target)) => (camera, target),
+            None => ("camera", before.trim_end_matches('_')),
+        };
+        let target = if target.is_empty() { "marker" } else { target };
+        Some(Sensor {
+            name: format!("{target}{number}"),
+            channel: "pixels",
+            camera: Some(camera.to_owned()),
+            columns,
+            sigmas: "sigma_px = 0.5\n",
+        })
+    })
+}
+
+/// The first column that is called a distance.
+fn first_distance(titles: &[String]) -> Option<Sensor> {
+    titles.iter().find_map(|title| {
+        let before = stem(title).strip_suffix("distance")?;
+        let target = before.strip_suffix('_').or_else(|| before.is_empty().then_some("marker"))?;
+        Some(Sensor {
+            name: target.to_owned(),
+            channel: "distance",
+            camera: None,
+            columns: vec![title.clone()],
+            sigmas: "sigma_m = 0.0005\n",
+        })
+    })
+}
+
 /// The first columns that are called x, y and z alike, with those of a rotation that begin alike.
 fn first_place(titles: &[String]) -> Option<Sensor> {
     let find = |wanted: &str| titles.iter().find(|title| stem(title) == wanted).cloned();
     titles.iter().find_map(|title| {
-        let (before, after) = around_x(stem(title))?;
+        let (before, after) = around('x', stem(title))?;
         let named = |letter: &str| find(&format!("{before}{letter}{after}"));
         let mut columns = vec![named("x")?, named("y")?, named("z")?];
         let rotation = ROTATIONS.iter().find_map(|ends| {
@@ -83,17 +123,15 @@ fn first_place(titles: &[String]) -> Option<Sensor> {
                 ("pose", "sigma_m = 0.0005\nsigma_deg = 0.1\n")
             }
         };
-        Some(Sensor { name, channel, columns, sigmas })
+        Some(Sensor { name, channel, camera: None, columns, sigmas })
     })
 }
 
-/// What stands before and after the x of a coordinate: `x`, `x1`, `hand_x`.
-fn around_x(stem: &str) -> Option<(&str, &str)> {
-    if let Some(before) = stem.strip_suffix("_x") {
-        return Some((&stem[..before.len() + 1], ""));
-    }
-    let after = stem.strip_prefix('x')?;
-    after.chars().all(|c| c.is_ascii_digit()).then_some(("", after))
+/// What stands before and after the letter of a coordinate: `x`, `x1`, `hand_x`, `cam_tag_u2`.
+fn around(letter: char, stem: &str) -> Option<(&str, &str)> {
+    let bare = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+    let before = bare.strip_suffix(letter)?;
+    (before.is_empty() || before.ends_with('_')).then_some((before, &stem[bare.len()..]))
 }
 
 #[cfg(test)]
@@ -112,6 +150,23 @@ mod tests {
         assert_eq!(told, [("marker1", "position", 3), ("marker2", "position", 3), ("hand", "pose", 6)]);
         assert_eq!((found.others, found.sockets), (vec!["time".to_owned()], None));
         assert!(has_joint(&titles, "elbow") && !has_joint(&titles, "elbo"));
+    }
+
+    #[test]
+    fn pictures_and_distances_are_told_by_their_titles() {
+        let found = measured(&titles("cam_tag_u1,cam_tag_v1,cam_tag_u2_px,cam_tag_v2_px,u,v,hand_distance_mm,q"), &[]);
+        let told = |it: &Sensor| (it.name.clone(), it.channel, it.camera.clone().unwrap_or_default(), it.columns.len());
+        let expected = [
+            ("tag1", "pixels", "cam", 2),
+            ("tag2", "pixels", "cam", 2),
+            ("marker", "pixels", "camera", 2),
+            ("hand", "distance", "", 1),
+        ];
+        let expected =
+            expected.map(|(name, channel, camera, count)| (name.to_owned(), channel, camera.to_owned(), count));
+        assert_eq!(found.sensors.iter().map(told).collect::<Vec<_>>(), expected);
+        assert_eq!(found.others, ["q"]);
+        assert_eq!(measured(&titles("menu,nonsense_distances,u3"), &[]).sensors, []);
     }
 
     #[test]

@@ -4,12 +4,15 @@
 //! had to be guessed is said, in the file and to whoever asked.
 
 mod columns;
+mod pictures;
+mod written;
 
 use crate::{
     model::urdf::{Chain, Urdf, UrdfError},
     table::{Columns, Table, TableError},
 };
-use columns::{Measured, Sensor};
+use columns::Measured;
+use written::written;
 
 /// Two files, as the calibration file is to name them, and what they hold.
 #[derive(Clone, Copy, Debug)]
@@ -116,7 +119,8 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
                 listed(&others)
             ),
             mend:
-                "title what was measured x, y, z (with the target's name before it, as in hand_x), or place and socket"
+                "title what was measured x, y, z (with the target's name before it, as in hand_x), cam_hand_u and cam_hand_v, \
+                 hand_distance, or place and socket"
                     .to_owned(),
         });
     }
@@ -140,8 +144,22 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
         guesses.push(format!(
             "`{}`: a {}, from the columns {}",
             sensor.name,
-            sensor.channel,
+            if sensor.channel == "pixels" { "point in a picture" } else { sensor.channel },
             sensor.columns.join(", ")
+        ));
+    }
+    let pictures = pictures::sizes(&sensors, sources.table).map_err(of_table)?;
+    for (camera, [width, height]) in &pictures {
+        guesses.push(format!(
+            "camera `{camera}`: a picture of {width} × {height}, as its points lie in it; its focal lengths and where it stands the \
+             table does not say: write them before you calibrate"
+        ));
+    }
+    for sensor in sensors.iter().filter(|sensor| sensor.channel == "distance") {
+        guesses.push(format!(
+            "`{}`: the fixed point of its distance is taken for the origin in which the base is found; write `to_m` where there are \
+             several such points, or other sensors",
+            sensor.name
         ));
     }
     if !others.is_empty() {
@@ -152,7 +170,7 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
         (None, true) => "held out: every row once, in five folds, as there is one place alone".to_owned(),
         (None, false) => "held out: every row once, in five folds".to_owned(),
     });
-    let text = written(sources, &chain, &sensors, sockets.as_ref(), trained.as_deref(), &guesses);
+    let text = written(sources, &chain, (&sensors, &pictures), sockets.as_ref(), trained.as_deref(), &guesses);
     Ok(Begun { text, guesses })
 }
 
@@ -188,61 +206,4 @@ fn tip(urdf: &Urdf, base: &str, titles: &[String], guesses: &mut Vec<String>) ->
     };
     guesses.push(format!("tip: `{}`, {why}; --tip names another", chosen.tip()));
     Ok(chosen.clone())
-}
-
-fn written(
-    sources: &Sources<'_>,
-    chain: &Chain,
-    sensors: &[Sensor],
-    sockets: Option<&(String, String)>,
-    trained: Option<&str>,
-    guesses: &[String],
-) -> String {
-    let Sources { name, urdf_file, table_file, .. } = sources;
-    let mut text = format!("# Calibration of {name}: body-schema calibrate\n#\n# Guessed, to be looked over:\n");
-    guesses.iter().for_each(|guess| text.push_str(&format!("#   {guess}\n")));
-    text.push_str(&format!(
-        "\nname = {}\n\n[robot]\nurdf = {}\n# The link that stands still, and the one that carries the targets.\nbase = {}\ntip = {}\n\
-         # Joints that are right as they are described: hold = [\"…\"]\n",
-        quoted(name),
-        quoted(urdf_file),
-        quoted(&chain.base),
-        quoted(chain.tip())
-    ));
-    for sensor in sensors {
-        text.push_str(&format!(
-            "\n# Where it is on the tip is found, to 0.3 m; say what is known by at_m and known = {{ to_m = … }}.\n[[target]]\nname = {}\n\
-             \n[[sensor]]\nchannel = {}\ntarget = {}\ncolumns = [{}]\n# What its maker promises; how much noise there is, is learned.\n{}",
-            quoted(&sensor.name),
-            quoted(sensor.channel),
-            quoted(&sensor.name),
-            sensor.columns.iter().map(|column| quoted(column)).collect::<Vec<_>>().join(", "),
-            sensor.sigmas
-        ));
-    }
-    if let Some((place, socket)) = sockets {
-        text.push_str(&format!(
-            "\n[[target]]\nname = \"ball\"\n\n# The ball is put into sockets, and nothing but joints is measured.\n[sockets]\n\
-             place_column = {}\nsocket_column = {}\n# Play, and what the joints' readings scatter, at the ball.\nsigma_m = 0.0002\n\
-             # How far the sockets of one place are apart: without it nothing tells how large the robot is.\n\
-             # distance_m = 0.05\n# sigma_distance_m = 0.0001\n",
-            quoted(place),
-            quoted(socket)
-        ));
-    }
-    text.push_str(&format!("\n[measurements]\nfile = {}\n\n", quoted(table_file)));
-    text.push_str("# What nothing is learned from: it says how good the calibration is on data that it has not seen.\n[held_out]\n");
-    match (trained, sockets) {
-        (Some(trained), Some((place, _))) => {
-            text.push_str(&format!("by = {}\ntrain = [{}]\n", quoted(place), quoted(trained)));
-        }
-        _ => text.push_str("folds = 5\n"),
-    }
-    text.push_str("\n# How well the description is known: about half a degree and a few millimetres.\n[prior]\ndirection_rad = 0.01\npoint_m = 0.005\n");
-    text
-}
-
-/// A string as TOML writes it.
-fn quoted(text: &str) -> String {
-    toml::Value::from(text).to_string()
 }

@@ -4,7 +4,10 @@ use super::{
     document::{Document, Part},
     plots::{self, residual},
 };
-use crate::calibration::{Case, Extra, Figures, Placement, Reading, Report, SocketDistance, undetermined::listed};
+use crate::{
+    calibration::{Case, Extra, Figures, Placement, Reading, Report, SocketDistance},
+    model::listed,
+};
 
 /// Readings listed at most; of more the worst.
 const LISTED: usize = 200;
@@ -103,6 +106,14 @@ fn headline(document: &mut Document, report: &Report, case: &Case<'_>) {
         let row = |it: &SocketDistance| [it.place.clone(), number(Some(it.predicted_mm)), number(it.known_mm)];
         document.table(1, ["place", "predicted (mm)", "known (mm)"], report.sockets.iter().map(row));
     }
+    document.parts.extend(report.span_1m_sd_mm.map(|sd_mm| Part::Text(span(sd_mm))));
+}
+
+fn span(sd_mm: f64) -> String {
+    format!(
+        "By what was learned and the prior, a span of 1 m of the calibrated robot is right to ± {sd_mm:.2} mm (one standard deviation, \
+         over the joint limits): errors that no parameter explains come on top."
+    )
 }
 
 fn same(one: &Figures, other: &Figures) -> bool {

@@ -276,6 +276,10 @@ impl Smoother {
 }
 
 impl Estimator for Smoother {
+    fn boxed(&self) -> Box<dyn Estimator> {
+        Box::new(self.clone())
+    }
+
     fn belief(&self) -> &Belief {
         &self.belief
     }

@@ -18,7 +18,7 @@ use crate::{experiment::Body, kinematics::JointKind, selection::Optimality};
 pub use constraints::{Constraints, ForbiddenBox};
 pub use exactly::Exactly;
 pub use measurements::{HeldOut, Measurements, Sockets};
-pub use read::{key_in, line_of, read};
+pub use read::{Source, key_in, line_of, read};
 pub use sensors::Sensors;
 
 #[derive(Debug, Deserialize)]

@@ -7,10 +7,19 @@ use toml::de::DeTable;
 use super::{Scenario, defaults::complete};
 use crate::scenario::error::{Problem, similar};
 
+/// What a text is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A scenario file.
+    File,
+    /// What is known of a robot elsewhere.
+    Outside,
+}
+
 /// Reads the keys of `text`.
-pub fn read(text: &str) -> Result<Scenario, Problem> {
+pub fn read(text: &str, source: Source) -> Result<Scenario, Problem> {
     let mut document = DeTable::parse(text).map_err(|error| problem(text, "", &error))?;
-    complete(document.get_mut()).map_err(|error| problem(text, "", &error))?;
+    complete(document.get_mut(), source).map_err(|error| problem(text, "", &error))?;
     let deserializer = toml::Deserializer::from(document);
     serde_path_to_error::deserialize(deserializer).map_err(|error| {
         let path = readable_path(&error.path().to_string());

@@ -22,15 +22,18 @@ const SIGMA_M: f64 = 0.001;
 const SIGMA_DEG: f64 = 0.1;
 const SIGMA_PX: f64 = 1.0;
 
-/// Completes a scenario whose robot is a URDF and whose measurements are a table with these titles.
-pub(super) fn complete(raw: &mut raw::Scenario, titles: &Titles) {
-    let Some(span) = raw.measurements.as_ref().map(Spanned::span) else { return };
-    if raw.sensor.is_none() && raw.held.is_none() && titles.label("socket").is_ok() {
+/// Completes a scenario whose robot is a URDF and whose measurements are a table with these titles; or one of a robot
+/// elsewhere, where there are no titles, whose targets' positions are measured unless it says otherwise.
+pub(super) fn complete(raw: &mut raw::Scenario, titles: Option<&Titles>) {
+    let span = raw.measurements.as_ref().map_or(0..0, Spanned::span);
+    let has_sockets = titles.map_or(!raw.sockets.is_empty(), |titles| titles.label("socket").is_ok());
+    if (raw.sensor.is_none() || titles.is_none()) && raw.held.is_none() && has_sockets {
         raw.held = Some(Spanned::new(span.clone(), raw::Sockets::default()));
     }
     if raw.sensor.is_none() && raw.held.is_none() {
         let named: Vec<String> = raw.targets.iter().map(|target| target.get_ref().name.get_ref().clone()).collect();
-        let seen = if named.is_empty() { prefixes(titles) } else { named };
+        let titled = || titles.map_or_else(|| vec!["marker".to_owned()], prefixes);
+        let seen = if named.is_empty() { titled() } else { named };
         let keys = seen.into_iter().map(|name| Spanned::new(span.clone(), keys_of(name, titles)));
         raw.sensor = Some(Spanned::new(span.clone(), raw::Sensors(keys.collect())));
     }
@@ -66,8 +69,9 @@ fn prefixes(titles: &Titles) -> Vec<String> {
 }
 
 /// A sensor of a target's pose where its titles have a rotation, or else of its position.
-fn keys_of(target: String, titles: &Titles) -> Keys {
-    let is_pose = ["", &target].iter().any(|prefix| titles.reading(Layout::Pose, prefix).is_ok());
+fn keys_of(target: String, titles: Option<&Titles>) -> Keys {
+    let has_pose = |prefix: &&str| titles.is_some_and(|titles| titles.reading(Layout::Pose, prefix).is_ok());
+    let is_pose = ["", &target].iter().any(has_pose);
     let channel = if is_pose { "pose" } else { "position" };
     Keys { channel: Some(channel.to_owned()), target: Some(target), ..Keys::default() }
 }

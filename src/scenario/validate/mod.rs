@@ -10,6 +10,7 @@ mod head;
 mod held_out;
 mod learners;
 mod measured;
+mod outside;
 mod recorded_sockets;
 mod sockets;
 mod world;
@@ -23,6 +24,7 @@ use super::{
     EstimatorKind, Filter, Known, Prior, Robot, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError},
     misfit::Setting,
+    summary::WorldKind,
     raw,
 };
 use crate::{
@@ -42,9 +44,32 @@ impl Scenario {
     /// Reads a scenario from `text`. `file` is how errors name it; `open` returns the text of a data file that the
     /// scenario names, or says why it cannot.
     pub fn parse(file: &str, text: &str, open: &dyn Fn(&str) -> Result<String, String>) -> Result<Self, ScenarioError> {
+        Self::parse_as(raw::Source::File, file, text, open)
+    }
+
+    /// Reads what is known of a robot elsewhere, in the keys of a file that replays a table, but without one.
+    ///
+    /// # Errors
+    ///
+    /// As of [`parse`](Self::parse).
+    pub fn parse_outside(
+        file: &str,
+        text: &str,
+        open: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Self, ScenarioError> {
+        Self::parse_as(raw::Source::Outside, file, text, open)
+    }
+
+    fn parse_as(
+        source: raw::Source,
+        file: &str,
+        text: &str,
+        open: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Self, ScenarioError> {
         let invalid = |problems| ScenarioError::Invalid { file: file.to_owned(), problems };
-        let raw = raw::read(text).map_err(|problem| invalid(vec![problem]))?;
-        let mut check = Check { text, open, data: Vec::new(), problems: Vec::new() };
+        let raw = raw::read(text, source).map_err(|problem| invalid(vec![problem]))?;
+        let mut check =
+            Check { text, open, is_outside: source == raw::Source::Outside, data: Vec::new(), problems: Vec::new() };
         let scenario = check.scenario(raw);
         match scenario {
             Some(scenario) if check.problems.is_empty() => Ok(scenario),
@@ -60,6 +85,8 @@ const FILTER_SIGMAS: f64 = 2.0;
 struct Check<'a> {
     text: &'a str,
     open: &'a dyn Fn(&str) -> Result<String, String>,
+    /// Whether the text is about a robot elsewhere.
+    is_outside: bool,
     data: Vec<(String, String)>,
     problems: Vec<Problem>,
 }
@@ -138,10 +165,15 @@ impl Check<'_> {
     }
 
     fn scenario(&mut self, mut raw: raw::Scenario) -> Option<Scenario> {
-        let is_recorded = raw.initial_error.is_none();
+        if self.is_outside {
+            self.nothing_recorded_or_simulated(&raw)?;
+            completed::complete(&mut raw, None);
+            self.share_what_sockets_have_in_common(&mut raw);
+        }
+        let is_recorded = raw.initial_error.is_none() && !self.is_outside;
         if let (Some(measurements), Some(_), true) = (&raw.measurements, &raw.robot.urdf, is_recorded) {
             let titles = self.titles(measurements.get_ref())?;
-            completed::complete(&mut raw, &titles);
+            completed::complete(&mut raw, Some(&titles));
         }
         let raw = &raw;
         let name = raw.name.get_ref();
@@ -150,17 +182,26 @@ impl Check<'_> {
             self.problem(raw.name.span(), "name", format!("{name:?} cannot be a name"), mend);
         }
         let mut robot = self.robot(raw)?;
+        if self.is_outside {
+            self.space_sockets(raw, &mut robot);
+        }
         let recorded = if is_recorded { self.recorded(raw, &mut robot) } else { None };
         let rig = self.rig(raw, &robot);
         let rows = recorded.as_ref().map(|(_, held_out)| held_out.split(0).0.len() as u64);
         let world = self.world(raw, &robot, rig.as_deref(), recorded);
-        let setting = Setting::of(&robot, rig.as_deref(), raw.measurements.is_some());
+        let kind = match (self.is_outside, &raw.measurements) {
+            (true, _) => WorldKind::Outside,
+            (false, Some(_)) => WorldKind::Measured,
+            (false, None) => WorldKind::Simulated,
+        };
+        let setting = Setting::of(&robot, rig.as_deref(), kind);
         let learners = self.learners(&raw.learners, setting);
-        let usual = rig.as_deref().filter(|_| robot.described.is_some() && raw.measurements.is_some());
+        let is_told = raw.measurements.is_some() || self.is_outside;
+        let usual = rig.as_deref().filter(|_| robot.described.is_some() && is_told);
         let usual = usual.map(|rig| (FILTER_SIGMAS * rig.sigma()).powi(2));
         let filter = self.filter("filter", &raw.filter, usual);
         let constraints = raw.constraints.as_ref();
-        if let (Some(given), true) = (constraints, raw.held.is_some()) {
+        if let (Some(given), true) = (constraints, raw.held.is_some() && !self.is_outside) {
             let mend = "leave [constraints] out, or the sockets";
             self.problem(given.span(), "constraints", "recorded sockets know no constraints yet", mend);
         }
@@ -285,7 +326,8 @@ impl Check<'_> {
             spawned: count("smoother.spawned", given.and_then(|given| given.spawned.as_ref()), default.spawned),
         };
         // Of recorded data nobody knows more than the filter assumes.
-        let usual = if raw.measurements.is_some() { raw::NoiseKnowledge::Unknown } else { raw::NoiseKnowledge::Known };
+        let is_told = raw.measurements.is_some() || self.is_outside;
+        let usual = if is_told { raw::NoiseKnowledge::Unknown } else { raw::NoiseKnowledge::Known };
         let noise_unknown = given.and_then(|given| given.noise).unwrap_or(usual) == raw::NoiseKnowledge::Unknown;
         SmootherSpec { sigma, hypotheses, loss: self.loss(given), noise_unknown }
     }
@@ -336,7 +378,7 @@ impl Check<'_> {
             };
         }
         let socket = raw.sockets.first().map(Spanned::span);
-        if raw.measurements.is_some() && raw.initial_error.is_none() {
+        if self.is_outside || (raw.measurements.is_some() && raw.initial_error.is_none()) {
             return Scenario::THRESHOLDS;
         }
         if let Some(span) = raw.sensor.as_ref().map(Spanned::span).or(socket) {

@@ -10,9 +10,9 @@ use crate::{
 };
 
 /// What play and the noise of the joints amount to at the target, unless a scenario says otherwise, metres.
-const SIGMA_M: f64 = 2e-4;
+pub(super) const SIGMA_M: f64 = 2e-4;
 /// How well the distance between two sockets is known, likewise.
-const SIGMA_DISTANCE_M: f64 = 1e-4;
+pub(super) const SIGMA_DISTANCE_M: f64 = 1e-4;
 
 impl Check<'_> {
     /// Every pair of a place and a socket is a socket of the robot's: to learn from where any fold has rows there to learn from,
@@ -80,7 +80,7 @@ impl Check<'_> {
     }
 
     /// The two sockets of every tool are a known distance apart.
-    fn pairs(&mut self, span: std::ops::Range<usize>, robot: &mut Robot, sigma_m: f64) -> Option<()> {
+    pub(super) fn pairs(&mut self, span: std::ops::Range<usize>, robot: &mut Robot, sigma_m: f64) -> Option<()> {
         for one in 0..robot.sockets.len() {
             let place = &robot.sockets[one].place;
             let there: Vec<usize> =

@@ -19,6 +19,9 @@ impl Check<'_> {
         rig: Option<&Rig>,
         recorded: Option<(Measurements, HeldOut)>,
     ) -> Option<WorldSpec> {
+        if self.is_outside {
+            return Some(self.outside(raw, robot, rig));
+        }
         let socket = raw.sockets.first().map(Spanned::span);
         let is_replayed = raw.measurements.is_some();
         let senses = raw.sensor.is_some() || (socket.is_some() && !is_replayed);
@@ -119,7 +122,7 @@ impl Check<'_> {
         let given = sensors.get_ref();
         let mut channels = Vec::new();
         for (index, keys) in given.0.iter().enumerate() {
-            if let (Some(_), None) = (&keys.get_ref().columns, &raw.measurements) {
+            if let (Some(_), None, false) = (&keys.get_ref().columns, &raw.measurements, self.is_outside) {
                 let mend = "remove it, or add [measurements] with a file";
                 self.problem(keys.span(), format!("sensor[{index}].columns"), "there is no table", mend);
             }

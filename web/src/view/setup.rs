@@ -15,6 +15,7 @@ const MOST_LEARNERS: usize = 6;
 fn figures(scenario: &ScenarioSummary) -> String {
     let world = match scenario.world {
         WorldKind::Measured => "measured data",
+        WorldKind::Outside => "a robot of your own",
         WorldKind::Simulated => "simulated",
     };
     let (joints, parameters) = (scenario.joints.len(), scenario.parameters);

@@ -1,10 +1,14 @@
-//! What blocks and coordinates are called.
+//! What blocks and their coordinates are called, and what is said of those that nothing determines.
 
-use crate::{
-    kinematics::JointKind,
-    model::{Block, Layout, State},
-    scenario::{Robot, SocketSpec},
-};
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
+use super::{Block, Layout, State};
+use crate::kinematics::JointKind;
+
+/// The share of a block's coordinate that undetermined directions must hold for the block to be named.
+const NAMED: f64 = 0.05;
 
 /// The names of everything that can be learned.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -20,16 +24,6 @@ pub struct Names {
 }
 
 impl Names {
-    /// Those of a scenario's robot.
-    pub fn new(robot: &Robot) -> Self {
-        Self {
-            joints: robot.names.clone(),
-            targets: robot.equipment.targets.iter().map(|target| target.name.clone()).collect(),
-            cameras: robot.equipment.cameras.iter().map(|camera| camera.name.clone()).collect(),
-            sockets: robot.sockets.iter().chain(&robot.held_out_sockets).map(label).collect(),
-        }
-    }
-
     /// A block, as the object of a sentence.
     pub fn block(&self, block: Block) -> String {
         let of = |names: &[String], index: usize| names.get(index).cloned().unwrap_or_else(|| format!("{}", index + 1));
@@ -39,7 +33,10 @@ impl Names {
             Block::Offset(joint) => format!("the offset of {}", of(&self.joints, joint)),
             Block::Ratio(joint) => format!("the ratio of {}", of(&self.joints, joint)),
             Block::Eccentricity(joint) => format!("the eccentricity of {}", of(&self.joints, joint)),
-            Block::Target(target) => format!("target {}", of(&self.targets, target)),
+            Block::Target(target) => match of(&self.targets, target) {
+                name if name == "marker" => "the marker".to_owned(),
+                name => format!("target {name}"),
+            },
             Block::Device(device) => format!("camera {}", of(&self.cameras, device)),
             Block::Intrinsics(device) => format!("the lens of camera {}", of(&self.cameras, device)),
             Block::Socket(socket) => format!("socket {}", of(&self.sockets, socket)),
@@ -60,7 +57,7 @@ impl Names {
                 _ => &["x", "y", "z", "turn about x", "turn about y", "turn about z"],
             }
         };
-        let named = |(block, range): (Block, std::ops::Range<usize>)| {
+        let named = |(block, range): (Block, Range<usize>)| {
             let name = self.block(block);
             let ends = ends(block).iter().take(range.len());
             ends.map(move |end| if end.is_empty() { name.clone() } else { format!("{name}, {end}") })
@@ -68,9 +65,30 @@ impl Names {
         };
         layout.blocks().flat_map(named).collect()
     }
+
+    /// What the directions in the columns of `free` (m × k, orthonormal) are, which `by` does not tell; `None` without any.
+    pub fn untold(&self, layout: &Layout, free: &DMatrix<f64>, by: &str) -> Option<String> {
+        let count = free.ncols();
+        if count == 0 {
+            return None;
+        }
+        let is_named = |range: &Range<usize>| range.clone().any(|at| free.row(at).norm_squared() > NAMED);
+        let names = layout.blocks().filter(|(_, range)| is_named(range)).map(|(block, _)| self.block(block));
+        let (directions, they) = if count == 1 { ("direction", "it moves") } else { ("directions", "they move") };
+        Some(format!(
+            "{count} {directions} among the {} parameters cannot be told by {by}, and stay as described: {they} {} so that nothing \
+             that is measured changes",
+            layout.dimension(),
+            listed(names.collect())
+        ))
+    }
 }
 
-/// A socket by its place and its name.
-fn label(socket: &SocketSpec) -> String {
-    socket.place.as_ref().map_or_else(|| socket.name.clone(), |place| format!("{place}/{}", socket.name))
+/// "a, b and c".
+pub fn listed(mut names: Vec<String>) -> String {
+    match names.pop() {
+        Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),
+        Some(last) => last,
+        None => String::new(),
+    }
 }

@@ -1,0 +1,99 @@
+//! Ask and tell: sessions with a robot that is not ours.
+//!
+//! Such a robot is asked to move ([`Session::prepare_suggest`]) and tells where it moved and what was seen
+//! ([`Session::prepare_observe`]). One agent decides, the first learner of the [`Setup`]: unless that names another, a smoother
+//! that plans by the predicted error over the workspace.
+//!
+//! ```
+//! use body_schema::ask_tell::{Ask, Observation, Session, Setup};
+//! use serde_json::json;
+//!
+//! let urdf = r#"<robot name="pendulum"><link name="wall"/><link name="rod"/>
+//!   <joint name="swing" type="revolute"><parent link="wall"/><child link="rod"/>
+//!     <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"#;
+//! let setup = Setup::new(json!({ "robot": { "urdf": urdf, "base": "wall", "tip": "rod" } }));
+//! let mut session = Session::open(setup)?;
+//! let asked = session.suggest(&Ask::default(), None)?;
+//! let told: Observation = serde_json::from_value(json!({
+//!     "suggestion_id": asked.suggestions[0].id,
+//!     "configuration": { "swing": 0.48 },
+//!     "measurements": { "marker": [0.1, 0.02, -0.3] },
+//! }))?;
+//! assert_eq!(session.observe(told, None)?.observation, 1);
+//! let restored = Session::from_json(&session.to_json())?;
+//! assert_eq!(restored.events(), session.events());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # A session is its list of events
+//!
+//! [`Session`] is a [`Setup`] and a list of [`Event`]s, and nothing else: replaying the list gives it again, to the last bit on
+//! the same build and kind of CPU, and without choosing anything again, since a suggestion's event holds its plan. There are no
+//! clocks and no random numbers but those keyed by the seed; who calls says what time it is, if that matters.
+//!
+//! Whatever changes a session is done in two phases, so that a store can write in between: `prepare_…` tries it on a copy and
+//! gives the events that it would append, with the answer; [`Session::commit`] appends them. A `prepare_…` that fails, or that
+//! is dropped, has changed nothing. Prepared work is of one revision: if another was committed since, `commit` refuses it.
+//!
+//! # Suggestions
+//!
+//! | state | meaning | what it does to the next choice |
+//! |---|---|---|
+//! | `pending` | waits to be carried out | others are chosen given what it will teach |
+//! | `observed` | an observation names it | teaches what was observed where the robot truly was |
+//! | `not_seen` | the same, and no channel had a reading | the surroundings count as hard to see |
+//! | `infeasible` | the robot cannot go there | its neighbourhood is excluded; one that grows with each refusal nearby |
+//! | `abandoned` | nobody carries it out | none |
+//! | `superseded` | the body has changed, the constraints have (by a refusal, or since from where the robot stands now it is out of reach), or its client asked anew | none |
+//! | `expired` | its time ran out; only if it was given one | none |
+//!
+//! An observation is accepted whatever the state of the suggestion that it names, and one that names none is as good. Each
+//! client has pending suggestions of its own; all are chosen together, in the order in which they were asked for, as one robot
+//! would carry them out.
+//!
+//! # Observations
+//!
+//! `configuration` is where the joints were, by name, in the units of the URDF (rad, m). `measurements` has one entry per
+//! channel; null, and an entry that is left out, mean that it saw nothing.
+//!
+//! | channel | its name | shape |
+//! |---|---|---|
+//! | position | the target's | `[x, y, z]`, metres in the frame of the measurements |
+//! | pose | the target's | `{"position": [x, y, z], "quaternion": [x, y, z, w]}` |
+//! | pixels | `CAMERA_TARGET` | `[[u, v], …]`, one pair for each point of the target |
+//! | distance | `TARGET_distance` | metres |
+//! | sockets | `socket` | `{"socket": "PLACE/NAME"}`, or `"PLACE/NAME"` |
+//!
+//! Names that would be taken get `_2`, `_3` behind them. An excluded observation counts for nothing but where the robot stands.
+//!
+//! # Results
+//!
+//! [`Session::observations_csv`] and [`Session::calibration_toml`] are what `calibrate` reads; [`Session::calibrate`] does it
+//! here. See [`Results`].
+
+mod channel;
+mod error;
+mod event;
+#[cfg(test)]
+mod laws;
+mod ledger;
+mod limits;
+mod observation;
+mod prepare;
+mod results;
+mod session;
+mod setup;
+mod suggestion;
+mod table;
+
+pub use channel::{ChannelShape, Shape};
+pub use error::{Fault, Refusal, ReplayError, SetupError};
+pub use event::{Choice, Document, Event, Happened, Plan, Why, VERSION};
+pub use ledger::Told;
+pub use limits::*;
+pub use observation::{Answer, Observation};
+pub use prepare::Prepared;
+pub use results::{Results, ResultsError};
+pub use session::{Session, Status};
+pub use setup::Setup;
+pub use suggestion::{Ask, Enough, Outcome, Suggestion, SuggestionState, Suggestions};

@@ -1,0 +1,132 @@
+//! Movements that are suggested, and what becomes of them.
+
+use std::{collections::BTreeMap, fmt};
+
+use serde::{Deserialize, Serialize};
+
+/// A movement that is suggested.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct Suggestion {
+    /// Counted from 1 over all clients.
+    pub id: u64,
+    /// How many events the session had when it was chosen.
+    pub revision: u64,
+    /// For whom; null for who gave no name.
+    #[serde(default)]
+    pub client: Option<String>,
+    /// Where to move, by joint name, in the units of the URDF (rad, m).
+    pub configuration: BTreeMap<String, f64>,
+    /// The socket that the target is to be held in, as `PLACE/NAME`; null without sockets.
+    #[serde(default)]
+    pub socket: Option<String>,
+    /// By how much the criterion is expected to fall, in its own units; null for a policy without one, and for a movement that
+    /// was told in advance, as the first into a socket.
+    pub expected_gain: Option<f64>,
+    /// The mean error of predictions over the workspace that is expected after it and all that were pending before it,
+    /// millimetres; null for an estimator without a covariance.
+    pub expected_error_mm_after: Option<f64>,
+    /// The chance that anything is seen, 0 to 1.
+    pub chance_seen: f64,
+    /// By how far the joint that moves farthest moves, from where the robot will stand then, rad (or m); null where nobody
+    /// knows where that is.
+    pub travel_rad: Option<f64>,
+    /// What became of it.
+    pub state: SuggestionState,
+    /// When it expires, seconds since 1970; null if it does not.
+    #[serde(default)]
+    pub expires_at_s: Option<f64>,
+}
+
+/// What became of a suggestion; see the [module](super).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum SuggestionState {
+    /// It waits to be carried out.
+    Pending,
+    /// An observation names it.
+    Observed,
+    /// An observation names it, and nothing was seen.
+    NotSeen,
+    /// The robot cannot go there.
+    Infeasible,
+    /// Nobody carries it out.
+    Abandoned,
+    /// Another takes its place.
+    Superseded,
+    /// Its time ran out.
+    Expired,
+}
+
+impl fmt::Display for SuggestionState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Pending => "pending",
+            Self::Observed => "observed",
+            Self::NotSeen => "not_seen",
+            Self::Infeasible => "infeasible",
+            Self::Abandoned => "abandoned",
+            Self::Superseded => "superseded",
+            Self::Expired => "expired",
+        })
+    }
+}
+
+/// What is told of a suggestion that is not carried out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The robot cannot go there.
+    Infeasible,
+    /// Nobody carries it out.
+    Abandoned,
+}
+
+impl From<Outcome> for SuggestionState {
+    fn from(outcome: Outcome) -> Self {
+        match outcome {
+            Outcome::Infeasible => Self::Infeasible,
+            Outcome::Abandoned => Self::Abandoned,
+        }
+    }
+}
+
+/// What is asked for.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+#[serde(default, deny_unknown_fields)]
+pub struct Ask {
+    /// How many pending suggestions the client wants to have, 1 unless told otherwise.
+    pub count: Option<u64>,
+    /// Who asks.
+    pub client: Option<String>,
+    /// Whether the client's pending suggestions are to be replaced.
+    pub replan: bool,
+    /// How long new suggestions stay pending, seconds; for ever unless told otherwise.
+    pub expires_s: Option<f64>,
+}
+
+/// A client's pending suggestions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct Suggestions {
+    /// In the order in which they were chosen.
+    pub suggestions: Vec<Suggestion>,
+    /// There once no more are needed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub enough: Option<Enough>,
+}
+
+/// The accuracy that was wanted is reached: what the agent expects of its predictions has been below it for five movements.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
+pub struct Enough {
+    /// The mean error of predictions over the workspace that is expected now, millimetres.
+    pub expected_error_mm: f64,
+    /// What was wanted, millimetres.
+    pub wanted_mm: f64,
+    /// From how many observations, those that are excluded not counted.
+    pub observations: u64,
+}

@@ -1,0 +1,147 @@
+//! The observations as a table that `calibrate` reads, and the file that goes with it.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use toml::{Table, Value};
+
+use super::{
+    ChannelShape, Session, Shape,
+    channel::SOCKET,
+};
+
+/// What the table is called.
+pub(super) const FILE: &str = "observations.csv";
+
+/// How a channel's numbers become the cells of a row.
+struct Cells {
+    titles: Vec<String>,
+    rotation: Rotation,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Rotation {
+    Vector,
+    RollPitchYaw,
+    Quaternion,
+}
+
+impl Cells {
+    /// Of the columns that a calibration names, or else as titles are by themselves.
+    fn new(ChannelShape { name, shape }: &ChannelShape, named: Option<Vec<String>>) -> Self {
+        let all = |ends: &[&str]| ends.iter().map(|end| format!("{name}_{end}")).collect::<Vec<String>>();
+        let usual = match shape {
+            Shape::Position => all(&["x", "y", "z"]),
+            Shape::Pose => all(&["x", "y", "z", "rx", "ry", "rz"]),
+            Shape::Pixels { points: 1 } => all(&["u", "v"]),
+            Shape::Pixels { points } => (1..=*points).flat_map(|k| all(&[&format!("u{k}"), &format!("v{k}")])).collect(),
+            Shape::Distance => vec![name.clone()],
+            Shape::Sockets { .. } => Vec::new(),
+        };
+        let titles = named.unwrap_or(usual);
+        let rotation = match titles.get(3) {
+            _ if titles.len() == 7 => Rotation::Quaternion,
+            Some(title) if *shape == Shape::Pose && title.contains("roll") => Rotation::RollPitchYaw,
+            _ => Rotation::Vector,
+        };
+        Self { titles, rotation }
+    }
+
+    fn of(&self, reading: &[f64]) -> Vec<f64> {
+        let mut numbers = reading.to_vec();
+        if let (Some(&[x, y, z]), true) = (reading.get(3..6), self.rotation != Rotation::Vector) {
+            let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(x, y, z));
+            numbers.truncate(3);
+            match self.rotation {
+                Rotation::RollPitchYaw => numbers.extend::<[f64; 3]>(rotation.euler_angles().into()),
+                _ => numbers.extend_from_slice(rotation.coords.as_slice()),
+            }
+        }
+        let factor = |title: &str| match title {
+            _ if title.ends_with("_mm") => 1e3,
+            _ if title.ends_with("_deg") => 1_f64.to_degrees(),
+            _ => 1.0,
+        };
+        numbers.iter().zip(&self.titles).map(|(number, title)| number * factor(title)).collect()
+    }
+}
+
+impl Session {
+    /// The observations that count and saw anything, as CSV: one line of titles, then one line per observation. Joints are in
+    /// rad and m, readings in the columns that the calibration names, or else titled as `docs/calibrate.md` says. `calibrate`
+    /// reads it by the file that [`calibration_toml`](Self::calibration_toml) gives.
+    pub fn observations_csv(&self) -> String {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let names = &self.scenario().robot.names;
+        let cells = self.cells();
+        let sockets = &self.scenario().robot.sockets;
+        let has_places = sockets.iter().any(|socket| socket.place.is_some());
+        let [place, socket] = self.socket_titles();
+        let mut titles: Vec<String> = Vec::new();
+        titles.extend(has_places.then_some(place));
+        titles.extend((!sockets.is_empty()).then_some(socket));
+        titles.extend(names.iter().cloned().chain(cells.iter().flat_map(|cells| cells.titles.clone())));
+        // Writing to memory does not fail, and every row is as long as the titles.
+        let _ = writer.write_record(&titles);
+        for told in self.observations().iter().filter(|told| !told.excluded) {
+            let Ok(executed) = told.observation.read(self.scenario(), self.channels()) else { continue };
+            if executed.observation.is_miss() {
+                continue;
+            }
+            let held = executed.movement.socket.and_then(|socket| sockets.get(socket));
+            let place = held.and_then(|socket| socket.place.clone()).unwrap_or_default();
+            let mut row: Vec<String> = Vec::new();
+            row.extend(has_places.then_some(place));
+            row.extend((!sockets.is_empty()).then(|| held.map_or_else(String::new, |socket| socket.name.clone())));
+            row.extend(executed.movement.configuration.iter().map(f64::to_string));
+            for (cells, reading) in cells.iter().zip(&executed.observation.readings) {
+                match reading {
+                    Some(reading) => row.extend(cells.of(reading).iter().map(f64::to_string)),
+                    None => row.extend(cells.titles.iter().map(|_| String::new())),
+                }
+            }
+            let _ = writer.write_record(&row);
+        }
+        writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
+    }
+
+    /// The calibration file for [`observations_csv`](Self::observations_csv) under that name, beside `robot.urdf`. What only
+    /// movements are chosen by is left out.
+    pub fn calibration_toml(&self) -> String {
+        let Ok(mut table) = self.setup().table() else { return String::new() };
+        ["constraints", "view", "socket"].iter().for_each(|key| drop(table.remove(*key)));
+        if !self.scenario().robot.sockets.is_empty() {
+            table.entry("sockets").or_insert_with(|| Value::Table(Table::new()));
+        }
+        let name = |cells: &Cells| Value::Array(cells.titles.iter().map(|title| title.as_str().into()).collect());
+        let named: Vec<Value> = self.cells().iter().map(name).collect();
+        let sensors = match table.get_mut("sensor") {
+            Some(Value::Table(sensor)) => vec![sensor],
+            Some(Value::Array(sensors)) => sensors.iter_mut().filter_map(Value::as_table_mut).collect(),
+            _ => Vec::new(),
+        };
+        for (sensor, titles) in sensors.into_iter().zip(named) {
+            sensor.entry("columns").or_insert(titles);
+        }
+        table.insert("measurements".to_owned(), Value::Table([("file".to_owned(), FILE.into())].into_iter().collect()));
+        toml::to_string(&table).unwrap_or_default()
+    }
+
+    /// By channel that always reads, in the order of the rig.
+    fn cells(&self) -> Vec<Cells> {
+        let calibration = &self.setup().calibration;
+        let sensors = calibration.get("sensor");
+        let columns = |index: usize| {
+            let sensor = sensors.and_then(|it| if it.is_array() { it.get(index) } else { (index == 0).then_some(it) });
+            let titles = sensor?.get("columns")?.as_array()?.iter();
+            titles.map(|title| title.as_str().map(str::to_owned)).collect::<Option<Vec<String>>>()
+        };
+        let channels = self.channels().iter().filter(|channel| channel.name != SOCKET).enumerate();
+        channels.map(|(index, channel)| Cells::new(channel, columns(index))).collect()
+    }
+
+    /// The titles of place and socket.
+    fn socket_titles(&self) -> [String; 2] {
+        let given = |key: &str| self.setup().calibration.get("sockets")?.get(key)?.as_str().map(str::to_owned);
+        [("place_column", "place"), ("socket_column", SOCKET)]
+            .map(|(key, usual)| given(key).unwrap_or_else(|| usual.to_owned()))
+    }
+}

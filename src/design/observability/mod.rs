@@ -1,0 +1,157 @@
+//! Before any measurement: what a chain, its sensors, its limits and constraints can determine.
+//!
+//! Everything is linearised at the robot as it is described. With H the whitened rows of a movement there and Λ = Σ HᵀH the
+//! information of some movements,
+//!
+//! ```text
+//! P = D (I + D Λ D)⁻¹ D,    D = diag(σ₀)
+//! ```
+//!
+//! is the covariance that they leave of the prior's D². What no movement tells is the null space of the Λ of many movements in
+//! general position that the constraints allow ([`null_space`]). *Best* movements are those that the planner chooses one after the
+//! other, by the scenario's criterion, as if each had been made and had shown what was expected; *random* ones are drawn as the random
+//! policy draws them, several times, and what is told of them are medians. Both keep to the constraints, and neither learns from what
+//! is out of view. The error of predictions is the mean over a workspace of √(tr(H P Hᵀ)), with postures that were not chosen by.
+//!
+//! Of the description itself nothing is known yet: where it is far off, the first movements tell less than is said here.
+
+mod course;
+mod indices;
+mod needed;
+mod report;
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use crate::{
+    kinematics::JointBox,
+    model::{Layout, Names, State, Workspace, null_space},
+    optimize::Settings,
+    selection::{Actions, Constraints, CriterionUnits, Planner, Planning, Random, SelectionError, Watch, Weights},
+    sensing::Rig,
+};
+
+use course::Course;
+pub use indices::Indices;
+pub use needed::Needed;
+pub use report::{Accuracy, Deviation, ErrorPoint, IndexTable, Observability, ObservedParameters, Posture, Weak};
+
+/// What is to be calibrated, by what, and what may be done.
+#[derive(Clone, Debug)]
+pub struct Prospect {
+    /// The scenario's name.
+    pub scenario: String,
+    /// One line about it.
+    pub title: String,
+    /// What everything is called.
+    pub names: Names,
+    /// The robot as it is described.
+    pub state: State,
+    /// Which of its parameters are learned.
+    pub layout: Arc<Layout>,
+    /// The sensors, whitened by their nominal noise.
+    pub rig: Arc<Rig>,
+    /// Joint limits.
+    pub limits: JointBox,
+    /// The movements that there are.
+    pub actions: Actions,
+    /// What they are bound to.
+    pub constraints: Option<Constraints>,
+    /// The head that watches, or a posture in view, where not everything is seen.
+    pub watch: Option<Watch>,
+    /// σ₀: by tangent coordinate the standard deviation before any measurement.
+    pub deviations: DVector<f64>,
+    /// The units of the criterion.
+    pub units: CriterionUnits,
+    /// How the joint box is searched.
+    pub search: Settings,
+    /// How movements are planned.
+    pub planning: Planning,
+    /// Whether predictions are judged after the rigid motion that fits best.
+    pub up_to_motion: bool,
+}
+
+/// Random courses, of which medians are told.
+pub const DRAWS: usize = 20;
+/// Postures by which the planner chooses, and others over which its errors are told.
+const CHOSEN_OVER: usize = 64;
+const TOLD_OVER: usize = 200;
+/// Deviations that have fallen to no less than this share of the prior's are called weak, and so many directions at most.
+const WEAK: f64 = 0.5;
+const WEAKEST: usize = 4;
+
+impl Prospect {
+    /// What can be determined, and how well by `postures` movements; `tick` is called after every movement of
+    /// [`steps`](Self::steps).
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError`] where no movement can be chosen, as where the constraints leave none within reach.
+    pub fn observability(
+        &self,
+        postures: usize,
+        accuracy_m: f64,
+        tick: &(dyn Fn() + Sync),
+    ) -> Result<Observability, SelectionError> {
+        let weights = Weights::new(self.units, &self.layout, &self.deviations);
+        let random = Random::new(weights.clone(), self.watch.clone());
+        let general = self.course(&random, self.general(), 0, None, tick)?;
+        let free = null_space(&general.information);
+        let told_over = self.workspace(TOLD_OVER, 1).jacobian(&self.state, &self.layout);
+        let planner = Planner::new(weights, self.search, self.planning, self.workspace(CHOSEN_OVER, 2));
+        let planner = match &self.watch {
+            Some(watch) => planner.watched(watch.clone()),
+            None => planner,
+        };
+        let best = self.course(&planner, postures, 0, Some(&told_over), tick)?;
+        let drawn = (1..=DRAWS as u64).map(|draw| self.course(&random, postures, draw, Some(&told_over), tick));
+        let drawn = drawn.collect::<Result<Vec<Course>, _>>()?;
+        // With no end of movements nothing is left but what none tells.
+        let floor_m = course::mean_error(&told_over, &self.left_of_prior(&free));
+        Ok(self.report(&free, &best, &drawn, floor_m, accuracy_m))
+    }
+
+    /// How many movements [`observability`](Self::observability) looks at.
+    pub fn steps(&self, postures: usize) -> usize {
+        self.general() + (1 + DRAWS) * postures
+    }
+
+    /// Movements that stand for all: each brings an equation at least where it is seen, and one in four is.
+    fn general(&self) -> usize {
+        4 * (self.layout.dimension() + 20)
+    }
+
+    fn workspace(&self, count: usize, stream: u64) -> Workspace {
+        let mut rng = course::rng(u64::MAX, stream);
+        let configurations = (0..count).map(|_| self.limits.draw(&mut rng)).collect();
+        Workspace { configurations, up_to_motion: self.up_to_motion }
+    }
+
+    /// P once everything else is known: N (Nᵀ D⁻² N)⁻¹ Nᵀ.
+    fn left_of_prior(&self, free: &DMatrix<f64>) -> DMatrix<f64> {
+        let m = self.layout.dimension();
+        let known = DMatrix::from_diagonal(&self.deviations.map(|sd| sd.powi(-2)));
+        let within = (free.transpose() * known * free).cholesky();
+        within.map_or_else(|| DMatrix::zeros(m, m), |within| free * within.inverse() * free.transpose())
+    }
+
+    /// D Λ D: the information in units of the prior.
+    fn scaled(&self, information: &DMatrix<f64>) -> DMatrix<f64> {
+        information.component_mul(&(&self.deviations * self.deviations.transpose()))
+    }
+
+    /// The directions of parameter space, in units of the prior, that some movements tell little of though others could, and what
+    /// is left of their deviation; the weakest first. The first `undetermined` eigenvectors are those that nothing tells.
+    fn weakest(&self, information: &DMatrix<f64>, undetermined: usize) -> Vec<(f64, DVector<f64>)> {
+        let eigen = SymmetricEigen::new(self.scaled(information));
+        let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+        let left = |k: usize| (1.0 + eigen.eigenvalues[k].max(0.0)).sqrt().recip();
+        let weak = order.into_iter().skip(undetermined).map(|k| (left(k), eigen.eigenvectors.column(k).into_owned()));
+        weak.take_while(|(left, _)| *left > WEAK).take(WEAKEST).collect()
+    }
+}
+
+#[cfg(test)]
+mod laws;
