@@ -284,10 +284,14 @@ impl<'a> Scene<'a> {
         let partition = direct(scope, searched, *search, &mut evaluate)?;
         let leaves = partition.leaves.iter().filter_map(|leaf| Some((leaf.value?, leaf.centre.clone())));
         let mut starts: Vec<(f64, Vec<f64>)> = leaves.collect();
+        // The best of some that are feasible. Scaled to the unit cube and back, one on the edge may be so no more.
+        let mut feasible = None;
         if starts.is_empty() && scope.is_constrained() {
             // What is feasible may be too small a part of the box for DIRECT to come upon.
-            let found: Vec<Vec<f64>> = scope.some()?.iter().map(|pose| searched.to_unit(pose)).collect();
-            starts.extend(evaluate(&found).into_iter().zip(found));
+            let found = scope.some()?;
+            let values = scope.evaluate_beside(&plan.poses, &found, |feasible| outlook.evaluate(feasible));
+            starts.extend(values.iter().copied().zip(found.iter().map(|pose| searched.to_unit(pose))));
+            feasible = least(found.into_iter().zip(values));
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         starts.truncate(planning.polished.max(1));
@@ -297,7 +301,8 @@ impl<'a> Scene<'a> {
         let mut evaluate = |points: &[Vec<f64>]| ground.evaluate(&outlook, &plan.poses, points);
         let polished = starts.into_iter().map(|(_, start)| start).chain(familiar);
         let best = least(polished.map(|start| polish(&start, planning.polish, &mut evaluate)));
-        Ok(best.map(|(point, _)| searched.from_unit(&point)))
+        let best = best.map(|(point, value)| (searched.from_unit(&point), value));
+        Ok(least(best.into_iter().chain(feasible)).map(|(pose, _)| pose))
     }
 }
 

@@ -52,6 +52,8 @@ impl Watch {
 /// How much a miss says about its neighbourhood, in units of the joint box (each joint's range is 1): at this distance
 /// a movement's chance is discounted by a factor of 1 − e^{−1/2}.
 const RADIUS: f64 = 0.15;
+/// The least chance that misses leave: where constraints leave one posture only, it is tried again.
+const HOPE: f64 = 1e-6;
 /// Misses that are remembered, the latest ones.
 pub(super) const MEMORY: usize = 50;
 /// κ², by which the believed covariance of the marker is widened: linearised at a poor estimate it is too small. Of 4, 9
@@ -100,10 +102,11 @@ impl<'a> Visibility<'a> {
 
     /// The factor by which the latest misses lower the chance at a configuration scaled to the unit cube.
     pub fn discount(&self, scaled: &[f64]) -> f64 {
-        self.misses.iter().fold(1.0, |chance, miss| {
+        let discount = self.misses.iter().fold(1.0, |chance, miss| {
             let squared: f64 = scaled.iter().zip(miss).map(|(a, b)| (a - b).powi(2)).sum();
             chance * -(-0.5 * squared / (RADIUS * RADIUS)).exp_m1()
-        })
+        });
+        f64::max(discount, HOPE)
     }
 }
 
@@ -140,7 +143,7 @@ mod tests {
         };
         assert_eq!(chance(&history, 0.5), 1.0);
         miss(&mut history, 0.5);
-        assert_eq!(chance(&history, 0.5), 0.0);
+        assert!(chance(&history, 0.5) <= HOPE);
         assert!((chance(&history, 0.5 + RADIUS) - (1.0 - (-0.5_f64).exp())).abs() < 1e-12);
         assert!(chance(&history, 1.0) > 0.95);
         (0..MEMORY).for_each(|_| miss(&mut history, 9.0));

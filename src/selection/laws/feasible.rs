@@ -112,6 +112,24 @@ proptest! {
     }
 }
 
+/// What is feasible is a corner of the box, which rounding leaves when it is scaled to the unit cube and back.
+#[test]
+fn a_corner_is_found() {
+    let seed = 1_212_315_602_338_997_873;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let constraints = drawn(&mut rng, &Case::new(0.02).limits());
+    for (name, policy) in policies(&Case::new(0.02)) {
+        let mut case = Case::new(0.02);
+        for movement in 0..4 {
+            let selection = match case.select_within(policy.as_ref(), &constraints) {
+                Err(SelectionError::Infeasible(_)) => break,
+                selected => selected.unwrap_or_else(|error| panic!("{name}, movement {movement}: {error}")),
+            };
+            case.moved(&selection, movement % 3 != 1);
+        }
+    }
+}
+
 /// DIRECT against brute force: where the best posture of all is forbidden, the best feasible one is found.
 #[test]
 fn the_best_of_what_is_left_is_found() {
