@@ -129,6 +129,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         held_out,
         sockets: if has_folds { Vec::new() } else { case.distances(&fit, &first.held_out) },
         extras: trials.clone(),
+        compliance: case.compliance(&fuller),
         outliers: case.outliers(&fit),
         noise: case.noise(&fit),
         base: case.base(&fit),

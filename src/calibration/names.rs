@@ -39,6 +39,9 @@ impl Names {
             Block::Offset(joint) => format!("the offset of {}", of(&self.joints, joint)),
             Block::Ratio(joint) => format!("the ratio of {}", of(&self.joints, joint)),
             Block::Eccentricity(joint) => format!("the eccentricity of {}", of(&self.joints, joint)),
+            Block::Compliance(joint, load) => {
+                format!("how {} gives way to the load at the {}", of(&self.joints, joint), load.name())
+            }
             Block::Target(target) => format!("target {}", of(&self.targets, target)),
             Block::Device(device) => format!("camera {}", of(&self.cameras, device)),
             Block::Intrinsics(device) => format!("the lens of camera {}", of(&self.cameras, device)),
@@ -55,7 +58,7 @@ impl Names {
                 }
                 Block::Axis(_) => &["tilt towards b₁", "tilt towards b₂"],
                 Block::Eccentricity(_) => &["sine", "cosine"],
-                Block::Offset(_) | Block::Ratio(_) => &[""],
+                Block::Offset(_) | Block::Ratio(_) | Block::Compliance(..) => &[""],
                 Block::Intrinsics(_) => &["fx", "fy", "cx", "cy"],
                 _ => &["x", "y", "z", "turn about x", "turn about y", "turn about z"],
             }

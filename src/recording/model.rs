@@ -60,6 +60,7 @@ mod tests {
             base: None,
             cameras: Vec::new(),
             targets: Vec::new(),
+            loads: None,
         };
         assert_eq!(origins(&model), [a, a, a, b, marker_m]);
     }

@@ -310,6 +310,33 @@ fn extras(document: &mut Document, report: &Report) {
         ["added", "parameters", &inner, "with", "± difference", "held out", "kept"],
         report.extras.iter().map(row),
     );
+    let mut merged: Vec<&String> = report.extras.iter().flat_map(|trial| &trial.merged).collect();
+    merged.sort_unstable();
+    merged.dedup();
+    if !merged.is_empty() {
+        document.parts.push(Part::List(merged.into_iter().map(|said| sentence(said)).collect()));
+    }
+    compliance(document, report);
+}
+
+fn compliance(document: &mut Document, report: &Report) {
+    let Some(compliance) = &report.compliance else { return };
+    let [x, y, z] = compliance.up;
+    document.text(format!(
+        "Joints give way to gravity. By how much for every N·m with which it pulls at 1 kg at the target, or at the elbow (the origin \
+         of {}), up being [{x:.3}, {y:.3}, {z:.3}]:",
+        compliance.elbow
+    ));
+    let row = |term: &crate::calibration::GivesWay| {
+        [
+            term.joint.clone(),
+            term.load.clone(),
+            format!("{:+.4} ± {:.4}", term.deg_per_nm, term.sd_deg_per_nm),
+            format!("{:+.3}", term.greatest_deg),
+        ]
+    };
+    let head = ["joint", "load at the", "deg per N·m", "at its greatest load (deg)"];
+    document.table(2, head, compliance.terms.iter().map(row));
 }
 
 fn folds(document: &mut Document, report: &Report) {
