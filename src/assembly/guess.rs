@@ -48,7 +48,9 @@ impl Scenario {
             let Some(known) = self.prior.of(block) else { continue };
             let guess = match (block, known) {
                 (Block::Base, _) => known.displaced(&block.of(&state), rng),
-                (Block::Offset(_) | Block::Ratio(_) | Block::Eccentricity(_) | Block::Compliance(..), _) => block.of(&state),
+                (Block::Offset(_) | Block::Ratio(_) | Block::Eccentricity(_) | Block::Compliance(..), _) => {
+                    block.of(&state)
+                }
                 (_, Known::Anywhere { within_m }) => anywhere(&block.of(&state), within_m, rng),
                 (_, known) => known.displaced(&block.of(&state), rng),
             };

@@ -150,7 +150,7 @@ impl Case<'_> {
     fn judge(&self, split: &Split, nominal: &Fit, fit: &Fit, fuller: &Fit) -> Result<Judged, CalibrationError> {
         let judged = |fit: &Fit| self.residuals(fit, &split.held_out);
         let tried = TRIED.iter().map(|extras| {
-            let fit = self.fit(&self.extended(extras), &split.training, Some(fit.state()))?;
+            let fit = self.fit(&self.extended(extras, fit.state()), &split.training, Some(fit.state()))?;
             Ok(judged(&fit))
         });
         let tried = tried.collect::<Result<_, CalibrationError>>()?;

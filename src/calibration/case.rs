@@ -99,11 +99,14 @@ impl<'a> Case<'a> {
         Layout::new(self.guess(), places)
     }
 
-    /// What a URDF can hold, and more.
-    pub fn extended(&self, extras: &[Extra]) -> Layout {
+    /// What a URDF can hold, and more, of a robot that bears what `near` does.
+    pub fn extended(&self, extras: &[Extra], near: &State) -> Layout {
         let learned = self.writable();
         let blocks: Vec<Block> = learned.blocks().map(|(block, _)| block).collect();
-        Layout::new(self.guess(), blocks.into_iter().chain(extras.iter().flat_map(|extra| extra.blocks(self, extras))))
+        Layout::new(
+            self.guess(),
+            blocks.into_iter().chain(extras.iter().flat_map(|extra| extra.blocks(self, extras, near))),
+        )
     }
 
     fn layout(&self, wanted: impl Fn(Block) -> bool) -> Layout {

@@ -70,7 +70,7 @@ impl Extra {
     }
 
     /// Its blocks, where all of `extras` are learned.
-    pub(super) fn blocks(self, case: &Case<'_>, extras: &[Self]) -> Vec<Block> {
+    pub(super) fn blocks(self, case: &Case<'_>, extras: &[Self], near: &State) -> Vec<Block> {
         let joints = (0..case.guess().joints.len()).filter(|joint| case.scenario.robot.layout.is_learned(*joint));
         match self {
             Self::Ratios => joints.map(Block::Ratio).collect(),
@@ -78,7 +78,7 @@ impl Extra {
                 .filter(|joint| case.guess().joints[*joint].kind() == JointKind::Revolute)
                 .map(Block::Eccentricity)
                 .collect(),
-            Self::Compliance => case.borne(extras).blocks,
+            Self::Compliance => case.borne(extras, near).blocks,
         }
     }
 }
@@ -86,12 +86,12 @@ impl Extra {
 impl Case<'_> {
     /// What is worth adding, by folds among `rows`; `near` is a fit of them without it.
     pub fn trials(&self, rows: &[usize], near: &State) -> Result<Vec<Trial>, CalibrationError> {
-        let layouts: Vec<Layout> = TRIED.iter().map(|extras| self.extended(extras)).collect();
+        let layouts: Vec<Layout> = TRIED.iter().map(|extras| self.extended(extras, near)).collect();
         let plain = self.writable();
         let trial = |(extras, layout): (&&[Extra], &Layout)| Trial {
             extras: extras.to_vec(),
             parameters: layout.dimension() - plain.dimension(),
-            merged: if extras.contains(&Extra::Compliance) { self.borne(extras).said } else { Vec::new() },
+            merged: if extras.contains(&Extra::Compliance) { self.borne(extras, near).said } else { Vec::new() },
             inner_without: None,
             inner: None,
             standard_error: None,
@@ -137,7 +137,7 @@ impl Case<'_> {
     /// The fit with what stays; `plain` itself where nothing does.
     pub fn fuller(&self, trials: &[Trial], plain: &Fit) -> Result<Fit, CalibrationError> {
         match trials.iter().find(|trial| trial.kept) {
-            Some(trial) => self.fit(&self.extended(&trial.extras), &plain.rows, Some(plain.state())),
+            Some(trial) => self.fit(&self.extended(&trial.extras, plain.state()), &plain.rows, Some(plain.state())),
             None => Ok(plain.clone()),
         }
     }

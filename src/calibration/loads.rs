@@ -6,7 +6,7 @@ use super::{Case, Compliance, Extra, Fit, GivesWay};
 use crate::{
     experiment::Stream,
     kinematics::JointKind,
-    model::{Block, Load, Loads},
+    model::{Block, Load, Loads, State},
 };
 
 /// Postures within the limits, over which corrections are compared, and the seed of their draw.
@@ -31,10 +31,10 @@ struct Term {
 
 impl Case<'_> {
     /// The loads of all revolute joints whose axes are learned, less those that are nothing but other corrections among `extras`
-    /// over the joints' limits.
-    pub(super) fn borne(&self, extras: &[Extra]) -> Borne {
+    /// over the joints' limits; of a robot that bears what `near` does.
+    pub(super) fn borne(&self, extras: &[Extra], near: &State) -> Borne {
         let mut borne = Borne::default();
-        let Some(loads) = &self.guess().loads else { return borne };
+        let Some(loads) = &near.loads else { return borne };
         let robot = &self.scenario.robot;
         let mut rng = Stream::Workspace.rng(SEED);
         let postures: Vec<Vec<f64>> = (0..POSTURES).map(|_| robot.limits.draw(&mut rng)).collect();
@@ -73,7 +73,10 @@ impl Case<'_> {
                         load.name()
                     )),
                 }
-                terms.push(Term { name: format!("how it gives way to the load at the {}", load.name()), values: vec![values] });
+                terms.push(Term {
+                    name: format!("how it gives way to the load at the {}", load.name()),
+                    values: vec![values],
+                });
             }
             if !is_pulled {
                 borne.said.push(format!("gravity does not pull at {name}: it has no compliance to learn"));

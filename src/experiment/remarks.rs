@@ -49,7 +49,9 @@ fn undetermined(learner: &Learner, description: &Description) -> Option<String> 
             Block::Offset(index) => format!("the offset of {}", joint(index)),
             Block::Ratio(index) => format!("the ratio of {}", joint(index)),
             Block::Eccentricity(index) => format!("the eccentricity of {}", joint(index)),
-            Block::Compliance(index, load) => format!("the compliance of {} under the {}'s load", joint(index), load.name()),
+            Block::Compliance(index, load) => {
+                format!("the compliance of {} under the {}'s load", joint(index), load.name())
+            }
             Block::Target(0) => "the marker".to_owned(),
             Block::Target(index) => format!("target {index}"),
             Block::Device(index) => format!("camera {index}"),

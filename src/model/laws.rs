@@ -6,7 +6,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Block, Correction, Device, Element, Frame, Layout, Load, Loads, Pass, Place, Prior, State, Target, anywhere, jacobian,
+    Block, Correction, Device, Element, Frame, Layout, Load, Loads, Pass, Place, Prior, State, Target, anywhere,
+    jacobian,
 };
 use crate::kinematics::{Joint, Line, chart};
 

@@ -86,9 +86,11 @@ impl Loads {
         let (axes, places) = self.posture(readings);
         let torque = |joint: usize, (pivot, w): &(Point3<f64>, Vector3<f64>)| {
             let across = self.up.cross(w) * -GRAVITY;
-            Load::ALL.map(|load| {
-                if self.bears(joint, load) { across.dot(&(places[load as usize] - pivot)) } else { 0.0 }
-            })
+            Load::ALL.map(
+                |load| {
+                    if self.bears(joint, load) { across.dot(&(places[load as usize] - pivot)) } else { 0.0 }
+                },
+            )
         };
         axes.iter().enumerate().map(|(joint, axis)| torque(joint, axis)).collect()
     }
@@ -190,7 +192,8 @@ mod tests {
             };
             for load in Load::ALL {
                 let mass = loads.mass(load);
-                let height = |readings: &[f64]| loads.up.dot(&(described.links(readings)[mass.link] * mass.place).coords);
+                let height =
+                    |readings: &[f64]| loads.up.dot(&(described.links(readings)[mass.link] * mass.place).coords);
                 for j in 0..6 {
                     let fall = -GRAVITY * (height(&moved(j, 1e-5)) - height(&moved(j, -1e-5))) / 2e-5;
                     let expected = if loads.bears(j, load) { fall } else { 0.0 };
@@ -212,7 +215,9 @@ mod tests {
         let kinds = |kinds: &str| -> Vec<Joint> {
             kinds.chars().map(|kind| if kind == 'r' { turning } else { sliding }).collect()
         };
-        for (joints, elbow) in [("rrrrrr", Some(2)), ("rrrrrrr", Some(3)), ("prrr", Some(2)), ("r", Some(0)), ("pp", None)] {
+        for (joints, elbow) in
+            [("rrrrrr", Some(2)), ("rrrrrrr", Some(3)), ("prrr", Some(2)), ("r", Some(0)), ("pp", None)]
+        {
             assert_eq!(middle(&kinds(joints)), elbow, "{joints}");
         }
     }

@@ -221,7 +221,9 @@ impl State {
     /// The same derivative by the readings, of one by the joints' positions: `J ∂θ/∂q`.
     fn by_readings(&self, jacobian: &Matrix3xX<f64>, positions: &[f64]) -> Matrix3xX<f64> {
         let mut by_readings = jacobian.clone();
-        for (mut column, (correction, reading)) in by_readings.column_iter_mut().zip(self.corrections.iter().zip(positions)) {
+        for (mut column, (correction, reading)) in
+            by_readings.column_iter_mut().zip(self.corrections.iter().zip(positions))
+        {
             column *= correction.slope(*reading);
         }
         // A joint gives way to what all joints do.

@@ -190,9 +190,8 @@ impl State {
         debug_assert_eq!(positions.len(), self.joints.len());
         let Target { link, place } = &self.targets[target];
         let thetas = self.thetas(positions);
-        let moved = (0..*link)
-            .rev()
-            .fold(place.origin(), |point, index| self.joints[index].carry(thetas.of(index), &point));
+        let moved =
+            (0..*link).rev().fold(place.origin(), |point, index| self.joints[index].carry(thetas.of(index), &point));
         self.base * moved
     }
 
@@ -200,8 +199,7 @@ impl State {
     pub fn frame_at(&self, frame: Frame, positions: &[f64]) -> Isometry3<f64> {
         let thetas = self.thetas(positions);
         let behind = |link: usize, place: Isometry3<f64>| {
-            let moved =
-                (0..link).rev().fold(place, |place, index| self.joints[index].exp(thetas.of(index)) * place);
+            let moved = (0..link).rev().fold(place, |place, index| self.joints[index].exp(thetas.of(index)) * place);
             self.base * moved
         };
         match frame {
