@@ -5,10 +5,11 @@ mod simulated;
 
 use body_schema::{
     calibration::{Calibration, Case, Extra, Figures, Options, Silent, Trial, calibrate},
+    experiment::{LearnerReport, ModelReport},
     model::urdf::{Chain, Urdf},
     scenario::{Scenario, builtin},
 };
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use simulated::{ONE_DEGREE, Simulated, UR10};
 
 const SEEDS: [u64; 4] = [301, 302, 303, 304];
@@ -182,7 +183,7 @@ fn learners_that_are_asked_to_learn_what_gives_way() {
         (scenario, learner)
     };
     let ((scenario, knows), (_, knows_not)) = (ends(true), ends(false));
-    let error = |learner: &body_schema::experiment::LearnerReport| learner.metrics.prediction_mean_m.expect("a truth");
+    let error = |learner: &LearnerReport| learner.metrics.prediction_mean_m.expect("a truth");
     assert!(error(&knows) < 0.35 * error(&knows_not), "{} {}", error(&knows), error(&knows_not));
     let compliance = knows.estimate.joints[1].correction.expect("learned").compliance;
     assert!((compliance[0].to_degrees() / 0.12 - 1.0).abs() < 0.1, "{compliance:?}");
@@ -193,10 +194,9 @@ fn learners_that_are_asked_to_learn_what_gives_way() {
     assert!(knows_not.estimate.loads.is_none());
     // The report of the truth moves as the truth does.
     let readings = [0.3, -0.4, 0.5, -1.1, 0.2, 0.7, -0.2];
-    let shown = body_schema::experiment::ModelReport::of_state(truth).state().expect("finite");
+    let shown = ModelReport::of_state(truth).state().expect("finite");
     assert!((shown.marker_at(&readings) - truth.marker_at(&readings)).norm() < 1e-12);
-    let stiff =
-        body_schema::experiment::ModelReport { loads: None, ..body_schema::experiment::ModelReport::of_state(truth) };
+    let stiff = ModelReport { loads: None, ..ModelReport::of_state(truth) };
     assert!((stiff.state().expect("finite").marker_at(&readings) - truth.marker_at(&readings)).norm() > 1e-3);
 }
 
@@ -231,4 +231,56 @@ fn keys_that_make_no_sense_are_refused_with_a_mend() {
     let not_finite = source.replacen("eccentricity_deg = [0.07, -0.19]", "compliance_deg_per_nm = [nan, 0.0]", 1);
     let error = Scenario::parse("nan.toml", &not_finite, &|_| Err(String::new())).expect_err("refused").to_string();
     assert!(error.contains("`robot.joint[0].compliance_deg_per_nm`: it is not finite"), "{error}");
+}
+
+/// A real Panda gives way to gravity, and not to one that pulls sideways.
+#[test]
+fn a_real_panda_gives_way_downwards() {
+    let trial = |up: UnitVector3<f64>| {
+        let mut scenario = builtin("panda-sockets").expect("built in");
+        scenario.robot.gravity.up = up;
+        let found = calibrated(&scenario);
+        let axes = mean(&found.report.held_out.as_ref().expect("seven places").after);
+        let trial = compliance_alone(&found).clone();
+        (mean(&trial.held_out.expect("judged")) / axes, trial.kept)
+    };
+    let (down, is_kept) = trial(Vector3::z_axis());
+    assert!(down < 0.97 && is_kept, "{down}");
+    for up in [Vector3::x_axis(), Vector3::y_axis()] {
+        let (sideways, is_kept) = trial(up);
+        assert!(sideways > 1.0 && !is_kept, "{sideways}");
+    }
+}
+
+/// As a user meets it: the report says by how much joints give way.
+#[cfg(feature = "app")]
+#[test]
+fn the_report_says_by_how_much_joints_give_way() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = |name: &str| folder.path().join(name);
+    let bent = Simulated::bent(SEEDS[2]);
+    for (name, text) in [("ur10.urdf", UR10.to_owned()), ("bent.csv", bent.table()), ("bent.toml", bent.file(""))] {
+        std::fs::write(place(name), text).expect("written");
+    }
+    let done = std::process::Command::new(env!("CARGO_BIN_EXE_body-schema"))
+        .args(["calibrate", "bent.toml", "--out", "out"])
+        .current_dir(folder.path())
+        .output()
+        .expect("the program starts");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let read = |name: &str| std::fs::read_to_string(place("out").join(name)).expect(name);
+    let report: serde_json::Value = serde_json::from_str(&read("report.json")).expect("JSON");
+    assert_eq!(report["compliance"]["up"], serde_json::json!([0.0, 0.0, 1.0]));
+    assert!(report["compliance"]["terms"][0]["deg_per_nm"].is_f64());
+    let mean = |which: &str| report["held_out"][which]["mean_mm"].as_f64().expect("a number");
+    assert!(mean("full_model") < 0.5 * mean("after"), "{} {}", mean("full_model"), mean("after"));
+    let markdown = read("report.md");
+    for said in [
+        "Joints give way to gravity",
+        "How shoulder\\_lift\\_joint gives way to the load at the elbow cannot be told from its eccentricity: learned as one.",
+        "at its greatest load (deg)",
+    ] {
+        assert!(markdown.contains(said), "{said}: {markdown}");
+    }
+    assert!(read("report.html").contains("Joints give way to gravity"));
 }

@@ -119,7 +119,7 @@ impl Case<'_> {
         };
         format!(
             "# The torque about joint i is −gravity ∂h/∂qᵢ, N·m per kg, with h the height along `up` of a place that is fixed to a link of \
-             the robot\n# as it was described, before calibration; `up` and `at_m` in the frame of {} with all joints at 0.\nloads:\n  \
+             the robot\n# as it was described, before calibration, at the readings q; `up` and `at_m` in the frame of {} with all joints at 0.\nloads:\n  \
              gravity: {:?}\n  up: {}\n{}{}",
             self.link(0),
             crate::model::GRAVITY,
@@ -165,4 +165,32 @@ fn without(mut vector: DVector<f64>, basis: &[DVector<f64>]) -> DVector<f64> {
         vector.axpy(-along, unit, 1.0);
     }
     vector
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sums of terms are told, by the name of one term alone where that will do.
+    #[test]
+    fn sums_of_other_corrections_are_named() {
+        let of = |f: fn(f64) -> f64| centred(DVector::from_fn(50, |row, _| f(0.1 * row as f64)));
+        let term = |name: &str, values: Vec<DVector<f64>>| Term { name: name.to_owned(), values };
+        let terms = [
+            term("its ratio", vec![of(|q| q)]),
+            term("its eccentricity", vec![of(f64::sin), of(f64::cos)]),
+            term("how it gives way to the load at the target", vec![of(|q| q.sin() + (2.0 * q).cos())]),
+        ];
+        let named = |values: DVector<f64>| alike(&values, 1.0 + values.norm(), &terms);
+        assert_eq!(named(of(|q| 3.0 * q - 1.0)).as_deref(), Some("its ratio"));
+        assert_eq!(named(of(|q| (q + 0.3).sin())).as_deref(), Some("its eccentricity"));
+        assert_eq!(
+            named(of(|q| -q.sin() - (2.0 * q).cos())).as_deref(),
+            Some("how it gives way to the load at the target")
+        );
+        let all = "its ratio and its eccentricity and how it gives way to the load at the target";
+        assert_eq!(named(of(|q| q + (2.0 * q).cos())).as_deref(), Some(all));
+        assert_eq!(named(of(|q| (2.0 * q).sin())), None);
+        assert_eq!(named(of(|_| 2.0)).as_deref(), Some("its offset"));
+    }
 }
