@@ -49,6 +49,12 @@ pub struct Mass {
     pub place: Point3<f64>,
 }
 
+/// An axis in a posture.
+struct Placed {
+    pivot: Point3<f64>,
+    w: Vector3<f64>,
+}
+
 /// The robot as it is described, and the masses at which gravity pulls.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loads {
@@ -84,7 +90,7 @@ impl Loads {
     /// By joint, the torque of every load at readings (rad or m), N·m per kg.
     pub fn torques(&self, readings: &[f64]) -> Vec<[f64; 2]> {
         let (axes, places) = self.posture(readings);
-        let torque = |joint: usize, (pivot, w): &(Point3<f64>, Vector3<f64>)| {
+        let torque = |joint: usize, Placed { pivot, w }: &Placed| {
             let across = self.up.cross(w) * -GRAVITY;
             Load::ALL.map(
                 |load| {
@@ -101,24 +107,24 @@ impl Loads {
         let (p, count) = (places[load as usize], self.joints.len());
         let turns = |joint: usize| self.joints[joint].kind() == JointKind::Revolute;
         let mut moved = Matrix3xX::zeros(count);
-        for (joint, (pivot, w)) in axes.iter().enumerate() {
+        for (joint, Placed { pivot, w }) in axes.iter().enumerate() {
             moved.set_column(joint, &if turns(joint) { w.cross(&(p - pivot)) } else { *w });
         }
         DMatrix::from_fn(count, count, |i, j| {
             let (near, far) = (i.min(j), i.max(j));
             let moves = self.bears(i, load) && j < self.mass(load).link && turns(near);
-            if moves { -GRAVITY * self.up.dot(&axes[near].1.cross(&moved.column(far))) } else { 0.0 }
+            if moves { -GRAVITY * self.up.dot(&axes[near].w.cross(&moved.column(far))) } else { 0.0 }
         })
     }
 
-    /// Where the axes are, a point and a direction, and the masses.
-    fn posture(&self, readings: &[f64]) -> (Vec<(Point3<f64>, Vector3<f64>)>, [Point3<f64>; 2]) {
+    /// Where the axes and the masses are.
+    fn posture(&self, readings: &[f64]) -> (Vec<Placed>, [Point3<f64>; 2]) {
         let mut link = Isometry3::identity();
         let mut axes = Vec::with_capacity(self.joints.len());
         let mut places = self.masses.map(|mass| mass.place);
         for (index, (joint, reading)) in self.joints.iter().zip(readings).enumerate() {
             let pivot = link * joint.line().map_or(Point3::origin(), |line| line.point);
-            axes.push((pivot, link * joint.direction().into_inner()));
+            axes.push(Placed { pivot, w: link * joint.direction().into_inner() });
             link *= joint.exp(*reading);
             for (place, mass) in places.iter_mut().zip(&self.masses).filter(|(_, mass)| mass.link == index + 1) {
                 *place = link * mass.place;

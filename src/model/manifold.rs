@@ -201,16 +201,16 @@ fn masked(jacobian: &Matrix3xX<f64>, free: &[bool]) -> Matrix3xX<f64> {
 }
 
 impl State {
-    /// J = ∂p/∂θ of a target by the readings of all joints (3 × n), m per rad or m; frame of the measurements.
+    /// J = ∂p/∂q of a target by the readings of all joints (3 × n), m per rad or m; frame of the measurements.
     pub fn target_jacobian(&self, target: usize, positions: &[f64]) -> Matrix3xX<f64> {
         let links = self.links(positions);
         let link = self.targets[target].link;
         let p = links[link] * self.targets[target].place.origin();
         let mut jacobian = Matrix3xX::zeros(positions.len());
-        for index in 0..link {
-            let along = links[index].rotation * self.joints[index].direction().into_inner();
-            let column = match &self.joints[index] {
-                Joint::Revolute(line) => along.cross(&(p - links[index] * line.point)),
+        for (index, (joint, before)) in self.joints.iter().zip(&links).enumerate().take(link) {
+            let along = before.rotation * joint.direction().into_inner();
+            let column = match joint {
+                Joint::Revolute(line) => along.cross(&(p - before * line.point)),
                 Joint::Prismatic(_) => along,
             };
             jacobian.set_column(index, &column);

@@ -5,7 +5,7 @@ use super::{
     extras,
     plots::{self, residual},
 };
-use crate::calibration::{Case, Figures, Placement, Reading, Report, SocketDistance, undetermined::listed};
+use crate::calibration::{Case, Figures, Placement, Reading, Report, SocketDistance};
 
 /// Readings listed at most; of more the worst.
 const LISTED: usize = 200;
