@@ -233,9 +233,9 @@ fn keys_that_make_no_sense_are_refused_with_a_mend() {
     assert!(error.contains("`robot.joint[0].compliance_deg_per_nm`: it is not finite"), "{error}");
 }
 
-/// A real Panda gives way to gravity, and not to one that pulls sideways.
+/// Of a real Panda gravity explains what one that pulls sideways does not.
 #[test]
-fn a_real_panda_gives_way_downwards() {
+fn a_real_panda_tells_down_from_sideways() {
     let trial = |up: UnitVector3<f64>| {
         let mut scenario = builtin("panda-sockets").expect("built in");
         scenario.robot.gravity.up = up;
