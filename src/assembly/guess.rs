@@ -56,7 +56,9 @@ impl Scenario {
             let Some(known) = self.prior.of(block) else { continue };
             let guess = match (block, known) {
                 (Block::Base, _) => known.displaced(&block.of(&state), rng),
-                (Block::Offset(_) | Block::Ratio(_) | Block::Eccentricity(_), _) => block.of(&state),
+                (Block::Offset(_) | Block::Ratio(_) | Block::Eccentricity(_) | Block::Compliance(..), _) => {
+                    block.of(&state)
+                }
                 (_, Known::Anywhere { within_m }) => anywhere(&block.of(&state), within_m, rng),
                 (_, known) => known.displaced(&block.of(&state), rng),
             };
@@ -68,6 +70,9 @@ impl Scenario {
                 state.sockets[socket] = state.target_at(spec.target, &spec.posture);
             }
         }
+        // What its joints bear is what they would as guessed: the truth's loads are nobody's to know.
+        let learns = layout.blocks().any(|(block, _)| matches!(block, Block::Compliance(..)));
+        state.loads = learns.then(|| self.robot.loads(&state));
         state
     }
 }

@@ -132,6 +132,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         sockets: if has_folds { Vec::new() } else { case.distances(&fit, &first.held_out) },
         span_1m_sd_mm: if case.meets_itself() { case.span_sd_mm(&fit) } else { None },
         extras: trials.clone(),
+        compliance: case.compliance(&fuller),
         outliers: case.outliers(&fit),
         noise: case.noise(&fit),
         base: case.base(&fit),
@@ -152,7 +153,7 @@ impl Case<'_> {
     fn judge(&self, split: &Split, nominal: &Fit, fit: &Fit, fuller: &Fit) -> Result<Judged, CalibrationError> {
         let judged = |fit: &Fit| self.residuals(fit, &split.held_out);
         let tried = TRIED.iter().map(|extras| {
-            let fit = self.fit(&self.extended(extras), &split.training, Some(fit.state()))?;
+            let fit = self.fit(&self.extended(extras, fit.state()), &split.training, Some(fit.state()))?;
             Ok(judged(&fit))
         });
         let tried = tried.collect::<Result<_, CalibrationError>>()?;

@@ -27,6 +27,8 @@ pub struct Row {
 #[derive(Clone, Debug)]
 pub struct Case<'a> {
     pub(crate) scenario: &'a Scenario,
+    /// The robot as it is described, with what its joints bear.
+    guess: State,
     /// The rows, in the order of the table.
     pub rows: Vec<Row>,
     /// What everything is called.
@@ -58,8 +60,11 @@ impl<'a> Case<'a> {
             observation: measurements.observations[index].clone(),
             socket: measurements.sockets.get(index).copied().flatten(),
         };
+        let mut guess = scenario.robot.state.clone();
+        guess.loads = Some(scenario.robot.loads(&guess));
         Ok(Self {
             scenario,
+            guess,
             rows: (0..measurements.rows()).map(row).collect(),
             names: scenario.robot.called(),
             described: scenario.robot.described.as_deref(),
@@ -71,7 +76,7 @@ impl<'a> Case<'a> {
 
     /// The robot as it is described.
     pub fn guess(&self) -> &State {
-        &self.scenario.robot.state
+        &self.guess
     }
 
     /// The sensors with their nominal noise.
@@ -79,23 +84,29 @@ impl<'a> Case<'a> {
         &self.rig
     }
 
-    /// What a URDF can hold, and where base, targets, cameras and sockets are: no ratios and no eccentricity.
+    /// What a URDF can hold, and where base, targets, cameras and sockets are: no ratios, no eccentricity and no
+    /// compliance.
     pub fn writable(&self) -> Layout {
-        let holds = |block: &Block| !matches!(block, Block::Ratio(_) | Block::Eccentricity(_));
+        let holds = |block: &Block| !matches!(block, Block::Ratio(_) | Block::Eccentricity(_) | Block::Compliance(..));
         self.layout(|block| holds(&block))
     }
 
     /// Where base, targets, cameras and sockets are, with the chain as described.
     pub fn placing(&self) -> Layout {
-        use Block::{Axis, Eccentricity, Offset, Ratio};
-        self.layout(|block| !matches!(block, Axis(_) | Offset(_) | Ratio(_) | Eccentricity(_)))
+        let is_of_chain = |block: &Block| matches!(block, Block::Axis(_) | Block::Offset(_));
+        let learned = self.writable();
+        let places = learned.blocks().map(|(block, _)| block).filter(|block| !is_of_chain(block));
+        Layout::new(self.guess(), places)
     }
 
-    /// What a URDF can hold, and more.
-    pub fn extended(&self, extras: &[Extra]) -> Layout {
+    /// What a URDF can hold, and more, of a robot that bears what `near` does.
+    pub fn extended(&self, extras: &[Extra], near: &State) -> Layout {
         let learned = self.writable();
         let blocks: Vec<Block> = learned.blocks().map(|(block, _)| block).collect();
-        Layout::new(self.guess(), blocks.into_iter().chain(extras.iter().flat_map(|extra| extra.blocks(self))))
+        Layout::new(
+            self.guess(),
+            blocks.into_iter().chain(extras.iter().flat_map(|extra| extra.blocks(self, extras, near))),
+        )
     }
 
     fn layout(&self, wanted: impl Fn(Block) -> bool) -> Layout {

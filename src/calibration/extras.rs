@@ -19,11 +19,18 @@ pub enum Extra {
     Ratios,
     /// Sine and cosine of readings, of all revolute joints whose axes are learned: encoders off their centres.
     Eccentricity,
+    /// How much the same joints give way to gravity, at the target and at the elbow.
+    Compliance,
 }
 
-/// What is tried: nothing, each, and all together.
-pub(super) const TRIED: [&[Extra]; 3] =
-    [&[Extra::Ratios], &[Extra::Eccentricity], &[Extra::Ratios, Extra::Eccentricity]];
+/// What is tried: each, the two that are functions of a joint's own reading, and all together.
+pub(super) const TRIED: [&[Extra]; 5] = [
+    &[Extra::Ratios],
+    &[Extra::Eccentricity],
+    &[Extra::Compliance],
+    &[Extra::Ratios, Extra::Eccentricity],
+    &[Extra::Ratios, Extra::Eccentricity, Extra::Compliance],
+];
 
 /// Folds among the training rows, and how many rows there must be for any.
 const FOLDS: usize = 5;
@@ -38,6 +45,8 @@ pub struct Trial {
     pub extras: Vec<Extra>,
     /// Parameters more.
     pub parameters: usize,
+    /// What has no parameter of its own, since it cannot be told from others, in words.
+    pub merged: Vec<String>,
     /// Mean error over the folds among the training rows without it, in the unit of the report.
     pub inner_without: Option<f64>,
     /// The same with it.
@@ -56,10 +65,12 @@ impl Extra {
         match self {
             Self::Ratios => "ratios",
             Self::Eccentricity => "eccentricity",
+            Self::Compliance => "compliance",
         }
     }
 
-    pub(super) fn blocks(self, case: &Case<'_>) -> Vec<Block> {
+    /// Its blocks, where all of `extras` are learned.
+    pub(super) fn blocks(self, case: &Case<'_>, extras: &[Self], near: &State) -> Vec<Block> {
         let joints = (0..case.guess().joints.len()).filter(|joint| case.scenario.robot.layout.is_learned(*joint));
         match self {
             Self::Ratios => joints.map(Block::Ratio).collect(),
@@ -67,6 +78,7 @@ impl Extra {
                 .filter(|joint| case.guess().joints[*joint].kind() == JointKind::Revolute)
                 .map(Block::Eccentricity)
                 .collect(),
+            Self::Compliance => case.borne(extras, near).blocks,
         }
     }
 }
@@ -74,11 +86,12 @@ impl Extra {
 impl Case<'_> {
     /// What is worth adding, by folds among `rows`; `near` is a fit of them without it.
     pub fn trials(&self, rows: &[usize], near: &State) -> Result<Vec<Trial>, CalibrationError> {
-        let layouts: Vec<Layout> = TRIED.iter().map(|extras| self.extended(extras)).collect();
+        let layouts: Vec<Layout> = TRIED.iter().map(|extras| self.extended(extras, near)).collect();
         let plain = self.writable();
         let trial = |(extras, layout): (&&[Extra], &Layout)| Trial {
             extras: extras.to_vec(),
             parameters: layout.dimension() - plain.dimension(),
+            merged: if extras.contains(&Extra::Compliance) { self.borne(extras, near).said } else { Vec::new() },
             inner_without: None,
             inner: None,
             standard_error: None,
@@ -124,7 +137,7 @@ impl Case<'_> {
     /// The fit with what stays; `plain` itself where nothing does.
     pub fn fuller(&self, trials: &[Trial], plain: &Fit) -> Result<Fit, CalibrationError> {
         match trials.iter().find(|trial| trial.kept) {
-            Some(trial) => self.fit(&self.extended(&trial.extras), &plain.rows, Some(plain.state())),
+            Some(trial) => self.fit(&self.extended(&trial.extras, plain.state()), &plain.rows, Some(plain.state())),
             None => Ok(plain.clone()),
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Calibration, CalibrationError, Case, Fit, Progress, learned::axis};
+use super::{Calibration, CalibrationError, Case, Extra, Fit, Progress, learned::axis};
 use crate::model::{Correction, State};
 
 /// A file of the output, by its path below the folder.
@@ -67,18 +67,32 @@ impl Calibration {
 
     /// The fuller model: what corrects readings, and the axes that belong to it.
     fn readings_yaml(&self, case: &Case<'_>) -> Result<String, CalibrationError> {
-        let mut text = "# What a URDF cannot hold: θ = offset + ratio q + sine sin q + cosine cos q, with q what a joint reports \
-                        (rad, m).\n# These axes and corrections belong together: they are not those of calibrated.urdf.\n"
-            .to_owned();
+        let loads = self.fuller.state().loads.as_deref().filter(|_| self.extras.contains(&Extra::Compliance));
+        let bent = if loads.is_some() { " + compliance·τ" } else { "" };
+        let mut text = format!(
+            "# What a URDF cannot hold: θ = offset + ratio q + sine sin q + cosine cos q{bent}, with q what a joint reports \
+             (rad, m).\n# These axes and corrections belong together: they are not those of calibrated.urdf.\n"
+        );
+        if loads.is_some() {
+            text.push_str(
+                "# τ are the torques about the joint of the loads at the target and at the elbow; compliance is in rad per N·m of 1 kg.\n",
+            );
+        }
         if self.extras.is_empty() {
-            text.push_str("# Nothing was kept: with ratios or eccentricity the training rows did not predict each other better.\n");
+            text.push_str("# Nothing was kept: with ratios, eccentricity or compliance the training rows did not predict each other better.\n");
         }
         text.push_str("readings:\n");
         for (name, correction) in case.names.joints.iter().zip(&self.fuller.state().corrections) {
-            let Correction { offset, ratio, sine, cosine } = correction;
+            let Correction { offset, ratio, sine, cosine, compliance: [target, elbow] } = correction;
             // Writing to a string does not fail.
             let _ = writeln!(text, "  {}:\n    offset: {offset:?}\n    ratio: {ratio:?}", quoted(name));
             let _ = writeln!(text, "    sine: {sine:?}\n    cosine: {cosine:?}");
+            if loads.is_some() {
+                let _ = writeln!(text, "    compliance: [{target:?}, {elbow:?}]");
+            }
+        }
+        if let Some(loads) = loads {
+            text.push_str(&case.loads_yaml(loads));
         }
         match &case.described {
             Some(description) => {

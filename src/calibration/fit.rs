@@ -58,7 +58,7 @@ impl Case<'_> {
     /// What explains `rows`, as far as `layout` can, from a start near which it is to be found; without one it is searched for
     /// wherever the prior allows.
     pub fn fit(&self, layout: &Layout, rows: &[usize], near: Option<&State>) -> Result<Fit, CalibrationError> {
-        let mut smoother = self.smoother(layout, near.is_none())?;
+        let mut smoother = self.smoother(layout, near)?;
         let movements: Vec<_> = rows.iter().map(|row| &self.rows[*row]).collect();
         let movements: Vec<_> = movements.iter().map(|row| (row.positions.as_slice(), &row.observation)).collect();
         let starts = match near {
@@ -76,21 +76,28 @@ impl Case<'_> {
         })
     }
 
-    /// The chain as described with base, targets, cameras and sockets where `rows` put them.
+    /// The chain as described with base, targets, cameras and sockets where `rows` put them. So its joints bear what they do with
+    /// the target there, and what is fitted near to it takes that over.
     pub fn nominal(&self, rows: &[usize]) -> Result<Fit, CalibrationError> {
-        self.fit(&self.placing(), rows, None)
+        let mut fit = self.fit(&self.placing(), rows, None)?;
+        fit.belief.state.loads = Some(self.scenario.robot.loads(fit.state()));
+        Ok(fit)
     }
 
-    fn smoother(&self, layout: &Layout, searches: bool) -> Result<Smoother, CalibrationError> {
+    fn smoother(&self, layout: &Layout, near: Option<&State>) -> Result<Smoother, CalibrationError> {
         let deviations = self.deviations(layout);
         let covariance = DMatrix::from_diagonal(&deviations.map(|sd| sd * sd));
         let within = |block: Block| match self.scenario.prior.of(block) {
             Some(Known::Anywhere { within_m }) => Some(within_m),
             _ => None,
         };
-        let prior = Prior::new(self.guess().clone(), layout, covariance, within)?;
+        let mut guess = self.guess().clone();
+        if let Some(near) = near {
+            guess.loads.clone_from(&near.loads);
+        }
+        let prior = Prior::new(guess, layout, covariance, within)?;
         let given = self.scenario.smoother.hypotheses;
-        let settings = HypothesisSettings { spawned: if searches { given.spawned } else { 0 }, ..given };
+        let settings = HypothesisSettings { spawned: if near.is_none() { given.spawned } else { 0 }, ..given };
         // What is known of the equipment is known as well as the file says: there is one reading of it.
         let is_unknown = |noise: &Noise| {
             self.scenario.smoother.noise_unknown

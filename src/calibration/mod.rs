@@ -37,6 +37,7 @@ mod files;
 mod fit;
 mod init;
 mod learned;
+mod loads;
 mod outcome;
 mod parallel;
 mod progress;

@@ -36,6 +36,8 @@ pub struct Report {
     pub span_1m_sd_mm: Option<f64>,
     /// What adding to the axes changes.
     pub extras: Vec<Trial>,
+    /// How joints give way to their loads in the fuller model; null where that is not kept.
+    pub compliance: Option<Compliance>,
     /// Rows that are likelier outliers than not.
     pub outliers: Vec<Outlier>,
     /// What the residuals say of the sensors' noise.
@@ -121,6 +123,33 @@ pub struct Fold {
     pub base: Placement,
     /// Where its targets are.
     pub targets: Vec<Target>,
+}
+
+/// How joints give way to gravity: by so much for every N·m with which it pulls at 1 kg, at the target or at the elbow, of the robot
+/// as it is described.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Compliance {
+    /// Away from the ground, in the base link's frame.
+    pub up: [f64; 3],
+    /// The joint at whose origin the elbow is.
+    pub elbow: String,
+    /// By joint and load.
+    pub terms: Vec<GivesWay>,
+}
+
+/// How a joint gives way to a load.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GivesWay {
+    /// Its name.
+    pub joint: String,
+    /// `target` or `elbow`.
+    pub load: String,
+    /// Degrees per N·m of 1 kg; above 0 where it gives way downwards.
+    pub deg_per_nm: f64,
+    /// Its standard deviation.
+    pub sd_deg_per_nm: f64,
+    /// By how much it gives way in the posture of its greatest load among the rows, degrees.
+    pub greatest_deg: f64,
 }
 
 /// A row that is likelier an outlier than not.

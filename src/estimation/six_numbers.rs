@@ -50,6 +50,7 @@ impl SixNumbers {
     /// The transposed derivative of the marker by all numbers, w before v, joint by joint, and its predicted position.
     fn rows(&self, positions: &[f64]) -> (DMatrix<f64>, Vector3<f64>) {
         let Belief { state, layout, .. } = &self.belief;
+        let thetas = state.thetas(positions);
         let mut pass = Pass::new(state, layout);
         let marker = pass.at(positions).target(0);
         let mut rows = DMatrix::zeros(self.covariance.nrows(), 3);
@@ -69,7 +70,7 @@ impl SixNumbers {
                         let turn = (before.rotation - after.rotation) * w.cross(&e);
                         turn.cross(&(marker - before.point(&line.point.coords)))
                     }
-                    Joint::Prismatic(_) => before.rotation * e * state.theta(index, positions),
+                    Joint::Prismatic(_) => before.rotation * e * thetas.of(index),
                 });
             }
             if joint.line().is_some() {

@@ -20,6 +20,7 @@ mod judge;
 #[cfg(test)]
 mod laws;
 mod learner;
+mod loads;
 mod metrics;
 mod remarks;
 mod report;
@@ -41,6 +42,7 @@ pub use gauge::Gauge;
 pub use head::{GazeReport, HeadDescription};
 pub use judge::{Judge, Verdict};
 pub use learner::{Learner, SETTLING_STEPS};
+pub use loads::{AxisReport, LoadsReport, MassReport};
 pub use metrics::{
     Evaluation, HeldInSocket, HeldOutError, JointMetrics, Metrics, axis_deg, location_m, orientation_deg,
 };

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     convergence::Thresholds,
     head::{GazeReport, HeadDescription},
+    loads::LoadsReport,
     metrics::Metrics,
     sight::{CameraDescription, ChannelDescription, ChannelReading, CorrectionReport, PlaceReport, TargetDescription},
 };
@@ -236,6 +237,9 @@ pub struct ModelReport {
     /// them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sockets_m: Vec<[f64; 3]>,
+    /// What joints that give way bear; null where none does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub loads: Option<LoadsReport>,
 }
 
 /// The axis of one joint at θ = 0.
@@ -286,6 +290,7 @@ impl ModelReport {
             cameras: PlaceReport::of_cameras(&state),
             targets: PlaceReport::of_targets(&state),
             sockets_m: state.sockets.iter().map(|socket| array(&socket.coords)).collect(),
+            loads: state.bending().map(LoadsReport::of),
         }
     }
 
@@ -331,6 +336,9 @@ impl ModelReport {
         let mut state = finite(&self.marker_m).then(|| State::arm(joints, self.marker_m.into()))?;
         for (correction, joint) in state.corrections.iter_mut().zip(&self.joints) {
             *correction = joint.correction.map_or(*correction, |report| report.correction());
+        }
+        if let Some(report) = &self.loads {
+            state.loads = Some(report.loads(state.joints.len())?.into());
         }
         state.devices = self.cameras.iter().map(PlaceReport::device).collect::<Option<_>>()?;
         state.targets.extend(self.targets.iter().map(PlaceReport::target).collect::<Option<Vec<_>>>()?);

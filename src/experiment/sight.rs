@@ -62,7 +62,7 @@ pub struct PlaceReport {
     pub intrinsics_px: Option<[f64; 4]>,
 }
 
-/// What makes a joint's position θ of its reading q: `θ = offset + ratio q + sine sin q + cosine cos q`.
+/// What makes a joint's position θ of its reading q: `θ = offset + ratio q + sine sin q + cosine cos q + compliance·τ`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
 pub struct CorrectionReport {
@@ -74,6 +74,9 @@ pub struct CorrectionReport {
     pub sine: f64,
     /// Rad or m.
     pub cosine: f64,
+    /// How much the joint gives way to the loads at the target and at the elbow, rad per N·m with which gravity pulls at 1 kg.
+    #[serde(default, skip_serializing_if = "is_stiff")]
+    pub compliance: [f64; 2],
 }
 
 /// A reading of the present movement beside what the estimate after the update says of it.
@@ -220,15 +223,19 @@ impl PlaceReport {
     }
 }
 
+fn is_stiff(compliance: &[f64; 2]) -> bool {
+    *compliance == [0.0; 2]
+}
+
 impl CorrectionReport {
     /// `None` where readings are taken for what they say.
     pub(super) fn of(correction: &Correction) -> Option<Self> {
-        let Correction { offset, ratio, sine, cosine } = *correction;
-        (*correction != Correction::default()).then_some(Self { offset, ratio, sine, cosine })
+        let Correction { offset, ratio, sine, cosine, compliance } = *correction;
+        (*correction != Correction::default()).then_some(Self { offset, ratio, sine, cosine, compliance })
     }
 
     pub(super) fn correction(&self) -> Correction {
-        let Self { offset, ratio, sine, cosine } = *self;
-        Correction { offset, ratio, sine, cosine }
+        let Self { offset, ratio, sine, cosine, compliance } = *self;
+        Correction { offset, ratio, sine, cosine, compliance }
     }
 }

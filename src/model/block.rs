@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::{Element, Place, Quantity, State};
+use super::{Element, Load, Place, Quantity, State};
 use crate::kinematics::JointKind;
 
 /// A group of parameters of a [`State`] that is learned or held as a whole. Indices count from 0.
@@ -18,6 +18,8 @@ pub enum Block {
     Ratio(usize),
     /// Sine and cosine of a joint's reading, rad.
     Eccentricity(usize),
+    /// By how much a joint gives way to a load, rad per N·m of 1 kg; see [`Loads`](super::Loads).
+    Compliance(usize, Load),
     /// The place of a target on its link.
     Target(usize),
     /// The pose of a device.
@@ -36,6 +38,9 @@ impl Block {
             Self::Axis(joint) | Self::Offset(joint) | Self::Ratio(joint) | Self::Eccentricity(joint) => {
                 joint < state.joints.len()
             }
+            Self::Compliance(joint, load) => {
+                joint < state.joints.len() && state.loads.as_ref().is_some_and(|loads| loads.bears(joint, load))
+            }
             Self::Target(target) => target < state.targets.len(),
             Self::Device(device) => device < state.devices.len(),
             Self::Intrinsics(device) => state.devices.get(device).is_some_and(|device| device.intrinsics.is_some()),
@@ -52,6 +57,7 @@ impl Block {
             Self::Offset(joint) => numbers(&[state.corrections[joint].offset]),
             Self::Ratio(joint) => numbers(&[state.corrections[joint].ratio]),
             Self::Eccentricity(joint) => numbers(&[state.corrections[joint].sine, state.corrections[joint].cosine]),
+            Self::Compliance(joint, load) => numbers(&[state.corrections[joint].compliance[load as usize]]),
             Self::Target(target) => match &state.targets[target].place {
                 Place::Point(point) => Element::Point(*point),
                 Place::Pose(pose) => Element::Pose(*pose),
@@ -72,6 +78,9 @@ impl Block {
             (Self::Eccentricity(joint), Element::Numbers(numbers)) => {
                 (state.corrections[joint].sine, state.corrections[joint].cosine) = (numbers[0], numbers[1]);
             }
+            (Self::Compliance(joint, load), Element::Numbers(numbers)) => {
+                state.corrections[joint].compliance[load as usize] = numbers[0];
+            }
             (Self::Target(target), Element::Point(point)) => state.targets[target].place = Place::Point(point),
             (Self::Target(target), Element::Pose(pose)) => state.targets[target].place = Place::Pose(pose),
             (Self::Device(device), Element::Pose(pose)) => state.devices[device].pose = pose,
@@ -85,7 +94,7 @@ impl Block {
 
     /// What each of its tangent coordinates measures.
     pub fn quantities(&self, state: &State) -> Vec<Quantity> {
-        use Quantity::{Angle, Length, Pixels, Ratio};
+        use Quantity::{Angle, Compliance, Length, Pixels, Ratio};
         let turns = |joint: usize| state.joints[joint].kind() == JointKind::Revolute;
         match *self {
             Self::Axis(joint) if turns(joint) => vec![Length, Length, Angle, Angle],
@@ -93,6 +102,7 @@ impl Block {
             Self::Offset(joint) => vec![if turns(joint) { Angle } else { Length }],
             Self::Ratio(_) => vec![Ratio],
             Self::Eccentricity(joint) => vec![if turns(joint) { Angle } else { Length }; 2],
+            Self::Compliance(..) => vec![Compliance],
             Self::Target(target) if matches!(state.targets[target].place, Place::Point(_)) => vec![Length; 3],
             Self::Socket(_) => vec![Length; 3],
             Self::Intrinsics(_) => vec![Pixels; 4],

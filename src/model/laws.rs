@@ -5,7 +5,10 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Block, Correction, Device, Element, Frame, Layout, Pass, Place, Prior, State, Target, anywhere, jacobian};
+use super::{
+    Block, Correction, Device, Element, Frame, Layout, Load, Loads, Pass, Place, Prior, State, Target, anywhere,
+    jacobian,
+};
 use crate::kinematics::{Joint, Line, chart};
 
 pub(crate) fn random_direction(rng: &mut ChaCha8Rng) -> UnitVector3<f64> {
@@ -50,6 +53,7 @@ pub(crate) fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
             ratio: rng.random_range(0.9..1.1),
             sine: rng.random_range(-0.1..0.1),
             cosine: rng.random_range(-0.1..0.1),
+            compliance: [0.0; 2],
         })
         .collect();
     state.targets.push(Target { link: rng.random_range(0..=joints), place: Place::Pose(random_pose(rng)) });
@@ -61,6 +65,12 @@ pub(crate) fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
     });
     state.devices.push(Device { link: None, pose: random_pose(rng), intrinsics: None });
     state.sockets.extend([random_point(rng), random_point(rng)]);
+    let turning: Vec<usize> = (0..joints).filter(|joint| state.joints[*joint].line().is_some()).collect();
+    let elbow = (!turning.is_empty()).then(|| turning[rng.random_range(0..turning.len())]);
+    state.loads = Some(Loads::new(&state, random_direction(rng), elbow).into());
+    for correction in &mut state.corrections {
+        correction.compliance = [(); 2].map(|()| rng.random_range(-0.01..0.01));
+    }
     state
 }
 
@@ -69,6 +79,7 @@ pub(crate) fn all_blocks(state: &State) -> Vec<Block> {
     let mut blocks = vec![Block::Base];
     for joint in 0..state.joints.len() {
         blocks.extend([Block::Axis(joint), Block::Offset(joint), Block::Ratio(joint), Block::Eccentricity(joint)]);
+        blocks.extend(Load::ALL.map(|load| Block::Compliance(joint, load)));
     }
     blocks.extend((0..state.targets.len()).map(Block::Target));
     blocks.extend((0..state.devices.len()).flat_map(|device| [Block::Device(device), Block::Intrinsics(device)]));

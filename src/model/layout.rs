@@ -31,6 +31,8 @@ pub enum Quantity {
     Angle,
     /// Without a unit.
     Ratio,
+    /// Radians per N·m with which gravity pulls at 1 kg.
+    Compliance,
     /// Pixels.
     Pixels,
 }

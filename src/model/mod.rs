@@ -4,6 +4,7 @@
 //! * [`Block`]: parameters that belong together; [`Element`]: their values, with chart and transport.
 //! * [`Layout`]: which blocks are learned, and where each stands in the tangent vector.
 //! * [`Prior`]: what is known before any measurement, with a full covariance, or anywhere within bounds.
+//! * [`Loads`]: what gravity does to joints that give way.
 //! * [`Pass`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
 //!   and not among the kinematics since it is the layout that says which parameters there are.
 //! * [`Workspace`]: where predictions of the hand count.
@@ -14,6 +15,7 @@
 mod block;
 mod element;
 mod layout;
+mod loads;
 mod manifold;
 mod names;
 mod pass;
@@ -26,12 +28,13 @@ mod workspace;
 pub use block::Block;
 pub use element::{Displacement, Element};
 pub use layout::{Layout, Quantity};
+pub use loads::{GRAVITY, Load, Loads, Mass};
 pub use manifold::Manifold;
 pub use names::{Names, listed};
 pub use pass::{Frame, Motion, Pass, jacobian};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
 pub use rank::{null_space, rank};
-pub use state::{Correction, Device, Hand, Place, State, Target};
+pub use state::{Correction, Device, Hand, Place, State, Target, Thetas};
 pub use workspace::{Workspace, best_motion};
 
 #[cfg(test)]

@@ -33,6 +33,9 @@ impl Names {
             Block::Offset(joint) => format!("the offset of {}", of(&self.joints, joint)),
             Block::Ratio(joint) => format!("the ratio of {}", of(&self.joints, joint)),
             Block::Eccentricity(joint) => format!("the eccentricity of {}", of(&self.joints, joint)),
+            Block::Compliance(joint, load) => {
+                format!("how {} gives way to the load at the {}", of(&self.joints, joint), load.name())
+            }
             Block::Target(target) => match of(&self.targets, target) {
                 name if name == "marker" => "the marker".to_owned(),
                 name => format!("target {name}"),
@@ -52,7 +55,7 @@ impl Names {
                 }
                 Block::Axis(_) => &["tilt towards b₁", "tilt towards b₂"],
                 Block::Eccentricity(_) => &["sine", "cosine"],
-                Block::Offset(_) | Block::Ratio(_) => &[""],
+                Block::Offset(_) | Block::Ratio(_) | Block::Compliance(..) => &[""],
                 Block::Intrinsics(_) => &["fx", "fy", "cx", "cy"],
                 _ => &["x", "y", "z", "turn about x", "turn about y", "turn about z"],
             }

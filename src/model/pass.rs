@@ -6,7 +6,7 @@
 //! | parameter | twist (linear, angular) |
 //! |---|---|
 //! | axis, moved by η | `Ad_{A_{i-1}} η − Ad_{A_i} η` |
-//! | what makes θ of the reading q, c·f(q) | `f(q) Ad_{A_{i-1}} ξ`: f = 1 for the offset, q for the ratio, sin q, cos q |
+//! | what makes θ of the reading q, c·f(q) | `f(q) Ad_{A_{i-1}} ξ`: f = 1 for the offset, q for the ratio, sin q, cos q, the torque of a load |
 //! | base (t + ν, exp(\[ω\]×) R) | `(ν − ω × t, ω)` |
 //!
 //! The linear part is the velocity of the point that is at the origin, so that a point at x moves by `linear + angular × x`.
@@ -23,7 +23,7 @@ use nalgebra::{
     Isometry3, Matrix3, Matrix3x2, Matrix3xX, Matrix6xX, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
 };
 
-use super::{Block, Hand, Layout, State};
+use super::{Block, Hand, Layout, Load, Loads, State};
 use crate::kinematics::{Joint, chart};
 
 /// A rigid motion as a matrix and a shift: `x ↦ R x + t`.
@@ -85,6 +85,10 @@ pub struct Pass<'a> {
     corrections: Vec<Vec<(usize, Term)>>,
     /// By joint: where its axis stands (usize::MAX if it is not learned), and its basis.
     axes: Vec<(usize, Matrix3x2<f64>)>,
+    /// Where joints give way, or may be learned to.
+    loads: Option<&'a Loads>,
+    /// By joint: what it bears, N·m per kg; empty without loads.
+    torques: Vec<[f64; 2]>,
     links: Vec<Motion>,
     /// Of base, axes and corrections, those that move the links nearest to the base first.
     twists: Vec<Twist>,
@@ -96,6 +100,7 @@ enum Term {
     Ratio,
     Sine,
     Cosine,
+    Torque(Load),
 }
 
 const HELD: usize = usize::MAX;
@@ -104,14 +109,19 @@ impl<'a> Pass<'a> {
     /// At no posture yet: [`at`](Self::at) comes first.
     pub fn new(state: &'a State, layout: &'a Layout) -> Self {
         let mut corrections = vec![Vec::new(); state.joints.len()];
+        let mut loads = state.bending();
         for (block, range) in layout.blocks() {
-            let (joint, terms): (usize, &[Term]) = match block {
-                Block::Offset(joint) => (joint, &[Term::Offset]),
-                Block::Ratio(joint) => (joint, &[Term::Ratio]),
-                Block::Eccentricity(joint) => (joint, &[Term::Sine, Term::Cosine]),
+            let (joint, terms) = match block {
+                Block::Offset(joint) => (joint, [Some(Term::Offset), None]),
+                Block::Ratio(joint) => (joint, [Some(Term::Ratio), None]),
+                Block::Eccentricity(joint) => (joint, [Some(Term::Sine), Some(Term::Cosine)]),
+                Block::Compliance(joint, load) => {
+                    loads = state.loads.as_deref();
+                    (joint, [Some(Term::Torque(load)), None])
+                }
                 _ => continue,
             };
-            corrections[joint].extend(range.zip(terms.iter().copied()));
+            corrections[joint].extend(range.zip(terms.into_iter().flatten()));
         }
         let axes = state.joints.iter().enumerate();
         let axes = axes.map(|(joint, axis)| {
@@ -120,7 +130,7 @@ impl<'a> Pass<'a> {
         });
         let axes = axes.collect();
         let (links, twists) = (Vec::with_capacity(state.joints.len() + 1), Vec::with_capacity(layout.dimension()));
-        Self { state, layout, corrections, axes, links, twists }
+        Self { state, layout, corrections, axes, loads, torques: Vec::new(), links, twists }
     }
 
     /// The state.
@@ -148,6 +158,9 @@ impl<'a> Pass<'a> {
             }
         }
         self.links.push(link);
+        if let Some(loads) = self.loads {
+            self.torques = loads.torques(positions);
+        }
         for (index, &reading) in positions.iter().enumerate() {
             link = self.pass_joint(index, reading, &link);
             self.links.push(link);
@@ -159,7 +172,9 @@ impl<'a> Pass<'a> {
     #[inline]
     fn pass_joint(&mut self, index: usize, reading: f64, before: &Motion) -> Motion {
         let joint = &self.state.joints[index];
-        let theta = self.state.corrections[index].position(reading);
+        let torques = self.torques.get(index).copied().unwrap_or_default();
+        let correction = &self.state.corrections[index];
+        let theta = correction.position(reading) + correction.given_way(&torques);
         let (start, basis) = &self.axes[index];
         let from = index + 1;
         let mut put = |coordinate, linear, angular| self.twists.push(Twist { coordinate, from, linear, angular });
@@ -196,6 +211,7 @@ impl<'a> Pass<'a> {
                 Term::Ratio => reading,
                 Term::Sine => reading.sin(),
                 Term::Cosine => reading.cos(),
+                Term::Torque(load) => torques[load as usize],
             };
             put(coordinate, axis_linear * f, axis_angular * f);
         }

@@ -1,10 +1,10 @@
 //! All parameters of a robot and of what watches it, and its forward kinematics.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, sync::Arc};
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3};
 
-use super::{Block, Frame, Layout};
+use super::{Block, Frame, Layout, Load, Loads};
 use crate::kinematics::Joint;
 
 /// Everything that can be learned: joints from base to hand, and what is placed on links or beside the robot.
@@ -20,6 +20,8 @@ pub struct State {
     pub joints: Vec<Joint>,
     /// By joint: what its readings are corrected by.
     pub corrections: Vec<Correction>,
+    /// What joints that give way bear; without it none does.
+    pub loads: Option<Arc<Loads>>,
     /// What is looked at; the first is the marker.
     pub targets: Vec<Target>,
     /// What looks on: cameras, anchors of cables.
@@ -57,7 +59,8 @@ impl Hand {
     }
 }
 
-/// What makes a joint's position θ of its reading q: `θ = offset + ratio q + sine sin q + cosine cos q`.
+/// What makes a joint's position θ of its reading q:
+/// `θ = offset + ratio q + sine sin q + cosine cos q + compliance·τ`, τ the torques of the [`Loads`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correction {
     /// Rad or m.
@@ -68,16 +71,18 @@ pub struct Correction {
     pub sine: f64,
     /// As `sine`.
     pub cosine: f64,
+    /// By [`Load`], how much the joint gives way, rad per N·m of 1 kg.
+    pub compliance: [f64; 2],
 }
 
 impl Default for Correction {
     fn default() -> Self {
-        Self { offset: 0.0, ratio: 1.0, sine: 0.0, cosine: 0.0 }
+        Self { offset: 0.0, ratio: 1.0, sine: 0.0, cosine: 0.0, compliance: [0.0; 2] }
     }
 }
 
 impl Correction {
-    /// θ at a reading, rad or m.
+    /// θ at a reading without load, rad or m.
     pub fn position(&self, reading: f64) -> f64 {
         let proportional = self.offset + self.ratio * reading;
         if self.sine == 0.0 && self.cosine == 0.0 {
@@ -87,10 +92,33 @@ impl Correction {
         proportional + self.sine * sin + self.cosine * cos
     }
 
-    /// ∂θ/∂q at a reading.
+    /// What torques (by [`Load`], N·m per kg) add to that, rad.
+    pub fn given_way(&self, torques: &[f64; 2]) -> f64 {
+        self.compliance[0] * torques[0] + self.compliance[1] * torques[1]
+    }
+
+    /// ∂θ/∂q at a reading without load.
     pub fn slope(&self, reading: f64) -> f64 {
         let (sin, cos) = reading.sin_cos();
         self.ratio + self.sine * cos - self.cosine * sin
+    }
+}
+
+/// The joints' positions at one posture.
+#[derive(Clone, Debug)]
+pub struct Thetas<'a> {
+    corrections: &'a [Correction],
+    readings: &'a [f64],
+    /// Empty where no joint gives way.
+    torques: Vec<[f64; 2]>,
+}
+
+impl Thetas<'_> {
+    /// A joint's, rad or m.
+    pub fn of(&self, joint: usize) -> f64 {
+        let correction = &self.corrections[joint];
+        let unloaded = correction.position(self.readings[joint]);
+        self.torques.get(joint).map_or(unloaded, |torques| unloaded + correction.given_way(torques))
     }
 }
 
@@ -149,6 +177,7 @@ impl State {
             base: Isometry3::identity(),
             corrections: vec![Correction::default(); joints.len()],
             joints,
+            loads: None,
             targets: vec![target],
             devices: Vec::new(),
             sockets: Vec::new(),
@@ -160,18 +189,17 @@ impl State {
     pub fn target_at(&self, target: usize, positions: &[f64]) -> Point3<f64> {
         debug_assert_eq!(positions.len(), self.joints.len());
         let Target { link, place } = &self.targets[target];
-        let moved = (0..*link)
-            .rev()
-            .fold(place.origin(), |point, index| self.joints[index].carry(self.theta(index, positions), &point));
+        let thetas = self.thetas(positions);
+        let moved =
+            (0..*link).rev().fold(place.origin(), |point, index| self.joints[index].carry(thetas.of(index), &point));
         self.base * moved
     }
 
     /// Where a frame is at readings `positions` (rad or m, one per joint), in the frame of the measurements.
     pub fn frame_at(&self, frame: Frame, positions: &[f64]) -> Isometry3<f64> {
+        let thetas = self.thetas(positions);
         let behind = |link: usize, place: Isometry3<f64>| {
-            let moved = (0..link)
-                .rev()
-                .fold(place, |place, index| self.joints[index].exp(self.theta(index, positions)) * place);
+            let moved = (0..link).rev().fold(place, |place, index| self.joints[index].exp(thetas.of(index)) * place);
             self.base * moved
         };
         match frame {
@@ -216,18 +244,35 @@ impl State {
         self
     }
 
-    /// A joint's position at its reading, rad or m.
-    pub fn theta(&self, joint: usize, positions: &[f64]) -> f64 {
-        self.corrections[joint].position(positions[joint])
+    /// The link that carries the hand; that of a device beside the robot is the base.
+    pub fn hand_link(&self) -> usize {
+        match self.hand {
+            Hand::Target(target) => self.targets.get(target).map_or(0, |target| target.link),
+            Hand::Device(device) => self.devices[device].link.unwrap_or(0),
+        }
+    }
+
+    /// The joints' positions at readings `positions`, rad or m.
+    pub fn thetas<'a>(&'a self, positions: &'a [f64]) -> Thetas<'a> {
+        let torques = self.bending().map_or_else(Vec::new, |loads| loads.torques(positions));
+        Thetas { corrections: &self.corrections, readings: positions, torques }
+    }
+
+    /// The loads, where a joint gives way to them.
+    pub(crate) fn bending(&self) -> Option<&Loads> {
+        let loads = self.loads.as_deref()?;
+        let gives_way = |correction: &Correction| correction.compliance != [0.0; Load::ALL.len()];
+        self.corrections.iter().any(gives_way).then_some(loads)
     }
 
     /// What the joints do to each link, `base e^{ξ₁θ₁} … e^{ξᵢθᵢ}` for i = 0 … n: the i-th carries what is fixed to
     /// link i from where it is at θ = 0 into the frame of the measurements.
     pub fn links(&self, positions: &[f64]) -> Vec<Isometry3<f64>> {
+        let thetas = self.thetas(positions);
         let mut links = Vec::with_capacity(self.joints.len() + 1);
         links.push(self.base);
         for (index, joint) in self.joints.iter().enumerate() {
-            links.push(links[index] * joint.exp(self.theta(index, positions)));
+            links.push(links[index] * joint.exp(thetas.of(index)));
         }
         links
     }

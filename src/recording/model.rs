@@ -61,6 +61,7 @@ mod tests {
             cameras: Vec::new(),
             targets: Vec::new(),
             sockets_m: Vec::new(),
+            loads: None,
         };
         assert_eq!(origins(&model), [a, a, a, b, marker_m]);
     }

@@ -21,7 +21,7 @@ mod validate;
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use nalgebra::{DVector, Point3};
+use nalgebra::{DVector, Point3, UnitVector3};
 
 pub use builtin::{BUILTIN, Builtin, builtin};
 pub use data::Measurements;
@@ -36,7 +36,7 @@ use crate::{
     experiment::{Body, Outliers, Thresholds},
     kinematics::JointBox,
     model::{
-        Block, Layout, Names, Quantity, State,
+        Block, Layout, Loads, Names, Quantity, State,
         urdf::{Chain, Urdf},
     },
     optimize::Settings,
@@ -134,6 +134,8 @@ pub struct Robot {
     pub spacings: Vec<Spacing>,
     /// Whether predictions are judged after the rigid motion that fits best.
     pub up_to_motion: bool,
+    /// How its load pulls at its joints.
+    pub gravity: Gravity,
     /// The description that the joints are from, if they are not written in the scenario.
     pub described: Option<Arc<Described>>,
 }
@@ -148,6 +150,20 @@ impl Robot {
             sockets: self.sockets.iter().chain(&self.held_out_sockets).map(SocketSpec::label).collect(),
         }
     }
+
+    /// What the joints of such a robot bear, as `described`.
+    pub fn loads(&self, described: &State) -> Arc<Loads> {
+        Arc::new(Loads::new(described, self.gravity.up, self.gravity.elbow))
+    }
+}
+
+/// What is known of how a robot's load pulls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gravity {
+    /// Away from the ground, in the frame of the base.
+    pub up: UnitVector3<f64>,
+    /// The joint at whose origin the elbow is; the middle one that turns if none is named.
+    pub elbow: Option<usize>,
 }
 
 /// A robot's description, and what of it the scenario is about.
@@ -287,6 +303,8 @@ pub struct Prior {
     pub point_m: f64,
     /// Of the marker, metres.
     pub marker_m: f64,
+    /// Of how much a joint gives way, rad per N·m with which gravity pulls at 1 kg.
+    pub compliance_rad_per_nm: f64,
     /// Of other blocks, where they are learned.
     pub known: BTreeMap<Block, Known>,
 }
@@ -311,6 +329,7 @@ impl Prior {
                     (None, quantity) => match (block, quantity) {
                         (Block::Axis(_), Quantity::Length) => self.point_m,
                         (_, Quantity::Length) => self.marker_m,
+                        (_, Quantity::Compliance) => self.compliance_rad_per_nm,
                         _ => self.direction_rad,
                     },
                 };

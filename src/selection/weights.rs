@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::{Layout, Quantity};
+use crate::model::{GRAVITY, Layout, Quantity};
 
 /// How the criterion compares metres with radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +25,8 @@ impl Weights {
             (CriterionUnits::Prior, _) | (_, Quantity::Pixels) => prior_sd[index].powi(-2),
             (CriterionUnits::CharacteristicLength(_), Quantity::Angle | Quantity::Ratio) => 1.0,
             (CriterionUnits::CharacteristicLength(length), Quantity::Length) => length.powi(-2),
+            // As an angle, with 1 kg held out level by that length.
+            (CriterionUnits::CharacteristicLength(length), Quantity::Compliance) => (GRAVITY * length).powi(2),
         };
         let quantities = layout.quantities();
         Self(DVector::from_iterator(quantities.len(), quantities.iter().enumerate().map(weight)))

@@ -2,12 +2,10 @@
 
 use super::{
     document::{Document, Part},
+    extras,
     plots::{self, residual},
 };
-use crate::{
-    calibration::{Case, Extra, Figures, Placement, Reading, Report, SocketDistance},
-    model::listed,
-};
+use crate::calibration::{Case, Figures, Placement, Reading, Report, SocketDistance};
 
 /// Readings listed at most; of more the worst.
 const LISTED: usize = 200;
@@ -36,7 +34,7 @@ pub fn document(report: &Report, case: &Case<'_>) -> Document {
     document.heading("More rows");
     document.text(sentence(&report.more_rows.said));
     by_number(&mut document, report);
-    extras(&mut document, report);
+    extras::write(&mut document, report);
     folds(&mut document, report);
     written(&mut document, report, case);
     readings(&mut document, report);
@@ -44,12 +42,12 @@ pub fn document(report: &Report, case: &Case<'_>) -> Document {
 }
 
 /// A number with two decimals, or a dash.
-fn number(value: Option<f64>) -> String {
+pub(super) fn number(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2}"))
 }
 
 /// A sentence with a capital at its beginning and a full stop at its end.
-fn sentence(said: &str) -> String {
+pub(super) fn sentence(said: &str) -> String {
     let mut letters = said.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
     format!("{first}{}.", letters.as_str().trim_end_matches('.'))
@@ -288,39 +286,6 @@ fn by_number(document: &mut Document, report: &Report) {
     let title = |name: &str| format!("{name} ({unit})");
     let (chosen, median) = (title("chosen"), title("random, median"));
     document.table(0, ["rows", &chosen, &median, "lower quartile", "upper quartile"], shown.map(row));
-}
-
-fn extras(document: &mut Document, report: &Report) {
-    document.heading("What axes cannot explain");
-    if report.extras.iter().all(|trial| trial.inner.is_none()) {
-        document.text("There are too few rows to tell whether anything beside the axes is worth learning.");
-        return;
-    }
-    let kept = report.extras.iter().any(|trial| trial.kept);
-    document.text(format!(
-        "What is added must predict rows better that it has not seen: five folds among the training rows decide, by more than twice \
-         the standard error of the difference. Rows that are held out decide nothing. {}",
-        if kept { "What stays is in readings.yaml, with axes of its own." } else { "Nothing stays." }
-    ));
-    let unit = plots::unit(report);
-    let row = |trial: &crate::calibration::Trial| {
-        let name = listed(trial.extras.iter().map(|extra: &Extra| extra.name().to_owned()).collect());
-        [
-            name,
-            trial.parameters.to_string(),
-            number(trial.inner_without),
-            number(trial.inner),
-            number(trial.standard_error),
-            number(trial.held_out.and_then(|figures| figures.mean())),
-            if trial.kept { "yes" } else { "no" }.to_owned(),
-        ]
-    };
-    let inner = format!("without ({unit})");
-    document.table(
-        1,
-        ["added", "parameters", &inner, "with", "± difference", "held out", "kept"],
-        report.extras.iter().map(row),
-    );
 }
 
 fn folds(document: &mut Document, report: &Report) {

@@ -2,6 +2,7 @@
 
 mod contents;
 mod document;
+mod extras;
 mod html;
 mod markdown;
 mod plots;

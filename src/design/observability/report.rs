@@ -214,6 +214,7 @@ impl Prospect {
                 Quantity::Angle => ("deg", 1_f64.to_degrees()),
                 Quantity::Pixels => ("px", 1.0),
                 Quantity::Ratio => ("1", 1.0),
+                Quantity::Compliance => ("deg/(N·m)", 1_f64.to_degrees()),
             };
             let after = |course: &Course| factor * course.covariance[(at, at)].max(0.0).sqrt();
             Deviation {

@@ -5,7 +5,7 @@ use rand::{Rng, RngExt};
 
 use super::posterior::{Normal, Posterior};
 use crate::{
-    model::{Layout, Quantity, State},
+    model::{GRAVITY, Layout, Quantity, State},
     sensing::Graduated,
 };
 
@@ -48,6 +48,8 @@ fn length(delta: &DVector<f64>, layout: &Layout) -> f64 {
     let longest = |quantity: &Quantity| match quantity {
         Quantity::Length | Quantity::Angle => LONGEST_STEP,
         Quantity::Ratio => LONGEST_STEP / 3.0,
+        // At arm's length.
+        Quantity::Compliance => LONGEST_STEP / GRAVITY,
         Quantity::Pixels => LONGEST_STEP * 300.0,
     };
     delta.iter().zip(layout.quantities()).map(|(x, quantity)| x.abs() / longest(quantity)).fold(0.0, f64::max)

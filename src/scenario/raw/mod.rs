@@ -73,6 +73,8 @@ pub struct Robot {
     pub tip: Option<Spanned<String>>,
     #[serde(default)]
     pub hold: Vec<Spanned<String>>,
+    pub up: Option<Spanned<Exactly<f64, 3>>>,
+    pub elbow: Option<Spanned<String>>,
     #[serde(rename = "joint")]
     pub joints: Spanned<Vec<Spanned<Joint>>>,
 }
@@ -98,6 +100,9 @@ pub struct Joint {
     pub eccentricity_deg: Option<Spanned<Exactly<f64, 2>>>,
     #[serde(default)]
     pub learn_eccentricity: bool,
+    pub compliance_deg_per_nm: Option<Spanned<Exactly<f64, 2>>>,
+    #[serde(default)]
+    pub learn_compliance: bool,
     pub column: Option<Spanned<String>>,
 }
 
@@ -249,6 +254,7 @@ pub struct Prior {
     pub offset_rad: Option<Spanned<f64>>,
     pub offset_m: Option<Spanned<f64>>,
     pub eccentricity_rad: Option<Spanned<f64>>,
+    pub compliance_rad_per_nm: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Deserialize)]

@@ -8,7 +8,7 @@ use toml::Spanned;
 use super::{Check, described::Links, equipment::Outfit, raw};
 use crate::{
     kinematics::{Joint, JointBox, JointKind, Line},
-    model::{Block, Correction, Layout, State},
+    model::{Block, Correction, Layout, Load, Loads, State},
     scenario::Robot,
     sensing::TargetKind,
 };
@@ -83,6 +83,8 @@ impl Check<'_> {
             blocks.extend(spanned.get_ref().learn_ratio.then_some(Block::Ratio(index)));
             blocks.extend(spanned.get_ref().learn_offset.then_some(Block::Offset(index)));
             blocks.extend(spanned.get_ref().learn_eccentricity.then_some(Block::Eccentricity(index)));
+            let compliance = Load::ALL.map(|load| Block::Compliance(index, load));
+            blocks.extend(compliance.into_iter().filter(|_| spanned.get_ref().learn_compliance));
         }
         outfit.equip(&mut state);
         blocks.extend(outfit.known.iter().map(|(block, _)| *block));
@@ -100,6 +102,10 @@ impl Check<'_> {
             if let Some(hand) = self.hand("prediction.of", &prediction.of, &equipment) {
                 state.hand = hand;
             }
+        }
+        let gravity = self.gravity(raw, &names, &state.joints);
+        if blocks.iter().any(|block| matches!(block, Block::Compliance(..))) || gives_way(&state) {
+            state.loads = Some(Loads::new(&state, gravity.up, gravity.elbow).into());
         }
         let layout = Layout::new(&state, blocks.iter().copied());
         if layout.dimension() == 0 {
@@ -124,6 +130,7 @@ impl Check<'_> {
             held_out_sockets,
             spacings,
             up_to_motion,
+            gravity,
             described,
         };
         self.sockets(scenario, &mut robot);
@@ -135,7 +142,7 @@ impl Check<'_> {
     /// What a joint's readings are truly corrected by.
     fn correction(&mut self, index: usize, raw: &raw::Joint) -> Correction {
         let key = |field: &str| format!("robot.joint[{index}].{field}");
-        let mut correction = Correction::default();
+        let mut correction = Correction { compliance: self.compliance(index, raw), ..Correction::default() };
         if let Some(ratio) = &raw.ratio {
             correction.ratio = self.number(&key("ratio"), ratio, |ratio| ratio != 0.0, "a number other than 0");
         }
@@ -231,4 +238,9 @@ impl Check<'_> {
             JointKind::Prismatic => (lower, upper),
         })
     }
+}
+
+/// Whether joints of it truly do.
+fn gives_way(state: &State) -> bool {
+    state.corrections.iter().any(|correction| correction.compliance != [0.0; 2])
 }

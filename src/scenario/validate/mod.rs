@@ -6,6 +6,7 @@ mod completed;
 mod constraints;
 mod described;
 mod equipment;
+mod gravity;
 mod head;
 mod held_out;
 mod learners;
@@ -24,8 +25,8 @@ use super::{
     EstimatorKind, Filter, Known, Prior, Robot, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError},
     misfit::Setting,
-    summary::WorldKind,
     raw,
+    summary::WorldKind,
 };
 use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
@@ -36,6 +37,9 @@ use crate::{
     selection::{CriterionUnits, Planning},
     sensing::{Loss, Rig},
 };
+
+/// Unless a file says otherwise, a joint gives way to this torque by as much as an axis may be tilted: 1 kg half a metre out, N·m.
+const USUAL_TORQUE: f64 = 5.0;
 
 /// How far from 1 the length of an axis may be: what is lost by writing six digits.
 const UNIT_TOLERANCE: f64 = 1e-5;
@@ -235,10 +239,14 @@ impl Check<'_> {
             let mend = "add `marker_m = …`, its standard deviation in metres";
             self.problem(raw.prior.span(), "prior.marker_m", "the marker is learned", mend);
         }
+        let direction_rad = self.positive("prior.direction_rad", &prior.direction_rad);
+        let compliance = prior.compliance_rad_per_nm.as_ref();
         Prior {
-            direction_rad: self.positive("prior.direction_rad", &prior.direction_rad),
+            direction_rad,
             point_m: self.positive("prior.point_m", &prior.point_m),
             marker_m: prior.marker_m.as_ref().map_or(1.0, |sd| self.positive("prior.marker_m", sd)),
+            compliance_rad_per_nm: compliance
+                .map_or(direction_rad / USUAL_TORQUE, |sd| self.positive("prior.compliance_rad_per_nm", sd)),
             known: self.known_blocks(raw, robot),
         }
     }

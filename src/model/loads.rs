@@ -1,0 +1,230 @@
+//! What gravity does to a robot whose joints give way.
+//!
+//! Joint i turns by c τᵢ more than its reading says, τᵢ being the torque about it with which gravity pulls at a mass of 1 kg:
+//!
+//! ```text
+//! τᵢ(q) = −g ∂h/∂qᵢ = −g (up × wᵢ)·(p − vᵢ)        N·m per kg
+//! ```
+//!
+//! with h = up·p the height of the mass and (vᵢ, wᵢ) the axis, both of the *described* robot without load at the readings q, in
+//! the frame of its base. So τ is a function of q alone, whatever is estimated. c is in rad per N·m of 1 kg: a load of m kg on a
+//! joint of stiffness k (N·m/rad) makes c = m/k. A joint that slides bears nothing, and neither does one behind the mass.
+
+use nalgebra::{DMatrix, Isometry3, Matrix3xX, Point3, UnitVector3, Vector3};
+
+use super::State;
+use crate::kinematics::{Joint, JointKind};
+
+/// g, m/s².
+pub const GRAVITY: f64 = 9.81;
+
+/// What pulls at the joints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Load {
+    /// A mass at the hand's target.
+    Target,
+    /// A mass at the elbow.
+    Elbow,
+}
+
+impl Load {
+    /// Both, in the order of [`Correction::compliance`](super::Correction).
+    pub const ALL: [Self; 2] = [Self::Target, Self::Elbow];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Target => "target",
+            Self::Elbow => "elbow",
+        }
+    }
+}
+
+/// A mass of 1 kg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mass {
+    /// The link that carries it: 0 is the base, i what moves with the i-th joint.
+    pub link: usize,
+    /// Where it is at θ = 0, in the frame of the base, metres.
+    pub place: Point3<f64>,
+}
+
+/// An axis in a posture.
+struct Placed {
+    pivot: Point3<f64>,
+    w: Vector3<f64>,
+}
+
+/// The robot as it is described, and the masses at which gravity pulls.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loads {
+    /// The axes at θ = 0, in the frame of the base.
+    pub joints: Vec<Joint>,
+    /// Away from the ground, in the frame of the base.
+    pub up: UnitVector3<f64>,
+    /// By load.
+    pub masses: [Mass; 2],
+}
+
+impl Loads {
+    /// Those of a robot as it is described: a mass at its hand, and one where the axis of the revolute joint `elbow` is written to
+    /// be; of the middle revolute joint (the earlier of two) if none is named.
+    pub fn new(described: &State, up: UnitVector3<f64>, elbow: Option<usize>) -> Self {
+        let link = described.hand_link();
+        let elbow = elbow.or_else(|| middle(&described.joints)).unwrap_or(0);
+        let origin = described.joints.get(elbow).and_then(Joint::line).map_or(Point3::origin(), |line| line.point);
+        let masses = [Mass { link, place: described.marker() }, Mass { link: elbow, place: origin }];
+        Self { joints: described.joints.clone(), up, masses }
+    }
+
+    /// The mass of a load.
+    pub fn mass(&self, load: Load) -> &Mass {
+        &self.masses[load as usize]
+    }
+
+    /// Whether a joint can bear a load.
+    pub fn bears(&self, joint: usize, load: Load) -> bool {
+        joint < self.mass(load).link && self.joints[joint].kind() == JointKind::Revolute
+    }
+
+    /// By joint, the torque of every load at readings (rad or m), N·m per kg.
+    pub fn torques(&self, readings: &[f64]) -> Vec<[f64; 2]> {
+        let (axes, places) = self.posture(readings);
+        let torque = |joint: usize, Placed { pivot, w }: &Placed| {
+            let across = self.up.cross(w) * -GRAVITY;
+            Load::ALL.map(
+                |load| {
+                    if self.bears(joint, load) { across.dot(&(places[load as usize] - pivot)) } else { 0.0 }
+                },
+            )
+        };
+        axes.iter().enumerate().map(|(joint, axis)| torque(joint, axis)).collect()
+    }
+
+    /// ∂τᵢ/∂qⱼ of a load (n × n): the curvature of the potential energy, up·(wₐ × ∂p/∂q_b) with a the joint nearer to the base.
+    pub fn slopes(&self, load: Load, readings: &[f64]) -> DMatrix<f64> {
+        let (axes, places) = self.posture(readings);
+        let (p, count) = (places[load as usize], self.joints.len());
+        let turns = |joint: usize| self.joints[joint].kind() == JointKind::Revolute;
+        let mut moved = Matrix3xX::zeros(count);
+        for (joint, Placed { pivot, w }) in axes.iter().enumerate() {
+            moved.set_column(joint, &if turns(joint) { w.cross(&(p - pivot)) } else { *w });
+        }
+        DMatrix::from_fn(count, count, |i, j| {
+            let (near, far) = (i.min(j), i.max(j));
+            let moves = self.bears(i, load) && j < self.mass(load).link && turns(near);
+            if moves { -GRAVITY * self.up.dot(&axes[near].w.cross(&moved.column(far))) } else { 0.0 }
+        })
+    }
+
+    /// Where the axes and the masses are.
+    fn posture(&self, readings: &[f64]) -> (Vec<Placed>, [Point3<f64>; 2]) {
+        let mut link = Isometry3::identity();
+        let mut axes = Vec::with_capacity(self.joints.len());
+        let mut places = self.masses.map(|mass| mass.place);
+        for (index, (joint, reading)) in self.joints.iter().zip(readings).enumerate() {
+            let pivot = link * joint.line().map_or(Point3::origin(), |line| line.point);
+            axes.push(Placed { pivot, w: link * joint.direction().into_inner() });
+            link *= joint.exp(*reading);
+            for (place, mass) in places.iter_mut().zip(&self.masses).filter(|(_, mass)| mass.link == index + 1) {
+                *place = link * mass.place;
+            }
+        }
+        (axes, places)
+    }
+}
+
+/// The middle one of the revolute joints, the earlier of two.
+fn middle(joints: &[Joint]) -> Option<usize> {
+    let turning: Vec<usize> = (0..joints.len()).filter(|joint| joints[*joint].kind() == JointKind::Revolute).collect();
+    turning.get(turning.len().checked_sub(1)? / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::{kinematics::Line, model::laws::random_state};
+
+    fn revolute(point: [f64; 3], direction: Vector3<f64>) -> Joint {
+        Joint::Revolute(Line { point: point.into(), direction: UnitVector3::new_normalize(direction) })
+    }
+
+    /// A shoulder that turns about the vertical, then pitches; an elbow 0.4 m out, the hand 0.7 m out.
+    fn arm() -> State {
+        let joints = vec![
+            revolute([0.0, 0.0, 0.3], Vector3::z()),
+            revolute([0.0, 0.0, 0.3], Vector3::y()),
+            revolute([0.4, 0.0, 0.3], Vector3::y()),
+            revolute([0.6, 0.0, 0.3], Vector3::x()),
+            revolute([0.7, 0.0, 0.3], Vector3::y()),
+        ];
+        State::arm(joints, Point3::new(0.7, 0.0, 0.3))
+    }
+
+    /// An arm held out level bears its masses times their reach, and gives way downwards; about the vertical nothing pulls.
+    #[test]
+    fn a_level_arm_bears_mass_times_reach() {
+        let loads = Loads::new(&arm(), Vector3::z_axis(), None);
+        let torques = loads.torques(&[0.7, 0.0, 0.0, 0.0, 0.0]);
+        let expected = [[0.0, 0.0], [7.0, 4.0], [3.0, 0.0], [0.0, 0.0], [0.0, 0.0]];
+        for (found, expected) in torques.iter().flatten().zip(expected.iter().flatten()) {
+            assert!((found - expected * GRAVITY / 10.0).abs() < 1e-12, "{torques:?}");
+        }
+        // To turn about +y is to lower what is in front.
+        let mut state = arm();
+        state.loads = Some(loads.into());
+        state.corrections[1].compliance = [0.01, 0.0];
+        assert!(state.marker_at(&[0.0; 5]).z < 0.3 - 0.04);
+        // Held upright it bears nothing.
+        let upright = state.marker_at(&[0.0, -std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0]);
+        assert!((upright - Point3::new(0.0, 0.0, 1.0)).norm() < 1e-12);
+    }
+
+    /// The torque is what the potential energy falls by, and its slopes are its differences.
+    #[test]
+    fn torques_are_the_descent_of_the_potential_energy() {
+        for seed in 0..20 {
+            let state = random_state(&mut ChaCha8Rng::seed_from_u64(seed), 6);
+            let loads = state.loads.as_deref().expect("loads");
+            let described = State::arm(loads.joints.clone(), Point3::origin());
+            let readings = [0.3, -0.4, 0.5, 0.1, -0.7, 0.2];
+            let moved = |joint: usize, step: f64| {
+                let mut moved = readings;
+                moved[joint] += step;
+                moved
+            };
+            for load in Load::ALL {
+                let mass = loads.mass(load);
+                let height =
+                    |readings: &[f64]| loads.up.dot(&(described.links(readings)[mass.link] * mass.place).coords);
+                for j in 0..6 {
+                    let fall = -GRAVITY * (height(&moved(j, 1e-5)) - height(&moved(j, -1e-5))) / 2e-5;
+                    let expected = if loads.bears(j, load) { fall } else { 0.0 };
+                    assert!((loads.torques(&readings)[j][load as usize] - expected).abs() < 1e-7);
+                    for i in 0..6 {
+                        let torque = |step: f64| loads.torques(&moved(j, step))[i][load as usize];
+                        let difference = (torque(1e-5) - torque(-1e-5)) / 2e-5;
+                        assert!((loads.slopes(load, &readings)[(i, j)] - difference).abs() < 1e-6);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_elbow_is_the_middle_joint_that_turns() {
+        let turning = revolute([0.0; 3], Vector3::x());
+        let sliding = Joint::Prismatic(Vector3::z_axis());
+        let kinds = |kinds: &str| -> Vec<Joint> {
+            kinds.chars().map(|kind| if kind == 'r' { turning } else { sliding }).collect()
+        };
+        for (joints, elbow) in
+            [("rrrrrr", Some(2)), ("rrrrrrr", Some(3)), ("prrr", Some(2)), ("r", Some(0)), ("pp", None)]
+        {
+            assert_eq!(middle(&kinds(joints)), elbow, "{joints}");
+        }
+    }
+}
