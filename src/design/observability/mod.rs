@@ -1,6 +1,6 @@
 //! Before any measurement: what a chain, its sensors, its limits and constraints can determine.
 //!
-//! Everything is linearised at the robot as it is described. With H the whitened rows of a movement there and Λ = Σ HᵀH the
+//! Everything is linearised at one state, the robot as it is described. With H the whitened rows of a movement there and Λ = Σ HᵀH the
 //! information of some movements,
 //!
 //! ```text
