@@ -20,7 +20,7 @@
 //! | [`estimation`] | estimators and their beliefs: recursive least squares, stochastic gradient, a smoother with several hypotheses |
 //! | [`optimize`] | DIRECT and a bounded local search: minimisers over the unit cube that know nothing of robots |
 //! | [`selection`] | the A-criterion and its kin, and the policies that choose movements or plan them |
-//! | [`design`] | the best movements there could be, and what data allow: for judges, who know the truth |
+//! | [`design`] | the best movements there could be, and what data allow: for judges, who know the truth; what can be determined before any measurement |
 //! | [`experiment`] | agents that propose and absorb, a world, a judge; the reports that everything outside reads |
 //! | [`scenario`] | scenario files, strictly read |
 //! | [`assembly`] | the experiments that are drawn from them |

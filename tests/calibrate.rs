@@ -301,6 +301,11 @@ fn three_rows_say_what_they_cannot_tell() {
     assert!(report.parameters.rank <= 9, "{:?}", report.parameters);
     assert!(report.parameters.undetermined[0].contains("cannot be told by these rows"), "{:?}", report.parameters);
     assert!(report.extras.iter().all(|trial| trial.inner.is_none() && !trial.kept));
+    let more_rows = report.more_rows;
+    assert!(
+        more_rows.said.contains("3 rows leave no equation to spare") && more_rows.rows_needed.is_none(),
+        "{more_rows:?}"
+    );
 }
 
 /// Pictures and distances: what their titles say is written, what no table says is named, and the file is valid.

@@ -19,7 +19,7 @@ fn report(arguments: &[&str]) -> Observability {
 /// A Panda before a tracker: all of it can be told, and chosen postures are worth more than random ones at every number that suffices.
 #[test]
 fn a_panda_before_a_tracker() {
-    let found = report(&["panda-calibration", "--postures", "24", "--accuracy", "0.6"]);
+    let found = report(&["panda-calibration", "--postures", "24", "--accuracy", "0.7"]);
     assert_eq!((found.parameters.learned, found.parameters.rank), (31, 31), "{:?}", found.parameters);
     assert!(found.parameters.undetermined.is_empty() && found.criterion.starts_with('I'), "{}", found.criterion);
     assert_eq!((found.errors.len(), found.best.len(), found.deviations.len()), (24, 24, 31));
@@ -27,10 +27,10 @@ fn a_panda_before_a_tracker() {
     let accuracy = &found.accuracy;
     let (best, random) = (accuracy.best_postures.expect("reached"), accuracy.random_postures.expect("reached"));
     assert!(best <= 24 && random > best && accuracy.floor_mm < 1e-6, "{accuracy:?}");
-    assert!(found.errors[best as usize - 1].best_mm <= 0.6 && found.errors[best as usize - 2].best_mm > 0.6);
+    assert!(found.errors[best as usize - 1].best_mm <= 0.7 && found.errors[best as usize - 2].best_mm > 0.7);
     assert!(found.indices.best.o1 > found.indices.random_median.o1, "{:?}", found.indices);
-    // What was promised is what a run of the same scenario meets: 0.57 mm after 20 movements, the median over many seeds.
-    assert!((0.45..0.7).contains(&found.errors[19].best_mm), "{:?}", found.errors[19]);
+    // What was promised is what a run of the same scenario meets: 0.59 mm after 20 movements, the median over many seeds.
+    assert!((0.5..0.75).contains(&found.errors[19].best_mm), "{:?}", found.errors[19]);
     assert!(found.best.iter().all(|posture| posture.joints.len() == 7 && posture.joints[3] < -3.9));
 }
 
@@ -39,6 +39,11 @@ fn a_panda_before_a_tracker() {
 fn sockets_tell_all_but_where_the_robot_stands() {
     let found = report(&["panda-sockets", "--postures", "6"]);
     assert_eq!(found.parameters.learned - found.parameters.rank, 6, "{:?}", found.parameters);
+    assert!(
+        found.parameters.undetermined[0].contains("socket front_center/0"),
+        "they stand with it: {:?}",
+        found.parameters
+    );
     assert!(found.parameters.undetermined[0].contains("cannot be told by any movement"), "{:?}", found.parameters);
     assert!(
         found.best.iter().all(|posture| posture.socket.as_deref().is_some_and(|it| it.starts_with("front_center/")))
@@ -86,7 +91,7 @@ fn a_table_for_people() {
         assert!(said.contains(part), "{part}: {said}");
     }
     for (arguments, wrong) in [
-        (&["arm-6dof", "--accuracy", "-1"][..], "write a number above 0, in millimetres"),
+        (&["arm-6dof", "--accuracy", "0"][..], "write a number above 0, in millimetres"),
         (&["arm-6dof", "--postures", "0"], "0 is not in 1..=1000"),
         (&["nowhere.toml"], "nowhere.toml cannot be read"),
     ] {

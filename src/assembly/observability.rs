@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
+use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::{
     design::observability::Prospect,
-    scenario::{Scenario, WorldSpec},
+    model::{Block, Place, State},
+    scenario::{Known, Scenario, WorldSpec},
     selection::Watch,
 };
 
@@ -18,16 +20,21 @@ impl Scenario {
     /// The robot as the file describes it, with its sensors, limits and constraints: what was recorded does not count.
     pub fn prospect(&self) -> Prospect {
         let layout = self.robot.layout.clone();
+        let mut state = self.robot.state.clone();
+        if !matches!(self.world, WorldSpec::Simulated { .. }) {
+            self.unline(&mut state);
+        }
+        let watch = self.watch(&state);
         Prospect {
             scenario: self.name.clone(),
             title: self.title.clone(),
             names: self.robot.called(),
-            state: self.robot.state.clone(),
+            state,
             rig: Arc::new(self.rig.assuming(self.smoother.sigma)),
             limits: self.robot.limits.clone(),
             actions: self.actions(),
             constraints: self.constraints.clone(),
-            watch: self.watch(),
+            watch,
             deviations: self.prior.standard_deviations(&layout),
             units: self.selection.units,
             search: self.selection.search,
@@ -37,15 +44,34 @@ impl Scenario {
         }
     }
 
+    /// Moves targets of unknown places off where the file happens to put them, often the origin of the flange and so the axis of the
+    /// last joint, which could then not be told: by half of what they are known to, in no direction that an axis is likely to have.
+    /// Sockets that nobody has guessed follow.
+    fn unline(&self, state: &mut State) {
+        for (block, _) in self.robot.layout.blocks() {
+            let (Block::Target(index), Some(Known::Within { length_m, .. })) = (block, self.prior.of(block)) else {
+                continue;
+            };
+            let shift = Vector3::new(0.36, 0.48, 0.8) * (0.5 * length_m);
+            match &mut state.targets[index].place {
+                Place::Point(point) => *point += shift,
+                Place::Pose(pose) => pose.translation.vector += shift,
+            }
+        }
+        for (index, socket) in self.robot.sockets.iter().enumerate().filter(|(_, socket)| !socket.is_guessed) {
+            state.sockets[index] = state.target_at(socket.target, &socket.posture);
+        }
+    }
+
     /// Who watches; where sensors see some postures only and the file names none in view, one in which something is.
-    fn watch(&self) -> Option<Watch> {
+    fn watch(&self, state: &State) -> Option<Watch> {
         if let WorldSpec::Simulated { watch: Some(watch), .. } | WorldSpec::Outside { watch: Some(watch), .. } =
             &self.world
         {
             return Some(watch.clone());
         }
         let noise = vec![0.0; self.rig.equations()];
-        let is_seen = |posture: &Vec<f64>| !self.rig.observe(&self.robot.state, posture, &noise).is_miss();
+        let is_seen = |posture: &Vec<f64>| !self.rig.observe(state, posture, &noise).is_miss();
         let is_feasible = |posture: &Vec<f64>| {
             self.constraints.as_ref().is_none_or(|constraints| constraints.allow(constraints.start.as_deref(), posture))
         };

@@ -177,12 +177,17 @@ impl Case<'_> {
         let from_parameters_mm = certain.expected_error_m(&workspace).map(mm);
         let (floor, wanted, rows) = (mm(fit.belief.model_error_m), mm(self.scenario.settled_below_m), fit.rows.len());
         let spare = wanted * wanted - floor * floor;
+        let to_spare: f64 = fit.noise.iter().map(|noise| noise.equations - noise.absorbed).sum();
         let rows_needed = from_parameters_mm
-            .filter(|_| spare > 0.0)
+            .filter(|_| spare > 0.0 && to_spare >= 1.0)
             .map(|error| (rows as f64 * error * error / spare).ceil() as u64)
             .map(|needed| needed.max(1));
         let said = match (from_parameters_mm, rows_needed) {
             (None, _) => "nothing is predicted without rows".to_owned(),
+            _ if to_spare < 1.0 => format!(
+                "{rows} rows leave no equation to spare by which it could be told how good predictions are, or how many more rows \
+                 they take: measure more"
+            ),
             (Some(_), None) => format!(
                 "no number of rows reaches {wanted:.2} mm: {floor:.2} mm of the error is explained by no parameter (gears, \
                  bending, a loose target), and more rows of the same kind do not make it smaller"

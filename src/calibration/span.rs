@@ -62,7 +62,10 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let state = random_arm(&mut rng, 4);
         let layout = Layout::new(&state, (0..4).map(Block::Axis).chain([Block::Base, Block::Target(0)]));
-        let postures: Vec<Vec<f64>> = (0..40).map(|_| (0..4).map(|_| rng.random_range(-2.0..2.0)).collect()).collect();
+        // How far a joint slides is read in metres, and does not grow with the robot.
+        let turns: Vec<bool> = state.joints.iter().map(|joint| joint.line().is_some()).collect();
+        let mut draw = || turns.iter().map(|turns| if *turns { rng.random_range(-2.0..2.0) } else { 0.0 }).collect();
+        let postures: Vec<Vec<f64>> = (0..40).map(|_| draw()).collect();
         (state, layout, Workspace::from(postures))
     }
 

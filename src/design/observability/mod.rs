@@ -1,6 +1,6 @@
 //! Before any measurement: what a chain, its sensors, its limits and constraints can determine.
 //!
-//! Everything is linearised at the robot as it is described. With H the whitened rows of a movement there and Λ = Σ HᵀH the
+//! Everything is linearised at one state, the robot as it is described. With H the whitened rows of a movement there and Λ = Σ HᵀH the
 //! information of some movements,
 //!
 //! ```text
@@ -18,6 +18,7 @@
 mod course;
 mod indices;
 mod needed;
+mod outcome;
 mod report;
 
 use std::sync::Arc;
@@ -35,7 +36,7 @@ use crate::{
 use course::Course;
 pub use indices::Indices;
 pub use needed::Needed;
-pub use report::{Accuracy, Deviation, ErrorPoint, IndexTable, Observability, ObservedParameters, Posture, Weak};
+pub use outcome::{Accuracy, Deviation, ErrorPoint, IndexTable, Observability, ObservedParameters, Posture, Weak};
 
 /// What is to be calibrated, by what, and what may be done.
 #[derive(Clone, Debug)]
