@@ -90,35 +90,42 @@ fn the_written_urdf_predicts_what_the_report_says() {
     assert_ne!(text(&files, "calibrated.urdf"), TIAGO);
 }
 
-/// Another library recomputes the figure from the written files, where Python (`BODY_SCHEMA_PYTHON`, or `python3`) has it:
-/// `pip install yourdfpy`.
+/// Another library recomputes the figures from the written files and the tables: of folds, and of sockets. Which Python has it
+/// `BODY_SCHEMA_PYTHON` says (`pip install -r tests/requirements.txt`); without that variable `python3` may lack it.
 #[test]
 fn another_library_recomputes_the_held_out_figure() {
-    let (report, files) = by_folds(&tiago());
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("calibrated");
-    for File { path, text } in files {
-        let place = folder.join(path);
-        std::fs::create_dir_all(place.parent().expect("a folder")).expect("created");
-        std::fs::write(place, text).expect("written");
-    }
-    let python = std::env::var("BODY_SCHEMA_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let has_library = Command::new(&python).args(["-c", "import yourdfpy"]).output();
-    if !has_library.is_ok_and(|output| output.status.success()) {
+    let asked = std::env::var("BODY_SCHEMA_PYTHON");
+    let python = asked.clone().unwrap_or_else(|_| "python3".to_owned());
+    let library = Command::new(&python).args(["-c", "import yourdfpy"]).output();
+    if !library.is_ok_and(|output| output.status.success()) {
+        assert!(asked.is_err(), "{python} has no yourdfpy");
         eprintln!("{python} has no yourdfpy: not recomputed");
         return;
     }
-    let output = Command::new(&python)
-        .arg("tests/calibrate/held_out.py")
-        .arg(&folder)
-        .args(["scenarios/tiago-mocap.csv", "x1", "y1", "z1"])
-        .output()
-        .expect("it starts");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let theirs: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let after = report.held_out.expect("folds").after;
-    assert_eq!(theirs["readings"].as_u64(), Some(after.readings as u64));
-    let apart_mm = theirs["mean_mm"].as_f64().expect("a number") - after.mean_mm.expect("lengths");
-    assert!(apart_mm.abs() < 1e-3, "{apart_mm} mm");
+    let tiago = by_folds(&tiago());
+    let panda = builtin("panda-sockets").expect("built in");
+    let case = Case::new(&panda).expect("measured");
+    let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
+    let files = found.files(&case).expect("written");
+    for (name, (report, files), table) in [
+        ("tiago", tiago, &["scenarios/tiago-mocap.csv", "x1", "y1", "z1"][..]),
+        ("panda", (found.report, files), &["scenarios/panda-sockets.csv"]),
+    ] {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("calibrated").join(name);
+        for File { path, text } in files {
+            let place = folder.join(path);
+            std::fs::create_dir_all(place.parent().expect("a folder")).expect("created");
+            std::fs::write(place, text).expect("written");
+        }
+        let script = "tests/calibrate/held_out.py";
+        let output = Command::new(&python).arg(script).arg(&folder).args(table).output().expect("it starts");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let theirs: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        let after = report.held_out.expect("judged").after;
+        assert_eq!(theirs["readings"].as_u64(), Some(after.readings as u64), "{name}");
+        let apart_mm = theirs["mean_mm"].as_f64().expect("a number") - after.mean_mm.expect("lengths");
+        assert!(apart_mm.abs() < 1e-3, "{name}: {apart_mm} mm");
+    }
 }
 
 /// A robot that calibrates itself by a ball in two sockets: what it learned at one place holds at the seven others, and chosen

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{CalibrationError, Case, Figures, Fit, Residual, Split, parallel::mapped};
+use super::{CalibrationError, Case, Figures, Fit, Residual, Split, Unit, parallel::mapped};
 use crate::{
     kinematics::JointKind,
     model::{Block, Layout, State},
@@ -108,9 +108,10 @@ impl Case<'_> {
         let without = self.inner(&plain, &folds, near)?;
         for (trial, layout) in trials.iter_mut().zip(&layouts) {
             let with = self.inner(layout, &folds, near)?;
-            let (before, after) = (Figures::of(&without).mean(), Figures::of(&with).mean());
+            let figures = Figures::of(&without);
+            let (before, after) = (figures.mean(), Figures::of(&with).mean());
             (trial.inner_without, trial.inner) = (before, after);
-            trial.standard_error = standard_error(&without, &with);
+            trial.standard_error = standard_error(figures.unit(), &without, &with);
         }
         let gain = |trial: &Trial| Some(trial.inner_without? - trial.inner?);
         let is_worth =
@@ -143,12 +144,9 @@ impl Case<'_> {
     }
 }
 
-/// The standard error of the mean difference, reading by reading, in the unit of [`Figures::mean`].
-fn standard_error(before: &[Residual], after: &[Residual]) -> Option<f64> {
-    let error = |residual: &Residual| {
-        let apart = &residual.apart;
-        apart.length_m.map(|metres| metres * 1e3).or(apart.pixels).or(apart.angle_rad.map(f64::to_degrees))
-    };
+/// The standard error of the mean difference, reading by reading, in a unit.
+fn standard_error(unit: Unit, before: &[Residual], after: &[Residual]) -> Option<f64> {
+    let error = |residual: &Residual| unit.of(&residual.apart);
     let differences: Vec<f64> = before.iter().zip(after).filter_map(|(a, b)| Some(error(a)? - error(b)?)).collect();
     let count = differences.len() as f64;
     if count < 2.0 {

@@ -1,11 +1,14 @@
 //! Errors of predictions, row by row and in figures.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt,
+};
 
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{Case, Fit};
+use super::{Case, Fit, Reading};
 use crate::sensing::{Apart, Occasion};
 
 /// A reading beside what was predicted for it.
@@ -70,9 +73,9 @@ impl Figures {
                 (mean, rms, errors.iter().copied().fold(0.0, f64::max))
             })
         };
-        let mm = figures(&|apart| apart.length_m.map(|metres| metres * 1e3));
-        let deg = figures(&|apart| apart.angle_rad.map(f64::to_degrees));
-        let px = figures(&|apart| apart.pixels);
+        let mm = figures(&|apart| Unit::Millimetres.of(apart));
+        let deg = figures(&|apart| Unit::Degrees.of(apart));
+        let px = figures(&|apart| Unit::Pixels.of(apart));
         Self {
             readings: residuals.len(),
             mean_mm: mm.map(|it| it.0),
@@ -87,18 +90,69 @@ impl Figures {
         }
     }
 
-    /// The mean by which fits are compared: of lengths, where any were measured, else of what there is.
+    /// The mean by which fits are compared, in their [`unit`](Self::unit).
     pub fn mean(&self) -> Option<f64> {
-        self.mean_mm.or(self.mean_px).or(self.mean_deg)
+        self.told(self.unit())[0]
     }
 
-    /// The unit of [`mean`](Self::mean).
-    pub fn unit(&self) -> &'static str {
+    /// The unit in which they are told.
+    pub fn unit(&self) -> Unit {
         match (self.mean_mm, self.mean_px) {
-            (Some(_), _) => "mm",
-            (None, Some(_)) => "px",
-            (None, None) => "deg",
+            (Some(_), _) => Unit::Millimetres,
+            (None, Some(_)) => Unit::Pixels,
+            (None, None) => Unit::Degrees,
         }
+    }
+
+    /// Mean, root mean square and maximum in a unit.
+    pub fn told(&self, unit: Unit) -> [Option<f64>; 3] {
+        match unit {
+            Unit::Millimetres => [self.mean_mm, self.rms_mm, self.max_mm],
+            Unit::Pixels => [self.mean_px, self.rms_px, self.max_px],
+            Unit::Degrees => [self.mean_deg, self.rms_deg, self.max_deg],
+        }
+    }
+}
+
+/// The one unit in which the errors of a table are compared: that of lengths where any was measured, else of pictures, else of
+/// rotations. Readings that have none of it do not count then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// mm.
+    Millimetres,
+    /// px.
+    Pixels,
+    /// deg.
+    Degrees,
+}
+
+impl Unit {
+    /// A residual in it.
+    pub fn of(self, apart: &Apart) -> Option<f64> {
+        match self {
+            Self::Millimetres => apart.length_m.map(|metres| metres * 1e3),
+            Self::Pixels => apart.pixels,
+            Self::Degrees => apart.angle_rad.map(f64::to_degrees),
+        }
+    }
+
+    /// A reported reading's residual in it.
+    pub fn of_reading(self, reading: &Reading) -> Option<f64> {
+        match self {
+            Self::Millimetres => reading.residual_mm,
+            Self::Pixels => reading.residual_px,
+            Self::Degrees => reading.residual_deg,
+        }
+    }
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Millimetres => "mm",
+            Self::Pixels => "px",
+            Self::Degrees => "deg",
+        })
     }
 }
 
@@ -207,7 +261,25 @@ mod tests {
         let near = |found: Option<f64>, wanted: f64| (found.expect("measured") - wanted).abs() < 1e-12;
         assert!(near(figures.mean_mm, 3.5) && near(figures.rms_mm, 12.5_f64.sqrt()) && near(figures.max_mm, 4.0));
         assert!(near(figures.mean_deg, 1.0) && near(figures.mean(), 3.5));
-        assert_eq!((figures.readings, figures.mean_px, figures.unit()), (2, None, "mm"));
+        assert_eq!((figures.readings, figures.mean_px, figures.unit()), (2, None, Unit::Millimetres));
         assert_eq!(Figures::of(&[]), Figures::default());
+    }
+
+    /// A tracker and a camera: millimetres and pixels are never one list.
+    #[test]
+    fn readings_of_other_units_do_not_count() {
+        let length = Apart { length_m: Some(0.002), ..Apart::default() };
+        let picture = Apart { pixels: Some(40.0), ..Apart::default() };
+        let residual = |apart: &Apart| Residual {
+            row: 0,
+            sensor: Sensed::Channel(0),
+            predicted: vec![],
+            measured: vec![],
+            apart: *apart,
+        };
+        let figures = Figures::of(&[residual(&length), residual(&picture)]);
+        let unit = figures.unit();
+        assert_eq!((unit, unit.of(&length), unit.of(&picture)), (Unit::Millimetres, Some(2.0), None));
+        assert_eq!((figures.mean(), figures.told(Unit::Pixels)[0]), (Some(2.0), Some(40.0)));
     }
 }

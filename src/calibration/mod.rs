@@ -52,7 +52,7 @@ pub use calibrate::{Calibration, Options, calibrate};
 pub use case::{Case, Row};
 pub use error::CalibrationError;
 pub use extras::{Extra, Trial};
-pub use figures::{Figures, Residual, Sensed, SocketDistance};
+pub use figures::{Figures, Residual, Sensed, SocketDistance, Unit};
 pub use files::File;
 pub use fit::Fit;
 pub use init::{Begun, InitError, Sources, begin};

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{ActivePoint, Figures, SocketDistance, Trial};
+use super::{ActivePoint, Figures, SocketDistance, Trial, Unit};
 
 /// Everything that a report says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,6 +60,13 @@ pub struct Report {
     pub learning: Vec<ActivePoint>,
     /// Every reading.
     pub residuals: Vec<Reading>,
+}
+
+impl Report {
+    /// The unit in which its errors are compared.
+    pub fn unit(&self) -> Unit {
+        self.training.after.unit()
+    }
 }
 
 /// Which links of which description.

@@ -7,7 +7,7 @@ use std::{
 
 use anyhow::{Context, Result};
 use body_schema::{
-    calibration::{self, Calibration, Case, Figures, File, Options, Progress, Report, report},
+    calibration::{self, Calibration, Case, Figures, File, Options, Progress, Report, Unit, report},
     recording,
 };
 use indicatif::ProgressBar;
@@ -127,17 +127,16 @@ fn summarise(report: &Report) -> Result<()> {
         "{}: {} rows, {} learned from; held out: {}",
         report.scenario, report.rows, report.training_rows, report.held_out_by
     ))?;
-    let mut rows = Vec::new();
+    let (unit, mut rows) = (report.unit(), Vec::new());
     if let Some(held_out) = &report.held_out {
-        rows.push(line("held out, as described", &held_out.before));
-        rows.push(line("held out, calibrated", &held_out.after));
+        rows.push(line("held out, as described", &held_out.before, unit));
+        rows.push(line("held out, calibrated", &held_out.after, unit));
         if held_out.full_model != held_out.after {
-            rows.push(line("held out, fuller model", &held_out.full_model));
+            rows.push(line("held out, fuller model", &held_out.full_model, unit));
         }
     }
-    rows.push(line("learned from, as described", &report.training.before));
-    rows.push(line("learned from, calibrated", &report.training.after));
-    let unit = report.training.after.unit();
+    rows.push(line("learned from, as described", &report.training.before, unit));
+    rows.push(line("learned from, calibrated", &report.training.after, unit));
     let [mean, rms, max] = ["mean", "rms", "max"].map(|name| format!("{name} ({unit})"));
     output::say(output::table(["errors", "readings", &mean, &rms, &max, "mean (deg)"], rows))?;
     if let Some(sd_mm) = report.span_1m_sd_mm {
@@ -158,13 +157,8 @@ fn summarise(report: &Report) -> Result<()> {
     output::say(&report.more_rows.said)
 }
 
-fn line(name: &str, figures: &Figures) -> [String; 6] {
-    let (rms, max) = match figures.unit() {
-        "px" => (figures.rms_px, figures.max_px),
-        "deg" => (figures.rms_deg, figures.max_deg),
-        _ => (figures.rms_mm, figures.max_mm),
-    };
-    let [mean, rms, max] = [figures.mean(), rms, max].map(|value| output::number(value, 2));
+fn line(name: &str, figures: &Figures, unit: Unit) -> [String; 6] {
+    let [mean, rms, max] = figures.told(unit).map(|value| output::number(value, 2));
     let deg = output::number(figures.mean_deg, 3);
     [name.to_owned(), figures.readings.to_string(), mean, rms, max, deg]
 }

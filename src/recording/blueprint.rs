@@ -19,7 +19,10 @@ use super::{
     solid::single,
     stage::{GROUNDS, Stage},
 };
-use crate::experiment::{Description, LearnerDescription};
+use crate::{
+    calibration::Unit,
+    experiment::{Description, LearnerDescription},
+};
 
 /// The colours around a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
@@ -181,7 +184,7 @@ impl Arranger {
 pub(super) fn calibration(
     stage: &Stage,
     application: ApplicationId,
-    has_places: bool,
+    unit: Unit,
 ) -> Result<Vec<LogMsg>, RecordingError> {
     let [target, eye] = stage.camera(Shape::default().aspect()).map(|point| single(point.coords.into()));
     let contents = ["robot/**", "body/**", GROUNDS[0], "key"].map(|entity| format!("+ /{entity}"));
@@ -191,8 +194,8 @@ pub(super) fn calibration(
         .with(&Background::new(BackgroundKind::SolidColor).with_color(Theme::Light.background()))
         .with(&LineGrid3D::new().with_visible(false));
     let report = View::new("TextDocument", "Report", &EntityPath::from("report"));
-    let unit = if has_places { "Distance from what was measured, by row (mm)" } else { "Residual, by row" };
-    let residuals = chart(unit, ["+ /residuals/**".to_owned()], None);
+    let title = format!("Distance from what was measured, by row ({unit})");
+    let residuals = chart(&title, ["+ /residuals/**".to_owned()], None);
     let outliers = chart("Probability of an outlier, by row", ["+ /outliers".to_owned()], Some([0.0, 1.0]));
     let above = Container::horizontal([scene.into(), report.into()]);
     let below = Container::horizontal([residuals, outliers]);

@@ -44,7 +44,7 @@ use super::{
     uncertainty::{Drawn, Uncertainty},
 };
 use crate::{
-    calibration::{Calibration, Case, Reading, Residual},
+    calibration::{Calibration, Case, Reading, Residual, Unit},
     experiment::ModelReport,
     model::State,
 };
@@ -93,11 +93,11 @@ pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &s
         let described = described.get(&row).map_or(&[][..], Vec::as_slice);
         let readings = readings.get(&row).map_or(&[][..], Vec::as_slice);
         scene.log(&mut rows, row, case, &mut uncertainty, (described, readings));
-        log_residuals(&mut rows, row, described, readings);
+        log_residuals(&mut rows, row, found.report.unit(), described, readings);
     }
     let mut file = RrdFile::create(path)?;
     file.append(&[message::store_info(&store)])?;
-    file.append(&arrangement(&scene.stage, application, scene.magnified.is_some())?)?;
+    file.append(&arrangement(&scene.stage, application, found.report.unit())?)?;
     let chunks = rows.drain(|_| true)?;
     let steps = chunks.iter().filter_map(super::rows::by_steps);
     let messages: Vec<_> = steps.map(|chunk| message::data(&store, &chunk)).collect::<Result<_, _>>()?;
@@ -121,21 +121,20 @@ fn series(rows: &mut Rows) {
 }
 
 /// A row's residuals, and whether it is an outlier.
-fn log_residuals(rows: &mut Rows, row: usize, described: &[Residual], readings: &[&Reading]) {
+fn log_residuals(rows: &mut Rows, row: usize, unit: Unit, described: &[Residual], readings: &[&Reading]) {
     let step = row as u64 + 1;
     let mean = |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
-    let apart = |residual: &Residual| {
-        let apart = &residual.apart;
-        apart.length_m.map(|m| m * 1e3).or(apart.pixels).or(apart.angle_rad.map(f64::to_degrees))
-    };
     let of = |held_out: bool| {
         let wanted = readings.iter().filter(|reading| reading.held_out == held_out);
-        mean(
-            wanted.filter_map(|reading| reading.residual_mm.or(reading.residual_px).or(reading.residual_deg)).collect(),
-        )
+        mean(wanted.filter_map(|reading| unit.of_reading(reading)).collect())
     };
     let outlier = readings.iter().filter_map(|reading| reading.outlier_probability).reduce(f64::max);
-    let values = [mean(described.iter().filter_map(apart).collect()), of(false), of(true), outlier];
+    let values = [
+        mean(described.iter().filter_map(|residual| unit.of(&residual.apart)).collect()),
+        of(false),
+        of(true),
+        outlier,
+    ];
     for ((path, ..), value) in SERIES.iter().zip(values) {
         if let Some(value) = value {
             rows.at(step, &EntityPath::from(*path), &[&Scalars::new([value])]);

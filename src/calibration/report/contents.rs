@@ -2,10 +2,9 @@
 
 use super::{
     document::{Document, Part},
-    extras,
-    plots::{self, residual},
+    extras, plots,
 };
-use crate::calibration::{Case, Figures, Placement, Reading, Report, SocketDistance};
+use crate::calibration::{Case, Figures, Placement, Reading, Report, SocketDistance, Unit};
 
 /// Readings listed at most; of more the worst.
 const LISTED: usize = 200;
@@ -54,12 +53,13 @@ pub(super) fn sentence(said: &str) -> String {
 }
 
 fn headline(document: &mut Document, report: &Report, case: &Case<'_>) {
-    let unit = plots::unit(report);
+    let unit = report.unit();
     let means = report.held_out.as_ref().map(|held_out| (held_out.before.mean(), held_out.after.mean()));
     let said = match means {
         Some((Some(before), Some(after))) => {
             let change = 100.0 * (1.0 - after / before);
-            let verdict = if change >= 0.0 { format!("{change:.0} % less") } else { format!("{:.0} % more", -change) };
+            let verdict =
+                if change >= 0.0 { format!("{change:.0}\u{a0}% less") } else { format!("{:.0}\u{a0}% more", -change) };
             if case.meets_itself() {
                 format!(
                     "Where it has not been before, the calibrated robot meets itself within {after:.2} {unit} on average; as \
@@ -118,24 +118,17 @@ fn same(one: &Figures, other: &Figures) -> bool {
     one == other
 }
 
-/// What stands in a column: mean, root mean square and greatest.
-type Column = fn(&Figures) -> [Option<f64>; 3];
-
 fn figures<'a>(document: &mut Document, rows: impl Iterator<Item = (&'a str, &'a Figures)>) {
     let rows: Vec<_> = rows.collect();
-    let columns: [(&str, Column); 3] = [
-        ("mm", |it| [it.mean_mm, it.rms_mm, it.max_mm]),
-        ("deg", |it| [it.mean_deg, it.rms_deg, it.max_deg]),
-        ("px", |it| [it.mean_px, it.rms_px, it.max_px]),
-    ];
-    let shown: Vec<_> =
-        columns.iter().filter(|(_, of)| rows.iter().any(|(_, figures)| of(figures)[0].is_some())).collect();
+    let units = [Unit::Millimetres, Unit::Degrees, Unit::Pixels].into_iter();
+    let shown: Vec<Unit> =
+        units.filter(|unit| rows.iter().any(|(_, figures)| figures.told(*unit)[0].is_some())).collect();
     let mut head = vec!["errors".to_owned(), "readings".to_owned()];
-    for (unit, _) in &shown {
+    for unit in &shown {
         head.extend(["mean", "rms", "max"].map(|name| format!("{name} ({unit})")));
     }
     let cells = |(name, figures): &(&str, &Figures)| {
-        let numbers = shown.iter().flat_map(|(_, of)| of(figures)).map(number);
+        let numbers = shown.iter().flat_map(|unit| figures.told(*unit)).map(number);
         [(*name).to_owned(), figures.readings.to_string()].into_iter().chain(numbers).collect()
     };
     let rows = rows.iter().map(cells).collect();
@@ -274,7 +267,7 @@ fn by_number(document: &mut Document, report: &Report) {
     if points.is_empty() {
         return;
     }
-    let unit = plots::unit(report);
+    let unit = report.unit();
     let step = points.len().div_ceil(SHOWN);
     let shown = points.iter().enumerate().filter(|(index, _)| (points.len() - 1 - index).is_multiple_of(step));
     let row = |(_, point): (usize, &crate::calibration::ActivePoint)| {
@@ -293,7 +286,7 @@ fn folds(document: &mut Document, report: &Report) {
         return;
     };
     document.heading("Fold by fold");
-    let unit = plots::unit(report);
+    let unit = report.unit();
     let row = |fold: &crate::calibration::Fold| {
         let mean = |figures: &Figures| number(figures.mean());
         let figures = [&fold.before, &fold.after, &fold.full_model].map(mean);
@@ -332,13 +325,14 @@ fn written(document: &mut Document, report: &Report, case: &Case<'_>) {
 
 fn readings(document: &mut Document, report: &Report) {
     document.heading("Readings");
+    let unit = report.unit();
+    let error_of = |reading: &Reading| unit.of_reading(reading).unwrap_or(0.0);
     let mut shown: Vec<&Reading> = report.residuals.iter().collect();
     if shown.len() > LISTED {
-        shown.sort_by(|a, b| residual(b).unwrap_or(0.0).total_cmp(&residual(a).unwrap_or(0.0)));
+        shown.sort_by(|a, b| error_of(b).total_cmp(&error_of(a)));
         shown.truncate(LISTED);
         document.text(format!("The {LISTED} worst of {}; report.json has all.", report.residuals.len()));
     }
-    let unit = plots::unit(report);
     let numbers = |numbers: &[f64]| numbers.iter().map(|x| format!("{x:.4}")).collect::<Vec<_>>().join(", ");
     let row = |it: &Reading| {
         [
@@ -349,7 +343,7 @@ fn readings(document: &mut Document, report: &Report) {
             it.chosen.map_or_else(String::new, |place| place.to_string()),
             numbers(&it.measured),
             numbers(&it.predicted),
-            number(residual(it)),
+            number(unit.of_reading(it)),
             it.outlier_probability.map_or_else(|| "–".to_owned(), |probability| format!("{probability:.2}")),
         ]
     };

@@ -2,7 +2,7 @@
 
 use super::document::Part;
 use crate::{
-    calibration::{ActivePoint, Reading, Report},
+    calibration::{ActivePoint, Reading, Report, Unit},
     chart::{Axis, Chart, Colour, Layer, Marker, Panel, Style},
     recording::learner_color,
 };
@@ -16,7 +16,7 @@ pub fn plots(report: &Report) -> Vec<Part> {
 }
 
 fn residuals(report: &Report) -> Option<Part> {
-    let unit = unit(report);
+    let unit = report.unit();
     let panels: Vec<Panel> = [by_row(report, unit), by_number(report, unit)].into_iter().flatten().collect();
     if panels.is_empty() {
         return None;
@@ -76,19 +76,9 @@ fn chosen_style() -> Style {
     Style { colour: learner_color(0), dashes: "", marker: Some(Marker::Dot) }
 }
 
-/// The unit in which residuals are drawn.
-pub fn unit(report: &Report) -> &'static str {
-    report.training.after.unit()
-}
-
-/// A reading's residual in it.
-pub fn residual(reading: &Reading) -> Option<f64> {
-    reading.residual_mm.or(reading.residual_px).or(reading.residual_deg)
-}
-
-fn by_row(report: &Report, unit: &str) -> Option<Panel> {
-    let drawn = thinned(&report.residuals);
-    let values = drawn.iter().filter_map(|reading| residual(reading));
+fn by_row(report: &Report, unit: Unit) -> Option<Panel> {
+    let drawn = thinned(&report.residuals, unit);
+    let values = drawn.iter().filter_map(|reading| unit.of_reading(reading));
     let most = values.fold(0.0, f64::max);
     if most <= 0.0 {
         return None;
@@ -96,7 +86,7 @@ fn by_row(report: &Report, unit: &str) -> Option<Panel> {
     let suspected: Vec<usize> = report.outliers.iter().map(|outlier| outlier.row).collect();
     let points = |wanted: &dyn Fn(&Reading) -> bool| -> Vec<[f64; 2]> {
         let wanted = drawn.iter().filter(|reading| wanted(reading));
-        wanted.filter_map(|reading| Some([reading.row as f64, residual(reading)?])).collect()
+        wanted.filter_map(|reading| Some([reading.row as f64, unit.of_reading(reading)?])).collect()
     };
     let is_suspected = |reading: &Reading| suspected.contains(&reading.row);
     let layer = |points, marker, colour| Layer::Points { points, marker, colour };
@@ -117,13 +107,13 @@ fn by_row(report: &Report, unit: &str) -> Option<Panel> {
 }
 
 /// The greatest residual of every stretch of rows, where there are many.
-fn thinned(readings: &[Reading]) -> Vec<&Reading> {
+fn thinned(readings: &[Reading], unit: Unit) -> Vec<&Reading> {
     let length = readings.len().div_ceil(POINTS).max(1);
-    let size = |reading: &&Reading| residual(reading).unwrap_or(0.0);
+    let size = |reading: &&Reading| unit.of_reading(reading).unwrap_or(0.0);
     readings.chunks(length).filter_map(|chunk| chunk.iter().max_by(|a, b| size(a).total_cmp(&size(b)))).collect()
 }
 
-fn by_number(report: &Report, unit: &str) -> Option<Panel> {
+fn by_number(report: &Report, unit: Unit) -> Option<Panel> {
     let points = if report.active.is_empty() { &report.learning } else { &report.active };
     let curve = |of: fn(&ActivePoint) -> Option<f64>| -> Vec<[f64; 2]> {
         points.iter().filter_map(|point| Some([point.rows as f64, of(point)?])).collect()
