@@ -371,3 +371,25 @@ fn init_says_what_it_guessed() {
     let (code, error) = failure(&["init", &place("tiago.urdf"), &place("none.csv")]);
     assert!(code == 2 && error.contains("title columns with the joints' names: torso_lift_joint"), "{error}");
 }
+
+/// The pages of the robots that ship say what their reports say today.
+#[test]
+fn pages_of_robots_tell_what_is_measured() {
+    for entry in std::fs::read_dir("docs/robots").expect("pages") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_stem().and_then(|name| name.to_str()).expect("a name").to_owned();
+        if path.extension().is_none_or(|end| end != "md") || name == "README" {
+            continue;
+        }
+        let page = std::fs::read_to_string(&path).expect("readable");
+        let scenario = builtin(&name).expect("built in");
+        let case = Case::new(&scenario).expect("measured");
+        let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
+        let said = body_schema::calibration::report::markdown(&found, &case);
+        let lead = said.lines().find(|line| line.starts_with("**")).expect("a headline");
+        let errors = said.lines().skip_while(|line| !line.starts_with("| errors")).take_while(|line| line.starts_with('|'));
+        for line in errors.chain([lead]) {
+            assert!(page.contains(line), "docs/robots/{name}.md lacks: {line}");
+        }
+    }
+}

@@ -2,6 +2,8 @@
 
 #![cfg(feature = "app")]
 
+#[path = "recording/calibrations.rs"]
+mod calibrations;
 #[path = "recording/channels.rs"]
 mod channels;
 #[path = "recording/checks.rs"]

@@ -146,6 +146,20 @@ fn robots_of_descriptions_stand_as_reported() {
     }
 }
 
+/// Where no truth is known sockets stand where the learner takes them to be; those that are held out nowhere.
+#[test]
+fn believed_sockets_move_with_the_belief() {
+    let (reading, reports, names) = recorded("panda-sockets", 6);
+    let sockets = format!("/{}/sockets", names[0]);
+    assert_eq!(reading.steps(&sockets).len(), 7);
+    for report in &reports {
+        let drawn = reading.points(&sockets, report.step).unwrap();
+        let believed = report.learners[0].estimate.sockets_m.concat();
+        assert_eq!((drawn.len(), believed.len()), (6, 6));
+        assert!(drawn.iter().zip(&believed).all(|(a, b)| (a - b).abs() < 1e-5), "step {}", report.step);
+    }
+}
+
 #[test]
 fn a_long_recording_with_a_camera_is_small() {
     let text = builtin("arm-6dof-camera").unwrap().source;
