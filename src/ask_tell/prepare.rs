@@ -197,9 +197,6 @@ impl Session {
     /// [`Refusal`] of a wrong field, of a suggestion that there is not, and once the estimate has diverged.
     pub fn prepare_observe(&self, told: Observation, now_s: Option<f64>) -> Result<Prepared<Answer>, Refusal> {
         self.check_room(1)?;
-        if let Some(described) = self.scenario().robot.described.as_deref() {
-            told.check_limits(described)?;
-        }
         let mut draft = Draft::of(self, now_s)?;
         let count = draft.ledger.suggestions.len();
         if let Some(id) = told.suggestion_id
@@ -208,6 +205,9 @@ impl Session {
             return Err(Refusal::UnknownSuggestion { id, count });
         }
         let executed = told.read(&draft.ledger.scenario, &draft.ledger.shapes)?;
+        if let Some(described) = self.scenario().robot.described.as_deref() {
+            told.check_limits(described)?;
+        }
         let experiment = &draft.ledger.experiment;
         if let Some(failure) = experiment.agent().and_then(Agent::failure) {
             return Err(Refusal::Ended(failure.to_owned()));
@@ -297,10 +297,13 @@ impl Ask {
         let most = MOST_SUGGESTIONS as u64;
         let count = self.count.unwrap_or(1);
         if !(1..=most).contains(&count) {
-            return Err(Fault::new("count", format!("{count} is out of range"), format!("write a number from 1 to {most}")));
+            return Err(Fault::new(
+                "count",
+                format!("{count} is out of range"),
+                format!("write a number from 1 to {most}"),
+            ));
         }
-        let is_name =
-            |client: &String| !client.is_empty() && client.chars().count() <= MOST_CLIENT_CHARACTERS;
+        let is_name = |client: &String| !client.is_empty() && client.chars().count() <= MOST_CLIENT_CHARACTERS;
         if self.client.as_ref().is_some_and(|client| !is_name(client)) {
             let mend = format!("write a name of 1 to {MOST_CLIENT_CHARACTERS} characters, or leave it out");
             return Err(Fault::new("client", "this is no name", mend));

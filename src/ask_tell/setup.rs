@@ -6,7 +6,7 @@ use toml::Table;
 
 use super::{Fault, SetupError, limits::*};
 use crate::{
-    model::urdf::Urdf,
+    model::urdf::{Urdf, UrdfError},
     scenario::{Scenario, ScenarioError},
 };
 
@@ -65,8 +65,9 @@ impl Setup {
             && let Some(toml::Value::String(urdf)) = robot.get_mut("urdf")
         {
             let opened = open(urdf);
-            let refused =
-                |why| Fault::new("robot.urdf", format!("{urdf} {why}"), "name a file that can be read, beside this one");
+            let refused = |why| {
+                Fault::new("robot.urdf", format!("{urdf} {why}"), "name a file that can be read, beside this one")
+            };
             *urdf = opened.map_err(refused)?;
         }
         let calibration = serde_json::to_value(table);
@@ -127,13 +128,13 @@ impl Setup {
             let what = format!("`{}` is no text of a URDF", urdf.chars().take(40).collect::<String>());
             return Err(Fault::new("robot.urdf", what, "write the text of the file, not its name"));
         }
-        // What cannot be read is refused where the rest is read.
-        if let Ok(description) = Urdf::parse(urdf) {
-            let leaves: Vec<&str> = description.leaves().collect();
-            let ends = [("base", description.root()), ("tip", leaves.first().copied().filter(|_| leaves.len() == 1))];
-            for (key, link) in ends.into_iter().filter_map(|(key, link)| Some((key, link?.to_owned()))) {
-                robot.entry(key).or_insert_with(|| link.into());
-            }
+        let description = Urdf::parse(urdf).map_err(|UrdfError { line, what, mend, .. }| {
+            Fault::new("robot.urdf", format!("line {line}: {what}"), mend)
+        })?;
+        let leaves: Vec<&str> = description.leaves().collect();
+        let ends = [("base", description.root()), ("tip", leaves.first().copied().filter(|_| leaves.len() == 1))];
+        for (key, link) in ends.into_iter().filter_map(|(key, link)| Some((key, link?.to_owned()))) {
+            robot.entry(key).or_insert_with(|| link.into());
         }
         robot.insert("urdf".to_owned(), URDF.into());
         Ok(table)
@@ -182,9 +183,11 @@ fn check_size(scenario: &Scenario) -> Result<(), Fault> {
         ("sensor", "channels", scenario.rig.channels().len(), MOST_CHANNELS),
     ];
     match counts.into_iter().find(|(_, _, count, most)| count > most) {
-        Some((field, what, count, most)) => {
-            Err(Fault::new(field, format!("{count} {what} are more than the {most} that there may be"), "leave some out"))
-        }
+        Some((field, what, count, most)) => Err(Fault::new(
+            field,
+            format!("{count} {what} are more than the {most} that there may be"),
+            "leave some out",
+        )),
         None => Ok(()),
     }
 }
