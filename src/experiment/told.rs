@@ -68,8 +68,8 @@ impl Experiment {
         if let Some(failure) = learner.agent().failure() {
             return Err(refused(super::AbsorbError::Ended(failure.to_owned())));
         }
-        let pending = learner.agent().pending().iter();
-        let proposal = pending.filter(|pending| Some(pending.id) == proposal).cloned().next();
+        let mut pending = learner.agent().pending().iter();
+        let proposal = pending.find(|pending| Some(pending.id) == proposal).cloned();
         let label = movement.socket.and_then(|socket| description.sockets.get(socket)).map(SocketDescription::label);
         let (report, update) =
             learner.learn(proposal, movement, observation, world, &description.channels).map_err(refused)?;
