@@ -138,7 +138,7 @@ def test_configurations_of_files(tmp_path: Path) -> None:
     session = Session.from_config(tmp_path / "three.toml", agent="smoother:random", seed=4)
     assert session.joints == JOINTS and session.description()["scenario"] == "three"
     assert session.channels() == [{"name": "marker", "channel": "position"}]
-    same = Session.from_config({"robot": {"urdf": urdf()}}, agent="smoother:random", seed=4)
+    same = Session.from_config({"robot": {"urdf": urdf()}, "prior": {"direction_rad": 0.02, "point_m": 0.01}}, agent="smoother:random", seed=4)
     assert same.suggest()["suggestions"] == session.suggest()["suggestions"]
     with pytest.raises(body_schema.FieldError, match="missing.toml"):
         Session.from_config(tmp_path / "missing.toml")

@@ -189,3 +189,30 @@ fn sockets() {
     let Err(Refusal::Field(fault)) = session.observe(elsewhere, None) else { panic!("no such socket") };
     assert!(fault.field == "measurements.socket" && fault.mend.contains("front_center/0, front_center/1"), "{fault:?}");
 }
+
+/// Motors that were homed by eye: the axes are right, the zeros are not. They go into the description and into the report.
+#[test]
+fn offsets_of_readings() {
+    let mut keys = quick();
+    keys["robot"]["hold"] = json!(["pan", "lift", "elbow"]);
+    keys["robot"]["offsets"] = json!(["lift", "elbow"]);
+    let (session, _) = told(json!({ "robot": keys["robot"] }), 8, |robot, theta| {
+        let nominal = body_schema::model::urdf::Urdf::parse(keys["robot"]["urdf"].as_str().expect("a text"));
+        let mut state = nominal.and_then(|urdf| urdf.chain("base", "tip")).expect("a chain").state();
+        state.targets[0] = robot.truth.targets[0];
+        let at = state.marker_at(&[theta[0], theta[1] + 0.04, theta[2] - 0.03]);
+        json!({ "marker": [at.x, at.y, at.z] })
+    });
+    let (calibration, _) = session.calibrate(&Silent).expect("calibrated");
+    let offset = |index: usize| calibration.report.joints[index].offset.map(|offset| offset.value);
+    assert_eq!(offset(0), None);
+    for (index, wanted) in [(1, 0.04_f64), (2, -0.03)] {
+        let found = offset(index).expect("learned");
+        assert!((found - wanted.to_degrees()).abs() < 0.02, "{found} degrees");
+    }
+    agrees(&session);
+    let mut wrong = keys.clone();
+    wrong["robot"]["offsets"] = json!(["elbw"]);
+    let error = Session::open(Setup::new(wrong)).map(drop).expect_err("no such joint").to_string();
+    assert!(error.contains("`robot.offsets`: the URDF has no joint `elbw`; did you mean `elbow`"), "{error}");
+}

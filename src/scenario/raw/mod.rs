@@ -73,6 +73,8 @@ pub struct Robot {
     pub tip: Option<Spanned<String>>,
     #[serde(default)]
     pub hold: Vec<Spanned<String>>,
+    #[serde(default)]
+    pub offsets: Vec<Spanned<String>>,
     #[serde(rename = "joint")]
     pub joints: Spanned<Vec<Spanned<Joint>>>,
 }
