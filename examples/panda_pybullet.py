@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A Panda in PyBullet that is not as its URDF says: body_schema asks where to move, PyBullet moves and measures.
 
-    pip install ./python pybullet
+    pip install ./python pybullet numpy
     python examples/panda_pybullet.py --seeds 10
     python examples/panda_pybullet.py --url http://localhost:8080     # the same through a server
 

@@ -136,7 +136,7 @@ def test_refusals_are_the_same_exceptions(server: Server) -> None:
     session = client(server).from_urdf(urdf(), "base", "tip", **calibration())
     with pytest.raises(body_schema.FieldError) as refused:
         session.observe({"pan": 0.0}, marker=None)
-    assert refused.value.field == "configuration.elbow" and refused.value.mend
+    assert refused.value.field == "configuration.lift" and refused.value.mend
     with pytest.raises(body_schema.NotFoundError):
         session.reject(9)
     session.suggest()
