@@ -11,7 +11,9 @@ mod robot;
 
 use std::collections::BTreeMap;
 
-use body_schema::ask_tell::{Ask, Event, Happened, Outcome, Refusal, Session, Suggestion, SuggestionState, Why};
+use body_schema::ask_tell::{
+    Ask, Event, Happened, Outcome, Refusal, Session, Status, Suggestion, SuggestionState, Why,
+};
 use robot::{Robot, open, quick};
 use serde_json::{Value, json};
 
@@ -187,9 +189,12 @@ fn enough_is_said_and_outliers_are_named() {
         let next = ask(session, "", 1).remove(0);
         session.observe(robot.sees(&next, off), None).expect("seen")
     };
-    assert_eq!(session.enough(), None);
+    assert_eq!((session.enough(), session.status().movements_left), (None, None));
     for _ in 0..20 {
         step(&mut session, 0.0);
+        let Status { movements_left, enough, expected_error_mm, .. } = session.status();
+        assert_eq!(movements_left == Some(0), enough.is_some());
+        assert!(movements_left.is_none_or(|left| left < 60), "{movements_left:?} at {expected_error_mm:?} mm");
     }
     let enough = session.suggest(&Ask::default(), None).expect("one").enough.expect("settled");
     assert!(enough.expected_error_mm < enough.wanted_mm && (enough.wanted_mm, enough.observations) == (2.0, 20));
