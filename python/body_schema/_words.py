@@ -174,7 +174,8 @@ class Asking(ABC):
                 what, mend = f"{len(positions)} positions are none of {len(names)} joints", f"tell all of {', '.join(names)}"
                 raise FieldError(f"`configuration`: {what}; {mend}", "configuration", what, mend)
             configuration = dict(zip(names, positions))
-        body = {"configuration": dict(configuration), "measurements": {**(measurements or {}), **channels}}
+        seen = {**(measurements or {}), **channels}
+        body: dict[str, Any] = {"configuration": dict(configuration), "measurements": seen}
         if suggestion_id is not None:
             body["suggestion_id"] = suggestion_id
         return self._observe(body)
