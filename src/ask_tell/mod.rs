@@ -72,6 +72,7 @@
 //! here. See [`Results`].
 
 mod channel;
+mod draft;
 mod error;
 mod event;
 #[cfg(test)]

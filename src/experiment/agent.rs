@@ -12,7 +12,10 @@ use std::sync::Arc;
 
 use web_time::Instant;
 
-use super::streams::Stream;
+use super::{
+    standpoint::{OwnedStandpoint, Standpoint},
+    streams::Stream,
+};
 use crate::{
     estimation::{Belief, EstimationError, Estimator, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
@@ -415,45 +418,5 @@ impl Agent {
             return Ok(None);
         }
         self.policy.explain(&standpoint.situation(), &self.limits)
-    }
-}
-
-/// What a choice rests on, at one moment.
-#[derive(Clone, Copy, Debug)]
-pub struct Standpoint<'a> {
-    belief: &'a Belief,
-    actions: &'a Actions,
-    history: &'a History,
-    constraints: &'a Option<Arc<Constraints>>,
-}
-
-impl<'a> Standpoint<'a> {
-    fn situation(&self) -> Situation<'a> {
-        let constraints = self.constraints.as_deref();
-        Situation { belief: self.belief, actions: self.actions, history: self.history, constraints }
-    }
-
-    /// A copy to keep.
-    pub fn to_owned(&self) -> OwnedStandpoint {
-        let (actions, history) = (self.actions.clone(), self.history.clone());
-        OwnedStandpoint { belief: self.belief.clone(), actions, history, constraints: self.constraints.clone() }
-    }
-}
-
-/// A [`Standpoint`] that was kept.
-#[derive(Clone, Debug)]
-pub struct OwnedStandpoint {
-    /// What was believed.
-    pub belief: Belief,
-    actions: Actions,
-    history: History,
-    constraints: Option<Arc<Constraints>>,
-}
-
-impl OwnedStandpoint {
-    /// The same to look at.
-    pub fn borrowed(&self) -> Standpoint<'_> {
-        let Self { belief, actions, history, constraints } = self;
-        Standpoint { belief, actions, history, constraints }
     }
 }
