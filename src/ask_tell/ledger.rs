@@ -7,10 +7,11 @@ use std::{
 
 use super::{
     Answer, ChannelShape, Event, Happened, Observation, Outcome, Plan, Setup, SetupError, Suggestion, SuggestionState,
+    Why,
     channel::{label, shapes},
 };
 use crate::{
-    experiment::{Event as AgentEvent, Experiment, Proposal, StepReport},
+    experiment::{Agent, Event as AgentEvent, Experiment, Proposal, StepReport},
     scenario::Scenario,
     selection::{Movement, Planned, Selection},
 };
@@ -104,8 +105,11 @@ impl Ledger {
                     agent.into_iter().for_each(|agent| agent.forbid(&refused.configuration));
                 }
             }
-            Happened::Superseded { suggestions, .. } => {
+            Happened::Superseded { suggestions, why } => {
                 suggestions.iter().try_for_each(|id| self.end(*id, SuggestionState::Superseded))?;
+                // What is planned goes on where nothing is wrong with it.
+                let agent = self.experiment.agent_mut().filter(|_| *why != Why::Constraints);
+                agent.into_iter().for_each(Agent::forget_plan);
             }
             Happened::Expired { suggestions } => {
                 suggestions.iter().try_for_each(|id| self.end(*id, SuggestionState::Expired))?;
@@ -167,7 +171,15 @@ impl Ledger {
             return Err(format!("suggestion {id} is {} and not pending", suggestion.state));
         }
         suggestion.state = state;
-        self.agent(AgentEvent::Withdrawn(id - 1))
+        if let Some(agent) = self.experiment.agent_mut() {
+            let leaves_no_trace = matches!(state, SuggestionState::Abandoned | SuggestionState::Expired);
+            if leaves_no_trace {
+                agent.abandon(id - 1)
+            } else {
+                agent.withdraw(id - 1)
+            };
+        }
+        Ok(())
     }
 
     fn suggestion_mut(&mut self, id: u64) -> Result<&mut Suggestion, String> {

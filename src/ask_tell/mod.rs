@@ -43,8 +43,8 @@
 //! | `observed` | an observation names it | teaches what was observed where the robot truly was |
 //! | `not_seen` | the same, and no channel had a reading | the surroundings count as hard to see |
 //! | `infeasible` | the robot cannot go there | its neighbourhood is excluded; one that grows with each refusal nearby |
-//! | `abandoned` | nobody carries it out | none |
-//! | `superseded` | the body has changed, the constraints have (by a refusal, or since from where the robot stands now it is out of reach), or its client asked anew | none |
+//! | `abandoned` | nobody carries it out | none: the next choice is as if it had never been made, and so may be the same |
+//! | `superseded` | the body has changed, the constraints have (by a refusal, or since from where the robot stands now it is out of reach), or its client asked anew | what was planned to follow is forgotten, but where it is only out of reach |
 //! | `expired` | its time ran out; only if it was given one | none |
 //!
 //! An observation is accepted whatever the state of the suggestion that it names, and one that names none is as good. Each
@@ -72,6 +72,7 @@
 //! here. See [`Results`].
 
 mod channel;
+mod draft;
 mod error;
 mod event;
 #[cfg(test)]

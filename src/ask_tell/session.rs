@@ -47,6 +47,10 @@ pub struct Status {
     /// There once no more are needed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub enough: Option<Enough>,
+    /// About how many more movements there are until then, if they teach as those so far did: the error that is not the model's
+    /// falls with the root of their number. Null before there are half as many again as could determine the robot, and where the model's
+    /// own error is more than is wanted, so that no number will do.
+    pub movements_left: Option<u64>,
     /// How often the body seemed to have changed.
     pub changes_noticed: u64,
     /// Why nothing is learned any more; null as long as something is.
@@ -243,6 +247,20 @@ impl Session {
         })
     }
 
+    fn movements_left(&self) -> Option<u64> {
+        if self.enough().is_some() {
+            return Some(0);
+        }
+        let metrics = &self.latest().learners[0].metrics;
+        let seen = metrics.movements - metrics.misses;
+        let (wanted, floor) = (self.scenario().settled_below_m, metrics.model_error_m.unwrap_or(0.0));
+        let spare = wanted * wanted - floor * floor;
+        let is_determined = 2 * seen >= 3 * self.description().movements_by_counting as u64;
+        let expected = metrics.expected_prediction_m.filter(|_| is_determined && spare > 0.0)?;
+        let needed = seen as f64 * (expected * expected - floor * floor).max(0.0) / spare;
+        Some(((needed - seen as f64).ceil() as u64).max(1))
+    }
+
     /// How it stands.
     pub fn status(&self) -> Status {
         let learner = &self.latest().learners[0];
@@ -265,6 +283,7 @@ impl Session {
             model_error_mm: metrics.model_error_m.map(|metres| metres * 1e3),
             wanted_mm: self.scenario().settled_below_m * 1e3,
             enough: self.enough(),
+            movements_left: self.movements_left(),
             changes_noticed: metrics.changes_noticed,
             failure: learner.failure.clone(),
         }

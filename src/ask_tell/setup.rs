@@ -6,7 +6,7 @@ use toml::Table;
 
 use super::{Fault, SetupError, limits::*};
 use crate::{
-    model::urdf::Urdf,
+    model::urdf::{Urdf, UrdfError},
     scenario::{Scenario, ScenarioError},
 };
 
@@ -128,13 +128,13 @@ impl Setup {
             let what = format!("`{}` is no text of a URDF", urdf.chars().take(40).collect::<String>());
             return Err(Fault::new("robot.urdf", what, "write the text of the file, not its name"));
         }
-        // What cannot be read is refused where the rest is read.
-        if let Ok(description) = Urdf::parse(urdf) {
-            let leaves: Vec<&str> = description.leaves().collect();
-            let ends = [("base", description.root()), ("tip", leaves.first().copied().filter(|_| leaves.len() == 1))];
-            for (key, link) in ends.into_iter().filter_map(|(key, link)| Some((key, link?.to_owned()))) {
-                robot.entry(key).or_insert_with(|| link.into());
-            }
+        let description = Urdf::parse(urdf).map_err(|UrdfError { line, what, mend, .. }| {
+            Fault::new("robot.urdf", format!("line {line}: {what}"), mend)
+        })?;
+        let leaves: Vec<&str> = description.leaves().collect();
+        let ends = [("base", description.root()), ("tip", leaves.first().copied().filter(|_| leaves.len() == 1))];
+        for (key, link) in ends.into_iter().filter_map(|(key, link)| Some((key, link?.to_owned()))) {
+            robot.entry(key).or_insert_with(|| link.into());
         }
         robot.insert("urdf".to_owned(), URDF.into());
         Ok(table)

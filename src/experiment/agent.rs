@@ -12,12 +12,16 @@ use std::sync::Arc;
 
 use web_time::Instant;
 
-use super::streams::Stream;
+use super::{
+    standpoint::{OwnedStandpoint, Standpoint},
+    streams::Stream,
+};
 use crate::{
     estimation::{Belief, EstimationError, Estimator, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
     selection::{
-        Actions, Appraisal, Constraints, History, Movement, Policy, Search, Selection, SelectionError, Situation,
+        Actions, Appraisal, Constraints, History, Movement, Planned, Policy, Search, Selection, SelectionError,
+        Situation,
     },
     sensing::{Observation, Refused},
 };
@@ -34,6 +38,8 @@ pub struct Agent {
     /// Proposals made so far.
     proposals: u64,
     pending: Vec<Proposal>,
+    /// The plan of the latest proposal that was carried out, with its ordinal.
+    carried_out: Option<(u64, Planned)>,
     history: History,
     failure: Option<String>,
 }
@@ -94,8 +100,21 @@ impl Agent {
         seed: u64,
     ) -> Self {
         let (pending, history) = (Vec::new(), History::default());
-        let (constraints, policy) = (None, Arc::from(policy));
-        Self { estimator, policy, actions, limits, constraints, seed, proposals: 0, pending, history, failure: None }
+        let policy = Arc::from(policy);
+        let (constraints, carried_out, failure) = (None, None, None);
+        Self {
+            estimator,
+            policy,
+            actions,
+            limits,
+            constraints,
+            seed,
+            proposals: 0,
+            pending,
+            carried_out,
+            history,
+            failure,
+        }
     }
 
     /// The same bound to constraints: it proposes nothing that violates them.
@@ -297,7 +316,8 @@ impl Agent {
 
     /// Where the robot stands, as far as is known, rad or m per joint: where it moved last, or else where it starts.
     pub fn posture(&self) -> Option<&[f64]> {
-        self.history.posture().or(self.constraints.as_deref()?.start.as_deref())
+        let start = || self.constraints.as_deref()?.start.as_deref();
+        self.history.posture().or_else(start)
     }
 
     /// Takes a proposal back; false if it is not pending.
@@ -305,6 +325,24 @@ impl Agent {
         let before = self.pending.len();
         self.pending.retain(|proposal| proposal.id != id);
         self.pending.len() < before
+    }
+
+    /// Takes a proposal back as if it had never been made, the plan that came with it included; false if it is not pending. What
+    /// is drawn for the next one is drawn anew.
+    pub fn abandon(&mut self, id: u64) -> bool {
+        let was_pending = self.withdraw(id);
+        if was_pending {
+            let planned = self.pending.iter().filter_map(|it| Some((it.id, it.selection.plan.clone()?)));
+            let latest = planned.chain(self.carried_out.clone()).max_by_key(|(id, _)| *id);
+            self.history.plan_anew(latest.map(|(_, plan)| plan));
+        }
+        was_pending
+    }
+
+    /// Forgets what is planned: the next choice begins with none.
+    pub fn forget_plan(&mut self) {
+        self.carried_out = None;
+        self.history.plan_anew(None);
     }
 
     /// Takes in movements that were executed, in order. If one does not fit, none is absorbed. Tells what each update
@@ -321,8 +359,12 @@ impl Agent {
 
     fn absorb_one(&mut self, executed: &Executed) -> Result<Update, AbsorbError> {
         let Executed { proposal, movement, observation } = executed;
-        if let Some(id) = proposal {
-            self.withdraw(*id);
+        if let Some(index) = self.pending.iter().position(|pending| Some(pending.id) == *proposal) {
+            let Proposal { id, selection, .. } = self.pending.remove(index);
+            let is_latest = self.carried_out.as_ref().is_none_or(|(latest, _)| *latest < id);
+            if let Some(plan) = selection.plan.filter(|_| is_latest) {
+                self.carried_out = Some((id, plan));
+            }
         }
         self.history.moved(movement, &self.actions, observation);
         self.actions.use_up(movement);
@@ -376,45 +418,5 @@ impl Agent {
             return Ok(None);
         }
         self.policy.explain(&standpoint.situation(), &self.limits)
-    }
-}
-
-/// What a choice rests on, at one moment.
-#[derive(Clone, Copy, Debug)]
-pub struct Standpoint<'a> {
-    belief: &'a Belief,
-    actions: &'a Actions,
-    history: &'a History,
-    constraints: &'a Option<Arc<Constraints>>,
-}
-
-impl<'a> Standpoint<'a> {
-    fn situation(&self) -> Situation<'a> {
-        let constraints = self.constraints.as_deref();
-        Situation { belief: self.belief, actions: self.actions, history: self.history, constraints }
-    }
-
-    /// A copy to keep.
-    pub fn to_owned(&self) -> OwnedStandpoint {
-        let (actions, history) = (self.actions.clone(), self.history.clone());
-        OwnedStandpoint { belief: self.belief.clone(), actions, history, constraints: self.constraints.clone() }
-    }
-}
-
-/// A [`Standpoint`] that was kept.
-#[derive(Clone, Debug)]
-pub struct OwnedStandpoint {
-    /// What was believed.
-    pub belief: Belief,
-    actions: Actions,
-    history: History,
-    constraints: Option<Arc<Constraints>>,
-}
-
-impl OwnedStandpoint {
-    /// The same to look at.
-    pub fn borrowed(&self) -> Standpoint<'_> {
-        let Self { belief, actions, history, constraints } = self;
-        Standpoint { belief, actions, history, constraints }
     }
 }

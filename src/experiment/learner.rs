@@ -3,13 +3,14 @@
 use std::{mem::take, sync::OnceLock};
 
 use super::{
-    agent::{AbsorbError, Agent, Executed, OwnedStandpoint, Proposal, Standpoint},
+    agent::{AbsorbError, Agent, Executed, Proposal},
     choice::{AppraisalReport, Choice, ChoiceError},
     head::GazeReport,
     judge::Judge,
     metrics::Metrics,
     report::{LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
     sight::{ChannelDescription, readings},
+    standpoint::{OwnedStandpoint, Standpoint},
     world::World,
 };
 use crate::{

@@ -26,11 +26,12 @@ mod remarks;
 mod report;
 mod result;
 mod sight;
+mod standpoint;
 mod streams;
 mod told;
 mod world;
 
-pub use agent::{AbsorbError, Agent, Event, Executed, OwnedStandpoint, Proposal, Standpoint};
+pub use agent::{AbsorbError, Agent, Event, Executed, Proposal};
 pub use choice::{
     AppraisalReport, BoxReport, Choice, ChoiceError, ChosenReport, IterationReport, SearchedJoint, ShapeReport,
 };
@@ -55,6 +56,7 @@ pub use sight::{
     CameraDescription, ChannelDescription, ChannelReading, CorrectionReport, PlaceReport, TargetDescription,
 };
 pub(crate) use sight::{channels, described};
+pub use standpoint::{OwnedStandpoint, Standpoint};
 pub use streams::Stream;
 pub use told::Prospect;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};

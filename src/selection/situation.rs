@@ -47,6 +47,11 @@ impl History {
         }
     }
 
+    /// This is what is planned now, whatever was proposed with.
+    pub fn plan_anew(&mut self, plan: Option<Planned>) {
+        self.plan = plan;
+    }
+
     /// A movement was made.
     pub fn moved(&mut self, movement: &Movement, actions: &Actions, observation: &Observation) {
         self.expect(&movement.configuration);

@@ -75,6 +75,8 @@ pub struct Robot {
     pub hold: Vec<Spanned<String>>,
     pub up: Option<Spanned<Exactly<f64, 3>>>,
     pub elbow: Option<Spanned<String>>,
+    #[serde(default)]
+    pub offsets: Vec<Spanned<String>>,
     #[serde(rename = "joint")]
     pub joints: Spanned<Vec<Spanned<Joint>>>,
 }

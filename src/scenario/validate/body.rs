@@ -69,6 +69,7 @@ impl Check<'_> {
             }
         }
         let (held, partly) = self.learned(scenario, &names);
+        let offsets = self.offsets(scenario, &names, &joints);
         learned.resize(names.len(), true);
         learned.iter_mut().zip(held).for_each(|(learned, held)| *learned &= held);
         if names.is_empty() {
@@ -87,10 +88,10 @@ impl Check<'_> {
             blocks.extend(compliance.into_iter().filter(|_| spanned.get_ref().learn_compliance));
         }
         outfit.equip(&mut state);
-        blocks.extend(outfit.known.iter().map(|(block, _)| *block));
+        blocks.extend(offsets.iter().chain(&outfit.known).map(|(block, _)| *block));
         blocks.extend(raw.learn_marker.then_some(Block::Target(0)));
         let Outfit { mut equipment, mut known, .. } = outfit;
-        known.extend(partly);
+        known.extend(partly.into_iter().chain(offsets));
         if equipment.targets.is_empty() {
             let (name, points) = ("marker".to_owned(), vec![Point3::origin()]);
             equipment.targets.push(TargetKind { name, points, facing: None });

@@ -7,6 +7,7 @@ use toml::Spanned;
 
 use super::{Check, raw};
 use crate::{
+    kinematics::{Joint, JointKind},
     model::{
         Block,
         urdf::{Chain, Urdf, UrdfError},
@@ -118,6 +119,47 @@ impl Check<'_> {
             return None;
         }
         Some(Arc::new(Described { file: name, urdf, chain }))
+    }
+
+    /// The joints of a description whose readings are off by an offset that is learned, and how well that is known.
+    pub(super) fn offsets(
+        &mut self,
+        scenario: &raw::Scenario,
+        names: &[String],
+        joints: &[Joint],
+    ) -> Vec<(Block, Known)> {
+        let (prior, mut offsets) = (scenario.prior.get_ref(), Vec::new());
+        for given in &scenario.robot.offsets {
+            let name = given.get_ref();
+            let Some(index) = names.iter().position(|joint| joint == name).filter(|_| scenario.robot.urdf.is_some())
+            else {
+                let mend = match similar(name, names.iter().map(String::as_str)) {
+                    _ if scenario.robot.urdf.is_none() => {
+                        "write `learn_offset = true` of the [[robot.joint]]".to_owned()
+                    }
+                    Some(known) => format!("did you mean `{known}`?"),
+                    None => format!("write some of {}", names.join(", ")),
+                };
+                self.problem(given.span(), "robot.offsets", format!("the URDF has no joint `{name}`"), mend);
+                continue;
+            };
+            let (key, sd) = match joints.get(index).map(Joint::kind) {
+                Some(JointKind::Prismatic) => ("prior.offset_m", &prior.offset_m),
+                _ => ("prior.offset_rad", &prior.offset_rad),
+            };
+            match sd {
+                Some(sd) => {
+                    let size = self.positive(key, sd);
+                    let known = Known::Within { length_m: size, angle_rad: size, other: size };
+                    offsets.push((Block::Offset(index), known));
+                }
+                None => {
+                    let mend = "add it to [prior]: the standard deviation of an offset";
+                    self.problem(given.span(), key, "an offset is learned", mend);
+                }
+            }
+        }
+        offsets
     }
 
     /// By joint, whether it is learned: all that are not held. An axis of which `joint.direction` or `joint.point` is held is

@@ -1,0 +1,26 @@
+"""Learn a robot's kinematics from a few well-chosen movements.
+
+``Session`` asks where to move and is told what was seen; ``Client`` does the same on a server; ``simulate`` and ``compare`` run
+scenarios. Lengths are metres and angles radians, but where a name ends with a unit.
+"""
+
+from ._client import Client, RemoteSession
+from ._engine import __version__
+from ._errors import ConflictError, EngineError, Error, FieldError, NotFoundError, ServerError
+from ._runs import compare, simulate
+from ._session import Session
+
+__all__ = [
+    "Client",
+    "ConflictError",
+    "EngineError",
+    "Error",
+    "FieldError",
+    "NotFoundError",
+    "RemoteSession",
+    "ServerError",
+    "Session",
+    "__version__",
+    "compare",
+    "simulate",
+]

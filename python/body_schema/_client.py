@@ -1,0 +1,182 @@
+"""Sessions on a server, in the words of sessions here. Nothing but the standard library."""
+
+from __future__ import annotations
+
+import json
+import time
+import urllib.error
+import urllib.parse
+import urllib.request
+import uuid
+from collections.abc import Mapping
+from os import PathLike, fspath
+from typing import Any
+
+from ._engine import setup_of_file, setup_of_urdf
+from ._errors import ConflictError, EngineError, Error, FieldError, NotFoundError, ServerError
+from ._words import Asking, kept, setup_with, text_of_urdf, written
+
+TRIES = 3
+"""How often a request is sent where no answer comes."""
+WAIT_S = 0.3
+"""How long is waited before the next time, longer each time, seconds."""
+
+
+class Client:
+    """A server of body-schema, by its address, as ``http://localhost:8080``.
+
+    ``token`` is what the server asks for unless it is on this machine. ``timeout_s`` is how long an answer may take, seconds.
+    """
+
+    def __init__(self, url: str, *, token: str | None = None, timeout_s: float = 120.0) -> None:
+        self.url = url.rstrip("/")
+        self._token = token
+        self._timeout_s = timeout_s
+
+    def from_urdf(
+        self,
+        urdf: str | PathLike[str],
+        base: str | None = None,
+        tip: str | None = None,
+        *,
+        agent: str | None = None,
+        seed: int = 0,
+        **calibration: Any,
+    ) -> RemoteSession:
+        """Open a session with the robot of a URDF; see ``Session.from_urdf``."""
+        if "base_" in calibration:
+            calibration["base"] = calibration.pop("base_")
+        setup = json.loads(setup_of_urdf(text_of_urdf(urdf), base, tip))
+        return self._open(setup_with(setup, agent, seed, **calibration))
+
+    def from_config(
+        self, config: Mapping[str, Any] | str | PathLike[str], *, agent: str | None = None, seed: int = 0
+    ) -> RemoteSession:
+        """Open a session of a calibration file, by its path, or of its keys; see ``Session.from_config``."""
+        if isinstance(config, Mapping):
+            setup: dict[str, Any] = {"calibration": dict(config)}
+        else:
+            setup = json.loads(setup_of_file(fspath(config)))
+        return self._open(setup_with(setup, agent, seed))
+
+    def session(self, id: str) -> RemoteSession:
+        """A session that is there already, by its id."""
+        return RemoteSession(self, id, self.request("GET", f"/v1/sessions/{urllib.parse.quote(id, safe='')}"))
+
+    def _open(self, setup: dict[str, Any]) -> RemoteSession:
+        opened = self.request("POST", "/v1/sessions", {"world": "outside", **setup})
+        return RemoteSession(self, opened["id"], opened)
+
+    def request(self, method: str, path: str, body: object = None, key: str | None = None) -> Any:
+        """The JSON of an answer; ``None`` where there is none. ``key`` is the ``Idempotency-Key``."""
+        text = self.text(method, path, body, key)
+        return json.loads(text) if text else None
+
+    def text(self, method: str, path: str, body: object = None, key: str | None = None) -> str:
+        """The text of an answer. What can be sent twice without harm is sent again where no answer comes."""
+        headers = {"Accept": "*/*"}
+        data = None
+        if body is not None:
+            headers["Content-Type"] = "application/json"
+            data = written("body", body).encode()
+        if key is not None:
+            headers["Idempotency-Key"] = key
+        if self._token is not None:
+            headers["Authorization"] = f"Bearer {self._token}"
+        request = urllib.request.Request(self.url + path, data=data, headers=headers, method=method)
+        tries = TRIES if method != "POST" or key is not None else 1
+        for again in range(tries):
+            try:
+                with urllib.request.urlopen(request, timeout=self._timeout_s) as answer:
+                    return str(answer.read().decode())
+            except urllib.error.HTTPError as error:
+                with error:
+                    raise _refused(error.code, error.read().decode(errors="replace")) from None
+            except (urllib.error.URLError, OSError) as error:
+                if again + 1 == tries:
+                    reason = getattr(error, "reason", error)
+                    raise ServerError(f"{self.url} does not answer: {reason}") from None
+            time.sleep(WAIT_S * 2**again)
+        raise ServerError(f"{self.url} does not answer")
+
+
+class RemoteSession(Asking):
+    """A session on a server, with the methods of ``Session``. It lives there until it is deleted."""
+
+    def __init__(self, client: Client, id: str, resource: dict[str, Any]) -> None:
+        self.id = id
+        """By this ``Client.session`` finds it again."""
+        self._client = client
+        self._names = [joint["name"] for joint in resource["description"]["joints"]]
+        self._path = f"/v1/sessions/{urllib.parse.quote(id, safe='')}"
+
+    def _suggest(self, ask: dict[str, Any]) -> dict[str, Any]:
+        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/suggestions", ask)
+        return answer
+
+    def _observe(self, observation: dict[str, Any]) -> dict[str, Any]:
+        key = str(uuid.uuid4())
+        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/observations", observation, key)
+        return answer
+
+    def _outcome(self, id: int, outcome: dict[str, Any]) -> dict[str, Any]:
+        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/suggestions/{id}/outcome", outcome)
+        return answer
+
+    def _joints(self) -> list[str]:
+        return list(self._names)
+
+    def suggestions(self) -> list[dict[str, Any]]:
+        """All suggestions that were ever made, whoever asked, each with its ``state``."""
+        answer: list[dict[str, Any]] = self._client.request("GET", f"{self._path}/suggestions")["suggestions"]
+        return answer
+
+    def exclude(self, observation: int) -> None:
+        """Take an observation out, by its number: the belief becomes what the others give."""
+        self._client.text("DELETE", f"{self._path}/observations/{observation}")
+
+    def include(self, observation: int) -> None:
+        """Take an excluded observation in again: the belief becomes as if it had never been excluded."""
+        self._client.text("PUT", f"{self._path}/observations/{observation}/included")
+
+    def report(self) -> dict[str, Any]:
+        """What ``body-schema calibrate`` says of the observations: the content of ``report.json``."""
+        answer: dict[str, Any] = self._client.request("GET", f"{self._path}/report.json")
+        return answer
+
+    def to_urdf(self, path: str | PathLike[str] | None = None) -> str:
+        """The URDF with the learned origins, byte for byte the given one otherwise; written to ``path`` if there is one."""
+        return kept(self._client.text("GET", f"{self._path}/model.urdf"), path)
+
+    def to_yaml(self, path: str | PathLike[str] | None = None) -> str:
+        """The same origins by joint as ``kinematics.yaml``: x, y, z in m, roll, pitch, yaw in rad."""
+        return kept(self._client.text("GET", f"{self._path}/kinematics.yaml"), path)
+
+    def to_csv(self, path: str | PathLike[str] | None = None) -> str:
+        """The observations that count, as the table that ``body-schema calibrate`` reads; rad and m."""
+        return kept(self._client.text("GET", f"{self._path}/observations.csv"), path)
+
+    def delete(self) -> None:
+        """Delete the session on the server, with all its events."""
+        self._client.text("DELETE", self._path)
+
+
+def _refused(status: int, text: str) -> Error:
+    """The exception of an answer by RFC 9457, ``application/problem+json``."""
+    try:
+        problem = json.loads(text)
+    except ValueError:
+        problem = {}
+    if not isinstance(problem, dict):
+        problem = {}
+    detail = str(problem.get("detail") or problem.get("title") or text or f"HTTP {status}")
+    if status in (400, 413, 422) and problem.get("field"):
+        field, what, mend = (str(problem.get(key) or "") for key in ("field", "what", "mend"))
+        return FieldError(detail, field, what or detail, mend)
+    if status == 404:
+        return NotFoundError(detail)
+    if status == 409:
+        return ConflictError(detail)
+    if status == 422:
+        return EngineError(detail)
+    return ServerError(detail, status)

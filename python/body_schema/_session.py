@@ -1,0 +1,160 @@
+"""Sessions of one's own, computed here."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from ._engine import Engine, setup_of_file, setup_of_urdf
+from ._words import Asking, Configuration, kept, setup_with, text_of_urdf, written
+
+
+class Session(Asking):
+    """A session with a robot: it is asked where to move, and told what was seen.
+
+    A session is a list of events. ``save`` writes it, and ``load`` gives it again, to the last bit on the same build and kind of
+    CPU. While it computes, other threads run.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        """Use ``from_urdf``, ``from_config`` or ``load``."""
+        self._engine = engine
+
+    @classmethod
+    def from_urdf(
+        cls,
+        urdf: str | PathLike[str],
+        base: str | None = None,
+        tip: str | None = None,
+        *,
+        agent: str | None = None,
+        seed: int = 0,
+        **calibration: Any,
+    ) -> Session:
+        """A session with the robot of a URDF, given as text or by the path of its file.
+
+        ``base`` and ``tip`` are links, the ends of the chain; where one link hangs on nothing, and nothing on one link, they may
+        be left out. Without more keys the position of a marker somewhere on ``tip`` is measured, and the robot stands
+        somewhere: both are found. ``calibration`` are the keys of a calibration file, as ``sensor``, ``target``, ``base_``,
+        ``prior`` and ``constraints``; ``base_`` is its table ``[base]``, where the robot stands.
+
+        ``agent`` names who decides: ``global`` unless told otherwise, or an estimator and a policy as ``smoother:random``.
+        """
+        if "base_" in calibration:
+            calibration["base"] = calibration.pop("base_")
+        setup = json.loads(setup_of_urdf(text_of_urdf(urdf), base, tip))
+        return cls(Engine.open(written("calibration", setup_with(setup, agent, seed, **calibration))))
+
+    @classmethod
+    def from_config(
+        cls, config: Mapping[str, Any] | str | PathLike[str], *, agent: str | None = None, seed: int = 0
+    ) -> Session:
+        """A session of a calibration file, by its path, or of its keys.
+
+        A file names its URDF, which lies beside it; its ``[measurements]`` are left out. Among keys ``robot.urdf`` is the text
+        of the URDF.
+        """
+        if isinstance(config, Mapping):
+            setup: dict[str, Any] = {"calibration": dict(config)}
+        else:
+            setup = json.loads(setup_of_file(fspath(config)))
+        return cls(Engine.open(written("calibration", setup_with(setup, agent, seed))))
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Session:
+        """A session that ``save`` wrote. Nothing is chosen again."""
+        return cls(Engine.load(Path(path).read_text(encoding="utf-8")))
+
+    def save(self, path: str | PathLike[str] | None = None) -> str:
+        """The whole session as JSON, setup and events; written to ``path`` if there is one."""
+        return kept(self._engine.save(), path)
+
+    def _suggest(self, ask: dict[str, Any]) -> dict[str, Any]:
+        answer: dict[str, Any] = json.loads(self._engine.suggest(written("suggest", ask), time.time()))
+        return answer
+
+    def _observe(self, observation: dict[str, Any]) -> dict[str, Any]:
+        answer: dict[str, Any] = json.loads(self._engine.observe(written("observation", observation), time.time()))
+        return answer
+
+    def _outcome(self, id: int, outcome: dict[str, Any]) -> dict[str, Any]:
+        told = self._engine.outcome(id, outcome["state"], outcome.get("reason"), time.time())
+        answer: dict[str, Any] = json.loads(told)
+        return answer
+
+    def _joints(self) -> list[str]:
+        return [joint["name"] for joint in self.description()["joints"]]
+
+    def exclude(self, observation: int) -> None:
+        """Take an observation out, by its number: the belief becomes what the others give."""
+        self._engine.exclude(observation, time.time())
+
+    def include(self, observation: int) -> None:
+        """Take an excluded observation in again: the belief becomes as if it had never been excluded."""
+        self._engine.include(observation, time.time())
+
+    def suggestions(self) -> list[dict[str, Any]]:
+        """All suggestions that were ever made, whoever asked, each with its ``state``."""
+        answer: list[dict[str, Any]] = json.loads(self._engine.suggestions())
+        return answer
+
+    def observations(self) -> list[dict[str, Any]]:
+        """All observations: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
+        answer: list[dict[str, Any]] = json.loads(self._engine.observations())
+        return answer
+
+    def events(self) -> list[dict[str, Any]]:
+        """Everything that happened, in order."""
+        answer: list[dict[str, Any]] = json.loads(self._engine.events())
+        return answer
+
+    def channels(self) -> list[dict[str, Any]]:
+        """The names of the channels, and the shapes of their readings."""
+        answer: list[dict[str, Any]] = json.loads(self._engine.channels())
+        return answer
+
+    def description(self) -> dict[str, Any]:
+        """What stays the same: joints with kinds and limits (rad, m), channels, targets, parameters."""
+        answer: dict[str, Any] = json.loads(self._engine.description())
+        return answer
+
+    def status(self) -> dict[str, Any]:
+        """How it stands: ``observations``, ``outliers``, ``expected_error_mm``, ``wanted_mm``, ``enough``, ``failure``, …"""
+        answer: dict[str, Any] = json.loads(self._engine.status())
+        return answer
+
+    def estimate(self) -> dict[str, Any]:
+        """The robot as it is believed now: every joint's axis at zero with its covariance, the marker; m and rad."""
+        answer: dict[str, Any] = json.loads(self._engine.estimate())
+        return answer
+
+    def predict(self, configurations: Sequence[Configuration]) -> list[list[float]]:
+        """Where the hand is believed to be at these configurations, ``[x, y, z]`` each, m, frame of the measurements."""
+        names = self.joints
+        rows = [[it[name] for name in names] if isinstance(it, Mapping) else list(it) for it in configurations]
+        return [list(point) for point in self._engine.predict([[float(q) for q in row] for row in rows])]
+
+    def report(self) -> dict[str, Any]:
+        """What ``body-schema calibrate`` says of the observations: the content of ``report.json``."""
+        answer: dict[str, Any] = json.loads(self._engine.report())
+        return answer
+
+    def to_urdf(self, path: str | PathLike[str] | None = None) -> str:
+        """The URDF with the learned origins, byte for byte the given one otherwise; written to ``path`` if there is one."""
+        return kept(self._engine.described("calibrated.urdf"), path)
+
+    def to_yaml(self, path: str | PathLike[str] | None = None) -> str:
+        """The same origins by joint as ``kinematics.yaml``: x, y, z in m, roll, pitch, yaw in rad."""
+        return kept(self._engine.described("kinematics.yaml"), path)
+
+    def to_csv(self, path: str | PathLike[str] | None = None) -> str:
+        """The observations that count, as the table that ``body-schema calibrate`` reads; rad and m."""
+        return kept(self._engine.csv(), path)
+
+    def to_toml(self, path: str | PathLike[str] | None = None) -> str:
+        """The calibration file that goes with ``observations.csv`` and ``robot.urdf``."""
+        return kept(self._engine.toml(), path)

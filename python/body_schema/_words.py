@@ -1,0 +1,212 @@
+"""The words in which a robot is asked and told, the same for a session here and one on a server."""
+
+from __future__ import annotations
+
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal, Union
+
+from ._errors import FieldError
+
+Configuration = Union[Mapping[str, float], Sequence[float]]
+"""Joint positions by name, or in the order of ``joints``; rad (revolute) or m (prismatic)."""
+
+PENDING: Literal["pending"] = "pending"
+
+
+def written(field: str, value: object) -> str:
+    """JSON, with arrays of numpy as lists."""
+
+    def plain(other: Any) -> Any:
+        if hasattr(other, "tolist"):
+            return other.tolist()
+        raise TypeError(f"{type(other).__name__} is neither number, text, list nor dict")
+
+    try:
+        return json.dumps(value, default=plain, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        what, mend = str(error), "write finite numbers, texts, lists and dicts"
+        raise FieldError(f"`{field}`: {what}; {mend}", field, what, mend) from None
+
+
+def text_of_urdf(urdf: str | PathLike[str]) -> str:
+    """The text of a URDF that is given as such, or by the path of its file."""
+    if isinstance(urdf, str) and urdf.lstrip("\ufeff \t\r\n").startswith("<"):
+        return urdf
+    try:
+        return Path(urdf).read_text(encoding="utf-8")
+    except OSError as error:
+        what, mend = f"{urdf}: {error.strerror}", "name a file that can be read, or pass its text"
+        raise FieldError(f"`urdf`: {what}; {mend}", "urdf", what, mend) from None
+
+
+def setup_with(setup: dict[str, Any], agent: str | None, seed: int, **calibration: Any) -> dict[str, Any]:
+    """A setup with more keys of its calibration."""
+    for key, value in calibration.items():
+        if key == "robot" and isinstance(value, Mapping):
+            setup["calibration"]["robot"].update(value)
+        else:
+            setup["calibration"][key] = value
+    if agent is not None:
+        setup["agent"] = agent
+    setup["seed"] = seed
+    return setup
+
+
+class Asking(ABC):
+    """A session with a robot: it is asked where to move, and told what was seen."""
+
+    # What differs between here and there.
+
+    @abstractmethod
+    def _suggest(self, ask: dict[str, Any]) -> dict[str, Any]: ...
+
+    @abstractmethod
+    def _observe(self, observation: dict[str, Any]) -> dict[str, Any]: ...
+
+    @abstractmethod
+    def _outcome(self, id: int, outcome: dict[str, Any]) -> dict[str, Any]: ...
+
+    @abstractmethod
+    def _joints(self) -> list[str]: ...
+
+    @abstractmethod
+    def suggestions(self) -> list[dict[str, Any]]:
+        """All suggestions that were ever made, whoever asked, each with its ``state``."""
+
+    @abstractmethod
+    def exclude(self, observation: int) -> None:
+        """Take an observation out, by its number: the belief becomes what the others give."""
+
+    @abstractmethod
+    def include(self, observation: int) -> None:
+        """Take an excluded observation in again: the belief becomes as if it had never been excluded."""
+
+    @abstractmethod
+    def report(self) -> dict[str, Any]:
+        """What ``body-schema calibrate`` says of the observations: the content of ``report.json``."""
+
+    @abstractmethod
+    def to_urdf(self, path: str | PathLike[str] | None = None) -> str:
+        """The URDF with the learned origins, byte for byte the given one otherwise; written to ``path`` if there is one."""
+
+    @abstractmethod
+    def to_yaml(self, path: str | PathLike[str] | None = None) -> str:
+        """The same origins by joint as ``kinematics.yaml``: x, y, z in m, roll, pitch, yaw in rad."""
+
+    @abstractmethod
+    def to_csv(self, path: str | PathLike[str] | None = None) -> str:
+        """The observations that count, as the table that ``body-schema calibrate`` reads; rad and m."""
+
+    # What is the same.
+
+    @property
+    def joints(self) -> list[str]:
+        """The names of the joints that move, base first."""
+        return self._joints()
+
+    def suggest(
+        self,
+        count: int = 1,
+        *,
+        client: str | None = None,
+        replan: bool = False,
+        expires_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Where to move next.
+
+        Gives ``{"suggestions": […], "enough": {…}}``: the client's pending suggestions, topped up to ``count`` and chosen
+        together. Each has ``id``, ``configuration`` by joint name (rad, m), ``expected_gain``, ``expected_error_mm_after``,
+        ``chance_seen``, ``travel_rad`` and ``state``. Asking again gives the same until they are observed or rejected, unless
+        ``replan`` replaces them. ``enough`` is there once the expected error of predictions (``expected_error_mm``) has been
+        below what was wanted for five movements.
+
+        ``client`` tells several askers of one session apart; ``expires_s`` is how long new suggestions stay pending, in
+        seconds, for ever without it.
+        """
+        ask = {"count": count, "client": client, "replan": replan, "expires_s": expires_s}
+        return self._suggest({key: value for key, value in ask.items() if value is not None})
+
+    def pending(self, client: str | None = None) -> list[dict[str, Any]]:
+        """The client's pending suggestions, the oldest first."""
+        return [it for it in self.suggestions() if it["state"] == "pending" and it.get("client") == client]
+
+    def observe(
+        self,
+        configuration: Configuration,
+        /,
+        *,
+        suggestion_id: int | Literal["pending"] | None = PENDING,
+        client: str | None = None,
+        measurements: Mapping[str, Any] | None = None,
+        **channels: Any,
+    ) -> dict[str, Any]:
+        """Tell where the robot moved, and what was seen there.
+
+        ``configuration`` is where the joints *were*, by name or in the order of ``joints``, rad or m: what was executed, not
+        what was suggested. What was seen is told by channel, as keywords or in ``measurements``; ``None``, and a channel that
+        is left out, saw nothing:
+
+        ========  =======================  ==========================================================
+        channel   its name                 shape
+        ========  =======================  ==========================================================
+        position  the target's             ``[x, y, z]``, m
+        pose      the target's             ``{"position": [x, y, z], "quaternion": [x, y, z, w]}``, m
+        pixels    ``CAMERA_TARGET``        ``[[u, v], …]``, px, one pair for each point
+        distance  ``TARGET_distance``      m
+        sockets   ``socket``               ``"PLACE/NAME"``
+        ========  =======================  ==========================================================
+
+        It carries out the client's oldest pending suggestion, if there is one; ``suggestion_id`` names another, or ``None`` for
+        a movement that nobody suggested.
+
+        Gives ``observation`` (its number), ``seen``, ``innovation_sigmas`` (about 1 where all is well),
+        ``outlier_probability``, ``expected_error_mm`` (of predictions, now) and ``body_seems_changed``.
+        """
+        if suggestion_id == PENDING:
+            suggestion_id = next((it["id"] for it in self.pending(client)), None)
+        if not isinstance(configuration, Mapping):
+            positions, names = list(configuration), self.joints
+            if len(positions) != len(names):
+                what, mend = f"{len(positions)} positions are none of {len(names)} joints", f"tell all of {', '.join(names)}"
+                raise FieldError(f"`configuration`: {what}; {mend}", "configuration", what, mend)
+            configuration = dict(zip(names, positions))
+        seen = {**(measurements or {}), **channels}
+        body: dict[str, Any] = {"configuration": dict(configuration), "measurements": seen}
+        if suggestion_id is not None:
+            body["suggestion_id"] = suggestion_id
+        return self._observe(body)
+
+    def reject(
+        self,
+        suggestion_id: int | None = None,
+        *,
+        state: Literal["infeasible", "abandoned"] = "infeasible",
+        reason: str | None = None,
+        client: str | None = None,
+    ) -> dict[str, Any]:
+        """Tell that a suggestion is not carried out; without ``suggestion_id`` the client's oldest pending one.
+
+        ``infeasible``: the robot cannot go there, so that its neighbourhood is excluded, a wider one each time nearby.
+        ``abandoned``: nobody goes there, which leaves no trace. Gives the suggestion with its new ``state``.
+        """
+        if suggestion_id is None:
+            pending = self.pending(client)
+            if not pending:
+                what, mend = "nothing is pending", "ask for a suggestion first"
+                raise FieldError(f"`suggestion_id`: {what}; {mend}", "suggestion_id", what, mend)
+            suggestion_id = pending[0]["id"]
+        outcome: dict[str, Any] = {"state": state}
+        if reason is not None:
+            outcome["reason"] = reason
+        return self._outcome(suggestion_id, outcome)
+
+
+def kept(text: str, path: str | PathLike[str] | None) -> str:
+    """The text, written to a file if one is named."""
+    if path is not None:
+        Path(path).write_bytes(text.encode("utf-8"))
+    return text

@@ -1,0 +1,203 @@
+//! Sessions.
+
+use std::{
+    path::Path,
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use body_schema::{
+    ask_tell::{Ask, Fault, Observation, Outcome, Session, Setup},
+    calibration::Silent,
+};
+use pyo3::prelude::*;
+use serde::{Serialize, de::DeserializeOwned};
+
+use crate::refusal::Failure;
+
+/// A session with a robot elsewhere.
+#[pyclass(frozen)]
+pub struct Engine(Mutex<Session>);
+
+type Answer = Result<String, Failure>;
+
+impl Engine {
+    /// What `work` makes of the session, with the interpreter's lock released. What failed has changed nothing, so that a
+    /// panic in between leaves a sound session, too.
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(MutexGuard<'_, Session>) -> T + Send) -> T {
+        py.detach(|| work(self.0.lock().unwrap_or_else(PoisonError::into_inner)))
+    }
+}
+
+#[pymethods]
+impl Engine {
+    /// Of the JSON of a setup.
+    #[staticmethod]
+    fn open(py: Python<'_>, setup: &str) -> PyResult<Self> {
+        let opened = py.detach(|| Ok::<_, Failure>(Session::open(read::<Setup>("calibration", setup)?)?));
+        Ok(Self(Mutex::new(opened?)))
+    }
+
+    /// Of what `save` gave.
+    #[staticmethod]
+    fn load(py: Python<'_>, text: &str) -> PyResult<Self> {
+        let loaded = py.detach(|| Session::from_json(text));
+        Ok(Self(Mutex::new(loaded.map_err(Failure::from)?)))
+    }
+
+    fn save(&self, py: Python<'_>) -> String {
+        self.with(py, |session| session.to_json())
+    }
+
+    fn suggest(&self, py: Python<'_>, ask: &str, now_s: f64) -> PyResult<String> {
+        let answer = self.with(py, |mut session| -> Answer {
+            written(&session.suggest(&read::<Ask>("suggest", ask)?, Some(now_s))?)
+        });
+        Ok(answer?)
+    }
+
+    fn outcome(&self, py: Python<'_>, id: u64, state: &str, reason: Option<&str>, now_s: f64) -> PyResult<String> {
+        let answer = self.with(py, |mut session| -> Answer {
+            let outcome = serde_json::from_value::<Outcome>(state.into()).map_err(|_| Fault {
+                field: "state".to_owned(),
+                what: format!("`{state}` is no outcome"),
+                mend: "write `infeasible` or `abandoned`".to_owned(),
+            })?;
+            written(&session.outcome(id, outcome, reason, Some(now_s))?)
+        });
+        Ok(answer?)
+    }
+
+    fn observe(&self, py: Python<'_>, observation: &str, now_s: f64) -> PyResult<String> {
+        let answer = self.with(py, |mut session| -> Answer {
+            written(&session.observe(read::<Observation>("observation", observation)?, Some(now_s))?)
+        });
+        Ok(answer?)
+    }
+
+    fn exclude(&self, py: Python<'_>, number: u64, now_s: f64) -> PyResult<()> {
+        Ok(self.with(py, |mut session| session.exclude(number, Some(now_s))).map_err(Failure::from)?)
+    }
+
+    fn include(&self, py: Python<'_>, number: u64, now_s: f64) -> PyResult<()> {
+        Ok(self.with(py, |mut session| session.include(number, Some(now_s))).map_err(Failure::from)?)
+    }
+
+    fn suggestions(&self, py: Python<'_>) -> PyResult<String> {
+        let answer = self.with(py, |session| {
+            let all: Vec<_> = session.suggestions().iter().map(|suggestion| (**suggestion).clone()).collect();
+            written(&all)
+        });
+        Ok(answer?)
+    }
+
+    fn observations(&self, py: Python<'_>) -> PyResult<String> {
+        let answer = self.with(py, |session| {
+            let all = session.observations().iter().map(|told| {
+                serde_json::json!({ "told": told.observation, "answer": told.answer, "excluded": told.excluded })
+            });
+            written(&all.collect::<Vec<_>>())
+        });
+        Ok(answer?)
+    }
+
+    fn events(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(self.with(py, |session| written(session.events()))?)
+    }
+
+    fn channels(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(self.with(py, |session| written(session.channels()))?)
+    }
+
+    fn description(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(self.with(py, |session| written(session.description()))?)
+    }
+
+    fn status(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(self.with(py, |session| written(&session.status()))?)
+    }
+
+    fn estimate(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(self.with(py, |session| written(&session.latest().learners[0].estimate))?)
+    }
+
+    /// Predicted places of the hand at postures, metres.
+    fn predict(&self, py: Python<'_>, postures: Vec<Vec<f64>>) -> PyResult<Vec<[f64; 3]>> {
+        let predicted = self.with(py, |session| {
+            let state = session.belief().map(|belief| belief.state.clone());
+            let state = state.ok_or_else(|| Failure::new("EngineError", "there is no agent"))?;
+            let wanted = state.joints.len();
+            let of = |posture: &Vec<f64>| {
+                let what = || format!("{} positions are none of {wanted} joints", posture.len());
+                let fault = || Fault {
+                    field: "configuration".to_owned(),
+                    what: what(),
+                    mend: "write one position per joint".to_owned(),
+                };
+                match posture.len() == wanted {
+                    true => Ok(state.marker_at(posture).coords.into()),
+                    false => Err(Failure::from(fault())),
+                }
+            };
+            postures.iter().map(of).collect::<Result<Vec<[f64; 3]>, Failure>>()
+        });
+        Ok(predicted?)
+    }
+
+    /// `report.json`.
+    fn report(&self, py: Python<'_>) -> PyResult<String> {
+        let answer = self.with(py, |session| -> Answer { written(&session.calibrate(&Silent)?.0.report) });
+        Ok(answer?)
+    }
+
+    /// The text of `calibrated.urdf` or `kinematics.yaml`.
+    fn described(&self, py: Python<'_>, path: &str) -> PyResult<String> {
+        let answer = self.with(py, |session| -> Answer {
+            let files = session.results()?.description()?;
+            let found = files.into_iter().find(|file| file.path == path);
+            found.map(|file| file.text).ok_or_else(|| Failure::new("EngineError", format!("there is no {path}")))
+        });
+        Ok(answer?)
+    }
+
+    fn csv(&self, py: Python<'_>) -> String {
+        self.with(py, |session| session.observations_csv())
+    }
+
+    fn toml(&self, py: Python<'_>) -> String {
+        self.with(py, |session| session.calibration_toml())
+    }
+}
+
+/// The setup of a calibration file, as JSON; the URDF that it names is beside it.
+#[pyfunction]
+pub fn setup_of_file(path: &str) -> PyResult<String> {
+    let unreadable = |error: std::io::Error| Fault {
+        field: "config".to_owned(),
+        what: format!("{path}: {error}"),
+        mend: "name a calibration file that can be read, or pass its keys as a dict".to_owned(),
+    };
+    let text = std::fs::read_to_string(path).map_err(|error| Failure::from(unreadable(error)))?;
+    let folder = Path::new(path).parent().unwrap_or(Path::new("")).to_path_buf();
+    let open = |file: &str| std::fs::read_to_string(folder.join(file)).map_err(|error| error.to_string());
+    let setup = Setup::from_toml(&text, &open).map_err(Failure::from)?;
+    Ok(written(&setup)?)
+}
+
+/// The setup of the text of a URDF, as JSON.
+#[pyfunction]
+#[pyo3(signature = (urdf, base=None, tip=None))]
+pub fn setup_of_urdf(urdf: &str, base: Option<&str>, tip: Option<&str>) -> PyResult<String> {
+    Ok(written(&Setup::from_urdf(urdf, base, tip))?)
+}
+
+/// JSON of what holds numbers, names and lists alone.
+fn written<T: Serialize + ?Sized>(value: &T) -> Answer {
+    serde_json::to_string(value).map_err(|error| Failure::new("EngineError", error))
+}
+
+fn read<T: DeserializeOwned>(field: &str, text: &str) -> Result<T, Failure> {
+    serde_json::from_str(text).map_err(|error| {
+        let (field, mend) = (field.to_owned(), "write what the documentation says".to_owned());
+        Fault { field, what: error.to_string(), mend }.into()
+    })
+}
