@@ -160,7 +160,7 @@ impl Arranger {
         let series = |kind: &'static str| self.roots.iter().map(move |root| format!("+ {root}/readings/{kind}/**"));
         let mut views = vec![chart("Residual per reading (σ)", series("residuals"), None)];
         if self.description.learners.iter().any(|learner| learner.robust) {
-            views.push(chart("Probability of an outlier", series("outliers"), Some([0.0, 1.0])));
+            views.push(chart("Probability of an outlier", series("outliers"), Some([-0.05, 1.05])));
         }
         views
     }
@@ -196,7 +196,7 @@ pub(super) fn calibration(
     let report = View::new("TextDocument", "Report", &EntityPath::from("report"));
     let title = format!("Distance from what was measured, by row ({unit})");
     let residuals = chart(&title, ["+ /residuals/**".to_owned()], None);
-    let outliers = chart("Probability of an outlier, by row", ["+ /outliers".to_owned()], Some([0.0, 1.0]));
+    let outliers = chart("Probability of an outlier, by row", ["+ /outliers".to_owned()], Some([-0.05, 1.05]));
     let above = Container::horizontal([scene.into(), report.into()]);
     let below = Container::horizontal([residuals, outliers]);
     Container::vertical([above.into(), below.into()], [2.0, 1.0]).messages(application, Time::Shown)
