@@ -18,7 +18,7 @@ struct Program {
 impl Program {
     fn serve(environment: &[(&str, &str)]) -> Self {
         let mut process = Command::new(env!("CARGO_BIN_EXE_body-schema"))
-            .args(["serve", "--bind", "127.0.0.1:0"])
+            .args(["serve", "--bind", "127.0.0.1:0", "--ephemeral"])
             .envs(environment.iter().copied())
             .stdout(Stdio::piped())
             .spawn()

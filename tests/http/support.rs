@@ -24,7 +24,7 @@ impl Server {
     }
 
     pub async fn with_data_dir(data_dir: Option<PathBuf>) -> Self {
-        Self::with(Options { data_dir, ..Options::default() }).await
+        Self::with(Options { keep_recordings: data_dir.is_some(), data_dir, ..Options::default() }).await
     }
 
     pub async fn with(options: Options) -> Self {
