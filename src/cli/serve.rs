@@ -86,7 +86,9 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
         }
         match (&token, &arguments.token_file) {
             (None, _) => {}
-            (Some(_), Some(file)) => writeln!(out, "only those who carry the token in {} are answered", file.display())?,
+            (Some(_), Some(file)) => {
+                writeln!(out, "only those who carry the token in {} are answered", file.display())?
+            }
             (Some(token), None) => {
                 let (token, reachable) = (token.as_str(), reachable(address));
                 writeln!(out, "only those who carry the token are answered. Open once in each browser:")?;
@@ -116,7 +118,8 @@ fn data_dir(arguments: &Arguments) -> Result<Option<PathBuf>> {
 /// What whoever asks has to carry; `None` if nothing.
 fn token(arguments: &Arguments) -> Result<Option<Token>> {
     if let Some(file) = &arguments.token_file {
-        let mend = || format!("cannot read the token in {}; name a file with one in it with --token-file", file.display());
+        let mend =
+            || format!("cannot read the token in {}; name a file with one in it with --token-file", file.display());
         let text = std::fs::read_to_string(file).with_context(mend)?;
         return Ok(Some(text.trim().parse().with_context(|| format!("{} holds no token", file.display()))?));
     }

@@ -24,14 +24,7 @@ mod session;
 mod store;
 mod strangers;
 
-use std::{
-    future::IntoFuture,
-    io,
-    net::SocketAddr,
-    path::PathBuf,
-    sync::Arc,
-    time::Duration,
-};
+use std::{future::IntoFuture, io, net::SocketAddr, path::PathBuf, sync::Arc, time::Duration};
 
 use axum::Router;
 use tokio::net::TcpListener;
@@ -45,8 +38,8 @@ pub use problem::{PROBLEM_JSON, Problem};
 use session::{Budget, Keeping, Sessions};
 pub use session::{NewOutsideSession, NewSession, SessionResource};
 pub use store::{MOST_STORED_SESSIONS, Shown, Store, StoreError, Stored};
-use strangers::{Reached, Strangers};
 pub use strangers::{HostName, NoHostName, NoToken, Token};
+use strangers::{Reached, Strangers};
 
 use crate::ask_tell::MOST_SETUP_BYTES;
 

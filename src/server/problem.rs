@@ -258,7 +258,8 @@ impl From<StoreError> for Problem {
         match error {
             StoreError::Full(_) => Self::new(Kind::ServerFull, error.to_string()),
             _ if error.is_for_want_of_space() => {
-                let detail = format!("it could not be written, and has not happened: {error}; free some space and ask again");
+                let detail =
+                    format!("it could not be written, and has not happened: {error}; free some space and ask again");
                 Self::new(Kind::Storage, detail)
             }
             _ => Self::new(Kind::Internal, format!("it has not happened: {error}")),

@@ -24,8 +24,8 @@ use super::{
     EstimatorKind, Filter, Known, Prior, Robot, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError},
     misfit::Setting,
-    summary::WorldKind,
     raw,
+    summary::WorldKind,
 };
 use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},

@@ -125,7 +125,10 @@ pub(super) async fn get(
     let standing = app.sessions.standing(&id).await?;
     let told = standing.observations.iter().find(|told| told.answer.observation == number);
     let unknown = || {
-        let detail = format!("there is no observation {number}; {} were told so far, counted from 1", standing.observations.len());
+        let detail = format!(
+            "there is no observation {number}; {} were told so far, counted from 1",
+            standing.observations.len()
+        );
         Problem::new(Kind::UnknownObservation, detail).field("n")
     };
     json(ToldObservation::from(&**told.ok_or_else(unknown)?)).await

@@ -180,5 +180,6 @@ fn find(files: Vec<File>, path: &str) -> Result<String, Problem> {
 
 fn download(name: &str, content_type: &'static str, text: String) -> Response {
     let disposition = format!("attachment; filename=\"{name}\"");
-    ([(header::CONTENT_TYPE, content_type.to_owned()), (header::CONTENT_DISPOSITION, disposition)], text).into_response()
+    ([(header::CONTENT_TYPE, content_type.to_owned()), (header::CONTENT_DISPOSITION, disposition)], text)
+        .into_response()
 }

@@ -12,7 +12,12 @@ use utoipa::ToSchema;
 use super::json;
 use crate::{
     ask_tell::{Ask, Enough, Outcome, Suggestion, Suggestions},
-    server::{App, extract::JsonBody, problem::Problem, session::{Standing, now_s}},
+    server::{
+        App,
+        extract::JsonBody,
+        problem::Problem,
+        session::{Standing, now_s},
+    },
 };
 
 /// All suggestions of a session.

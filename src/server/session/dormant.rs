@@ -237,9 +237,7 @@ fn counted(events: &[ask_tell::Event]) -> u64 {
 }
 
 /// Reads and writes where it holds up no other request.
-async fn aside<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, StoreError> + Send + 'static,
-) -> Result<T, Problem> {
+async fn aside<T: Send + 'static>(work: impl FnOnce() -> Result<T, StoreError> + Send + 'static) -> Result<T, Problem> {
     let failed = |error| Problem::new(Kind::Internal, format!("a part of the server failed: {error}"));
     Ok(spawn_blocking(work).await.map_err(failed)??)
 }

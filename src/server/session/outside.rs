@@ -150,13 +150,7 @@ pub(in crate::server) struct Elsewhere {
 }
 
 impl Elsewhere {
-    fn open(
-        id: Uuid,
-        origin: Origin,
-        made_s: f64,
-        store: Arc<Store>,
-        shared: Arc<Shared>,
-    ) -> Result<Self, Problem> {
+    fn open(id: Uuid, origin: Origin, made_s: f64, store: Arc<Store>, shared: Arc<Shared>) -> Result<Self, Problem> {
         let (is_new, (setup, shown), events, keys) = match origin {
             Origin::New(setup, shown) => (true, (setup, shown), Vec::new(), BTreeMap::new()),
             Origin::Store(Stored { setup, shown, events, keys }) => (false, (setup, shown), events, keys),
@@ -184,8 +178,7 @@ impl Elsewhere {
             store.insert(id, made_s, session.setup(), shown)?;
         }
         let (recorded, channels) = (session.latest().step, session.channels().into());
-        let mut robot =
-            Self { id, session, channels, keys, recorder, recorded, store, shared, is_rewritten: false };
+        let mut robot = Self { id, session, channels, keys, recorder, recorded, store, shared, is_rewritten: false };
         robot.show().map_err(recording_failed)?;
         robot.publish(reports);
         Ok(robot)
@@ -245,7 +238,8 @@ impl Elsewhere {
             }
             let detail = format!(
                 "`{key}` came with observation {}, whose body was another; nothing has happened. Send a key of its own with \
-                 each observation", known.answer.observation
+                 each observation",
+                known.answer.observation
             );
             return Err(Problem::new(Kind::KeyTaken, detail).field("Idempotency-Key"));
         }

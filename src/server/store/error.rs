@@ -71,7 +71,10 @@ impl StoreError {
     /// Whether what failed is to write, as on a full disk: it may succeed later.
     pub fn is_for_want_of_space(&self) -> bool {
         let Self::Sqlite { source, .. } = self else { return false };
-        matches!(source.sqlite_error_code(), Some(ErrorCode::DiskFull | ErrorCode::SystemIoFailure | ErrorCode::CannotOpen))
+        matches!(
+            source.sqlite_error_code(),
+            Some(ErrorCode::DiskFull | ErrorCode::SystemIoFailure | ErrorCode::CannotOpen)
+        )
     }
 
     /// Whether the session to which something was appended is no more.

@@ -16,7 +16,8 @@ pub(super) struct Lock(#[expect(dead_code, reason = "it is locked as long as it 
 impl Lock {
     pub(super) fn take(directory: &Path) -> Result<Self, StoreError> {
         let folder = |source| StoreError::Folder { path: directory.to_owned(), source };
-        let file = File::options().create(true).truncate(false).write(true).open(directory.join(FILE)).map_err(folder)?;
+        let file =
+            File::options().create(true).truncate(false).write(true).open(directory.join(FILE)).map_err(folder)?;
         match file.try_lock() {
             Ok(()) => Ok(Self(file)),
             Err(TryLockError::WouldBlock) => Err(StoreError::Held { path: directory.to_owned() }),

@@ -108,7 +108,8 @@ impl Store {
     pub fn read(directory: &Path) -> Result<Self, StoreError> {
         let path = directory.join(FILE);
         let told = |source| StoreError::Sqlite { path: path.clone(), source };
-        let connection = Connection::open_with_flags(&path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE).map_err(told)?;
+        let connection =
+            Connection::open_with_flags(&path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE).map_err(told)?;
         connection.pragma_update(None, "query_only", true).map_err(told)?;
         schema::check(&connection, &path)?;
         Ok(Self { connection: Mutex::new(connection), path, _lock: None })
@@ -180,7 +181,9 @@ impl Store {
         let session = connection.query_row(
             "SELECT number, form, setup, shown FROM session WHERE id = ?1",
             [id.to_string()],
-            |row| Ok((row.get::<_, i64>(0)?, row.get::<_, u32>(1)?, row.get::<_, String>(2)?, row.get::<_, String>(3)?)),
+            |row| {
+                Ok((row.get::<_, i64>(0)?, row.get::<_, u32>(1)?, row.get::<_, String>(2)?, row.get::<_, String>(3)?))
+            },
         );
         let Some((number, form, setup, shown)) = session.optional().map_err(self.told())? else { return Ok(None) };
         if form > VERSION {
@@ -189,7 +192,8 @@ impl Store {
         let rows = (|| {
             let mut select = connection
                 .prepare_cached("SELECT event, idempotency_key FROM event WHERE session = ?1 ORDER BY number")?;
-            let rows = select.query_map([number], |row| Ok((row.get::<_, String>(0)?, row.get::<_, Option<String>>(1)?)))?;
+            let rows =
+                select.query_map([number], |row| Ok((row.get::<_, String>(0)?, row.get::<_, Option<String>>(1)?)))?;
             rows.collect::<Result<Vec<_>, _>>()
         })();
         let (mut events, mut keys, mut observations) = (Vec::new(), BTreeMap::new(), 0);

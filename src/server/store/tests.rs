@@ -67,7 +67,10 @@ fn a_directory_is_held_by_one_and_read_by_any() {
     store.insert(id, 0.0, &setup(), Shown::default()).expect("kept");
     let error = Store::open(folder.path()).err().expect("held");
     let told = error.to_string();
-    assert!(matches!(error, StoreError::Held { .. }) && told.contains("--data-dir") && told.contains("--ephemeral"), "{told}");
+    assert!(
+        matches!(error, StoreError::Held { .. }) && told.contains("--data-dir") && told.contains("--ephemeral"),
+        "{told}"
+    );
     let reader = Store::read(folder.path()).expect("a reader");
     assert_eq!(reader.all().expect("read"), [(id, 0.0)]);
     reader.delete(id).expect_err("it only reads");
