@@ -66,12 +66,7 @@ fn a_robot_to_be_measured() {
         assert!(found.parameters.undetermined[0].contains("the base"), "{:?}", found.parameters);
         assert!(found.errors[19].best_mm < found.errors[19].random_median_mm, "{:?}", found.errors[19]);
     }
-    assert!(
-        pose.parameters.rank >= position.parameters.rank + 2,
-        "{} {}",
-        pose.parameters.rank,
-        position.parameters.rank
-    );
+    assert!(pose.parameters.rank >= position.parameters.rank + 2, "{} {}", pose.parameters.rank, position.parameters.rank);
     let held = sensor("position").replacen("tip =", "hold = [\"wrist_3_joint\"]\ntip =", 1);
     assert_eq!(of(&held).parameters.learned, position.parameters.learned - 4);
 }

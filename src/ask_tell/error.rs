@@ -118,9 +118,7 @@ pub enum ReplayError {
     #[error("this is no session of body-schema: {0}")]
     NotASession(String),
     /// Written by a later version.
-    #[error(
-        "this session was written in version {found} of its form, and this program knows {known}; update body-schema"
-    )]
+    #[error("this session was written in version {found} of its form, and this program knows {known}; update body-schema")]
     Version {
         /// Of the session.
         found: u32,

@@ -66,23 +66,10 @@ pub(super) fn seen(session: &Session, id: Option<u64>, posture: BTreeMap<String,
 /// What can be asked or told.
 #[derive(Clone, Debug)]
 enum Call {
-    Suggest {
-        count: u64,
-        client: usize,
-        replan: bool,
-        expires: bool,
-    },
+    Suggest { count: u64, client: usize, replan: bool, expires: bool },
     /// Of one of the suggestions, where there is one; as executed, which is not quite as suggested.
-    Observe {
-        which: Option<usize>,
-        moved: f64,
-        off: f64,
-        sees: bool,
-    },
-    Outcome {
-        which: usize,
-        infeasible: bool,
-    },
+    Observe { which: Option<usize>, moved: f64, off: f64, sees: bool },
+    Outcome { which: usize, infeasible: bool },
     Exclude(usize),
     Include(usize),
     Wrong(usize),

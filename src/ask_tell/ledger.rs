@@ -80,8 +80,7 @@ impl Ledger {
                     return Err(format!("it suggests number {}, and {id} comes next", suggestion.id));
                 }
                 let movement = self.movement(suggestion)?;
-                let plan =
-                    choice.plan.clone().map(|Plan { postures, committed }| Planned { poses: postures, committed });
+                let plan = choice.plan.clone().map(|Plan { postures, committed }| Planned { poses: postures, committed });
                 let proposal = Proposal {
                     id: id - 1,
                     selection: Selection {

@@ -88,7 +88,7 @@ mod table;
 
 pub use channel::{ChannelShape, Shape};
 pub use error::{Fault, Refusal, ReplayError, SetupError};
-pub use event::{Choice, Document, Event, Happened, Plan, VERSION, Why};
+pub use event::{Choice, Document, Event, Happened, Plan, Why, VERSION};
 pub use ledger::Told;
 pub use limits::*;
 pub use observation::{Answer, Observation};

@@ -297,13 +297,10 @@ impl Ask {
         let most = MOST_SUGGESTIONS as u64;
         let count = self.count.unwrap_or(1);
         if !(1..=most).contains(&count) {
-            return Err(Fault::new(
-                "count",
-                format!("{count} is out of range"),
-                format!("write a number from 1 to {most}"),
-            ));
+            return Err(Fault::new("count", format!("{count} is out of range"), format!("write a number from 1 to {most}")));
         }
-        let is_name = |client: &String| !client.is_empty() && client.chars().count() <= MOST_CLIENT_CHARACTERS;
+        let is_name =
+            |client: &String| !client.is_empty() && client.chars().count() <= MOST_CLIENT_CHARACTERS;
         if self.client.as_ref().is_some_and(|client| !is_name(client)) {
             let mend = format!("write a name of 1 to {MOST_CLIENT_CHARACTERS} characters, or leave it out");
             return Err(Fault::new("client", "this is no name", mend));

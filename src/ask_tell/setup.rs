@@ -65,9 +65,8 @@ impl Setup {
             && let Some(toml::Value::String(urdf)) = robot.get_mut("urdf")
         {
             let opened = open(urdf);
-            let refused = |why| {
-                Fault::new("robot.urdf", format!("{urdf} {why}"), "name a file that can be read, beside this one")
-            };
+            let refused =
+                |why| Fault::new("robot.urdf", format!("{urdf} {why}"), "name a file that can be read, beside this one");
             *urdf = opened.map_err(refused)?;
         }
         let calibration = serde_json::to_value(table);
@@ -183,11 +182,9 @@ fn check_size(scenario: &Scenario) -> Result<(), Fault> {
         ("sensor", "channels", scenario.rig.channels().len(), MOST_CHANNELS),
     ];
     match counts.into_iter().find(|(_, _, count, most)| count > most) {
-        Some((field, what, count, most)) => Err(Fault::new(
-            field,
-            format!("{count} {what} are more than the {most} that there may be"),
-            "leave some out",
-        )),
+        Some((field, what, count, most)) => {
+            Err(Fault::new(field, format!("{count} {what} are more than the {most} that there may be"), "leave some out"))
+        }
         None => Ok(()),
     }
 }

@@ -3,7 +3,10 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use toml::{Table, Value};
 
-use super::{ChannelShape, Session, Shape, channel::SOCKET};
+use super::{
+    ChannelShape, Session, Shape,
+    channel::SOCKET,
+};
 
 /// What the table is called.
 pub(super) const FILE: &str = "observations.csv";
@@ -29,9 +32,7 @@ impl Cells {
             Shape::Position => all(&["x", "y", "z"]),
             Shape::Pose => all(&["x", "y", "z", "rx", "ry", "rz"]),
             Shape::Pixels { points: 1 } => all(&["u", "v"]),
-            Shape::Pixels { points } => {
-                (1..=*points).flat_map(|k| all(&[&format!("u{k}"), &format!("v{k}")])).collect()
-            }
+            Shape::Pixels { points } => (1..=*points).flat_map(|k| all(&[&format!("u{k}"), &format!("v{k}")])).collect(),
             Shape::Distance => vec![name.clone()],
             Shape::Sockets { .. } => Vec::new(),
         };

@@ -39,9 +39,7 @@ impl Scenario {
 
     /// Who watches; where sensors see some postures only and the file names none in view, one in which something is.
     fn watch(&self) -> Option<Watch> {
-        if let WorldSpec::Simulated { watch: Some(watch), .. } | WorldSpec::Outside { watch: Some(watch), .. } =
-            &self.world
-        {
+        if let WorldSpec::Simulated { watch: Some(watch), .. } | WorldSpec::Outside { watch: Some(watch), .. } = &self.world {
             return Some(watch.clone());
         }
         let noise = vec![0.0; self.rig.equations()];

@@ -99,9 +99,9 @@ async fn steps_go_on_without_their_file_which_is_written_anew_at_the_end() {
 #[tokio::test]
 async fn a_server_that_ends_on_a_full_disk_says_which_recordings_lack_their_end() {
     let folder = tempfile::tempdir().expect("a folder");
-    let program = limited(folder.path(), 400_000);
+    let program = limited(folder.path(), 2_000_000);
     let [long, short] = [program.api.open_quick(1).await, program.api.open_quick(2).await];
-    program.api.step(&long, 200).await;
+    program.api.step(&long, 1000).await;
     program.api.step(&short, 1).await;
     let file = async |session: &str| program.api.get_json(session).await["file"].as_str().expect("a file").to_owned();
     let (long, short): (String, String) = (file(&long).await, file(&short).await);

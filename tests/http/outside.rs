@@ -261,7 +261,7 @@ async fn what_is_wrong_is_named() {
     }).collect();
     let links: String = (0..42).map(|index| format!("<link name=\"l{index}\"/>")).collect();
     let long = format!("<robot name=\"long\">{links}{joints}</robot>");
-    let wide = format!("<robot><!-- {} --></robot>", "x".repeat(8 << 20));
+    let wide = format!("<robot><!-- {} --></robot>", "x".repeat(9 << 20));
     for (body, status, field) in [
         (json!({ "world": "outside" }), 422, "calibration"),
         (json!({ "world": "outside", "calibration": 3 }), 422, "calibration"),

@@ -24,8 +24,8 @@ use super::{
     EstimatorKind, Filter, Known, Prior, Robot, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError},
     misfit::Setting,
-    raw,
     summary::WorldKind,
+    raw,
 };
 use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},

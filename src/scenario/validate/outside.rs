@@ -51,12 +51,7 @@ impl Check<'_> {
             ];
             for (key, _) in given.into_iter().filter(|(_, is_given)| *is_given) {
                 let mend = "remove it; `distance_m` and `sigma_distance_m` of [sockets] say how far the two of a place are apart";
-                self.problem(
-                    span.clone(),
-                    format!("socket[{index}].{key}"),
-                    "of a real socket nobody knows this",
-                    mend,
-                );
+                self.problem(span.clone(), format!("socket[{index}].{key}"), "of a real socket nobody knows this", mend);
             }
         }
         if let (Some(held), true) = (&raw.held, raw.sockets.is_empty()) {
@@ -81,14 +76,14 @@ impl Check<'_> {
 
     /// Adds the distance that the two sockets of every place are apart, if it is known.
     pub(super) fn space_sockets(&mut self, raw: &raw::Scenario, robot: &mut Robot) {
-        let Some((held, distance)) =
-            raw.held.as_ref().and_then(|held| Some((held, held.get_ref().distance_m.as_ref()?)))
+        let Some((held, distance)) = raw.held.as_ref().and_then(|held| Some((held, held.get_ref().distance_m.as_ref()?)))
         else {
             return;
         };
         self.positive("sockets.distance_m", distance);
         let sigma = held.get_ref().sigma_distance_m.as_ref();
-        let sigma = sigma.map_or(SIGMA_DISTANCE_M, |sigma| self.positive("sockets.sigma_distance_m", sigma));
+        let sigma =
+            sigma.map_or(SIGMA_DISTANCE_M, |sigma| self.positive("sockets.sigma_distance_m", sigma));
         // Where more than two stand together it has left a problem behind.
         let _ = self.pairs(held.span(), robot, sigma);
     }
