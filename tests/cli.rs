@@ -255,6 +255,9 @@ fn bad_input_exits_with_two_and_says_what_to_do() {
         (&["compare", "arm-6dof", "--seeds", "0"], &["at least one seed"]),
         (&["sweep", "arm-6dof", "--set", "filter.x=1"], &["--learner"]),
         (&["serve", "--frame-ancestors", "example.org"], &["`example.org`", "https://example.org"]),
+        (&["serve", "--allow-host", "http://lab"], &["`http://lab` is no host name", "lab.example.org"]),
+        (&["serve", "--ephemeral", "--data-dir", "x"], &["--ephemeral", "cannot be used with", "--data-dir"]),
+        (&["export", "--out", "x"], &["SCENARIO"]),
         (&["fly"], &["fly"]),
     ];
     for (arguments, expected) in cases {

@@ -12,6 +12,8 @@ mod crashes;
 mod disk;
 #[path = "http/errors.rs"]
 mod errors;
+#[path = "http/exported.rs"]
+mod exported;
 #[path = "http/openapi.rs"]
 mod openapi;
 #[path = "http/outside.rs"]

@@ -283,7 +283,7 @@ impl Session {
         }
     }
 
-    pub(super) fn scenario(&self) -> &Arc<Scenario> {
+    pub(crate) fn scenario(&self) -> &Arc<Scenario> {
         &self.ledger.scenario
     }
 

@@ -108,11 +108,15 @@ fn data_dir(arguments: &Arguments) -> Result<Option<PathBuf>> {
     if arguments.ephemeral {
         return Ok(None);
     }
-    let platform = || Some(directories::ProjectDirs::from("", "", "body-schema")?.data_dir().to_owned());
-    let folder = arguments.data_dir.clone().or_else(platform).context(
-        "this platform names no folder for data; name one with --data-dir, or keep nothing with --ephemeral",
-    )?;
-    Ok(Some(folder))
+    let usual = || usual_data_dir().context("or keep nothing, with --ephemeral");
+    arguments.data_dir.clone().map_or_else(usual, Ok).map(Some)
+}
+
+/// The platform's folder for the data of programs.
+pub(super) fn usual_data_dir() -> Result<PathBuf> {
+    let project = directories::ProjectDirs::from("", "", "body-schema");
+    let project = project.context("this platform names no folder for data; name one with --data-dir")?;
+    Ok(project.data_dir().to_owned())
 }
 
 /// What whoever asks has to carry; `None` if nothing.

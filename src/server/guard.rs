@@ -75,7 +75,7 @@ async fn refuse_strangers(State(app): State<Arc<App>>, request: Request, next: N
         let detail = format!("this server does not answer to `{host}`; start it with --allow-host if it is to");
         return Problem::new(Kind::ForeignOrigin, detail).field("Host").into_response();
     }
-    if let Err(response) = app.strangers.admit(&request) {
+    if let Some(response) = app.strangers.turn_away(&request) {
         return response;
     }
     let harmless = matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS)

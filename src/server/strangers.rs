@@ -129,24 +129,24 @@ impl Strangers {
         is_local(&name) || self.hosts.iter().any(|HostName(allowed)| *allowed == name) || is_reached() == Some(true)
     }
 
-    /// Lets in who carries the token; tells others what to answer.
-    pub(super) fn admit(&self, request: &Request) -> Result<(), Response> {
-        let Some(token) = &self.token else { return Ok(()) };
+    /// What is answered to who does not carry the token; `None` to all others, who may come in.
+    pub(super) fn turn_away(&self, request: &Request) -> Option<Response> {
+        let token = self.token.as_ref()?;
         let headers = request.headers();
         if bearer(headers).is_some_and(|given| token.is(given)) || self.cookies(headers).any(|given| token.is(given)) {
-            return Ok(());
+            return None;
         }
         let brought = (request.method() == Method::GET && request.uri().path() == "/")
             .then(|| request.uri().query().and_then(query_token))
             .flatten();
-        match brought {
-            Some((given, rest)) if token.is(given) => Err(self.keep(token, &rest, headers)),
+        Some(match brought {
+            Some((given, rest)) if token.is(given) => self.keep(token, &rest, headers),
             _ => {
                 let detail = "send the token that the server printed when it started, or that of its --token-file, as \
                               `Authorization: Bearer TOKEN`; a browser is opened once at /?token=TOKEN";
-                Err(Problem::new(Kind::NoToken, detail).field("Authorization").into_response())
+                Problem::new(Kind::NoToken, detail).field("Authorization").into_response()
             }
-        }
+        })
     }
 
     fn cookies<'a>(&'a self, headers: &'a HeaderMap) -> impl Iterator<Item = &'a str> {

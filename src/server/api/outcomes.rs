@@ -18,6 +18,7 @@ use crate::{
     server::{
         App,
         problem::{Kind, Problem},
+        session::ReportFiles,
     },
 };
 
@@ -157,11 +158,11 @@ async fn report(app: &App, id: &str) -> Result<Arc<[File]>, Problem> {
     let copy = app.sessions.tell(id, |robot| Ok(robot.copy())).await?;
     let revision = copy.events().len();
     let mut kept = session.report().lock().await;
-    if let Some((_, files)) = kept.as_ref().filter(|(of, _)| *of == revision) {
-        return Ok(files.clone());
+    if let Some(kept) = kept.as_ref().filter(|kept| kept.revision == revision) {
+        return Ok(kept.files.clone());
     }
     let files: Arc<[File]> = aside(move || report_files(&copy)).await?.into();
-    *kept = Some((revision, files.clone()));
+    *kept = Some(ReportFiles { revision, files: files.clone() });
     Ok(files)
 }
 

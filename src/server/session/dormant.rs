@@ -216,7 +216,7 @@ impl Sessions {
 
     async fn load(&self, id: Uuid) -> Result<Option<Stored>, Problem> {
         let store = self.store.clone();
-        Ok(aside(move || store.load(id)).await?)
+        aside(move || store.load(id)).await
     }
 }
 

@@ -22,7 +22,7 @@ use std::{
     time::Instant,
 };
 
-use tokio::sync::{oneshot, watch};
+use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
@@ -136,8 +136,15 @@ pub(super) struct Session {
     used: Mutex<Instant>,
     /// How many watch it.
     watchers: AtomicUsize,
-    /// Of a robot elsewhere: the files of its report, and after how many events they were made.
-    report: tokio::sync::Mutex<Option<(usize, Arc<[File]>)>>,
+    /// Of a robot elsewhere.
+    report: AsyncMutex<Option<ReportFiles>>,
+}
+
+/// The files of a report, which take a while to make.
+pub(super) struct ReportFiles {
+    /// How many events the session had.
+    pub(super) revision: usize,
+    pub(super) files: Arc<[File]>,
 }
 
 /// The way to the thread that computes.
@@ -198,8 +205,8 @@ impl Session {
         self.shared.rewritten.load(Ordering::Relaxed)
     }
 
-    /// Of a robot elsewhere: the files of its report as they were made last, and after how many events.
-    pub(super) fn report(&self) -> &tokio::sync::Mutex<Option<(usize, Arc<[File]>)>> {
+    /// Of a robot elsewhere: the files of its report, as they were made last.
+    pub(super) fn report(&self) -> &AsyncMutex<Option<ReportFiles>> {
         &self.report
     }
 
