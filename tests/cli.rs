@@ -240,7 +240,7 @@ fn bad_input_exits_with_two_and_says_what_to_do() {
     let measured = folder.path().join("measured.toml");
     std::fs::write(&measured, include_str!("../scenarios/tiago-mocap.toml")).expect("written");
     let (binary, measured) = (binary.to_str().expect("a plain path"), measured.to_str().expect("a plain path"));
-    let cases: [(&[&str], &[&str]); 15] = [
+    let cases: [(&[&str], &[&str]); 18] = [
         (&["check", file], &["bad.toml:", "`sensor.sigma`", "`sigma_m`"]),
         (&["run", "arm-6dofx"], &["did you mean `arm-6dof`"]),
         (&["run", "no/such.toml"], &["no/such.toml"]),
@@ -255,6 +255,9 @@ fn bad_input_exits_with_two_and_says_what_to_do() {
         (&["compare", "arm-6dof", "--seeds", "0"], &["at least one seed"]),
         (&["sweep", "arm-6dof", "--set", "filter.x=1"], &["--learner"]),
         (&["serve", "--frame-ancestors", "example.org"], &["`example.org`", "https://example.org"]),
+        (&["serve", "--allow-host", "http://lab"], &["`http://lab` is no host name", "lab.example.org"]),
+        (&["serve", "--ephemeral", "--data-dir", "x"], &["--ephemeral", "cannot be used with", "--data-dir"]),
+        (&["export", "--out", "x"], &["SCENARIO"]),
         (&["fly"], &["fly"]),
     ];
     for (arguments, expected) in cases {

@@ -6,19 +6,33 @@ mod support;
 
 #[path = "http/choices.rs"]
 mod choices;
+#[path = "http/crashes.rs"]
+mod crashes;
+#[path = "http/disk.rs"]
+mod disk;
 #[path = "http/errors.rs"]
 mod errors;
+#[path = "http/exported.rs"]
+mod exported;
 #[path = "http/openapi.rs"]
 mod openapi;
+#[path = "http/outside.rs"]
+mod outside;
 #[path = "http/pages.rs"]
 mod pages;
 #[path = "http/program.rs"]
 mod program;
+#[path = "http/robot.rs"]
+mod robot;
 #[path = "http/scene.rs"]
 mod scene;
 #[path = "http/sessions.rs"]
 mod sessions;
 #[path = "http/shutdown.rs"]
 mod shutdown;
+#[path = "http/strangers.rs"]
+mod strangers;
 #[path = "http/streams.rs"]
 mod streams;
+#[path = "http/walkthrough.rs"]
+mod walkthrough;

@@ -55,8 +55,8 @@ impl Ledger {
         Ok(Self { scenario, shapes, experiment, suggestions, told, counted })
     }
 
-    /// After all of `events`. Those that are excluded in the end never counted.
-    pub fn replayed(mut self, events: &[Event]) -> Result<Self, (usize, String)> {
+    /// After all of `events`. Those that are excluded in the end never counted. `tell` hears of every observation that counts.
+    pub fn replayed(mut self, events: &[Event], tell: &mut dyn FnMut(StepReport)) -> Result<Self, (usize, String)> {
         let mut excluded = BTreeSet::new();
         for event in events {
             match event.happened {
@@ -66,7 +66,8 @@ impl Ledger {
             }
         }
         for (index, event) in events.iter().enumerate() {
-            self.apply(event, &excluded).map_err(|what| (index + 1, what))?;
+            let report = self.apply(event, &excluded).map_err(|what| (index + 1, what))?;
+            report.into_iter().for_each(&mut *tell);
         }
         Ok(self)
     }

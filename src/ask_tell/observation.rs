@@ -27,7 +27,7 @@ pub struct Observation {
     pub configuration: BTreeMap<String, f64>,
     /// By channel what it saw, in the shape of its kind (see the [module](super)); null where it saw nothing.
     #[serde(default)]
-    #[cfg_attr(feature = "app", schema(value_type = BTreeMap<String, Object>))]
+    #[cfg_attr(feature = "app", schema(value_type = BTreeMap<String, Value>))]
     pub measurements: BTreeMap<String, Value>,
 }
 

@@ -177,7 +177,7 @@ impl Session {
             let events: Vec<Event> = self.events().iter().chain(&draft.events).cloned().collect();
             let empty = Ledger::new(self.setup(), self.scenario().clone());
             let empty = empty.map_err(|error| Refusal::Ended(error.to_string()))?;
-            draft.ledger = empty.replayed(&events).map_err(|(_, what)| Refusal::Ended(what))?;
+            draft.ledger = empty.replayed(&events, &mut |_| ()).map_err(|(_, what)| Refusal::Ended(what))?;
             draft.drop_infeasible()?;
         }
         Ok(draft.done(()))

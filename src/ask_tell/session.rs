@@ -75,8 +75,22 @@ impl Session {
     ///
     /// [`ReplayError`] names the first event that cannot have happened.
     pub fn replay(setup: Setup, events: Vec<Event>) -> Result<Self, ReplayError> {
+        Self::replay_telling(setup, events, &mut |_| ())
+    }
+
+    /// The same, and its [history](Self::history) as it goes.
+    ///
+    /// # Errors
+    ///
+    /// [`ReplayError`] names the first event that cannot have happened.
+    pub fn replay_telling(
+        setup: Setup,
+        events: Vec<Event>,
+        tell: &mut dyn FnMut(StepReport),
+    ) -> Result<Self, ReplayError> {
         let Self { setup, ledger, .. } = Self::open(setup)?;
-        let ledger = ledger.replayed(&events).map_err(|(index, what)| ReplayError::Event { index, what })?;
+        tell(ledger.experiment.latest().clone());
+        let ledger = ledger.replayed(&events, tell).map_err(|(index, what)| ReplayError::Event { index, what })?;
         Ok(Self { setup, ledger, events })
     }
 
@@ -228,11 +242,10 @@ impl Session {
     /// One report per observation that counts, from step 0, as belongs to the belief of now: what a recording shows of a
     /// stored session.
     pub fn history(&self) -> Vec<StepReport> {
-        let Ok(mut ledger) = Ledger::new(&self.setup, self.scenario().clone()) else { return Vec::new() };
-        let excluded: BTreeSet<u64> = self.ledger.excluded();
+        let Ok(ledger) = Ledger::new(&self.setup, self.scenario().clone()) else { return Vec::new() };
         let mut reports = vec![ledger.experiment.latest().clone()];
         // Whatever has happened can happen again.
-        reports.extend(self.events.iter().filter_map(|event| ledger.apply(event, &excluded).ok().flatten()));
+        drop(ledger.replayed(&self.events, &mut |report| reports.push(report)));
         reports
     }
 
@@ -289,7 +302,7 @@ impl Session {
         }
     }
 
-    pub(super) fn scenario(&self) -> &Arc<Scenario> {
+    pub(crate) fn scenario(&self) -> &Arc<Scenario> {
         &self.ledger.scenario
     }
 

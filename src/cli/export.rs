@@ -2,19 +2,28 @@
 
 use std::{collections::BTreeSet, path::PathBuf, str::FromStr};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use body_schema::{
+    ask_tell::Session,
     export::{Export, Plan, Written},
     scenario::Scenario,
+    server::{Store, Stored},
 };
+use uuid::Uuid;
 
-use super::{BadInput, load_scenario, no_person, output, progress};
+use super::{BadInput, load_scenario, no_person, output, progress, serve};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// Built-in scenarios (see `body-schema scenarios`) or paths of scenario files
-    #[arg(value_name = "SCENARIO", required = true)]
+    #[arg(value_name = "SCENARIO", required_unless_present = "sessions")]
     scenarios: Vec<String>,
+    /// A session with a robot elsewhere, by the id under which a server keeps it; repeat for several
+    #[arg(long = "session", value_name = "ID")]
+    sessions: Vec<Uuid>,
+    /// Where the server keeps it [default: the platform's folder for data of programs]
+    #[arg(long, value_name = "DIR", requires = "sessions")]
+    data_dir: Option<PathBuf>,
     /// The folder to write; an earlier export in it is replaced
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -81,18 +90,21 @@ fn address(text: &str) -> Result<String, String> {
 
 pub fn export(arguments: &Arguments) -> Result<()> {
     let scenarios = arguments.scenarios.iter().map(|name| load_scenario(name)).collect::<Result<Vec<Scenario>>>()?;
-    let names: BTreeSet<&str> = scenarios.iter().map(|scenario| scenario.name.as_str()).collect();
-    if names.len() < scenarios.len() {
-        return Err(BadInput("a scenario is named twice, or two have one name; name each once".to_owned()).into());
-    }
+    let sessions = sessions(arguments)?;
     let seeds: BTreeSet<u64> = arguments.seeds.iter().flat_map(|range| range.first..=range.last).collect();
     let learners = (!arguments.learners.is_empty()).then_some(arguments.learners.as_slice());
     for scenario in &scenarios {
         no_person(&scenario.chosen(learners)?)?;
     }
-    let plans = scenarios.iter().map(|scenario| Ok(Plan::new(scenario, learners, arguments.steps)?));
+    let told = sessions.iter().map(|session| Ok(Plan::told(session, arguments.steps)?));
+    let plans = scenarios.iter().map(|scenario| Ok(Plan::new(scenario, learners, arguments.steps)?)).chain(told);
+    let plans = plans.collect::<Result<Vec<_>>>()?;
+    let names: BTreeSet<&str> = plans.iter().map(|plan| plan.scenario.name.as_str()).collect();
+    if names.len() < plans.len() {
+        return Err(BadInput("a scenario is named twice, or two have one name; name each once".to_owned()).into());
+    }
     let export = Export {
-        plans: plans.collect::<Result<_>>()?,
+        plans,
         seeds: seeds.into_iter().collect(),
         address: arguments.address.clone(),
         panel_dir: arguments.panel_dir.clone(),
@@ -103,6 +115,24 @@ pub fn export(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.display();
     output::say(format!("wrote {files} files, {:.1} MB, to {out}", bytes as f64 / 1e6))?;
     output::say(format!("any static host serves it; here: python3 -m http.server -d {out}"))
+}
+
+/// The stored sessions that are asked for.
+fn sessions(arguments: &Arguments) -> Result<Vec<Session>> {
+    if arguments.sessions.is_empty() {
+        return Ok(Vec::new());
+    }
+    let folder = arguments.data_dir.clone().map_or_else(serve::usual_data_dir, Ok)?;
+    let mend = || format!("no sessions can be read in {}; name the server's folder with --data-dir", folder.display());
+    let store = Store::read(&folder).with_context(mend)?;
+    let session = |id: &Uuid| {
+        let stored = store.load(*id).with_context(mend)?;
+        let unknown =
+            || BadInput(format!("there is no session {id} in {}; GET /v1/sessions lists them", folder.display()));
+        let Stored { setup, events, .. } = stored.ok_or_else(unknown)?;
+        Session::replay(setup, events).with_context(|| format!("session {id} cannot be taken up"))
+    };
+    arguments.sessions.iter().map(session).collect()
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use body_schema::server::{self, FrameAncestor, Options};
+use body_schema::server::{FrameAncestor, HostName, Options, Server, Token};
 use tokio_util::sync::CancellationToken;
 
 #[derive(Debug, clap::Args)]
@@ -15,9 +15,20 @@ pub struct Arguments {
     /// Address and port to listen on; port 0 takes a free one
     #[arg(long, default_value_t = DEFAULT_ADDRESS, value_name = "ADDRESS")]
     bind: SocketAddr,
-    /// Also keep every session's recording as a file in DIR [default: in memory only, to be downloaded]
+    /// Keep sessions with robots elsewhere in DIR, and every other session's recording as a file there [default: the
+    /// platform's folder for data of programs, without recordings]
     #[arg(long, value_name = "DIR")]
     data_dir: Option<PathBuf>,
+    /// Keep nothing: sessions end with the server
+    #[arg(long, conflicts_with = "data_dir")]
+    ephemeral: bool,
+    /// Answer only those who carry the token in FILE [default: on addresses that other machines can reach a token is drawn
+    /// and printed, on others none is needed]
+    #[arg(long, value_name = "FILE")]
+    token_file: Option<PathBuf>,
+    /// Answer also to NAME, beside localhost and the address that is listened on; repeat or separate by commas for several
+    #[arg(long = "allow-host", value_name = "NAME", value_delimiter = ',', num_args = 1)]
+    allow_hosts: Vec<HostName>,
     /// Let pages of ORIGIN show the explorer in a frame, as https://example.org, or `self`; repeat or separate by commas for
     /// several [default: nobody]
     #[arg(long, value_name = "ORIGIN", value_delimiter = ',', num_args = 1)]
@@ -31,14 +42,21 @@ const DEFAULT_ADDRESS: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Add
 
 impl Default for Arguments {
     fn default() -> Self {
-        Self { bind: DEFAULT_ADDRESS, data_dir: None, frame_ancestors: Vec::new(), panel_dir: None }
+        Self {
+            bind: DEFAULT_ADDRESS,
+            data_dir: None,
+            ephemeral: false,
+            token_file: None,
+            allow_hosts: Vec::new(),
+            frame_ancestors: Vec::new(),
+            panel_dir: None,
+        }
     }
 }
 
 pub fn serve(arguments: &Arguments) -> Result<()> {
-    if let Some(folder) = &arguments.data_dir {
-        std::fs::create_dir_all(folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;
-    }
+    let data_dir = data_dir(arguments)?;
+    let token = token(arguments)?;
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().context("cannot start")?;
     runtime.block_on(async {
         let listener = tokio::net::TcpListener::bind(arguments.bind).await.with_context(|| {
@@ -47,21 +65,80 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
         let address = listener.local_addr().context("cannot tell the address")?;
         let shutdown = CancellationToken::new();
         tokio::spawn(cancel_on_signal(shutdown.clone()));
-        let mut out = std::io::stdout();
-        writeln!(out, "body-schema is at http://{address}/ (Ctrl-C ends it)")?;
-        if let Some(folder) = &arguments.data_dir {
-            writeln!(out, "recordings are kept in {}", folder.display())?;
-        }
-        out.flush()?;
         let options = Options {
-            data_dir: arguments.data_dir.clone(),
+            data_dir: data_dir.clone(),
+            keep_recordings: arguments.data_dir.is_some(),
+            token: token.clone(),
+            allow_hosts: arguments.allow_hosts.clone(),
             panel_dir: arguments.panel_dir.clone(),
             frame_ancestors: arguments.frame_ancestors.clone(),
+            sleep_after: None,
         };
-        server::serve(listener, options, shutdown).await?;
+        let server = Server::new(listener, options, shutdown)?;
+        let mut out = std::io::stdout();
+        writeln!(out, "body-schema is at http://{address}/ (Ctrl-C ends it)")?;
+        match (&data_dir, &arguments.data_dir) {
+            (None, _) => writeln!(out, "nothing is kept: sessions end with the server")?,
+            (Some(folder), None) => writeln!(out, "sessions with robots elsewhere are kept in {}", folder.display())?,
+            (Some(folder), Some(_)) => {
+                writeln!(out, "recordings, and sessions with robots elsewhere, are kept in {}", folder.display())?;
+            }
+        }
+        match (&token, &arguments.token_file) {
+            (None, _) => {}
+            (Some(_), Some(file)) => {
+                writeln!(out, "only those who carry the token in {} are answered", file.display())?
+            }
+            (Some(token), None) => {
+                let (token, reachable) = (token.as_str(), reachable(address));
+                writeln!(out, "only those who carry the token are answered. Open once in each browser:")?;
+                writeln!(out, "  http://{reachable}/?token={token}")?;
+                writeln!(out, "Programs send the header `Authorization: Bearer {token}`")?;
+            }
+        }
+        out.flush()?;
+        server.run().await?;
         writeln!(out, "ended; every recording is complete")?;
         Ok(())
     })
+}
+
+/// Where sessions are kept; `None` if nowhere.
+fn data_dir(arguments: &Arguments) -> Result<Option<PathBuf>> {
+    if arguments.ephemeral {
+        return Ok(None);
+    }
+    let usual = || usual_data_dir().context("or keep nothing, with --ephemeral");
+    arguments.data_dir.clone().map_or_else(usual, Ok).map(Some)
+}
+
+/// The platform's folder for the data of programs.
+pub(super) fn usual_data_dir() -> Result<PathBuf> {
+    let project = directories::ProjectDirs::from("", "", "body-schema");
+    let project = project.context("this platform names no folder for data; name one with --data-dir")?;
+    Ok(project.data_dir().to_owned())
+}
+
+/// What whoever asks has to carry; `None` if nothing.
+fn token(arguments: &Arguments) -> Result<Option<Token>> {
+    if let Some(file) = &arguments.token_file {
+        let mend =
+            || format!("cannot read the token in {}; name a file with one in it with --token-file", file.display());
+        let text = std::fs::read_to_string(file).with_context(mend)?;
+        return Ok(Some(text.trim().parse().with_context(|| format!("{} holds no token", file.display()))?));
+    }
+    if arguments.bind.ip().to_canonical().is_loopback() {
+        return Ok(None);
+    }
+    Ok(Some(Token::draw().context("cannot draw a token; give one with --token-file")?))
+}
+
+/// An address that a browser on this machine can open.
+fn reachable(address: SocketAddr) -> SocketAddr {
+    match address.ip().is_unspecified() {
+        true => SocketAddr::new(Ipv4Addr::LOCALHOST.into(), address.port()),
+        false => address,
+    }
 }
 
 /// Ctrl-C, and where there is one the terminate signal.

@@ -25,7 +25,10 @@ use serde::{Deserialize, Serialize};
 
 pub use error::ExportError;
 
-use crate::scenario::{Scenario, ScenarioSummary, WorldSpec};
+use crate::{
+    ask_tell::Session,
+    scenario::{Scenario, ScenarioSummary, WorldSpec},
+};
 use error::Doing;
 use run::Recorded;
 
@@ -42,7 +45,7 @@ pub const MAX_STEPS: u64 = 1000;
 pub struct Export<'a> {
     /// The scenarios, each with what to run of it.
     pub plans: Vec<Plan<'a>>,
-    /// The seeds of each.
+    /// The seeds of each scenario; what was told has its own.
     pub seeds: Vec<u64>,
     /// The address at which the folder will be, with a slash at its end, if it is known: previews of links to it have a
     /// picture only then.
@@ -59,6 +62,8 @@ pub struct Plan<'a> {
     pub learners: Vec<String>,
     /// Steps of each run.
     pub steps: u64,
+    /// What was told by a robot elsewhere; it is shown in place of runs of its own.
+    told: Option<&'a Session>,
 }
 
 impl<'a> Plan<'a> {
@@ -74,7 +79,28 @@ impl<'a> Plan<'a> {
             Some(steps) => steps,
             None => usual_steps(scenario).min(most),
         };
-        Ok(Self { scenario, learners, steps })
+        Ok(Self { scenario, learners, steps, told: None })
+    }
+
+    /// A session with a robot elsewhere: its observations that count, or so many of them.
+    ///
+    /// # Errors
+    ///
+    /// [`ExportError::Steps`] of more than there are, and where there are none.
+    pub fn told(session: &'a Session, steps: Option<u64>) -> Result<Self, ExportError> {
+        let scenario = &**session.scenario();
+        let most = session.latest().step.min(MAX_STEPS);
+        let steps = steps.unwrap_or(most);
+        if steps > most || steps == 0 {
+            return Err(ExportError::Steps { scenario: scenario.name.clone(), steps, most });
+        }
+        let learners = session.description().learners.iter().map(|learner| learner.name.clone()).collect();
+        Ok(Self { scenario, learners, steps, told: Some(session) })
+    }
+
+    /// The seeds of its runs, of those that are asked for.
+    fn seeds(&self, asked: &[u64]) -> Vec<u64> {
+        self.told.map_or_else(|| asked.to_vec(), |session| vec![session.setup().seed])
     }
 }
 
@@ -132,7 +158,7 @@ struct ExportedRun {
 impl Export<'_> {
     /// How many steps there are to make.
     pub fn steps(&self) -> u64 {
-        self.plans.iter().map(|plan| plan.steps).sum::<u64>() * self.seeds.len() as u64
+        self.plans.iter().map(|plan| plan.steps * plan.seeds(&self.seeds).len() as u64).sum()
     }
 
     /// Writes the folder. One that holds another export is replaced; one that holds anything else is refused unless `force`
@@ -166,7 +192,7 @@ impl Export<'_> {
             let recorded = run::record(plan, seed, &out.join(&folder), tick)?;
             Ok(ExportedRun { seed, steps: plan.steps, learners: plan.learners.clone(), recorded, folder })
         };
-        let runs = self.seeds.par_iter().map(run).collect::<Result<Vec<_>, ExportError>>()?;
+        let runs = plan.seeds(&self.seeds).par_iter().map(run).collect::<Result<Vec<_>, ExportError>>()?;
         let summary = ScenarioSummary {
             learners: scenario
                 .chosen(Some(&plan.learners))?

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ExportError, Plan, error::Doing, write, write_json};
 use crate::{
+    ask_tell::Session,
     experiment::Experiment,
     recording::{LiveLog, Recorder, StepsCsv, Target, Theme},
 };
@@ -45,7 +46,11 @@ pub(super) fn record(
     tick: &(dyn Fn() + Sync),
 ) -> Result<Recorded, ExportError> {
     let scenario = plan.scenario;
-    let mut experiment = scenario.experiment(seed, Some(&plan.learners))?;
+    let mut experiment = match plan.told {
+        Some(session) => session.experiment().clone(),
+        None => scenario.experiment(seed, Some(&plan.learners))?,
+    };
+    let told = plan.told.map(Session::history).unwrap_or_default();
     let live = LiveLog::new();
     let mut recorder = Recorder::new(experiment.description(), Target::live(live.clone()))?;
     let mut table = Vec::new();
@@ -53,12 +58,14 @@ pub(super) fn record(
     let (mut reports, mut searched) = (Vec::new(), BTreeSet::new());
     for step in 0..=plan.steps {
         if step > 0 {
-            let failed = |source| ExportError::Run { scenario: scenario.name.clone(), seed, source };
-            experiment.step().map_err(failed)?;
-            searched.extend(write_selections(&experiment, &plan.learners, folder)?);
+            if plan.told.is_none() {
+                let failed = |source| ExportError::Run { scenario: scenario.name.clone(), seed, source };
+                experiment.step().map_err(failed)?;
+                searched.extend(write_selections(&experiment, &plan.learners, folder)?);
+            }
             tick();
         }
-        let report = experiment.latest();
+        let report = told.get(step as usize).unwrap_or_else(|| experiment.latest());
         recorder.log_moving(report, FRAMES)?;
         csv.write(report)?;
         serde_json::to_writer(&mut reports, report)?;

@@ -1,8 +1,8 @@
 //! A recording in a file.
 
 use std::{
-    fs::File,
-    io::{self, BufWriter},
+    fs::{self, File},
+    io::{self, BufWriter, Write},
     path::{Path, PathBuf},
 };
 
@@ -37,6 +37,22 @@ impl RrdFile {
     /// Writes the footer.
     pub(super) fn finish(&mut self) -> Result<(), RecordingError> {
         self.attempt(Encoder::finish)
+    }
+
+    /// Puts a finished recording in its place, whatever became of what was written before.
+    pub(super) fn replace(&self, recording: &[u8]) -> Result<(), RecordingError> {
+        let failed = |source| RecordingError::Write { path: self.path.clone(), source };
+        // A device holds nothing that could be replaced.
+        if !fs::metadata(&self.path).map_err(failed)?.is_file() {
+            return Err(failed(io::Error::other("it is no file")));
+        }
+        let part = self.path.with_extension("rrd.part");
+        let written = File::create(&part).and_then(|mut file| file.write_all(recording).and_then(|()| file.sync_all()));
+        written.and_then(|()| fs::rename(&part, &self.path)).map_err(|source| {
+            // Half a file is of no use, and takes space.
+            drop(fs::remove_file(&part));
+            failed(source)
+        })
     }
 
     fn attempt(

@@ -61,6 +61,8 @@ pub struct Recorder {
     store: StoreId,
     rows: Rows,
     file: Option<RrdFile>,
+    /// Why the file lacks what the log has.
+    file_failure: Option<String>,
     live: Option<LiveLog>,
     learners: Vec<LearnerEntities>,
     /// Where all stand; known from the first report on.
@@ -87,6 +89,7 @@ impl Recorder {
             store: StoreId::recording(ApplicationId::new_or_unknown(application), recording),
             rows: Rows::default(),
             file: file.as_deref().map(RrdFile::create).transpose()?,
+            file_failure: None,
             live,
             learners: (names.iter().zip(learner_slots(names.iter().copied())).enumerate())
                 .map(|(index, (name, slot))| {
@@ -194,6 +197,22 @@ impl Recorder {
         self.write(|entity| !hidden.contains(entity))
     }
 
+    /// Why the file lacks steps that the log has: it could not be written. [`seal`](Self::seal) writes it anew.
+    pub fn file_failure(&self) -> Option<&str> {
+        self.file_failure.as_deref()
+    }
+
+    /// Whether a file was written. Beside a log one that was not costs no step: it is remembered, and all is in the log.
+    fn settle(&mut self, written: Result<(), RecordingError>) -> Result<(), RecordingError> {
+        match written {
+            Err(error) if self.live.is_some() => {
+                self.file_failure.get_or_insert_with(|| error.to_string());
+                Ok(())
+            }
+            written => written,
+        }
+    }
+
     /// To both targets, whatever happens to the other.
     fn write(&mut self, wanted: impl Fn(&EntityPath) -> bool) -> Result<(), RecordingError> {
         let chunks = self.rows.drain(wanted)?;
@@ -209,7 +228,7 @@ impl Recorder {
             Some(file) => messages(&mut chunks.iter().filter_map(by_steps)).and_then(|steps| file.append(&steps)),
             None => Ok(()),
         };
-        file.and(live)
+        self.settle(file).and(live)
     }
 
     /// Writes what is left, ends the file with its footer, and closes the log.
@@ -217,22 +236,42 @@ impl Recorder {
         self.end()
     }
 
-    fn end(&mut self) -> Result<(), RecordingError> {
-        if std::mem::replace(&mut self.finished, true) {
+    /// Writes what is left and ends the file with its footer: nothing is recorded after it. A file that could not be written
+    /// as it grew is written anew from the log. After an error it may be tried again, and steps may be recorded.
+    pub fn seal(&mut self) -> Result<(), RecordingError> {
+        if self.finished {
             return Ok(());
         }
-        let flushed = self.flush();
+        self.flush()?;
+        if let Some(file) = &mut self.file
+            && let Err(error) = file.finish()
+        {
+            let written = match &self.live {
+                Some(live) => file.replace(&live.complete()?),
+                None => Err(error),
+            };
+            written.inspect_err(|error| {
+                self.file_failure.get_or_insert_with(|| error.to_string());
+            })?;
+        }
+        (self.finished, self.file_failure) = (true, None);
+        Ok(())
+    }
+
+    fn end(&mut self) -> Result<(), RecordingError> {
+        let sealed = self.seal();
+        self.finished = true;
         if let Some(live) = &self.live {
             live.close();
         }
-        flushed?;
-        self.file.as_mut().map_or(Ok(()), RrdFile::finish)
+        sealed
     }
 
     /// To both targets, whatever happens to the other.
     fn send(&mut self, messages: &[LogMsg]) -> Result<(), RecordingError> {
         let live = self.live.as_ref().map_or(Ok(()), |live| live.append(messages));
-        self.file.as_mut().map_or(Ok(()), |file| file.append(messages)).and(live)
+        let file = self.file.as_mut().map_or(Ok(()), |file| file.append(messages));
+        self.settle(file).and(live)
     }
 
     fn begin(&mut self, ellipsoids: EllipsoidSize) -> Result<(), RecordingError> {
@@ -309,7 +348,8 @@ impl Recorder {
         let whole = arranger.whole()?;
         // To both targets, whatever happens to the other.
         let live = self.live.as_ref().map_or(Ok(()), |live| live.append_arrangement(&whole, arranger));
-        self.file.as_mut().map_or(Ok(()), |file| file.append(&whole)).and(live)?;
+        let file = self.file.as_mut().map_or(Ok(()), |file| file.append(&whole));
+        self.settle(file).and(live)?;
         Ok(stage)
     }
 }

@@ -16,7 +16,23 @@ use super::{
 /// A JSON body. An absent body counts as `{}`, so that defaults need no body.
 pub(super) struct JsonBody<T>(pub(super) T);
 
-impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
+/// What is read from a body. Whatever serde reads is read by [`parse`].
+pub(super) trait FromJson: Sized {
+    fn from_json(bytes: &[u8]) -> Result<Self, Problem>;
+
+    /// What is told of a body beyond the limit of its route.
+    fn too_large() -> Problem {
+        Problem::body_too_large(MAX_BODY_BYTES)
+    }
+}
+
+impl<T: DeserializeOwned> FromJson for T {
+    fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
+        parse(bytes)
+    }
+}
+
+impl<S: Send + Sync, T: FromJson> FromRequest<S> for JsonBody<T> {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
@@ -24,9 +40,7 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
         let bytes = Bytes::from_request(request, state).await.map_err(|rejection| {
             let response = rejection.into_response();
             match response.status() {
-                StatusCode::PAYLOAD_TOO_LARGE => {
-                    Problem::new(Kind::BodyTooLarge, format!("a body may have at most {MAX_BODY_BYTES} bytes"))
-                }
+                StatusCode::PAYLOAD_TOO_LARGE => T::too_large(),
                 _ => Problem::new(Kind::Malformed, "the body broke off before its end"),
             }
         })?;
@@ -34,7 +48,7 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
             let detail = "send the body as JSON, with the header `Content-Type: application/json`";
             return Err(Problem::new(Kind::UnsupportedMediaType, detail).field("Content-Type"));
         }
-        parse(if bytes.is_empty() { b"{}" } else { &bytes }).map(Self)
+        T::from_json(if bytes.is_empty() { b"{}" } else { &bytes }).map(Self)
     }
 }
 
@@ -45,7 +59,7 @@ fn is_json(headers: &HeaderMap) -> bool {
     })
 }
 
-fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     // Syntax first: a body that breaks off is not blamed on the field where it does.
     serde_json::from_slice::<IgnoredAny>(bytes)
         .map_err(|error| Problem::new(Kind::Malformed, format!("the body is not JSON: {error}")))?;
@@ -113,6 +127,16 @@ pub(super) fn parameters<'a, const N: usize>(
 pub(super) fn last_event_id(headers: &HeaderMap) -> Result<Option<u64>, Problem> {
     let Some(value) = headers.get("last-event-id") else { return Ok(None) };
     whole_number("Last-Event-ID", value.to_str().unwrap_or_default()).map(Some)
+}
+
+/// The header `Idempotency-Key`.
+pub(super) fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
+    const MOST_BYTES: usize = 200;
+    const NAME: &str = "Idempotency-Key";
+    let Some(value) = headers.get(NAME) else { return Ok(None) };
+    let key = value.to_str().ok().filter(|key| (1..=MOST_BYTES).contains(&key.len()));
+    let detail = || format!("`{NAME}` must have 1 to {MOST_BYTES} visible characters of ASCII");
+    key.map(|key| Some(key.to_owned())).ok_or_else(|| Problem::new(Kind::Malformed, detail()).field(NAME))
 }
 
 fn whole_number(name: &str, value: &str) -> Result<u64, Problem> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use axum::{
     Router,
     body::to_bytes,
-    extract::{DefaultBodyLimit, Request, State},
+    extract::{ConnectInfo, DefaultBodyLimit, Request, State},
     http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header},
     middleware::{Next, from_fn_with_state, map_response},
     response::{IntoResponse, Response},
@@ -14,6 +14,7 @@ use axum::{
 use super::{
     App, FrameAncestor, MAX_BODY_BYTES,
     problem::{Kind, PROBLEM_JSON, Problem},
+    strangers::Reached,
 };
 
 /// Scripts, styles, images and connections from here and from nowhere else; the viewer is WebAssembly. It also keeps
@@ -65,13 +66,17 @@ pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>, always: Headers)
         .layer(map_response(move |response| with_headers(always.clone(), response)))
 }
 
-/// A page of another origin must neither change anything nor open a WebSocket, and on a loopback address a foreign host
-/// name is a page that had its name point here.
+/// Who has no business here: under a foreign name, without the token, or from a page of another origin, which must neither
+/// change anything nor open a WebSocket.
 async fn refuse_strangers(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let host = request.headers().get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
-    if app.loopback && !is_local(host) {
-        let detail = format!("this server answers to localhost only, not to `{host}`");
+    let reached = request.extensions().get::<ConnectInfo<Reached>>().map(|ConnectInfo(reached)| *reached);
+    if !app.strangers.are_meant_by(host, reached) {
+        let detail = format!("this server does not answer to `{host}`; start it with --allow-host if it is to");
         return Problem::new(Kind::ForeignOrigin, detail).field("Host").into_response();
+    }
+    if let Some(response) = app.strangers.turn_away(&request) {
+        return response;
     }
     let harmless = matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS)
         && !request.headers().contains_key(header::UPGRADE);
@@ -80,17 +85,6 @@ async fn refuse_strangers(State(app): State<Arc<App>>, request: Request, next: N
         return Problem::new(Kind::ForeignOrigin, detail).field("Origin").into_response();
     }
     next.run(request).await
-}
-
-fn is_local(host: &str) -> bool {
-    let name = match host.rsplit_once(':') {
-        Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
-        _ => host,
-    };
-    let name = name.trim_matches(['[', ']']).to_ascii_lowercase();
-    name == "localhost"
-        || name.ends_with(".localhost")
-        || name.parse::<std::net::IpAddr>().is_ok_and(|address| address.is_loopback())
 }
 
 /// Scripts send no origin; browsers always do where it matters.
@@ -139,18 +133,6 @@ async fn with_headers(always: Headers, mut response: Response) -> Response {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn only_names_of_this_machine_are_local() {
-        for host in ["localhost", "localhost:8080", "LOCALHOST:1", "127.0.0.1:80", "127.1.2.3", "[::1]:8080", "[::1]"] {
-            assert!(is_local(host), "{host}");
-        }
-        for host in
-            ["", "example.org", "example.org:8080", "127.0.0.1.example.org", "localhost.example.org", "10.0.0.1"]
-        {
-            assert!(!is_local(host), "{host}");
-        }
-    }
 
     #[test]
     fn an_origin_must_be_the_host() {

@@ -1,16 +1,17 @@
-//! The HTTP server: sessions to step and watch, and the page that does so.
+//! The HTTP server: sessions to step and watch, robots elsewhere that ask and tell, and the page that shows them.
 //!
 //! ```text
-//! api/      the routes: scenarios, sessions, steps, streams, downloads; their OpenAPI description
-//! session/  experiments on threads of their own, and what they leave to read
+//! api/      the routes: scenarios, sessions, steps, suggestions, observations, streams, downloads; their OpenAPI description
+//! session/  experiments and robots elsewhere on threads of their own, and what they leave to read
+//! store/    the sessions of robots elsewhere on the disk
 //! extract   requests, read        problem  errors, as RFC 9457 problem details
 //! guard     foreign pages, headers, stray errors        assets   the page and Rerun's viewer
-//! frame     who may embed the page
+//! strangers who may ask at all    frame    who may embed the page
 //! ```
 //!
 //! Every session's engine computes on its own thread; the runtime's workers only carry messages and bytes. Memory is
-//! bounded: [`MAX_SESSIONS`] sessions of [`MAX_STEPS_PER_SESSION`] steps, and [`MAX_MEMORY_BYTES`] for the reports and
-//! recordings of them all.
+//! bounded: [`MAX_SESSIONS`] sessions of [`MAX_STEPS_PER_SESSION`] steps, as many with robots elsewhere (the others of them are
+//! in the store), and [`MAX_MEMORY_BYTES`] for the reports and recordings of them all.
 
 mod api;
 mod assets;
@@ -20,8 +21,10 @@ mod guard;
 mod gzip;
 mod problem;
 mod session;
+mod store;
+mod strangers;
 
-use std::{future::IntoFuture, io, path::PathBuf, sync::Arc, time::Duration};
+use std::{future::IntoFuture, io, net::SocketAddr, path::PathBuf, sync::Arc, time::Duration};
 
 use axum::Router;
 use tokio::net::TcpListener;
@@ -32,8 +35,13 @@ pub(crate) use assets::{INDEX, PageFile, page_files};
 pub use frame::{FrameAncestor, NoOrigin};
 pub(crate) use guard::CONTENT_SECURITY_POLICY;
 pub use problem::{PROBLEM_JSON, Problem};
-use session::{Budget, Sessions};
-pub use session::{NewSession, SessionResource};
+use session::{Budget, Keeping, Sessions};
+pub use session::{NewOutsideSession, NewSession, SessionResource};
+pub use store::{MOST_STORED_SESSIONS, Shown, Store, StoreError, Stored};
+pub use strangers::{HostName, NoHostName, NoToken, Token};
+use strangers::{Reached, Strangers};
+
+use crate::ask_tell::MOST_SETUP_BYTES;
 
 /// How many sessions there are at most. When one more is asked for, one that was idle for [`IDLE_AFTER`] makes room.
 pub const MAX_SESSIONS: usize = 32;
@@ -45,7 +53,10 @@ pub const MAX_STEPS_PER_REQUEST: u64 = 1000;
 pub const MAX_MEMORY_BYTES: usize = 2 << 30;
 /// How large a request's body may be.
 pub const MAX_BODY_BYTES: usize = 64 << 10;
-/// After this time without a request and without anyone watching, a session may have to make room for another.
+/// How large the body may be that opens a session with a robot elsewhere.
+pub const MAX_SETUP_BODY_BYTES: usize = MOST_SETUP_BYTES + MAX_BODY_BYTES;
+/// After this time without a request and without anyone watching, a session may have to make room for another. One with a
+/// robot elsewhere leaves memory then, and comes back when it is asked for.
 pub const IDLE_AFTER: Duration = Duration::from_secs(15 * 60);
 
 /// How long open connections may take to end at shutdown.
@@ -54,8 +65,16 @@ const DRAIN_WITHIN: Duration = Duration::from_secs(15);
 /// How a server is set up.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Where recordings are kept as files, `{scenario}-seed{seed}-{session}.rrd`; made if it does not exist.
+    /// Where sessions with robots elsewhere are kept; made if it does not exist. Without it they end with the server.
     pub data_dir: Option<PathBuf>,
+    /// Whether recordings of all other sessions are kept there as files, `{scenario}-seed{seed}-{session}.rrd`.
+    pub keep_recordings: bool,
+    /// What whoever asks has to carry. A server that can be reached from other machines needs one.
+    pub token: Option<Token>,
+    /// Names under which it is meant, beside those of this machine and the address at which it was reached.
+    pub allow_hosts: Vec<HostName>,
+    /// After how much time a session with a robot elsewhere leaves memory; [`IDLE_AFTER`] unless told otherwise.
+    pub sleep_after: Option<Duration>,
     /// A folder with another build of the page's panel than the one that is part of this program, for those who work
     /// on it.
     pub panel_dir: Option<PathBuf>,
@@ -66,14 +85,15 @@ pub struct Options {
 /// Why a server could not run.
 #[derive(Debug, thiserror::Error)]
 pub enum ServerError {
-    /// The data directory cannot be made.
-    #[error("the data directory {} cannot be used: {source}", directory.display())]
-    DataDir {
-        /// The directory.
-        directory: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    /// Sessions cannot be kept.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// Others can reach it, and nobody would have to carry a token.
+    #[error("other machines can reach {0}, and real robots may hang on this server: it needs a token there")]
+    Unguarded(SocketAddr),
+    /// The server has ended, and files lack their end.
+    #[error("these recordings lack their end: {}", .0.join("; "))]
+    Incomplete(Vec<String>),
     /// Rerun's viewer is not part of this program.
     #[error("the viewer cannot be loaded: {0}")]
     Viewer(#[from] re_web_viewer_server::WebViewerDataError),
@@ -96,39 +116,82 @@ struct App {
     assets: assets::Assets,
     /// The OpenAPI document, as it is sent.
     openapi: bytes::Bytes,
-    /// The server can be reached from this machine only, so no other host name can be meant.
-    loopback: bool,
+    strangers: Strangers,
 }
 
-/// Serves on `listener` until `shutdown` is cancelled; then ends sessions, so that their recordings are complete, and
-/// open streams with them, and returns within half a minute at most.
-pub async fn serve(listener: TcpListener, options: Options, shutdown: CancellationToken) -> Result<(), ServerError> {
-    if let Some(directory) = &options.data_dir {
-        std::fs::create_dir_all(directory)
-            .map_err(|source| ServerError::DataDir { directory: directory.clone(), source })?;
+/// A server that is ready to serve.
+pub struct Server {
+    listener: TcpListener,
+    app: Arc<App>,
+    router: Router,
+    shutdown: CancellationToken,
+}
+
+impl Server {
+    /// One on `listener`, with all that it needs: what can fail at the start fails here.
+    ///
+    /// # Errors
+    ///
+    /// [`ServerError`] where sessions cannot be kept, files are missing, or strangers could come in.
+    pub fn new(listener: TcpListener, options: Options, shutdown: CancellationToken) -> Result<Self, ServerError> {
+        let address = listener.local_addr()?;
+        if !address.ip().to_canonical().is_loopback() && options.token.is_none() {
+            return Err(ServerError::Unguarded(address));
+        }
+        let store = match &options.data_dir {
+            Some(directory) => Store::open(directory)?,
+            None => Store::in_memory()?,
+        };
+        let keeping = Keeping {
+            store,
+            recordings: options.data_dir.filter(|_| options.keep_recordings),
+            sleep_after: options.sleep_after.unwrap_or(IDLE_AFTER),
+        };
+        let (routes, document) = api::routes();
+        let app = Arc::new(App {
+            sessions: Sessions::new(Budget::new(MAX_MEMORY_BYTES), keeping, shutdown.clone())?,
+            assets: assets::Assets::load(options.panel_dir.as_deref())?,
+            openapi: document,
+            strangers: Strangers::new(options.token, options.allow_hosts, address.port()),
+        });
+        let router = Router::new().merge(routes).merge(assets::routes(&app.assets));
+        let router = guard::layered(router, &app, guard::Headers::new(&options.frame_ancestors));
+        Ok(Self { listener, app, router, shutdown })
     }
-    let loopback = listener.local_addr()?.ip().is_loopback();
-    let (routes, document) = api::routes();
-    let app = Arc::new(App {
-        sessions: Sessions::new(Budget::new(MAX_MEMORY_BYTES), options.data_dir, shutdown.clone()),
-        assets: assets::Assets::load(options.panel_dir.as_deref())?,
-        openapi: document,
-        loopback,
-    });
-    let router = Router::new().merge(routes).merge(assets::routes(&app.assets));
-    let router = guard::layered(router, &app, guard::Headers::new(&options.frame_ancestors));
-    let serving = axum::serve(listener, router).with_graceful_shutdown(shutdown.clone().cancelled_owned());
-    let ending = async {
-        shutdown.cancelled().await;
-        app.sessions.close_all().await;
-        tokio::time::sleep(DRAIN_WITHIN).await;
-    };
-    // Serving ends by itself once all connections have; a connection that does not end is given up.
-    let ended = tokio::select! {
-        ended = serving.into_future() => Some(ended),
-        () = ending => None,
-    };
-    // Without any connection serving may end before the recordings are complete.
-    app.sessions.close_all().await;
-    Ok(ended.unwrap_or(Ok(()))?)
+
+    /// Serves until it is to end; then ends sessions, so that their recordings are complete, and open streams with them, and
+    /// returns within half a minute at most.
+    ///
+    /// # Errors
+    ///
+    /// [`ServerError`] where the socket fails, and where recordings could not be completed.
+    pub async fn run(self) -> Result<(), ServerError> {
+        let Self { listener, app, router, shutdown } = self;
+        let service = router.into_make_service_with_connect_info::<Reached>();
+        let serving = axum::serve(listener, service).with_graceful_shutdown(shutdown.clone().cancelled_owned());
+        let ending = async {
+            shutdown.cancelled().await;
+            app.sessions.close_all().await;
+            tokio::time::sleep(DRAIN_WITHIN).await;
+        };
+        // Serving ends by itself once all connections have; a connection that does not end is given up.
+        let ended = tokio::select! {
+            ended = serving.into_future() => Some(ended),
+            () = ending => None,
+            () = app.sessions.watch_over() => None,
+        };
+        // Without any connection serving may end before the recordings are complete.
+        let incomplete = app.sessions.close_all().await;
+        ended.unwrap_or(Ok(()))?;
+        if incomplete.is_empty() { Ok(()) } else { Err(ServerError::Incomplete(incomplete)) }
+    }
+}
+
+/// Serves on `listener` until `shutdown` is cancelled; see [`Server`].
+///
+/// # Errors
+///
+/// [`ServerError`] of its start and of its end.
+pub async fn serve(listener: TcpListener, options: Options, shutdown: CancellationToken) -> Result<(), ServerError> {
+    Server::new(listener, options, shutdown)?.run().await
 }

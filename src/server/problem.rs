@@ -7,7 +7,12 @@ use axum::{
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::{experiment::ChoiceError, scenario::ScenarioError};
+use super::store::StoreError;
+use crate::{
+    ask_tell::{Refusal, ReplayError, ResultsError, SetupError},
+    experiment::ChoiceError,
+    scenario::ScenarioError,
+};
 
 /// Media type of every error.
 pub const PROBLEM_JSON: &str = "application/problem+json";
@@ -40,13 +45,23 @@ pub struct Problem {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Malformed,
+    NoToken,
     ForeignOrigin,
     UnknownRoute,
     UnknownScenario,
     UnknownSession,
     UnknownLearner,
+    UnknownSuggestion,
+    UnknownObservation,
     MethodNotAllowed,
     StepMismatch,
+    NeverSteps,
+    NotOutside,
+    NotPending,
+    SessionFull,
+    NothingToSuggest,
+    Diverged,
+    KeyTaken,
     NothingToShow,
     NoConfiguration,
     ChoosesItself,
@@ -58,6 +73,8 @@ pub(super) enum Kind {
     Internal,
     ServerFull,
     ShuttingDown,
+    Dormant,
+    Storage,
     Other(StatusCode),
 }
 
@@ -70,13 +87,23 @@ impl Kind {
         }
         match self {
             Self::Malformed => (400, urn!("malformed"), "The request cannot be read"),
+            Self::NoToken => (401, urn!("no-token"), "The request does not carry the server's token"),
             Self::ForeignOrigin => (403, urn!("foreign-origin"), "The request comes from a foreign page"),
             Self::UnknownRoute => (404, urn!("unknown-route"), "There is nothing here"),
             Self::UnknownScenario => (404, urn!("unknown-scenario"), "There is no such scenario"),
             Self::UnknownSession => (404, urn!("unknown-session"), "There is no such session"),
             Self::UnknownLearner => (404, urn!("unknown-learner"), "There is no such learner"),
+            Self::UnknownSuggestion => (404, urn!("unknown-suggestion"), "There is no such suggestion"),
+            Self::UnknownObservation => (404, urn!("unknown-observation"), "There is no such observation"),
             Self::MethodNotAllowed => (405, urn!("method-not-allowed"), "This method is not allowed here"),
             Self::StepMismatch => (409, urn!("step-mismatch"), "The session is at another step"),
+            Self::NeverSteps => (409, urn!("never-steps"), "The session never steps by itself"),
+            Self::NotOutside => (409, urn!("not-outside"), "The session has no robot elsewhere"),
+            Self::NotPending => (409, urn!("not-pending"), "The suggestion is not pending any more"),
+            Self::SessionFull => (409, urn!("session-full"), "The session holds as much as it can"),
+            Self::NothingToSuggest => (409, urn!("nothing-to-suggest"), "No movement can be suggested"),
+            Self::Diverged => (409, urn!("diverged"), "The estimate has diverged"),
+            Self::KeyTaken => (409, urn!("key-taken"), "The key came with another body"),
             Self::NothingToShow => (409, urn!("nothing-to-show"), "There is nothing to show yet"),
             Self::NoConfiguration => (409, urn!("no-configuration"), "A person has not chosen the next movement"),
             Self::ChoosesItself => (409, urn!("chooses-itself"), "The learner chooses its movements itself"),
@@ -88,6 +115,8 @@ impl Kind {
             Self::Internal => (500, urn!("internal"), "The server has failed"),
             Self::ServerFull => (503, urn!("server-full"), "The server holds as much as it can"),
             Self::ShuttingDown => (503, urn!("shutting-down"), "The server is shutting down"),
+            Self::Dormant => (503, urn!("dormant"), "The session has just left memory"),
+            Self::Storage => (507, urn!("storage"), "There is no room to write"),
             Self::Other(status) => (status.as_u16(), "about:blank", status.canonical_reason().unwrap_or("Error")),
         }
     }
@@ -109,6 +138,30 @@ impl Problem {
 
     pub(super) fn remaining(self, remaining: u64) -> Self {
         Self { remaining: Some(remaining), ..self }
+    }
+
+    pub(super) fn is(&self, kind: Kind) -> bool {
+        self.kind == kind.parts().1
+    }
+
+    pub(super) fn body_too_large(most: usize) -> Self {
+        Self::new(Kind::BodyTooLarge, format!("the body may have at most {most} bytes"))
+    }
+
+    pub(super) fn never_steps(id: impl std::fmt::Display) -> Self {
+        let detail = format!(
+            "a session with a robot elsewhere never steps by itself: ask for a movement with POST \
+             /v1/sessions/{id}/suggestions, and tell what was seen after it with POST /v1/sessions/{id}/observations"
+        );
+        Self::new(Kind::NeverSteps, detail)
+    }
+
+    pub(super) fn not_outside(id: impl std::fmt::Display) -> Self {
+        let detail = format!(
+            "this session has no robot elsewhere: it makes steps, with POST /v1/sessions/{id}/steps. One that has is opened \
+             with {{\"world\": \"outside\", \"calibration\": {{…}}}}"
+        );
+        Self::new(Kind::NotOutside, detail)
     }
 
     pub(super) fn unknown_session(id: impl std::fmt::Display) -> Self {
@@ -153,13 +206,79 @@ impl From<ChoiceError> for Problem {
     }
 }
 
+/// A calibration that cannot become a session, blamed on the body field that is wrong.
+impl From<SetupError> for Problem {
+    fn from(error: SetupError) -> Self {
+        let field = match &error {
+            SetupError::Invalid(faults) => match faults.first().map(|fault| fault.field.as_str()) {
+                None | Some("calibration") => "calibration".to_owned(),
+                Some(key) => format!("calibration.{key}"),
+            },
+            SetupError::Agent(_) => "agent".to_owned(),
+        };
+        Self::new(Kind::InvalidValue, error.to_string()).field(field)
+    }
+}
+
+/// A kept session that this program cannot take up.
+impl From<ReplayError> for Problem {
+    fn from(error: ReplayError) -> Self {
+        Self::new(Kind::EngineFailed, format!("the session cannot be taken up again: {error}"))
+    }
+}
+
+/// What a session with a robot elsewhere has refused. Nothing has happened then.
+impl From<Refusal> for Problem {
+    fn from(refusal: Refusal) -> Self {
+        let (kind, field) = match &refusal {
+            Refusal::Field(fault) => (Kind::InvalidValue, Some(fault.field.clone())),
+            Refusal::UnknownSuggestion { .. } => (Kind::UnknownSuggestion, Some("sid".to_owned())),
+            Refusal::UnknownObservation { .. } => (Kind::UnknownObservation, Some("n".to_owned())),
+            Refusal::NotPending { .. } => (Kind::NotPending, None),
+            Refusal::Full { .. } => (Kind::SessionFull, None),
+            Refusal::Selection(_) => (Kind::NothingToSuggest, None),
+            Refusal::Ended(_) => (Kind::Diverged, None),
+            Refusal::Stale => (Kind::Internal, None),
+        };
+        let problem = Self::new(kind, refusal.to_string());
+        field.into_iter().fold(problem, Self::field)
+    }
+}
+
+/// What was observed comes to nothing yet.
+impl From<ResultsError> for Problem {
+    fn from(error: ResultsError) -> Self {
+        Self::new(Kind::NothingToShow, error.to_string())
+    }
+}
+
+/// What could not be written has not happened.
+impl From<StoreError> for Problem {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::Full(_) => Self::new(Kind::ServerFull, error.to_string()),
+            _ if error.is_for_want_of_space() => {
+                let detail =
+                    format!("it could not be written, and has not happened: {error}; free some space and ask again");
+                Self::new(Kind::Storage, detail)
+            }
+            _ => Self::new(Kind::Internal, format!("it has not happened: {error}")),
+        }
+    }
+}
+
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let body = serde_json::to_vec(&self).unwrap_or_default();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
         if matches!(status, StatusCode::SERVICE_UNAVAILABLE) {
-            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("10"));
+            // A session that has left memory is back at once.
+            let after = if self.is(Kind::Dormant) { "0" } else { "10" };
+            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static(after));
+        }
+        if matches!(status, StatusCode::UNAUTHORIZED) {
+            response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
         }
         response
     }

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::support::{Server, timeless};
 
-const ROUTES: [(&str, &str); 20] = [
+const ROUTES: [(&str, &str); 35] = [
     ("get", "/v1/scenarios"),
     ("get", "/v1/scenarios/{name}"),
     ("get", "/v1/sessions"),
@@ -17,6 +17,21 @@ const ROUTES: [(&str, &str); 20] = [
     ("post", "/v1/sessions/{id}/learners/{name}/evaluations"),
     ("get", "/v1/sessions/{id}/learners/{name}/configuration"),
     ("post", "/v1/sessions/{id}/learners/{name}/configuration"),
+    ("get", "/v1/sessions/{id}/suggestions"),
+    ("post", "/v1/sessions/{id}/suggestions"),
+    ("post", "/v1/sessions/{id}/suggestions/{sid}/outcome"),
+    ("get", "/v1/sessions/{id}/observations"),
+    ("post", "/v1/sessions/{id}/observations"),
+    ("get", "/v1/sessions/{id}/observations/{n}"),
+    ("delete", "/v1/sessions/{id}/observations/{n}"),
+    ("put", "/v1/sessions/{id}/observations/{n}/included"),
+    ("get", "/v1/sessions/{id}/model.urdf"),
+    ("get", "/v1/sessions/{id}/kinematics.yaml"),
+    ("get", "/v1/sessions/{id}/report.json"),
+    ("get", "/v1/sessions/{id}/report.html"),
+    ("get", "/v1/sessions/{id}/observations.csv"),
+    ("get", "/v1/sessions/{id}/calibration.toml"),
+    ("get", "/v1/sessions/{id}/robot.urdf"),
     ("get", "/v1/sessions/{id}/events"),
     ("get", "/v1/sessions/{id}/live"),
     ("get", "/v1/sessions/{id}/live.rrd"),
@@ -118,6 +133,34 @@ async fn responses_are_as_described() {
     let set = server.post(&path, json!({ "configuration": [0.1, 0.2, -0.3, -1.0, 0.4, 0.5] })).await;
     check(("post", route), 200, set.json().await.expect("JSON"));
     check(("get", route), 200, server.get_json(&path).await);
+    let created = server.post("/v1/sessions", crate::robot::opening()).await;
+    let session = created.headers()["location"].to_str().expect("text").to_owned();
+    check(("post", "/v1/sessions"), 201, created.json().await.expect("JSON"));
+    let suggestions = "/v1/sessions/{id}/suggestions";
+    let asked = server.post(&format!("{session}/suggestions"), json!({ "count": 2 })).await;
+    let asked: Value = asked.json().await.expect("JSON");
+    check(("post", suggestions), 200, asked.clone());
+    check(("get", suggestions), 200, server.get_json(&format!("{session}/suggestions")).await);
+    let outcome = server.post(&format!("{session}/suggestions/2/outcome"), json!({ "state": "abandoned" })).await;
+    check(("post", "/v1/sessions/{id}/suggestions/{sid}/outcome"), 200, outcome.json().await.expect("JSON"));
+    let observations = "/v1/sessions/{id}/observations";
+    let told = crate::robot::carried_out(&asked["suggestions"][0]);
+    let told = server.post(&format!("{session}/observations"), told).await;
+    check(("post", observations), 201, told.json().await.expect("JSON"));
+    check(("get", observations), 200, server.get_json(&format!("{session}/observations")).await);
+    let path = format!("{session}/observations/1");
+    check(("get", "/v1/sessions/{id}/observations/{n}"), 200, server.get_json(&path).await);
+    let excluded = server.request(Method::DELETE, &path).send().await.expect("an answer");
+    check(("delete", "/v1/sessions/{id}/observations/{n}"), 200, excluded.json().await.expect("JSON"));
+    let included = server.request(Method::PUT, &format!("{path}/included")).send().await.expect("an answer");
+    check(("put", "/v1/sessions/{id}/observations/{n}/included"), 200, included.json().await.expect("JSON"));
+    check(("get", "/v1/sessions/{id}"), 200, server.get_json(&session).await);
+    let live = json!({ "$ref": "#/components/schemas/LiveEvent" });
+    for event in crate::streams::first_messages(&server, &session, 1).await {
+        contract.check_schema(&live, &event);
+    }
+    let steps = server.post(&format!("{session}/steps"), json!({})).await;
+    check(("post", "/v1/sessions/{id}/steps"), 409, steps.json().await.expect("JSON"));
     let gone = server.request(Method::DELETE, "/v1/sessions/x").send().await.expect("an answer");
     check(("delete", "/v1/sessions/{id}"), 404, gone.json().await.expect("JSON"));
     server.stop().await;

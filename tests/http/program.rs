@@ -1,8 +1,9 @@
 //! The program itself as a server: what only a process of its own can show.
 
 use std::{
-    io::{BufRead, BufReader},
-    process::{Child, Command, Stdio},
+    io::{BufRead, BufReader, Read},
+    path::Path,
+    process::{Child, ChildStdout, Command, Stdio},
 };
 
 use serde_json::json;
@@ -10,25 +11,71 @@ use serde_json::json;
 use crate::support::{Api, steps};
 
 /// The program, serving on a port of its own; it is killed when this goes.
-struct Program {
+pub struct Program {
     process: Child,
-    api: Api,
+    pub api: Api,
+    /// What it said when it started.
+    pub said: String,
+    output: BufReader<ChildStdout>,
 }
 
 impl Program {
     fn serve(environment: &[(&str, &str)]) -> Self {
-        let mut process = Command::new(env!("CARGO_BIN_EXE_body-schema"))
-            .args(["serve", "--bind", "127.0.0.1:0"])
-            .envs(environment.iter().copied())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the program starts");
-        let mut line = String::new();
-        let output = process.stdout.as_mut().expect("its output");
-        BufReader::new(output).read_line(&mut line).expect("a line");
-        let address = line.split_once("http://").and_then(|(_, rest)| rest.split_once('/')).expect("an address").0;
+        let mut command = Command::new(env!("CARGO_BIN_EXE_body-schema"));
+        command.args(["serve", "--bind", "127.0.0.1:0", "--ephemeral"]).envs(environment.iter().copied());
+        Self::start(&mut command)
+    }
+
+    /// That keeps nothing.
+    pub fn ephemeral() -> Self {
+        Self::serve(&[])
+    }
+
+    /// That keeps its sessions in a folder.
+    pub fn keeping(folder: &Path) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_body-schema"));
+        Self::start(command.args(["serve", "--bind", "127.0.0.1:0", "--data-dir"]).arg(folder))
+    }
+
+    /// Waits until it says where it is, and all that it says beside.
+    pub fn start(command: &mut Command) -> Self {
+        let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts");
+        let mut output = BufReader::new(process.stdout.take().expect("its output"));
+        let mut said = String::new();
+        while !said.contains("kept") {
+            assert!(output.read_line(&mut said).expect("a line") > 0, "it ended: {said}");
+        }
+        let address = said.split_once("http://").and_then(|(_, rest)| rest.split_once('/')).expect("an address").0;
         let api = Api::at(address.parse().expect("an address"));
-        Self { process, api }
+        Self { process, api, said, output }
+    }
+
+    /// The next line that it says.
+    pub fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.output.read_line(&mut line).expect("a line");
+        line
+    }
+
+    pub fn id(&self) -> u32 {
+        self.process.id()
+    }
+
+    /// Ends it at once, whatever it is doing.
+    pub fn kill(mut self) {
+        self.process.kill().expect("killed");
+        self.process.wait().expect("it ends");
+    }
+
+    /// Asks it to end. Tells its exit code, and what it said on the way.
+    #[cfg(unix)]
+    pub fn terminate(mut self) -> (Option<i32>, String) {
+        let id = self.id().to_string();
+        assert!(Command::new("kill").args(["-TERM", &id]).status().expect("kill").success());
+        let mut said = String::new();
+        self.output.read_to_string(&mut said).expect("text");
+        self.process.stderr.take().expect("its errors").read_to_string(&mut said).expect("text");
+        (self.process.wait().expect("it ends").code(), said)
     }
 
     #[cfg(target_os = "linux")]

@@ -36,6 +36,20 @@ async fn follow(server: &Server, session: &str, query: &str) -> WebSocketStream<
     client_async(url, stream).await.expect("a WebSocket").0
 }
 
+/// The text messages of a session's WebSocket, up to the report of a step and the status that goes with it.
+pub async fn first_messages(server: &Server, session: &str, last: u64) -> Vec<Value> {
+    let mut socket = follow(server, session, "").await;
+    let mut messages: Vec<Value> = Vec::new();
+    let is_last = |message: &Value| message["type"] == "step" && message["data"]["step"] == last;
+    while !(messages.iter().any(is_last) && messages.iter().any(|message| message["type"] == "status")) {
+        let message = timeout(SOON, socket.next()).await.expect("soon").expect("a message").expect("no error");
+        if let Message::Text(text) = message {
+            messages.push(serde_json::from_str(&text).expect("JSON"));
+        }
+    }
+    messages
+}
+
 /// The events of a stream, as they come.
 struct Events {
     response: reqwest::Response,

@@ -1,6 +1,11 @@
 //! A server on a port of its own, and a client for it.
 
-use std::{net::SocketAddr, ops::Deref, path::PathBuf, time::Duration};
+use std::{
+    net::{Ipv4Addr, SocketAddr},
+    ops::Deref,
+    path::PathBuf,
+    time::Duration,
+};
 
 use body_schema::server::{Options, ServerError, serve};
 use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
@@ -24,12 +29,17 @@ impl Server {
     }
 
     pub async fn with_data_dir(data_dir: Option<PathBuf>) -> Self {
-        Self::with(Options { data_dir, ..Options::default() }).await
+        Self::with(Options { keep_recordings: data_dir.is_some(), data_dir, ..Options::default() }).await
     }
 
     pub async fn with(options: Options) -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
-        let address = listener.local_addr().expect("an address");
+        Self::at("127.0.0.1:0", options).await
+    }
+
+    /// A server that listens on an address, and is asked from this machine.
+    pub async fn at(address: &str, options: Options) -> Self {
+        let listener = TcpListener::bind(address).await.expect("a free port");
+        let address = (Ipv4Addr::LOCALHOST, listener.local_addr().expect("an address").port()).into();
         let shutdown = CancellationToken::new();
         let serving = tokio::spawn(serve(listener, options, shutdown.clone()));
         Self { api: Api::at(address), shutdown, serving }

@@ -48,7 +48,7 @@ pub(super) async fn selection(
     State(app): State<Arc<App>>,
     Path((id, name)): Path<(String, String)>,
 ) -> Result<Response, Problem> {
-    json(app.sessions.get(&id)?.choice(name).await?).await
+    json(app.sessions.get(&id).await?.choice(name).await?).await
 }
 
 /// What a posture of your own would have taught instead of the last movement.
@@ -77,7 +77,7 @@ pub(super) async fn evaluate(
     Path((id, name)): Path<(String, String)>,
     JsonBody(request): JsonBody<EvaluationRequest>,
 ) -> Result<Response, Problem> {
-    json(app.sessions.get(&id)?.appraise(name, request.configuration).await?).await
+    json(app.sessions.get(&id).await?.appraise(name, request.configuration).await?).await
 }
 
 /// The next movement of a learner for which a person chooses (policy `human`), as it is set so far.
@@ -97,7 +97,7 @@ pub(super) async fn configuration(
     State(app): State<Arc<App>>,
     Path((id, name)): Path<(String, String)>,
 ) -> Result<Response, Problem> {
-    json(Configuration { configuration: app.sessions.get(&id)?.configuration(name).await? }).await
+    json(Configuration { configuration: app.sessions.get(&id).await?.configuration(name).await? }).await
 }
 
 /// Set the next movement of a learner for which a person chooses (policy `human`). It may be set anew until the next step;
@@ -128,5 +128,5 @@ pub(super) async fn set_configuration(
     Path((id, name)): Path<(String, String)>,
     JsonBody(request): JsonBody<EvaluationRequest>,
 ) -> Result<Response, Problem> {
-    json(app.sessions.get(&id)?.set_configuration(name, request.configuration).await?).await
+    json(app.sessions.get(&id).await?.set_configuration(name, request.configuration).await?).await
 }

@@ -29,7 +29,7 @@ use crate::{
     )
 )]
 pub(super) async fn recording(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let session = app.sessions.get(&id)?.watch();
+    let session = app.sessions.get(&id).await?.watch();
     session.flush().await?;
     let live = session.live().clone();
     let complete = move || {
@@ -48,7 +48,7 @@ pub(super) async fn recording(State(app): State<Arc<App>>, Path(id): Path<String
     )
 )]
 pub(super) async fn steps_csv(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let session = app.sessions.get(&id)?;
+    let session = app.sessions.get(&id).await?;
     let (description, reports) = (session.description().clone(), session.reports(0, usize::MAX));
     let table = move || {
         let mut table = Vec::new();
@@ -71,7 +71,7 @@ pub(super) async fn steps_csv(State(app): State<Arc<App>>, Path(id): Path<String
     )
 )]
 pub(super) async fn result(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let session = app.sessions.get(&id)?.watch();
+    let session = app.sessions.get(&id).await?.watch();
     json(session.result().await?).await
 }
 

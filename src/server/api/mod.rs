@@ -2,10 +2,13 @@
 
 mod choices;
 mod downloads;
+mod observations;
+mod outcomes;
 mod readers;
 mod scenarios;
 mod sessions;
 mod streams;
+mod suggestions;
 mod views;
 
 use std::sync::Arc;
@@ -13,19 +16,22 @@ use std::sync::Arc;
 use axum::{
     Json, Router,
     body::{Body, Bytes},
-    extract::State,
+    extract::{DefaultBodyLimit, State},
     http::header,
     response::{IntoResponse, Response},
 };
 use serde::Serialize;
 use utoipa::{OpenApi, ToSchema, openapi::RefOr};
-use utoipa_axum::{router::OpenApiRouter, routes};
+use utoipa_axum::{
+    router::{OpenApiRouter, UtoipaMethodRouterExt},
+    routes,
+};
 
 pub use scenarios::{ScenarioList, ScenarioResource};
 pub use sessions::{MadeSteps, SessionList, StepRequest};
 
 use super::{
-    App,
+    App, MAX_SETUP_BODY_BYTES,
     problem::{Kind, PROBLEM_JSON, Problem},
 };
 use crate::experiment::StepReport;
@@ -56,12 +62,14 @@ pub enum Liveness {
         title = "body-schema",
         description = "Learn a robot's kinematic body schema from a few well-chosen movements, and watch it happen.\n\n\
             A session is an experiment: a scenario with a seed, in which several learners each make one movement per \
-            step. Step it, follow its reports as they are made, take its recording away.\n\nEvery error is a problem \
+            step. Step it, follow its reports as they are made, take its recording away. Or it is a robot elsewhere: ask \
+            where to move it, tell where it was and what was seen, take its calibrated description away.\n\nEvery error is a problem \
             document (RFC 9457). Lengths are in metres and angles in radians unless a name says otherwise."
     ),
     tags(
         (name = "scenarios", description = "What experiments there are"),
         (name = "sessions", description = "Running experiments"),
+        (name = "robots", description = "Robots elsewhere, which ask and tell"),
         (name = "results", description = "What came out of a session"),
         (name = "server", description = "The server itself")
     ),
@@ -75,12 +83,24 @@ pub(super) fn routes() -> (Router<Arc<App>>, Bytes) {
     let (router, mut document) = OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(scenarios::list))
         .routes(routes!(scenarios::get))
-        .routes(routes!(sessions::list, sessions::create))
+        .routes(routes!(sessions::list, sessions::create).layer(DefaultBodyLimit::max(MAX_SETUP_BODY_BYTES)))
         .routes(routes!(sessions::get, sessions::delete))
         .routes(routes!(sessions::step))
         .routes(routes!(choices::selection))
         .routes(routes!(choices::evaluate))
         .routes(routes!(choices::configuration, choices::set_configuration))
+        .routes(routes!(suggestions::list, suggestions::suggest))
+        .routes(routes!(suggestions::outcome))
+        .routes(routes!(observations::list, observations::observe))
+        .routes(routes!(observations::get, observations::exclude))
+        .routes(routes!(observations::include))
+        .routes(routes!(outcomes::urdf))
+        .routes(routes!(outcomes::kinematics))
+        .routes(routes!(outcomes::report_json))
+        .routes(routes!(outcomes::report_html))
+        .routes(routes!(outcomes::observations))
+        .routes(routes!(outcomes::calibration_file))
+        .routes(routes!(outcomes::nominal_urdf))
         .routes(routes!(streams::events))
         .routes(routes!(streams::live))
         .routes(routes!(streams::live_recording))
@@ -99,7 +119,7 @@ pub(super) fn routes() -> (Router<Arc<App>>, Bytes) {
 /// Says once for all routes that problems have their own media type.
 fn describe_problems(document: &mut utoipa::openapi::OpenApi) {
     for item in document.paths.paths.values_mut() {
-        let operations = [&mut item.get, &mut item.post, &mut item.delete].into_iter().flatten();
+        let operations = [&mut item.get, &mut item.post, &mut item.put, &mut item.delete].into_iter().flatten();
         let responses = operations.flat_map(|operation| &mut operation.responses.responses);
         let errors = responses.filter(|(status, _)| status.starts_with(['4', '5']));
         for response in errors.filter_map(|(_, response)| match response {

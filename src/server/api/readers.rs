@@ -52,6 +52,11 @@ impl Reports {
     pub(super) fn failure(&self) -> Option<String> {
         self.session.failure()
     }
+
+    /// Whether the history ended because it has to be made anew.
+    pub(super) fn is_rewritten(&self) -> bool {
+        self.session.is_rewritten()
+    }
 }
 
 /// Reads parts of the recording from an index on.

@@ -8,19 +8,20 @@ use axum::{
     http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer, de::IgnoredAny};
 use serde_json::value::RawValue;
 use utoipa::ToSchema;
+use uuid::Uuid;
 
 use super::json;
 use crate::{
     experiment::StepReport,
     recording::MOST_FRAMES,
     server::{
-        App, MAX_STEPS_PER_REQUEST,
-        extract::JsonBody,
+        App, MAX_BODY_BYTES, MAX_SETUP_BODY_BYTES, MAX_STEPS_PER_REQUEST,
+        extract::{FromJson, JsonBody, parse},
         problem::{Kind, Problem},
-        session::{NewSession, SessionResource},
+        session::{NewOutsideSession, NewSession, SessionResource},
     },
 };
 
@@ -84,15 +85,48 @@ fn all<S: Serializer>(reports: &[Arc<RawValue>], serializer: S) -> Result<S::Ok,
 
 /// All sessions.
 #[utoipa::path(get, path = "/v1/sessions", tag = "sessions", operation_id = "listSessions", responses(
-    (status = 200, description = "All sessions, oldest first", body = SessionList)
+    (status = 200, description = "All sessions, oldest first", body = SessionList),
+    (status = 500, description = "The sessions with robots elsewhere cannot be read", body = Problem),
 ))]
-pub(super) async fn list(State(app): State<Arc<App>>) -> Json<SessionList> {
-    Json(SessionList { sessions: app.sessions.all().iter().map(|session| session.resource()).collect() })
+pub(super) async fn list(State(app): State<Arc<App>>) -> Result<Json<SessionList>, Problem> {
+    Ok(Json(SessionList { sessions: app.sessions.list().await? }))
 }
 
-/// Open a session. It is at step 0: no movement yet.
+/// What a session is made from: a scenario of ours, or a robot elsewhere.
+#[derive(ToSchema)]
+#[schema(as = OpenSession)]
+#[serde(untagged)]
+pub(super) enum Opening {
+    /// Learners in a world of ours, compared.
+    Scenario(NewSession),
+    /// A robot that is not ours.
+    Outside(NewOutsideSession),
+}
+
+impl FromJson for Opening {
+    fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
+        #[derive(Deserialize)]
+        struct Which {
+            world: Option<IgnoredAny>,
+        }
+        // What cannot even be read so far is told of by the one that has always been there.
+        let is_outside = serde_json::from_slice(bytes).is_ok_and(|Which { world }| world.is_some());
+        match is_outside {
+            true => parse(bytes).map(Self::Outside),
+            false if bytes.len() > MAX_BODY_BYTES => Err(Problem::body_too_large(MAX_BODY_BYTES)),
+            false => parse(bytes).map(Self::Scenario),
+        }
+    }
+
+    fn too_large() -> Problem {
+        Problem::body_too_large(MAX_SETUP_BODY_BYTES).field("calibration")
+    }
+}
+
+/// Open a session: a scenario of ours, or a robot elsewhere, which is asked to move and tells what it saw. It is at step 0: no
+/// movement yet.
 #[utoipa::path(post, path = "/v1/sessions", tag = "sessions", operation_id = "openSession",
-    request_body = NewSession,
+    request_body = Opening,
     responses(
         (status = 201, description = "The session", body = SessionResource,
             headers(("Location" = String, description = "The session's address"))),
@@ -103,13 +137,20 @@ pub(super) async fn list(State(app): State<Arc<App>>) -> Json<SessionList> {
         (status = 422, description = "A value is not valid; `field` names it", body = Problem),
         (status = 500, description = "The session could not be set up", body = Problem),
         (status = 503, description = "There are too many sessions, or the server is shutting down", body = Problem),
+        (status = 507, description = "There is no room to keep it; no session was opened", body = Problem),
     )
 )]
 pub(super) async fn create(
     State(app): State<Arc<App>>,
-    JsonBody(new): JsonBody<NewSession>,
+    JsonBody(opening): JsonBody<Opening>,
 ) -> Result<Response, Problem> {
-    let session = app.sessions.open(new).await?;
+    let session = to_its_end(async move {
+        match opening {
+            Opening::Scenario(new) => app.sessions.open(new).await,
+            Opening::Outside(new) => app.sessions.open_outside(new).await,
+        }
+    });
+    let session = session.await?;
     let location = format!("/v1/sessions/{}", session.id());
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(session.resource())).into_response())
 }
@@ -123,22 +164,34 @@ pub(super) async fn create(
     )
 )]
 pub(super) async fn get(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Json<SessionResource>, Problem> {
-    Ok(Json(app.sessions.get(&id)?.resource()))
+    Ok(Json(app.sessions.get(&id).await?.resource()))
 }
 
-/// End a session. Its streams end, its recording is finished, and its memory is free again.
+/// End a session. Its streams end, its recording is finished, and its memory is free again; one with a robot elsewhere is kept
+/// no longer.
 #[utoipa::path(delete, path = "/v1/sessions/{id}", tag = "sessions", operation_id = "deleteSession",
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
         (status = 204, description = "The session is no more"),
         (status = 403, description = "The request comes from a foreign page", body = Problem),
         (status = 404, description = "There is no such session", body = Problem),
+        (status = 500, description = "It cannot be deleted, and is still there", body = Problem),
+        (status = 503, description = "It is deleted, but is still choosing a movement", body = Problem),
+        (status = 507, description = "There is no room to complete its recording, or to forget it; it is still there", body = Problem),
     )
 )]
 pub(super) async fn delete(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<StatusCode, Problem> {
-    let id = app.sessions.get(&id)?.id();
-    app.sessions.close(id).await?;
+    let id = Uuid::parse_str(&id).map_err(|_| Problem::unknown_session(id))?;
+    to_its_end(async move { app.sessions.close(id).await }).await?;
     Ok(StatusCode::NO_CONTENT)
+}
+
+/// Does it whole, also for a client that goes away meanwhile.
+async fn to_its_end<T: Send + 'static>(
+    work: impl Future<Output = Result<T, Problem>> + Send + 'static,
+) -> Result<T, Problem> {
+    let done = tokio::spawn(work).await;
+    done.unwrap_or_else(|error| Err(Problem::new(Kind::Internal, format!("a part of the server failed: {error}"))))
 }
 
 /// Make steps: in each, every learner makes one movement. Requests to a busy session wait for their turn; one that its
@@ -151,8 +204,9 @@ pub(super) async fn delete(State(app): State<Arc<App>>, Path(id): Path<String>) 
         (status = 400, description = "The body is not JSON", body = Problem),
         (status = 403, description = "The request comes from a foreign page", body = Problem),
         (status = 404, description = "There is no such session", body = Problem),
-        (status = 409, description = "The session is not at `expected_step` but at `step`, or a person has not chosen \
-            a movement yet (problem type `no-configuration`); nothing was stepped", body = Problem),
+        (status = 409, description = "The session is not at `expected_step` but at `step`, a person has not chosen a \
+            movement yet (problem type `no-configuration`), or a robot elsewhere moves (`never-steps`); nothing was stepped",
+            body = Problem),
         (status = 413, description = "The body is too large", body = Problem),
         (status = 415, description = "The body is not said to be JSON", body = Problem),
         (status = 422, description = "A value is not valid, or only `remaining` steps are left; nothing was stepped", body = Problem),
@@ -165,7 +219,7 @@ pub(super) async fn step(
     Path(id): Path<String>,
     JsonBody(StepRequest { count, expected_step, frames, reports }): JsonBody<StepRequest>,
 ) -> Result<Response, Problem> {
-    let session = app.sessions.get(&id)?;
+    let session = app.sessions.get(&id).await?;
     if !(1..=MAX_STEPS_PER_REQUEST).contains(&count) {
         let detail = format!("`count` must be from 1 to {MAX_STEPS_PER_REQUEST}, not {count}");
         return Err(Problem::new(Kind::InvalidValue, detail).field("count"));

@@ -17,13 +17,18 @@ use axum::{
 use futures_util::{Stream, stream::unfold};
 use serde::Serialize;
 use serde_json::value::RawValue;
+use tokio::sync::watch;
 use utoipa::ToSchema;
 
 use super::readers::{Parts, Reports};
 use crate::{
     experiment::{Description, StepReport},
     recording::LiveLog,
-    server::{App, extract, problem::Problem, session::Kept},
+    server::{
+        App, extract,
+        problem::Problem,
+        session::{Kept, Standing},
+    },
 };
 
 /// From so many waiting parts on, a WebSocket gets them put together: a viewer takes some dozens a frame.
@@ -32,6 +37,8 @@ const MANY_PARTS: usize = 200;
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// Why the WebSocket was closed: the session was deleted …
 const CLOSE_DELETED: u16 = 4404;
+/// … or its history was rewritten, so that whoever follows it begins anew …
+const CLOSE_REWRITTEN: u16 = 4409;
 /// … or its engine has failed …
 const CLOSE_FAILED: u16 = 4500;
 /// … or the server is going away.
@@ -54,6 +61,9 @@ pub(super) enum LiveEvent {
         /// Its index.
         next: usize,
     },
+    /// With a robot elsewhere: how it stands, at first and whenever that changes.
+    #[schema(value_type = Standing)]
+    Status(Arc<Standing>),
 }
 
 fn report<S: serde::Serializer>(report: &Arc<RawValue>, serializer: S) -> Result<S::Ok, S::Error> {
@@ -78,7 +88,7 @@ pub(super) async fn events(
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let session = app.sessions.get(&id)?;
+    let session = app.sessions.get(&id).await?;
     let first = extract::last_event_id(&headers)?.map_or(0, |last| last.saturating_add(1));
     let events = unfold((Reports::new(&session, first), Vec::new().into_iter()), |(mut reports, mut batch)| async {
         let report: Kept = match batch.next() {
@@ -104,7 +114,7 @@ pub(super) async fn events(
     )
 )]
 pub(super) async fn live_recording(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let session = app.sessions.get(&id)?;
+    let session = app.sessions.get(&id).await?;
     let body = Body::from_stream(parts(Parts::new(&session, 0, LiveLog::parts_from)));
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], body).into_response())
 }
@@ -136,6 +146,7 @@ fn parts(parts: Parts) -> impl Stream<Item = Result<Bytes, Infallible>> {
     ),
     responses(
         (status = 101, description = "The WebSocket. Its close code says why it ended: 4404 the session was deleted, \
+            4409 an observation was excluded or included, so that all is to be followed anew from the first part and step 0, \
             4500 its engine has failed, 1001 the server is shutting down."),
         (status = 400, description = "Not a WebSocket handshake, or a parameter is not a number", body = Problem),
         (status = 403, description = "The request comes from a foreign page", body = Problem),
@@ -149,7 +160,7 @@ pub(super) async fn live(
     RawQuery(query): RawQuery,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Problem> {
-    let session = app.sessions.get(&id)?;
+    let session = app.sessions.get(&id).await?;
     let [from, step] = extract::whole_numbers(query.as_deref(), ["from", "step"])?;
     let upgrade = match upgrade {
         Ok(upgrade) => upgrade,
@@ -157,12 +168,12 @@ pub(super) async fn live(
     };
     let readers =
         (Reports::new(&session, step.unwrap_or(0)), Parts::new(&session, from.unwrap_or(0), LiveLog::scene_parts_from));
-    let description = session.description().clone();
+    let (description, standing) = (session.description().clone(), session.standing());
     // Clients have nothing to say; what they say must not fill the memory.
     let upgrade = upgrade.max_message_size(1 << 10);
     Ok(upgrade.on_upgrade(|socket| async move {
         // A client that goes away needs no answer.
-        drop(follow(socket, &app, description, readers).await);
+        drop(follow(socket, &app, description, standing, readers).await);
     }))
 }
 
@@ -170,9 +181,12 @@ async fn follow(
     mut socket: WebSocket,
     app: &App,
     description: Description,
+    mut standing: watch::Receiver<Option<Arc<Standing>>>,
     (mut reports, mut parts): (Reports, Parts),
 ) -> Result<(), axum::Error> {
     socket.send(text(&LiveEvent::Description(Box::new(description)))?).await?;
+    // What it is now, as if it had just changed.
+    standing.mark_changed();
     let mut ping = tokio::time::interval_at(tokio::time::Instant::now() + KEEP_ALIVE, KEEP_ALIVE);
     loop {
         // Parts first: they are published before the reports of their steps.
@@ -191,6 +205,13 @@ async fn follow(
                     socket.send(text(&LiveEvent::Step(report.json))?).await?;
                 }
             }
+            // Its sender lives as long as the session, whose end the readers hear of.
+            Ok(()) = standing.changed() => {
+                let now = standing.borrow_and_update().clone();
+                if let Some(now) = now {
+                    socket.send(text(&LiveEvent::Status(now))?).await?;
+                }
+            }
             _ = ping.tick() => socket.send(Message::Ping(Bytes::new())).await?,
         }
     }
@@ -201,6 +222,7 @@ async fn follow(
     }
     let (code, reason) = match reports.failure() {
         _ if app.sessions.is_shutting_down() => (CLOSE_GOING_AWAY, "the server is shutting down".to_owned()),
+        _ if reports.is_rewritten() => (CLOSE_REWRITTEN, "what was told counts anew".to_owned()),
         Some(failure) => (CLOSE_FAILED, failure.chars().take(CLOSE_REASON_CHARS).collect()),
         None => (CLOSE_DELETED, "the session was deleted".to_owned()),
     };

@@ -41,7 +41,7 @@ pub(super) async fn blueprint(
     Path(id): Path<String>,
     RawQuery(query): RawQuery,
 ) -> Result<Response, Problem> {
-    let session = app.sessions.get(&id)?;
+    let session = app.sessions.get(&id).await?;
     let [theme, shape, aspect] = extract::parameters(query.as_deref(), ["theme", "shape", "aspect"])?;
     let (theme, shape): (Theme, Shape) = (extract::word("theme", theme)?, extract::word("shape", shape)?);
     let aspect = aspect.map(self::aspect).transpose()?.unwrap_or(shape.aspect());

@@ -6,7 +6,7 @@
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     path::PathBuf,
-    sync::{Arc, mpsc},
+    sync::{Arc, atomic::Ordering, mpsc},
     time::{Duration, Instant},
 };
 
@@ -16,7 +16,7 @@ use uuid::Uuid;
 use super::{Kept, Shared};
 use crate::{
     experiment::{AppraisalReport, Choice, Description, Experiment, RunResult},
-    recording::{EllipsoidSize, Recorder, Target},
+    recording::{EllipsoidSize, Recorder, RecordingError, Target},
     scenario::builtin,
     server::{
         MAX_STEPS_PER_SESSION,
@@ -28,7 +28,7 @@ use crate::{
 const PUBLISH_EVERY: Duration = Duration::from_millis(200);
 /// What the arrangement of views does not show is written when nothing was asked for so long: while steps are made one
 /// by one, every message counts.
-const COMPLETE_AFTER: Duration = Duration::from_millis(500);
+pub(super) const COMPLETE_AFTER: Duration = Duration::from_millis(500);
 
 /// What a session is made from.
 pub(super) struct Setup {
@@ -84,6 +84,10 @@ pub(super) enum Command {
     Flush {
         reply: Reply<()>,
     },
+    /// Completes the recording's file and ends the engine, or tells why it cannot and goes on.
+    End {
+        reply: Reply<()>,
+    },
     /// Makes the engine look whether it is to end.
     Wake,
     #[cfg(test)]
@@ -116,8 +120,9 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
                     shared.fail(panicked(&*panic).detail);
                 }
             }
-            if let Ok(Err(error)) = catch_unwind(AssertUnwindSafe(|| recorder.finish())) {
-                shared.fail(format!("the recording could not be finished: {error}"));
+            // A file that cannot be completed is told of when the server ends.
+            if let Ok(finished) = catch_unwind(AssertUnwindSafe(|| recorder.finish())) {
+                shared.note_recording(finished.err().map(|error| error.to_string()));
             }
         }
         Err(problem) => drop(opened.send(Err(problem))),
@@ -147,6 +152,14 @@ impl Engine<'_> {
             }
             match command {
                 Err(mpsc::RecvError) => return,
+                Ok(Command::End { reply }) => {
+                    let sealed = recorder.seal().map_err(|error| self.unsealed(&error));
+                    let is_sealed = sealed.is_ok();
+                    drop(reply.send(sealed));
+                    if is_sealed {
+                        return;
+                    }
+                }
                 Ok(command) => self.obey(command, recorder),
             }
         }
@@ -174,7 +187,7 @@ impl Engine<'_> {
                 drop(reply.send(configuration.map(|set| set.map(<[f64]>::to_vec))));
             }
             Command::Flush { reply } => drop(reply.send(self.flush(recorder))),
-            Command::Wake => {}
+            Command::End { .. } | Command::Wake => {}
             #[cfg(test)]
             Command::Panic => panic!("as the test asked"),
         }
@@ -199,8 +212,17 @@ impl Engine<'_> {
         Ok(appraisal)
     }
 
+    /// Why the session goes on although it was to end.
+    fn unsealed(&self, error: &RecordingError) -> Problem {
+        self.shared.interrupted.store(false, Ordering::Relaxed);
+        self.shared.note_recording(Some(error.to_string()));
+        let detail = format!("{error}. The session is still there, with its whole recording: end it again then");
+        Problem::new(Kind::Storage, detail).step(self.experiment.latest().step)
+    }
+
     fn flush(&self, recorder: &mut Recorder) -> Result<(), Problem> {
         let flushed = recorder.flush().map_err(recording_failed);
+        self.shared.note_recording(recorder.file_failure().map(str::to_owned));
         self.shared.publish(Vec::new(), self.experiment.remaining());
         flushed
     }
@@ -224,7 +246,8 @@ impl Engine<'_> {
         let mut outcome = Ok(());
         while outcome.is_ok() && (batch.made.len() as u64) < count {
             // A request that its client has given up, or a session that is to end, stops between two steps.
-            if self.shared.stop.is_cancelled() || reply.is_closed() {
+            let is_to_end = self.shared.stop.is_cancelled() || self.shared.interrupted.load(Ordering::Relaxed);
+            if is_to_end || reply.is_closed() {
                 let detail = format!("the session is ending; {} of {count} steps were made", batch.made.len());
                 outcome = Err(Problem::new(Kind::ShuttingDown, detail));
                 break;
@@ -248,6 +271,7 @@ impl Engine<'_> {
 
     fn publish(&self, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
         let flushed = recorder.flush_shown().map_err(recording_failed);
+        self.shared.note_recording(recorder.file_failure().map(str::to_owned));
         self.shared.publish(batch.made[batch.published..].to_vec(), self.experiment.remaining());
         (batch.published, batch.last) = (batch.made.len(), Instant::now());
         flushed
@@ -298,11 +322,11 @@ struct Batch {
     last: Instant,
 }
 
-fn recording_failed(error: impl std::fmt::Display) -> Problem {
+pub(super) fn recording_failed(error: impl std::fmt::Display) -> Problem {
     Problem::new(Kind::Internal, format!("the recording cannot be written: {error}"))
 }
 
-fn panicked(panic: &(dyn std::any::Any + Send)) -> Problem {
+pub(super) fn panicked(panic: &(dyn std::any::Any + Send)) -> Problem {
     let said = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     Problem::new(Kind::EngineFailed, format!("the engine panicked: {}", said.unwrap_or("no message")))
 }

@@ -1,57 +1,47 @@
-//! Sessions: experiments that clients step and watch.
+//! Sessions: experiments that clients step and watch, and robots elsewhere that ask and tell.
 //!
-//! [`engine`] is the thread that computes, [`Shared`] is what it leaves for everyone to read, each report as [`Kept`],
-//! [`Session`] is the way to both, and [`registry`] keeps them all.
+//! [`engine`] and [`outside`] are the threads that compute, [`Shared`] is what they leave for everyone to read, each report as
+//! [`Kept`], [`Session`] is the way to both, and [`registry`] keeps them all; those with robots elsewhere are also in the
+//! store, and [`dormant`] ones there alone.
 
+mod dormant;
 mod engine;
 mod kept;
 mod memory;
+mod outside;
 mod registry;
+mod resource;
+mod watching;
 
 use std::{
     sync::{
         Arc, Mutex, MutexGuard, PoisonError, RwLock,
-        atomic::{AtomicU64, AtomicUsize, Ordering},
+        atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering},
         mpsc,
     },
     time::Instant,
 };
 
-use serde::Serialize;
-use tokio::sync::{oneshot, watch};
+use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
 use tokio_util::sync::CancellationToken;
-use utoipa::ToSchema;
 use uuid::Uuid;
 
 use engine::Command;
 pub(super) use kept::Kept;
 pub(super) use memory::Budget;
+pub use outside::NewOutsideSession;
+pub(super) use outside::{Elsewhere, Standing, now_s};
 pub use registry::NewSession;
-pub(super) use registry::Sessions;
+pub(super) use registry::{Keeping, Sessions};
+pub use resource::SessionResource;
+pub(super) use watching::Watching;
 
 use super::problem::{Kind, Problem};
 use crate::{
+    calibration::File,
     experiment::{AppraisalReport, Choice, Description, RunResult},
     recording::LiveLog,
 };
-
-/// A session as its resource shows it.
-#[derive(Clone, Debug, Serialize, ToSchema)]
-pub struct SessionResource {
-    /// Its id.
-    #[schema(format = "uuid")]
-    pub id: String,
-    /// What stays the same from step to step.
-    pub description: Description,
-    /// The latest step; 0 is the start, before any movement.
-    pub step: u64,
-    /// How many steps the recorded data set has left; null in a simulated world, which has no end.
-    pub remaining: Option<u64>,
-    /// Name of the recording's file in the server's data directory; null if it keeps none.
-    pub file: Option<String>,
-    /// Why the session can make no more steps, if its engine has failed; null otherwise.
-    pub failure: Option<String>,
-}
 
 /// What an engine leaves for everyone to read.
 struct Shared {
@@ -64,6 +54,14 @@ struct Shared {
     /// `u64::MAX` stands for no end.
     remaining: AtomicU64,
     failure: Mutex<Option<String>>,
+    /// Why the recording's file lacks steps.
+    recording_failure: Mutex<Option<String>>,
+    /// How a session with a robot elsewhere stands, and to wait on; `None` for all others.
+    standing: watch::Sender<Option<Arc<Standing>>>,
+    /// The history is another than it was: whoever follows it begins anew.
+    rewritten: AtomicBool,
+    /// Asks the engine to leave off the command that it is at.
+    interrupted: AtomicBool,
     /// Asks the engine to end.
     stop: CancellationToken,
     /// The engine has ended: nothing more is coming and the recording's file is complete.
@@ -83,6 +81,10 @@ impl Shared {
             live: LiveLog::new(),
             remaining: AtomicU64::new(u64::MAX),
             failure: Mutex::default(),
+            recording_failure: Mutex::default(),
+            standing: watch::Sender::new(None),
+            rewritten: AtomicBool::new(false),
+            interrupted: AtomicBool::new(false),
             stop,
             ended: CancellationToken::new(),
             budget,
@@ -106,6 +108,10 @@ impl Shared {
         self.reports.send_replace(length);
     }
 
+    fn note_recording(&self, failure: Option<String>) {
+        *lock(&self.recording_failure) = failure;
+    }
+
     fn fail(&self, why: String) {
         *lock(&self.failure) = Some(why);
     }
@@ -122,12 +128,31 @@ pub(super) struct Session {
     id: Uuid,
     description: Description,
     file: Option<String>,
-    commands: mpsc::Sender<Command>,
+    /// When it was made, seconds since 1970.
+    made_s: f64,
+    engine: Engine,
     shared: Arc<Shared>,
     /// When it was last asked for anything.
     used: Mutex<Instant>,
     /// How many watch it.
     watchers: AtomicUsize,
+    /// Of a robot elsewhere.
+    report: AsyncMutex<Option<ReportFiles>>,
+}
+
+/// The files of a report, which take a while to make.
+pub(super) struct ReportFiles {
+    /// How many events the session had.
+    pub(super) revision: usize,
+    pub(super) files: Arc<[File]>,
+}
+
+/// The way to the thread that computes.
+enum Engine {
+    /// Learners in a world of ours.
+    Steps(mpsc::Sender<Command>),
+    /// A robot elsewhere.
+    Elsewhere(mpsc::Sender<outside::Job>),
 }
 
 impl Session {
@@ -137,17 +162,6 @@ impl Session {
 
     pub(super) fn description(&self) -> &Description {
         &self.description
-    }
-
-    pub(super) fn resource(&self) -> SessionResource {
-        SessionResource {
-            id: self.id.to_string(),
-            description: self.description.clone(),
-            step: self.step(),
-            remaining: Some(self.shared.remaining.load(Ordering::Relaxed)).filter(|left| *left != u64::MAX),
-            file: self.file.clone(),
-            failure: self.failure(),
-        }
     }
 
     /// Why the engine has failed, if it has.
@@ -181,6 +195,25 @@ impl Session {
         &self.shared.ended
     }
 
+    /// How a session with a robot elsewhere stands, and to wait on; `None` for all others.
+    pub(super) fn standing(&self) -> watch::Receiver<Option<Arc<Standing>>> {
+        self.shared.standing.subscribe()
+    }
+
+    /// Whether its history was rewritten, so that whoever follows it has to begin anew.
+    pub(super) fn is_rewritten(&self) -> bool {
+        self.shared.rewritten.load(Ordering::Relaxed)
+    }
+
+    /// Of a robot elsewhere: the files of its report, as they were made last.
+    pub(super) fn report(&self) -> &AsyncMutex<Option<ReportFiles>> {
+        &self.report
+    }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self.engine, Engine::Elsewhere(_))
+    }
+
     /// Makes `count` steps, after whatever the session is busy with, and draws so many postures on the way to each.
     pub(super) async fn make_steps(
         &self,
@@ -193,16 +226,25 @@ impl Session {
 
     /// The outcome so far, after whatever the session is busy with.
     pub(super) async fn result(&self) -> Result<RunResult, Problem> {
+        if self.is_elsewhere() {
+            return self.tell(|robot| Ok(robot.experiment().result())).await;
+        }
         self.ask(|reply| Command::Result { reply }).await
     }
 
     /// How a learner's last movement was chosen, after whatever the session is busy with.
     pub(super) async fn choice(&self, learner: String) -> Result<Choice, Problem> {
+        if self.is_elsewhere() {
+            return self.tell(move |robot| Ok(robot.experiment().choice(&learner)?)).await;
+        }
         self.ask(|reply| Command::Choice { learner, reply }).await
     }
 
     /// What another movement would have taught a learner, after whatever the session is busy with.
     pub(super) async fn appraise(&self, learner: String, configuration: Vec<f64>) -> Result<AppraisalReport, Problem> {
+        if self.is_elsewhere() {
+            return self.tell(move |robot| Ok(robot.experiment().appraise(&learner, &configuration)?)).await;
+        }
         self.ask(|reply| Command::Appraise { learner, configuration, reply }).await
     }
 
@@ -222,15 +264,52 @@ impl Session {
 
     /// Completes the recording so far, after whatever the session is busy with. That of a failed engine is complete.
     pub(super) async fn flush(&self) -> Result<(), Problem> {
+        if self.is_elsewhere() {
+            return self.tell(|robot| robot.complete()).await;
+        }
         let flushed = self.ask(|reply| Command::Flush { reply }).await;
         if self.failure().is_some() { Ok(()) } else { flushed }
     }
 
+    /// Completes the recording's file and ends the engine. On a problem nothing has ended.
+    async fn end(&self) -> Result<(), Problem> {
+        self.shared.interrupted.store(true, Ordering::Relaxed);
+        let ended = self.ask(|reply| Command::End { reply }).await;
+        // An engine that has failed is at its end.
+        if ended.is_err() && !self.ended().is_cancelled() {
+            return ended;
+        }
+        self.ended().cancelled().await;
+        Ok(())
+    }
+
+    /// Asks the engine of a world of ours.
     async fn ask<T>(&self, command: impl FnOnce(engine::Reply<T>) -> Command) -> Result<T, Problem> {
+        let Engine::Steps(commands) = &self.engine else { return Err(Problem::never_steps(self.id)) };
         let (reply, answer) = oneshot::channel();
         // Both an engine that takes no commands and one that dropped this one have ended. A command that was not sent
         // must go at once: it holds the other end of `answer`.
-        if self.commands.send(command(reply)).is_ok()
+        if commands.send(command(reply)).is_ok()
+            && let Ok(outcome) = answer.await
+        {
+            return outcome;
+        }
+        Err(self.why_ended().await)
+    }
+
+    /// Has something done by the engine of a robot elsewhere, after whatever it is busy with.
+    pub(super) async fn tell<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut Elsewhere) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let Engine::Elsewhere(jobs) = &self.engine else { return Err(Problem::not_outside(self.id)) };
+        let (reply, answer) = oneshot::channel();
+        let job: outside::Job = Box::new(move |robot| {
+            let outcome = work(robot);
+            // Nobody may wait for it any longer; what was done stands all the same.
+            Box::new(move || drop(reply.send(outcome)))
+        });
+        if jobs.send(job).is_ok()
             && let Ok(outcome) = answer.await
         {
             return outcome;
@@ -243,6 +322,9 @@ impl Session {
         self.shared.ended.cancelled().await;
         match self.failure() {
             Some(failure) => Problem::new(Kind::EngineFailed, failure).step(self.step()),
+            None if self.is_elsewhere() => {
+                Problem::new(Kind::Dormant, "the session has just left memory; ask again and it comes back")
+            }
             None => Problem::unknown_session(self.id),
         }
     }
@@ -251,40 +333,40 @@ impl Session {
     pub(super) fn stop(&self) {
         self.shared.stop.cancel();
         // An engine that waits for commands must wake; one that has ended needs nothing.
-        drop(self.commands.send(Command::Wake));
-    }
-
-    /// Counts the caller among those who watch, as long as it keeps the answer.
-    pub(super) fn watch(self: &Arc<Self>) -> Watching {
-        self.watchers.fetch_add(1, Ordering::Relaxed);
-        Watching(self.clone())
+        match &self.engine {
+            Engine::Steps(commands) => drop(commands.send(Command::Wake)),
+            Engine::Elsewhere(jobs) => drop(jobs.send(Box::new(|_| Box::new(|| ())))),
+        }
     }
 
     fn touch(&self) {
         *lock(&self.used) = Instant::now();
     }
 
+    fn used(&self) -> Instant {
+        *lock(&self.used)
+    }
+
+    fn is_watched(&self) -> bool {
+        self.watchers.load(Ordering::Relaxed) > 0
+    }
+
+    /// The recording's file with what it lacks, if it is not complete.
+    fn unfinished(&self) -> Option<String> {
+        let file = self.file.as_deref()?;
+        match lock(&self.shared.recording_failure).as_deref() {
+            Some(failure) => Some(format!("{file}: {failure}")),
+            None if !self.ended().is_cancelled() => Some(format!("{file}: its session had not ended in time")),
+            None => None,
+        }
+    }
+
     #[cfg(test)]
     fn panic(&self) {
-        drop(self.commands.send(Command::Panic));
-    }
-}
-
-/// One who watches a session.
-pub(super) struct Watching(Arc<Session>);
-
-impl std::ops::Deref for Watching {
-    type Target = Session;
-
-    fn deref(&self) -> &Session {
-        &self.0
-    }
-}
-
-impl Drop for Watching {
-    fn drop(&mut self) {
-        self.0.touch();
-        self.0.watchers.fetch_sub(1, Ordering::Relaxed);
+        match &self.engine {
+            Engine::Steps(commands) => drop(commands.send(Command::Panic)),
+            Engine::Elsewhere(jobs) => drop(jobs.send(Box::new(|_| panic!("as the test asked")))),
+        }
     }
 }
 

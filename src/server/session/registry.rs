@@ -2,7 +2,7 @@
 
 use std::{
     path::PathBuf,
-    sync::{Arc, Mutex, atomic::Ordering, mpsc},
+    sync::{Arc, Mutex, mpsc},
     thread,
     time::{Duration, Instant},
 };
@@ -16,17 +16,18 @@ use tokio_util::sync::CancellationToken;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::{Budget, Session, Shared, engine, lock};
+use super::{Budget, Engine, Session, Shared, dormant::Known, engine, lock, outside::now_s};
 use crate::{
     recording::EllipsoidSize,
     server::{
         IDLE_AFTER, MAX_SESSIONS,
         problem::{Kind, Problem},
+        store::{Store, StoreError},
     },
 };
 
 /// How long a session may take to end after it was told to.
-const END_WITHIN: Duration = Duration::from_secs(10);
+pub(super) const END_WITHIN: Duration = Duration::from_secs(10);
 
 /// What a session is made from.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
@@ -52,26 +53,52 @@ fn first_seed() -> u64 {
     1
 }
 
+/// What is kept of sessions, and where.
+pub(in crate::server) struct Keeping {
+    /// The sessions with robots elsewhere.
+    pub(in crate::server) store: Store,
+    /// Where the recordings of all others are kept as files, if they are.
+    pub(in crate::server) recordings: Option<PathBuf>,
+    /// After how much time without a request a session with a robot elsewhere leaves memory.
+    pub(in crate::server) sleep_after: Duration,
+}
+
 /// All sessions of a server.
 pub(in crate::server) struct Sessions {
-    /// In the order of their making; few enough to search one by one.
-    all: Mutex<Vec<Arc<Session>>>,
-    /// One for each session, also while it ends.
+    /// Those in memory, in the order in which they came there; few enough to search one by one.
+    pub(super) all: Mutex<Vec<Arc<Session>>>,
+    /// Those in the store, oldest first.
+    pub(super) known: Mutex<Vec<Arc<Known>>>,
+    /// One for each session that makes steps, also while it ends.
     permits: Arc<Semaphore>,
-    budget: Arc<Budget>,
-    data_dir: Option<PathBuf>,
-    shutdown: CancellationToken,
+    /// One for each session with a robot elsewhere that is in memory.
+    pub(super) places: Arc<Semaphore>,
+    pub(super) budget: Arc<Budget>,
+    pub(super) store: Arc<Store>,
+    recordings: Option<PathBuf>,
+    pub(super) sleep_after: Duration,
+    pub(super) shutdown: CancellationToken,
 }
 
 impl Sessions {
-    pub(in crate::server) fn new(budget: Budget, data_dir: Option<PathBuf>, shutdown: CancellationToken) -> Self {
-        Self {
+    pub(in crate::server) fn new(
+        budget: Budget,
+        keeping: Keeping,
+        shutdown: CancellationToken,
+    ) -> Result<Self, StoreError> {
+        let Keeping { store, recordings, sleep_after } = keeping;
+        let known = store.all()?.into_iter().map(|(id, made_s)| Arc::new(Known::new(id, made_s))).collect();
+        Ok(Self {
             all: Mutex::default(),
+            known: Mutex::new(known),
             permits: Arc::new(Semaphore::new(MAX_SESSIONS)),
+            places: Arc::new(Semaphore::new(MAX_SESSIONS)),
             budget: Arc::new(budget),
-            data_dir,
+            store: Arc::new(store),
+            recordings,
+            sleep_after,
             shutdown,
-        }
+        })
     }
 
     /// Opens a session: a thread, an experiment, its recording.
@@ -80,60 +107,57 @@ impl Sessions {
         let id = Uuid::new_v4();
         let shared = Arc::new(Shared::new(self.shutdown.child_token(), self.budget.clone()));
         // An unknown scenario's name becomes part of no path: the engine refuses it before it opens the file.
-        let file = self.data_dir.as_ref().map(|_| format!("{}-seed{}-{id}.rrd", new.scenario, new.seed));
+        let file = self.recordings.as_ref().map(|_| format!("{}-seed{}-{id}.rrd", new.scenario, new.seed));
         let setup = engine::Setup {
             id,
             scenario: new.scenario,
             seed: new.seed,
             learners: new.learners,
             ellipsoids: new.ellipsoids,
-            file: self.data_dir.as_ref().zip(file.as_ref()).map(|(directory, file)| directory.join(file)),
+            file: self.recordings.as_ref().zip(file.as_ref()).map(|(directory, file)| directory.join(file)),
             shared: shared.clone(),
             permit,
         };
         let (commands, receiver) = mpsc::channel();
         let (opened, opening) = oneshot::channel();
-        thread::Builder::new()
-            .name("session".to_owned())
-            .spawn(move || engine::run(setup, receiver, opened))
-            .map_err(|error| Problem::new(Kind::Internal, format!("no thread for the session: {error}")))?;
-        let description =
-            opening.await.map_err(|_| Problem::new(Kind::EngineFailed, "the engine ended while it was set up"))??;
-        let session = Arc::new(Session {
+        spawn(move || engine::run(setup, receiver, opened))?;
+        let description = opening.await.map_err(|_| no_engine())??;
+        let session = Session {
             id,
             description,
             file,
-            commands,
+            made_s: now_s(),
+            engine: Engine::Steps(commands),
             shared,
             used: Mutex::new(Instant::now()),
             watchers: 0.into(),
-        });
-        lock(&self.all).push(session.clone());
+            report: Default::default(),
+        };
+        Ok(self.enter(session))
+    }
+
+    /// Adds a session to those in memory.
+    pub(super) fn enter(&self, session: Session) -> Arc<Session> {
+        let session = Arc::new(session);
+        let mut all = lock(&self.all);
+        // One that was there before has ended.
+        all.retain(|other| other.id != session.id);
+        all.push(session.clone());
+        drop(all);
         // A shutdown that began meanwhile has not seen this session.
         if self.shutdown.is_cancelled() {
             session.stop();
         }
-        Ok(session)
+        session
     }
 
     /// A place for one more session, if need be that of the one that has been idle longest.
     async fn permit(&self) -> Result<OwnedSemaphorePermit, Problem> {
-        if self.shutdown.is_cancelled() {
-            return Err(Problem::new(Kind::ShuttingDown, "no session can be opened any more"));
-        }
+        self.check_open()?;
         if let Ok(permit) = self.permits.clone().try_acquire_owned() {
             return Ok(permit);
         }
-        let idle = {
-            let all = lock(&self.all);
-            let used = |session: &Arc<Session>| *lock(&session.used);
-            let unwatched = all.iter().filter(|session| session.watchers.load(Ordering::Relaxed) == 0);
-            unwatched
-                .min_by_key(|session| used(session))
-                .filter(|session| used(session).elapsed() > IDLE_AFTER)
-                .cloned()
-        };
-        if let Some(session) = idle {
+        if let Some(session) = self.idle_longest(|session| !session.is_elsewhere(), IDLE_AFTER) {
             self.close(session.id).await?;
         }
         self.permits.clone().try_acquire_owned().map_err(|_| {
@@ -141,39 +165,70 @@ impl Sessions {
         })
     }
 
+    pub(super) fn check_open(&self) -> Result<(), Problem> {
+        match self.shutdown.is_cancelled() {
+            true => Err(Problem::new(Kind::ShuttingDown, "no session can be opened any more")),
+            false => Ok(()),
+        }
+    }
+
+    /// The session in memory that was not asked for longest, and for so long, among those that nobody watches.
+    pub(super) fn idle_longest(&self, wanted: impl Fn(&Session) -> bool, idle: Duration) -> Option<Arc<Session>> {
+        let all = lock(&self.all);
+        let unwatched = all.iter().filter(|session| wanted(session) && !session.is_watched());
+        let longest = unwatched.min_by_key(|session| session.used());
+        longest.filter(|session| session.used().elapsed() > idle).cloned()
+    }
+
     pub(in crate::server) fn is_shutting_down(&self) -> bool {
         self.shutdown.is_cancelled()
     }
 
-    /// All sessions, oldest first.
-    pub(in crate::server) fn all(&self) -> Vec<Arc<Session>> {
-        lock(&self.all).clone()
-    }
-
-    /// The session of that id.
-    pub(in crate::server) fn get(&self, id: &str) -> Result<Arc<Session>, Problem> {
-        let found = Uuid::parse_str(id).ok().and_then(|id| lock(&self.all).iter().find(|s| s.id == id).cloned());
-        let session = found.ok_or_else(|| Problem::unknown_session(id))?;
+    /// The session of that id, from the store if it is not in memory.
+    pub(in crate::server) async fn get(&self, id: &str) -> Result<Arc<Session>, Problem> {
+        let known = Uuid::parse_str(id).map_err(|_| Problem::unknown_session(id))?;
+        let session = match self.in_memory(known) {
+            Some(session) => session,
+            None => self.wake(known).await?,
+        };
         session.touch();
         Ok(session)
     }
 
-    /// Ends a session and forgets it; its recording's file is complete afterwards.
-    pub(in crate::server) async fn close(&self, id: Uuid) -> Result<(), Problem> {
-        let session = {
-            let mut all = lock(&self.all);
-            let index = all.iter().position(|session| session.id == id);
-            all.remove(index.ok_or_else(|| Problem::unknown_session(id))?)
-        };
-        session.stop();
-        // An engine in the middle of a step ends a little later; whoever deletes need not wait for ever.
-        drop(timeout(END_WITHIN, session.ended().cancelled()).await);
-        Ok(())
+    /// One that is in memory. A robot elsewhere whose engine has ended comes back from the store.
+    pub(super) fn in_memory(&self, id: Uuid) -> Option<Arc<Session>> {
+        let has_left = |session: &Session| session.is_elsewhere() && session.ended().is_cancelled();
+        lock(&self.all).iter().find(|session| session.id == id).filter(|session| !has_left(session)).cloned()
     }
 
-    /// Ends all sessions and waits, within bounds, until their recordings are complete.
-    pub(in crate::server) async fn close_all(&self) {
-        let all = self.all();
+    /// Ends a session and forgets it; its recording's file is complete afterwards, or its events are in the store no more.
+    pub(in crate::server) async fn close(&self, id: Uuid) -> Result<(), Problem> {
+        if let Some(known) = self.known(id) {
+            return self.forget(&known).await;
+        }
+        let session = self.in_memory(id).ok_or_else(|| Problem::unknown_session(id))?;
+        match timeout(END_WITHIN, session.end()).await {
+            Ok(ended) => ended?,
+            Err(_) => {
+                session.stop();
+                self.leave(id);
+                let detail = "the session is choosing a movement, and ends after it; it is deleted already";
+                return Err(Problem::new(Kind::ShuttingDown, detail));
+            }
+        }
+        self.leave(id).map(drop).ok_or_else(|| Problem::unknown_session(id))
+    }
+
+    /// Takes a session out of memory.
+    pub(super) fn leave(&self, id: Uuid) -> Option<Arc<Session>> {
+        let mut all = lock(&self.all);
+        let index = all.iter().position(|session| session.id == id)?;
+        Some(all.remove(index))
+    }
+
+    /// Ends all sessions and waits, within bounds, until their recordings are complete. Tells which are not, and why.
+    pub(in crate::server) async fn close_all(&self) -> Vec<String> {
+        let all = lock(&self.all).clone();
         for session in &all {
             session.stop();
         }
@@ -183,16 +238,33 @@ impl Sessions {
             }
         };
         drop(timeout(END_WITHIN, ended).await);
+        all.iter().filter_map(|session| session.unfinished()).collect()
     }
+}
+
+/// Begins the thread of a session.
+pub(super) fn spawn(body: impl FnOnce() + Send + 'static) -> Result<(), Problem> {
+    let spawned = thread::Builder::new().name("session".to_owned()).spawn(body);
+    spawned.map(drop).map_err(|error| Problem::new(Kind::Internal, format!("no thread for the session: {error}")))
+}
+
+pub(super) fn no_engine() -> Problem {
+    Problem::new(Kind::EngineFailed, "the engine ended while it was set up")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn sessions(memory: usize) -> Sessions {
+        let store = Store::in_memory().expect("a store");
+        let keeping = Keeping { store, recordings: None, sleep_after: IDLE_AFTER };
+        Sessions::new(Budget::new(memory), keeping, CancellationToken::new()).expect("sessions")
+    }
+
     #[tokio::test]
     async fn a_panic_of_the_engine_is_a_problem_for_its_requests_and_hangs_none() {
-        let sessions = Sessions::new(Budget::new(usize::MAX), None, CancellationToken::new());
+        let sessions = sessions(usize::MAX);
         let new = |scenario: &str| NewSession {
             scenario: scenario.to_owned(),
             seed: 1,
@@ -211,12 +283,12 @@ mod tests {
         assert_eq!(session.reports(0, usize::MAX).len(), 3, "what was made can still be read");
         assert!(session.resource().failure.is_some());
         sessions.close(session.id).await.expect("it can be deleted");
-        assert_eq!(sessions.get(&session.id.to_string()).err().map(|problem| problem.status), Some(404));
+        assert_eq!(sessions.get(&session.id.to_string()).await.err().map(|problem| problem.status), Some(404));
     }
 
     #[tokio::test]
     async fn a_report_is_written_once_for_all_its_readers() {
-        let sessions = Sessions::new(Budget::new(usize::MAX), None, CancellationToken::new());
+        let sessions = sessions(usize::MAX);
         let new = NewSession {
             scenario: "arm-6dof".to_owned(),
             seed: 1,
@@ -234,7 +306,7 @@ mod tests {
 
     #[tokio::test]
     async fn full_memory_refuses_steps_until_a_session_goes() {
-        let sessions = Sessions::new(Budget::new(300_000), None, CancellationToken::new());
+        let sessions = sessions(300_000);
         let new = NewSession {
             scenario: "arm-6dof".to_owned(),
             seed: 1,

@@ -1,0 +1,186 @@
+//! What the observations of a robot elsewhere come to, to take away.
+//!
+//! The robot's description is quick to make. The report judges it on data that it has not seen, which takes longer: it is made
+//! when it is first asked for, and kept until something changes.
+
+use std::sync::Arc;
+
+use axum::{
+    extract::{Path, State},
+    http::header,
+    response::{IntoResponse, Response},
+};
+
+use super::aside;
+use crate::{
+    ask_tell::Session,
+    calibration::{self, File, Silent},
+    server::{
+        App,
+        problem::{Kind, Problem},
+        session::ReportFiles,
+    },
+};
+
+/// The robot's URDF with what was learned.
+#[utoipa::path(get, path = "/v1/sessions/{id}/model.urdf", tag = "results", operation_id = "getUrdf",
+    params(("id" = String, Path, description = "The session's id", format = "uuid")),
+    responses(
+        (status = 200, description = "A URDF", body = String, content_type = "application/xml"),
+        (status = 404, description = "There is no such session", body = Problem),
+        (status = 409, description = "Nothing was observed, nothing explains it, or the session has no robot elsewhere", body = Problem),
+        (status = 500, description = "The session's engine has failed", body = Problem),
+        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+    )
+)]
+pub(super) async fn urdf(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let file = of_session(&app, &id, |session| find(description(session)?, "calibrated.urdf")).await?;
+    Ok(download("model.urdf", "application/xml", file))
+}
+
+/// The same origins of joints as YAML, as `ros_calibration`s and drivers take them.
+#[utoipa::path(get, path = "/v1/sessions/{id}/kinematics.yaml", tag = "results", operation_id = "getKinematics",
+    params(("id" = String, Path, description = "The session's id", format = "uuid")),
+    responses(
+        (status = 200, description = "YAML", body = String, content_type = "application/yaml"),
+        (status = 404, description = "There is no such session", body = Problem),
+        (status = 409, description = "Nothing was observed, nothing explains it, or the session has no robot elsewhere", body = Problem),
+        (status = 500, description = "The session's engine has failed", body = Problem),
+        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+    )
+)]
+pub(super) async fn kinematics(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let file = of_session(&app, &id, |session| find(description(session)?, "kinematics.yaml")).await?;
+    Ok(download("kinematics.yaml", "application/yaml", file))
+}
+
+/// What `calibrate` finds: errors on data that was not learned from, what is undetermined, outliers.
+#[utoipa::path(get, path = "/v1/sessions/{id}/report.json", tag = "results", operation_id = "getReport",
+    params(("id" = String, Path, description = "The session's id", format = "uuid")),
+    responses(
+        (status = 200, description = "The report of `body-schema calibrate`", body = Object, content_type = "application/json"),
+        (status = 404, description = "There is no such session", body = Problem),
+        (status = 409, description = "Too little was observed, nothing explains it, or the session has no robot elsewhere", body = Problem),
+        (status = 500, description = "The session's engine has failed", body = Problem),
+        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+    )
+)]
+pub(super) async fn report_json(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let report = find(report(&app, &id).await?.to_vec(), "report.json")?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], report).into_response())
+}
+
+/// The same report to be read, with its figures.
+#[utoipa::path(get, path = "/v1/sessions/{id}/report.html", tag = "results", operation_id = "getReportPage",
+    params(("id" = String, Path, description = "The session's id", format = "uuid")),
+    responses(
+        (status = 200, description = "A page", body = String, content_type = "text/html"),
+        (status = 404, description = "There is no such session", body = Problem),
+        (status = 409, description = "Too little was observed, nothing explains it, or the session has no robot elsewhere", body = Problem),
+        (status = 500, description = "The session's engine has failed", body = Problem),
+        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+    )
+)]
+pub(super) async fn report_html(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let page = find(report(&app, &id).await?.to_vec(), "report.html")?;
+    // It is a document by itself, with its style and its drawings within.
+    let policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'";
+    let headers = [(header::CONTENT_TYPE, "text/html; charset=utf-8"), (header::CONTENT_SECURITY_POLICY, policy)];
+    Ok((headers, page).into_response())
+}
+
+/// The observations as the table that `calibrate` reads, with `calibration.toml` and the robot's URDF beside it.
+#[utoipa::path(get, path = "/v1/sessions/{id}/observations.csv", tag = "results", operation_id = "getObservationsCsv",
+    params(("id" = String, Path, description = "The session's id", format = "uuid")),
+    responses(
+        (status = 200, description = "A table with one row for each observation that counts", body = String, content_type = "text/csv"),
+        (status = 404, description = "There is no such session", body = Problem),
+        (status = 409, description = "The session has no robot elsewhere", body = Problem),
+        (status = 500, description = "The session's engine has failed", body = Problem),
+        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+    )
+)]
+pub(super) async fn observations(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let table = of_session(&app, &id, |session| Ok(session.observations_csv())).await?;
+    Ok(download("observations.csv", "text/csv; charset=utf-8", table))
+}
+
+/// The calibration file beside `observations.csv`: it names that table, and the description that the session was opened with as
+/// `robot.urdf`.
+#[utoipa::path(get, path = "/v1/sessions/{id}/calibration.toml", tag = "results", operation_id = "getCalibrationFile",
+    params(("id" = String, Path, description = "The session's id", format = "uuid")),
+    responses(
+        (status = 200, description = "TOML", body = String, content_type = "application/toml"),
+        (status = 404, description = "There is no such session", body = Problem),
+        (status = 409, description = "The session has no robot elsewhere", body = Problem),
+        (status = 500, description = "The session's engine has failed", body = Problem),
+        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+    )
+)]
+pub(super) async fn calibration_file(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let file = of_session(&app, &id, |session| Ok(session.calibration_toml())).await?;
+    Ok(download("calibration.toml", "application/toml", file))
+}
+
+/// The URDF that the session was opened with.
+#[utoipa::path(get, path = "/v1/sessions/{id}/robot.urdf", tag = "results", operation_id = "getNominalUrdf",
+    params(("id" = String, Path, description = "The session's id", format = "uuid")),
+    responses(
+        (status = 200, description = "A URDF", body = String, content_type = "application/xml"),
+        (status = 404, description = "There is no such session", body = Problem),
+        (status = 409, description = "The session has no robot elsewhere", body = Problem),
+        (status = 500, description = "The session's engine has failed", body = Problem),
+        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+    )
+)]
+pub(super) async fn nominal_urdf(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let file = of_session(&app, &id, |session| Ok(session.setup().urdf().to_owned())).await?;
+    Ok(download("robot.urdf", "application/xml", file))
+}
+
+/// Works on a copy of a session, so that its engine is free meanwhile.
+async fn of_session<T: Send + 'static>(
+    app: &App,
+    id: &str,
+    work: impl FnOnce(&Session) -> Result<T, Problem> + Send + 'static,
+) -> Result<T, Problem> {
+    let session = app.sessions.tell(id, |robot| Ok(robot.copy())).await?;
+    aside(move || work(&session)).await
+}
+
+fn description(session: &Session) -> Result<Vec<File>, Problem> {
+    Ok(session.results()?.description()?)
+}
+
+/// The files of the report; those of one revision are made once, by whoever asks first.
+async fn report(app: &App, id: &str) -> Result<Arc<[File]>, Problem> {
+    let session = app.sessions.get(id).await?.watch();
+    let copy = app.sessions.tell(id, |robot| Ok(robot.copy())).await?;
+    let revision = copy.events().len();
+    let mut kept = session.report().lock().await;
+    if let Some(kept) = kept.as_ref().filter(|kept| kept.revision == revision) {
+        return Ok(kept.files.clone());
+    }
+    let files: Arc<[File]> = aside(move || report_files(&copy)).await?.into();
+    *kept = Some(ReportFiles { revision, files: files.clone() });
+    Ok(files)
+}
+
+fn report_files(session: &Session) -> Result<Vec<File>, Problem> {
+    let (calibration, mut files) = session.calibrate(&Silent)?;
+    let results = session.results()?;
+    files.extend(calibration::report::files(&calibration, &results.case()?));
+    files.retain(|file| file.path.starts_with("report."));
+    Ok(files)
+}
+
+fn find(files: Vec<File>, path: &str) -> Result<String, Problem> {
+    let found = files.into_iter().find(|file| file.path == path).map(|file| file.text);
+    found.ok_or_else(|| Problem::new(Kind::Internal, format!("`{path}` was not made")))
+}
+
+fn download(name: &str, content_type: &'static str, text: String) -> Response {
+    let disposition = format!("attachment; filename=\"{name}\"");
+    ([(header::CONTENT_TYPE, content_type.to_owned()), (header::CONTENT_DISPOSITION, disposition)], text)
+        .into_response()
+}

@@ -1,0 +1,383 @@
+//! A robot elsewhere: one thread that owns its session, and does one thing at a time.
+//!
+//! Whatever changes the session is prepared, written to the store, and only then made: an answer never tells of what a crash
+//! could take back, and what could not be written has not happened.
+
+use std::{
+    collections::BTreeMap,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{Arc, atomic::Ordering, mpsc},
+    time::SystemTime,
+};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use tokio::sync::{OwnedSemaphorePermit, oneshot};
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::{
+    Kept, Shared,
+    engine::{COMPLETE_AFTER, panicked, recording_failed},
+};
+use crate::{
+    ask_tell::{
+        self, Answer, Ask, ChannelShape, Observation, Outcome, Prepared, Setup, Status, Suggestion, SuggestionState,
+        Suggestions, Told,
+    },
+    experiment::{Description, Experiment},
+    recording::{EllipsoidSize, Recorder, RecordingError, Target},
+    server::{
+        problem::{Kind, Problem},
+        store::{Shown, Store, Stored},
+    },
+};
+
+/// What a session with a robot elsewhere is made from.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewOutsideSession {
+    /// `outside`.
+    pub world: OutsideWorld,
+    /// The keys of a calibration file as JSON, with the text of the URDF as `robot.urdf` and without measurements.
+    #[schema(value_type = Object)]
+    pub calibration: Value,
+    /// The learner that decides; `global`, unless the calibration lists others, if absent or null.
+    #[serde(default)]
+    pub agent: Option<String>,
+    /// Seed of all that is drawn.
+    #[serde(default)]
+    pub seed: u64,
+    /// How large the ellipsoids of its recording are.
+    #[serde(default)]
+    pub ellipsoids: EllipsoidSize,
+}
+
+/// The world of a robot elsewhere.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum OutsideWorld {
+    /// A robot that is not ours.
+    Outside,
+}
+
+/// Something to be done by the engine. What it returns tells whoever asked.
+pub(super) type Job = Box<dyn FnOnce(&mut Elsewhere) -> Reply + Send>;
+type Reply = Box<dyn FnOnce() + Send>;
+
+/// How a session stands, for everyone to read while its engine is busy. Followers are told of its status and what is pending.
+#[derive(Debug, Serialize, ToSchema)]
+pub(in crate::server) struct Standing {
+    /// How it stands.
+    pub(in crate::server) status: Status,
+    /// The suggestions that wait to be carried out, of all clients, in the order in which they were chosen.
+    #[schema(value_type = Vec<Suggestion>)]
+    pub(in crate::server) pending: Vec<Arc<Suggestion>>,
+    /// All that were ever made, by id.
+    #[serde(skip)]
+    pub(in crate::server) suggestions: Vec<Arc<Suggestion>>,
+    /// All that were ever told, by number.
+    #[serde(skip)]
+    pub(in crate::server) observations: Vec<Arc<Told>>,
+    #[serde(skip)]
+    pub(in crate::server) channels: Arc<[ChannelShape]>,
+}
+
+impl Standing {
+    /// The observations that count, each of which is a step.
+    pub(super) fn step(&self) -> u64 {
+        self.status.observations - self.status.excluded.len() as u64
+    }
+}
+
+/// Where a session comes from.
+pub(super) enum Origin {
+    New(Setup, Shown),
+    Store(Stored),
+}
+
+/// What an engine is made from.
+pub(super) struct Beginning {
+    pub(super) id: Uuid,
+    pub(super) origin: Origin,
+    /// When it was made, seconds since 1970.
+    pub(super) made_s: f64,
+    pub(super) store: Arc<Store>,
+    pub(super) shared: Arc<Shared>,
+    /// Held until the thread ends, so that ending sessions still count.
+    pub(super) permit: OwnedSemaphorePermit,
+}
+
+/// The body of the thread. `opened` hears of the description once the session stands, and is in the store.
+pub(super) fn run(
+    beginning: Beginning,
+    jobs: &mpsc::Receiver<Job>,
+    opened: oneshot::Sender<Result<Description, Problem>>,
+) {
+    let (shared, permit) = (beginning.shared.clone(), beginning.permit);
+    let open = || Elsewhere::open(beginning.id, beginning.origin, beginning.made_s, beginning.store, shared.clone());
+    match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
+        Ok(mut robot) => {
+            if opened.send(Ok(robot.session.description().clone())).is_ok() {
+                let served = catch_unwind(AssertUnwindSafe(|| robot.serve(jobs)));
+                if let Err(panic) = served {
+                    shared.fail(panicked(&*panic).detail);
+                }
+            }
+        }
+        Err(problem) => drop(opened.send(Err(problem))),
+    }
+    shared.live.close();
+    // Before anybody hears of the end: whoever waits for a place may take it at once.
+    drop(permit);
+    shared.ended.cancel();
+}
+
+/// The engine of a robot elsewhere.
+pub(in crate::server) struct Elsewhere {
+    id: Uuid,
+    session: ask_tell::Session,
+    channels: Arc<[ChannelShape]>,
+    /// By `Idempotency-Key` the number of its observation.
+    keys: BTreeMap<String, u64>,
+    recorder: Recorder,
+    /// The latest step that is recorded.
+    recorded: u64,
+    store: Arc<Store>,
+    shared: Arc<Shared>,
+    /// What was told counts otherwise than it did: the history has to be made anew.
+    is_rewritten: bool,
+}
+
+impl Elsewhere {
+    fn open(id: Uuid, origin: Origin, made_s: f64, store: Arc<Store>, shared: Arc<Shared>) -> Result<Self, Problem> {
+        let (is_new, (setup, shown), events, keys) = match origin {
+            Origin::New(setup, shown) => (true, (setup, shown), Vec::new(), BTreeMap::new()),
+            Origin::Store(Stored { setup, shown, events, keys }) => (false, (setup, shown), events, keys),
+        };
+        let mut history = Vec::new();
+        let session = match is_new {
+            true => {
+                let session = ask_tell::Session::open(setup)?;
+                history.push(session.latest().clone());
+                session
+            }
+            false => ask_tell::Session::replay_telling(setup, events, &mut |report| history.push(report))?,
+        };
+        // Each life of a session in memory records anew: viewers must not take two recordings for one.
+        let target = Target::live(shared.live.clone()).with_recording_id(Uuid::new_v4().to_string());
+        let begun = Recorder::new(session.description(), target.with_ellipsoids(shown.ellipsoids));
+        let mut recorder = begun.map_err(recording_failed)?;
+        let mut reports = Vec::with_capacity(history.len());
+        for report in &history {
+            recorder.log(report).map_err(recording_failed)?;
+            reports.push(Kept::of(report, session.description())?);
+        }
+        recorder.flush().map_err(recording_failed)?;
+        if is_new {
+            store.insert(id, made_s, session.setup(), shown)?;
+        }
+        let (recorded, channels) = (session.latest().step, session.channels().into());
+        let mut robot = Self { id, session, channels, keys, recorder, recorded, store, shared, is_rewritten: false };
+        robot.show().map_err(recording_failed)?;
+        robot.publish(reports);
+        Ok(robot)
+    }
+
+    fn serve(&mut self, jobs: &mpsc::Receiver<Job>) {
+        loop {
+            let job = jobs.recv_timeout(COMPLETE_AFTER).or_else(|_| {
+                drop(self.complete());
+                jobs.recv()
+            });
+            let Ok(job) = job else { return };
+            if self.shared.stop.is_cancelled() {
+                return;
+            }
+            let reply = job(self);
+            if self.is_rewritten {
+                // Whoever hears of it and asks again is to meet the new history.
+                self.shared.rewritten.store(true, Ordering::Relaxed);
+                self.shared.live.close();
+                self.shared.ended.cancel();
+                return reply();
+            }
+            reply();
+        }
+    }
+
+    /// The client's pending suggestions, topped up to as many as it asks for.
+    pub(in crate::server) fn suggest(&mut self, ask: &Ask) -> Result<Suggestions, Problem> {
+        self.has_room()?;
+        let prepared = self.session.prepare_suggest(ask, Some(now_s()))?;
+        self.commit(prepared, None)
+    }
+
+    /// A suggestion is not carried out.
+    pub(in crate::server) fn outcome(
+        &mut self,
+        id: u64,
+        state: Outcome,
+        reason: Option<&str>,
+    ) -> Result<Suggestion, Problem> {
+        let prepared = self.session.prepare_outcome(id, state, reason, Some(now_s()))?;
+        self.commit(prepared, None)
+    }
+
+    /// Takes in an observation, or answers again what was answered to the one that came with this key. Tells which.
+    pub(in crate::server) fn observe(
+        &mut self,
+        told: &Observation,
+        key: Option<&str>,
+    ) -> Result<(Answer, bool), Problem> {
+        if let Some(key) = key
+            && let Some(known) = self.keys.get(key).and_then(|number| self.told(*number))
+        {
+            if known.observation == *told {
+                return Ok((known.answer.clone(), true));
+            }
+            let detail = format!(
+                "`{key}` came with observation {}, whose body was another; nothing has happened. Send a key of its own with \
+                 each observation",
+                known.answer.observation
+            );
+            return Err(Problem::new(Kind::KeyTaken, detail).field("Idempotency-Key"));
+        }
+        self.has_room()?;
+        let prepared = self.session.prepare_observe(told.clone(), Some(now_s())).map_err(|refusal| {
+            let problem = Problem::from(refusal);
+            // It is not the address that is wrong.
+            match problem.is(Kind::UnknownSuggestion) {
+                true => Problem::new(Kind::InvalidValue, problem.detail).field("suggestion_id"),
+                false => problem,
+            }
+        })?;
+        let answer = self.commit(prepared, key)?;
+        self.keys.extend(key.map(|key| (key.to_owned(), answer.observation)));
+        Ok((answer, false))
+    }
+
+    /// From now on an observation counts for nothing, or counts again. Tells how the session stands then.
+    pub(in crate::server) fn mark(&mut self, number: u64, excluded: bool) -> Result<Status, Problem> {
+        let now = Some(now_s());
+        let prepared = match excluded {
+            true => self.session.prepare_exclude(number, now)?,
+            false => self.session.prepare_include(number, now)?,
+        };
+        self.is_rewritten = !prepared.events().is_empty();
+        self.commit(prepared, None).inspect_err(|_| self.is_rewritten = false)?;
+        Ok(self.session.status())
+    }
+
+    /// Ends the pending suggestions whose time has run out.
+    pub(in crate::server) fn expire(&mut self) -> Result<(), Problem> {
+        let prepared = self.session.prepare_expire(now_s())?;
+        self.commit(prepared, None)
+    }
+
+    /// A copy as it is now, to work on elsewhere.
+    pub(in crate::server) fn copy(&self) -> ask_tell::Session {
+        self.session.clone()
+    }
+
+    pub(super) fn experiment(&self) -> &Experiment {
+        self.session.experiment()
+    }
+
+    /// Completes the recording so far.
+    pub(super) fn complete(&mut self) -> Result<(), Problem> {
+        let flushed = self.recorder.flush().map_err(recording_failed);
+        self.shared.publish(Vec::new(), None);
+        flushed
+    }
+
+    fn told(&self, number: u64) -> Option<&Told> {
+        let index = usize::try_from(number.checked_sub(1)?).ok()?;
+        self.session.observations().get(index).map(AsRef::as_ref)
+    }
+
+    fn has_room(&self) -> Result<(), Problem> {
+        match self.shared.budget.has_room() {
+            true => Ok(()),
+            false => Err(Problem::new(
+                Kind::ServerFull,
+                "the sessions together fill the server's memory, and nothing has happened; delete some and ask again",
+            )),
+        }
+    }
+
+    /// Writes a prepared change, makes it, and shows it.
+    fn commit<A>(&mut self, prepared: Prepared<A>, key: Option<&str>) -> Result<A, Problem> {
+        if prepared.events().is_empty() {
+            return Ok(self.session.commit(prepared)?);
+        }
+        self.store.append(self.id, prepared.revision(), prepared.events(), key).map_err(|error| {
+            match error.is_for_want_of_a_session() {
+                true => Problem::unknown_session(self.id),
+                false => error.into(),
+            }
+        })?;
+        let answer = self.session.commit(prepared)?;
+        // It has happened, and is answered so, whatever becomes of the picture of it.
+        let shown = self.record().map_err(|error| error.to_string());
+        match shown {
+            Ok(reports) => self.publish(reports),
+            Err(error) => self.shared.note_recording(Some(error)),
+        }
+        Ok(answer)
+    }
+
+    /// Records what is new.
+    fn record(&mut self) -> Result<Vec<Kept>, RecordingError> {
+        let report = self.session.latest();
+        let mut reports = Vec::new();
+        if self.is_rewritten {
+            return Ok(reports);
+        }
+        if report.step > self.recorded {
+            self.recorded = report.step;
+            self.recorder.log(report)?;
+            let kept = Kept::of(report, self.session.description());
+            reports.push(kept.map_err(|problem| RecordingError::Encode(problem.detail))?);
+        }
+        self.show()?;
+        Ok(reports)
+    }
+
+    /// Draws the posture that is suggested next, as a ghost of the arm.
+    fn show(&mut self) -> Result<(), RecordingError> {
+        let next = self.session.suggestions().iter().find(is_pending);
+        let joints = &self.session.description().joints;
+        let posture = next.and_then(|next| {
+            let positions = joints.iter().map(|joint| next.configuration.get(&joint.name).copied());
+            positions.collect::<Option<Vec<f64>>>()
+        });
+        let skeleton = posture.zip(self.session.belief()).map(|(posture, belief)| -> Vec<[f64; 3]> {
+            let points = belief.state.measured().skeleton(&posture);
+            points.iter().map(|point| [point.x, point.y, point.z]).collect()
+        });
+        self.recorder.log_ghost(self.recorded, 0, skeleton.as_deref())
+    }
+
+    fn publish(&self, reports: Vec<Kept>) {
+        let suggestions = self.session.suggestions().to_vec();
+        let standing = Standing {
+            status: self.session.status(),
+            pending: suggestions.iter().filter(is_pending).cloned().collect(),
+            suggestions,
+            observations: self.session.observations().to_vec(),
+            channels: self.channels.clone(),
+        };
+        self.shared.standing.send_replace(Some(Arc::new(standing)));
+        self.shared.publish(reports, None);
+    }
+}
+
+fn is_pending(suggestion: &&Arc<Suggestion>) -> bool {
+    suggestion.state == SuggestionState::Pending
+}
+
+/// Seconds since 1970.
+pub(in crate::server) fn now_s() -> f64 {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
+}

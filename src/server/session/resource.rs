@@ -1,0 +1,64 @@
+//! A session as its resource shows it.
+
+use std::sync::atomic::Ordering;
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::{Session, lock};
+use crate::{
+    ask_tell::{ChannelShape, Status},
+    experiment::Description,
+    scenario::WorldKind,
+};
+
+/// A session as its resource shows it.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct SessionResource {
+    /// Its id.
+    #[schema(format = "uuid")]
+    pub id: String,
+    /// Where its movements are made.
+    pub world: WorldKind,
+    /// What stays the same from step to step.
+    pub description: Description,
+    /// The latest step; 0 is the start, before any movement. With a robot elsewhere a step is an observation that counts.
+    pub step: u64,
+    /// How many steps the recorded data set has left; null in a simulated world and with a robot elsewhere, which have no end.
+    pub remaining: Option<u64>,
+    /// Name of the recording's file in the server's data directory; null if it keeps none.
+    pub file: Option<String>,
+    /// Why the recording's file lacks steps, if it could not be written; null otherwise. Nothing else is affected, and it is
+    /// written anew when the session ends.
+    pub recording_failure: Option<String>,
+    /// Why the session can make no more steps, if its engine has failed; null otherwise.
+    pub failure: Option<String>,
+    /// With a robot elsewhere: how it stands. Null for all others, and in a list for one that was not asked for since the
+    /// server was started.
+    pub status: Option<Status>,
+    /// With a robot elsewhere: its channels, by their names among the measurements of an observation; empty for all others.
+    pub channels: Vec<ChannelShape>,
+}
+
+impl Session {
+    pub(in crate::server) fn resource(&self) -> SessionResource {
+        let standing = self.shared.standing.borrow().clone();
+        let world = match (&standing, self.description.movements_available) {
+            (Some(_), _) => WorldKind::Outside,
+            (None, Some(_)) => WorldKind::Measured,
+            (None, None) => WorldKind::Simulated,
+        };
+        SessionResource {
+            id: self.id.to_string(),
+            world,
+            description: self.description.clone(),
+            step: standing.as_deref().map_or(self.step(), |standing| standing.step()),
+            remaining: Some(self.shared.remaining.load(Ordering::Relaxed)).filter(|left| *left != u64::MAX),
+            file: self.file.clone(),
+            recording_failure: lock(&self.shared.recording_failure).clone(),
+            failure: self.failure(),
+            status: standing.as_deref().map(|standing| standing.status.clone()),
+            channels: standing.as_deref().map(|standing| standing.channels.to_vec()).unwrap_or_default(),
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! The tables, and how those of earlier versions become them.
+
+use std::path::Path;
+
+use rusqlite::{Connection, TransactionBehavior};
+
+use super::StoreError;
+
+/// Says whose file it is: `body` in ASCII.
+const APPLICATION: u32 = 0x626f_6479;
+
+/// The step from each version to the next. The version is in `user_version`; an empty file is of version 0.
+const MIGRATIONS: [&str; 1] = ["
+    CREATE TABLE session (
+        number INTEGER PRIMARY KEY AUTOINCREMENT,
+        id TEXT NOT NULL UNIQUE,
+        made_s REAL NOT NULL,      -- seconds since 1970
+        form INTEGER NOT NULL,     -- the version of setup and events
+        setup TEXT NOT NULL,       -- JSON, and so are the others
+        shown TEXT NOT NULL
+    ) STRICT;
+    CREATE TABLE event (
+        session INTEGER NOT NULL REFERENCES session (number) ON DELETE CASCADE,
+        number INTEGER NOT NULL,   -- counted from 1 in each session
+        event TEXT NOT NULL,
+        idempotency_key TEXT,
+        PRIMARY KEY (session, number)
+    ) STRICT, WITHOUT ROWID;
+    CREATE UNIQUE INDEX event_by_key ON event (session, idempotency_key) WHERE idempotency_key IS NOT NULL;
+"];
+
+/// The version that this program writes.
+pub(super) const KNOWN: u32 = MIGRATIONS.len() as u32;
+
+/// Refuses the file of another program, and one of a later version. Tells the version.
+pub(super) fn check(connection: &Connection, path: &Path) -> Result<u32, StoreError> {
+    let told = |source: rusqlite::Error| match source.sqlite_error_code() {
+        Some(rusqlite::ErrorCode::NotADatabase) => StoreError::Foreign { path: path.to_owned() },
+        _ => StoreError::Sqlite { path: path.to_owned(), source },
+    };
+    let number = |name| connection.pragma_query_value(None, name, |row| row.get::<_, u32>(0)).map_err(told);
+    let (found, application) = (number("user_version")?, number("application_id")?);
+    let count = connection.query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get::<_, u32>(0));
+    let is_empty = count.map_err(told)? == 0;
+    if application != APPLICATION && !is_empty {
+        return Err(StoreError::Foreign { path: path.to_owned() });
+    }
+    if found > KNOWN {
+        return Err(StoreError::Newer { path: path.to_owned(), found, known: KNOWN });
+    }
+    Ok(found)
+}
+
+/// Brings an earlier version up to this one: all of it or nothing.
+pub(super) fn migrate(connection: &mut Connection, path: &Path) -> Result<(), StoreError> {
+    let found = check(connection, path)?;
+    let migrated = (|| {
+        for (version, step) in (1_u32..).zip(MIGRATIONS).skip(found as usize) {
+            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+            transaction.execute_batch(step)?;
+            transaction.pragma_update(None, "user_version", version)?;
+            transaction.pragma_update(None, "application_id", APPLICATION)?;
+            transaction.commit()?;
+        }
+        Ok(())
+    })();
+    migrated.map_err(|source| StoreError::Sqlite { path: path.to_owned(), source })
+}
