@@ -387,7 +387,8 @@ fn pages_of_robots_tell_what_is_measured() {
         let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
         let said = body_schema::calibration::report::markdown(&found, &case);
         let lead = said.lines().find(|line| line.starts_with("**")).expect("a headline");
-        let errors = said.lines().skip_while(|line| !line.starts_with("| errors")).take_while(|line| line.starts_with('|'));
+        let errors =
+            said.lines().skip_while(|line| !line.starts_with("| errors")).take_while(|line| line.starts_with('|'));
         for line in errors.chain([lead]) {
             assert!(page.contains(line), "docs/robots/{name}.md lacks: {line}");
         }

@@ -88,7 +88,7 @@ impl Panel {
             Verdict::Diverged => Outcome::Diverged,
             Verdict::Converged(first) => Outcome::After(first - begin),
             Verdict::Learning | Verdict::Settled | Verdict::Waiting => {
-                let errors = self.history.curve(learner, |row| row.prediction_m.filter(|_| row.movements > 0));
+                let errors = self.history.errors(learner);
                 let last = errors.last().map_or(f64::INFINITY, |[_, error]| *error);
                 Outcome::HeldOut { last, mean: self.history.mean_error(learner) }
             }

@@ -11,6 +11,8 @@ pub struct Row {
     pub location_m: Option<f64>,
     /// Mean distance of the predicted marker, metres.
     pub prediction_m: Option<f64>,
+    /// Mean distance of a predicted target from its mean in sockets that nobody learned from, metres.
+    pub scatter_m: Option<f64>,
     /// tr(W P).
     pub trace: Option<f64>,
     /// What the data collected allow of it, linearised at the truth.
@@ -34,6 +36,12 @@ pub struct Row {
 }
 
 impl Row {
+    /// What tells how good it is where no truth is known, metres: predictions, or where nothing but sockets is measured, the
+    /// scatter in them.
+    pub fn error_m(&self) -> Option<f64> {
+        self.prediction_m.or(self.scatter_m)
+    }
+
     /// `convergence` is judged up to this report, and counts from step `begin`.
     fn of(report: &LearnerReport, convergence: &Convergence, begin: u64) -> Self {
         let LearnerReport { movement, metrics, failure, .. } = report;
@@ -42,6 +50,7 @@ impl Row {
             orientation_deg: metrics.orientation_deg,
             location_m: metrics.location_m,
             prediction_m: metrics.prediction_mean_m,
+            scatter_m: metrics.scatter_m,
             trace: metrics.trace,
             bound: metrics.bound_trace,
             gain: movement.as_ref().and_then(|movement| movement.gain),
@@ -131,9 +140,14 @@ impl History {
         self.change_at.filter(|change| step > *change).unwrap_or(0)
     }
 
-    /// Mean prediction error of a learner over its movements, metres; 0 before any.
+    /// The error of a learner after each of its movements, metres, by step.
+    pub fn errors(&self, learner: usize) -> Vec<[f64; 2]> {
+        self.curve(learner, |row| row.error_m().filter(|_| row.movements > 0))
+    }
+
+    /// Its mean over the movements; 0 before any.
     pub fn mean_error(&self, learner: usize) -> f64 {
-        let errors = self.curve(learner, |row| row.prediction_m.filter(|_| row.movements > 0));
+        let errors = self.errors(learner);
         errors.iter().map(|[_, error]| error).sum::<f64>() / errors.len().max(1) as f64
     }
 

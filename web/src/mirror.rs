@@ -22,6 +22,7 @@ impl Panel {
                 row.orientation_deg.map(|error| format!("{error:.1}°")),
                 row.location_m.map(|error| format!("{:.0} mm", error * 1e3)),
                 row.prediction_m.filter(|_| row.location_m.is_none()).map(|error| format!("{:.0} mm", error * 1e3)),
+                row.scatter_m.filter(|_| row.prediction_m.is_none()).map(|error| format!("{:.1} mm", error * 1e3)),
             ];
             let errors: Vec<String> = errors.into_iter().flatten().collect();
             let [red, green, blue, _] = colours::learner(slot).to_array();
@@ -62,6 +63,8 @@ impl Panel {
             }
             if let Some(error) = row.prediction_m {
                 text += &format!(", prediction {:.0} millimetres", error * 1e3);
+            } else if let Some(error) = row.scatter_m {
+                text += &format!(", scatter {:.1} millimetres", error * 1e3);
             }
             text.push('.');
         }

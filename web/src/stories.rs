@@ -240,7 +240,7 @@ pub const STORIES: [Story; 6] = [
         teaser: "A ball in two sockets, and nothing measured but the joints",
         scenario: "panda-sockets",
         seed: 1,
-        learners: &[],
+        learners: &["global", "random", "nominal"],
         step: 1,
         cards: &[
             Card {
@@ -273,7 +273,7 @@ pub const STORIES: [Story; 6] = [
         teaser: "A URDF and a table are enough",
         scenario: "ur10-camera",
         seed: 1,
-        learners: &[],
+        learners: &["global", "random", "nominal"],
         step: 1,
         cards: &[
             Card {

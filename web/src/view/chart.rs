@@ -20,7 +20,10 @@ pub(super) struct Chart {
     pub(super) bound: Option<fn(&Row) -> Option<f64>>,
 }
 
-pub(super) const CHARTS: [Chart; 6] = [
+/// The title of the error where nothing but sockets is measured.
+pub(super) const SCATTER: &str = "Scatter in sockets";
+
+pub(super) const CHARTS: [Chart; 7] = [
     Chart {
         title: "Orientation error",
         unit: "°",
@@ -49,6 +52,17 @@ pub(super) const CHARTS: [Chart; 6] = [
         judged: false,
         is_error: true,
         value: |row| Some(row.prediction_m? * 1e3),
+        bound: None,
+    },
+    Chart {
+        title: SCATTER,
+        unit: "mm",
+        tip: "Mean distance of the predicted target from its own mean, in sockets that nobody has learned from: it is blind to \
+              how large the robot is",
+        logarithmic: true,
+        judged: false,
+        is_error: true,
+        value: |row| Some(row.scatter_m? * 1e3),
         bound: None,
     },
     Chart {

@@ -4,10 +4,17 @@ use egui::{ComboBox, RichText, Ui};
 
 use super::{
     LOW, TALL,
-    chart::{CHARTS, Chart},
+    chart::{CHARTS, Chart, SCATTER},
     learners::entry,
 };
-use crate::{colours, panel::Panel, seeds::SeedRuns, stories::Spot, words};
+use crate::{
+    colours,
+    history::Row,
+    panel::{PREDICTION, Panel},
+    seeds::SeedRuns,
+    stories::Spot,
+    words,
+};
 
 /// From this width on there are two charts beside each other.
 const TWO_COLUMNS: f32 = 640.0;
@@ -19,11 +26,25 @@ impl Panel {
     /// The charts of which there is something to see.
     fn shown_charts(&self) -> Vec<&'static Chart> {
         let known = self.description().is_some_and(|description| description.truth.is_some());
-        let missed = self.description().is_some_and(|description| {
-            (0..description.learners.len())
-                .any(|learner| self.history.row(self.history.latest(), learner).is_some_and(|row| row.misses > 0))
-        });
-        CHARTS.iter().filter(|chart| (known || !chart.judged) && (chart.title != "Misses" || missed)).collect()
+        let learners = self.description().map_or(0, |description| description.learners.len());
+        let any = |wanted: fn(&Row) -> bool| {
+            (0..learners).any(|learner| self.history.row(self.history.latest(), learner).is_some_and(wanted))
+        };
+        let is_told = |chart: &Chart| match chart.title {
+            "Misses" => any(|row| row.misses > 0),
+            SCATTER => any(|row| row.scatter_m.is_some()),
+            PREDICTION => !self.meets_itself(),
+            _ => true,
+        };
+        CHARTS.iter().filter(|chart| (known || !chart.judged) && is_told(chart)).collect()
+    }
+
+    /// Whether nothing but sockets tells how good the learners are.
+    pub(super) fn meets_itself(&self) -> bool {
+        let learners = self.description().map_or(0, |description| description.learners.len());
+        let rows = (0..learners).filter_map(|learner| self.history.row(self.history.latest(), learner));
+        let rows: Vec<&Row> = rows.collect();
+        rows.iter().all(|row| row.prediction_m.is_none()) && rows.iter().any(|row| row.scatter_m.is_some())
     }
 
     /// The chart that is always in sight, with the legend of all; without a height it takes the room that is left.

@@ -80,13 +80,22 @@ impl Panel {
         let Some(description) = self.description() else { return };
         let count = description.learners.len();
         let misses = (0..count).any(|i| self.history.row(self.cursor, i).is_some_and(|row| row.misses > 0));
+        let meets_itself = self.meets_itself();
         let narrow = ui.available_width() < NARROW;
         let short = |long: &'static str, short: &'static str| if narrow { short } else { long };
         let mut heads = vec![
             ("Learner", "How each goes about it stands beside the chart; the terms stand in the tooltip of its name"),
             (short("Orientation, °", "Orient. °"), "Mean error of the angles between the joints' axes"),
             (short("Location, mm", "Loc. mm"), "Mean distance of the true axis points from the estimated axes"),
-            (short("Prediction, mm", "Pred. mm"), "Mean distance between the predicted and the true marker"),
+            match meets_itself {
+                true => (
+                    "Scatter, mm",
+                    "Mean distance of the predicted target from its mean, in sockets that nobody has learned from",
+                ),
+                false => {
+                    (short("Prediction, mm", "Pred. mm"), "Mean distance between the predicted and the true marker")
+                }
+            },
             ("State", "What has become of it, judged with the truth; the terms stand in the tooltip of each"),
         ];
         let mut shares = if narrow { vec![0.24, 0.15, 0.14, 0.15, 0.32] } else { vec![0.24, 0.17, 0.16, 0.18, 0.25] };
@@ -115,7 +124,7 @@ impl Panel {
                         let text = match column {
                             1 => fixed(numbers.orientation_deg, 1.0, 2),
                             2 => fixed(numbers.location_m, 1e3, 1),
-                            3 => fixed(numbers.prediction_m, 1e3, 1),
+                            3 => fixed(numbers.error_m(), 1e3, if meets_itself { 2 } else { 1 }),
                             _ => numbers.misses.to_string(),
                         };
                         ui.label(RichText::new(text).monospace());
@@ -124,7 +133,12 @@ impl Panel {
             }
         });
         if description.truth.is_none() {
-            let text = "–: recorded data have no known truth. Prediction is over measurements held out from learning.";
+            let text = match meets_itself {
+                true => "–: recorded data have no known truth. Scatter is in sockets that nobody has learned from.",
+                false => {
+                    "–: recorded data have no known truth. Prediction is over measurements held out from learning."
+                }
+            };
             ui.label(RichText::new(text).weak().small());
         }
     }
