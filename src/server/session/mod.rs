@@ -11,12 +11,14 @@ mod memory;
 mod outside;
 mod registry;
 mod resource;
+mod shared;
+mod standing;
 mod watching;
 
 use std::{
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError, RwLock,
-        atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering},
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicUsize, Ordering},
         mpsc,
     },
     time::Instant,
@@ -29,11 +31,13 @@ use uuid::Uuid;
 use engine::Command;
 pub(super) use kept::Kept;
 pub(super) use memory::Budget;
-pub use outside::NewOutsideSession;
-pub(super) use outside::{Elsewhere, Standing, now_s};
+pub(super) use outside::{Elsewhere, now_s};
 pub use registry::NewSession;
 pub(super) use registry::{Keeping, Sessions};
 pub use resource::SessionResource;
+use shared::Shared;
+pub use standing::NewOutsideSession;
+pub(super) use standing::Standing;
 pub(super) use watching::Watching;
 
 use super::problem::{Kind, Problem};
@@ -42,86 +46,6 @@ use crate::{
     experiment::{AppraisalReport, Choice, Description, RunResult},
     recording::LiveLog,
 };
-
-/// What an engine leaves for everyone to read.
-struct Shared {
-    /// One report per step, from step 0.
-    history: RwLock<Vec<Kept>>,
-    /// The length of `history`, to wait on.
-    reports: watch::Sender<usize>,
-    /// The recording, as encoded bytes.
-    live: LiveLog,
-    /// `u64::MAX` stands for no end.
-    remaining: AtomicU64,
-    failure: Mutex<Option<String>>,
-    /// Why the recording's file lacks steps.
-    recording_failure: Mutex<Option<String>>,
-    /// How a session with a robot elsewhere stands, and to wait on; `None` for all others.
-    standing: watch::Sender<Option<Arc<Standing>>>,
-    /// The history is another than it was: whoever follows it begins anew.
-    rewritten: AtomicBool,
-    /// Asks the engine to leave off the command that it is at.
-    interrupted: AtomicBool,
-    /// Asks the engine to end.
-    stop: CancellationToken,
-    /// The engine has ended: nothing more is coming and the recording's file is complete.
-    ended: CancellationToken,
-    budget: Arc<Budget>,
-    /// What this session has taken of the budget …
-    taken: AtomicUsize,
-    /// … and how much of it for reports.
-    reported: AtomicUsize,
-}
-
-impl Shared {
-    fn new(stop: CancellationToken, budget: Arc<Budget>) -> Self {
-        Self {
-            history: RwLock::default(),
-            reports: watch::Sender::new(0),
-            live: LiveLog::new(),
-            remaining: AtomicU64::new(u64::MAX),
-            failure: Mutex::default(),
-            recording_failure: Mutex::default(),
-            standing: watch::Sender::new(None),
-            rewritten: AtomicBool::new(false),
-            interrupted: AtomicBool::new(false),
-            stop,
-            ended: CancellationToken::new(),
-            budget,
-            taken: AtomicUsize::new(0),
-            reported: AtomicUsize::new(0),
-        }
-    }
-
-    fn publish(&self, reports: Vec<Kept>, remaining: Option<usize>) {
-        // The engine alone publishes, so that nothing comes between these.
-        let reported = self.reported.load(Ordering::Relaxed) + reports.iter().map(Kept::bytes).sum::<usize>();
-        self.reported.store(reported, Ordering::Relaxed);
-        let taken = reported + self.live.bytes();
-        self.budget.take(taken - self.taken.swap(taken, Ordering::Relaxed));
-        self.remaining.store(remaining.map_or(u64::MAX, |left| left as u64), Ordering::Relaxed);
-        let length = {
-            let mut history = self.history.write().unwrap_or_else(PoisonError::into_inner);
-            history.extend(reports);
-            history.len()
-        };
-        self.reports.send_replace(length);
-    }
-
-    fn note_recording(&self, failure: Option<String>) {
-        *lock(&self.recording_failure) = failure;
-    }
-
-    fn fail(&self, why: String) {
-        *lock(&self.failure) = Some(why);
-    }
-}
-
-impl Drop for Shared {
-    fn drop(&mut self) {
-        self.budget.give_back(self.taken.load(Ordering::Relaxed));
-    }
-}
 
 /// A session: its engine's command line, and all that it has left to read.
 pub(super) struct Session {

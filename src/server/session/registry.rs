@@ -254,6 +254,8 @@ pub(super) fn no_engine() -> Problem {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     fn sessions(memory: usize) -> Sessions {
@@ -284,6 +286,25 @@ mod tests {
         assert!(session.resource().failure.is_some());
         sessions.close(session.id).await.expect("it can be deleted");
         assert_eq!(sessions.get(&session.id.to_string()).await.err().map(|problem| problem.status), Some(404));
+    }
+
+    #[tokio::test]
+    async fn a_robot_elsewhere_whose_engine_panics_comes_back_as_it_was_kept() {
+        let urdf = r#"<robot name="pendulum"><link name="wall"/><link name="rod"/>
+            <joint name="swing" type="revolute"><parent link="wall"/><child link="rod"/>
+            <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"#;
+        let new = json!({ "world": "outside", "calibration": { "robot": { "urdf": urdf } } });
+        let sessions = sessions(usize::MAX);
+        let session = sessions.open_outside(serde_json::from_value(new).expect("a request")).await.expect("a session");
+        let id = session.id.to_string();
+        let told = json!({ "configuration": { "swing": 0.4 }, "measurements": { "marker": [0.1, 0.02, -0.3] } });
+        let told = serde_json::from_value(told).expect("an observation");
+        sessions.tell(&id, move |robot| robot.observe(&told, None)).await.expect("an answer");
+        session.panic();
+        let problem = session.result().await.expect_err("a failed engine");
+        assert_eq!(problem.status, 500, "{}", problem.detail);
+        assert_eq!(sessions.standing(&id).await.expect("it is back").status.observations, 1);
+        sessions.tell(&id, |robot| robot.suggest(&Default::default())).await.expect("suggestions");
     }
 
     #[tokio::test]

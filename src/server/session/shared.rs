@@ -1,0 +1,92 @@
+//! What an engine leaves for everyone to read.
+
+use std::sync::{
+    Arc, Mutex, PoisonError, RwLock,
+    atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering},
+};
+
+use tokio::sync::watch;
+use tokio_util::sync::CancellationToken;
+
+use super::{Budget, Kept, Standing, lock};
+use crate::recording::LiveLog;
+
+/// What an engine leaves for everyone to read.
+pub(super) struct Shared {
+    /// One report per step, from step 0.
+    pub(super) history: RwLock<Vec<Kept>>,
+    /// The length of `history`, to wait on.
+    pub(super) reports: watch::Sender<usize>,
+    /// The recording, as encoded bytes.
+    pub(super) live: LiveLog,
+    /// `u64::MAX` stands for no end.
+    pub(super) remaining: AtomicU64,
+    pub(super) failure: Mutex<Option<String>>,
+    /// Why the recording's file lacks steps.
+    pub(super) recording_failure: Mutex<Option<String>>,
+    /// How a session with a robot elsewhere stands, and to wait on; `None` for all others.
+    pub(super) standing: watch::Sender<Option<Arc<Standing>>>,
+    /// The history is another than it was: whoever follows it begins anew.
+    pub(super) rewritten: AtomicBool,
+    /// Asks the engine to leave off the command that it is at.
+    pub(super) interrupted: AtomicBool,
+    /// Asks the engine to end.
+    pub(super) stop: CancellationToken,
+    /// The engine has ended: nothing more is coming and the recording's file is complete.
+    pub(super) ended: CancellationToken,
+    pub(super) budget: Arc<Budget>,
+    /// What this session has taken of the budget …
+    taken: AtomicUsize,
+    /// … and how much of it for reports.
+    reported: AtomicUsize,
+}
+
+impl Shared {
+    pub(super) fn new(stop: CancellationToken, budget: Arc<Budget>) -> Self {
+        Self {
+            history: RwLock::default(),
+            reports: watch::Sender::new(0),
+            live: LiveLog::new(),
+            remaining: AtomicU64::new(u64::MAX),
+            failure: Mutex::default(),
+            recording_failure: Mutex::default(),
+            standing: watch::Sender::new(None),
+            rewritten: AtomicBool::new(false),
+            interrupted: AtomicBool::new(false),
+            stop,
+            ended: CancellationToken::new(),
+            budget,
+            taken: AtomicUsize::new(0),
+            reported: AtomicUsize::new(0),
+        }
+    }
+
+    pub(super) fn publish(&self, reports: Vec<Kept>, remaining: Option<usize>) {
+        // The engine alone publishes, so that nothing comes between these.
+        let reported = self.reported.load(Ordering::Relaxed) + reports.iter().map(Kept::bytes).sum::<usize>();
+        self.reported.store(reported, Ordering::Relaxed);
+        let taken = reported + self.live.bytes();
+        self.budget.take(taken - self.taken.swap(taken, Ordering::Relaxed));
+        self.remaining.store(remaining.map_or(u64::MAX, |left| left as u64), Ordering::Relaxed);
+        let length = {
+            let mut history = self.history.write().unwrap_or_else(PoisonError::into_inner);
+            history.extend(reports);
+            history.len()
+        };
+        self.reports.send_replace(length);
+    }
+
+    pub(super) fn note_recording(&self, failure: Option<String>) {
+        *lock(&self.recording_failure) = failure;
+    }
+
+    pub(super) fn fail(&self, why: String) {
+        *lock(&self.failure) = Some(why);
+    }
+}
+
+impl Drop for Shared {
+    fn drop(&mut self) {
+        self.budget.give_back(self.taken.load(Ordering::Relaxed));
+    }
+}

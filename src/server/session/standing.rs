@@ -1,0 +1,65 @@
+//! What a session with a robot elsewhere is made from, and how it stands.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use crate::{
+    ask_tell::{ChannelShape, Status, Suggestion, Told},
+    recording::EllipsoidSize,
+};
+
+/// What a session with a robot elsewhere is made from.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewOutsideSession {
+    /// `outside`.
+    pub world: OutsideWorld,
+    /// The keys of a calibration file as JSON, with the text of the URDF as `robot.urdf` and without measurements.
+    #[schema(value_type = Object)]
+    pub calibration: Value,
+    /// The learner that decides; `global`, unless the calibration lists others, if absent or null.
+    #[serde(default)]
+    pub agent: Option<String>,
+    /// Seed of all that is drawn.
+    #[serde(default)]
+    pub seed: u64,
+    /// How large the ellipsoids of its recording are.
+    #[serde(default)]
+    pub ellipsoids: EllipsoidSize,
+}
+
+/// The world of a robot elsewhere.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum OutsideWorld {
+    /// A robot that is not ours.
+    Outside,
+}
+
+/// How a session stands, for everyone to read while its engine is busy. Followers are told of its status and what is pending.
+#[derive(Debug, Serialize, ToSchema)]
+pub(in crate::server) struct Standing {
+    /// How it stands.
+    pub(in crate::server) status: Status,
+    /// The suggestions that wait to be carried out, of all clients, in the order in which they were chosen.
+    #[schema(value_type = Vec<Suggestion>)]
+    pub(in crate::server) pending: Vec<Arc<Suggestion>>,
+    /// All that were ever made, by id.
+    #[serde(skip)]
+    pub(in crate::server) suggestions: Vec<Arc<Suggestion>>,
+    /// All that were ever told, by number.
+    #[serde(skip)]
+    pub(in crate::server) observations: Vec<Arc<Told>>,
+    #[serde(skip)]
+    pub(in crate::server) channels: Arc<[ChannelShape]>,
+}
+
+impl Standing {
+    /// The observations that count, each of which is a step.
+    pub(super) fn step(&self) -> u64 {
+        self.status.observations - self.status.excluded.len() as u64
+    }
+}
