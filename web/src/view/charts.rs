@@ -47,15 +47,18 @@ impl Panel {
         rows.iter().all(|row| row.prediction_m.is_none()) && rows.iter().any(|row| row.scatter_m.is_some())
     }
 
-    /// The chart that is always in sight, with the legend of all; without a height it takes the room that is left.
+    /// The chart that is always in sight: the chosen one, if there is something of it to see.
+    fn pinned(&self, shown: &[&'static Chart]) -> Option<&'static Chart> {
+        shown.iter().find(|chart| chart.title == self.chart).or(shown.first()).copied()
+    }
+
+    /// It, with the legend of all; without a height it takes the room that is left.
     pub(super) fn pinned_chart(&mut self, ui: &mut Ui, height: Option<f32>) {
         if self.session.is_none() {
             return;
         }
         let shown = self.shown_charts();
-        let Some(chart) = shown.iter().find(|chart| chart.title == self.chart).or(shown.first()).copied() else {
-            return;
-        };
+        let Some(chart) = self.pinned(&shown) else { return };
         let low = ui.ctx().content_rect().height() < LOW;
         let drawn = ui.scope(|ui| {
             ui.horizontal_wrapped(|ui| {
@@ -87,7 +90,8 @@ impl Panel {
 
     pub(super) fn charts(&mut self, ui: &mut Ui) {
         let mut shown = self.shown_charts();
-        shown.retain(|chart| chart.title != self.chart);
+        let pinned = self.pinned(&shown).map(|chart| chart.title);
+        shown.retain(|chart| Some(chart.title) != pinned);
         let columns = if ui.available_width() >= TWO_COLUMNS { 2 } else { 1 };
         let mut clicked = None;
         for row in shown.chunks(columns) {
