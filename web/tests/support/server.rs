@@ -28,7 +28,16 @@ impl Server {
 
     /// What there is to choose from: as many scenarios as a test needs.
     pub fn scenarios() -> Value {
-        let names = ["arm-6dof", "head-fov", "body-change", "tiago-mocap", "arm-6dof-camera", "arm-6dof-outliers"];
+        let names = [
+            "arm-6dof",
+            "head-fov",
+            "body-change",
+            "tiago-mocap",
+            "arm-6dof-camera",
+            "arm-6dof-outliers",
+            "panda-sockets",
+            "ur10-camera",
+        ];
         let summaries = names.map(|name| builtin(name).expect("a built-in scenario").summary());
         json!({ "is": "scenarios", "scenarios": summaries })
     }
