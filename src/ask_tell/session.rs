@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     estimation::Belief,
-    experiment::{Description, Experiment, StepReport},
+    experiment::{ChannelReading, Description, Experiment, StepReport},
     scenario::Scenario,
 };
 
@@ -204,6 +204,11 @@ impl Session {
         &self.events
     }
 
+    /// The suggestions that wait to be carried out, of all clients, in the order in which they were chosen.
+    pub fn pending(&self) -> impl Iterator<Item = &Arc<Suggestion>> {
+        self.ledger.pending()
+    }
+
     /// All suggestions that were ever made, by id.
     pub fn suggestions(&self) -> &[Arc<Suggestion>] {
         &self.ledger.suggestions
@@ -279,8 +284,8 @@ impl Session {
         let learner = &self.latest().learners[0];
         let metrics = &learner.metrics;
         let readings = self.experiment().agent().map_or_else(Vec::new, |agent| agent.readings());
-        let is_outlier = |probability: f64| probability > 0.5;
-        let suspected = readings.iter().filter(|reading| reading.outlier_probability.is_some_and(is_outlier));
+        let suspected =
+            readings.iter().filter(|reading| reading.outlier_probability.is_some_and(|p| p > ChannelReading::OUTLIER));
         let numbers = suspected.filter_map(|reading| {
             let index = usize::try_from(reading.movement.checked_sub(1)?).ok()?;
             self.ledger.counted.get(index).copied()

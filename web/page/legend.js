@@ -8,6 +8,7 @@ export class Legend {
   #ellipsoids;
   #truth;
   #seen;
+  #suggested;
   /** What it says of the session, as text: it is built anew only for another. */
   #said = "";
 
@@ -18,12 +19,16 @@ export class Legend {
     this.#ellipsoids = list.querySelector("[data-line=ellipsoids] span");
     this.#truth = list.querySelector("[data-line=truth]");
     this.#seen = list.querySelector("[data-line=seen] span");
+    this.#suggested = list.querySelector("[data-line=suggested]");
     this.#learners.remove();
   }
 
-  /** @param {{learners: {name: string, colour: number[]}[], ellipsoids: string, truth: boolean, seen: string}} caption */
-  show({ learners, ellipsoids, truth, seen }) {
-    const said = JSON.stringify([learners.map(({ name, colour }) => [name, colour]), ellipsoids, truth, seen]);
+  /**
+   * @param {{learners: {name: string, colour: number[]}[], ellipsoids: string, truth: boolean, seen: string, suggested: boolean}}
+   *   caption
+   */
+  show({ learners, ellipsoids, truth, seen, suggested }) {
+    const said = JSON.stringify([learners.map(({ name, colour }) => [name, colour]), ellipsoids, truth, seen, suggested]);
     if (said === this.#said) return;
     this.#said = said;
     this.#ellipsoids.textContent = ellipsoids;
@@ -31,6 +36,8 @@ export class Legend {
     // Of measured data there is no true arm.
     if (truth) this.#seen.closest("li").before(this.#truth);
     else this.#truth.remove();
+    if (suggested) this.#list.append(this.#suggested);
+    else this.#suggested.remove();
     this.#list.querySelectorAll("[data-line=learner]").forEach((line) => line.remove());
     this.#list.prepend(...learners.map((learner) => this.#line(learner)));
     this.#list.hidden = learners.length === 0;

@@ -73,6 +73,23 @@ async function request(asked, method, path, body, answer) {
 const commands = {
   scenarios: () => request("scenarios", "GET", "/v1/scenarios", undefined, (list) => tell({ is: "scenarios", ...list })),
 
+  // The page does without them where they cannot be had.
+  async robots() {
+    const { sessions } = await ask("GET", "/v1/sessions").catch(() => ({ sessions: [] }));
+    tell({ is: "robots", sessions: sessions.filter(({ world }) => world === "outside") });
+  },
+
+  // What becomes of these comes over the WebSocket.
+  suggest: ({ session: id }) => request("suggest", "POST", `/v1/sessions/${id}/suggestions`, {}, () => tell({ is: "told" })),
+
+  end_suggestion: ({ session: id, suggestion, state }) =>
+    request("end_suggestion", "POST", `/v1/sessions/${id}/suggestions/${suggestion}/outcome`, { state }, () => tell({ is: "told" })),
+
+  not_seen: ({ session: id, suggestion: suggestion_id, configuration }) =>
+    request("not_seen", "POST", `/v1/sessions/${id}/observations`, { suggestion_id, configuration, measurements: {} }, () =>
+      tell({ is: "told" }),
+    ),
+
   async find({ session: id }) {
     // A session that is gone is no error: its address says how to run it again.
     const resource = await sessionOf(id);
@@ -185,7 +202,8 @@ function follow(resource) {
     connected: () => tell({ is: "connected" }),
     lost: (seconds) => tell({ is: "lost", seconds }),
     ended: (failure, unseen) => tell({ is: "ended", failure, unseen }),
-  });
+    begun: follow,
+  }, resource.world === "outside");
 }
 
 /** Tells the panel on which side of it the scene is. */

@@ -79,15 +79,20 @@ export class Follower {
   #socket = null;
   #timer = 0;
   #stopped = false;
+  #recordsAnew;
 
   /**
    * @param {string} id
-   * @param {{message: Function, part: Function, connected: Function, lost: Function, ended: Function}} on
-   *   lost(seconds) says when it is tried again, ended(failure, unseen) why there is nothing more
+   * @param {{message: Function, part: Function, connected: Function, lost: Function, ended: Function, begun: Function}} on
+   *   lost(seconds) says when it is tried again, ended(failure, unseen) why there is nothing more, begun(resource) that all
+   *   begins anew
+   * @param {boolean} recordsAnew whether the session may record itself anew while nobody is connected, or when what was told
+   *   to it counts otherwise
    */
-  constructor(id, on) {
+  constructor(id, on, recordsAnew) {
     this.#id = id;
     this.#on = on;
+    this.#recordsAnew = recordsAnew;
     this.#connect();
   }
 
@@ -140,8 +145,9 @@ export class Follower {
     const resource = await sessionOf(this.#id);
     if (this.#stopped) return;
     if (resource === null) return this.#on.ended(null, true);
+    if (resource !== undefined && this.#recordsAnew) return this.#on.begun(resource);
     const wait = BACK_OFF_MS[Math.min(this.#attempt++, BACK_OFF_MS.length - 1)];
     this.#on.lost(wait / 1000);
-    this.#timer = setTimeout(() => this.#connect(), wait);
+    this.#timer = setTimeout(() => (this.#recordsAnew ? this.#closed(code) : this.#connect()), wait);
   }
 }

@@ -13,14 +13,16 @@ const VERSION: &str = "1";
 impl Settings {
     /// Reads an address's query, with a notice for everything that could not be used.
     pub fn parse(query: &str) -> (Self, Vec<String>) {
-        let (mut settings, mut notices) = (Self::default(), Vec::new());
+        let (mut settings, mut notices) = (Self { robot: true, ..Self::default() }, Vec::new());
         for pair in query.trim_start_matches('?').split('&').filter(|pair| !pair.is_empty()) {
             let (name, value) = pair.split_once('=').unwrap_or((pair, ""));
             let value = decode(value);
             if let Err(notice) = settings.set(name, &value) {
                 notices.push(notice);
             }
+            settings.robot &= name != "scenario";
         }
+        settings.robot &= settings.session.is_some();
         (settings, notices)
     }
 
@@ -44,7 +46,8 @@ impl Settings {
             }
             "step" => {
                 let range = format!("a step up to {MAX_RESTORED}");
-                self.step = number(0..=MAX_RESTORED).ok_or_else(|| wrong(&range, self.step.to_string()))?;
+                let step = number(0..=MAX_RESTORED);
+                self.step = Some(step.ok_or_else(|| wrong(&range, "the usual one".to_owned()))?);
             }
             "speed" => {
                 let range = format!("from {MIN_SPEED} to {MAX_SPEED}");
@@ -104,9 +107,11 @@ impl Settings {
         query
     }
 
-    /// The query of a link to give away: it names no session, and what is shared rather than how to share it.
+    /// The query of a link to give away: it names what is shared rather than how to share it, and no session but that of a
+    /// robot elsewhere, which cannot be run again.
     pub fn link(&self) -> String {
-        self.choice()
+        let session = self.session.as_deref().filter(|_| self.robot);
+        self.choice() + &session.map(|id| format!("&session={}", encode(id))).unwrap_or_default()
     }
 
     /// The query of a link to a game on the same seed.
@@ -116,12 +121,18 @@ impl Settings {
 
     fn choice(&self) -> String {
         let usual = Self::default();
-        let mut query = format!("v={VERSION}&scenario={}&seed={}", encode(&self.scenario), self.seed);
+        let mut query = format!("v={VERSION}");
         let mut add = |name: &str, value: &str| query += &format!("&{name}={}", encode(value));
-        if !self.learners.is_empty() {
+        if !self.robot {
+            add("scenario", &self.scenario);
+            add("seed", &self.seed.to_string());
+        }
+        if !self.learners.is_empty() && !self.robot {
             add("learners", &self.learners.join(","));
         }
-        add("step", &self.step.to_string());
+        if let Some(step) = self.step {
+            add("step", &step.to_string());
+        }
         if self.speed != usual.speed {
             add("speed", &self.speed.to_string());
         }
@@ -196,7 +207,7 @@ mod tests {
             scenario: "head-fov".to_owned(),
             seed: MAX_SEED,
             learners: vec!["active".to_owned(), "random".to_owned()],
-            step: 57,
+            step: Some(57),
             speed: 2.5,
             run_to: Some(300),
             stop: StopWhen::First,
@@ -205,6 +216,7 @@ mod tests {
             joints: Some((0, 3)),
             ellipsoids: "95-percent".to_owned(),
             session: Some("3f2a".to_owned()),
+            robot: false,
             embed: true,
             play: false,
         };
@@ -220,6 +232,15 @@ mod tests {
         assert_eq!((read, notices.len()), (Settings::default(), 0));
         let (read, notices) = Settings::parse(&settings.challenge());
         assert!(read.play && notices.is_empty());
+    }
+
+    #[test]
+    fn a_link_to_a_robot_elsewhere_names_its_session_and_no_scenario() {
+        let session = Some("3f2a".to_owned());
+        let mut settings = Settings { session, robot: true, ..Settings::default() };
+        assert_eq!(settings.link(), "v=1&session=3f2a");
+        settings.step = Some(4);
+        assert_eq!(Settings::parse(&settings.query()), (settings, Vec::new()));
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! How a run ended, in a sentence: computed from the run, and naming both sides of every comparison.
 
-use crate::{history::Verdict, panel::Panel};
+use crate::{
+    history::{Verdict, Yardstick},
+    panel::Panel,
+};
 
 /// What has become of a learner at the end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,12 +66,14 @@ impl Panel {
     pub fn ending(&self) -> Option<Ending> {
         let latest = self.history.latest();
         let over = self.is_told() || latest >= self.run_to() || self.remaining() == Some(0);
+        let over = over && !self.is_outside();
         let description = self.description().filter(|_| over && latest > 0 && self.human().is_none())?;
         let change = description.change_at.filter(|change| latest > *change);
         let mut outcomes: Vec<(usize, Outcome)> =
             (0..description.learners.len()).map(|learner| (learner, self.outcome(learner))).collect();
         outcomes.sort_by(|(_, a), (_, b)| a.rank().total_cmp(&b.rank()));
         let counted = match change {
+            _ if self.history.yardstick() == Yardstick::Expected => format!("Expected error after {latest} movements"),
             _ if description.truth.is_none() => format!("Error over measurements held out, after {latest} movements"),
             Some(_) => "Movements after the body changed, until accurate again".to_owned(),
             None => "Movements until accurate".to_owned(),

@@ -1,11 +1,15 @@
 //! What events do to the panel's state.
 
-use body_schema::{experiment::StepReport, scenario::ScenarioSummary};
+use body_schema::{
+    experiment::StepReport,
+    scenario::{ScenarioSummary, WorldKind},
+};
 
 use crate::{
     history::History,
     host::{Command, Event, Live},
     panel::{Link, PREDICTION, Pace, Panel},
+    robot::Robot,
     seeds::SeedRuns,
     settings::{HUMAN, MAX_RESTORED, Settings},
     why::Why,
@@ -23,15 +27,15 @@ impl Panel {
             Event::Layout { scene } => self.scene = scene,
             Event::Navigated { query } => self.navigate(&query),
             Event::Scenarios { scenarios } => self.take_scenarios(scenarios),
+            Event::Robots { sessions } => self.robots = sessions,
+            Event::Told => self.robot.asking = false,
             Event::Session { session: Some(session) } => self.adopt(*session),
-            Event::Session { session: None } => {
-                self.notice("The session of this address is gone; its run is computed again.".to_owned());
-                self.open(self.settings.step);
-            }
+            Event::Session { session: None } => self.without_session(),
             Event::Refused { asked, problem } => self.refused(&asked, &problem),
             Event::Connected => self.link = Link::Connected,
             Event::Live { message: Live::Step(report) } => self.take(&report),
             Event::Live { message: Live::Description(_) } => {}
+            Event::Live { message: Live::Status(standing) } => self.take_standing(*standing),
             Event::Stepped { session, step } => {
                 if self.session.as_ref().is_some_and(|current| current.id == session) {
                     self.stepped(step);
@@ -63,23 +67,43 @@ impl Panel {
         notices.into_iter().for_each(|notice| self.notice(notice));
         self.tour = Some(0).filter(|_| !known && !self.settings.embed);
         self.ask(Command::Scenarios);
+        if self.server {
+            self.ask(Command::Robots);
+        }
+    }
+
+    /// There is no session of the address's id.
+    fn without_session(&mut self) {
+        self.notice(match self.settings.robot {
+            true => "This server has no session of that address: it was deleted, or another server has it.".to_owned(),
+            false => "The session of this address is gone; its run is computed again.".to_owned(),
+        });
+        self.open(self.settings.first_step());
     }
 
     /// Shows what an earlier address showed: a step of this run, or another run.
     fn navigate(&mut self, query: &str) {
-        let what = |settings: &Settings| (settings.scenario.clone(), settings.seed, settings.learners.clone());
+        let what = |settings: &Settings| {
+            let Settings { robot, session, scenario, seed, learners, .. } = settings.clone();
+            if robot { (session, None) } else { (None, Some((scenario, seed, learners))) }
+        };
         let before = what(&self.settings);
         let (mut settings, mut notices) = Settings::parse(query);
         notices.extend(settings.validate(&self.scenarios));
         // The session of that address may be gone, and the one that is shown needs no other.
-        settings.session = self.settings.session.take();
+        if !settings.robot {
+            settings.session = self.settings.session.take();
+        }
         self.settings = settings;
         self.seed_text = self.settings.seed.to_string();
         notices.into_iter().for_each(|notice| self.notice(notice));
         if self.is_ready() && what(&self.settings) == before {
-            self.scrub(self.settings.step);
+            let usual = if self.settings.robot { self.history.latest() } else { self.settings.first_step() };
+            self.scrub(self.settings.step.unwrap_or(usual));
+        } else if let Some(session) = self.settings.session.clone().filter(|_| self.settings.robot) {
+            self.find(session);
         } else {
-            self.open(self.settings.step);
+            self.open(self.settings.first_step());
         }
     }
 
@@ -94,13 +118,18 @@ impl Panel {
             None => self.tour = None,
         }
         match self.settings.session.clone() {
-            Some(session) => {
-                self.wanted = Some(self.settings.step);
-                self.opening = true;
-                self.ask(Command::Find { session });
-            }
-            None => self.open(self.settings.step),
+            Some(session) => self.find(session),
+            None => self.open(self.settings.first_step()),
         }
+    }
+
+    /// Shows a session that is there already.
+    pub(crate) fn find(&mut self, session: String) {
+        self.pause();
+        self.restoring = None;
+        self.wanted = Some(self.settings.first_step());
+        self.opening = true;
+        self.ask(Command::Find { session });
     }
 
     /// The learners that tell most beside each other, unless the visitor chose some.
@@ -116,6 +145,7 @@ impl Panel {
     pub(crate) fn open(&mut self, step: u64) {
         self.pause();
         self.opening = true;
+        self.settings.robot = false;
         // Movements that the visitor chose cannot be computed again.
         let is_game = self.settings.learners.iter().any(|name| name == HUMAN);
         let step = if is_game { 0 } else { step };
@@ -129,11 +159,19 @@ impl Panel {
 
     fn adopt(&mut self, session: Session) {
         let description = &session.description;
-        self.settings.scenario.clone_from(&description.scenario);
-        self.settings.seed = description.seed;
-        self.seed_text = description.seed.to_string();
-        self.settings.learners = description.learners.iter().map(|learner| learner.name.clone()).collect();
+        self.settings.robot = session.world == WorldKind::Outside;
+        if self.settings.robot {
+            // What the explorer last showed stays chosen, to go back to.
+            self.wanted = self.settings.step;
+            self.tour = None;
+        } else {
+            self.settings.scenario.clone_from(&description.scenario);
+            self.settings.seed = description.seed;
+            self.seed_text = description.seed.to_string();
+            self.settings.learners = description.learners.iter().map(|learner| learner.name.clone()).collect();
+        }
         self.settings.session = Some(session.id.clone());
+        self.robot = Robot::default();
         self.history = History::new(description);
         self.why = Why::default();
         self.pace = Pace::default();
@@ -188,7 +226,10 @@ impl Panel {
                 self.seeds.iter_mut().for_each(SeedRuns::cancel);
                 self.notice(format!("The other seeds stopped: {sentence}."));
             }
-            _ => self.notice(sentence),
+            _ => {
+                self.robot.asking = false;
+                self.notice(sentence);
+            }
         }
     }
 
@@ -237,7 +278,7 @@ impl Panel {
                 self.pause();
                 self.link = Link::Failed(failure);
             }
-            None if unseen => {
+            None if unseen && !self.settings.robot => {
                 let (latest, cursor) = (self.history.latest(), self.cursor);
                 self.notice(format!("The server was started anew; the run is computed again up to step {latest}."));
                 self.open(latest);

@@ -13,6 +13,8 @@ pub struct Row {
     pub prediction_m: Option<f64>,
     /// Mean distance of a predicted target from its mean in sockets that nobody learned from, metres.
     pub scatter_m: Option<f64>,
+    /// Mean error of predictions over the workspace as the learner itself expects it, metres.
+    pub expected_m: Option<f64>,
     /// tr(W P).
     pub trace: Option<f64>,
     /// What the data collected allow of it, linearised at the truth.
@@ -36,10 +38,9 @@ pub struct Row {
 }
 
 impl Row {
-    /// What tells how good it is where no truth is known, metres: predictions, or where nothing but sockets is measured, the
-    /// scatter in them.
+    /// What tells how good it is where no truth is known, metres; see [`Yardstick`].
     pub fn error_m(&self) -> Option<f64> {
-        self.prediction_m.or(self.scatter_m)
+        self.prediction_m.or(self.scatter_m).or(self.expected_m)
     }
 
     /// `convergence` is judged up to this report, and counts from step `begin`.
@@ -51,6 +52,7 @@ impl Row {
             location_m: metrics.location_m,
             prediction_m: metrics.prediction_mean_m,
             scatter_m: metrics.scatter_m,
+            expected_m: metrics.expected_prediction_m,
             trace: metrics.trace,
             bound: metrics.bound_trace,
             gain: movement.as_ref().and_then(|movement| movement.gain),
@@ -68,6 +70,17 @@ impl Row {
     fn is_judged(&self) -> bool {
         self.orientation_deg.is_some() || self.location_m.is_some()
     }
+}
+
+/// What tells best how good the learners are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Yardstick {
+    /// Predictions, held against the truth or measurements that were held out.
+    Prediction,
+    /// Where nothing but sockets is measured, the scatter of predictions in them.
+    Scatter,
+    /// With a robot elsewhere, what they expect themselves.
+    Expected,
 }
 
 /// What has become of a learner.
@@ -127,6 +140,21 @@ impl History {
         let misses = |step| self.row(step, learner).map_or(0, |row| row.misses);
         let is_blind = || latest > BLIND && misses(latest) - misses(latest - BLIND) == BLIND;
         matches!(self.verdict(latest, learner), Verdict::Converged(_) | Verdict::Diverged) || is_blind()
+    }
+
+    /// What tells best how good the learners are.
+    pub fn yardstick(&self) -> Yardstick {
+        let rows = self.rows.last().map_or(&[][..], Vec::as_slice);
+        let any = |value: fn(&Row) -> Option<f64>| rows.iter().any(|row| value(row).is_some());
+        if any(|row| row.prediction_m.or(row.orientation_deg)) {
+            Yardstick::Prediction
+        } else if any(|row| row.scatter_m) {
+            Yardstick::Scatter
+        } else if any(|row| row.expected_m) {
+            Yardstick::Expected
+        } else {
+            Yardstick::Prediction
+        }
     }
 
     /// Whether nothing more is to be told of any learner, and the body will not change any more.

@@ -3,13 +3,16 @@
 //! The panel keeps no connection and reads no clock: the page tells it what happened ([`Event`]) and does what it asks
 //! ([`Command`]). So everything that it does can be tested without a browser.
 
+use std::collections::BTreeMap;
+
 use body_schema::{
+    ask_tell::Outcome,
     experiment::{AppraisalReport, Choice, StepReport},
     scenario::ScenarioSummary,
 };
 use serde::{Deserialize, Serialize};
 
-use crate::wire::{Problem, Session};
+use crate::wire::{Problem, Session, Standing};
 
 /// What happened.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -43,6 +46,13 @@ pub enum Event {
         /// All of them.
         scenarios: Vec<ScenarioSummary>,
     },
+    /// The sessions with robots elsewhere.
+    Robots {
+        /// Oldest first.
+        sessions: Vec<Session>,
+    },
+    /// What was asked for or said about a robot's movements is done; how the session stands since comes by itself.
+    Told,
     /// The session that was asked for is there; null if there is none of that id.
     Session {
         /// The session.
@@ -159,6 +169,8 @@ pub enum Live {
     Description(serde::de::IgnoredAny),
     /// A step.
     Step(Box<StepReport>),
+    /// With a robot elsewhere: how it stands.
+    Status(Box<Standing>),
 }
 
 /// What the page is to do.
@@ -167,6 +179,31 @@ pub enum Live {
 pub enum Command {
     /// Ask for the scenarios.
     Scenarios,
+    /// Ask for the sessions with robots elsewhere.
+    Robots,
+    /// Have the next movement of a robot elsewhere suggested.
+    Suggest {
+        /// The session.
+        session: String,
+    },
+    /// Say that a suggestion is not carried out.
+    EndSuggestion {
+        /// The session.
+        session: String,
+        /// The suggestion's id.
+        suggestion: u64,
+        /// What becomes of it.
+        state: Outcome,
+    },
+    /// Say that a suggestion was carried out and nothing was seen.
+    NotSeen {
+        /// The session.
+        session: String,
+        /// The suggestion's id.
+        suggestion: u64,
+        /// Where the joints are, by name.
+        configuration: BTreeMap<String, f64>,
+    },
     /// Look for a session.
     Find {
         /// Its id.
@@ -308,6 +345,8 @@ pub struct Caption {
     pub truth: bool,
     /// What is drawn of the measurements.
     pub seen: String,
+    /// Whether the movement that is suggested next can be seen.
+    pub suggested: bool,
 }
 
 /// A learner, as a caption names it.

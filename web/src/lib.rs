@@ -6,6 +6,7 @@
 //! history   the numbers of every step, verdicts          seeds      the runs of other seeds
 //! search    DIRECT's search, ready to be drawn           why        what was asked and answered about it
 //! stories   what can be told, as data                    game       the movements that the visitor chooses
+//! robot     a robot elsewhere, and what is said to it
 //! panel     the state: all of the above                  words      plain words for the terms of the field
 //! tour      going through a story, what its cards do     contest    playing the game
 //! ending    how a run ended, in a sentence               status     what goes on, in a sentence
@@ -39,6 +40,7 @@ mod mirror;
 mod news;
 pub mod panel;
 pub mod play;
+pub mod robot;
 pub mod search;
 pub mod seeds;
 pub mod settings;

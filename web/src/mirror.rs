@@ -1,5 +1,7 @@
 //! The panel in words, for those who hear it and for scripts.
 
+use body_schema::experiment::Description;
+
 use crate::{
     colours,
     host::{Caption, Captioned, Command, Mirror},
@@ -14,7 +16,7 @@ impl Panel {
     /// What the legend over the scene says, and what stands under a picture of it.
     pub fn caption(&self) -> Caption {
         let Some(description) = self.description() else { return Caption::default() };
-        let title = format!("{}, seed {}, step {}", description.scenario, description.seed, self.cursor);
+        let title = self.title(description);
         let slots = colours::slots(description);
         let learners = description.learners.iter().zip(slots).enumerate().map(|(index, (learner, slot))| {
             let row = self.history.row(self.cursor, index).copied().unwrap_or_default();
@@ -22,7 +24,8 @@ impl Panel {
                 row.orientation_deg.map(|error| format!("{error:.1}°")),
                 row.location_m.map(|error| format!("{:.0} mm", error * 1e3)),
                 row.prediction_m.filter(|_| row.location_m.is_none()).map(|error| format!("{:.0} mm", error * 1e3)),
-                row.scatter_m.filter(|_| row.prediction_m.is_none()).map(|error| format!("{:.1} mm", error * 1e3)),
+                (row.error_m().filter(|_| row.prediction_m.is_none() && row.location_m.is_none()))
+                    .map(|error| format!("{:.1} mm", error * 1e3)),
             ];
             let errors: Vec<String> = errors.into_iter().flatten().collect();
             let [red, green, blue, _] = colours::learner(slot).to_array();
@@ -33,7 +36,15 @@ impl Panel {
         let sees =
             if description.cameras.is_empty() { "where the hand was seen" } else { "from a camera to what it saw" };
         let (truth, seen) = (description.truth.is_some(), sees.to_owned());
-        Caption { title, learners: learners.collect(), ellipsoids, truth, seen }
+        let suggested = self.is_outside() && self.suggestion().is_some();
+        Caption { title, learners: learners.collect(), ellipsoids, truth, seen, suggested }
+    }
+
+    fn title(&self, description: &Description) -> String {
+        match self.is_outside() {
+            true => format!("{}, observation {}", description.scenario, self.cursor),
+            false => format!("{}, seed {}, step {}", description.scenario, description.seed, self.cursor),
+        }
     }
 
     pub(crate) fn phase(&self) -> &'static str {
@@ -51,7 +62,10 @@ impl Panel {
     fn words(&self) -> String {
         let mut text = self.status();
         let Some(description) = self.description() else { return text };
-        text += &format!(" {}, seed {}, step {}.", description.scenario, description.seed, self.cursor);
+        text += &format!(" {}.", self.title(description));
+        for sentence in self.robot_words() {
+            text += &format!(" {sentence}");
+        }
         for (index, learner) in description.learners.iter().enumerate() {
             let Some(row) = self.history.row(self.cursor, index) else { continue };
             text += &format!(" {}: {}", learner.name, self.verdict(index));
@@ -65,6 +79,8 @@ impl Panel {
                 text += &format!(", prediction {:.0} millimetres", error * 1e3);
             } else if let Some(error) = row.scatter_m {
                 text += &format!(", scatter {:.1} millimetres", error * 1e3);
+            } else if let Some(error) = row.expected_m {
+                text += &format!(", expected error {:.2} millimetres", error * 1e3);
             }
             text.push('.');
         }

@@ -7,6 +7,7 @@ use crate::{
     history::History,
     host::{Command, Mirror, Side},
     news::Told,
+    robot::Robot,
     seeds::SeedRuns,
     settings::{HUMAN, Settings, Tab},
     stories::{STORIES, Spot, Spots},
@@ -79,6 +80,10 @@ pub struct Panel {
     pub story: usize,
     /// The movements that the visitor chooses.
     pub game: Game,
+    /// The robot of a session with one elsewhere.
+    pub robot: Robot,
+    /// The sessions with robots elsewhere, as they were when the page was opened.
+    pub robots: Vec<Session>,
     /// Whether there is a server; without one, recorded runs are shown and nothing new is computed.
     pub server: bool,
     /// The seeds of the recorded runs, where there is no server.
@@ -149,6 +154,8 @@ impl Default for Panel {
             tour: None,
             story: 0,
             game: Game::default(),
+            robot: Robot::default(),
+            robots: Vec::new(),
             server: true,
             recorded_seeds: Vec::new(),
             chart: PREDICTION,

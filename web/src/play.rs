@@ -57,8 +57,8 @@ impl Panel {
 
     /// Plays until something stops it.
     pub fn play(&mut self) {
-        // Who chooses the movements makes them one by one.
-        if !self.is_ready() || self.restoring.is_some() || self.human().is_some() {
+        // Who chooses the movements makes them one by one, and a robot elsewhere makes them itself.
+        if !self.is_ready() || self.restoring.is_some() || self.human().is_some() || self.is_outside() {
             return;
         }
         (self.stopped, self.wanted) = (None, None);
@@ -171,6 +171,9 @@ impl Panel {
     pub fn make_step(&mut self) {
         self.pause();
         self.stopped = None;
+        if self.is_outside() {
+            return;
+        }
         if self.remaining() == Some(0) {
             self.stop_if_due();
         } else if self.human().is_some() {
@@ -193,6 +196,9 @@ impl Panel {
 
     /// Opens the session anew.
     pub fn reset(&mut self) {
+        if self.is_outside() {
+            return;
+        }
         if self.scenarios.is_empty() {
             self.link = Link::Loading;
             self.ask(Command::Scenarios);
@@ -279,7 +285,9 @@ impl Panel {
         if self.session.is_none() || self.opening || self.wanted.is_some() || self.history.is_empty() {
             return None;
         }
-        self.settings.step = self.cursor;
+        // Who watches a robot as it moves wants to see its latest step next time too.
+        let is_latest = self.settings.robot && self.cursor == self.history.latest();
+        self.settings.step = Some(self.cursor).filter(|_| !is_latest);
         let query = self.settings.query();
         if self.address.1 == query {
             return None;

@@ -65,8 +65,8 @@ pub struct Settings {
     pub seed: u64,
     /// The learners to compare; empty means those that the scenario runs by default.
     pub learners: Vec<String>,
-    /// The step that is shown.
-    pub step: u64,
+    /// The step that is shown; `None` for the usual: the first, or the latest of a robot elsewhere.
+    pub step: Option<u64>,
     /// Steps a second.
     pub speed: f64,
     /// The last step of a run; `None` for the scenario's.
@@ -83,6 +83,8 @@ pub struct Settings {
     pub ellipsoids: String,
     /// The session, which only this server knows.
     pub session: Option<String>,
+    /// It is one with a robot elsewhere, of which its address needs no more.
+    pub robot: bool,
     /// The page stands in another one: transport and one chart only.
     pub embed: bool,
     /// The address asks for a game; taken by [`Settings::validate`], which makes it a choice of learners.
@@ -95,7 +97,7 @@ impl Default for Settings {
             scenario: "arm-6dof".to_owned(),
             seed: 1,
             learners: Vec::new(),
-            step: 1,
+            step: None,
             speed: 10.0,
             run_to: None,
             stop: StopWhen::Told,
@@ -104,6 +106,7 @@ impl Default for Settings {
             joints: None,
             ellipsoids: ELLIPSOIDS[0].0.to_owned(),
             session: None,
+            robot: false,
             embed: false,
             play: false,
         }
@@ -111,6 +114,11 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// The step at which a session that is made anew begins.
+    pub fn first_step(&self) -> u64 {
+        self.step.unwrap_or(1)
+    }
+
     /// Holds the choice against what there is; what does not exist is replaced, with a notice.
     pub fn validate(&mut self, scenarios: &[ScenarioSummary]) -> Vec<String> {
         let mut notices = Vec::new();
@@ -123,7 +131,7 @@ impl Settings {
         scenario.name.clone_into(&mut self.scenario);
         if std::mem::take(&mut self.play) {
             self.learners = GAME.map(str::to_owned).to_vec();
-            self.step = 0;
+            self.step = Some(0);
         }
         let offered = |name: &String| scenario.offered().any(|learner| learner.name == *name);
         for name in self.learners.iter().filter(|name| !offered(name)) {

@@ -9,6 +9,7 @@ impl Panel {
         match &self.link {
             Link::Unreachable(why) => format!("The server cannot be used: {why}. Reset tries again."),
             Link::Lost(seconds) => format!("The connection is lost; trying again in {seconds} s. The run is kept."),
+            Link::Expired if self.is_outside() => "This session was deleted. Explorer leaves it.".to_owned(),
             Link::Expired => "This session has expired. Restore computes it again; Reset begins anew.".to_owned(),
             Link::Failed(why) => format!("The engine has failed: {why}. Reset begins anew."),
             _ if self.opening => "Opening a session…".to_owned(),
@@ -20,6 +21,7 @@ impl Panel {
                 Some(what) => format!("Fast-forward, {what}…"),
                 None => format!("Running, {} movements a second.", self.settings.speed),
             },
+            Link::Connected if self.is_outside() => self.robot_status(),
             Link::Connected if self.human().is_some() => self.game_status(),
             Link::Connected => match &self.stopped {
                 Some(reason) => reason.clone(),

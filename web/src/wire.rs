@@ -1,7 +1,11 @@
 //! What the server itself says, as far as the panel reads it. What it passes on from the engine (scenarios,
 //! descriptions, reports, choices) are the engine's own types.
 
-use body_schema::experiment::Description;
+use body_schema::{
+    ask_tell::{Answer, Status, Suggestion},
+    experiment::Description,
+    scenario::WorldKind,
+};
 use serde::Deserialize;
 
 /// A session.
@@ -9,6 +13,9 @@ use serde::Deserialize;
 pub struct Session {
     /// Its id.
     pub id: String,
+    /// Where its movements are made.
+    #[serde(default = "simulated")]
+    pub world: WorldKind,
     /// What it runs.
     pub description: Description,
     /// Its latest step.
@@ -16,6 +23,26 @@ pub struct Session {
     /// Steps that recorded data still offer; null without an end.
     #[serde(default)]
     pub remaining: Option<u64>,
+    /// Why its recording lacks steps, if it does.
+    #[serde(default)]
+    pub recording_failure: Option<String>,
+}
+
+/// Recorded runs do not say.
+fn simulated() -> WorldKind {
+    WorldKind::Simulated
+}
+
+/// How a session with a robot elsewhere stands.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct Standing {
+    /// In numbers.
+    pub status: Status,
+    /// The suggestions that wait to be carried out, in the order in which they were chosen.
+    pub pending: Vec<Suggestion>,
+    /// What was answered to the latest observation.
+    #[serde(default)]
+    pub last: Option<Answer>,
 }
 
 /// Why the server refused (RFC 9457).

@@ -18,7 +18,7 @@ fn steps(commands: &[Command]) -> Vec<u64> {
 #[test]
 fn an_opened_page_asks_for_a_session_and_its_first_step() {
     let mut page = Page::open("?scenario=head-fov&seed=7&learners=random,active");
-    assert_eq!(page.commands(), [Command::Scenarios]);
+    assert_eq!(page.commands(), [Command::Scenarios, Command::Robots]);
     page.tell(Server::scenarios());
     let learners = Some(vec!["active".to_owned(), "random".to_owned()]);
     let open = Command::Open { scenario: "head-fov".to_owned(), seed: 7, learners, ellipsoids: "1-sigma".to_owned() };

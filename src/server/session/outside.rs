@@ -19,8 +19,7 @@ use super::{
 };
 use crate::{
     ask_tell::{
-        self, Answer, Ask, ChannelShape, Observation, Outcome, Prepared, Setup, Status, Suggestion, SuggestionState,
-        Suggestions, Told,
+        self, Answer, Ask, ChannelShape, Observation, Outcome, Prepared, Setup, Status, Suggestion, Suggestions, Told,
     },
     experiment::{Description, Experiment},
     recording::{Recorder, RecordingError, Target},
@@ -290,7 +289,7 @@ impl Elsewhere {
 
     /// Draws the posture that is suggested next, as a ghost of the arm.
     fn show(&mut self) -> Result<(), RecordingError> {
-        let next = self.session.suggestions().iter().find(is_pending);
+        let next = self.session.pending().next();
         let joints = &self.session.description().joints;
         let posture = next.and_then(|next| {
             let positions = joints.iter().map(|joint| next.configuration.get(&joint.name).copied());
@@ -304,21 +303,18 @@ impl Elsewhere {
     }
 
     fn publish(&self, reports: Vec<Kept>) {
-        let suggestions = self.session.suggestions().to_vec();
+        let observations = self.session.observations().to_vec();
         let standing = Standing {
             status: self.session.status(),
-            pending: suggestions.iter().filter(is_pending).cloned().collect(),
-            suggestions,
-            observations: self.session.observations().to_vec(),
+            pending: self.session.pending().cloned().collect(),
+            last: observations.last().map(|told| told.answer.clone()),
+            suggestions: self.session.suggestions().to_vec(),
+            observations,
             channels: self.channels.clone(),
         };
         self.shared.standing.send_replace(Some(Arc::new(standing)));
         self.shared.publish(reports, None);
     }
-}
-
-fn is_pending(suggestion: &&Arc<Suggestion>) -> bool {
-    suggestion.state == SuggestionState::Pending
 }
 
 /// Seconds since 1970.

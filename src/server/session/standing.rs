@@ -7,7 +7,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::{
-    ask_tell::{ChannelShape, Status, Suggestion, Told},
+    ask_tell::{Answer, ChannelShape, Status, Suggestion, Told},
     recording::EllipsoidSize,
 };
 
@@ -47,6 +47,8 @@ pub(in crate::server) struct Standing {
     /// The suggestions that wait to be carried out, of all clients, in the order in which they were chosen.
     #[schema(value_type = Vec<Suggestion>)]
     pub(in crate::server) pending: Vec<Arc<Suggestion>>,
+    /// What was answered to the latest observation; null before any.
+    pub(in crate::server) last: Option<Answer>,
     /// All that were ever made, by id.
     #[serde(skip)]
     pub(in crate::server) suggestions: Vec<Arc<Suggestion>>,

@@ -23,7 +23,10 @@ pub(super) struct Chart {
 /// The title of the error where nothing but sockets is measured.
 pub(super) const SCATTER: &str = "Scatter in sockets";
 
-pub(super) const CHARTS: [Chart; 7] = [
+/// The title of the error that a robot elsewhere can be told.
+pub(super) const EXPECTED: &str = "Expected error";
+
+pub(super) const CHARTS: [Chart; 8] = [
     Chart {
         title: "Orientation error",
         unit: "°",
@@ -63,6 +66,16 @@ pub(super) const CHARTS: [Chart; 7] = [
         judged: false,
         is_error: true,
         value: |row| Some(row.scatter_m? * 1e3),
+        bound: None,
+    },
+    Chart {
+        title: EXPECTED,
+        unit: "mm",
+        tip: "Mean error of predictions over the workspace, as the learner expects it by its own estimate; dashed: what is wanted",
+        logarithmic: true,
+        judged: false,
+        is_error: true,
+        value: |row| Some(row.expected_m? * 1e3),
         bound: None,
     },
     Chart {
@@ -120,6 +133,9 @@ impl Chart {
     }
 
     pub(super) fn threshold(&self, panel: &Panel) -> Option<f64> {
+        if self.title == EXPECTED {
+            return panel.robot.standing.as_ref().map(|standing| standing.status.wanted_mm);
+        }
         let description = panel.description().filter(|description| description.truth.is_some() && self.judged)?;
         let thresholds = description.thresholds;
         Some(if self.unit == "°" { thresholds.orientation_deg } else { thresholds.location_m * 1e3 })

@@ -4,12 +4,12 @@ use egui::{ComboBox, RichText, Ui};
 
 use super::{
     LOW, TALL,
-    chart::{CHARTS, Chart, SCATTER},
+    chart::{CHARTS, Chart, EXPECTED, SCATTER},
     learners::entry,
 };
 use crate::{
     colours,
-    history::Row,
+    history::{Row, Yardstick},
     panel::{PREDICTION, Panel},
     seeds::SeedRuns,
     stories::Spot,
@@ -30,21 +30,15 @@ impl Panel {
         let any = |wanted: fn(&Row) -> bool| {
             (0..learners).any(|learner| self.history.row(self.history.latest(), learner).is_some_and(wanted))
         };
+        let yardstick = self.history.yardstick();
         let is_told = |chart: &Chart| match chart.title {
             "Misses" => any(|row| row.misses > 0),
             SCATTER => any(|row| row.scatter_m.is_some()),
-            PREDICTION => !self.meets_itself(),
+            PREDICTION => yardstick == Yardstick::Prediction,
+            EXPECTED => yardstick == Yardstick::Expected,
             _ => true,
         };
         CHARTS.iter().filter(|chart| (known || !chart.judged) && is_told(chart)).collect()
-    }
-
-    /// Whether nothing but sockets tells how good the learners are.
-    pub(super) fn meets_itself(&self) -> bool {
-        let learners = self.description().map_or(0, |description| description.learners.len());
-        let rows = (0..learners).filter_map(|learner| self.history.row(self.history.latest(), learner));
-        let rows: Vec<&Row> = rows.collect();
-        rows.iter().all(|row| row.prediction_m.is_none()) && rows.iter().any(|row| row.scatter_m.is_some())
     }
 
     /// The chart that is always in sight: the chosen one, if there is something of it to see.
@@ -109,6 +103,9 @@ impl Panel {
         }
         self.go_to(clicked);
         self.marks(ui);
+        if self.is_outside() {
+            return;
+        }
         if self.ending().is_none() || self.playing {
             self.seeds_row(ui);
         } else if let Some(done) = self.other_seeds().map(SeedRuns::done).filter(|done| *done > 0) {

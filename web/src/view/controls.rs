@@ -28,6 +28,10 @@ impl Panel {
     }
 
     fn transport(&mut self, ui: &mut Ui) {
+        if self.is_outside() {
+            self.transport_of_a_robot(ui);
+            return;
+        }
         let ready = self.is_ready() && self.restoring.is_none();
         if self.human().is_none() {
             let (name, tip) = if self.playing { ("Pause", "Pause (Space)") } else { ("Play", "Play (Space)") };
@@ -66,11 +70,41 @@ impl Panel {
         }
     }
 
+    /// Its steps are its own: they can be gone through, and not made here.
+    fn transport_of_a_robot(&mut self, ui: &mut Ui) {
+        let (cursor, latest) = (self.cursor, self.history.latest());
+        let tip = "One observation back (left arrow)";
+        if ui.add_enabled(cursor > 0, Button::new("Back")).on_hover_text(tip).clicked() {
+            self.back();
+        }
+        let tip = "One observation on (right arrow)";
+        if ui.add_enabled(cursor < latest, Button::new("Step")).on_hover_text(tip).clicked() {
+            self.forward();
+        }
+        let tip = "The latest observation, and those that come";
+        if ui.add_enabled(cursor < latest, Button::new("Latest")).on_hover_text(tip).clicked() {
+            self.scrub(latest);
+            self.sought = None;
+        }
+        if self.settings.embed {
+            return;
+        }
+        let tip = "Leaves this session, which goes on, for learners that are compared in scenarios of our own";
+        if ui.button("Explorer").on_hover_text(tip).clicked() {
+            self.choose_usual_learners();
+            self.open(1);
+        }
+        if ui.button("?").on_hover_text("Keyboard and words (?)").clicked() {
+            self.help = !self.help;
+        }
+    }
+
     fn scrubber(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             let latest = self.history.latest();
             let left = self.remaining().map_or(String::new(), |left| format!(", {left} left"));
-            let label = ui.label(RichText::new(format!("Step {} of {latest}{left}", self.cursor)).monospace());
+            let what = if self.is_outside() { "Observation" } else { "Step" };
+            let label = ui.label(RichText::new(format!("{what} {} of {latest}{left}", self.cursor)).monospace());
             let mut cursor = self.cursor;
             ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(60.0);
             let slider = Slider::new(&mut cursor, 0..=latest.max(1)).show_value(false);

@@ -9,7 +9,12 @@ use egui::{
 use egui_plot::LineStyle;
 
 use super::{NARROW, alarm, good};
-use crate::{colours, history::Verdict, panel::Panel, words};
+use crate::{
+    colours,
+    history::{Verdict, Yardstick},
+    panel::Panel,
+    words,
+};
 
 const DASH: &str = "–";
 const ROW: f32 = 20.0;
@@ -80,19 +85,23 @@ impl Panel {
         let Some(description) = self.description() else { return };
         let count = description.learners.len();
         let misses = (0..count).any(|i| self.history.row(self.cursor, i).is_some_and(|row| row.misses > 0));
-        let meets_itself = self.meets_itself();
+        let yardstick = self.history.yardstick();
         let narrow = ui.available_width() < NARROW;
         let short = |long: &'static str, short: &'static str| if narrow { short } else { long };
         let mut heads = vec![
             ("Learner", "How each goes about it stands beside the chart; the terms stand in the tooltip of its name"),
             (short("Orientation, °", "Orient. °"), "Mean error of the angles between the joints' axes"),
             (short("Location, mm", "Loc. mm"), "Mean distance of the true axis points from the estimated axes"),
-            match meets_itself {
-                true => (
+            match yardstick {
+                Yardstick::Scatter => (
                     "Scatter, mm",
                     "Mean distance of the predicted target from its mean, in sockets that nobody has learned from",
                 ),
-                false => {
+                Yardstick::Expected => (
+                    short("Expected, mm", "Exp. mm"),
+                    "Mean error of predictions over the workspace, as the learner expects it by its own estimate",
+                ),
+                Yardstick::Prediction => {
                     (short("Prediction, mm", "Pred. mm"), "Mean distance between the predicted and the true marker")
                 }
             },
@@ -124,7 +133,7 @@ impl Panel {
                         let text = match column {
                             1 => fixed(numbers.orientation_deg, 1.0, 2),
                             2 => fixed(numbers.location_m, 1e3, 1),
-                            3 => fixed(numbers.error_m(), 1e3, if meets_itself { 2 } else { 1 }),
+                            3 => fixed(numbers.error_m(), 1e3, if yardstick == Yardstick::Prediction { 1 } else { 2 }),
                             _ => numbers.misses.to_string(),
                         };
                         ui.label(RichText::new(text).monospace());
@@ -133,9 +142,14 @@ impl Panel {
             }
         });
         if description.truth.is_none() {
-            let text = match meets_itself {
-                true => "–: recorded data have no known truth. Scatter is in sockets that nobody has learned from.",
-                false => {
+            let text = match yardstick {
+                Yardstick::Scatter => {
+                    "–: recorded data have no known truth. Scatter is in sockets that nobody has learned from."
+                }
+                Yardstick::Expected => {
+                    "–: a robot elsewhere has no known truth. What is expected is the learner's own account."
+                }
+                Yardstick::Prediction => {
                     "–: recorded data have no known truth. Prediction is over measurements held out from learning."
                 }
             };

@@ -16,6 +16,7 @@ mod game;
 mod learners;
 mod notices;
 mod readings;
+mod robot;
 mod setup;
 mod share;
 mod slice;
@@ -88,6 +89,10 @@ impl Panel {
                 self.empty(ui);
                 return;
             }
+            if self.is_outside() {
+                self.with_a_robot(ui);
+                return;
+            }
             self.game(ui);
             self.ending_card(ui);
             let learners = part(ui, "learners", |ui| self.learners(ui)).response;
@@ -108,6 +113,21 @@ impl Panel {
                 }
             });
         });
+    }
+
+    /// With a robot elsewhere: what it is to do, how that stands, and all that is known of any session.
+    fn with_a_robot(&mut self, ui: &mut Ui) {
+        part(ui, "robot", |ui| self.robot(ui));
+        ui.add_space(6.0);
+        part(ui, "tabs", |ui| self.tabs(ui));
+        part(ui, "tab", |ui| match self.settings.tab {
+            Tab::Charts => self.charts(ui),
+            Tab::Why => self.why(ui),
+            Tab::Share => self.share(ui),
+        });
+        ui.add_space(6.0);
+        ui.separator();
+        part(ui, "setup", |ui| self.choose_session(ui));
     }
 
     /// Notes where something is, as far as it is in sight, and brings it there if a card has just begun to speak of it.

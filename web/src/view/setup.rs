@@ -6,7 +6,7 @@ use body_schema::{
 };
 use egui::{ComboBox, RichText, TextEdit, Ui};
 
-use crate::{panel::Panel, settings::MAX_SEED, words};
+use crate::{panel::Panel, settings::MAX_SEED, wire::Session, words};
 
 /// There are so many colours, dashes and markers.
 const MOST_LEARNERS: usize = 6;
@@ -26,23 +26,9 @@ fn figures(scenario: &ScenarioSummary) -> String {
 impl Panel {
     pub(super) fn setup(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            let label = ui.label("Scenario");
-            let mut chosen = self.settings.scenario.clone();
-            ComboBox::from_id_salt("scenario")
-                .selected_text(format!("All scenarios… ({chosen})"))
-                .width(190.0)
-                .height(420.0)
-                .show_ui(ui, |ui| {
-                    for scenario in &self.scenarios {
-                        let text = format!("{}\n{}\n{}", scenario.name, scenario.title, figures(scenario));
-                        ui.selectable_value(&mut chosen, scenario.name.clone(), text);
-                    }
-                })
-                .response
-                .labelled_by(label.id);
-            if chosen != self.settings.scenario {
-                self.choose_scenario(&chosen);
-            }
+            let text = format!("All scenarios… ({})", self.settings.scenario);
+            self.scenario_list(ui, &text);
+            self.robot_list(ui);
             if !self.server {
                 self.choose_recorded_seed(ui);
                 return;
@@ -76,6 +62,63 @@ impl Panel {
             }
             self.add_learner(ui, &scenario, &compared);
         });
+    }
+
+    /// Another session than that with a robot elsewhere.
+    pub(super) fn choose_session(&mut self, ui: &mut Ui) {
+        ui.horizontal_wrapped(|ui| {
+            self.robot_list(ui);
+            self.scenario_list(ui, "Scenarios of the explorer…");
+        });
+    }
+
+    fn scenario_list(&mut self, ui: &mut Ui, text: &str) {
+        let label = ui.label("Scenario");
+        let current = Some(&self.settings.scenario).filter(|_| !self.is_outside());
+        let mut chosen = None;
+        let list = ComboBox::from_id_salt("scenario").selected_text(text).width(190.0).height(420.0);
+        let list = list.show_ui(ui, |ui| {
+            for scenario in &self.scenarios {
+                let text = format!("{}\n{}\n{}", scenario.name, scenario.title, figures(scenario));
+                if ui.selectable_label(current == Some(&scenario.name), text).clicked() {
+                    chosen = Some(scenario.name.clone());
+                }
+            }
+        });
+        list.response.labelled_by(label.id);
+        if let Some(chosen) = chosen.filter(|chosen| current != Some(chosen)) {
+            self.choose_scenario(&chosen);
+        }
+    }
+
+    /// The sessions with robots elsewhere, where there are any.
+    fn robot_list(&mut self, ui: &mut Ui) {
+        let current = self.session.as_ref().map(|session| session.id.as_str());
+        if self.robots.iter().all(|robot| Some(robot.id.as_str()) == current) {
+            return;
+        }
+        let label = ui.label("Robot");
+        let mut chosen = None;
+        let list = ComboBox::from_id_salt("robot").selected_text("Robots elsewhere…").width(150.0).height(420.0);
+        let list = list.show_ui(ui, |ui| {
+            for robot in self.robots.iter().rev() {
+                let Session { id, description, step, .. } = robot;
+                let told = if *step == 1 { "1 observation".to_owned() } else { format!("{step} observations") };
+                let short: String = id.chars().take(8).collect();
+                let text =
+                    format!("{}\n{} joints · {told} · session {short}", description.scenario, description.joints.len());
+                if ui.selectable_label(current == Some(id.as_str()), text).clicked() {
+                    chosen = Some(id.clone());
+                }
+            }
+        });
+        list.response
+            .labelled_by(label.id)
+            .on_hover_text("Sessions with robots elsewhere, which ask and tell over HTTP");
+        if let Some(session) = chosen {
+            self.settings.step = None;
+            self.find(session);
+        }
     }
 
     fn choose_learner_to_compare(&mut self, ui: &mut Ui, learner: &LearnerDescription, compared: &[String]) {
@@ -179,6 +222,9 @@ impl Panel {
 
     /// Another seed, and its run.
     pub fn reroll(&mut self) {
+        if self.is_outside() {
+            return;
+        }
         // A step through all numbers that looks like chance; the first few seeds come from people.
         let mixed = self.settings.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let seed = (mixed >> 33) % 10_000;

@@ -4,6 +4,22 @@ use egui::{RichText, Ui};
 
 use crate::{host::Command, panel::Panel, settings::ELLIPSOIDS};
 
+/// What there is of every session to take away, and what it is.
+const OF_ALL: [(&str, &str); 3] = [
+    ("recording.rrd", "The recording, to open with Rerun 0.36"),
+    ("steps.csv", "Every metric of every learner at every step"),
+    ("result.json", "The outcome and the learned models"),
+];
+/// The same of one with a robot elsewhere alone.
+const OF_A_ROBOT: [(&str, &str); 6] = [
+    ("model.urdf", "The robot's description with what was learned"),
+    ("kinematics.yaml", "The same as joint origins, as driver packages of arms take them"),
+    ("report.html", "How accurate it is, held against data that was not learned from, to read and print"),
+    ("report.json", "The same in numbers"),
+    ("observations.csv", "All that was observed, as body-schema calibrate reads it"),
+    ("calibration.toml", "The file for body-schema calibrate that goes with it"),
+];
+
 impl Panel {
     /// The command that computes what is shown.
     pub fn command_line(&self) -> String {
@@ -22,8 +38,12 @@ impl Panel {
     }
 
     pub(super) fn share(&mut self, ui: &mut Ui) {
+        let outside = self.is_outside();
         ui.label(RichText::new("This view as a link").strong());
-        ui.label("It holds scenario, seed, learners, step and view. Whoever opens it sees the same numbers.");
+        ui.label(match outside {
+            true => "It names the session with this robot, which this server keeps.",
+            false => "It holds scenario, seed, learners, step and view. Whoever opens it sees the same numbers.",
+        });
         let link = format!("?{}", self.settings.link());
         ui.add(egui::Label::new(RichText::new(&link).monospace().small()).wrap().selectable(true));
         ui.vertical(|ui| {
@@ -42,12 +62,7 @@ impl Panel {
         ui.add_space(8.0);
         ui.label(RichText::new("Files of this session").strong());
         ui.horizontal_wrapped(|ui| {
-            let files = [
-                ("recording.rrd", "The recording, to open with Rerun 0.36"),
-                ("steps.csv", "Every metric of every learner at every step"),
-                ("result.json", "The outcome and the learned models"),
-            ];
-            for (file, tip) in files {
+            for (file, tip) in OF_A_ROBOT.into_iter().filter(|_| outside).chain(OF_ALL) {
                 let session = self.session.as_ref().map(|session| session.id.clone());
                 if ui.button(file).on_hover_text(tip).clicked()
                     && let Some(session) = session
@@ -56,17 +71,19 @@ impl Panel {
                     self.ask(Command::Download { path, name: self.file_name(file) });
                 }
             }
-            if ui.button("scenario.toml").on_hover_text("The scenario, to change and run").clicked() {
+            if !outside && ui.button("scenario.toml").on_hover_text("The scenario, to change and run").clicked() {
                 let path = format!("/v1/scenarios/{}", self.settings.scenario);
                 self.ask(Command::Download { path, name: format!("{}.toml", self.settings.scenario) });
             }
         });
-        ui.add_space(8.0);
-        ui.label(RichText::new("The same run without this page").strong());
-        let command = self.command_line();
-        ui.add(egui::Label::new(RichText::new(&command).monospace()).wrap().selectable(true));
-        if ui.button("Copy command").clicked() {
-            self.ask(Command::Copy { text: command });
+        if !outside {
+            ui.add_space(8.0);
+            ui.label(RichText::new("The same run without this page").strong());
+            let command = self.command_line();
+            ui.add(egui::Label::new(RichText::new(&command).monospace()).wrap().selectable(true));
+            if ui.button("Copy command").clicked() {
+                self.ask(Command::Copy { text: command });
+            }
         }
         ui.add_space(8.0);
         ui.label(RichText::new("The scene").strong());
@@ -76,6 +93,14 @@ impl Panel {
         if !self.server {
             return;
         }
+        if !outside {
+            self.choose_ellipsoids(ui);
+        }
+        ui.add_space(8.0);
+        ui.hyperlink_to("The HTTP interface that this page uses", "/v1/openapi.json");
+    }
+
+    fn choose_ellipsoids(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
             ui.label("Ellipsoids of uncertainty");
             let mut ellipsoids = self.settings.ellipsoids.clone();
@@ -88,11 +113,12 @@ impl Panel {
             }
         });
         ui.label(RichText::new("Another size draws the run anew, up to this step.").weak().small());
-        ui.add_space(8.0);
-        ui.hyperlink_to("The HTTP interface that this page uses", "/v1/openapi.json");
     }
 
     fn file_name(&self, file: &str) -> String {
+        if let Some(description) = self.description().filter(|_| self.is_outside()) {
+            return format!("{}-{file}", description.scenario);
+        }
         let stem = format!("{}-seed{}-step{}", self.settings.scenario, self.settings.seed, self.history.latest());
         format!("{stem}-{file}")
     }

@@ -132,7 +132,7 @@ impl Server {
 }
 
 /// A report as JSON.
-fn written(report: &StepReport) -> Value {
+pub(super) fn written(report: &StepReport) -> Value {
     let mut report = report.clone();
     for movement in report.learners.iter_mut().filter_map(|learner| learner.movement.as_mut()) {
         movement.selection_ms = SELECTION_MS;
