@@ -22,6 +22,8 @@ mod outside;
 mod pages;
 #[path = "http/program.rs"]
 mod program;
+#[path = "http/python.rs"]
+mod python;
 #[path = "http/robot.rs"]
 mod robot;
 #[path = "http/scene.rs"]

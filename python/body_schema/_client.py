@@ -10,6 +10,7 @@ import urllib.request
 import uuid
 from collections.abc import Mapping
 from os import PathLike, fspath
+from pathlib import Path
 from typing import Any
 
 from ._engine import setup_of_file, setup_of_urdf
@@ -58,6 +59,15 @@ class Client:
         else:
             setup = json.loads(setup_of_file(fspath(config)))
         return self._open(setup_with(setup, agent, seed))
+
+    def load(self, path: str | PathLike[str]) -> RemoteSession:
+        """A session of its own that goes on where ``save`` left one, here or on a server. Nothing is chosen again."""
+        try:
+            saved = json.loads(Path(path).read_text(encoding="utf-8"))
+            setup = {**saved["setup"], "version": saved["version"], "events": saved["events"]}
+        except (ValueError, KeyError, TypeError) as error:
+            raise EngineError(f"{fspath(path)} is no session of body-schema: {error!r}") from None
+        return self._open(setup)
 
     def session(self, id: str) -> RemoteSession:
         """A session that is there already, by its id."""
@@ -131,6 +141,39 @@ class RemoteSession(Asking):
         answer: list[dict[str, Any]] = self._client.request("GET", f"{self._path}/suggestions")["suggestions"]
         return answer
 
+    def observations(self) -> list[dict[str, Any]]:
+        """All observations: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
+        answer: list[dict[str, Any]] = self._client.request("GET", f"{self._path}/observations")["observations"]
+        return answer
+
+    def events(self) -> list[dict[str, Any]]:
+        """Everything that happened, in order."""
+        answer: list[dict[str, Any]] = json.loads(self.save())["events"]
+        return answer
+
+    def channels(self) -> list[dict[str, Any]]:
+        """The names of the channels, and the shapes of their readings."""
+        answer: list[dict[str, Any]] = self._resource()["channels"]
+        return answer
+
+    def description(self) -> dict[str, Any]:
+        """What stays the same: joints with kinds and limits (rad, m), channels, targets, parameters."""
+        answer: dict[str, Any] = self._resource()["description"]
+        return answer
+
+    def status(self) -> dict[str, Any]:
+        """How it stands: ``observations``, ``outliers``, ``expected_error_mm``, ``wanted_mm``, ``enough``, ``failure``, …"""
+        answer: dict[str, Any] = self._resource()["status"]
+        return answer
+
+    def model(self) -> dict[str, Any]:
+        """The robot as it is believed now: ``joints``, ``marker``, ``others``, and the ``covariance`` of all that is learned."""
+        answer: dict[str, Any] = self._client.request("GET", f"{self._path}/result.json")["learners"][0]["model"]
+        return answer
+
+    def _resource(self) -> Any:
+        return self._client.request("GET", self._path)
+
     def exclude(self, observation: int) -> None:
         """Take an observation out, by its number: the belief becomes what the others give."""
         self._client.text("DELETE", f"{self._path}/observations/{observation}")
@@ -155,6 +198,15 @@ class RemoteSession(Asking):
     def to_csv(self, path: str | PathLike[str] | None = None) -> str:
         """The observations that count, as the table that ``body-schema calibrate`` reads; rad and m."""
         return kept(self._client.text("GET", f"{self._path}/observations.csv"), path)
+
+    def to_toml(self, path: str | PathLike[str] | None = None) -> str:
+        """The calibration file that goes with ``observations.csv`` and ``robot.urdf``."""
+        return kept(self._client.text("GET", f"{self._path}/calibration.toml"), path)
+
+    def save(self, path: str | PathLike[str] | None = None) -> str:
+        """The whole session as JSON, setup and events, for ``Session.load`` and ``Client.load``; written to ``path`` if there is
+        one."""
+        return kept(self._client.text("GET", f"{self._path}/session.json"), path)
 
     def delete(self) -> None:
         """Delete the session on the server, with all its events."""

@@ -132,6 +132,11 @@ class Session(Asking):
         answer: dict[str, Any] = json.loads(self._engine.estimate())
         return answer
 
+    def model(self) -> dict[str, Any]:
+        """The robot as it is believed now: ``joints``, ``marker``, ``others``, and the ``covariance`` of all that is learned."""
+        answer: dict[str, Any] = json.loads(self._engine.model())
+        return answer
+
     def predict(self, configurations: Sequence[Configuration]) -> list[list[float]]:
         """Where the hand is believed to be at these configurations, ``[x, y, z]`` each, m, frame of the measurements."""
         names = self.joints

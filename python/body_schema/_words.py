@@ -78,6 +78,34 @@ class Asking(ABC):
         """All suggestions that were ever made, whoever asked, each with its ``state``."""
 
     @abstractmethod
+    def observations(self) -> list[dict[str, Any]]:
+        """All observations: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
+
+    @abstractmethod
+    def events(self) -> list[dict[str, Any]]:
+        """Everything that happened, in order."""
+
+    @abstractmethod
+    def channels(self) -> list[dict[str, Any]]:
+        """The names of the channels, and the shapes of their readings."""
+
+    @abstractmethod
+    def description(self) -> dict[str, Any]:
+        """What stays the same: joints with kinds and limits (rad, m), channels, targets, parameters."""
+
+    @abstractmethod
+    def status(self) -> dict[str, Any]:
+        """How it stands: ``observations``, ``outliers``, ``expected_error_mm``, ``wanted_mm``, ``enough``, ``failure``, …"""
+
+    @abstractmethod
+    def model(self) -> dict[str, Any]:
+        """The robot as it is believed now: ``joints``, ``marker``, ``others``, and the ``covariance`` of all that is learned.
+
+        At zero, in the frame of the measurements; m and rad. The covariance is that of tangent coordinates, row by row, of which
+        every part lists its own as ``coordinates``; ``None`` for an estimator that keeps none.
+        """
+
+    @abstractmethod
     def exclude(self, observation: int) -> None:
         """Take an observation out, by its number: the belief becomes what the others give."""
 
@@ -100,6 +128,14 @@ class Asking(ABC):
     @abstractmethod
     def to_csv(self, path: str | PathLike[str] | None = None) -> str:
         """The observations that count, as the table that ``body-schema calibrate`` reads; rad and m."""
+
+    @abstractmethod
+    def to_toml(self, path: str | PathLike[str] | None = None) -> str:
+        """The calibration file that goes with ``observations.csv`` and ``robot.urdf``."""
+
+    @abstractmethod
+    def save(self, path: str | PathLike[str] | None = None) -> str:
+        """The whole session as JSON, setup and events; written to ``path`` if there is one."""
 
     # What is the same.
 

@@ -120,6 +120,10 @@ impl Engine {
         Ok(self.with(py, |session| written(&session.latest().learners[0].estimate))?)
     }
 
+    fn model(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(self.with(py, |session| written(&session.experiment().result().learners[0].model))?)
+    }
+
     /// Predicted places of the hand at postures, metres.
     fn predict(&self, py: Python<'_>, postures: Vec<Vec<f64>>) -> PyResult<Vec<[f64; 3]>> {
         let predicted = self.with(py, |session| {

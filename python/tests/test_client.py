@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import tempfile
 import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 
 import pytest
 
@@ -17,6 +19,14 @@ class Server(ThreadingHTTPServer):
     session: body_schema.Session
     answers: dict[str, object]
     broken = 0
+
+    def load(self, body: dict[str, object]) -> None:
+        setup = {key: value for key, value in body.items() if key not in ("version", "events")}
+        saved = {"version": body["version"], "setup": setup, "events": body["events"]}
+        with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
+            file.write(json.dumps(saved))
+            file.flush()
+            self.session = body_schema.Session.load(file.name)
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -50,15 +60,23 @@ class Handler(BaseHTTPRequestHandler):
             return 401, {"detail": "a token is required"}
         if route == ["POST", "sessions"]:
             assert body.pop("world") == "outside"
-            server.session = body_schema.Session.from_config(body["calibration"], seed=body["seed"])
+            if "events" in body:
+                server.load(body)
+            else:
+                server.session = body_schema.Session.from_config(body["calibration"], seed=body["seed"])
         session = server.session
         match route:
             case ["POST", "sessions"] | ["GET", "sessions", "one"]:
-                return 201, {"id": "one", "description": session.description()}
+                about = {"description": session.description(), "status": session.status(), "channels": session.channels()}
+                return 201, {"id": "one", **about}
             case ["POST", "sessions", "one", "suggestions"]:
                 return 200, session._suggest(body)
             case ["GET", "sessions", "one", "suggestions"]:
                 return 200, {"suggestions": session.suggestions()}
+            case ["GET", "sessions", "one", "observations"]:
+                return 200, {"observations": session.observations()}
+            case ["GET", "sessions", "one", "result.json"]:
+                return 200, {"learners": [{"model": session.model()}]}
             case ["POST", "sessions", "one", "suggestions", id, "outcome"]:
                 return 200, session._outcome(int(id), body)
             case ["POST", "sessions", "one", "observations"]:
@@ -78,7 +96,13 @@ class Handler(BaseHTTPRequestHandler):
                 session.include(int(number))
                 return 204, ""
             case ["GET", "sessions", "one", file]:
-                made = {"model.urdf": session.to_urdf, "kinematics.yaml": session.to_yaml, "observations.csv": session.to_csv}
+                made = {
+                    "model.urdf": session.to_urdf,
+                    "kinematics.yaml": session.to_yaml,
+                    "observations.csv": session.to_csv,
+                    "calibration.toml": session.to_toml,
+                    "session.json": session.save,
+                }
                 return 200, session.report() if file == "report.json" else made[file]()
             case _:
                 return 404, {"detail": f"there is no {self.path}"}
@@ -122,6 +146,30 @@ def test_a_session_there_is_as_one_here(server: Server) -> None:
     assert client(server).session(there.id).suggestions() == here.suggestions()
     assert (there.to_urdf(), there.to_yaml(), there.to_csv()) == (here.to_urdf(), here.to_yaml(), here.to_csv())
     assert there.report() == here.report() and there.joints == here.joints
+
+
+def test_what_is_known_of_a_session_here_is_known_of_one_there(server: Server) -> None:
+    there, robot = client(server).from_urdf(urdf(), "base", "tip", **calibration()), Robot(6)
+    for _ in range(3):
+        target = there.suggest()["suggestions"][0]["configuration"]
+        there.observe(target, marker=robot.sees(target))
+    here = server.session
+    assert there.status() == here.status() and there.channels() == here.channels()
+    assert there.description() == here.description() and there.model() == here.model()
+    assert there.observations() == here.observations() and there.events() == here.events()
+    assert there.to_toml() == here.to_toml()
+
+
+def test_a_saved_session_goes_on_wherever_it_is_loaded(server: Server, tmp_path: Path) -> None:
+    here, robot = body_schema.Session.from_urdf(urdf(), "base", "tip", **calibration()), Robot(7)
+    target = here.suggest()["suggestions"][0]["configuration"]
+    here.observe(target, marker=robot.sees(target))
+    here.save(tmp_path / "robot.json")
+    there = client(server).load(tmp_path / "robot.json")
+    assert there.save() == here.save() and there.suggest() == here.suggest()
+    (tmp_path / "other.json").write_text('{"events": []}')
+    with pytest.raises(body_schema.EngineError, match="no session of body-schema"):
+        client(server).load(tmp_path / "other.json")
 
 
 def test_what_was_not_heard_is_sent_again_and_counts_once(server: Server) -> None:

@@ -81,6 +81,11 @@ impl Ledger {
                     return Err(format!("it suggests number {}, and {id} comes next", suggestion.id));
                 }
                 let movement = self.movement(suggestion)?;
+                let joints = movement.configuration.len();
+                let is_posture = |one: &Vec<f64>| one.len() == joints && one.iter().all(|q| q.is_finite());
+                if choice.plan.as_ref().is_some_and(|plan| !plan.postures.iter().all(is_posture)) {
+                    return Err(format!("its plan has a posture that is none of {joints} joints"));
+                }
                 let plan =
                     choice.plan.clone().map(|Plan { postures, committed }| Planned { poses: postures, committed });
                 let proposal = Proposal {

@@ -9,7 +9,7 @@ use body_schema_panel::game::ROUNDS;
 use egui::{Key, Theme, Vec2, vec2};
 use egui_kittest::{Harness, SnapshotOptions, SnapshotResult, SnapshotResults};
 use serde_json::json;
-use support::{Page, Server};
+use support::{Page, Server, robot};
 
 /// Beside the scene on a screen of 1280 × 800, above it on a narrow one, and on a large screen.
 const USUAL: Vec2 = vec2(486.0, 800.0);
@@ -102,6 +102,17 @@ fn the_panel_looks_as_it_should() {
     page.harness.ctx.set_theme(Theme::Light);
     page.tell(json!({ "is": "ended", "failure": null, "unseen": false }));
     held(&mut page, "expired");
+
+    let mut robot = robot::after(7);
+    let mut page = Page::of_size(&robot::address(""), USUAL);
+    robot::follow(&mut page, &mut robot);
+    held(&mut page, "robot");
+    page.harness.ctx.set_theme(Theme::Dark);
+    page.click("Share");
+    held(&mut page, "robot-share-dark");
+    let mut page = Page::of_size(&robot::address(""), NARROW);
+    robot::follow(&mut page, &mut robot::Robot::default());
+    held(&mut page, "robot-narrow");
 
     let mut page = run("speed=100&to=60&stop=never", USUAL, 60);
     page.harness.state_mut().run_seeds();

@@ -8,39 +8,8 @@ use egui::Key;
 use serde_json::json;
 use support::{
     Page,
-    robot::{ID, Robot},
+    robot::{ID, Robot, after, opened, pass_on},
 };
-
-/// A page that has been opened by the address of a session.
-fn opened(query: &str, robot: &mut Robot) -> Page {
-    let mut page = Page::open(&format!("?v=1&session={ID}{query}"));
-    page.tell(support::Server::scenarios());
-    assert!(page.commands().contains(&Command::Find { session: ID.to_owned() }));
-    page.tell(robot.session());
-    page.tell(json!({ "is": "connected" }));
-    pass_on(&mut page, robot);
-    page.commands();
-    page
-}
-
-/// Tells the page all that is new.
-fn pass_on(page: &mut Page, robot: &mut Robot) {
-    for report in robot.news() {
-        page.tell(json!({ "is": "live", "message": { "type": "step", "data": report } }));
-    }
-    page.tell(robot.status());
-}
-
-/// A robot that has carried out so many suggestions, and waits with the next.
-fn after(movements: u64) -> Robot {
-    let mut robot = Robot::default();
-    for _ in 0..movements {
-        robot.suggest(1);
-        robot.carry_out(true);
-    }
-    robot.suggest(1);
-    robot
-}
 
 #[test]
 fn a_robot_that_asks_for_nothing_can_be_given_a_movement() {

@@ -9,7 +9,7 @@ use axum::{
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::json;
+use super::{json, refusals::OfBodies};
 use crate::{
     experiment::{AppraisalReport, Choice},
     server::{App, extract::JsonBody, problem::Problem},
@@ -63,13 +63,11 @@ pub(super) async fn selection(
         (status = 200, description = "The criterion there beside the best that DIRECT finds, the marker predicted there \
             and the chance of seeing it, under the belief before the last movement", body = AppraisalReport),
         (status = 400, description = "The body is not JSON", body = Problem),
-        (status = 403, description = "The request comes from a foreign page", body = Problem),
         (status = 404, description = "There is no such session or learner", body = Problem),
         (status = 409, description = "The learner keeps no covariance, so that nothing can be said", body = Problem),
-        (status = 413, description = "The body is too large", body = Problem),
-        (status = 415, description = "The body is not said to be JSON", body = Problem),
         (status = 422, description = "A value is not valid; `field` names it", body = Problem),
         (status = 500, description = "The session's engine has failed", body = Problem),
+        OfBodies,
     )
 )]
 pub(super) async fn evaluate(
@@ -113,14 +111,12 @@ pub(super) async fn configuration(
         (status = 200, description = "It is set. What it is expected to teach, beside the best that DIRECT finds, under \
             the present belief", body = AppraisalReport),
         (status = 400, description = "The body is not JSON", body = Problem),
-        (status = 403, description = "The request comes from a foreign page", body = Problem),
         (status = 404, description = "There is no such session or learner", body = Problem),
         (status = 409, description = "The learner chooses its movements itself, or makes no movement any more", body = Problem),
-        (status = 413, description = "The body is too large", body = Problem),
-        (status = 415, description = "The body is not said to be JSON", body = Problem),
         (status = 422, description = "A value is not valid; `field` names it", body = Problem),
         (status = 500, description = "The session's engine has failed", body = Problem),
         (status = 503, description = "The server's memory is full", body = Problem),
+        OfBodies,
     )
 )]
 pub(super) async fn set_configuration(

@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use axum::{
     extract::{Path, State},
-    http::header,
-    response::{IntoResponse, Response},
+    response::Response,
 };
 
-use super::{aside, json};
+use super::{aside, attachment, json};
 use crate::{
     experiment::RunResult,
     recording::{RecordingError, StepsCsv},
@@ -78,8 +77,5 @@ pub(super) async fn result(State(app): State<Arc<App>>, Path(id): Path<String>) 
 fn file(session: &Session, extension: &str, content_type: &'static str, bytes: Vec<u8>) -> Response {
     let description = session.description();
     let name = format!("{}-seed{}-step{}.{extension}", description.scenario, description.seed, session.step());
-    // Names of scenarios are made of letters, digits and hyphens.
-    let disposition = format!("attachment; filename=\"{name}\"");
-    ([(header::CONTENT_TYPE, content_type.to_owned()), (header::CONTENT_DISPOSITION, disposition)], bytes)
-        .into_response()
+    attachment(&name, content_type, bytes)
 }

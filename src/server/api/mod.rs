@@ -5,6 +5,7 @@ mod downloads;
 mod observations;
 mod outcomes;
 mod readers;
+mod refusals;
 mod scenarios;
 mod sessions;
 mod streams;
@@ -101,6 +102,7 @@ pub(super) fn routes() -> (Router<Arc<App>>, Bytes) {
         .routes(routes!(outcomes::observations))
         .routes(routes!(outcomes::calibration_file))
         .routes(routes!(outcomes::nominal_urdf))
+        .routes(routes!(outcomes::saved))
         .routes(routes!(streams::events))
         .routes(routes!(streams::live))
         .routes(routes!(streams::live_recording))
@@ -146,6 +148,14 @@ async fn openapi(State(app): State<Arc<App>>) -> Response {
 ))]
 async fn health() -> Json<Health> {
     Json(Health { status: Liveness::Ok, version: env!("CARGO_PKG_VERSION") })
+}
+
+/// A file to take away.
+fn attachment(name: &str, content_type: &'static str, content: impl Into<Body>) -> Response {
+    // Names are made of letters, digits, points and hyphens.
+    let disposition = format!("attachment; filename=\"{name}\"");
+    let headers = [(header::CONTENT_TYPE, content_type.to_owned()), (header::CONTENT_DISPOSITION, disposition)];
+    (headers, content.into()).into_response()
 }
 
 /// Does what takes long where it holds up no other request.

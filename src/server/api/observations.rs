@@ -10,7 +10,10 @@ use axum::{
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::json;
+use super::{
+    json,
+    refusals::{OfBodies, OfEngines, OfRobots},
+};
 use crate::{
     ask_tell::{Answer, Observation, Status, Told},
     server::{
@@ -61,16 +64,12 @@ impl From<&Told> for ToldObservation {
         (status = 200, description = "It was taken in before, with the same key; the same answer", body = Answer,
             headers(("Location" = String, description = "The observation's address"))),
         (status = 400, description = "The body is not JSON, or the key cannot be read", body = Problem),
-        (status = 403, description = "The request comes from a foreign page", body = Problem),
-        (status = 404, description = "There is no such session", body = Problem),
         (status = 409, description = "The key came with another body, the session has no robot elsewhere or is full, or its \
             estimate has diverged; nothing has happened", body = Problem),
-        (status = 413, description = "The body is too large", body = Problem),
-        (status = 415, description = "The body is not said to be JSON", body = Problem),
         (status = 422, description = "A value is not valid; `field` names it", body = Problem),
-        (status = 500, description = "The session's engine has failed", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
         (status = 507, description = "There is no room to keep it; nothing has happened", body = Problem),
+        OfBodies,
+        OfEngines,
     )
 )]
 pub(super) async fn observe(
@@ -91,10 +90,7 @@ pub(super) async fn observe(
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
         (status = 200, description = "All of them, in order, those that are excluded too", body = ObservationList),
-        (status = 404, description = "There is no such session", body = Problem),
-        (status = 409, description = "The session has no robot elsewhere", body = Problem),
-        (status = 500, description = "The session cannot be taken up again", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+        OfRobots,
     )
 )]
 pub(super) async fn list(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {

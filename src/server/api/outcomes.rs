@@ -11,7 +11,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use super::aside;
+use super::{aside, attachment, refusals::OfEngines};
 use crate::{
     ask_tell::Session,
     calibration::{self, File, Silent},
@@ -27,15 +27,13 @@ use crate::{
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
         (status = 200, description = "A URDF", body = String, content_type = "application/xml"),
-        (status = 404, description = "There is no such session", body = Problem),
         (status = 409, description = "Nothing was observed, nothing explains it, or the session has no robot elsewhere", body = Problem),
-        (status = 500, description = "The session's engine has failed", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+        OfEngines,
     )
 )]
 pub(super) async fn urdf(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let file = of_session(&app, &id, |session| find(description(session)?, "calibrated.urdf")).await?;
-    Ok(download("model.urdf", "application/xml", file))
+    let file = of_session(&app, &id, |session| find(&description(session)?, "calibrated.urdf")).await?;
+    Ok(attachment("model.urdf", "application/xml", file))
 }
 
 /// The same origins of joints as YAML, as `ros_calibration`s and drivers take them.
@@ -43,15 +41,13 @@ pub(super) async fn urdf(State(app): State<Arc<App>>, Path(id): Path<String>) ->
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
         (status = 200, description = "YAML", body = String, content_type = "application/yaml"),
-        (status = 404, description = "There is no such session", body = Problem),
         (status = 409, description = "Nothing was observed, nothing explains it, or the session has no robot elsewhere", body = Problem),
-        (status = 500, description = "The session's engine has failed", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+        OfEngines,
     )
 )]
 pub(super) async fn kinematics(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let file = of_session(&app, &id, |session| find(description(session)?, "kinematics.yaml")).await?;
-    Ok(download("kinematics.yaml", "application/yaml", file))
+    let file = of_session(&app, &id, |session| find(&description(session)?, "kinematics.yaml")).await?;
+    Ok(attachment("kinematics.yaml", "application/yaml", file))
 }
 
 /// What `calibrate` finds: errors on data that was not learned from, what is undetermined, outliers.
@@ -59,14 +55,12 @@ pub(super) async fn kinematics(State(app): State<Arc<App>>, Path(id): Path<Strin
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
         (status = 200, description = "The report of `body-schema calibrate`", body = Object, content_type = "application/json"),
-        (status = 404, description = "There is no such session", body = Problem),
         (status = 409, description = "Too little was observed, nothing explains it, or the session has no robot elsewhere", body = Problem),
-        (status = 500, description = "The session's engine has failed", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+        OfEngines,
     )
 )]
 pub(super) async fn report_json(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let report = find(report(&app, &id).await?.to_vec(), "report.json")?;
+    let report = find(&report(&app, &id).await?, "report.json")?;
     Ok(([(header::CONTENT_TYPE, "application/json")], report).into_response())
 }
 
@@ -75,14 +69,12 @@ pub(super) async fn report_json(State(app): State<Arc<App>>, Path(id): Path<Stri
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
         (status = 200, description = "A page", body = String, content_type = "text/html"),
-        (status = 404, description = "There is no such session", body = Problem),
         (status = 409, description = "Too little was observed, nothing explains it, or the session has no robot elsewhere", body = Problem),
-        (status = 500, description = "The session's engine has failed", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+        OfEngines,
     )
 )]
 pub(super) async fn report_html(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let page = find(report(&app, &id).await?.to_vec(), "report.html")?;
+    let page = find(&report(&app, &id).await?, "report.html")?;
     // It is a document by itself, with its style and its drawings within.
     let policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'";
     let headers = [(header::CONTENT_TYPE, "text/html; charset=utf-8"), (header::CONTENT_SECURITY_POLICY, policy)];
@@ -94,15 +86,13 @@ pub(super) async fn report_html(State(app): State<Arc<App>>, Path(id): Path<Stri
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
         (status = 200, description = "A table with one row for each observation that counts", body = String, content_type = "text/csv"),
-        (status = 404, description = "There is no such session", body = Problem),
         (status = 409, description = "The session has no robot elsewhere", body = Problem),
-        (status = 500, description = "The session's engine has failed", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+        OfEngines,
     )
 )]
 pub(super) async fn observations(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
     let table = of_session(&app, &id, |session| Ok(session.observations_csv())).await?;
-    Ok(download("observations.csv", "text/csv; charset=utf-8", table))
+    Ok(attachment("observations.csv", "text/csv; charset=utf-8", table))
 }
 
 /// The calibration file beside `observations.csv`: it names that table, and the description that the session was opened with as
@@ -111,15 +101,13 @@ pub(super) async fn observations(State(app): State<Arc<App>>, Path(id): Path<Str
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
         (status = 200, description = "TOML", body = String, content_type = "application/toml"),
-        (status = 404, description = "There is no such session", body = Problem),
         (status = 409, description = "The session has no robot elsewhere", body = Problem),
-        (status = 500, description = "The session's engine has failed", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+        OfEngines,
     )
 )]
 pub(super) async fn calibration_file(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
     let file = of_session(&app, &id, |session| Ok(session.calibration_toml())).await?;
-    Ok(download("calibration.toml", "application/toml", file))
+    Ok(attachment("calibration.toml", "application/toml", file))
 }
 
 /// The URDF that the session was opened with.
@@ -127,15 +115,27 @@ pub(super) async fn calibration_file(State(app): State<Arc<App>>, Path(id): Path
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
         (status = 200, description = "A URDF", body = String, content_type = "application/xml"),
-        (status = 404, description = "There is no such session", body = Problem),
         (status = 409, description = "The session has no robot elsewhere", body = Problem),
-        (status = 500, description = "The session's engine has failed", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+        OfEngines,
     )
 )]
 pub(super) async fn nominal_urdf(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
     let file = of_session(&app, &id, |session| Ok(session.setup().urdf().to_owned())).await?;
-    Ok(download("robot.urdf", "application/xml", file))
+    Ok(attachment("robot.urdf", "application/xml", file))
+}
+
+/// The whole session, setup and events: what `body_schema.Session.load` reads, and what another session can be opened with.
+#[utoipa::path(get, path = "/v1/sessions/{id}/session.json", tag = "results", operation_id = "saveSession",
+    params(("id" = String, Path, description = "The session's id", format = "uuid")),
+    responses(
+        (status = 200, description = "`version`, `setup` and `events`", body = Object, content_type = "application/json"),
+        (status = 409, description = "The session has no robot elsewhere", body = Problem),
+        OfEngines,
+    )
+)]
+pub(super) async fn saved(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let file = of_session(&app, &id, |session| Ok(session.to_json())).await?;
+    Ok(attachment("session.json", "application/json", file))
 }
 
 /// Works on a copy of a session, so that its engine is free meanwhile.
@@ -155,12 +155,14 @@ fn description(session: &Session) -> Result<Vec<File>, Problem> {
 /// The files of the report; those of one revision are made once, by whoever asks first.
 async fn report(app: &App, id: &str) -> Result<Arc<[File]>, Problem> {
     let session = app.sessions.get(id).await?.watch();
-    let copy = app.sessions.tell(id, |robot| Ok(robot.copy())).await?;
-    let revision = copy.events().len();
     let mut kept = session.report().lock().await;
-    if let Some(kept) = kept.as_ref().filter(|kept| kept.revision == revision) {
+    if let Some(kept) = kept.as_ref()
+        && app.sessions.tell(id, |robot| Ok(robot.revision())).await? == kept.revision
+    {
         return Ok(kept.files.clone());
     }
+    let copy = app.sessions.tell(id, |robot| Ok(robot.copy())).await?;
+    let revision = copy.events().len();
     let files: Arc<[File]> = aside(move || report_files(&copy)).await?.into();
     *kept = Some(ReportFiles { revision, files: files.clone() });
     Ok(files)
@@ -174,13 +176,7 @@ fn report_files(session: &Session) -> Result<Vec<File>, Problem> {
     Ok(files)
 }
 
-fn find(files: Vec<File>, path: &str) -> Result<String, Problem> {
-    let found = files.into_iter().find(|file| file.path == path).map(|file| file.text);
+fn find(files: &[File], path: &str) -> Result<String, Problem> {
+    let found = files.iter().find(|file| file.path == path).map(|file| file.text.clone());
     found.ok_or_else(|| Problem::new(Kind::Internal, format!("`{path}` was not made")))
-}
-
-fn download(name: &str, content_type: &'static str, text: String) -> Response {
-    let disposition = format!("attachment; filename=\"{name}\"");
-    ([(header::CONTENT_TYPE, content_type.to_owned()), (header::CONTENT_DISPOSITION, disposition)], text)
-        .into_response()
 }

@@ -13,7 +13,7 @@ use serde_json::value::RawValue;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::json;
+use super::{json, refusals::OfBodies};
 use crate::{
     experiment::StepReport,
     recording::MOST_FRAMES,
@@ -131,13 +131,11 @@ impl FromJson for Opening {
         (status = 201, description = "The session", body = SessionResource,
             headers(("Location" = String, description = "The session's address"))),
         (status = 400, description = "The body is not JSON", body = Problem),
-        (status = 403, description = "The request comes from a foreign page", body = Problem),
-        (status = 413, description = "The body is too large", body = Problem),
-        (status = 415, description = "The body is not said to be JSON", body = Problem),
         (status = 422, description = "A value is not valid; `field` names it", body = Problem),
         (status = 500, description = "The session could not be set up", body = Problem),
         (status = 503, description = "There are too many sessions, or the server is shutting down", body = Problem),
         (status = 507, description = "There is no room to keep it; no session was opened", body = Problem),
+        OfBodies,
     )
 )]
 pub(super) async fn create(
@@ -202,16 +200,14 @@ async fn to_its_end<T: Send + 'static>(
     responses(
         (status = 200, description = "The steps were made", body = MadeSteps),
         (status = 400, description = "The body is not JSON", body = Problem),
-        (status = 403, description = "The request comes from a foreign page", body = Problem),
         (status = 404, description = "There is no such session", body = Problem),
         (status = 409, description = "The session is not at `expected_step` but at `step`, a person has not chosen a \
             movement yet (problem type `no-configuration`), or a robot elsewhere moves (`never-steps`); nothing was stepped",
             body = Problem),
-        (status = 413, description = "The body is too large", body = Problem),
-        (status = 415, description = "The body is not said to be JSON", body = Problem),
         (status = 422, description = "A value is not valid, or only `remaining` steps are left; nothing was stepped", body = Problem),
         (status = 500, description = "The engine failed; the session is at `step`", body = Problem),
         (status = 503, description = "The server's memory is full, or the session is ending", body = Problem),
+        OfBodies,
     )
 )]
 pub(super) async fn step(

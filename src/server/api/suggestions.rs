@@ -9,7 +9,10 @@ use axum::{
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::json;
+use super::{
+    json,
+    refusals::{OfBodies, OfEngines, OfRobots},
+};
 use crate::{
     ask_tell::{Ask, Enough, Outcome, Suggestion, Suggestions},
     server::{
@@ -52,16 +55,12 @@ pub(super) struct NewOutcome {
     responses(
         (status = 200, description = "The client's pending suggestions; they are kept", body = Suggestions),
         (status = 400, description = "The body is not JSON", body = Problem),
-        (status = 403, description = "The request comes from a foreign page", body = Problem),
-        (status = 404, description = "There is no such session", body = Problem),
         (status = 409, description = "The session has no robot elsewhere, is full, or no movement can be chosen; nothing has \
             happened", body = Problem),
-        (status = 413, description = "The body is too large", body = Problem),
-        (status = 415, description = "The body is not said to be JSON", body = Problem),
         (status = 422, description = "A value is not valid; `field` names it", body = Problem),
-        (status = 500, description = "The session's engine has failed", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
         (status = 507, description = "There is no room to keep them; nothing has happened", body = Problem),
+        OfBodies,
+        OfEngines,
     )
 )]
 pub(super) async fn suggest(
@@ -77,11 +76,8 @@ pub(super) async fn suggest(
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
         (status = 200, description = "All of them, in the order in which they were chosen", body = AllSuggestions),
-        (status = 404, description = "There is no such session", body = Problem),
-        (status = 409, description = "The session has no robot elsewhere", body = Problem),
-        (status = 500, description = "The session cannot be taken up again", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
         (status = 507, description = "There is no room to keep that some have expired", body = Problem),
+        OfRobots,
     )
 )]
 pub(super) async fn list(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
@@ -111,16 +107,14 @@ fn some_have_expired(standing: &Standing) -> bool {
     responses(
         (status = 200, description = "The suggestion, as it is now", body = Suggestion),
         (status = 400, description = "The body is not JSON, or `sid` is no number", body = Problem),
-        (status = 403, description = "The request comes from a foreign page", body = Problem),
         (status = 404, description = "There is no such session or suggestion", body = Problem),
         (status = 409, description = "It is not pending, or the session has no robot elsewhere, or is full; nothing has \
             happened", body = Problem),
-        (status = 413, description = "The body is too large", body = Problem),
-        (status = 415, description = "The body is not said to be JSON", body = Problem),
         (status = 422, description = "A value is not valid; `field` names it", body = Problem),
         (status = 500, description = "The session's engine has failed", body = Problem),
         (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
         (status = 507, description = "There is no room to keep it; nothing has happened", body = Problem),
+        OfBodies,
     )
 )]
 pub(super) async fn outcome(

@@ -21,7 +21,7 @@ use super::{
     registry::{END_WITHIN, no_engine, spawn},
 };
 use crate::{
-    ask_tell::{self, Setup},
+    ask_tell::{self, ReplayError, Setup, VERSION},
     scenario::WorldKind,
     server::{
         problem::{Kind, Problem},
@@ -54,9 +54,13 @@ impl Sessions {
     /// Opens a session with a robot elsewhere. It is in the store before this returns.
     pub(in crate::server) async fn open_outside(&self, new: NewOutsideSession) -> Result<Arc<Session>, Problem> {
         self.check_open()?;
-        let NewOutsideSession { calibration, agent, seed, ellipsoids, .. } = new;
+        let NewOutsideSession { calibration, agent, seed, ellipsoids, events, version, .. } = new;
+        if let Some(found) = version.filter(|version| *version > VERSION) {
+            let newer = ReplayError::Version { found, known: VERSION };
+            return Err(Problem::new(Kind::InvalidValue, newer.to_string()).field("version"));
+        }
         let known = Arc::new(Known::new(Uuid::new_v4(), now_s()));
-        let origin = Origin::New(Setup { calibration, agent, seed }, Shown { ellipsoids });
+        let origin = Origin::New(Setup { calibration, agent, seed }, Shown { ellipsoids }, events);
         let session = self.begin(&known, origin).await?;
         lock(&self.known).push(known);
         Ok(session)

@@ -19,7 +19,8 @@ use super::{
 };
 use crate::{
     ask_tell::{
-        self, Answer, Ask, ChannelShape, Observation, Outcome, Prepared, Setup, Status, Suggestion, Suggestions, Told,
+        self, Answer, Ask, ChannelShape, Observation, Outcome, Prepared, ReplayError, Setup, Status, Suggestion,
+        Suggestions, Told,
     },
     experiment::{Description, Experiment},
     recording::{Recorder, RecordingError, Target},
@@ -35,7 +36,8 @@ type Reply = Box<dyn FnOnce() + Send>;
 
 /// Where a session comes from.
 pub(super) enum Origin {
-    New(Setup, Shown),
+    /// With what happened in it so far.
+    New(Setup, Shown, Vec<ask_tell::Event>),
     Store(Stored),
 }
 
@@ -95,18 +97,12 @@ pub(in crate::server) struct Elsewhere {
 impl Elsewhere {
     fn open(id: Uuid, origin: Origin, made_s: f64, store: Arc<Store>, shared: Arc<Shared>) -> Result<Self, Problem> {
         let (is_new, (setup, shown), events, keys) = match origin {
-            Origin::New(setup, shown) => (true, (setup, shown), Vec::new(), BTreeMap::new()),
+            Origin::New(setup, shown, events) => (true, (setup, shown), events, BTreeMap::new()),
             Origin::Store(Stored { setup, shown, events, keys }) => (false, (setup, shown), events, keys),
         };
         let mut history = Vec::new();
-        let session = match is_new {
-            true => {
-                let session = ask_tell::Session::open(setup)?;
-                history.push(session.latest().clone());
-                session
-            }
-            false => ask_tell::Session::replay_telling(setup, events, &mut |report| history.push(report))?,
-        };
+        let replayed = ask_tell::Session::replay_telling(setup, events, &mut |report| history.push(report));
+        let session = replayed.map_err(|error| if is_new { unusable(error) } else { error.into() })?;
         // Each life of a session in memory records anew: viewers must not take two recordings for one.
         let target = Target::live(shared.live.clone()).with_recording_id(Uuid::new_v4().to_string());
         let begun = Recorder::new(session.description(), target.with_ellipsoids(shown.ellipsoids));
@@ -118,7 +114,7 @@ impl Elsewhere {
         }
         recorder.flush().map_err(recording_failed)?;
         if is_new {
-            store.insert(id, made_s, session.setup(), shown)?;
+            store.insert(id, made_s, session.setup(), shown, session.events())?;
         }
         let (recorded, channels) = (session.latest().step, session.channels().into());
         let mut robot = Self { id, session, channels, keys, recorder, recorded, store, shared, is_rewritten: false };
@@ -218,6 +214,11 @@ impl Elsewhere {
         self.commit(prepared, None)
     }
 
+    /// How many events there are.
+    pub(in crate::server) fn revision(&self) -> usize {
+        self.session.events().len()
+    }
+
     /// A copy as it is now, to work on elsewhere.
     pub(in crate::server) fn copy(&self) -> ask_tell::Session {
         self.session.clone()
@@ -314,6 +315,19 @@ impl Elsewhere {
         };
         self.shared.standing.send_replace(Some(Arc::new(standing)));
         self.shared.publish(reports, None);
+    }
+}
+
+/// Why a new session cannot be, blamed on what was sent.
+fn unusable(error: ReplayError) -> Problem {
+    match error {
+        ReplayError::Setup(error) => error.into(),
+        ReplayError::Event { index, .. } => {
+            Problem::new(Kind::InvalidValue, error.to_string()).field(format!("events[{}]", index - 1))
+        }
+        ReplayError::NotASession(_) | ReplayError::Version { .. } => {
+            Problem::new(Kind::InvalidValue, error.to_string()).field("events")
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::{
-    ask_tell::{Answer, ChannelShape, Status, Suggestion, Told},
+    ask_tell::{Answer, ChannelShape, Event, Status, Suggestion, Told},
     recording::EllipsoidSize,
 };
 
@@ -20,6 +20,13 @@ pub struct NewOutsideSession {
     /// The keys of a calibration file as JSON, with the text of the URDF as `robot.urdf` and without measurements.
     #[schema(value_type = Object)]
     pub calibration: Value,
+    /// What happened so far, as `session.json` of another session or a saved one has it; nothing if absent.
+    #[serde(default)]
+    #[schema(value_type = Vec<Object>)]
+    pub events: Vec<Event>,
+    /// The version of the form of these events; the latest if absent.
+    #[serde(default)]
+    pub version: Option<u32>,
     /// The learner that decides; `global`, unless the calibration lists others, if absent or null.
     #[serde(default)]
     pub agent: Option<String>,

@@ -13,7 +13,7 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
-use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
+use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
@@ -122,23 +122,35 @@ impl Store {
         Ok(Self { connection: Mutex::new(connection), path, _lock: lock })
     }
 
-    /// Keeps a new session.
+    /// Keeps a new session, and what happened in it so far.
     ///
     /// # Errors
     ///
     /// [`StoreError`]: it is not kept then.
-    pub fn insert(&self, id: Uuid, made_s: f64, setup: &Setup, shown: Shown) -> Result<(), StoreError> {
+    pub fn insert(
+        &self,
+        id: Uuid,
+        made_s: f64,
+        setup: &Setup,
+        shown: Shown,
+        events: &[Event],
+    ) -> Result<(), StoreError> {
         let (setup, shown) = (json(setup), json(&shown));
-        let connection = self.connection();
+        let mut connection = self.connection();
         let count = connection.query_row("SELECT count(*) FROM session", [], |row| row.get::<_, i64>(0));
         if count.map_err(self.told())? >= MOST_STORED_SESSIONS as i64 {
             return Err(StoreError::Full(MOST_STORED_SESSIONS));
         }
-        let inserted = connection.execute(
-            "INSERT INTO session (id, made_s, form, setup, shown) VALUES (?1, ?2, ?3, ?4, ?5)",
-            params![id.to_string(), made_s, VERSION, setup, shown],
-        );
-        inserted.map(drop).map_err(self.told())
+        let written = (|| {
+            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+            transaction.execute(
+                "INSERT INTO session (id, made_s, form, setup, shown) VALUES (?1, ?2, ?3, ?4, ?5)",
+                params![id.to_string(), made_s, VERSION, setup, shown],
+            )?;
+            insert_events(&transaction, id, 0, events, None)?;
+            transaction.commit()
+        })();
+        written.map_err(self.told())
     }
 
     /// Appends events to a session that has `revision` of them. A `key` is that of the observation among them.
@@ -147,25 +159,10 @@ impl Store {
     ///
     /// [`StoreError`]: none is appended then.
     pub fn append(&self, id: Uuid, revision: usize, events: &[Event], key: Option<&str>) -> Result<(), StoreError> {
-        let rows: Vec<(i64, String, Option<&str>)> = (revision as i64 + 1..)
-            .zip(events)
-            .map(|(number, event)| {
-                let key = key.filter(|_| matches!(event.happened, Happened::Observed { .. }));
-                (number, json(event), key)
-            })
-            .collect();
         let mut connection = self.connection();
         let written = (|| {
             let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-            let id = id.to_string();
-            let mut insert = transaction.prepare_cached(
-                "INSERT INTO event (session, number, event, idempotency_key)
-                 VALUES ((SELECT number FROM session WHERE id = ?1), ?2, ?3, ?4)",
-            )?;
-            for (number, event, key) in rows {
-                insert.execute(params![id, number, event, key])?;
-            }
-            drop(insert);
+            insert_events(&transaction, id, revision, events, key)?;
             transaction.commit()
         })();
         written.map_err(self.told())
@@ -251,6 +248,24 @@ impl Store {
     fn damaged(&self, error: impl std::fmt::Display) -> StoreError {
         StoreError::Damaged { path: self.path.clone(), what: error.to_string() }
     }
+}
+
+fn insert_events(
+    transaction: &Transaction<'_>,
+    id: Uuid,
+    revision: usize,
+    events: &[Event],
+    key: Option<&str>,
+) -> Result<(), rusqlite::Error> {
+    let mut insert = transaction.prepare_cached(
+        "INSERT INTO event (session, number, event, idempotency_key)
+         VALUES ((SELECT number FROM session WHERE id = ?1), ?2, ?3, ?4)",
+    )?;
+    for (number, event) in (revision as i64 + 1..).zip(events) {
+        let key = key.filter(|_| matches!(event.happened, Happened::Observed { .. }));
+        insert.execute(params![id.to_string(), number, json(event), key])?;
+    }
+    Ok(())
 }
 
 /// What is kept holds numbers, texts and lists alone, so that it can be written.

@@ -17,7 +17,7 @@ fn what_was_kept_is_read_again() {
     let events: Vec<Event> = (1..=3).map(expired).collect();
     {
         let store = Store::open(folder.path()).expect("a store");
-        store.insert(id, 1.5, &setup(), Shown::default()).expect("kept");
+        store.insert(id, 1.5, &setup(), Shown::default(), &[]).expect("kept");
         store.append(id, 0, &events[..2], None).expect("kept");
         store.append(id, 2, &events[2..], None).expect("kept");
     }
@@ -35,7 +35,7 @@ fn what_was_kept_is_read_again() {
 fn nothing_is_written_twice_under_one_number() {
     let store = Store::in_memory().expect("a store");
     let id = Uuid::new_v4();
-    store.insert(id, 0.0, &setup(), Shown::default()).expect("kept");
+    store.insert(id, 0.0, &setup(), Shown::default(), &[]).expect("kept");
     store.append(id, 0, &[expired(1), expired(2)], None).expect("kept");
     store.append(id, 1, &[expired(3), expired(4)], None).expect_err("the second is there");
     assert_eq!(store.load(id).expect("read").expect("there").events, [expired(1), expired(2)]);
@@ -47,7 +47,7 @@ fn what_does_not_fit_leaves_no_trace() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = Store::open(folder.path()).expect("a store");
     let id = Uuid::new_v4();
-    store.insert(id, 0.0, &setup(), Shown::default()).expect("kept");
+    store.insert(id, 0.0, &setup(), Shown::default(), &[]).expect("kept");
     let pages: u32 = store.connection().pragma_query_value(None, "page_count", |row| row.get(0)).expect("a number");
     store.connection().pragma_update(None, "max_page_count", pages).expect("set");
     let long = Event { at_s: None, happened: Happened::Expired { suggestions: (0..4000).collect() } };
@@ -64,7 +64,7 @@ fn a_directory_is_held_by_one_and_read_by_any() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = Store::open(folder.path()).expect("a store");
     let id = Uuid::new_v4();
-    store.insert(id, 0.0, &setup(), Shown::default()).expect("kept");
+    store.insert(id, 0.0, &setup(), Shown::default(), &[]).expect("kept");
     let error = Store::open(folder.path()).err().expect("held");
     let told = error.to_string();
     assert!(

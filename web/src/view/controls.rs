@@ -16,7 +16,12 @@ impl Panel {
         if !self.settings.embed {
             ui.horizontal(|ui| {
                 ui.label(RichText::new("body-schema").strong().size(15.0));
-                ui.add(egui::Label::new(RichText::new(STATEMENT).weak()).truncate());
+                let robot = self.description().filter(|_| self.is_outside());
+                let about = robot.map_or_else(
+                    || STATEMENT.to_owned(),
+                    |robot| format!("{}, a robot elsewhere, learns where its joints are.", robot.scenario),
+                );
+                ui.add(egui::Label::new(RichText::new(about).weak()).truncate());
             });
         }
         let transport = ui.scope(|ui| {

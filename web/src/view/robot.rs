@@ -34,6 +34,16 @@ impl Panel {
             };
             ui.add(Label::new(text).wrap());
         }
+        if status.observations == 0
+            && let Some(session) = &self.session
+        {
+            let how = format!(
+                "Its program asks with POST /v1/sessions/{0}/suggestions where to move, and tells with POST \
+                 /v1/sessions/{0}/observations where it was and what was seen. In Python: Client(…).session(\"{0}\").",
+                session.id
+            );
+            ui.add(Label::new(RichText::new(how).weak().small()).wrap().selectable(true));
+        }
         let failures = [&status.failure, &self.session.as_ref().and_then(|session| session.recording_failure.clone())];
         for failure in failures.into_iter().flatten() {
             ui.add(Label::new(RichText::new(failure).color(alarm(ui))).wrap());

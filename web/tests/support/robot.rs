@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 
 use body_schema::ask_tell::{Ask, Observation, Outcome, Session, Setup, Suggestion};
+use body_schema_panel::host::Command;
 use serde_json::{Value, json};
+
+use super::{Page, Server};
 
 const URDF: &str = r#"<robot name="two">
   <link name="base"/> <link name="upper"/> <link name="lower"/>
@@ -103,9 +106,53 @@ impl Robot {
     }
 }
 
-/// Where the true arm, a little other than described, has its marker.
+/// A robot that has carried out so many suggestions, and waits with the next.
+pub fn after(movements: u64) -> Robot {
+    let mut robot = Robot::default();
+    for _ in 0..movements {
+        robot.suggest(1);
+        robot.carry_out(true);
+    }
+    robot.suggest(1);
+    robot
+}
+
+/// A page that has been opened by the address of the session.
+pub fn opened(query: &str, robot: &mut Robot) -> Page {
+    let mut page = Page::open(&address(query));
+    follow(&mut page, robot);
+    page
+}
+
+/// That address.
+pub fn address(query: &str) -> String {
+    format!("?v=1&session={ID}{query}")
+}
+
+/// Answers a page that has just been opened by it.
+pub fn follow(page: &mut Page, robot: &mut Robot) {
+    page.tell(Server::scenarios());
+    assert!(page.commands().contains(&Command::Find { session: ID.to_owned() }));
+    page.tell(robot.session());
+    page.tell(json!({ "is": "connected" }));
+    pass_on(page, robot);
+    page.commands();
+}
+
+/// Tells the page all that is new.
+pub fn pass_on(page: &mut Page, robot: &mut Robot) {
+    for report in robot.news() {
+        page.tell(json!({ "is": "live", "message": { "type": "step", "data": report } }));
+    }
+    page.tell(robot.status());
+}
+
+/// Where the true arm, a little other than described, has its marker, read to a millimetre.
 fn marker(posture: &BTreeMap<String, f64>) -> Value {
     let [shoulder, elbow] = [posture["shoulder"], posture["elbow"]];
     let reach = 0.304 + 0.25 * elbow.cos();
-    json!([reach * shoulder.cos(), reach * shoulder.sin(), 0.202 - 0.25 * elbow.sin()])
+    let place = [reach * shoulder.cos(), reach * shoulder.sin(), 0.202 - 0.25 * elbow.sin()];
+    // As good as drawn from -1 to 1, and the same each time.
+    let noise = |place: f64| ((place * 1e5).sin() * 1e4).fract();
+    json!(place.map(|metres| metres + 0.001 * noise(metres)))
 }

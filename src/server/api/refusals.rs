@@ -1,0 +1,59 @@
+//! Refusals that several routes have in common, as OpenAPI describes them.
+
+use std::collections::BTreeMap;
+
+use utoipa::{
+    IntoResponses,
+    openapi::{ContentBuilder, RefOr, Response, ResponseBuilder, schema::Ref},
+};
+
+use super::JSON;
+
+type Refusals = BTreeMap<String, RefOr<Response>>;
+
+/// Of a route with a body.
+pub(super) struct OfBodies;
+
+impl IntoResponses for OfBodies {
+    fn responses() -> Refusals {
+        described(&[
+            ("403", "The request comes from a foreign page"),
+            ("413", "The body is too large"),
+            ("415", "The body is not said to be JSON"),
+        ])
+    }
+}
+
+/// Of a route that an engine of a robot elsewhere answers.
+pub(super) struct OfEngines;
+
+impl IntoResponses for OfEngines {
+    fn responses() -> Refusals {
+        described(&[
+            ("404", "There is no such session"),
+            ("500", "The session's engine has failed"),
+            ("503", "The server's memory is full, or it is shutting down"),
+        ])
+    }
+}
+
+/// Of a route that shows how a session with a robot elsewhere stands.
+pub(super) struct OfRobots;
+
+impl IntoResponses for OfRobots {
+    fn responses() -> Refusals {
+        described(&[
+            ("404", "There is no such session"),
+            ("409", "The session has no robot elsewhere"),
+            ("500", "The session cannot be taken up again"),
+            ("503", "The server's memory is full, or it is shutting down"),
+        ])
+    }
+}
+
+/// Problems, by their status.
+fn described(refusals: &[(&str, &str)]) -> Refusals {
+    let problem = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build();
+    let response = |what: &str| ResponseBuilder::new().description(what).content(JSON, problem.clone()).build();
+    refusals.iter().map(|(status, what)| ((*status).to_owned(), response(what).into())).collect()
+}
