@@ -51,9 +51,9 @@ class Robot:
         pan, shoulder, elbow = joints["pan"], joints["shoulder"], joints["elbow"] + 0.02
         reach = 0.397 * math.cos(shoulder) + 0.26 * math.cos(shoulder + elbow)
         height = 0.304 - 0.397 * math.sin(shoulder) - 0.26 * math.sin(shoulder + elbow)
-        if height < 0.1:
-            return joints, None  # Behind the table's edge.
         place = (reach * math.cos(pan), reach * math.sin(pan), height)
+        if place[0] < -0.1:
+            return joints, None  # Behind the robot nobody looks.
         return joints, [x + self._draw.gauss(0.0, 0.0005) for x in place]
 
 

@@ -16,6 +16,13 @@ mod keyboard;
 mod newcomer;
 #[path = "browser/pixels.rs"]
 mod pixels;
+#[path = "browser/pointer.rs"]
+mod pointer;
+#[path = "browser/robot.rs"]
+mod robot;
+#[path = "http/robot.rs"]
+#[allow(dead_code, reason = "the tests over HTTP need more of it")]
+mod robot_elsewhere;
 #[path = "browser/scene.rs"]
 mod scene;
 #[path = "browser/screens.rs"]
@@ -116,6 +123,11 @@ async fn small_screens_and_fingers_have_all_that_matters() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_newcomer_is_told_the_first_story() {
     in_browser(&[], |page, server| async move { newcomer::visit(&page, server).await }).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_robot_elsewhere_is_watched_and_answered_for() {
+    in_browser(&[], |page, server| async move { robot::visit(&page, server).await }).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -24,6 +24,8 @@ mod pages;
 mod program;
 #[path = "http/python.rs"]
 mod python;
+#[path = "http/results.rs"]
+mod results;
 #[path = "http/robot.rs"]
 mod robot;
 #[path = "http/scene.rs"]

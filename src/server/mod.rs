@@ -6,7 +6,8 @@
 //! store/    the sessions of robots elsewhere on the disk
 //! extract   requests, read        problem  errors, as RFC 9457 problem details
 //! guard     foreign pages, headers, stray errors        assets   the page and Rerun's viewer
-//! strangers who may ask at all    frame    who may embed the page
+//! aside     work that holds up nobody                    gzip     answers, compressed
+//! strangers who may ask at all                           frame    who may embed the page
 //! ```
 //!
 //! Every session's engine computes on its own thread; the runtime's workers only carry messages and bytes. Memory is
@@ -14,6 +15,7 @@
 //! in the store), and [`MAX_MEMORY_BYTES`] for the reports and recordings of them all.
 
 mod api;
+mod aside;
 mod assets;
 mod extract;
 mod frame;

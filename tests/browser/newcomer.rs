@@ -1,33 +1,10 @@
 //! A newcomer's two minutes: the first story from opening the page to its closing sentence, by the mouse alone.
 
-use serde_json::Value;
-
-use crate::{Server, driver::Browser};
-
-/// What the cards and the ending say, as it is read out.
-const CONTROLS: &str = "document.getElementById('controls').textContent";
-
-/// The middle of a button that can be pressed, once it is there.
-async fn place(page: &Browser, name: &str) -> [f64; 2] {
-    let button = format!(
-        "[...document.querySelectorAll('#controls button')].find((one) => one.textContent === '{name}' && !one.disabled)"
-    );
-    page.wait_for(name, &format!("{button} !== undefined")).await;
-    let middle = format!(
-        "(({{ left, top, width, height }}) => [left + width / 2, top + height / 2])({button}.getBoundingClientRect())"
-    );
-    let place: Value = page.evaluate(&middle).await;
-    [0, 1].map(|index| place[index].as_f64().expect("a number"))
-}
-
-async fn click(page: &Browser, name: &str) {
-    let [x, y] = place(page, name).await;
-    page.click(x, y).await;
-}
-
-async fn reads(page: &Browser, words: &str) {
-    page.wait_for(words, &format!("{CONTROLS}.includes('{words}')")).await;
-}
+use crate::{
+    Server,
+    driver::Browser,
+    pointer::{click, place, reads},
+};
 
 pub async fn visit(page: &Browser, server: Server) {
     page.open(&format!("http://{}/", server.address)).await;

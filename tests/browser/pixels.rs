@@ -53,6 +53,11 @@ impl Picture {
         self.counts().iter().all(|count| *count >= ARM)
     }
 
+    /// Whether the arm of a learner is drawn.
+    pub fn shows(&self, learner: &str) -> bool {
+        NAMES.iter().position(|name| *name == learner).is_some_and(|index| self.counts()[index] >= ARM)
+    }
+
     /// Whether something as large as an arm has changed.
     pub fn differs_from(&self, other: &Self) -> bool {
         let apart = |(a, b): (&[u8; 3], &[u8; 3])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > TOLERANCE);

@@ -18,13 +18,18 @@ pub async fn place(page: &Browser, element: &str) -> [f64; 4] {
 
 /// A picture in which all learners are drawn and that is as asked.
 pub async fn drawn(page: &Browser, is_it: impl Fn(&Picture) -> bool) -> Picture {
+    once(page, |picture| picture.shows_all_learners() && is_it(picture)).await
+}
+
+/// A picture that is as asked.
+pub async fn once(page: &Browser, is_it: impl Fn(&Picture) -> bool) -> Picture {
     let [left, top, ..] = place(page, "document.getElementById('scene')").await;
     let [.., legend] = place(page, "document.getElementById('legend')").await;
     let (corner, legend) = ([left as usize, top as usize], legend as usize + 10);
     let deadline = Instant::now() + DRAWN_WITHIN;
     loop {
         let picture = Picture::of_scene(&page.screenshot().await, corner, legend);
-        if picture.shows_all_learners() && is_it(&picture) {
+        if is_it(&picture) {
             return picture;
         }
         if Instant::now() > deadline {

@@ -32,6 +32,7 @@ const ROUTES: [(&str, &str); 35] = [
     ("get", "/v1/sessions/{id}/observations.csv"),
     ("get", "/v1/sessions/{id}/calibration.toml"),
     ("get", "/v1/sessions/{id}/robot.urdf"),
+    ("get", "/v1/sessions/{id}/session.json"),
     ("get", "/v1/sessions/{id}/events"),
     ("get", "/v1/sessions/{id}/live"),
     ("get", "/v1/sessions/{id}/live.rrd"),

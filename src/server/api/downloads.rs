@@ -7,12 +7,13 @@ use axum::{
     response::Response,
 };
 
-use super::{aside, attachment, json};
+use super::{attachment, json};
 use crate::{
     experiment::RunResult,
     recording::{RecordingError, StepsCsv},
     server::{
         App,
+        aside::aside,
         problem::{Kind, Problem},
         session::Session,
     },

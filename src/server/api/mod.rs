@@ -33,6 +33,7 @@ pub use sessions::{MadeSteps, SessionList, StepRequest};
 
 use super::{
     App, MAX_SETUP_BODY_BYTES,
+    aside::aside,
     problem::{Kind, PROBLEM_JSON, Problem},
 };
 use crate::experiment::StepReport;
@@ -156,12 +157,6 @@ fn attachment(name: &str, content_type: &'static str, content: impl Into<Body>) 
     let disposition = format!("attachment; filename=\"{name}\"");
     let headers = [(header::CONTENT_TYPE, content_type.to_owned()), (header::CONTENT_DISPOSITION, disposition)];
     (headers, content.into()).into_response()
-}
-
-/// Does what takes long where it holds up no other request.
-async fn aside<T: Send + 'static>(work: impl FnOnce() -> Result<T, Problem> + Send + 'static) -> Result<T, Problem> {
-    let done = tokio::task::spawn_blocking(work).await;
-    done.unwrap_or_else(|error| Err(Problem::new(Kind::Internal, format!("a part of the server failed: {error}"))))
 }
 
 /// A JSON response, written aside.

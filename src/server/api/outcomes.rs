@@ -11,12 +11,13 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use super::{aside, attachment, refusals::OfEngines};
+use super::{attachment, refusals::OfEngines};
 use crate::{
     ask_tell::Session,
     calibration::{self, File, Silent},
     server::{
         App,
+        aside::aside,
         problem::{Kind, Problem},
         session::ReportFiles,
     },

@@ -6,10 +6,12 @@ use axum::{Json, extract::Path};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::aside;
 use crate::{
     scenario::{BUILTIN, Scenario, ScenarioError, ScenarioSummary, builtin},
-    server::problem::{Kind, Problem},
+    server::{
+        aside::aside,
+        problem::{Kind, Problem},
+    },
 };
 
 /// The built-in scenarios.

@@ -24,8 +24,9 @@ use crate::{
     ask_tell::{self, ReplayError, Setup, VERSION},
     scenario::WorldKind,
     server::{
+        aside::aside,
         problem::{Kind, Problem},
-        store::{Shown, StoreError, Stored},
+        store::{Shown, Stored},
     },
 };
 
@@ -119,7 +120,7 @@ impl Sessions {
         if session.is_watched() {
             return;
         }
-        *lock(&known.resource) = Some(session.resource());
+        *lock(&known.resource) = Some(SessionResource { recording: None, ..session.resource() });
         self.leave(session.id);
         session.stop();
         // However long that takes: nobody else may write its events meanwhile.
@@ -208,6 +209,7 @@ impl Sessions {
             description: session.description().clone(),
             step: counted(&events),
             remaining: None,
+            recording: None,
             file: None,
             recording_failure: None,
             failure: None,
@@ -238,10 +240,4 @@ fn counted(events: &[ask_tell::Event]) -> u64 {
         }
     }
     told - excluded.len() as u64
-}
-
-/// Reads and writes where it holds up no other request.
-async fn aside<T: Send + 'static>(work: impl FnOnce() -> Result<T, StoreError> + Send + 'static) -> Result<T, Problem> {
-    let failed = |error| Problem::new(Kind::Internal, format!("a part of the server failed: {error}"));
-    Ok(spawn_blocking(work).await.map_err(failed)??)
 }

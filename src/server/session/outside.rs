@@ -311,6 +311,7 @@ impl Elsewhere {
             last: observations.last().map(|told| told.answer.clone()),
             suggestions: self.session.suggestions().to_vec(),
             observations,
+            recording: self.recorder.recording_id().to_owned(),
             channels: self.channels.clone(),
         };
         self.shared.standing.send_replace(Some(Arc::new(standing)));

@@ -26,6 +26,9 @@ pub struct SessionResource {
     pub step: u64,
     /// How many steps the recorded data set has left; null in a simulated world and with a robot elsewhere, which have no end.
     pub remaining: Option<u64>,
+    /// The id of its recording, by which viewers tell one from another: with a robot elsewhere another one each time the
+    /// session comes back to memory. Null for one that is not there.
+    pub recording: Option<String>,
     /// Name of the recording's file in the server's data directory; null if it keeps none.
     pub file: Option<String>,
     /// Why the recording's file lacks steps, if it could not be written; null otherwise. Nothing else is affected, and it is
@@ -54,6 +57,7 @@ impl Session {
             description: self.description.clone(),
             step: standing.as_deref().map_or(self.step(), |standing| standing.step()),
             remaining: Some(self.shared.remaining.load(Ordering::Relaxed)).filter(|left| *left != u64::MAX),
+            recording: Some(standing.as_deref().map_or(self.id.to_string(), |standing| standing.recording.clone())),
             file: self.file.clone(),
             recording_failure: lock(&self.shared.recording_failure).clone(),
             failure: self.failure(),

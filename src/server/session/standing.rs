@@ -62,6 +62,9 @@ pub(in crate::server) struct Standing {
     /// All that were ever told, by number.
     #[serde(skip)]
     pub(in crate::server) observations: Vec<Arc<Told>>,
+    /// The id of its recording.
+    #[serde(skip)]
+    pub(in crate::server) recording: String,
     #[serde(skip)]
     pub(in crate::server) channels: Arc<[ChannelShape]>,
 }

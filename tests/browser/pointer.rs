@@ -1,0 +1,32 @@
+//! Buttons that are pressed by the mouse, and words that are read.
+
+use serde_json::Value;
+
+use crate::driver::Browser;
+
+/// What the panel says, as it is read out.
+const CONTROLS: &str = "document.getElementById('controls').textContent";
+
+/// The middle of a button that can be pressed, once it is there.
+pub async fn place(page: &Browser, name: &str) -> [f64; 2] {
+    let button = format!(
+        "[...document.querySelectorAll('#controls button')].find((one) => one.textContent === '{name}' && !one.disabled)"
+    );
+    page.wait_for(name, &format!("{button} !== undefined")).await;
+    let middle = format!(
+        "(({{ left, top, width, height }}) => [left + width / 2, top + height / 2])({button}.getBoundingClientRect())"
+    );
+    let place: Value = page.evaluate(&middle).await;
+    [0, 1].map(|index| place[index].as_f64().expect("a number"))
+}
+
+/// Clicks on a button, once it can be pressed.
+pub async fn click(page: &Browser, name: &str) {
+    let [x, y] = place(page, name).await;
+    page.click(x, y).await;
+}
+
+/// Waits until the panel says these words.
+pub async fn reads(page: &Browser, words: &str) {
+    page.wait_for(words, &format!("{CONTROLS}.includes('{words}')")).await;
+}
