@@ -17,7 +17,7 @@ use crate::{
 ///
 /// * `robot.urdf` is the text of the description, not the name of a file;
 /// * `robot.base` and `robot.tip` may be left out where one link hangs on nothing and nothing hangs on one link;
-/// * `name` may be left out, and a null is as good as nothing;
+/// * `name` may be left out, which is that of the robot then, and a null is as good as nothing;
 /// * there are no `measurements`: they are told;
 /// * sockets are listed, each with a posture in which the target was in it: `"socket": [{"name": "0", "place": "front",
 ///   "posture_deg": […]}, …]`. What they have in common stands in `sockets`.
@@ -42,8 +42,10 @@ pub struct Setup {
 
 /// What errors and files call the description.
 pub(super) const URDF: &str = "robot.urdf";
-/// What a session is called that has no name.
+/// What a session is called that has no name, and whose robot has none.
 const NAME: &str = "session";
+/// So much of a robot's name makes one of a session.
+const MOST_NAME_CHARACTERS: usize = 40;
 
 impl Setup {
     /// Of these keys, with the usual agent.
@@ -116,7 +118,6 @@ impl Setup {
             return Err(Fault::new("calibration", "it is no object", "write the keys of a calibration file"));
         };
         let mut table = tabled("", keys)?;
-        table.entry("name").or_insert_with(|| NAME.into());
         let Some(toml::Value::Table(robot)) = table.get_mut("robot") else {
             let mend = "add {\"robot\": {\"urdf\": TEXT, \"base\": LINK, \"tip\": LINK}}";
             return Err(Fault::new("robot", "missing", mend));
@@ -131,12 +132,16 @@ impl Setup {
         let description = Urdf::parse(urdf).map_err(|UrdfError { line, what, mend, .. }| {
             Fault::new("robot.urdf", format!("line {line}: {what}"), mend)
         })?;
+        // In letters that can stand in names of files and addresses.
+        let is_sound = |c: &char| c.is_ascii_alphanumeric() || "-_".contains(*c);
+        let own: String = description.name().chars().filter(is_sound).take(MOST_NAME_CHARACTERS).collect();
         let leaves: Vec<&str> = description.leaves().collect();
         let ends = [("base", description.root()), ("tip", leaves.first().copied().filter(|_| leaves.len() == 1))];
         for (key, link) in ends.into_iter().filter_map(|(key, link)| Some((key, link?.to_owned()))) {
             robot.entry(key).or_insert_with(|| link.into());
         }
         robot.insert("urdf".to_owned(), URDF.into());
+        table.entry("name").or_insert_with(|| if own.is_empty() { NAME.into() } else { own.into() });
         Ok(table)
     }
 }

@@ -36,6 +36,8 @@ const BATCH_RECTANGLES: usize = 200_000;
 
 /// Length of the arrows at θ = 0, as a part of the reach of the arm.
 const ARROW: f64 = 0.22;
+/// By how much farther out than believed a hand that nobody knows has room, as a part of the reach.
+const FARTHER: f64 = 0.6;
 
 /// Records an experiment, as the module's documentation lists it.
 ///
@@ -325,6 +327,10 @@ impl Recorder {
         let arm = self.truth.clone().or_else(believed);
         let figure = arm.as_ref().map(|arm| Figure::of(&self.description, arm)).unwrap_or_default();
         let room = arm.map_or_else(|| Room::around(&figure), |arm| Room::of(&arm, &figure, &self.description));
+        // Where nobody knows where the hand is on its link, it is drawn where it is believed to be, and found farther out.
+        let spread = first_estimate.filter(|_| self.truth.is_none()).and_then(|estimate| estimate.marker_covariance_m2);
+        let spread_m = spread.map_or(0.0, |covariance| (0..3).map(|k| covariance[k][k]).sum::<f64>().sqrt());
+        let room = room.with_hand(spread_m.min(FARTHER * figure.reach_m));
         let stage = Stage::new(figure, room, self.learners.len());
         let base = first_estimate.filter(|_| self.description.base_learned).and_then(ModelReport::base_frame);
         for learner in &mut self.learners {

@@ -57,6 +57,15 @@ impl Room {
         room
     }
 
+    /// The same where the hand may be farther out than it is believed to be.
+    pub(super) fn with_hand(mut self, beyond_m: f64) -> Self {
+        for posture in &mut self.postures {
+            let hand = posture.last().copied().filter(|hand| hand.norm() > 0.0);
+            posture.extend(hand.map(|hand| hand + beyond_m * hand.normalize()));
+        }
+        self
+    }
+
     /// Of a figure whose arm takes these postures alone, by the points on its axes and its marker.
     pub(super) fn of_postures(figure: &Figure, postures: Vec<Vec<Point3<f64>>>) -> Self {
         let from_shoulder = |posture: Vec<Point3<f64>>| posture.iter().map(|point| point - figure.shoulder).collect();
@@ -83,6 +92,13 @@ impl Room {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_hand_that_may_be_farther_out_has_room() {
+        let postures = vec![vec![Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, 0.0, 2.0)]];
+        let room = Room { postures, ..Room::around(&Figure { reach_m: 1.0, ..Figure::default() }) };
+        assert_eq!(room.with_hand(0.5).needs(|point| point.z), 2.5);
+    }
 
     #[test]
     fn few_postures_may_go_out_of_sight() {

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::support::{Server, timeless};
 
-const ROUTES: [(&str, &str); 35] = [
+const ROUTES: [(&str, &str); 36] = [
     ("get", "/v1/scenarios"),
     ("get", "/v1/scenarios/{name}"),
     ("get", "/v1/sessions"),

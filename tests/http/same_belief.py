@@ -33,7 +33,8 @@ def told(session: body_schema.Session | body_schema.RemoteSession) -> list[dict[
         executed = {name: position + draw.gauss(0.0, 1e-3) for name, position in asked["configuration"].items()}
         seen = [0.4 + draw.gauss(0.0, 0.1), draw.gauss(0.0, 0.1), 0.6 + draw.gauss(0.0, 0.1)]
         session.observe(executed, marker=None if movement == 7 else seen)
-    anywhere = {name: 0.3 for name in session.joints}
+    # Nobody has suggested this one.
+    anywhere = {name: 0.9 * position for name, position in suggested[0].items()}
     session.observe(anywhere, suggestion_id=None, marker=[0.5, 0.1, 0.5])
     session.exclude(2)
     session.exclude(4)

@@ -21,6 +21,8 @@ const MOST_NODES: u32 = 2_000_000;
 #[derive(Clone, Debug)]
 pub struct Urdf {
     pub(super) text: String,
+    /// What the robot calls itself; empty if it does not.
+    pub(super) name: String,
     pub(super) links: Vec<String>,
     pub(super) joints: Vec<JointElement>,
     /// By link: the joint that carries it.
@@ -78,7 +80,13 @@ impl Urdf {
             joints.push(JointElement { name, parent, child, at: node.range().start, body: Body::read(node) });
         }
         let start = robot.range().start;
-        Ok(Self { text: text.to_owned(), links: links.names, joints, carried_by, start })
+        let name = robot.attribute("name").unwrap_or_default().to_owned();
+        Ok(Self { text: text.to_owned(), name, links: links.names, joints, carried_by, start })
+    }
+
+    /// What the robot calls itself; empty if it does not.
+    pub fn name(&self) -> &str {
+        &self.name
     }
 
     /// The link that hangs on nothing, the first if there are several.
