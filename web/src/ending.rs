@@ -80,7 +80,13 @@ impl Panel {
         };
         let name = |learner: usize| description.learners[learner].name.as_str();
         let sentence = self.compared(&outcomes).map_or_else(
-            || format!("{}: {}.", name(outcomes[0].0), outcomes[0].1.words()),
+            || match self.history.yardstick() {
+                Yardstick::Expected => {
+                    let (learner, outcome) = outcomes[0];
+                    format!("After {latest} movements {} expects an error of {}.", name(learner), outcome.words())
+                }
+                _ => format!("{}: {}.", name(outcomes[0].0), outcomes[0].1.words()),
+            },
             |[(a, first), (b, second)]| sentence(name(a), first, name(b), second),
         );
         Some(Ending { sentence, counted, outcomes })

@@ -20,7 +20,8 @@ fn figures(scenario: &ScenarioSummary) -> String {
     };
     let (joints, parameters) = (scenario.joints.len(), scenario.parameters);
     let (learners, steps) = (scenario.learners.len(), scenario.steps);
-    format!("{joints} joints · {parameters} parameters · {learners} learners · {steps} movements · {world}")
+    let learners = if learners == 1 { "1 learner".to_owned() } else { format!("{learners} learners") };
+    format!("{joints} joints · {parameters} parameters · {learners} · {steps} movements · {world}")
 }
 
 impl Panel {

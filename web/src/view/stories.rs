@@ -6,6 +6,10 @@ use crate::panel::Panel;
 
 impl Panel {
     pub(super) fn stories_row(&mut self, ui: &mut Ui) {
+        let can_be_played = self.can_play() && self.human().is_none();
+        if self.stories().next().is_none() && !can_be_played {
+            return;
+        }
         let told = self.tour.map(|_| self.story);
         let mut chosen = None;
         ui.horizontal_wrapped(|ui| {
@@ -16,7 +20,7 @@ impl Panel {
                     chosen = Some(index);
                 }
             }
-            if self.can_play() && self.human().is_none() {
+            if can_be_played {
                 let tip = "Choose the movements yourself: ten rounds against active and random, on this seed";
                 let play = ui.add_enabled(self.is_ready(), Button::new("Beat the algorithm"));
                 if play.on_hover_text(tip).clicked() {
