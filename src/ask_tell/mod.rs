@@ -84,6 +84,7 @@ mod prepare;
 mod results;
 mod session;
 mod setup;
+mod status;
 mod suggestion;
 mod table;
 
@@ -95,6 +96,7 @@ pub use limits::*;
 pub use observation::{Answer, Observation};
 pub use prepare::Prepared;
 pub use results::{Results, ResultsError};
-pub use session::{Session, Status};
+pub use session::Session;
 pub use setup::Setup;
+pub use status::Status;
 pub use suggestion::{Ask, Enough, Outcome, Suggestion, SuggestionState, Suggestions};

@@ -1,6 +1,9 @@
 //! `compare`: many seeds, in parallel.
 
-use std::path::PathBuf;
+use std::{
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+};
 
 use anyhow::{Context, Result};
 use body_schema::{
@@ -12,7 +15,11 @@ use body_schema::{
 use comfy_table::Table;
 use rayon::prelude::*;
 
-use super::{ScenarioArguments, Seeds, designs, output, progress, steps_of};
+use super::{
+    ScenarioArguments, Seeds, designs, output,
+    part::{self, About, Shard},
+    progress, steps_of,
+};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -24,12 +31,15 @@ pub struct Arguments {
     /// Movements of every run [default: the scenario's]
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
-    /// Write everything as JSON to FILE, or to standard output for `-`
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Write the curves as CSV to FILE
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: Outputs,
+    /// Run only the I-th of N parts of the seeds, and write it to the file that --part names: `merge` puts all of them
+    /// together
+    #[arg(long, value_name = "I/N", requires = "part", conflicts_with_all = ["json", "csv", "limits"])]
+    shard: Option<Shard>,
+    /// Where the part is written
+    #[arg(long, value_name = "FILE", requires = "shard")]
+    part: Option<PathBuf>,
     /// Run on so many threads [default: one per core]; the outcome does not depend on it
     #[arg(long, value_name = "N")]
     threads: Option<std::num::NonZeroUsize>,
@@ -39,13 +49,27 @@ pub struct Arguments {
     limits: bool,
 }
 
+/// Where a comparison goes.
+#[derive(Debug, clap::Args)]
+pub struct Outputs {
+    /// Write everything as JSON to FILE, or to standard output for `-`
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the curves as CSV to FILE
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
 pub fn compare(arguments: &Arguments) -> Result<()> {
     let (scenario, learners) = arguments.scenario.load()?;
     let steps = steps_of(&scenario, arguments.steps)?;
+    if let Some((shard, path)) = arguments.shard.zip(arguments.part.as_deref()) {
+        return one_part(arguments, (&scenario, learners), steps, (shard, path));
+    }
     if arguments.limits {
         designs::check(&scenario)?;
     }
-    output::distinct([("--json", &arguments.json), ("--csv", &arguments.csv)])?;
+    arguments.outputs.check()?;
     let bar = progress::bar(
         arguments.seeds.count() * steps,
         &format!("{} × {} seeds", scenario.name, arguments.seeds.count()),
@@ -59,22 +83,59 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
         })
     })?;
     bar.finish_and_clear();
-    if let Some(path) = &arguments.csv {
-        comparison_csv(&comparison, output::create(path)?)
-            .with_context(|| format!("cannot write {}", path.display()))?;
+    arguments.outputs.tell(&comparison)
+}
+
+impl Outputs {
+    /// That no two go to one file.
+    pub fn check(&self) -> Result<()> {
+        output::distinct([("--json", &self.json), ("--csv", &self.csv)])
     }
-    if let Some(path) = &arguments.json {
-        output::write_json(path, &comparison)?;
+
+    /// Writes what is wanted, and says the rest.
+    pub fn tell(&self, comparison: &Comparison) -> Result<()> {
+        if let Some(path) = &self.csv {
+            comparison_csv(comparison, output::create(path)?)
+                .with_context(|| format!("cannot write {}", path.display()))?;
+        }
+        if let Some(path) = &self.json {
+            output::write_json(path, comparison)?;
+        }
+        if !self.json.as_deref().is_some_and(output::is_stdout) {
+            let Comparison { scenario, steps, learners, .. } = comparison;
+            let seeds = learners.first().map_or(0, |learner| learner.runs.len());
+            output::say(format!("{scenario}: {seeds} seeds, {steps} movements each"))?;
+            output::say(table(comparison))?;
+            let efficiencies = learners.iter().map(|learner| (learner.name.as_str(), learner.efficiency));
+            designs::say(comparison.movements_by_counting, &comparison.best_designs, efficiencies)?;
+        }
+        Ok(())
     }
-    if !arguments.json.as_deref().is_some_and(output::is_stdout) {
-        let Comparison { scenario, steps, .. } = &comparison;
-        let seeds = arguments.seeds.count();
-        output::say(format!("{scenario}: {seeds} seeds, {steps} movements each"))?;
-        output::say(table(&comparison))?;
-        let efficiencies = comparison.learners.iter().map(|learner| (learner.name.as_str(), learner.efficiency));
-        designs::say(comparison.movements_by_counting, &comparison.best_designs, efficiencies)?;
-    }
-    Ok(())
+}
+
+/// Runs one part of the seeds, and writes each run as it ends.
+fn one_part(
+    arguments: &Arguments,
+    (scenario, learners): (&Scenario, Option<&[String]>),
+    steps: u64,
+    (shard, path): (Shard, &Path),
+) -> Result<()> {
+    let names = scenario.chosen(learners)?.into_iter().map(|learner| learner.name).collect();
+    let seeds = shard.of(arguments.seeds.iter());
+    let about = About::new((&scenario.name, &scenario.source), names, steps, arguments.seeds.ends(), shard);
+    let writer = Mutex::new(part::Writer::begin(path, &about)?);
+    let bar = progress::bar(seeds.len() as u64 * steps, &format!("{} × {} seeds", scenario.name, seeds.len()));
+    let count = seeds.len();
+    super::on_threads(arguments.threads, || {
+        seeds.into_par_iter().try_for_each(|seed| {
+            let trace =
+                Trace::run(scenario.experiment(seed, learners)?, steps, || bar.inc(1)).map_err(ScenarioError::from)?;
+            writer.lock().unwrap_or_else(PoisonError::into_inner).run(&trace)
+        })
+    })?;
+    writer.into_inner().unwrap_or_else(PoisonError::into_inner).end()?;
+    bar.finish_and_clear();
+    output::say(format!("wrote {count} runs to {}", path.display()))
 }
 
 /// Runs the learners over the seeds, on all cores; the outcome does not depend on how many there are.

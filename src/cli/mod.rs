@@ -6,9 +6,11 @@ mod designs;
 mod export;
 mod init;
 mod input;
+mod merge;
 mod observability;
 mod output;
 mod paper;
+mod part;
 mod progress;
 mod run;
 mod scenarios;
@@ -47,6 +49,8 @@ enum Command {
     Run(run::Arguments),
     /// Run the learners of a scenario over many seeds, and compare them
     Compare(compare::Arguments),
+    /// Put the parts of a comparison together (`compare --shard`): what one run gives
+    Merge(merge::Arguments),
     /// Try a grid of values in a scenario, and rank them by a learner's own median
     Sweep(sweep::Arguments),
     /// Calibrate a robot by a table of measurements: a corrected URDF, and a report on data that it has not seen
@@ -107,6 +111,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Some(Command::Serve(arguments)) => serve::serve(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Compare(arguments)) => compare::compare(&arguments),
+        Some(Command::Merge(arguments)) => merge::merge(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Calibrate(arguments)) => calibrate::calibrate(&arguments),
         Some(Command::Init(arguments)) => init::init(&arguments),

@@ -12,6 +12,11 @@ impl Seeds {
         self.0.clone()
     }
 
+    /// The first and the last.
+    pub fn ends(&self) -> [u64; 2] {
+        [*self.0.start(), *self.0.end()]
+    }
+
     /// How many seeds.
     pub fn count(&self) -> u64 {
         (self.0.end() - self.0.start()).saturating_add(1)

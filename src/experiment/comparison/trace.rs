@@ -1,17 +1,19 @@
 //! One run of all learners, and what a comparison keeps of it.
 
+use serde::{Deserialize, Serialize};
+
 use super::RunSummary;
 use crate::experiment::{Experiment, ExperimentError, JointMetrics, StepReport};
 
 /// What is kept of one run of all learners.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trace {
     pub(super) seed: u64,
     pub(super) movements_by_counting: usize,
     pub(super) learners: Vec<LearnerTrace>,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct LearnerTrace {
     pub(super) name: String,
     pub(super) converged_at: Option<u64>,
@@ -24,6 +26,18 @@ pub(super) struct LearnerTrace {
 }
 
 impl Trace {
+    /// The seed of the run.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Whether it is of these learners, and of so many steps.
+    pub fn is_of(&self, learners: &[String], steps: u64) -> bool {
+        let whole =
+            |trace: &LearnerTrace| trace.errors.len() as u64 == steps + 1 && trace.joints.len() == trace.errors.len();
+        self.learners.iter().map(|trace| &trace.name).eq(learners) && self.learners.iter().all(whole)
+    }
+
     /// Runs `experiment` for `steps` steps and calls `tick` after each.
     pub fn run(mut experiment: Experiment, steps: u64, mut tick: impl FnMut()) -> Result<Self, ExperimentError> {
         let mut learners: Vec<LearnerTrace> = experiment

@@ -8,9 +8,12 @@ use std::{
 /// The crates whose version changes the bundle.
 const CRATES: [&str; 8] = ["eframe", "egui", "egui_plot", "epaint", "serde", "serde_json", "wasm-bindgen", "web-sys"];
 
-/// What the panel takes of the engine: the types of its reports and the rules behind a picture, and the palette of
-/// recordings. All else of the engine may change without changing the bundle.
-const ENGINE: [&str; 10] = [
+/// What the panel takes of the engine: the types of its reports, those of sessions with robots elsewhere, the rules behind a
+/// picture, and the palette of recordings. All else of the engine may change without changing the bundle.
+const ENGINE: [&str; 13] = [
+    "src/ask_tell/observation.rs",
+    "src/ask_tell/status.rs",
+    "src/ask_tell/suggestion.rs",
     "src/experiment/choice.rs",
     "src/experiment/convergence.rs",
     "src/experiment/metrics.rs",

@@ -1,0 +1,207 @@
+//! A part of a comparison: the runs of some of its seeds, in a file that `merge` puts together with the others.
+//!
+//! It is compressed JSON, a line each: what the comparison is, then one run after the other, in the order in which they ended.
+
+use std::{
+    collections::BTreeSet,
+    fs::File,
+    io::{BufRead, BufReader, Write},
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use anyhow::{Context, Result};
+use body_schema::experiment::{Comparison, Trace};
+use flate2::{Compression, bufread::GzDecoder, write::GzEncoder};
+use serde::{Deserialize, Serialize};
+
+use super::BadInput;
+
+/// The form of these files.
+const FORM: u32 = 1;
+
+/// One of so many parts, counted from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    index: u64,
+    of: u64,
+}
+
+impl Shard {
+    /// The seeds of this part: dealt out one by one, so that all parts take about as long.
+    pub fn of(self, seeds: impl Iterator<Item = u64>) -> Vec<u64> {
+        let mine = |place: u64| place % self.of == self.index - 1;
+        (0..).zip(seeds).filter(|(place, _)| mine(*place)).map(|(_, seed)| seed).collect()
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+        let (index, of) = numbers.ok_or("write the part and how many there are, as 1/4")?;
+        match (1..=of).contains(&index) {
+            true => Ok(Self { index, of }),
+            false => Err(format!("parts are counted from 1 to {of}")),
+        }
+    }
+}
+
+/// What a part is a part of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct About {
+    form: u32,
+    /// Of body-schema: another may compute other runs.
+    version: String,
+    /// The name of the scenario, and its file, which has to be the same for all.
+    pub scenario: String,
+    source: String,
+    pub learners: Vec<String>,
+    pub steps: u64,
+    /// All seeds of the comparison, the first and the last.
+    seeds: [u64; 2],
+    shard: Shard,
+}
+
+impl About {
+    pub fn new(scenario: (&str, &str), learners: Vec<String>, steps: u64, seeds: [u64; 2], shard: Shard) -> Self {
+        let (version, (scenario, source)) = (env!("CARGO_PKG_VERSION").to_owned(), scenario);
+        let (scenario, source) = (scenario.to_owned(), source.to_owned());
+        Self { form: FORM, version, scenario, source, learners, steps, seeds, shard }
+    }
+
+    /// Why this and another are no parts of one comparison; nothing if they are.
+    fn differs_from(&self, other: &Self) -> Option<&'static str> {
+        let alike = [
+            (self.version == other.version, "another version of body-schema wrote it"),
+            (self.scenario == other.scenario, "it is of another scenario"),
+            (self.source == other.source, "its scenario file was another"),
+            (self.learners == other.learners, "it is of other learners"),
+            (self.steps == other.steps, "its runs have another number of movements"),
+            (self.seeds == other.seeds, "it is of other --seeds"),
+            (self.shard.of == other.shard.of, "it is one of another number of parts"),
+        ];
+        alike.into_iter().find(|(same, _)| !same).map(|(_, why)| why)
+    }
+}
+
+/// A file that is being written. It has its name only once it is whole.
+pub struct Writer {
+    path: PathBuf,
+    unfinished: PathBuf,
+    lines: GzEncoder<File>,
+}
+
+impl Writer {
+    pub fn begin(path: &Path, about: &About) -> Result<Self> {
+        let mut unfinished = path.as_os_str().to_owned();
+        unfinished.push(".unfinished");
+        let unfinished = PathBuf::from(unfinished);
+        let cannot = || format!("cannot create {}", unfinished.display());
+        let file = File::create(&unfinished).with_context(cannot)?;
+        let lines = GzEncoder::new(file, Compression::default());
+        let mut writer = Self { path: path.to_owned(), unfinished, lines };
+        writer.line(about)?;
+        Ok(writer)
+    }
+
+    pub fn run(&mut self, trace: &Trace) -> Result<()> {
+        self.line(trace)
+    }
+
+    pub fn end(self) -> Result<()> {
+        let Self { path, unfinished, lines } = self;
+        let written = lines.finish().and_then(|file| file.sync_all());
+        let written = written.and_then(|()| std::fs::rename(&unfinished, &path));
+        written.with_context(|| format!("cannot write {}", path.display()))
+    }
+
+    fn line(&mut self, value: &impl Serialize) -> Result<()> {
+        let text = serde_json::to_string(value)?;
+        writeln!(self.lines, "{text}").with_context(|| format!("cannot write {}", self.unfinished.display()))
+    }
+}
+
+/// What one run over all seeds would have given.
+pub fn merged(paths: &[PathBuf]) -> Result<Comparison> {
+    let refuse = |path: &Path, why: &str| BadInput(format!("{}: {why}", path.display()));
+    let (mut all, mut traces): (Vec<(About, &Path)>, Vec<Trace>) = (Vec::new(), Vec::new());
+    for path in paths {
+        let (about, runs) = read(path)?;
+        if let Some((first, place)) = all.first()
+            && let Some(why) = about.differs_from(first)
+        {
+            let why = format!("{why} than {}; name the parts of one comparison", place.display());
+            return Err(refuse(path, &why).into());
+        }
+        if let Some((_, twin)) = all.iter().find(|(other, _)| other.shard == about.shard) {
+            let Shard { index, of } = about.shard;
+            let why = format!("it is part {index}/{of}, as is {}; name each part once", twin.display());
+            return Err(refuse(path, &why).into());
+        }
+        let wanted: BTreeSet<u64> = about.shard.of(about.seeds[0]..=about.seeds[1]).into_iter().collect();
+        let found: BTreeSet<u64> = runs.iter().map(Trace::seed).collect();
+        let is_whole = found == wanted && runs.len() == wanted.len();
+        if !is_whole || !runs.iter().all(|run| run.is_of(&about.learners, about.steps)) {
+            return Err(refuse(path, "its runs are not those that it promises; compute it again").into());
+        }
+        traces.extend(runs);
+        all.push((about, path));
+    }
+    let Some((about, _)) = all.first() else { return Err(BadInput("name the parts to merge".to_owned()).into()) };
+    let there: BTreeSet<u64> = all.iter().map(|(about, _)| about.shard.index).collect();
+    let missing: Vec<String> = (1..=about.shard.of)
+        .filter(|index| !there.contains(index))
+        .map(|index| format!("{index}/{}", about.shard.of))
+        .collect();
+    if !missing.is_empty() {
+        return Err(BadInput(format!("parts are missing: {}; name them too", missing.join(", "))).into());
+    }
+    traces.sort_by_key(Trace::seed);
+    Ok(Comparison::of(&about.scenario, about.steps, &traces))
+}
+
+fn read(path: &Path) -> Result<(About, Vec<Trace>)> {
+    let name = path.display();
+    let file = File::open(path).with_context(|| format!("cannot read {name}"))?;
+    let no_part =
+        |why: String| BadInput(format!("{name} is no part of a comparison, or not whole: {why}; compute it again"));
+    let mut lines = BufReader::new(GzDecoder::new(BufReader::new(file))).lines();
+    let first =
+        lines.next().ok_or_else(|| no_part("it is empty".to_owned()))?.map_err(|error| no_part(error.to_string()))?;
+    #[derive(Deserialize)]
+    struct Form {
+        form: u32,
+    }
+    let Form { form } = serde_json::from_str(&first).map_err(|error| no_part(error.to_string()))?;
+    if form > FORM {
+        return Err(
+            BadInput(format!("{name} has form {form}, and this program knows {FORM}; update body-schema")).into()
+        );
+    }
+    let about: About = serde_json::from_str(&first).map_err(|error| no_part(error.to_string()))?;
+    if about.shard.of == 0 || about.shard.index == 0 || about.seeds[0] > about.seeds[1] {
+        return Err(no_part("its numbers fit nothing".to_owned()).into());
+    }
+    let parsed = |line: std::io::Result<String>| -> Result<Trace, BadInput> {
+        let line = line.map_err(|error| no_part(error.to_string()))?;
+        serde_json::from_str(&line).map_err(|error| no_part(error.to_string()))
+    };
+    let traces = lines.map(parsed).collect::<Result<_, _>>()?;
+    Ok((about, traces))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_seed_is_dealt_to_one_part() {
+        let parts = ["1/3", "2/3", "3/3"].map(|text| text.parse::<Shard>().expect("a part").of(5..=11));
+        assert_eq!(parts, [vec![5, 8, 11], vec![6, 9], vec![7, 10]]);
+        for wrong in ["0/3", "4/3", "1", "a/b", "1/0", "-1/2"] {
+            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+        }
+    }
+}
