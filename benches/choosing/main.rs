@@ -1,0 +1,163 @@
+//! What choosing a posture costs beside what a user would otherwise reach for, in one run: every contestant takes its turn in
+//! every round, so that whatever else the machine does meets them all. Ratios of one round are what counts.
+//!
+//! ```text
+//! cargo bench --no-default-features --bench choosing
+//! cargo bench --no-default-features --features nlopt --bench choosing     # wants CMake and a C compiler
+//! ```
+//!
+//! | contestant | what it does |
+//! |---|---|
+//! | choosing | [`Active`]'s choice of one posture: DIRECT-l with a budget of 600 evaluations |
+//! | criterion | 600 evaluations of the criterion alone, in one batch |
+//! | DIRECT-l | the search alone, of an objective that costs next to nothing |
+//! | product | P (m × m) times m × 96 for every 32 candidates: the floor of any method that multiplies by P |
+//! | NLopt | `GN_DIRECT_L` with the same budget and the posterior's trace by the textbook's formula, with our Jacobian |
+//!
+//! P is that of the scenario's prior after ten random movements, hence dense.
+
+use std::{hint::black_box, time::Instant};
+
+use body_schema::{
+    estimation::Belief,
+    model::jacobian,
+    optimize::{Direct, Settings, Variant},
+    scenario::builtin,
+    selection::{Actions, Active, Criterion, History, Minimiser, Policy, Situation, Weights},
+    sensing::Rig,
+};
+use nalgebra::{DMatrix, Matrix3, MatrixXx3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+#[cfg(feature = "nlopt")]
+mod textbook;
+
+const SETTINGS: Settings = Settings { variant: Variant::LocallyBiased, epsilon: 1e-4, max_evaluations: 600 };
+const ROUNDS: usize = 41;
+
+struct Case {
+    belief: Belief,
+    weights: Weights,
+    actions: Actions,
+    limits: Vec<(f64, f64)>,
+    candidates: Vec<Vec<f64>>,
+}
+
+/// H P Hᵀ + R of the marker, and P Hᵀ.
+fn innovation(belief: &Belief, covariance: &DMatrix<f64>, posture: &[f64]) -> (Matrix3<f64>, MatrixXx3<f64>) {
+    let (_, h) = jacobian(&belief.state, &belief.layout, posture);
+    let numerator = covariance * h.transpose();
+    let s = &h * &numerator + Matrix3::identity() * belief.rig.sigma().powi(2);
+    (s, numerator)
+}
+
+impl Case {
+    fn new(name: &str) -> Self {
+        let scenario = builtin(name).expect("built in");
+        let layout = scenario.robot.layout.clone();
+        let prior_sd = scenario.prior.standard_deviations(&layout);
+        let weights = scenario.weights();
+        let limits = scenario.robot.limits.joints().to_vec();
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut draw = || limits.iter().map(|&(lower, upper)| rng.random_range(lower..upper)).collect::<Vec<f64>>();
+        let rig = Rig::tracker(scenario.filter.sigma());
+        let mut covariance = DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd));
+        let belief = Belief::new(scenario.robot.state.clone(), layout.into(), rig.into());
+        for _ in 0..10 {
+            let (s, numerator) = innovation(&belief, &covariance, &draw());
+            covariance -= &numerator * s.try_inverse().expect("positive") * numerator.transpose();
+            covariance = (&covariance + covariance.transpose()) * 0.5;
+        }
+        let candidates = (0..SETTINGS.max_evaluations).map(|_| draw()).collect();
+        let actions = Actions::Box(scenario.robot.limits.clone());
+        Self { belief: belief.with_covariance(covariance), weights, actions, limits, candidates }
+    }
+
+    fn covariance(&self) -> &DMatrix<f64> {
+        self.belief.covariance.as_ref().expect("a covariance")
+    }
+
+    /// The criterion at the posture that [`Active`] chooses.
+    fn choose(&self) -> f64 {
+        let active = Active::new(self.weights.clone(), Minimiser::Direct(SETTINGS));
+        let history = History::default();
+        let situation =
+            Situation { belief: &self.belief, actions: &self.actions, history: &history, constraints: None };
+        let selection = active.select(&situation, &mut ChaCha8Rng::seed_from_u64(1)).expect("a selection");
+        selection.criterion.expect("a criterion")
+    }
+
+    fn evaluate(&self) -> f64 {
+        let criterion = Criterion::new(&self.belief, &self.weights).expect("a covariance");
+        criterion.evaluate(&self.candidates)[0]
+    }
+
+    fn search(&self) -> f64 {
+        let mut direct = Direct::new(self.limits.len(), SETTINGS).expect("valid settings");
+        let mut values = Vec::new();
+        while let Some(batch) = direct.ask() {
+            values.clear();
+            values.extend(batch.iter().map(|x| x.iter().map(|x| (x - 0.3).powi(2)).sum::<f64>()));
+            direct.tell(&values).expect("as many values as points");
+        }
+        direct.best().expect("a value").1
+    }
+
+    fn multiply(&self, rows: &DMatrix<f64>, product: &mut DMatrix<f64>) -> f64 {
+        for _ in 0..SETTINGS.max_evaluations.div_ceil(32) {
+            product.gemm(1.0, self.covariance(), black_box(rows), 0.0);
+        }
+        product[(0, 0)]
+    }
+}
+
+/// Microseconds that each contestant took in each round.
+fn race(contestants: &mut [(&str, Box<dyn FnMut() -> f64 + '_>)]) -> Vec<Vec<f64>> {
+    let mut times = vec![Vec::with_capacity(ROUNDS); contestants.len()];
+    for round in 0..=ROUNDS {
+        for ((_, run), times) in contestants.iter_mut().zip(&mut times) {
+            let start = Instant::now();
+            black_box(run());
+            // The first round warms caches.
+            if round > 0 {
+                times.push(start.elapsed().as_secs_f64() * 1e6);
+            }
+        }
+    }
+    times
+}
+
+/// Median and quartiles.
+fn spread(values: impl Iterator<Item = f64>) -> [f64; 3] {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    [2, 1, 3].map(|quarter| sorted[(sorted.len() - 1) * quarter / 4])
+}
+
+fn main() {
+    println!("microseconds for 600 evaluations, and as a multiple of choosing: median (quartiles) of {ROUNDS} rounds");
+    for name in ["arm-6dof", "arm-12dof", "arm-20dof"] {
+        let case = Case::new(name);
+        let m = case.covariance().nrows();
+        println!("\n{name}, m = {m}");
+        let rows = DMatrix::from_fn(m, 96, |i, j| ((7 * i + 3 * j) % 11) as f64 - 5.0);
+        let mut product = DMatrix::zeros(m, 96);
+        let mut contestants: Vec<(&str, Box<dyn FnMut() -> f64 + '_>)> = vec![
+            ("choosing", Box::new(|| case.choose())),
+            ("criterion", Box::new(|| case.evaluate())),
+            ("DIRECT-l", Box::new(|| case.search())),
+            ("product", Box::new(|| case.multiply(&rows, &mut product))),
+        ];
+        #[cfg(feature = "nlopt")]
+        contestants.push(("NLopt", Box::new(|| textbook::minimise(&case))));
+        let times = race(&mut contestants);
+        for ((name, _), times_of) in contestants.iter().zip(&times) {
+            let [median, low, high] = spread(times_of.iter().copied());
+            let [ratio, least, most] = spread(times_of.iter().zip(&times[0]).map(|(time, choosing)| time / choosing));
+            println!("  {name:10} {median:8.1} ({low:.1} to {high:.1})   {ratio:6.3} ({least:.3} to {most:.3})");
+        }
+        #[cfg(feature = "nlopt")]
+        println!("  least value found: ours {:.6e}, NLopt's {:.6e}", case.choose(), textbook::minimise(&case));
+    }
+}
