@@ -65,19 +65,20 @@ def draw(study: dict, path: Path) -> None:
     for learner in study["learners"]:
         runs = len(learner["runs"])
         at = sorted(run["converged_at"] for run in learner["runs"] if run["converged_at"] is not None)
-        (line,) = reached.step([0, *at], [100 * count / runs for count in range(len(at) + 1)], where="post", label=learner["name"])
+        shares = [100 * count / runs for count in range(len(at) + 1)]
+        (line,) = reached.step([0, *at, study["steps"]], [*shares, shares[-1]], where="post", label=learner["name"])
         curve = [(one["movements"], one["prediction_mean_m"]) for one in learner["curve"] if one["prediction_mean_m"]]
         movements = [movement for movement, _ in curve]
         low, middle, high = ([1e3 * error[key] for _, error in curve] for key in ("q25", "median", "q75"))
         errors.plot(movements, middle, color=line.get_color(), label=learner["name"])
         errors.fill_between(movements, low, high, color=line.get_color(), alpha=0.2, linewidth=0)
     runs = len(study["learners"][0]["runs"])
-    reached.set(title=f"{study['scenario']}: {runs} runs each", xlabel="movements", ylabel="converged, % of the runs", ylim=(0, 100))
+    reached.set(title=f"{study['scenario']}: {runs} runs each", xlabel="movements", ylabel="converged, % of the runs", ylim=(-2, 102))
     errors.set(title="median and quartiles over the runs", xlabel="movements", ylabel="prediction error, mm", yscale="log")
     for axes in (reached, errors):
         axes.set_xlim(0, study["steps"])
         axes.grid(alpha=0.3)
-        axes.legend()
+        axes.legend(loc="center right" if axes is reached else "upper right")
     figure.savefig(path, dpi=150)
 
 

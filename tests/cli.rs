@@ -58,10 +58,12 @@ fn parts_that_were_computed_apart_merge_to_what_one_run_gives() {
     let folder = tempfile::tempdir().expect("a folder");
     let place = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
     let common = ["compare", "arm-6dof", "--learner", "global", "--learner", "random"];
-    let study = |more: &[&str]| [&common[..], more].concat();
+    fn with<'a>(common: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
+        [common, more].concat()
+    }
     let part = |shard: &str, steps: &str, path: &str| {
         let more = ["--seeds", "3..9", "--steps", steps, "--shard", shard, "--part", path];
-        let output = body_schema(&study(&more));
+        let output = body_schema(&with(&common, &more));
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     };
     let parts = ["1/3", "2/3", "3/3"].map(|shard| (shard, place(&shard.replace('/', "-"))));
@@ -73,7 +75,7 @@ fn parts_that_were_computed_apart_merge_to_what_one_run_gives() {
         }
         value
     };
-    let whole = without_times(json(&study(&["--seeds", "3..9", "--steps", "12", "--json", "-"])));
+    let whole = without_times(json(&with(&common, &["--seeds", "3..9", "--steps", "12", "--json", "-"])));
     assert_eq!(without_times(json(&["merge", &three, &one, &two, "--json", "-"])), whole);
 
     // What does not fit together is named.
@@ -93,7 +95,7 @@ fn parts_that_were_computed_apart_merge_to_what_one_run_gives() {
             failure(&[&["merge"], &named.iter().map(|path| path.as_str()).collect::<Vec<_>>()[..]].concat());
         assert!(code == 2 && told.contains(words), "{code} {told}");
     }
-    let (code, told) = failure(&study(&["--shard", "4/3", "--part", &other]));
+    let (code, told) = failure(&with(&common, &["--shard", "4/3", "--part", &other]));
     assert!(code == 2 && told.contains("counted from 1 to 3"), "{told}");
 }
 

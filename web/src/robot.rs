@@ -177,13 +177,14 @@ fn accuracy(status: &Status) -> String {
     let Some(now) = status.expected_error_mm else {
         return "How accurate it is, this estimator cannot tell.".to_owned();
     };
+    let is_below = now < status.wanted_mm;
     let (now, wanted) = (length(now), length(status.wanted_mm));
     if let Some(enough) = &status.enough {
         let reached = length(enough.expected_error_mm);
         return format!("Enough: an error of {reached} is expected, {wanted} was wanted.");
     }
     let left = match (status.movements_left, status.model_error_mm) {
-        (Some(0), _) => ": some more movements will confirm it".to_owned(),
+        _ if is_below => ": it is enough once five movements in a row have confirmed it".to_owned(),
         (Some(1), _) => ": about one more movement".to_owned(),
         (Some(left), _) => format!(": about {left} more movements"),
         (None, Some(own)) if own > status.wanted_mm => {
@@ -266,6 +267,12 @@ mod tests {
     fn how_many_movements_are_left_is_said_or_why_it_cannot_be() {
         let mut status = status();
         assert_eq!(accuracy(&status), "An error of 1.80 mm is expected, 1.00 mm is wanted: about 7 more movements.");
+        status.expected_error_mm = Some(0.9);
+        assert!(
+            accuracy(&status)
+                .ends_with("1.00 mm is wanted: it is enough once five movements in a row have confirmed it.")
+        );
+        status.expected_error_mm = Some(1.8);
         (status.movements_left, status.model_error_mm) = (None, Some(1.2));
         assert!(
             accuracy(&status).ends_with("the model itself is off by 1.20 mm, so that no number of movements will do.")
