@@ -112,8 +112,11 @@ impl Case {
     }
 }
 
+/// Who takes a turn in every round, and what it does.
+type Contestant<'a> = (&'a str, Box<dyn FnMut() -> f64 + 'a>);
+
 /// Microseconds that each contestant took in each round.
-fn race(contestants: &mut [(&str, Box<dyn FnMut() -> f64 + '_>)]) -> Vec<Vec<f64>> {
+fn race(contestants: &mut [Contestant<'_>]) -> Vec<Vec<f64>> {
     let mut times = vec![Vec::with_capacity(ROUNDS); contestants.len()];
     for round in 0..=ROUNDS {
         for ((_, run), times) in contestants.iter_mut().zip(&mut times) {
@@ -143,7 +146,7 @@ fn main() {
         println!("\n{name}, m = {m}");
         let rows = DMatrix::from_fn(m, 96, |i, j| ((7 * i + 3 * j) % 11) as f64 - 5.0);
         let mut product = DMatrix::zeros(m, 96);
-        let mut contestants: Vec<(&str, Box<dyn FnMut() -> f64 + '_>)> = vec![
+        let mut contestants: Vec<Contestant<'_>> = vec![
             ("choosing", Box::new(|| case.choose())),
             ("criterion", Box::new(|| case.evaluate())),
             ("DIRECT-l", Box::new(|| case.search())),
