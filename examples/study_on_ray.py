@@ -59,6 +59,14 @@ def compute(command: list[str], parts: int, folder: Path) -> list[Path]:
     return list(paths.values())
 
 
+def hold(path: Path, study: dict) -> None:
+    """Keeps what the folder is about, and refuses to mix it with another study."""
+    text = json.dumps(study, indent=2)
+    if path.exists() and path.read_text(encoding="utf-8") != text:
+        sys.exit(f"{path.parent} holds parts of another study ({path.name} says which); name another folder with --out")
+    path.write_text(text, encoding="utf-8")
+
+
 def draw(study: dict, path: Path) -> None:
     """How many runs have converged by when, and the error of predictions on the way."""
     figure, (reached, errors) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
@@ -110,6 +118,7 @@ def main() -> None:
         command += ["--steps", str(arguments.steps)] if arguments.steps else []
         arguments.out.mkdir(parents=True, exist_ok=True)
         parts = arguments.parts or 4 * int(ray.cluster_resources()["CPU"])
+        hold(arguments.out / "study-of.json", {"command": command[1:], "parts": parts})
         paths = compute(command, parts, arguments.out)
     except ray.exceptions.RayTaskError as error:
         sys.exit(str(error.cause))

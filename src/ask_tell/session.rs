@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::{
     Answer, Ask, ChannelShape, Document, Event, Observation, Outcome, Prepared, Refusal, ReplayError, Setup,
-    SetupError, Suggestion, Suggestions, Told, VERSION, ledger::Ledger, limits::MOST_EVENTS,
+    SetupError, Suggestion, Suggestions, Told, VERSION, ledger::Ledger,
 };
 use crate::{
     estimation::Belief,
@@ -53,10 +53,6 @@ impl Session {
         events: Vec<Event>,
         tell: &mut dyn FnMut(StepReport),
     ) -> Result<Self, ReplayError> {
-        if events.len() > MOST_EVENTS {
-            let what = format!("a session has at most {MOST_EVENTS} events");
-            return Err(ReplayError::Event { index: MOST_EVENTS + 1, what });
-        }
         let Self { setup, ledger, .. } = Self::open(setup)?;
         tell(ledger.experiment.latest().clone());
         let ledger = ledger.replayed(&events, tell).map_err(|(index, what)| ReplayError::Event { index, what })?;

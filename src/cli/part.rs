@@ -15,10 +15,14 @@ use body_schema::experiment::{Comparison, Trace};
 use flate2::{Compression, bufread::GzDecoder, write::GzEncoder};
 use serde::{Deserialize, Serialize};
 
-use super::BadInput;
+use super::{BadInput, seeds::MOST as MOST_SEEDS};
 
 /// The form of these files.
 const FORM: u32 = 1;
+/// There is a seed for each.
+const MOST_PARTS: u64 = MOST_SEEDS;
+/// So many missing parts are named.
+const NAMED: usize = 12;
 
 /// One of so many parts, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,6 +32,10 @@ pub struct Shard {
 }
 
 impl Shard {
+    fn is_sound(self) -> bool {
+        (1..=self.of.min(MOST_PARTS)).contains(&self.index)
+    }
+
     /// The seeds of this part: dealt out one by one, so that all parts take about as long.
     pub fn of(self, seeds: impl Iterator<Item = u64>) -> Vec<u64> {
         let mine = |place: u64| place % self.of == self.index - 1;
@@ -41,9 +49,13 @@ impl FromStr for Shard {
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers = text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
         let (index, of) = numbers.ok_or("write the part and how many there are, as 1/4")?;
-        match (1..=of).contains(&index) {
-            true => Ok(Self { index, of }),
-            false => Err(format!("parts are counted from 1 to {of}")),
+        let shard = Self { index, of };
+        if of > MOST_PARTS {
+            Err(format!("there are at most {MOST_PARTS} parts"))
+        } else if shard.is_sound() {
+            Ok(shard)
+        } else {
+            Err(format!("parts are counted from 1 to {of}"))
         }
     }
 }
@@ -156,7 +168,8 @@ pub fn merged(paths: &[PathBuf]) -> Result<Comparison> {
         .map(|index| format!("{index}/{}", about.shard.of))
         .collect();
     if !missing.is_empty() {
-        return Err(BadInput(format!("parts are missing: {}; name them too", missing.join(", "))).into());
+        let (named, more) = (&missing[..missing.len().min(NAMED)], if missing.len() > NAMED { ", …" } else { "" });
+        return Err(BadInput(format!("parts are missing: {}{more}; name them too", named.join(", "))).into());
     }
     traces.sort_by_key(Trace::seed);
     Ok(Comparison::of(&about.scenario, about.steps, &traces))
@@ -181,7 +194,8 @@ fn read(path: &Path) -> Result<(About, Vec<Trace>)> {
         );
     }
     let about: About = serde_json::from_str(&first).map_err(|error| no_part(error.to_string()))?;
-    if about.shard.of == 0 || about.shard.index == 0 || about.seeds[0] > about.seeds[1] {
+    let [first, last] = about.seeds;
+    if !about.shard.is_sound() || first > last || last - first >= MOST_SEEDS {
         return Err(no_part("its numbers fit nothing".to_owned()).into());
     }
     let parsed = |line: std::io::Result<String>| -> Result<Trace, BadInput> {
@@ -200,7 +214,7 @@ mod tests {
     fn every_seed_is_dealt_to_one_part() {
         let parts = ["1/3", "2/3", "3/3"].map(|text| text.parse::<Shard>().expect("a part").of(5..=11));
         assert_eq!(parts, [vec![5, 8, 11], vec![6, 9], vec![7, 10]]);
-        for wrong in ["0/3", "4/3", "1", "a/b", "1/0", "-1/2"] {
+        for wrong in ["0/3", "4/3", "1", "a/b", "1/0", "-1/2", "1/10000000000"] {
             assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
         }
     }

@@ -24,7 +24,7 @@ impl Seeds {
 }
 
 /// More seeds than this are a slip of the finger.
-const MOST: u64 = 100_000;
+pub const MOST: u64 = 100_000;
 
 impl FromStr for Seeds {
     type Err = String;

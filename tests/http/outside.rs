@@ -205,6 +205,30 @@ async fn an_excluded_observation_is_as_if_it_had_never_been_told() {
     server.stop().await;
 }
 
+/// Whoever watches a session sees that nothing is waited for any more, though nobody asks.
+#[tokio::test]
+async fn a_suggestion_whose_time_has_run_out_is_told_to_be() {
+    let server = Server::start().await;
+    let session = server.open(robot::opening()).await;
+    posted(&server, &format!("{session}/suggestions"), json!({ "expires_s": 0.2 })).await;
+    let pending = async || server.get_json(&session).await["status"]["pending"].clone();
+    assert_eq!(pending().await, 1);
+    for _ in 0..100 {
+        if pending().await == 0 {
+            break;
+        }
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    assert_eq!(pending().await, 0);
+    // What is said of one that has just run out is refused, and ends it.
+    let soon = posted(&server, &format!("{session}/suggestions"), json!({ "expires_s": 0.05 })).await;
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    let outcome = format!("{session}/suggestions/{}/outcome", soon["suggestions"][0]["id"]);
+    problem(server.post(&outcome, json!({ "state": "abandoned" })).await, 409, None).await;
+    assert_eq!(pending().await, 0);
+    server.stop().await;
+}
+
 #[tokio::test]
 async fn what_is_wrong_is_named() {
     let server = Server::start().await;

@@ -12,7 +12,7 @@ import { drawsInSoftware, startViewer } from "./viewer.js";
 
 /** Where runs come from: a server, or files beside the page. */
 const source = await import(document.documentElement.dataset.source === "files" ? "./files.js" : "./session.js");
-const { arrangement, ask, Follower, sessionOf } = source;
+const { arrangement, ask, Follower } = source;
 
 /** Keys that mean something to the panel wherever on the page they are pressed. */
 const KEYS = [" ", "ArrowLeft", "ArrowRight", "Escape", "+", "=", "-", "?", "r", "s", "n", "t"];
@@ -92,17 +92,22 @@ const commands = {
 
   async find({ session: id }) {
     // A session that is gone is no error: its address says how to run it again.
-    const resource = await sessionOf(id);
-    if (resource === null) tell({ is: "session", session: null });
-    else if (resource === undefined) tell({ is: "refused", asked: "find", problem: { status: 0 } });
-    else follow(resource);
+    let resource;
+    try {
+      resource = await ask("GET", `/v1/sessions/${encodeURIComponent(id)}`);
+    } catch (error) {
+      if (error.status === 404) tell({ is: "session", session: null });
+      else tell({ is: "refused", asked: "find", problem: error.problem ?? { status: 0 } });
+      return;
+    }
+    follow(resource);
   },
 
   open({ scenario, seed, learners, ellipsoids }) {
-    const before = session;
     return request("open", "POST", "/v1/sessions", { scenario, seed, learners, ellipsoids }, (next) => {
       // The old one goes only after the new one has come, and only if it was opened here.
-      if (before !== null && kept(OWN) === before) ask("DELETE", `/v1/sessions/${before}`).catch(() => {});
+      const before = kept(OWN);
+      if (before !== null && before !== next.id) ask("DELETE", `/v1/sessions/${before}`).catch(() => {});
       keep(OWN, next.id);
       follow(next);
     });
@@ -203,7 +208,7 @@ function follow(resource) {
     lost: (seconds) => tell({ is: "lost", seconds }),
     ended: (failure, unseen) => tell({ is: "ended", failure, unseen }),
     begun: follow,
-  }, resource.world === "outside");
+  }, resource.world === "outside" ? resource.recording : null);
 }
 
 /** Tells the panel on which side of it the scene is. */

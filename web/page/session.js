@@ -79,20 +79,20 @@ export class Follower {
   #socket = null;
   #timer = 0;
   #stopped = false;
-  #recordsAnew;
+  #recording;
 
   /**
    * @param {string} id
    * @param {{message: Function, part: Function, connected: Function, lost: Function, ended: Function, begun: Function}} on
    *   lost(seconds) says when it is tried again, ended(failure, unseen) why there is nothing more, begun(resource) that all
    *   begins anew
-   * @param {boolean} recordsAnew whether the session may record itself anew while nobody is connected, or when what was told
-   *   to it counts otherwise
+   * @param {string | null} recording the id of its recording, if it may be recorded anew: while nobody is connected, or when
+   *   what was told to it counts otherwise
    */
-  constructor(id, on, recordsAnew) {
+  constructor(id, on, recording) {
     this.#id = id;
     this.#on = on;
-    this.#recordsAnew = recordsAnew;
+    this.#recording = recording;
     this.#connect();
   }
 
@@ -140,14 +140,18 @@ export class Follower {
   }
 
   async #closed(code) {
-    if (code === CLOSE_DELETED || code === CLOSE_FAILED) return this.#end();
+    const mayBeAnew = this.#recording !== null;
+    // One that may be recorded anew may be there again, whatever ended its last life.
+    if (!mayBeAnew && (code === CLOSE_DELETED || code === CLOSE_FAILED)) return this.#end();
     // A refused connection does not say why: a session that is gone is asked for in vain.
     const resource = await sessionOf(this.#id);
     if (this.#stopped) return;
     if (resource === null) return this.#on.ended(null, true);
-    if (resource !== undefined && this.#recordsAnew) return this.#on.begun(resource);
+    if (mayBeAnew && resource !== undefined && resource.recording !== this.#recording) return this.#on.begun(resource);
     const wait = BACK_OFF_MS[Math.min(this.#attempt++, BACK_OFF_MS.length - 1)];
     this.#on.lost(wait / 1000);
-    this.#timer = setTimeout(() => (this.#recordsAnew ? this.#closed(code) : this.#connect()), wait);
+    // Of another recording, the part that comes next is not the next.
+    const isUnknown = mayBeAnew && resource === undefined;
+    this.#timer = setTimeout(() => (isUnknown ? this.#closed(code) : this.#connect()), wait);
   }
 }

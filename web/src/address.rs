@@ -152,7 +152,7 @@ impl Settings {
         if let Some((a, b)) = self.joints {
             add("joints", &format!("{a},{b}"));
         }
-        if self.ellipsoids != usual.ellipsoids {
+        if self.ellipsoids != usual.ellipsoids && !self.robot {
             add("ellipsoids", &self.ellipsoids);
         }
         query

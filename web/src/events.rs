@@ -74,11 +74,24 @@ impl Panel {
 
     /// There is no session of the address's id.
     fn without_session(&mut self) {
+        if self.session.is_some() {
+            self.stay("That session is gone: it was deleted, or the server was started anew without it.".to_owned());
+            self.ask(Command::Robots);
+            return;
+        }
         self.notice(match self.settings.robot {
             true => "This server has no session of that address: it was deleted, or another server has it.".to_owned(),
             false => "The session of this address is gone; its run is computed again.".to_owned(),
         });
         self.open(self.settings.first_step());
+    }
+
+    /// Goes on with the session that is shown, since there is no other.
+    fn stay(&mut self, why: String) {
+        (self.opening, self.restoring, self.wanted) = (false, None, None);
+        self.settings.robot = self.is_outside();
+        self.settings.session = self.session.as_ref().map(|session| session.id.clone());
+        self.notice(why);
     }
 
     /// Shows what an earlier address showed: a step of this run, or another run.
@@ -145,7 +158,6 @@ impl Panel {
     pub(crate) fn open(&mut self, step: u64) {
         self.pause();
         self.opening = true;
-        self.settings.robot = false;
         // Movements that the visitor chose cannot be computed again.
         let is_game = self.settings.learners.iter().any(|name| name == HUMAN);
         let step = if is_game { 0 } else { step };
@@ -196,9 +208,10 @@ impl Panel {
                 match problem.field.as_deref() {
                     Some(field) if self.session.is_none() => self.fall_back(field, &sentence),
                     _ if self.session.is_none() => self.link = Link::Unreachable(sentence),
-                    _ => self.notice(format!("No new session: {sentence}.")),
+                    _ => self.stay(format!("No new session: {sentence}.")),
                 }
             }
+            "find" if self.session.is_some() => self.stay(format!("That session cannot be shown: {sentence}.")),
             "find" => {
                 self.opening = false;
                 self.link = Link::Unreachable(sentence);

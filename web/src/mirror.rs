@@ -32,7 +32,9 @@ impl Panel {
             Captioned { name: learner.name.clone(), errors: errors.join(", "), colour: [red, green, blue] }
         });
         let size = ELLIPSOIDS.iter().find(|(name, _)| *name == self.settings.ellipsoids).map_or("", |(_, size)| size);
-        let ellipsoids = format!("where a learner thinks a joint may be ({size})");
+        // How large those of a robot elsewhere are was chosen by whoever opened its session.
+        let size = if self.is_outside() { String::new() } else { format!(" ({size})") };
+        let ellipsoids = format!("where a learner thinks a joint may be{size}");
         let sees =
             if description.cameras.is_empty() { "where the hand was seen" } else { "from a camera to what it saw" };
         let (truth, seen) = (description.truth.is_some(), sees.to_owned());

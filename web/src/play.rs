@@ -199,7 +199,11 @@ impl Panel {
         if self.is_outside() {
             return;
         }
-        if self.scenarios.is_empty() {
+        let asked = self.settings.session.clone().filter(|_| self.settings.robot && self.session.is_none());
+        if let Some(session) = asked.filter(|_| !self.scenarios.is_empty() && !self.opening) {
+            self.link = Link::Loading;
+            self.find(session);
+        } else if self.scenarios.is_empty() {
             self.link = Link::Loading;
             self.ask(Command::Scenarios);
         } else if !self.opening {

@@ -129,6 +129,55 @@ fn a_session_that_was_deleted_is_left_for_the_explorer() {
     assert!(page.has("This server has no session of that address"));
 }
 
+/// What cannot be shown leaves what is shown alone.
+#[test]
+fn another_session_that_cannot_be_had_changes_nothing() {
+    let mut robot = after(4);
+    let mut page = opened("", &mut robot);
+    let full = json!({ "status": 503, "title": "Full", "detail": "as many sessions are watched as there may be" });
+    page.click("Explorer");
+    page.tell(json!({ "is": "refused", "asked": "open", "problem": full }));
+    assert!(page.has("No new session: as many sessions are watched"));
+    let still = |page: &mut Page, robot: &mut Robot, cursor: u64| {
+        robot.suggest(1);
+        robot.carry_out(true);
+        pass_on(page, robot);
+        let panel = page.harness.state();
+        assert!(panel.is_outside() && panel.is_ready() && panel.cursor == cursor, "it follows: {}", panel.cursor);
+        assert_eq!(panel.settings.query(), format!("v=1&session={ID}"));
+        let asked = page.commands();
+        assert!(!asked.iter().any(|one| matches!(one, Command::Step { .. })), "{asked:?}");
+    };
+    still(&mut page, &mut robot, 5);
+    let mut other = robot.resource();
+    other["id"] = json!("another");
+    page.tell(json!({ "is": "robots", "sessions": [other] }));
+    for answer in
+        [json!({ "is": "refused", "asked": "find", "problem": full }), json!({ "is": "session", "session": null })]
+    {
+        page.scroll_to("Robot");
+        page.click("Robot");
+        page.click("two-joints\n2 joints · 5 observations · session another");
+        assert!(page.commands().contains(&Command::Find { session: "another".to_owned() }));
+        page.tell(answer);
+        let cursor = page.harness.state().cursor + 1;
+        still(&mut page, &mut robot, cursor);
+    }
+    assert!(page.has("That session cannot be shown") && page.has("That session is gone"));
+}
+
+#[test]
+fn a_session_that_could_not_be_had_is_asked_for_again() {
+    let mut page = Page::open(&format!("?v=1&session={ID}"));
+    page.tell(support::Server::scenarios());
+    page.commands();
+    let full = json!({ "status": 503, "title": "Full", "detail": "the server's memory is full" });
+    page.tell(json!({ "is": "refused", "asked": "find", "problem": full }));
+    assert!(page.has("the server's memory is full"));
+    page.click("Reset");
+    assert_eq!(page.commands(), [Command::Find { session: ID.to_owned() }]);
+}
+
 #[test]
 fn robots_are_offered_beside_the_scenarios() {
     let mut robot = after(2);

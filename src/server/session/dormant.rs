@@ -21,7 +21,7 @@ use super::{
     registry::{END_WITHIN, no_engine, spawn},
 };
 use crate::{
-    ask_tell::{self, ReplayError, Setup, VERSION},
+    ask_tell::{self, MOST_EVENTS, ReplayError, Setup, VERSION},
     scenario::WorldKind,
     server::{
         aside::aside,
@@ -59,6 +59,10 @@ impl Sessions {
         if let Some(found) = version.filter(|version| *version > VERSION) {
             let newer = ReplayError::Version { found, known: VERSION };
             return Err(Problem::new(Kind::InvalidValue, newer.to_string()).field("version"));
+        }
+        if events.len() > MOST_EVENTS {
+            let detail = format!("{} events are more than the {MOST_EVENTS} that a session may have", events.len());
+            return Err(Problem::new(Kind::InvalidValue, detail).field("events"));
         }
         let known = Arc::new(Known::new(Uuid::new_v4(), now_s()));
         let origin = Origin::New(Setup { calibration, agent, seed }, Shown { ellipsoids }, events);

@@ -7,7 +7,7 @@ use std::{
     collections::BTreeMap,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{Arc, atomic::Ordering, mpsc},
-    time::SystemTime,
+    time::{Duration, SystemTime},
 };
 
 use tokio::sync::{OwnedSemaphorePermit, oneshot};
@@ -29,6 +29,9 @@ use crate::{
         store::{Shown, Store, Stored},
     },
 };
+
+/// How soon at least, and how late at most, it is looked again whether the time of a suggestion has run out, seconds.
+const LOOK_AGAIN_S: [f64; 2] = [0.5, 3600.0];
 
 /// Something to be done by the engine. What it returns tells whoever asked.
 pub(super) type Job = Box<dyn FnOnce(&mut Elsewhere) -> Reply + Send>;
@@ -127,7 +130,7 @@ impl Elsewhere {
         loop {
             let job = jobs.recv_timeout(COMPLETE_AFTER).or_else(|_| {
                 drop(self.complete());
-                jobs.recv()
+                self.idle(jobs)
             });
             let Ok(job) = job else { return };
             if self.shared.stop.is_cancelled() {
@@ -145,6 +148,20 @@ impl Elsewhere {
         }
     }
 
+    /// Waits for the next job, and ends suggestions whose time runs out meanwhile.
+    fn idle(&mut self, jobs: &mpsc::Receiver<Job>) -> Result<Job, mpsc::RecvError> {
+        loop {
+            let due = self.session.pending().filter_map(|suggestion| suggestion.expires_at_s).min_by(f64::total_cmp);
+            let Some(due) = due else { return jobs.recv() };
+            match jobs.recv_timeout(Duration::from_secs_f64((due - now_s()).clamp(LOOK_AGAIN_S[0], LOOK_AGAIN_S[1]))) {
+                Ok(job) => return Ok(job),
+                Err(mpsc::RecvTimeoutError::Disconnected) => return Err(mpsc::RecvError),
+                // What cannot be written is tried again.
+                Err(mpsc::RecvTimeoutError::Timeout) => drop(self.expire()),
+            }
+        }
+    }
+
     /// The client's pending suggestions, topped up to as many as it asks for.
     pub(in crate::server) fn suggest(&mut self, ask: &Ask) -> Result<Suggestions, Problem> {
         self.has_room()?;
@@ -159,6 +176,8 @@ impl Elsewhere {
         state: Outcome,
         reason: Option<&str>,
     ) -> Result<Suggestion, Problem> {
+        // One whose time has run out is told to be, and not pending any more for anybody.
+        self.expire()?;
         let prepared = self.session.prepare_outcome(id, state, reason, Some(now_s()))?;
         self.commit(prepared, None)
     }
