@@ -71,6 +71,7 @@ pub mod experiment;
 #[cfg(feature = "app")]
 pub mod export;
 pub mod kinematics;
+mod lanes;
 pub mod model;
 pub mod optimize;
 #[cfg(feature = "app")]

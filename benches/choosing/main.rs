@@ -14,7 +14,11 @@
 //! | product | P (m × m) times m × 96 for every 32 candidates: the floor of any method that multiplies by P |
 //! | NLopt | `GN_DIRECT_L` with the same budget and the posterior's trace by the textbook's formula, with our Jacobian |
 //!
-//! P is that of the scenario's prior after ten random movements, hence dense.
+//! P is that of the scenario's prior after ten random movements, hence dense. Below the tables stands how the cost of one evaluation
+//! grows with joints and with the budget.
+//!
+//! The widest vector instructions that the processor has are used. What it would cost with fewer:
+//! `RUSTFLAGS="--cfg disable_dispatch_avx512 --cfg disable_dispatch_avx2" cargo bench …` takes SSE alone.
 
 use std::{hint::black_box, time::Instant};
 
@@ -22,7 +26,7 @@ use body_schema::{
     estimation::Belief,
     model::jacobian,
     optimize::{Direct, Settings, Variant},
-    scenario::builtin,
+    scenario::{Scenario, builtin},
     selection::{Actions, Active, Criterion, History, Minimiser, Policy, Situation, Weights},
     sensing::Rig,
 };
@@ -53,8 +57,7 @@ fn innovation(belief: &Belief, covariance: &DMatrix<f64>, posture: &[f64]) -> (M
 }
 
 impl Case {
-    fn new(name: &str) -> Self {
-        let scenario = builtin(name).expect("built in");
+    fn new(scenario: &Scenario) -> Self {
         let layout = scenario.robot.layout.clone();
         let prior_sd = scenario.prior.standard_deviations(&layout);
         let weights = scenario.weights();
@@ -78,9 +81,9 @@ impl Case {
         self.belief.covariance.as_ref().expect("a covariance")
     }
 
-    /// The criterion at the posture that [`Active`] chooses.
-    fn choose(&self) -> f64 {
-        let active = Active::new(self.weights.clone(), Minimiser::Direct(SETTINGS));
+    /// The criterion at the posture that [`Active`] chooses by so many evaluations.
+    fn choose(&self, max_evaluations: usize) -> f64 {
+        let active = Active::new(self.weights.clone(), Minimiser::Direct(Settings { max_evaluations, ..SETTINGS }));
         let history = History::default();
         let situation =
             Situation { belief: &self.belief, actions: &self.actions, history: &history, constraints: None };
@@ -138,16 +141,54 @@ fn spread(values: impl Iterator<Item = f64>) -> [f64; 3] {
     [2, 1, 3].map(|quarter| sorted[(sorted.len() - 1) * quarter / 4])
 }
 
+/// A chain of revolute joints 0.1 m apart, whose axes turn.
+fn chain(joints: usize) -> Scenario {
+    let axes = ["[0.0, 0.0, 1.0]", "[0.0, 1.0, 0.0]", "[1.0, 0.0, 0.0]"];
+    let joint = |index: usize| {
+        let (axis, x) = (axes[index % 3], 0.1 * index as f64);
+        format!(
+            "[[robot.joint]]\nname = \"joint_{index}\"\nkind = \"revolute\"\naxis = {axis}\npoint_m = [{x:?}, 0.02, 0.0]\n\
+             limits_deg = [-90.0, 90.0]\n"
+        )
+    };
+    let text = format!(
+        "name = \"chain\"\ntitle = \"A chain\"\nsteps = 10\n[robot]\nmarker_m = [{:?}, 0.05, 0.05]\nlearn_marker = false\n{}\
+         [prior]\ndirection_rad = 0.6\npoint_m = 0.4\n\
+         [filter]\nmeasurement_variance_m2 = 0.005\nstabilising_noise = {{ variance = 0.01, first_step = 1, every = 1 }}\n\
+         [selection]\nvariant = \"direct-l\"\nepsilon = 1e-4\nevaluations = 300\n\
+         units = \"characteristic_length\"\ncharacteristic_length_m = 1.0\n\
+         [thresholds]\norientation_deg = 5.0\nlocation_m = 0.02\n\
+         [[learner]]\nname = \"active\"\nestimator = \"rls\"\npolicy = \"active\"\n",
+        0.1 * joints as f64,
+        (0..joints).map(joint).collect::<String>(),
+    );
+    Scenario::parse("chain.toml", &text, &|_| Err("no other file".into())).expect("a scenario")
+}
+
+/// What grows, and what one evaluation costs of it beside the first of its kind.
+fn growth(title: &str, mut contestants: Vec<Contestant<'_>>, evaluations: impl Fn(usize) -> usize) {
+    println!("\n{title}: microseconds for one evaluation, and as a multiple of the first");
+    let mut times = race(&mut contestants);
+    for (index, times) in times.iter_mut().enumerate() {
+        times.iter_mut().for_each(|time| *time /= evaluations(index) as f64);
+    }
+    for ((name, _), times_of) in contestants.iter().zip(&times) {
+        let [median, low, high] = spread(times_of.iter().copied());
+        let [ratio, least, most] = spread(times_of.iter().zip(&times[0]).map(|(time, first)| time / first));
+        println!("  {name:10} {median:8.4} ({low:.4} to {high:.4})   {ratio:6.3} ({least:.3} to {most:.3})");
+    }
+}
+
 fn main() {
     println!("microseconds for 600 evaluations, and as a multiple of choosing: median (quartiles) of {ROUNDS} rounds");
     for name in ["arm-6dof", "arm-12dof", "arm-20dof"] {
-        let case = Case::new(name);
+        let case = Case::new(&builtin(name).expect("built in"));
         let m = case.covariance().nrows();
         println!("\n{name}, m = {m}");
         let rows = DMatrix::from_fn(m, 96, |i, j| ((7 * i + 3 * j) % 11) as f64 - 5.0);
         let mut product = DMatrix::zeros(m, 96);
         let mut contestants: Vec<Contestant<'_>> = vec![
-            ("choosing", Box::new(|| case.choose())),
+            ("choosing", Box::new(|| case.choose(SETTINGS.max_evaluations))),
             ("criterion", Box::new(|| case.evaluate())),
             ("DIRECT-l", Box::new(|| case.search())),
             ("product", Box::new(|| case.multiply(&rows, &mut product))),
@@ -161,6 +202,26 @@ fn main() {
             println!("  {name:10} {median:8.1} ({low:.1} to {high:.1})   {ratio:6.3} ({least:.3} to {most:.3})");
         }
         #[cfg(feature = "nlopt")]
-        println!("  least value found: ours {:.6e}, NLopt's {:.6e}", case.choose(), textbook::minimise(&case));
+        println!(
+            "  least value found: ours {:.6e}, NLopt's {:.6e}",
+            case.choose(SETTINGS.max_evaluations),
+            textbook::minimise(&case)
+        );
     }
+
+    let joints = [12, 3, 6, 20, 30, 40];
+    let names = joints.map(|joints| format!("{joints} joints"));
+    let cases = joints.map(|joints| Case::new(&chain(joints)));
+    let choosing = cases.iter().zip(&names);
+    let choosing =
+        choosing.map(|(case, name)| (name.as_str(), Box::new(|| case.choose(600)) as Box<dyn FnMut() -> f64>));
+    growth("joints", choosing.collect(), |_| 600);
+
+    let budgets = [600, 150, 300, 1_200, 2_400];
+    let names = budgets.map(|budget| budget.to_string());
+    let case = &cases[0];
+    let choosing = budgets.iter().zip(&names);
+    let choosing =
+        choosing.map(|(budget, name)| (name.as_str(), Box::new(|| case.choose(*budget)) as Box<dyn FnMut() -> f64>));
+    growth("evaluations, 12 joints", choosing.collect(), |index| budgets[index]);
 }

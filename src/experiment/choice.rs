@@ -207,7 +207,7 @@ impl Choice {
         limits: &JointBox,
         values: [Option<f64>; 2],
     ) -> Result<Self, ChoiceError> {
-        let Search { settings, partition } = search;
+        let (settings, partition) = (search.settings(), search.partition());
         let searched = partition.searched(limits);
         let point = searched.to_unit(&movement.configuration);
         let partition = partition.choosing(&point);

@@ -99,9 +99,17 @@ impl JointBox {
     /// The configuration that `point` stands for, one coordinate per joint. It is within the limits whatever rounding
     /// does; a coordinate below 0 or above 1 means the limit.
     pub fn from_unit(&self, point: &[f64]) -> Vec<f64> {
+        let mut configuration = vec![0.0; self.dimension()];
+        self.write_from_unit(point, &mut configuration);
+        configuration
+    }
+
+    /// The same, written to `configuration`.
+    pub(crate) fn write_from_unit(&self, point: &[f64], configuration: &mut [f64]) {
         debug_assert_eq!(point.len(), self.dimension(), "one coordinate per joint");
-        let position = |(x, &(lower, upper)): (&f64, &(f64, f64))| (lower + x * (upper - lower)).clamp(lower, upper);
-        point.iter().zip(&self.joints).map(position).collect()
+        for ((position, x), &(lower, upper)) in configuration.iter_mut().zip(point).zip(&self.joints) {
+            *position = (lower + x * (upper - lower)).clamp(lower, upper);
+        }
     }
 
     /// Whether `configuration` has one position per joint, each within the limits (the limits themselves count). A

@@ -17,10 +17,11 @@
 //! | numbers | as many | x + δ |
 
 use nalgebra::{
-    DMatrix, DVector, DVectorView, Isometry3, Matrix2, Matrix3, Point3, Translation3, UnitVector3, Vector3,
+    DMatrix, DVector, DVectorView, Isometry3, Matrix2, Matrix3, Matrix4, Point3, Translation3, UnitVector3, Vector2,
+    Vector3, Vector4,
 };
 
-use crate::kinematics::{Joint, chart, rotation};
+use crate::kinematics::{Joint, Line, chart, rotation};
 
 /// A value of one block of parameters.
 #[derive(Clone, Debug, PartialEq)]
@@ -169,50 +170,106 @@ impl Element {
     }
 }
 
+impl Element {
+    /// r of the [displacement](Self::displacement) alone.
+    pub(crate) fn displaced(&self, other: &Self) -> Option<DVector<f64>> {
+        match (self, other) {
+            (Self::Axis(guess), Self::Axis(joint)) if guess.kind() == joint.kind() => {
+                Some(axis_displaced(guess, joint))
+            }
+            _ => self.local(other),
+        }
+    }
+}
+
 /// The orthogonal part of the inverse left Jacobian: exp(−\[ω\]×/2).
 fn half_turned(omega: &Vector3<f64>) -> Matrix3<f64> {
     nalgebra::Rotation3::from_scaled_axis(-0.5 * omega).into_inner()
 }
 
+/// The angle from one direction to another; opposite ones are π apart, along which great circle is anybody's choice.
+fn turned(w0: &UnitVector3<f64>, w: &UnitVector3<f64>) -> Vector2<f64> {
+    chart::local_direction(w0, w).unwrap_or_else(|| Vector2::new(std::f64::consts::PI, 0.0))
+}
+
+/// r of an axis.
+fn axis_displaced(guess: &Joint, joint: &Joint) -> DVector<f64> {
+    match (guess, joint) {
+        (Joint::Revolute(guess), Joint::Revolute(line)) => {
+            DVector::from_column_slice(line_displaced(guess, line).as_slice())
+        }
+        _ => DVector::from_column_slice(turned(&guess.direction(), &joint.direction()).as_slice()),
+    }
+}
+
+/// r of a line.
+pub(super) fn line_displaced(guess: &Line, line: &Line) -> Vector4<f64> {
+    let parallel = Parallel::new(&line.direction, &guess.direction);
+    displaced_by(guess, line, &parallel)
+}
+
+fn displaced_by(guess: &Line, line: &Line, parallel: &Parallel) -> Vector4<f64> {
+    let offset = line.point - guess.point;
+    let across = offset - line.direction.into_inner() * line.direction.dot(&offset);
+    let shift = chart::basis(&guess.direction).transpose() * (parallel.matrix * across);
+    let angle = turned(&guess.direction, &line.direction);
+    Vector4::new(shift.x, shift.y, angle.x, angle.y)
+}
+
+/// The displacement of a line: its value, derivative and slope.
+pub(super) fn line_displacement(guess: &Line, line: &Line) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64>) {
+    let (w0, w) = (guess.direction, line.direction);
+    let (basis0, basis) = (chart::basis(&w0), chart::basis(&w));
+    let parallel = Parallel::new(&w, &w0);
+    let value = displaced_by(guess, line, &parallel);
+    let (carried, exact) = directions(&w0, &w, &parallel);
+    let offset = line.point - guess.point;
+    let along = w.dot(&offset);
+    let across = offset - w.into_inner() * along;
+    let mut slope = Matrix4::zeros();
+    // ∂a/∂(a, d) = [I, −(w·offset) I]: turning the line about its pivot carries it past the guess.
+    slope.fixed_view_mut::<2, 2>(0, 0).copy_from(&carried);
+    slope.fixed_view_mut::<2, 2>(0, 2).copy_from(&(carried * -along));
+    let mut derivative = slope;
+    slope.fixed_view_mut::<2, 2>(2, 2).copy_from(&carried);
+    derivative.fixed_view_mut::<2, 2>(2, 2).copy_from(&exact);
+    for k in 0..2 {
+        let e: Vector3<f64> = basis.column(k).into_owned();
+        // The parallel transport turns as well.
+        let column = basis0.transpose() * (parallel.along(&e) * across);
+        for row in 0..2 {
+            derivative[(row, 2 + k)] += column[row];
+        }
+    }
+    (value, derivative, slope)
+}
+
+/// How the angle from w₀ to w changes with w, by its coordinates: carried along in parallel, and exactly, where that is finite.
+fn directions(w0: &UnitVector3<f64>, w: &UnitVector3<f64>, parallel: &Parallel) -> (Matrix2<f64>, Matrix2<f64>) {
+    let carried = chart::basis(w0).transpose() * parallel.matrix * chart::basis(w);
+    let exact = chart::direction_transport(w0, &turned(w0, w), w).try_inverse();
+    let finite = |matrix: &Matrix2<f64>| matrix.iter().all(|x| x.is_finite());
+    (carried, exact.filter(finite).unwrap_or(carried))
+}
+
 /// The displacement of an axis.
 fn axis(guess: &Joint, joint: &Joint) -> Displacement {
-    let (w0, w) = (guess.direction(), joint.direction());
-    let (basis0, basis) = (chart::basis(&w0), chart::basis(&w));
-    // Opposite directions are π apart; along which great circle is anybody's choice.
-    let angle = chart::local_direction(&w0, &w).unwrap_or_else(|| nalgebra::Vector2::new(std::f64::consts::PI, 0.0));
-    let parallel = Parallel::new(&w, &w0);
-    let carried = basis0.transpose() * parallel.matrix * basis;
-    let exact = chart::direction_transport(&w0, &angle, &w).try_inverse();
-    let dimension = joint.degrees_of_freedom();
-    let directions = dimension - 2;
-    let mut value = DVector::zeros(dimension);
-    let mut slope = DMatrix::zeros(dimension, dimension);
-    value.fixed_rows_mut::<2>(directions).copy_from(&angle);
-    slope.fixed_view_mut::<2, 2>(directions, directions).copy_from(&carried);
-    let mut derivative = slope.clone();
-    let finite = |matrix: &Matrix2<f64>| matrix.iter().all(|x| x.is_finite());
-    if let Some(exact) = exact.filter(finite) {
-        derivative.fixed_view_mut::<2, 2>(directions, directions).copy_from(&exact);
-    }
-    if let (Joint::Revolute(guess), Joint::Revolute(line)) = (guess, joint) {
-        let offset = line.point - guess.point;
-        let along = w.dot(&offset);
-        let across = offset - w.into_inner() * along;
-        value.fixed_rows_mut::<2>(0).copy_from(&(basis0.transpose() * (parallel.matrix * across)));
-        // ∂a/∂(a, d) = [I, −(w·offset) I]: turning the line about its pivot carries it past the guess.
-        for matrix in [&mut slope, &mut derivative] {
-            matrix.fixed_view_mut::<2, 2>(0, 0).copy_from(&carried);
-            matrix.fixed_view_mut::<2, 2>(0, 2).copy_from(&(carried * -along));
+    let dynamic = |matrix: &[f64]| {
+        let n = matrix.len().isqrt();
+        DMatrix::from_column_slice(n, n, matrix)
+    };
+    let value = axis_displaced(guess, joint);
+    let (derivative, slope) = match (guess, joint) {
+        (Joint::Revolute(guess), Joint::Revolute(line)) => {
+            let (_, derivative, slope) = line_displacement(guess, line);
+            (dynamic(derivative.as_slice()), dynamic(slope.as_slice()))
         }
-        for k in 0..2 {
-            let e: Vector3<f64> = basis.column(k).into_owned();
-            // The parallel transport turns as well.
-            let column = basis0.transpose() * (parallel.along(&e) * across);
-            for row in 0..2 {
-                derivative[(row, 2 + k)] += column[row];
-            }
+        _ => {
+            let (w0, w) = (guess.direction(), joint.direction());
+            let (carried, exact) = directions(&w0, &w, &Parallel::new(&w, &w0));
+            (dynamic(exact.as_slice()), dynamic(carried.as_slice()))
         }
-    }
+    };
     Displacement { value, derivative, slope }
 }
 

@@ -94,8 +94,9 @@ pub struct Pass<'a> {
     twists: Vec<Twist>,
 }
 
+/// f: what moves θ in proportion to a parameter.
 #[derive(Clone, Copy, Debug)]
-enum Term {
+pub(super) enum Term {
     Offset,
     Ratio,
     Sine,

@@ -20,12 +20,16 @@
 use std::{f64::consts::PI, ops::Range};
 
 use nalgebra::{
-    Cholesky, DMatrix, DVector, Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, UnitVector3, Vector3,
+    Cholesky, DMatrix, DVector, Isometry3, Matrix4, Point3, Quaternion, Translation3, UnitQuaternion, UnitVector3,
+    Vector3,
 };
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
-use super::{Block, Element, Layout, Quantity, State};
+use super::{
+    Block, Element, Layout, Quantity, State,
+    element::{line_displaced, line_displacement},
+};
 use crate::kinematics::{Joint, Line, chart};
 
 /// What is known of the learned blocks of a state before any measurement.
@@ -39,8 +43,10 @@ pub struct Prior {
     information: DMatrix<f64>,
     /// L with L Lᵀ = P₀.
     root: DMatrix<f64>,
-    /// Pairs of blocks around the guess, by their places, whose information is not zero.
+    /// Pairs of blocks around the guess, by their places, whose information is not zero, but for those of lines alone.
     coupled: Vec<(usize, usize)>,
+    /// By block: the information of a line whose errors have nothing to do with those of any other block.
+    lines: Vec<Option<Matrix4<f64>>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,7 +136,15 @@ impl Prior {
                 }
             }
         }
-        Ok(Self { guess, blocks, covariance, information, root: cholesky.l(), coupled })
+        let line_alone = |(index, (block, range, knowledge)): (usize, &(Block, Range<usize>, Knowledge))| {
+            let is_line = matches!(block.of(&guess), Element::Axis(Joint::Revolute(_)));
+            let alone = coupled.iter().all(|(i, j)| i == j || (*i != index && *j != index));
+            (is_line && alone && *knowledge == Knowledge::Around)
+                .then(|| information.fixed_view::<4, 4>(range.start, range.start).into_owned())
+        };
+        let lines: Vec<Option<Matrix4<f64>>> = blocks.iter().enumerate().map(line_alone).collect();
+        coupled.retain(|(i, _)| lines[*i].is_none());
+        Ok(Self { guess, blocks, covariance, information, root: cholesky.l(), coupled, lines })
     }
 
     /// The state to start from. Blocks that may be anywhere mean nothing in it.
@@ -165,14 +179,35 @@ impl Prior {
     /// in the chart at `state` are added to `normal`, if wanted: the descent exactly, the information by Gauss and Newton.
     pub fn cost(&self, state: &State, mut normal: Option<Derivatives<'_>>) -> f64 {
         let mut cost = 0.0;
-        let mut displaced = Vec::with_capacity(self.blocks.len());
-        for (block, range, knowledge) in &self.blocks {
+        let (mut displaced, mut slopes) =
+            (Vec::with_capacity(self.blocks.len()), Vec::with_capacity(self.blocks.len()));
+        for ((block, range, knowledge), alone) in self.blocks.iter().zip(&self.lines) {
+            if let (Some(information), Block::Axis(joint)) = (alone, block)
+                && let (Some(guess), Some(line)) = (self.guess.joints[*joint].line(), state.joints[*joint].line())
+            {
+                let normal = normal.as_mut().map(|(i, d)| (&mut **i, &mut **d));
+                cost += line_cost(guess, line, information, range.start, normal);
+                displaced.push(None);
+                slopes.push(None);
+                continue;
+            }
             let element = block.of(state);
             match knowledge {
-                Knowledge::Around => displaced.push(block.of(&self.guess).displacement(&element)),
+                Knowledge::Around => {
+                    let guess = block.of(&self.guess);
+                    if normal.is_none() {
+                        displaced.push(guess.displaced(&element));
+                        continue;
+                    }
+                    let found = guess.displacement(&element);
+                    let (value, of) = found.map(|of| (of.value, (of.derivative, of.slope))).unzip();
+                    displaced.push(value);
+                    slopes.push(of);
+                }
                 Knowledge::Anywhere(bound) => {
                     cost += anywhere_cost(&element, range, *bound, normal.as_mut().map(|(i, d)| (&mut **i, &mut **d)));
                     displaced.push(None);
+                    slopes.push(None);
                 }
             }
         }
@@ -180,13 +215,15 @@ impl Prior {
             let (Some(a), Some(b)) = (&displaced[i], &displaced[j]) else { return f64::INFINITY };
             let (rows, columns) = (&self.blocks[i].1, &self.blocks[j].1);
             let shared = self.information.view((rows.start, columns.start), (rows.len(), columns.len()));
-            let pull = shared * &b.value;
-            cost += 0.5 * a.value.dot(&pull);
-            if let Some((information, descent)) = &mut normal {
+            let pull = shared * b;
+            cost += 0.5 * a.dot(&pull);
+            if let Some((information, descent)) = &mut normal
+                && let (Some((derivative, slope)), Some((_, other))) = (&slopes[i], &slopes[j])
+            {
                 let mut place = information.view_mut((rows.start, columns.start), (rows.len(), columns.len()));
-                place += a.slope.transpose() * shared * &b.slope;
+                place.gemm_tr(1.0, slope, &(shared * other), 1.0);
                 let mut place = descent.rows_mut(rows.start, rows.len());
-                place -= a.derivative.transpose() * pull;
+                place.gemv_tr(-1.0, derivative, &pull, 1.0);
             }
         }
         cost
@@ -208,6 +245,27 @@ impl Prior {
 
 fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
     (0..matrix.ncols()).all(|column| (0..matrix.nrows()).all(|row| row == column || matrix[(row, column)] == 0.0))
+}
+
+/// The cost of a line around a guess with this information, and its derivatives from a coordinate on.
+fn line_cost(
+    guess: &Line,
+    line: &Line,
+    information: &Matrix4<f64>,
+    start: usize,
+    normal: Option<Derivatives<'_>>,
+) -> f64 {
+    let Some((matrix, vector)) = normal else {
+        let value = line_displaced(guess, line);
+        return 0.5 * value.dot(&(information * value));
+    };
+    let (value, derivative, slope) = line_displacement(guess, line);
+    let pull = information * value;
+    let mut place = matrix.fixed_view_mut::<4, 4>(start, start);
+    place += slope.tr_mul(&(information * slope));
+    let mut place = vector.fixed_rows_mut::<4>(start);
+    place -= derivative.tr_mul(&pull);
+    0.5 * value.dot(&pull)
 }
 
 /// The cost of a block that may be anywhere, and its derivatives.

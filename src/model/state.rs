@@ -316,12 +316,17 @@ impl State {
     /// same kinematics, drawn comparably.
     pub fn slid_towards(&self, reference: &Self) -> Self {
         let mut state = self.clone();
-        for (joint, reference) in state.joints.iter_mut().zip(&reference.joints) {
+        state.slide_towards(reference);
+        state
+    }
+
+    /// The same in place.
+    pub(crate) fn slide_towards(&mut self, reference: &Self) {
+        for (joint, reference) in self.joints.iter_mut().zip(&reference.joints) {
             if let (Joint::Revolute(line), Some(other)) = (joint, reference.line()) {
                 *line = line.slid(line.direction.dot(&(other.point - line.point)));
             }
         }
-        state
     }
 
     /// The state at tangent coordinates δ (see [`Layout`]) in the chart at `self`; what is not learned stays.

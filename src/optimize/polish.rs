@@ -116,9 +116,14 @@ fn updated(before: Option<DMatrix<f64>>, step: &DVector<f64>, change: &DVector<f
         return before;
     }
     let n = step.len();
-    let b = before.unwrap_or_else(|| DMatrix::identity(n, n) * (curvature / change.norm_squared()));
-    let left = DMatrix::identity(n, n) - step * change.transpose() / curvature;
-    Some(&left * b * left.transpose() + step * step.transpose() / curvature)
+    let mut b = before.unwrap_or_else(|| DMatrix::identity(n, n) * (curvature / change.norm_squared()));
+    // (I − s yᵀ/c) B (I − y sᵀ/c) + s sᵀ/c, multiplied out.
+    let carried = &b * change;
+    let own = (1.0 + change.dot(&carried) / curvature) / curvature;
+    b.ger(own, step, step, 1.0);
+    b.ger(-1.0 / curvature, &carried, step, 1.0);
+    b.ger(-1.0 / curvature, step, &carried, 1.0);
+    Some(b)
 }
 
 #[cfg(test)]

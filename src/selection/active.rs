@@ -119,11 +119,8 @@ impl Active {
         let Minimiser::Direct(settings) = self.minimiser else { return Ok(None) };
         let criterion = self.criterion(situation.belief, situation, limits)?;
         let Some((scope, searched)) = Scope::around(situation, limits)? else { return Ok(None) };
-        let at = |points: &[Vec<f64>]| {
-            let candidates: Vec<Vec<f64>> = points.iter().map(|point| searched.from_unit(point)).collect();
-            scope.evaluate(&candidates, |feasible| criterion.evaluate(feasible))
-        };
-        Ok(Some(Search { settings, partition: direct(&scope, &searched, settings, at)? }))
+        let at = |postures: &[Vec<f64>]| scope.evaluate(postures, |feasible| criterion.evaluate(feasible));
+        Ok(Some(direct(&scope, &searched, settings, at)?))
     }
 
     /// The criterion in one socket.
@@ -165,6 +162,9 @@ impl Active {
             .map(|belief| self.criterion(belief, situation, limits))
             .collect::<Result<Vec<_>, SelectionError>>()?;
         let plainly = |candidates: &[Vec<f64>]| {
+            if let [criterion] = criteria.as_slice() {
+                return criterion.evaluate(candidates);
+            }
             let mut sums = vec![0.0; candidates.len()];
             for criterion in &criteria {
                 sums.iter_mut().zip(criterion.evaluate(candidates)).for_each(|(sum, value)| *sum += value);
@@ -172,15 +172,11 @@ impl Active {
             sums.iter().map(|sum| sum / criteria.len() as f64).collect::<Vec<f64>>()
         };
         let evaluate = |candidates: &[Vec<f64>]| scope.evaluate(candidates, plainly);
-        let at = |points: &[Vec<f64>]| {
-            evaluate(&points.iter().map(|point| searched.from_unit(point)).collect::<Vec<Vec<f64>>>())
-        };
         let (mut best, mut evaluations, search) = match self.minimiser {
             Minimiser::Direct(settings) => {
-                let partition = direct(scope, searched, settings, at)?;
-                let chosen = partition.leaves.get(partition.chosen);
-                let best = chosen.and_then(|leaf| Some((searched.from_unit(&leaf.centre), leaf.value?)));
-                (best, partition.leaves.len(), Some(Search { settings, partition }))
+                let search = direct(scope, searched, settings, evaluate)?;
+                let best = search.best().map(|(point, value)| (searched.from_unit(point), value));
+                (best, search.evaluations(), Some(search))
             }
             Minimiser::Random { evaluations } => {
                 let draws = (0..evaluations).map(|_| scope.draw(searched, rng));

@@ -17,13 +17,15 @@
 
 use std::sync::Arc;
 
+use fearless_simd::Level;
 use nalgebra::{DMatrix, Matrix3, Point3};
 
 use super::{Optimality, SelectionError, Visibility, Weights, optimality, prediction::Predictions, views::Views};
 use crate::{
     estimation::Belief,
     kinematics::JointBox,
-    model::{Layout, State, Workspace, jacobian},
+    lanes::GROUP,
+    model::{Layout, Points, State, Workspace, jacobian},
     sensing::Rig,
 };
 
@@ -43,6 +45,10 @@ pub struct Criterion<'a> {
     state: &'a State,
     layout: &'a Layout,
     rig: &'a Rig,
+    /// What is measured, where that is the place of points and nothing else.
+    points: Option<Arc<Points>>,
+    /// The instructions that this processor has.
+    level: Level,
     covariance: &'a DMatrix<f64>,
     weights: &'a Weights,
     value: f64,
@@ -73,17 +79,32 @@ pub struct Appraisal {
     pub chance: f64,
 }
 
-/// Candidates per batch product: enough to fill the matrix kernel, few enough to share among cores.
-const CHUNK: usize = 32;
+/// Candidates per batch product at most: enough to fill the matrix kernel, few enough for the caches and to share among cores.
+const CHUNK: usize = 16;
+
+/// Into chunks of which size so many candidates are divided: alike, as a small one costs nearly as much as a large one.
+fn chunk(candidates: usize) -> usize {
+    candidates.div_ceil(candidates.div_ceil(CHUNK)).next_multiple_of(GROUP)
+}
 
 /// The values of all candidates, in order, a chunk at a time: on several cores with the feature `parallel`.
 pub(super) fn in_chunks<C: Sync>(candidates: &[C], evaluate: impl Fn(&[C]) -> Vec<f64> + Sync) -> Vec<f64> {
-    #[cfg(feature = "parallel")]
-    if candidates.len() > CHUNK {
-        use rayon::prelude::*;
-        return candidates.par_chunks(CHUNK).flat_map_iter(&evaluate).collect();
+    match candidates.len() {
+        0 => Vec::new(),
+        1..=CHUNK => evaluate(candidates),
+        #[cfg(feature = "parallel")]
+        count => {
+            use rayon::prelude::*;
+            candidates.par_chunks(chunk(count)).flat_map_iter(&evaluate).collect()
+        }
+        #[cfg(not(feature = "parallel"))]
+        count => candidates.chunks(chunk(count)).flat_map(evaluate).collect(),
     }
-    candidates.chunks(CHUNK).flat_map(evaluate).collect()
+}
+
+/// What is measured in a state, where that is the place of points and nothing else.
+pub(super) fn points(belief: &Belief, state: &State) -> Option<Arc<Points>> {
+    belief.rig.points().and_then(|points| Points::new(state, &belief.layout, &points)).map(Arc::new)
 }
 
 impl<'a> Criterion<'a> {
@@ -100,10 +121,23 @@ impl<'a> Criterion<'a> {
         covariance: &'a DMatrix<f64>,
         weights: &'a Weights,
     ) -> Self {
+        Self::measuring(points(belief, state), belief, state, covariance, weights)
+    }
+
+    /// The same with the `points` that are measured in that state.
+    pub(super) fn measuring(
+        points: Option<Arc<Points>>,
+        belief: &'a Belief,
+        state: &'a State,
+        covariance: &'a DMatrix<f64>,
+        weights: &'a Weights,
+    ) -> Self {
         Self {
             state,
             layout: &belief.layout,
             rig: &belief.rig,
+            points,
+            level: Level::new(),
             covariance,
             weights,
             value: weights.trace(covariance),
@@ -167,8 +201,8 @@ impl<'a> Criterion<'a> {
                 };
                 (0..predictions.len()).map(of).collect()
             }
-            (_, Some(metric)) => predictions.traces(|gains| metric * gains),
-            (_, None) => predictions.traces(|gains| self.weights.scale(gains)),
+            (_, Some(metric)) => predictions.traces_by(metric),
+            (_, None) => predictions.traces(self.weights.all()),
         }
     }
 
@@ -194,8 +228,11 @@ impl<'a> Criterion<'a> {
     pub fn evaluate<C: AsRef<[f64]> + Sync>(&self, candidates: &[C]) -> Vec<f64> {
         in_chunks(candidates, |chunk| {
             let predictions = self.predictions(chunk);
-            let gains = self.gains(&predictions).into_iter().enumerate();
-            gains.map(|(index, gain)| self.expected(predictions.chance(index), gain)).collect()
+            let mut values = self.gains(&predictions);
+            for (index, value) in values.iter_mut().enumerate() {
+                *value = self.expected(predictions.chance(index), *value);
+            }
+            values
         })
     }
 
@@ -207,7 +244,13 @@ impl<'a> Criterion<'a> {
     /// What is predicted of every candidate.
     pub(super) fn predictions<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Predictions {
         let views = self.views.as_deref();
-        let mut predictions = Predictions::new(self.state, self.layout, self.rig, self.covariance, candidates, views);
+        let mut predictions = match (&self.points, views) {
+            (Some(points), None) => Predictions::of_points(self.level, points, self.covariance, candidates),
+            _ => {
+                let model = (self.state, self.layout, self.rig);
+                Predictions::new(self.level, model, self.covariance, candidates, views)
+            }
+        };
         if let (Some(Sight::Chance(visibility, limits)), true) = (&self.sight, views.is_some()) {
             predictions.discount(|index| visibility.discount(&limits.to_unit(candidates[index].as_ref())));
         } else if let Some(sight) = &self.sight {
@@ -216,6 +259,11 @@ impl<'a> Criterion<'a> {
             });
         }
         predictions
+    }
+
+    /// Whether every candidate is sure to be seen.
+    pub(super) fn sees_all(&self) -> bool {
+        self.sight.is_none() && self.views.is_none()
     }
 
     /// The criterion of one candidate and what it rests on; an error if it is no number.
@@ -285,6 +333,7 @@ mod tests {
 
     use super::*;
     use crate::{
+        lanes::levels,
         model::laws::random_arm,
         selection::CriterionUnits,
         sensing::{Position, Rig},
@@ -354,6 +403,34 @@ mod tests {
         }
     }
 
+    /// Lanes across candidates against one posture after the other, for one tracker and for two.
+    #[test]
+    fn points_in_lanes_say_what_single_postures_say() {
+        for seed in 0..40 {
+            let (mut belief, weights, mut rng) = random_belief(seed, 1 + seed as usize % 2);
+            belief.covariance = belief.covariance.map(|p| p * [1.0, 1e-2, 1e-4][seed as usize % 3]);
+            let criterion = Criterion::new(&belief, &weights).expect("a covariance");
+            let candidates = candidates(&mut rng, 33);
+            for level in levels() {
+                let criterion = Criterion { level, ..criterion.clone() };
+                let one_by_one = Criterion { points: None, ..criterion.clone() };
+                for (value, expected) in criterion.evaluate(&candidates).iter().zip(one_by_one.evaluate(&candidates)) {
+                    assert!((value - expected).abs() <= 1e-12 * criterion.before(), "{level:?} {value} {expected}");
+                }
+                assert!(criterion.points.is_some());
+            }
+        }
+    }
+
+    /// As of a robot whose sensors all want a socket, where it is in none.
+    #[test]
+    fn a_movement_without_a_sensor_gains_nothing() {
+        let (mut belief, weights, mut rng) = random_belief(3, 1);
+        belief.rig = Arc::new(Rig::new(Vec::new()));
+        let criterion = Criterion::new(&belief, &weights).expect("a covariance");
+        assert_eq!(criterion.evaluate(&candidates(&mut rng, 5)), [criterion.before(); 5]);
+    }
+
     #[test]
     fn batches_equal_single_evaluations_to_the_last_bit_of_the_sum() {
         let (belief, weights, mut rng) = random_belief(7, 1);
@@ -365,5 +442,6 @@ mod tests {
             assert!((value - single).abs() <= 1e-12 * criterion.before());
         }
         assert_eq!(batch, criterion.evaluate(&candidates));
+        assert!(criterion.evaluate::<Vec<f64>>(&[]).is_empty());
     }
 }

@@ -20,6 +20,7 @@ mod feasible;
 mod held;
 mod herding;
 mod human;
+mod innovation;
 #[cfg(test)]
 mod laws;
 mod optimality;

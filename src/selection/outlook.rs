@@ -23,13 +23,13 @@ use std::sync::Arc;
 
 use super::{
     Appraisal, Criterion, Optimality, SelectionError, Sight, Weights,
-    criterion::in_chunks,
+    criterion::{in_chunks, points},
     prediction::{Predictions, told_apart},
     views::Views,
 };
 use crate::{
     estimation::Belief,
-    model::{Block, Element, Layout, State, Workspace},
+    model::{Block, Element, Layout, Points, State, Workspace},
     sensing::Rig,
 };
 
@@ -42,6 +42,40 @@ pub struct Outlook<'a> {
     before: f64,
 }
 
+/// What the hypotheses of a belief have to do with each other and with what is measured, whatever their covariances.
+pub(super) struct Setting {
+    /// By hypothesis: the points that are measured, where nothing else is.
+    points: Vec<Option<Arc<Points>>>,
+    /// Pairs of hypotheses, and πⱼ πₖ ‖xⱼ − xₖ‖²_W.
+    pairs: Vec<(usize, usize, f64)>,
+}
+
+impl Setting {
+    /// Of `belief`.
+    pub fn new(belief: &Belief, weights: &Weights, optimality: Optimality, workspace: &Workspace) -> Self {
+        let others = belief.alternatives.iter().map(|alternative| (alternative.weight, &alternative.state));
+        let hypotheses: Vec<(f64, &State)> = std::iter::once((belief.weight(), &belief.state)).chain(others).collect();
+        let mut pairs = Vec::new();
+        for (k, (weight, state)) in hypotheses.iter().enumerate() {
+            for (j, (other_weight, other)) in hypotheses[..k].iter().enumerate() {
+                let distance = match optimality {
+                    Optimality::A | Optimality::E => squared_distance(other, state, &belief.layout, weights),
+                    Optimality::I => apart(other, state, workspace),
+                    Optimality::D => 1.0,
+                };
+                pairs.push((j, k, other_weight * weight * distance));
+            }
+        }
+        if optimality == Optimality::D {
+            // Which hypothesis holds is worth the entropy of the weights, in shares of the pairs.
+            let entropy: f64 = hypotheses.iter().map(|(weight, _)| -weight * weight.max(f64::MIN_POSITIVE).ln()).sum();
+            let sum: f64 = pairs.iter().map(|pair| pair.2).sum();
+            pairs.iter_mut().filter(|_| sum > 0.0).for_each(|pair| pair.2 *= entropy / sum);
+        }
+        Self { points: hypotheses.iter().map(|(_, state)| points(belief, state)).collect(), pairs }
+    }
+}
+
 impl<'a> Outlook<'a> {
     /// The criterion at `belief`, which must hold a covariance, under all its hypotheses; `workspace` serves criterion I
     /// alone. [`Belief::truncate`] leaves the heaviest.
@@ -51,34 +85,28 @@ impl<'a> Outlook<'a> {
         optimality: Optimality,
         workspace: &Workspace,
     ) -> Result<Self, SelectionError> {
-        let mut hypotheses = vec![(belief.weight(), Criterion::new(belief, weights)?)];
-        let mut states = vec![&belief.state];
-        for alternative in &belief.alternatives {
-            let criterion = Criterion::over(belief, &alternative.state, &alternative.covariance, weights);
-            hypotheses.push((alternative.weight, criterion));
-            states.push(&alternative.state);
-        }
-        if optimality != Optimality::A {
-            let by = |(weight, criterion): (f64, Criterion<'a>)| (weight, criterion.by(optimality, workspace));
-            hypotheses = hypotheses.into_iter().map(by).collect();
-        }
-        let mut pairs = Vec::new();
-        for k in 0..states.len() {
-            for j in 0..k {
-                let distance = match optimality {
-                    Optimality::A | Optimality::E => squared_distance(states[j], states[k], &belief.layout, weights),
-                    Optimality::I => apart(states[j], states[k], workspace),
-                    Optimality::D => 1.0,
-                };
-                pairs.push((j, k, hypotheses[j].0 * hypotheses[k].0 * distance));
-            }
-        }
-        if optimality == Optimality::D {
-            // Which hypothesis holds is worth the entropy of the weights, in shares of the pairs.
-            let entropy: f64 = hypotheses.iter().map(|(weight, _)| -weight * weight.max(f64::MIN_POSITIVE).ln()).sum();
-            let sum: f64 = pairs.iter().map(|pair| pair.2).sum();
-            pairs.iter_mut().filter(|_| sum > 0.0).for_each(|pair| pair.2 *= entropy / sum);
-        }
+        Self::over(belief, weights, optimality, workspace, &Setting::new(belief, weights, optimality, workspace))
+    }
+
+    /// The same where the hypotheses stand as they do in `setting`.
+    pub(super) fn over(
+        belief: &'a Belief,
+        weights: &'a Weights,
+        optimality: Optimality,
+        workspace: &Workspace,
+        setting: &Setting,
+    ) -> Result<Self, SelectionError> {
+        let covariance = belief.covariance.as_ref().ok_or(SelectionError::NoCovariance)?;
+        let others = belief.alternatives.iter().map(|of| (of.weight, &of.state, &of.covariance));
+        let all = std::iter::once((belief.weight(), &belief.state, covariance)).chain(others);
+        let hypotheses: Vec<(f64, Criterion<'a>)> = all
+            .zip(&setting.points)
+            .map(|((weight, state, covariance), points)| {
+                let criterion = Criterion::measuring(points.clone(), belief, state, covariance, weights);
+                (weight, if optimality == Optimality::A { criterion } else { criterion.by(optimality, workspace) })
+            })
+            .collect();
+        let pairs = setting.pairs.clone();
         let within: f64 = hypotheses.iter().map(|(weight, criterion)| weight * criterion.before()).sum();
         let before = within + pairs.iter().map(|pair| pair.2).sum::<f64>();
         Ok(Self { hypotheses, pairs, rig: &belief.rig, before })
@@ -108,6 +136,9 @@ impl<'a> Outlook<'a> {
 
     /// The chance of being seen under every hypothesis, and B of every pair, at one candidate.
     pub(super) fn expectations(&self, candidate: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        if self.pairs.is_empty() && self.hypotheses.iter().all(|(_, criterion)| criterion.sees_all()) {
+            return (vec![1.0; self.hypotheses.len()], Vec::new());
+        }
         let predicted = self.predictions(&[candidate]);
         let told = self.pairs.iter().map(|&(j, k, _)| {
             let chance = 0.5 * (predicted[j].chance(0) + predicted[k].chance(0));
@@ -169,13 +200,17 @@ impl<'a> Outlook<'a> {
             }
             gain += weight * of.chance(index) * gains[index];
         }
-        for &(j, k, between) in &self.pairs {
+        for &(j, k, between) in self.pairs.iter().filter(|pair| pair.2 > SPENT * self.before) {
             let told = told_apart(self.rig, &predicted[j], &predicted[k], index);
             gain += between * 0.5 * (predicted[j].chance(index) + predicted[k].chance(index)) * told;
         }
         self.before - gain
     }
 }
+
+/// What is left between two hypotheses that a plan will have told apart counts for nothing, below this share of the criterion:
+/// rounding is a hundred times as much.
+const SPENT: f64 = 1e-18;
 
 /// ‖x − x'‖²_W: squared angles between directions and rotations, squared distances between points and of plain numbers,
 /// weighted like tangent coordinates.

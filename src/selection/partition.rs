@@ -53,9 +53,7 @@ impl Partition {
                 potentially_optimal: rectangle.potentially_optimal,
             })
             .collect();
-        let best = direct.best().map(|(centre, _)| centre);
-        let chosen = leaves.iter().position(|leaf| Some(leaf.centre.as_slice()) == best).unwrap_or(0);
-        Self { leaves, chosen, limits: Vec::new() }
+        Self { leaves, chosen: direct.best_rectangle().unwrap_or(0), limits: Vec::new() }
     }
 
     /// The same of a search of this box, which constraints made smaller than the joint box.

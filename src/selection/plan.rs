@@ -15,7 +15,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix};
 
 use super::{SelectionError, Weights};
 use crate::{
@@ -35,6 +35,8 @@ pub(super) struct Plan {
     /// By pair of hypotheses (as [`Outlook`](super::Outlook) orders them): by how much each pose tells them apart, B.
     told: Vec<Vec<f64>>,
     chances: Vec<Vec<f64>>,
+    /// By pose and hypothesis: Hᵀ, whitened.
+    rows: Vec<Arc<[DMatrix<f64>]>>,
 }
 
 impl Plan {
@@ -42,7 +44,14 @@ impl Plan {
     pub fn new(belief: &Belief, considered: usize) -> Self {
         let mut after = belief.clone();
         after.truncate(considered);
-        Self { now: Arc::new(after.clone()), after, poses: Vec::new(), told: Vec::new(), chances: Vec::new() }
+        Self {
+            now: Arc::new(after.clone()),
+            after,
+            poses: Vec::new(),
+            told: Vec::new(),
+            chances: Vec::new(),
+            rows: Vec::new(),
+        }
     }
 
     /// How many independent equations a movement brings, by the rank of its Jacobian at `posture` (rad or m); at least one.
@@ -59,27 +68,30 @@ impl Plan {
         if !weighted.iter().all(|x| x.is_finite()) {
             return Err(SelectionError::NoFiniteCriterion);
         }
-        let eigenvalues = SymmetricEigen::new(weighted).eigenvalues;
+        let eigenvalues = weighted.symmetric_eigenvalues();
         Ok(eigenvalues.iter().filter(|value| **value > unknown * unknown).count())
     }
 
     /// Adds a pose that each hypothesis expects to be seen with these chances, and that tells pairs apart by `told`.
     pub fn add(&mut self, pose: Vec<f64>, chances: Vec<f64>, told: Vec<f64>) {
-        self.each(&pose, &chances, 1.0);
+        let rows: Arc<[DMatrix<f64>]> = jacobians(&self.after, &pose).into();
+        self.each(&rows, &chances, 1.0);
         self.poses.push(pose);
         self.chances.push(chances);
         self.told.push(told);
+        self.rows.push(rows);
     }
 
     /// Takes a pose out of the plan.
     pub fn remove(&mut self, index: usize) -> Vec<f64> {
         let (pose, chances) = (self.poses.remove(index), self.chances.remove(index));
         self.told.remove(index);
-        if !self.each(&pose, &chances, -1.0) {
+        let rows = self.rows.remove(index);
+        if !self.each(&rows, &chances, -1.0) {
             // Too much would cancel: from the beginning, without it.
             self.after = (*self.now).clone();
-            for (pose, chances) in self.poses.clone().iter().zip(self.chances.clone()) {
-                self.each(pose, &chances, 1.0);
+            for (rows, chances) in self.rows.clone().iter().zip(self.chances.clone()) {
+                self.each(rows, &chances, 1.0);
             }
         }
         pose
@@ -92,22 +104,32 @@ impl Plan {
     }
 
     /// The update (sign 1) or downdate (sign −1) of every hypothesis' covariance by a pose; whether that was sound.
-    fn each(&mut self, pose: &[f64], chances: &[f64], sign: f64) -> bool {
+    fn each(&mut self, rows: &[DMatrix<f64>], chances: &[f64], sign: f64) -> bool {
         let chance = |index: usize| sign * chances.get(index).copied().unwrap_or(1.0);
-        condition(&mut self.after, pose, chance)
+        by_rows(&mut self.after, rows, chance)
     }
 }
 
 /// Changes the covariance of every hypothesis of `belief` as an observation after moving to `pose` would, counted `weight`
 /// times, by hypothesis; a negative weight takes it out again. Whether that was sound.
 pub(super) fn condition(belief: &mut Belief, pose: &[f64], weight: impl Fn(usize) -> f64) -> bool {
-    let Belief { state, layout, rig, covariance, alternatives, .. } = belief;
+    let rows = jacobians(belief, pose);
+    by_rows(belief, &rows, weight)
+}
+
+/// Hᵀ, whitened, of a pose under every hypothesis.
+fn jacobians(belief: &Belief, pose: &[f64]) -> Vec<DMatrix<f64>> {
+    let Belief { state, layout, rig, alternatives, .. } = belief;
+    let states = std::iter::once(state).chain(alternatives.iter().map(|alternative| &alternative.state));
+    states.map(|state| rig.jacobian(state, layout, pose)).collect()
+}
+
+fn by_rows(belief: &mut Belief, rows: &[DMatrix<f64>], weight: impl Fn(usize) -> f64) -> bool {
+    let Belief { covariance, alternatives, .. } = belief;
+    let others = alternatives.iter_mut().map(|Alternative { covariance, .. }| Some(covariance));
     let mut sound = true;
-    if let Some(covariance) = covariance {
-        sound &= update(covariance, &rig.jacobian(state, layout, pose), weight(0));
-    }
-    for (index, Alternative { state, covariance, .. }) in alternatives.iter_mut().enumerate() {
-        sound &= update(covariance, &rig.jacobian(state, layout, pose), weight(index + 1));
+    for (index, (covariance, rows)) in std::iter::once(covariance.as_mut()).chain(others).zip(rows).enumerate() {
+        sound &= covariance.is_none_or(|covariance| update(covariance, rows, weight(index)));
     }
     sound
 }
@@ -130,8 +152,11 @@ fn update(covariance: &mut DMatrix<f64>, rows: &DMatrix<f64>, c: f64) -> bool {
     if c < 0.0 && cholesky.l_dirty().diagonal().iter().any(|x| x * x < SOUND) {
         return false;
     }
-    let inverse = cholesky.inverse() * c.signum();
-    let change = &numerator * inverse * numerator.transpose();
-    *covariance -= (&change + change.transpose()) * 0.5;
+    // With L Lᵀ = ±(I/c + H P Hᵀ), what P loses or gains is a square: of P Hᵀ L⁻ᵀ.
+    let Some(root) = cholesky.l_dirty().solve_lower_triangular(&numerator.transpose()) else { return false };
+    for column in root.transpose().column_iter() {
+        covariance.syger(-c.signum(), &column, &column, 1.0);
+    }
+    covariance.fill_upper_triangle_with_lower_triangle();
     true
 }

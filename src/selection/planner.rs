@@ -5,10 +5,11 @@ use std::sync::Arc;
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Actions, Appraisal, Domain, Movement, Optimality, Outlook, Partition, Planned, Policy, Scope, Search, Selection,
+    Actions, Appraisal, Domain, Movement, Optimality, Outlook, Planned, Policy, Scope, Search, Selection,
     SelectionError, Sight, Situation, Watch, Weights,
     held::{evaluate, held_by},
     herding::herd,
+    outlook::Setting,
     plan::Plan,
     search::direct,
     views::Views,
@@ -93,6 +94,7 @@ struct Scene<'a> {
     planner: &'a Planner,
     /// No movement planned: the belief as it is.
     now: Plan,
+    setting: Setting,
     /// What enters that not everything is seen: how, and by hypothesis what states drawn from it would see.
     sight: Option<(Sight<'a>, Vec<Option<Arc<Views>>>)>,
 }
@@ -107,7 +109,7 @@ struct Ground<'a> {
     /// Evaluations of the criterion so far.
     evaluations: usize,
     /// What DIRECT's first search left.
-    partition: Option<Partition>,
+    search: Option<Search>,
 }
 
 impl Planner {
@@ -190,13 +192,13 @@ impl Planner {
         let configuration = poses.remove(index);
         let value = value - scope.price(&configuration);
         let chosen = searched.to_unit(&configuration);
-        let Ground { evaluations, partition, .. } = ground;
+        let Ground { evaluations, search, .. } = ground;
         Ok(Selection {
             movement: Movement::to(configuration),
             criterion: Some(value),
             gain: Some(outlook.before() - value),
             evaluations,
-            search: partition.map(|partition| Search { settings: self.search, partition: partition.choosing(&chosen) }),
+            search: search.map(|search| search.choosing(chosen)),
             plan: Some(Planned { poses, committed: committed.saturating_sub(1) }),
         })
     }
@@ -212,13 +214,16 @@ impl<'a> Scene<'a> {
             let views = estimate.into_iter().chain(others).map(|(state, p)| sight.views(state, layout, p, rig));
             (sight, views.collect())
         });
-        Self { planner, now, sight }
+        let Planner { weights, planning, workspace, .. } = planner;
+        let setting = Setting::new(&now.after, weights, planning.optimality, workspace);
+        Self { planner, now, setting, sight }
     }
 
     /// The criterion once `plan` is carried out.
     fn outlook<'b>(&'b self, plan: &'b Plan) -> Result<Outlook<'b>, SelectionError> {
         let Planner { weights, planning, workspace, .. } = self.planner;
-        let outlook = Outlook::new(&plan.after, weights, planning.optimality, workspace)?.told(&plan.told());
+        let outlook = Outlook::over(&plan.after, weights, planning.optimality, workspace, &self.setting)?;
+        let outlook = outlook.told(&plan.told());
         Ok(match &self.sight {
             Some((sight, views)) => outlook.unsure(&self.now.after).watched_by(*sight, views),
             None => outlook,
@@ -231,7 +236,7 @@ impl<'a> Scene<'a> {
         Ok(())
     }
 
-    /// A plan of `horizon` movements, from where it stood. The partition is that of DIRECT's first search.
+    /// A plan of `horizon` movements, from where it stood. The search that is kept is DIRECT's first.
     fn plan(&self, horizon: usize, standing: Vec<Vec<f64>>, ground: &mut Ground<'_>) -> Result<Plan, SelectionError> {
         let searched = ground.searched;
         let mut plan = self.now.clone();
@@ -280,10 +285,9 @@ impl<'a> Scene<'a> {
         let Planner { search, planning, .. } = self.planner;
         let (scope, searched) = (ground.scope, ground.searched);
         let outlook = self.outlook(plan)?;
-        let mut evaluate = |points: &[Vec<f64>]| ground.evaluate(&outlook, &plan.poses, points);
-        let partition = direct(scope, searched, *search, &mut evaluate)?;
-        let leaves = partition.leaves.iter().filter_map(|leaf| Some((leaf.value?, leaf.centre.clone())));
-        let mut starts: Vec<(f64, Vec<f64>)> = leaves.collect();
+        let at = |postures: &[Vec<f64>]| ground.evaluate_postures(&outlook, &plan.poses, postures);
+        let search = direct(scope, searched, *search, at)?;
+        let mut starts = search.best_of_all(planning.polished.max(1));
         // The best of some that are feasible. Scaled to the unit cube and back, one on the edge may be so no more.
         let mut feasible = None;
         if starts.is_empty() && scope.is_constrained() {
@@ -295,7 +299,7 @@ impl<'a> Scene<'a> {
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         starts.truncate(planning.polished.max(1));
-        ground.partition.get_or_insert(partition);
+        ground.search.get_or_insert(search);
         // What is in view may be too small as well.
         let familiar = ground.familiar.clone();
         let mut evaluate = |points: &[Vec<f64>]| ground.evaluate(&outlook, &plan.poses, points);
@@ -322,14 +326,19 @@ impl<'a> Ground<'a> {
             true => situation.history.seen().iter().rev().take(planner.planning.polished).map(scaled).collect(),
             false => Vec::new(),
         };
-        Self { scope, searched, familiar, evaluations: 0, partition: None }
+        Self { scope, searched, familiar, evaluations: 0, search: None }
     }
 
     /// The criterion at points of the unit cube, beside the `poses` of a plan.
     fn evaluate(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], points: &[Vec<f64>]) -> Vec<f64> {
-        self.evaluations += points.len();
-        let candidates: Vec<Vec<f64>> = points.iter().map(|point| self.searched.from_unit(point)).collect();
-        self.scope.evaluate_beside(poses, &candidates, |feasible| outlook.evaluate(feasible))
+        let postures: Vec<Vec<f64>> = points.iter().map(|point| self.searched.from_unit(point)).collect();
+        self.evaluate_postures(outlook, poses, &postures)
+    }
+
+    /// The same at postures of the box, rad or m.
+    fn evaluate_postures(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], postures: &[Vec<f64>]) -> Vec<f64> {
+        self.evaluations += postures.len();
+        self.scope.evaluate_beside(poses, postures, |feasible| outlook.evaluate(feasible))
     }
 }
 
@@ -390,7 +399,7 @@ impl Policy for Planner {
         let Some((scope, searched)) = Scope::around(situation, limits)? else { return Ok(None) };
         let mut ground = Ground::new(self, situation, limits, &scope, &searched);
         let outlook = scene.outlook(&scene.now)?;
-        let partition = direct(&scope, &searched, self.search, |points| ground.evaluate(&outlook, &[], points))?;
-        Ok(Some(Search { settings: self.search, partition }))
+        let at = |postures: &[Vec<f64>]| ground.evaluate_postures(&outlook, &[], postures);
+        Ok(Some(direct(&scope, &searched, self.search, at)?))
     }
 }

@@ -1,28 +1,36 @@
 //! What a belief predicts of many candidate movements at once.
 //!
-//! The whitened transposed Jacobians of B candidates, d equations each, stack into one m × dB matrix, and one product with
-//! P serves them all. What is left per candidate are d × d matrices; for three equations, as of a marker, their size is
-//! known when this is compiled.
+//! The whitened Jacobians of a [group](GROUP) of candidates, d equations each, are kept by tangent coordinate, each equation of all
+//! candidates side by side, and multiplied by P together. What is left per candidate are d × d matrices (see
+//! [`innovation`](super::innovation)).
 
-use nalgebra::{Cholesky, Const, DMatrix, DefaultAllocator, Dim, Dyn, Matrix3, OMatrix, Point3, allocator::Allocator};
+use fearless_simd::{Level, dispatch};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Point3, Vector3};
 
-use super::views::Views;
+use super::{
+    innovation::{place, products, traces},
+    views::Views,
+};
 use crate::{
-    model::{Layout, Pass, State},
+    lanes::{GROUP, groups, times},
+    model::{Layout, Pass, Points, State},
     sensing::Rig,
 };
 
 /// Predictions of a chunk of candidates under one hypothesis.
 pub(super) struct Predictions {
-    /// Equations of a movement, d.
-    d: usize,
+    level: Level,
+    /// Equations of a candidate, d.
+    equations: usize,
+    /// Tangent coordinates, m.
+    dimension: usize,
     /// Predicted readings, d per candidate; NaN where a channel has none.
     readings: Vec<f64>,
-    /// Hᵀ, whitened (m × dB).
-    rows: DMatrix<f64>,
-    /// Gᵀ = P Hᵀ (m × dB).
-    gains: DMatrix<f64>,
-    /// H P Hᵀ of each candidate, d × d.
+    /// H, whitened: m × d rows of lanes for each group.
+    rows: Vec<f64>,
+    /// G = H P, likewise.
+    gains: Vec<f64>,
+    /// H P Hᵀ of each candidate.
     spreads: Vec<f64>,
     /// Chance of each candidate to be seen.
     chances: Vec<f64>,
@@ -32,34 +40,58 @@ impl Predictions {
     /// Of `candidates` (joint positions, rad or m) for a belief in `state` with `covariance`, seen as `views` tells; without
     /// them for certain, until [`seen`](Self::seen) says otherwise.
     pub fn new<C: AsRef<[f64]>>(
-        state: &State,
-        layout: &Layout,
-        rig: &Rig,
+        level: Level,
+        (state, layout, rig): (&State, &Layout, &Rig),
         covariance: &DMatrix<f64>,
         candidates: &[C],
         views: Option<&Views>,
     ) -> Self {
         let (m, d) = (layout.dimension(), rig.equations());
-        let mut rows = DMatrix::zeros(m, d * candidates.len());
+        let mut rows = vec![0.0; groups(candidates.len()) * m * d * GROUP];
         let mut readings = vec![0.0; d * candidates.len()];
         let mut chances = vec![1.0; candidates.len()];
         let mut pass = Pass::new(state, layout);
+        let mut columns = vec![0.0; d * m];
         for (index, candidate) in candidates.iter().enumerate() {
-            pass.at(candidate.as_ref());
-            let place = index * d..(index + 1) * d;
-            let columns = &mut rows.as_mut_slice()[place.start * m..place.end * m];
-            rig.rows(&pass, &mut readings[place], columns);
+            let candidate = candidate.as_ref();
+            columns.fill(0.0);
+            rig.rows(pass.at(candidate), &mut readings[index * d..(index + 1) * d], &mut columns);
             if let Some(views) = views {
-                chances[index] = views.weigh(rig, candidate.as_ref(), columns);
+                chances[index] = views.weigh(rig, candidate, &mut columns);
+            }
+            let rows = &mut rows[index / GROUP * m * d * GROUP..];
+            for (equation, columns) in columns.chunks_exact(m.max(1)).enumerate() {
+                let row = rows.iter_mut().skip(equation * GROUP + index % GROUP).step_by(d * GROUP);
+                row.zip(columns).for_each(|(row, x)| *row = *x);
             }
         }
-        let gains = covariance * &rows;
-        let spreads = if d == 3 {
-            products(Const::<3>, &rows, &gains, candidates.len())
-        } else {
-            products(Dyn(d), &rows, &gains, candidates.len())
-        };
-        Self { d, readings, rows, gains, spreads, chances }
+        Self::from_rows(level, [m, d], covariance, (readings, rows), chances)
+    }
+
+    /// The same where nothing but `points` is measured, which are seen for certain.
+    pub fn of_points<C: AsRef<[f64]>>(
+        level: Level,
+        points: &Points,
+        covariance: &DMatrix<f64>,
+        candidates: &[C],
+    ) -> Self {
+        let [m, d] = [covariance.nrows(), points.equations()];
+        let mut rows = vec![0.0; groups(candidates.len()) * m * d * GROUP];
+        let mut readings = vec![0.0; d * candidates.len()];
+        dispatch!(level, simd => points.rows(simd, candidates, &mut readings, &mut rows));
+        Self::from_rows(level, [m, d], covariance, (readings, rows), vec![1.0; candidates.len()])
+    }
+
+    fn from_rows(
+        level: Level,
+        [dimension, equations]: [usize; 2],
+        covariance: &DMatrix<f64>,
+        (readings, rows): (Vec<f64>, Vec<f64>),
+        chances: Vec<f64>,
+    ) -> Self {
+        let gains = times(level, equations, &rows, covariance.as_slice());
+        let spreads = products(level, [dimension, equations], &rows, &gains, None);
+        Self { level, equations, dimension, readings, rows, gains, spreads, chances }
     }
 
     /// The same with a chance of being seen for each candidate, from the predicted marker and its covariance (m, m²),
@@ -70,17 +102,17 @@ impl Predictions {
         doubt: Option<&DMatrix<f64>>,
         chance: impl Fn(usize, &Point3<f64>, &Matrix3<f64>) -> f64,
     ) {
-        let Some(place) = rig.marker_place() else { return };
-        let (d, count) = (self.d, self.chances.len());
+        let (Some(marker), d) = (rig.marker_place(), self.equations) else { return };
         let other = doubt.map(|doubt| {
-            let gains = doubt * &self.rows;
-            products(Dyn(d), &self.rows, &gains, count)
+            let gains = times(self.level, d, &self.rows, doubt.as_slice());
+            products(self.level, [self.dimension, d], &self.rows, &gains, None)
         });
         let spreads = other.as_ref().unwrap_or(&self.spreads);
-        for index in 0..count {
-            let spread = &spreads[index * d * d..(index + 1) * d * d];
-            let Some(spread) = rig.marker_spread(|row, column| spread[column * d + row]) else { return };
-            let at = index * d + place.start;
+        for index in 0..self.chances.len() {
+            let Some(spread) = rig.marker_spread(|row, column| spreads[place(d, row, column, index)]) else {
+                return;
+            };
+            let at = index * d + marker.start;
             let marker = Point3::from_slice(&self.readings[at..at + 3]);
             self.chances[index] = chance(index, &marker, &spread);
         }
@@ -103,105 +135,70 @@ impl Predictions {
 
     /// The predicted readings of a candidate, d numbers.
     pub fn reading(&self, index: usize) -> &[f64] {
-        &self.readings[index * self.d..(index + 1) * self.d]
+        &self.readings[index * self.equations..(index + 1) * self.equations]
     }
 
-    /// H P Hᵀ of a candidate, d × d numbers.
-    pub fn spread(&self, index: usize) -> &[f64] {
-        &self.spreads[index * self.d * self.d..(index + 1) * self.d * self.d]
+    /// H P Hᵀ of a candidate, by row and column.
+    pub fn spread(&self, index: usize) -> impl Fn(usize, usize) -> f64 {
+        move |row, column| self.spreads[place(self.equations, row, column, index)]
     }
 
     /// Gᵀ of a candidate (m × d), and S = H P Hᵀ + I.
     pub fn gain_and_innovation(&self, index: usize) -> (DMatrix<f64>, DMatrix<f64>) {
-        let s = DMatrix::from_column_slice(self.d, self.d, self.spread(index)) + DMatrix::identity(self.d, self.d);
-        (self.gains.columns(index * self.d, self.d).into_owned(), s)
+        let [m, d] = [self.dimension, self.equations];
+        let at = |row: usize, k: usize| ((index / GROUP * m + k) * d + row) * GROUP + index % GROUP;
+        let gain = DMatrix::from_fn(m, d, |k, row| self.gains[at(row, k)]);
+        (gain, self.innovation(index))
     }
 
-    /// tr(S⁻¹ G M Gᵀ) of every candidate, given M Gᵀ; NaN where S is not positive.
-    pub fn traces(&self, weighted: impl FnOnce(&DMatrix<f64>) -> DMatrix<f64>) -> Vec<f64> {
-        let weighted = weighted(&self.gains);
-        let (d, count) = (self.d, self.len());
-        if d == 3 {
-            traces(Const::<3>, &self.spreads, &products(Const::<3>, &self.gains, &weighted, count))
-        } else {
-            traces(Dyn(d), &self.spreads, &products(Dyn(d), &self.gains, &weighted, count))
-        }
+    fn innovation(&self, index: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(self.equations, self.equations, self.spread(index))
+            + DMatrix::identity(self.equations, self.equations)
+    }
+
+    /// tr(S⁻¹ G W Gᵀ) of every candidate, W diagonal; NaN where S is not positive.
+    pub fn traces(&self, weights: &[f64]) -> Vec<f64> {
+        self.traces_of(&self.gains, Some(weights))
+    }
+
+    /// tr(S⁻¹ G M Gᵀ) of every candidate, M symmetric; NaN where S is not positive.
+    pub fn traces_by(&self, metric: &DMatrix<f64>) -> Vec<f64> {
+        self.traces_of(&times(self.level, self.equations, &self.gains, metric.as_slice()), None)
+    }
+
+    fn traces_of(&self, gains: &[f64], weights: Option<&[f64]>) -> Vec<f64> {
+        let leverages = products(self.level, [self.dimension, self.equations], &self.gains, gains, weights);
+        let mut traces = traces(self.level, self.equations, &self.spreads, &leverages);
+        // Without any equation there is nothing to be gained.
+        traces.resize(self.len(), 0.0);
+        traces
     }
 
     /// ½ ln det S of every candidate, the information that it brings, nats; NaN where S is not positive.
     pub fn information(&self) -> Vec<f64> {
-        let of = |spread: &[f64]| {
-            let s = DMatrix::from_column_slice(self.d, self.d, spread) + DMatrix::identity(self.d, self.d);
+        let of = |s: DMatrix<f64>| {
             Cholesky::new(s).map_or(f64::NAN, |s| s.l_dirty().diagonal().iter().map(|x| x.ln()).sum())
         };
-        (0..self.len()).map(|index| of(self.spread(index))).collect()
+        (0..self.len()).map(|index| of(self.innovation(index))).collect()
     }
-}
-
-/// Aᵀ B of each candidate's d columns (m each), symmetric, one after the other.
-fn products<D: Dim>(d: D, a: &DMatrix<f64>, b: &DMatrix<f64>, count: usize) -> Vec<f64> {
-    let (m, d) = (a.nrows(), d.value());
-    let (a, b) = (a.as_slice(), b.as_slice());
-    let mut found = vec![0.0; d * d * count];
-    for index in 0..count {
-        let place = &mut found[index * d * d..(index + 1) * d * d];
-        for column in 0..d {
-            let b = &b[(index * d + column) * m..(index * d + column + 1) * m];
-            for row in 0..=column {
-                let a = &a[(index * d + row) * m..(index * d + row + 1) * m];
-                let value = dot(a, b);
-                place[column * d + row] = value;
-                place[row * d + column] = value;
-            }
-        }
-    }
-    found
-}
-
-/// Four sums at a time, which the compiler turns into vector instructions.
-#[inline]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (fours_a, rest_a) = a.as_chunks::<4>();
-    let (fours_b, rest_b) = b.as_chunks::<4>();
-    let mut sums = [0.0; 4];
-    for (a, b) in fours_a.iter().zip(fours_b) {
-        for k in 0..4 {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    let rest: f64 = rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum();
-    (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
-}
-
-/// tr(S⁻¹ L) of every candidate, S = spread + I.
-fn traces<D: Dim>(d: D, spreads: &[f64], leverages: &[f64]) -> Vec<f64>
-where
-    DefaultAllocator: Allocator<D, D>,
-{
-    let size = d.value() * d.value();
-    let one = OMatrix::<f64, D, D>::identity_generic(d, d);
-    let of = |(spread, leverage): (&[f64], &[f64])| {
-        let s = OMatrix::<f64, D, D>::from_column_slice_generic(d, d, spread) + &one;
-        let leverage = OMatrix::<f64, D, D>::from_column_slice_generic(d, d, leverage);
-        Cholesky::new(s).map_or(f64::NAN, |s| s.solve(&leverage).trace())
-    };
-    spreads.chunks_exact(size.max(1)).zip(leverages.chunks_exact(size.max(1))).map(of).collect()
 }
 
 /// 1 − e^{−B} of two hypotheses that predict a candidate, with B the Bhattacharyya distance of their readings.
 pub(super) fn told_apart(rig: &Rig, a: &Predictions, b: &Predictions, index: usize) -> f64 {
-    let d = a.d;
-    let mut difference = [0.0; 3];
+    let d = a.equations;
+    let (in_a, in_b) = (a.spread(index), b.spread(index));
+    let mean = |row: usize, column: usize| {
+        0.5 * (in_a(row, column) + in_b(row, column)) + if row == column { 1.0 } else { 0.0 }
+    };
     if d == 3 {
+        let mut difference = [0.0; 3];
         rig.difference(a.reading(index), b.reading(index), &mut difference);
-        let mean = (Matrix3::from_column_slice(a.spread(index)) + Matrix3::from_column_slice(b.spread(index))) * 0.5;
-        let difference = nalgebra::Vector3::from(difference);
-        let s = (mean + Matrix3::identity()).cholesky();
+        let difference = Vector3::from(difference);
+        let s = Matrix3::from_fn(mean).cholesky();
         return s.map_or(0.0, |s| -(-0.125 * difference.dot(&s.solve(&difference))).exp_m1());
     }
-    let mut difference = nalgebra::DVector::zeros(d);
+    let mut difference = DVector::zeros(d);
     rig.difference(a.reading(index), b.reading(index), difference.as_mut_slice());
-    let of = |spread: &[f64]| DMatrix::from_column_slice(d, d, spread);
-    let s = (of(a.spread(index)) + of(b.spread(index))) * 0.5 + DMatrix::identity(d, d);
-    Cholesky::new(s).map_or(0.0, |s| -(-0.125 * difference.dot(&s.solve(&difference))).exp_m1())
+    let s = Cholesky::new(DMatrix::from_fn(d, d, mean));
+    s.map_or(0.0, |s| -(-0.125 * difference.dot(&s.solve(&difference))).exp_m1())
 }

@@ -37,6 +37,11 @@ impl Weights {
         self.0[coordinate]
     }
 
+    /// All of them, in the order of the tangent coordinates.
+    pub(super) fn all(&self) -> &[f64] {
+        self.0.as_slice()
+    }
+
     /// The square roots of all.
     pub(super) fn roots(&self) -> DVector<f64> {
         self.0.map(f64::sqrt)

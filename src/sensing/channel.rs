@@ -4,7 +4,7 @@ use std::{fmt, sync::Arc};
 
 use nalgebra::Point3;
 
-use crate::model::{Pass, State};
+use crate::model::{Pass, State, Whitening};
 
 /// One kind of reading: what a model predicts for it, and how predictions differ from what was measured.
 ///
@@ -88,6 +88,12 @@ pub trait Channel: fmt::Debug + Send + Sync {
 
     /// The target whose position this channel measures, if it does.
     fn target(&self) -> Option<usize> {
+        None
+    }
+
+    /// The target of whose origin a reading is the three coordinates, in the frame of the measurements, and L⁻¹ of the noise;
+    /// `None` of a reading that is anything else.
+    fn point(&self) -> Option<(usize, Whitening)> {
         None
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Apart, Channel, Equipment, KeyError, Keys};
-use crate::model::{Pass, State};
+use crate::model::{Pass, State, Whitening};
 
 /// A tracker of a target's position in space, metres, in the frame of the measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,5 +123,14 @@ impl Channel for Position {
 
     fn target(&self) -> Option<usize> {
         Some(self.target)
+    }
+
+    fn point(&self) -> Option<(usize, Whitening)> {
+        let weight = self.sigma_m.recip();
+        let whitening = match &self.shape {
+            None => Whitening::Even(weight),
+            Some((_, inverse)) => Whitening::Full(inverse * weight),
+        };
+        Some((self.target, whitening))
     }
 }

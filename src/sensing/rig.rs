@@ -5,7 +5,7 @@ use std::{ops::Range, sync::Arc};
 use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::{Channel, Observation, Occasion, Position};
-use crate::model::{Layout, Pass, State};
+use crate::model::{Layout, Pass, State, Whitening};
 
 /// All channels through which a robot is observed. What it hands out is whitened: R = I.
 #[derive(Clone, Debug)]
@@ -138,6 +138,11 @@ impl Rig {
     /// Equations of a movement of which nothing is missed, d.
     pub fn equations(&self) -> usize {
         self.places.last().map_or(0, |place| place.end)
+    }
+
+    /// The points that are measured, where nothing else is: see [`Channel::point`].
+    pub fn points(&self) -> Option<Vec<(usize, Whitening)>> {
+        self.channels.iter().map(|channel| channel.point()).collect()
     }
 
     /// The channel that measures the marker's position.
@@ -294,6 +299,18 @@ impl Rig {
                 channel.difference(reading, predicted, whitened);
                 each(index, whitened);
             }
+        }
+    }
+
+    /// The same of readings (d numbers, as [`rows`](Self::rows) writes them) that are predicted already, none of which is
+    /// missing.
+    pub fn residuals_of(&self, predicted: &[f64], observation: &Observation, mut each: impl FnMut(usize, &[f64])) {
+        let mut whitened = Scratch::default();
+        for (index, (channel, reading)) in self.channels.iter().zip(&observation.readings).enumerate() {
+            let Some(reading) = reading else { continue };
+            let whitened = whitened.take(reading.len());
+            channel.difference(reading, &predicted[self.places[index].clone()], whitened);
+            each(index, whitened);
         }
     }
 

@@ -15,54 +15,60 @@ pub fn surrogate(value: f64) -> f64 {
 /// descendants lie; that is what makes the tree a spatial index.
 ///
 /// Rectangle 0 is the root and nobody's child, so a 0 ends every list of children.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Lineage {
-    parents: Vec<usize>,
-    last_children: Vec<usize>,
-    elder_siblings: Vec<usize>,
+    nodes: Vec<Node>,
     /// Levels at birth, as many per rectangle as there are dimensions.
     birth_levels: Vec<u8>,
+}
+
+/// A rectangle in the tree; 0, the root, where there is no child or sibling.
+#[derive(Debug, Clone)]
+struct Node {
+    parent: usize,
+    last_child: usize,
+    elder_sibling: usize,
     /// The least value of a feasible centre among a rectangle and its descendants.
-    least: Vec<f64>,
+    least: f64,
     /// Whether there is an infeasible centre among a rectangle and its descendants.
-    obscured: Vec<bool>,
+    obscured: bool,
 }
 
 impl Lineage {
+    /// With room for so many rectangles.
+    pub fn with_room(dimension: usize, room: usize) -> Self {
+        Self { nodes: Vec::with_capacity(room), birth_levels: Vec::with_capacity(room * dimension) }
+    }
+
     /// Whether any centre is infeasible.
     pub fn any_infeasible(&self) -> bool {
-        self.obscured.first().is_some_and(|&obscured| obscured)
+        self.nodes.first().is_some_and(|root| root.obscured)
     }
 
     /// Adds the next rectangle in line, in the shape it has now. The root is its own parent.
     pub fn add(&mut self, parent: usize, rectangles: &Rectangles) {
-        let child = self.parents.len();
-        self.parents.push(parent);
-        self.last_children.push(0);
-        self.elder_siblings.push(if child == 0 {
-            0
-        } else {
-            std::mem::replace(&mut self.last_children[parent], child)
-        });
+        let child = self.nodes.len();
+        let elder_sibling =
+            self.nodes.get_mut(parent).map_or(0, |parent| std::mem::replace(&mut parent.last_child, child));
+        self.nodes.push(Node { parent, last_child: 0, elder_sibling, least: f64::INFINITY, obscured: false });
         self.birth_levels.extend_from_slice(rectangles.levels(child));
-        self.least.push(f64::INFINITY);
-        self.obscured.push(false);
         let value = rectangles.values[child];
         let mut node = child;
         loop {
             // What is no news to a node is none to its ancestors.
+            let known = &mut self.nodes[node];
             let news = match value {
-                Some(value) => value < self.least[node],
-                None => !self.obscured[node],
+                Some(value) => value < known.least,
+                None => !known.obscured,
             };
             if !news {
                 break;
             }
             match value {
-                Some(value) => self.least[node] = value,
-                None => self.obscured[node] = true,
+                Some(value) => known.least = value,
+                None => known.obscured = true,
             }
-            node = self.parents[node];
+            node = known.parent;
         }
     }
 
@@ -70,7 +76,7 @@ impl Lineage {
     pub fn least_near(&self, infeasible: usize, rectangles: &Rectangles) -> f64 {
         let mut least = f64::INFINITY;
         self.descend(|node| {
-            if self.least[node] >= least {
+            if self.nodes[node].least >= least {
                 return false;
             }
             let reach = |side| 2 * half_side_ticks(rectangles.levels(infeasible)[side]);
@@ -88,7 +94,7 @@ impl Lineage {
     /// Visits the infeasible rectangles that hold a point in their doubled rectangle.
     pub fn infeasible_near(&self, point: usize, rectangles: &Rectangles, mut visit: impl FnMut(usize)) {
         self.descend(|node| {
-            if !self.obscured[node] {
+            if !self.nodes[node].obscured {
                 return false;
             }
             let reach = |levels: &[u8], side: usize| 2 * half_side_ticks(levels[side]);
@@ -114,10 +120,10 @@ impl Lineage {
             if !enter(node) {
                 continue;
             }
-            let mut child = self.last_children[node];
+            let mut child = self.nodes[node].last_child;
             while child != 0 {
                 open.push(child);
-                child = self.elder_siblings[child];
+                child = self.nodes[child].elder_sibling;
             }
         }
     }

@@ -21,17 +21,14 @@ pub struct Rectangles {
 }
 
 impl Rectangles {
-    /// The undivided cube, its centre not evaluated yet.
-    pub fn cube(dimension: usize) -> Self {
-        Self {
-            dimension,
-            centres: vec![0.5; dimension],
-            levels: vec![0; dimension],
-            values: Vec::new(),
-            scores: Vec::new(),
-            generations: Vec::new(),
-            chosen: Vec::new(),
-        }
+    /// The undivided cube, its centre not evaluated yet, with room for so many rectangles.
+    pub fn cube(dimension: usize, room: usize) -> Self {
+        let (mut centres, mut levels) = (Vec::with_capacity(room * dimension), Vec::with_capacity(room * dimension));
+        centres.resize(dimension, 0.5);
+        levels.resize(dimension, 0);
+        let (values, scores) = (Vec::with_capacity(room), Vec::with_capacity(room));
+        let (generations, chosen) = (Vec::with_capacity(room), Vec::with_capacity(room));
+        Self { dimension, centres, levels, values, scores, generations, chosen }
     }
 
     /// How many values have been told.
@@ -104,7 +101,7 @@ impl Rectangles {
                 ranking.push((self.scores[child].min(self.scores[child + 1]), child, side));
             }
         }
-        ranking.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ranking.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (rank, &(_, _, side)) in ranking.iter().enumerate() {
             self.levels[parent * self.dimension + side] += 1;
             for &(_, child, _) in &ranking[rank..] {

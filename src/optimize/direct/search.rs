@@ -6,6 +6,7 @@ use super::hull::{HullPoint, lower_right_hull};
 use super::lineage::{Lineage, surrogate};
 use super::partition::{Partition, Rectangles};
 use super::settings::{DirectError, Settings, Variant};
+use super::ternary::MAX_LEVEL;
 
 /// A search of the unit cube by DIRECT or DIRECT-l, as told by the [`Variant`](super::Variant).
 ///
@@ -60,6 +61,9 @@ pub struct Direct {
     worst: f64,
 }
 
+/// Rectangles for which there is room from the beginning.
+const ROOM: usize = 4096;
+
 impl Direct {
     /// Prepares a search of the unit cube of that dimension.
     ///
@@ -71,11 +75,12 @@ impl Direct {
         if dimension == 0 {
             return Err(DirectError::NoDimension);
         }
+        let room = settings.max_evaluations.min(ROOM);
         Ok(Self {
             settings,
-            rectangles: Rectangles::cube(dimension),
-            classes: SizeClasses::default(),
-            lineage: Lineage::default(),
+            rectangles: Rectangles::cube(dimension, room),
+            classes: SizeClasses::with_room(room),
+            lineage: Lineage::with_room(dimension, room),
             hull: Vec::new(),
             chosen: Vec::new(),
             dividing: 0,
@@ -251,15 +256,17 @@ impl Direct {
     }
 
     fn enlist(&mut self, rectangle: usize) {
-        if self.rectangles.divisible(rectangle) {
-            let class = self.settings.variant.class(self.rectangles.levels(rectangle));
+        let levels = self.rectangles.levels(rectangle);
+        let class = self.settings.variant.class(levels);
+        // Where the class is no smaller than the deepest level, the longest side may be there.
+        if class < usize::from(MAX_LEVEL) || self.rectangles.divisible(rectangle) {
             self.classes.insert(class, rectangle, self.rectangles.scores[rectangle]);
         }
     }
 
     fn delist(&mut self, rectangle: usize) -> bool {
         let class = self.settings.variant.class(self.rectangles.levels(rectangle));
-        self.classes.remove(class, rectangle, self.rectangles.scores[rectangle])
+        self.classes.remove(class, rectangle)
     }
 
     /// Chooses the potentially optimal rectangles.

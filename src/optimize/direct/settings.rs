@@ -64,7 +64,7 @@ impl Variant {
 
 /// The trisection level of the longest sides.
 pub(super) fn longest(levels: &[u8]) -> u8 {
-    levels.iter().copied().min().unwrap_or(0)
+    levels.iter().copied().reduce(u8::min).unwrap_or(0)
 }
 
 /// The settings of a search.

@@ -42,12 +42,13 @@ fn direct_chooses_the_best_of_all_that_it_evaluated() {
         let selection = case.select(&policy).expect("a selection");
         case.check_values(&policy, &selection);
         let search = selection.search.as_ref().expect("searched by DIRECT");
-        let leaves = &search.partition.leaves;
-        assert_eq!((search.settings, selection.evaluations), (settings, leaves.len()));
+        let partition = search.partition();
+        let leaves = &partition.leaves;
+        assert_eq!((search.settings(), selection.evaluations), (settings, leaves.len()));
         assert!((50..=100).contains(&leaves.len()), "{}", leaves.len());
         let least = leaves.iter().filter_map(|leaf| leaf.value).fold(f64::INFINITY, f64::min);
         assert_eq!(selection.criterion, Some(least), "{variant:?}");
-        let centre = &leaves[search.partition.chosen].centre;
+        let centre = &leaves[partition.chosen].centre;
         assert_eq!(selection.movement.configuration, case.limits().from_unit(centre), "{variant:?}");
         assert_eq!(selection.plan, None);
     }
@@ -165,7 +166,7 @@ fn the_naive_form_believes_its_own_prediction() {
     assert!(watch.head.expect("a head").sees(&case.belief.state.marker_at(pose)));
     let plain = case.value(&by_direct(&case), pose);
     assert!((selection.criterion.expect("chosen by it") - plain).abs() < 1e-12 * plain);
-    let leaves = &selection.search.as_ref().expect("searched").partition.leaves;
+    let leaves = selection.search.as_ref().expect("searched").partition().leaves;
     for leaf in leaves {
         let marker = case.belief.state.marker_at(&case.limits().from_unit(&leaf.centre));
         assert_eq!(leaf.value.is_some(), watch.head.expect("a head").sees(&marker));

@@ -153,7 +153,7 @@ fn the_best_of_what_is_left_is_found() {
     let scale = found + bound.gain.expect("a gain") - brute;
     assert!(found <= brute + 0.02 * scale, "{found} beside {brute}");
     // What is not feasible has no value, and is no centre that is chosen.
-    let partition = bound.search.expect("searched").partition;
+    let partition = bound.search.expect("searched").partition();
     let (mut without, mut with) = (0, 0);
     for leaf in &partition.leaves {
         let is_feasible = constraints.allow(None, &limits.from_unit(&leaf.centre));
@@ -181,7 +181,7 @@ fn a_small_feasible_set_is_found() {
     constraints.greatest_travel = vec![0.01; JOINTS];
     let policy = Active::new(case.weights.clone(), Minimiser::Direct(search(60)));
     let selection = case.select_within(&policy, &constraints).expect("a selection");
-    let partition = selection.search.expect("searched").partition;
+    let partition = selection.search.expect("searched").partition();
     assert!(partition.leaves.iter().all(|leaf| leaf.value.is_some()));
     assert!(partition.limits.iter().all(|[lower, upper]| (lower - 0.09).abs() + (upper - 0.11).abs() < 1e-12));
 }
@@ -262,7 +262,7 @@ fn what_a_person_might_have_done_is_feasible() {
     let human = Human::new(Active::new(case.weights.clone(), Minimiser::Direct(search(100))));
     let mut situation = case.situation();
     situation.constraints = Some(&constraints);
-    let partition = human.explain(&situation, &case.limits()).expect("searched").expect("by DIRECT").partition;
+    let partition = human.explain(&situation, &case.limits()).expect("searched").expect("by DIRECT").partition();
     let limits = partition.searched(&case.limits());
     for leaf in &partition.leaves {
         assert_eq!(leaf.value.is_some(), constraints.allow(None, &limits.from_unit(&leaf.centre)));
@@ -278,14 +278,14 @@ fn a_choice_from_a_list_is_explained_over_the_box() {
         let case = Case::new(0.3).with_pool(count);
         let limits = case.limits();
         let explained = planner(&case).explain(&case.situation(), &limits).expect("searched").expect("by DIRECT");
-        assert!(explained.partition.limits.is_empty() && explained.partition.leaves.len() > 20);
+        assert!(explained.partition().limits.is_empty() && explained.partition().leaves.len() > 20);
         let mut constraints = unconstrained(&limits);
         constraints.minimum_height = Some(-0.1);
         let within = |constraints: &Constraints| {
             let situation = Situation { constraints: Some(constraints), ..case.situation() };
             planner(&case).explain(&situation, &limits).expect("explained")
         };
-        let leaves = within(&constraints).expect("by DIRECT").partition.leaves;
+        let leaves = within(&constraints).expect("by DIRECT").partition().leaves;
         assert!(leaves.iter().any(|leaf| leaf.value.is_none()) && leaves.iter().any(|leaf| leaf.value.is_some()));
         constraints.allowed = Some(vec![vec![0.0; JOINTS]]);
         assert_eq!(within(&constraints), None);

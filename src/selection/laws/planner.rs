@@ -133,7 +133,7 @@ fn the_first_of_a_plan_is_what_teaches_most_at_once() {
 fn the_partition_tells_which_rectangle_holds_the_movement() {
     let case = Case::new(0.3);
     let selection = case.select(&planner(&case, Planning::default())).expect("a selection");
-    let partition = selection.search.expect("searched").partition;
+    let partition = selection.search.expect("searched").partition();
     let leaf = &partition.leaves[partition.chosen];
     let point = case.limits().to_unit(&selection.movement.configuration);
     for ((x, centre), level) in point.iter().zip(&leaf.centre).zip(&leaf.levels) {
@@ -148,13 +148,14 @@ fn explanations_agree_with_appraisals() {
     let case = Case::new(0.3).with_rival();
     let policy = greedy(&case);
     let search = policy.explain(&case.situation(), &case.limits()).expect("a search").expect("a planner explains");
-    let leaves = &search.partition.leaves;
+    let partition = search.partition();
+    let leaves = &partition.leaves;
     for leaf in leaves {
         let (found, value) = (case.value(&policy, &case.limits().from_unit(&leaf.centre)), leaf.value.expect("finite"));
         assert!((found - value).abs() < 1e-9 * found, "{found} {value}");
     }
     let least = leaves.iter().filter_map(|leaf| leaf.value).fold(f64::INFINITY, f64::min);
-    assert_eq!(leaves[search.partition.chosen].value, Some(least));
+    assert_eq!(leaves[partition.chosen].value, Some(least));
     let selection = case.select(&policy).expect("a selection");
     assert!(selection.criterion.expect("chosen by it") < least, "polished");
 }

@@ -1,0 +1,63 @@
+//! Several candidates at a time, one in each lane of a vector register.
+//!
+//! Where the same is computed of many candidates, lanes run across candidates: nothing is summed across lanes, so that a value
+//! does not depend on which others it is computed with. The widest instructions that the processor has are chosen at run time,
+//! by [`dispatch!`](fearless_simd::dispatch), in safe code. A function is compiled for those instructions only where it is
+//! inlined into the dispatched one: hence `#[inline(always)]` throughout, and loops instead of closures that are handed lanes.
+//! The same kind of processor gives the same bits; with and without fused multiplication they differ by rounding.
+//!
+//! In memory candidates stand in groups of [`GROUP`], whatever the width of a register: of each number of a group one candidate
+//! beside the other.
+
+mod rotor;
+mod space;
+mod symmetric;
+
+use fearless_simd::{Simd, SimdBase};
+
+pub use rotor::sin_cos;
+pub use space::{Frame, Vector};
+pub use symmetric::times;
+
+/// As many numbers as a register holds.
+pub type Lanes<S> = <S as Simd>::f64s;
+
+/// Candidates of a group: the lanes of the widest register that there is.
+pub const GROUP: usize = 8;
+
+/// The same number in all lanes.
+#[inline(always)]
+pub fn splat<S: Simd>(simd: S, x: f64) -> Lanes<S> {
+    Lanes::<S>::splat(simd, x)
+}
+
+/// A register full of what begins at `first`.
+#[inline(always)]
+pub fn load<S: Simd>(simd: S, numbers: &[f64], first: usize) -> Lanes<S> {
+    Lanes::<S>::from_slice(simd, &numbers[first..first + Lanes::<S>::LEN])
+}
+
+/// Puts a register where `first` is.
+#[inline(always)]
+pub fn store<S: Simd>(lanes: Lanes<S>, numbers: &mut [f64], first: usize) {
+    lanes.store_slice(&mut numbers[first..first + Lanes::<S>::LEN]);
+}
+
+/// Groups that hold so many candidates.
+pub fn groups(candidates: usize) -> usize {
+    candidates.div_ceil(GROUP)
+}
+
+/// Every level of instructions that this processor has, the plainest first.
+#[cfg(test)]
+pub fn levels() -> Vec<fearless_simd::Level> {
+    use fearless_simd::Level;
+    let mut levels = vec![Level::baseline()];
+    #[cfg(target_arch = "x86_64")]
+    {
+        levels.extend(Level::new().as_sse4_2().map(Level::Sse4_2));
+        levels.extend(Level::new().as_avx2().map(Level::Avx2));
+    }
+    levels.push(Level::new());
+    levels
+}

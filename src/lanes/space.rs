@@ -1,0 +1,119 @@
+//! Vectors and frames in space.
+
+use std::ops::{Add, Neg, Sub};
+
+use fearless_simd::{ExtractToken, Simd, SimdFloat};
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Lanes, splat};
+
+/// A vector of each candidate: three components.
+#[derive(Clone, Copy)]
+pub struct Vector<S: Simd>(pub [Lanes<S>; 3]);
+
+impl<S: Simd> Vector<S> {
+    /// The same vector in all lanes.
+    #[inline(always)]
+    pub fn splat(simd: S, v: &Vector3<f64>) -> Self {
+        Self([splat(simd, v.x), splat(simd, v.y), splat(simd, v.z)])
+    }
+
+    /// k v.
+    #[inline(always)]
+    pub fn scaled(self, k: Lanes<S>) -> Self {
+        let [x, y, z] = self.0;
+        Self([x * k, y * k, z * k])
+    }
+
+    /// k v + other.
+    #[inline(always)]
+    pub fn scaled_onto(self, k: Lanes<S>, other: Self) -> Self {
+        let ([x, y, z], [a, b, c]) = (self.0, other.0);
+        Self([x.mul_add(k, a), y.mul_add(k, b), z.mul_add(k, c)])
+    }
+
+    /// v × other.
+    #[inline(always)]
+    pub fn cross(self, other: Self) -> Self {
+        let ([x, y, z], [a, b, c]) = (self.0, other.0);
+        Self([y.mul_sub(c, z * b), z.mul_sub(a, x * c), x.mul_sub(b, y * a)])
+    }
+
+    /// A v, for the same A in all lanes.
+    #[inline(always)]
+    pub fn through(self, a: &Matrix3<f64>) -> Self {
+        let [x, y, z] = self.0;
+        let frame = Frame::splat(x.token(), a);
+        let [a, b, c] = frame.0;
+        a.scaled_onto(x, b.scaled_onto(y, c.scaled(z)))
+    }
+}
+
+impl<S: Simd> Add for Vector<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        let ([x, y, z], [a, b, c]) = (self.0, other.0);
+        Self([x + a, y + b, z + c])
+    }
+}
+
+impl<S: Simd> Sub for Vector<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        let ([x, y, z], [a, b, c]) = (self.0, other.0);
+        Self([x - a, y - b, z - c])
+    }
+}
+
+impl<S: Simd> Neg for Vector<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        let [x, y, z] = self.0;
+        Self([-x, -y, -z])
+    }
+}
+
+/// A rotation of each candidate: the columns of its matrix.
+#[derive(Clone, Copy)]
+pub struct Frame<S: Simd>(pub [Vector<S>; 3]);
+
+impl<S: Simd> Frame<S> {
+    /// The same rotation in all lanes.
+    #[inline(always)]
+    pub fn splat(simd: S, rotation: &Matrix3<f64>) -> Self {
+        let [a, b, c] = columns(rotation);
+        Self([Vector::splat(simd, &a), Vector::splat(simd, &b), Vector::splat(simd, &c)])
+    }
+
+    /// R v, for the same v in all lanes.
+    #[inline(always)]
+    pub fn times(&self, v: &Vector3<f64>) -> Vector<S> {
+        let ([a, b, c], simd) = (self.0, self.0[0].0[0].token());
+        a.scaled_onto(splat(simd, v.x), b.scaled_onto(splat(simd, v.y), c.scaled(splat(simd, v.z))))
+    }
+
+    /// R C, for the same C in all lanes.
+    #[inline(always)]
+    pub fn then(&self, c: &Matrix3<f64>) -> Self {
+        let [x, y, z] = columns(c);
+        Self([self.times(&x), self.times(&y), self.times(&z)])
+    }
+
+    /// The same turned about its own third axis by an angle of these sines and cosines.
+    #[inline(always)]
+    pub fn turned(&self, sine: Lanes<S>, cosine: Lanes<S>) -> Self {
+        let [a, b, c] = self.0;
+        Self([a.scaled_onto(cosine, b.scaled(sine)), b.scaled_onto(cosine, a.scaled(-sine)), c])
+    }
+}
+
+#[inline(always)]
+fn columns(a: &Matrix3<f64>) -> [Vector3<f64>; 3] {
+    [Vector3::new(a.m11, a.m21, a.m31), Vector3::new(a.m12, a.m22, a.m32), Vector3::new(a.m13, a.m23, a.m33)]
+}
