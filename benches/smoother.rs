@@ -9,7 +9,7 @@ use body_schema::{
     estimation::{Estimator, Smoother},
     model::Prior,
     scenario::builtin,
-    sensing::{Observation, Rig},
+    sensing::{Loss, Observation, Rig},
 };
 use divan::{Bencher, counter::ItemsCount};
 use nalgebra::Vector3;
@@ -22,14 +22,17 @@ fn main() {
 }
 
 /// Measurements before the first that is timed.
-const BEFORE: [usize; 5] = [20, 60, 120, 240, 480];
+const BEFORE: [usize; 6] = [20, 60, 120, 200, 480, 2000];
+/// One in so many is an outlier, where there are any.
+const OUTLIERS: usize = 10;
 /// Measurements that are timed together: as many as lie between two compressions.
 const TIMED: usize = 30;
 
 type Seen = (Vec<f64>, Observation);
 
-/// A smoother that has seen `before` random movements of an arm, and the next ones.
-fn case(name: &str, before: usize) -> (Smoother, Vec<Seen>) {
+/// A smoother that has seen `before` random movements of an arm, and the next ones; with a loss that expects outliers there
+/// are some.
+fn case(name: &str, before: usize, loss: Loss) -> (Smoother, Vec<Seen>) {
     let scenario = builtin(name).expect("built in");
     let layout = scenario.robot.layout.clone();
     let deviations = scenario.prior.standard_deviations(&layout);
@@ -37,17 +40,18 @@ fn case(name: &str, before: usize) -> (Smoother, Vec<Seen>) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let sigma_m = scenario.smoother.sigma;
     let mut seen: Vec<Seen> = (0..before + TIMED)
-        .map(|_| {
+        .map(|index| {
             let limits = scenario.robot.limits.joints();
             let theta: Vec<f64> = limits.iter().map(|&(lower, upper)| rng.random_range(lower..upper)).collect();
             let noise = Vector3::from_fn(|_, _| StandardNormal.sample(&mut rng));
-            let marker = scenario.robot.state.marker_at(&theta) + sigma_m * noise;
+            let scatter = if loss != Loss::None && index % OUTLIERS == OUTLIERS - 1 { 50.0 * sigma_m } else { sigma_m };
+            let marker = scenario.robot.state.marker_at(&theta) + scatter * noise;
             (theta, Observation::seen(marker))
         })
         .collect();
     let next = seen.split_off(before);
     let settings = scenario.smoother.hypotheses;
-    let mut smoother = Smoother::new(prior, layout.into(), Rig::tracker(sigma_m).into(), settings, rng);
+    let mut smoother = Smoother::new(prior, layout.into(), Rig::tracker(sigma_m).into(), settings, rng).with_loss(loss);
     observe(&mut smoother, &seen);
     (smoother, next)
 }
@@ -60,16 +64,21 @@ fn observe(smoother: &mut Smoother, seen: &[Seen]) {
 
 #[divan::bench(args = BEFORE, sample_count = 20)]
 fn a_thirty_measurements_of_6_joints_after(bencher: Bencher<'_, '_>, before: usize) {
-    time(bencher, "arm-6dof", before);
+    time(bencher, "arm-6dof", before, Loss::None);
 }
 
 #[divan::bench(args = BEFORE, sample_count = 20)]
 fn b_thirty_measurements_of_12_joints_after(bencher: Bencher<'_, '_>, before: usize) {
-    time(bencher, "arm-12dof", before);
+    time(bencher, "arm-12dof", before, Loss::None);
 }
 
-fn time(bencher: Bencher<'_, '_>, name: &str, before: usize) {
-    let (smoother, next) = case(name, before);
+#[divan::bench(args = BEFORE, sample_count = 20)]
+fn c_thirty_measurements_of_6_joints_with_outliers_after(bencher: Bencher<'_, '_>, before: usize) {
+    time(bencher, "arm-6dof", before, Loss::MIXTURE);
+}
+
+fn time(bencher: Bencher<'_, '_>, name: &str, before: usize, loss: Loss) {
+    let (smoother, next) = case(name, before, loss);
     bencher.counter(ItemsCount::new(TIMED)).with_inputs(|| smoother.clone()).bench_local_values(|mut smoother| {
         observe(&mut smoother, black_box(&next));
         smoother

@@ -17,7 +17,7 @@ use super::{
     Belief, ChangeDetector, EstimationError, Estimator, Update,
     belief::{Revision, innovation_covariance, is_finite},
 };
-use crate::sensing::Observation;
+use crate::{model::Layout, sensing::Observation};
 
 /// The stabilising noise of (5) and when it is added.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,10 +66,12 @@ impl Rls {
         let s = s.cholesky().ok_or(EstimationError::Diverged("the innovation covariance is not positive"))?;
         let k = s.solve(&numerator.transpose()).transpose();
         let delta: DVector<f64> = &k * innovation;
-        let shrink = DMatrix::identity(p.nrows(), p.ncols()) - &k * equations.rows.transpose();
-        let joseph = &shrink * p * shrink.transpose() + &k * k.transpose();
-        let transport = state.transport(layout, &delta);
-        let covariance = &transport * joseph * transport.transpose();
+        // Both factors of (3) are the identity but for as many rows as there are equations.
+        let mut covariance = p.clone();
+        covariance.gemm(-1.0, &k, &numerator.transpose(), 1.0);
+        let outer = &k - &covariance * &equations.rows;
+        covariance.gemm(1.0, &outer, &k.transpose(), 1.0);
+        carry(&mut covariance, &state.transport(layout, &delta), layout);
         let nis = innovation.dot(&s.solve(innovation));
         if !(is_finite(&delta, &covariance) && nis.is_finite()) {
             return Err(EstimationError::Diverged("an update was not a finite number"));
@@ -107,6 +109,19 @@ impl Estimator for Rls {
     }
 }
 
+/// P ← J P Jᵀ, J block diagonal.
+fn carry(covariance: &mut DMatrix<f64>, transport: &DMatrix<f64>, layout: &Layout) {
+    let m = covariance.nrows();
+    for (_, range) in layout.blocks() {
+        let (start, length) = (range.start, range.len());
+        let block = transport.view((start, start), (length, length));
+        let rows = block * covariance.rows(start, length);
+        covariance.rows_mut(start, length).copy_from(&rows);
+        let columns = covariance.columns(start, length) * block.transpose();
+        covariance.view_mut((0, start), (m, length)).copy_from(&columns);
+    }
+}
+
 /// Removes the rounding error that would let P drift from symmetry over thousands of updates.
 fn symmetrise(matrix: &mut DMatrix<f64>) {
     for column in 0..matrix.ncols() {
@@ -128,7 +143,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        model::{Layout, jacobian, laws::random_arm},
+        model::{jacobian, laws::random_arm},
         sensing::Rig,
     };
 

@@ -117,19 +117,26 @@ fn recorded_rows_are_bound_too() {
     assert!(!ended.is_empty());
 }
 
-/// A price of travel shortens the way, and the arm is learned as well.
+/// A price of travel shortens the way, and the arm is learned as well: medians, since what one learner comes to hangs on the last
+/// bit of a criterion.
 #[test]
 fn a_price_of_travel_shortens_the_way() {
     for (learner, steps, price) in [("global", 25, 0.003), ("active", 60, 0.03)] {
-        let way = |price: f64| {
+        let ways = |price: f64| {
             let start = vec![0.0; 6];
             let scenario =
                 bound("arm-6dof", &format!("[constraints]\ntravel_price = {price:?}\nstart_deg = {start:?}"));
-            let mut experiment = scenario.experiment(1004, Some(&[learner.to_owned()])).expect("starts");
-            let travelled = run(&scenario, &mut experiment, steps)[0];
-            (travelled, experiment.latest().learners[0].metrics.location_m.expect("simulated"))
+            let way = |seed: u64| {
+                let mut experiment = scenario.experiment(seed, Some(&[learner.to_owned()])).expect("starts");
+                let travelled = run(&scenario, &mut experiment, steps)[0];
+                (travelled, experiment.latest().learners[0].metrics.location_m.expect("simulated"))
+            };
+            let (mut travelled, mut errors): (Vec<f64>, Vec<f64>) = (1001..=1007).map(way).unzip();
+            travelled.sort_by(f64::total_cmp);
+            errors.sort_by(f64::total_cmp);
+            (travelled[3], errors[3])
         };
-        let ((free, error_of_free), (dear, error_of_dear)) = (way(0.0), way(price));
+        let ((free, error_of_free), (dear, error_of_dear)) = (ways(0.0), ways(price));
         assert!(dear < 0.7 * free, "{learner}: {dear} beside {free} rad");
         assert!(error_of_dear < error_of_free + 0.02, "{learner}: {error_of_dear} beside {error_of_free} m");
     }

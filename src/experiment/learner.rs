@@ -17,7 +17,7 @@ use crate::{
     estimation::{Belief, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
     model::{Hand, State, Workspace},
-    selection::{Movement, SelectionError, Weights},
+    selection::{Movement, Search, SelectionError, Weights},
     sensing::Observation,
 };
 
@@ -165,7 +165,7 @@ impl Learner {
 
     /// The gain of the best movement that DIRECT finds at a standpoint, for a policy that explains itself by one.
     fn searched_gain(&self, standpoint: Standpoint<'_>) -> Option<f64> {
-        let partition = self.agent.explain(standpoint).ok()??.partition;
+        let partition = self.agent.explain(standpoint).ok()??.partition();
         let values = partition.leaves.iter().filter_map(|leaf| Some((leaf, leaf.value?)));
         let (best, _) = values.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let centre = partition.searched(self.limits()).from_unit(&best.centre);
@@ -241,7 +241,7 @@ impl Learner {
             selection_ms: proposal.as_ref().map_or(0.0, |proposal| proposal.selection_ms),
             readings,
             seen,
-            partition: selection.and_then(|it| it.search.as_ref()).map(|search| search.partition.clone()),
+            partition: selection.and_then(|it| it.search.as_ref()).map(Search::partition),
         };
         self.last = proposal;
         Ok((report, update))

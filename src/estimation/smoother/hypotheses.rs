@@ -51,7 +51,8 @@ const COLD: Effort = Effort { steps: 40, tolerance: 1e-4, hopeless: f64::INFINIT
 impl Hypotheses {
     /// Searches every mode again after the posterior has changed.
     pub fn follow(&mut self, posterior: &Posterior, layout: &Layout) {
-        self.modes = self.modes.iter().filter_map(|mode| posterior.mode(&mode.state, layout, WARM)).collect();
+        let found = each(&self.modes, |mode| posterior.mode(&mode.state, layout, WARM));
+        self.modes = found.into_iter().flatten().collect();
     }
 
     /// Searches new modes, half of them from the prior, half of them from the modes there are. Where readings may be outliers,
@@ -60,20 +61,25 @@ impl Hypotheses {
         let best = self.modes.iter().map(|mode| mode.cost).fold(f64::INFINITY, f64::min);
         let effort = Effort { hopeless: (best + HOPELESS) * 10.0 + 1e3, ..COLD };
         let before = self.modes.len();
-        for index in 0..count {
-            if posterior.loss.is_robust() && index % 4 == 1 && before > 0 {
-                let start = &self.modes[rng.random_range(0..before)].state;
-                self.modes.extend(posterior.mode_suspecting(start, layout, effort, rng));
-                continue;
-            }
-            let drawn = posterior.prior.draw(layout, rng);
-            let start = if index % 2 == 0 || before == 0 {
-                drawn
-            } else {
-                mutated(&self.modes[rng.random_range(0..before)].state, &drawn, layout, rng)
-            };
-            self.modes.extend(posterior.mode_from_afar(&start, layout, effort));
-        }
+        // All that is drawn is drawn before the first search, so that these may be in any order.
+        let searches: Vec<(Option<Posterior>, State)> = (0..count)
+            .map(|index| {
+                if posterior.loss.is_robust() && index % 4 == 1 && before > 0 {
+                    let start = self.modes[rng.random_range(0..before)].state.clone();
+                    return (Some(posterior.suspecting(rng)), start);
+                }
+                let drawn = posterior.prior.draw(layout, rng);
+                if index % 2 == 0 || before == 0 {
+                    return (None, drawn);
+                }
+                (None, mutated(&self.modes[rng.random_range(0..before)].state, &drawn, layout, rng))
+            })
+            .collect();
+        let found = each(&searches, |(others, start)| match others {
+            Some(others) => posterior.mode_through(others, start, layout, effort),
+            None => posterior.mode_from_afar(start, layout, effort),
+        });
+        self.modes.extend(found.into_iter().flatten());
     }
 
     /// Merges, weighs, sorts and prunes.
@@ -101,6 +107,17 @@ impl Hypotheses {
         distinct.retain(|mode| mode.weight >= NEGLIGIBLE);
         self.modes = distinct;
     }
+}
+
+/// What becomes of each, in order: on several cores with the feature `parallel`.
+fn each<T: Sync, R: Send>(all: &[T], of: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        all.par_iter().map(of).collect()
+    }
+    #[cfg(not(feature = "parallel"))]
+    all.iter().map(of).collect()
 }
 
 /// `state` with one to three of its learned axes drawn anew or turned round; of other blocks, where no axis is learned.

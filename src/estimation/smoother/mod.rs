@@ -18,12 +18,15 @@
 mod batch;
 #[cfg(test)]
 mod changes;
+mod factor;
+mod gram;
 mod hypotheses;
 #[cfg(test)]
 mod laws;
 mod mode;
 mod model_error;
 mod noise;
+mod points;
 mod posterior;
 mod settled;
 
@@ -61,7 +64,8 @@ pub struct Smoother {
     /// Movements absorbed so far, misses among them.
     movements: u64,
     /// What was made of readings that are no longer looked at one by one.
-    past: Vec<ReadingReport>,
+    /// Shared with what a step begins from.
+    past: Arc<Vec<ReadingReport>>,
     /// The rig with its nominal noise.
     nominal: Arc<Rig>,
     /// By kind of noise: whether its scale is learned.
@@ -105,7 +109,7 @@ impl Smoother {
             changes: ChangeDetector::honest(),
             forgets: true,
             movements: 0,
-            past: Vec::new(),
+            past: Arc::default(),
             nominal,
             unknown,
             spare,
@@ -217,7 +221,8 @@ impl Smoother {
         let latest = changed.measurements.iter().map(|seen| seen.movement);
         let first = latest.filter(|movement| *movement != BEFOREHAND).min().unwrap_or(u64::MAX);
         let dropped = self.posterior.readings(&self.belief.state).take_while(|reading| reading.movement < first);
-        self.past.extend(dropped.collect::<Vec<_>>());
+        let dropped: Vec<ReadingReport> = dropped.collect();
+        Arc::make_mut(&mut self.past).extend(dropped);
         self.posterior = changed;
         self.hypotheses.calm = 0;
         self.changes.reset();
@@ -336,12 +341,13 @@ impl Smoother {
             return Err(EstimationError::Diverged("no hypothesis explains the measurements"));
         }
         self.publish();
-        if self.is_determined() && self.belief.alternatives.is_empty() && self.explains() {
+        // What costs most is asked last.
+        if self.belief.alternatives.is_empty() && self.explains() && self.is_determined() {
             self.hypotheses.calm += 1;
             if self.is_settled() && self.posterior.measurements.len() > KEPT {
                 let first = self.posterior.measurements[KEPT / 2].movement;
                 let settling = self.posterior.readings(&self.belief.state).take_while(|it| it.movement < first);
-                self.past.extend(settling.collect::<Vec<_>>());
+                Arc::make_mut(&mut self.past).extend(settling);
                 self.posterior.settle(KEPT / 2, &self.belief.state, &layout);
             }
         } else {

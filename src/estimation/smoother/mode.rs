@@ -1,9 +1,14 @@
 //! The search for the posterior's modes.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use fearless_simd::Level;
+use nalgebra::{DMatrix, DVector};
 use rand::{Rng, RngExt};
 
-use super::posterior::{Normal, Posterior};
+use super::{
+    factor::Factor,
+    points::Room,
+    posterior::{Normal, Posterior},
+};
 use crate::{
     model::{GRAVITY, Layout, Quantity, State},
     sensing::Graduated,
@@ -61,7 +66,7 @@ impl Posterior {
     /// Steps solve `(Λ + λ diag Λ) δ = descent`; λ follows the ratio of found to predicted descent (Nielsen's rule).
     pub fn mode(&self, start: &State, layout: &Layout, effort: Effort) -> Option<Mode> {
         let (state, normal) = self.descend(self.loss.into(), start, layout, effort)?;
-        Mode::at(state, normal)
+        Mode::at(self.level, state, normal)
     }
 
     /// The same from a start that may be far from where the search ends: a robust loss narrows on the way.
@@ -78,12 +83,17 @@ impl Posterior {
         self.mode(&state, layout, effort)
     }
 
-    /// The same from where all measurements but one to three are explained by least squares.
-    pub fn mode_suspecting(&self, start: &State, layout: &Layout, effort: Effort, rng: &mut impl Rng) -> Option<Mode> {
+    /// The same posterior without one to three of the measurements.
+    pub fn suspecting(&self, rng: &mut impl Rng) -> Self {
         let mut others = self.clone();
         for _ in 0..rng.random_range(1..=3).min(others.measurements.len()) {
             others.measurements.swap_remove(rng.random_range(0..others.measurements.len()));
         }
+        others
+    }
+
+    /// The local minimum reached from where `others`, some of the measurements, are explained by least squares.
+    pub fn mode_through(&self, others: &Self, start: &State, layout: &Layout, effort: Effort) -> Option<Mode> {
         let least_squares = Graduated { loss: self.loss, width: f64::INFINITY };
         let (state, _) = others.descend(least_squares, start, layout, effort)?;
         self.mode(&state, layout, effort)
@@ -91,17 +101,14 @@ impl Posterior {
 
     fn descend(&self, loss: Graduated, start: &State, layout: &Layout, effort: Effort) -> Option<(State, Normal)> {
         let mut state = start.slid_towards(&self.pins);
-        let mut normal = self.normal_by(loss, &state, layout)?;
+        let mut room = Room::default();
+        let mut normal = self.normal_by(loss, &state, layout, &mut room)?;
         let (mut lambda, mut growth) = (1e-3, 2.0);
         for step in 0..effort.steps {
             if step == effort.steps / 2 && normal.cost > effort.hopeless {
                 return None;
             }
-            let mut damped = normal.information.clone();
-            for k in 0..damped.nrows() {
-                damped[(k, k)] *= 1.0 + lambda;
-            }
-            let mut delta = Cholesky::new(damped)?.solve(&normal.descent);
+            let mut delta = Factor::new(self.level, &normal.information, lambda)?.solve(&normal.descent);
             let length = length(&delta, layout);
             if length > 1.0 {
                 delta /= length;
@@ -110,12 +117,13 @@ impl Posterior {
             if !predicted.is_finite() {
                 return None;
             }
-            let next = state.retract(layout, &delta).slid_towards(&self.pins);
-            let cost = self.cost_by(loss, &next, layout);
+            let mut next = state.retract(layout, &delta);
+            next.slide_towards(&self.pins);
+            let cost = self.cost_by(loss, &next, layout, &mut room);
             let ratio = (normal.cost - cost) / predicted;
             if ratio > 0.0 {
                 state = next;
-                normal = self.normal_by(loss, &state, layout)?;
+                normal = self.normal_by(loss, &state, layout, &mut room)?;
                 lambda = (lambda * (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0)).max(1e-9);
                 growth = 2.0;
             } else {
@@ -131,14 +139,13 @@ impl Posterior {
 }
 
 impl Mode {
-    fn at(state: State, normal: Normal) -> Option<Self> {
+    fn at(level: Level, state: State, normal: Normal) -> Option<Self> {
         let Normal { cost, information, .. } = normal;
-        let cholesky = Cholesky::new(information.clone())?;
-        let log_determinant = 2.0 * cholesky.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
-        let log_evidence = -cost - 0.5 * log_determinant;
+        let factor = Factor::new(level, &information, 0.0)?;
+        let log_evidence = -cost - 0.5 * factor.log_determinant();
         if !log_evidence.is_finite() {
             return None;
         }
-        Some(Self { state, cost, information, covariance: cholesky.inverse(), log_evidence, weight: 0.0 })
+        Some(Self { state, cost, information, covariance: factor.inverse(), log_evidence, weight: 0.0 })
     }
 }

@@ -11,15 +11,17 @@
 
 use std::{ops::Range, sync::Arc};
 
+use fearless_simd::Level;
 use nalgebra::{DMatrix, DVector};
 
 use super::{
     mode::Mode,
+    points::Room,
     settled::{Quadratic, Settled},
 };
 use crate::{
     estimation::ReadingReport,
-    model::{Layout, Pass, Prior, State, rank},
+    model::{Layout, Pass, Points, Prior, State, Whitening, rank},
     sensing::{Graduated, Loss, Observation, Rig},
 };
 
@@ -32,12 +34,22 @@ pub(super) struct Measurement {
     pub movement: u64,
 }
 
+impl AsRef<[f64]> for Measurement {
+    fn as_ref(&self) -> &[f64] {
+        &self.positions
+    }
+}
+
 /// Everything that is known.
 #[derive(Clone, Debug)]
 pub(super) struct Posterior {
     pub prior: Prior,
     pub pins: State,
     pub rig: Arc<Rig>,
+    /// The points that the rig measures, where it measures nothing else.
+    targets: Option<Vec<(usize, Whitening)>>,
+    /// The instructions that this processor has.
+    pub level: Level,
     pub loss: Loss,
     /// s, by kind of noise: 1 where it is known.
     pub scales: Vec<f64>,
@@ -71,7 +83,18 @@ fn norm_squared(x: &[f64]) -> f64 {
 impl Posterior {
     pub fn new(prior: Prior, rig: Arc<Rig>) -> Self {
         let scales = vec![1.0; rig.noises().len()];
-        Self { pins: prior.pins(), prior, rig, loss: Loss::None, scales, measurements: Vec::new(), settled: None }
+        let targets = rig.points();
+        Self {
+            pins: prior.pins(),
+            prior,
+            rig,
+            targets,
+            level: Level::new(),
+            loss: Loss::None,
+            scales,
+            measurements: Vec::new(),
+            settled: None,
+        }
     }
 
     /// The same rig and likelihood with another prior, and of the measurements only these.
@@ -149,13 +172,18 @@ impl Posterior {
     }
 
     /// The kinds of noise of a channel, with their numbers among all.
-    fn noises(&self, channel: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
+    pub fn noises(&self, channel: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
         let all = self.rig.noises().iter().enumerate();
         all.filter(move |(_, noise)| noise.channel == channel).map(|(index, noise)| (index, noise.part.clone()))
     }
 
+    /// What is measured at `state`, where that is the place of points and nothing else.
+    fn points(&self, state: &State, layout: &Layout) -> Option<Points> {
+        Points::new(state, layout, self.targets.as_ref()?)
+    }
+
     /// ‖r‖² of a reading, in σ as they are taken to be.
-    fn squared(&self, channel: usize, whitened: &[f64]) -> f64 {
+    pub fn squared(&self, channel: usize, whitened: &[f64]) -> f64 {
         self.noises(channel).map(|(noise, part)| norm_squared(&whitened[part]) / self.scales[noise].powi(2)).sum()
     }
 
@@ -163,17 +191,15 @@ impl Posterior {
     /// points nearest to the pins.
     #[cfg(test)]
     pub fn cost(&self, state: &State, layout: &Layout) -> f64 {
-        self.cost_by(self.loss.into(), state, layout)
+        self.cost_by(self.loss.into(), state, layout, &mut Room::default())
     }
 
     /// The same by another loss.
-    pub fn cost_by(&self, loss: Graduated, state: &State, layout: &Layout) -> f64 {
-        let mut errors = 0.0;
-        for seen in &self.measurements {
-            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
-                errors += loss.cost(self.squared(channel, whitened), whitened.len());
-            });
-        }
+    pub fn cost_by(&self, loss: Graduated, state: &State, layout: &Layout, room: &mut Room) -> f64 {
+        let errors = match self.points(state, layout) {
+            Some(points) => self.cost_of_points(loss, &points, room),
+            None => self.cost_of_readings(loss, state),
+        };
         let settled = self.settled.as_ref().map_or(0.0, |settled| {
             settled.state.local(layout, state).map_or(f64::INFINITY, |delta| {
                 let of = settled.noises.iter().zip(&self.scales);
@@ -181,6 +207,16 @@ impl Posterior {
             })
         });
         self.prior.cost(state, None) + errors + settled
+    }
+
+    fn cost_of_readings(&self, loss: Graduated, state: &State) -> f64 {
+        let mut cost = 0.0;
+        for seen in &self.measurements {
+            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+                cost += loss.cost(self.squared(channel, whitened), whitened.len());
+            });
+        }
+        cost
     }
 
     /// By kind of noise, how well the data are fitted at `state`: for one that is as assumed `squared` is χ² distributed with
@@ -214,18 +250,22 @@ impl Posterior {
     /// The normal equations at `state`, linearised there; `None` outside the chart of settled measurements.
     #[cfg(test)]
     pub fn normal(&self, state: &State, layout: &Layout) -> Option<Normal> {
-        self.normal_by(self.loss.into(), state, layout)
+        self.normal_by(self.loss.into(), state, layout, &mut Room::default())
     }
 
     /// The same by another loss.
-    pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout) -> Option<Normal> {
+    pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout, room: &mut Room) -> Option<Normal> {
         let m = layout.dimension();
         let (mut information, mut descent, mut cost) = (DMatrix::zeros(m, m), DVector::zeros(m), 0.0);
-        for measurements in self.measurements.chunks(STACKED) {
-            let (stacked, residuals, errors) = self.stacked(loss, state, layout, measurements);
-            information += &stacked * stacked.transpose();
-            descent += stacked * residuals;
-            cost += errors;
+        if let Some(points) = self.points(state, layout) {
+            cost += self.add_points(loss, &points, (&mut information, &mut descent), room);
+        } else {
+            for measurements in self.measurements.chunks(STACKED) {
+                let (stacked, residuals, errors) = self.stacked(loss, state, layout, measurements);
+                information += &stacked * stacked.transpose();
+                descent += stacked * residuals;
+                cost += errors;
+            }
         }
         cost += self.prior.cost(state, Some((&mut information, &mut descent)));
         if let Some(settled) = &self.settled {

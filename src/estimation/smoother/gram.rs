@@ -1,0 +1,112 @@
+//! Sums of squares: HᵀH and Hᵀr of many rows. They stand in blocks of as many rows each, in a block the columns of H one behind
+//! the other.
+
+use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
+use nalgebra::{DMatrix, DVector};
+
+use crate::lanes::{Lanes, load, splat};
+
+/// Columns of a tile: each number that is read serves several products.
+const ACROSS: usize = 4;
+const DOWN: usize = 2;
+
+/// Adds HᵀH to `information` and Hᵀr to `descent`; H has as many rows as `residuals`, in blocks of `length`, a multiple of
+/// [`GROUP`](crate::lanes::GROUP).
+pub(super) fn add_squares(
+    level: Level,
+    (rows, residuals): (&[f64], &[f64]),
+    length: usize,
+    information: &mut DMatrix<f64>,
+    descent: &mut DVector<f64>,
+) {
+    dispatch!(level, simd => {
+        squares(simd, rows, length, information);
+        for (rows, residuals) in rows.chunks_exact(length * descent.len()).zip(residuals.chunks_exact(length)) {
+            for (column, sum) in rows.chunks_exact(length).zip(descent.iter_mut()) {
+                *sum += dot(simd, column, residuals);
+            }
+        }
+    });
+}
+
+/// HᵀH of a single block of m columns, whose length is a multiple of [`GROUP`](crate::lanes::GROUP).
+pub(super) fn squared(level: Level, rows: &[f64], m: usize) -> DMatrix<f64> {
+    let mut product = DMatrix::zeros(m, m);
+    dispatch!(level, simd => squares(simd, rows, rows.len() / m.max(1), &mut product));
+    product
+}
+
+/// Adds HᵀH: by tiles above the diagonal, whose mirror image is what is below it.
+#[inline(always)]
+fn squares<S: Simd>(simd: S, rows: &[f64], length: usize, sums: &mut DMatrix<f64>) {
+    let m = sums.nrows();
+    for right in (0..m).step_by(DOWN) {
+        for left in (0..(right + DOWN).min(m)).step_by(ACROSS) {
+            let mut tile = [[splat(simd, 0.0); DOWN]; ACROSS];
+            for block in rows.chunks_exact((m * length).max(1)) {
+                // Beyond the last column it is taken again, and forgotten.
+                let column = |index: usize| &block[index.min(m - 1) * length..][..length];
+                let b = [column(right), column(right + 1)];
+                let a = [column(left), column(left + 1), column(left + 2), column(left + 3)];
+                for first in (0..length).step_by(Lanes::<S>::LEN) {
+                    let b = [load(simd, b[0], first), load(simd, b[1], first)];
+                    for (a, tile) in a.iter().zip(&mut tile) {
+                        let a = load(simd, a, first);
+                        tile[0] = a.mul_add(b[0], tile[0]);
+                        tile[1] = a.mul_add(b[1], tile[1]);
+                    }
+                }
+            }
+            for (i, tile) in tile.iter().enumerate() {
+                for (j, sum) in tile.iter().enumerate() {
+                    let (row, column) = (left + i, right + j);
+                    if row <= column && column < m {
+                        sums[(row, column)] += sum.as_slice().iter().sum::<f64>();
+                    }
+                }
+            }
+        }
+    }
+    sums.fill_lower_triangle_with_upper_triangle();
+}
+
+/// Σ aᵢ bᵢ of as many numbers as fill lanes.
+#[inline(always)]
+fn dot<S: Simd>(simd: S, a: &[f64], b: &[f64]) -> f64 {
+    let mut sum = splat(simd, 0.0);
+    for first in (0..a.len()).step_by(Lanes::<S>::LEN) {
+        sum = load(simd, a, first).mul_add(load(simd, b, first), sum);
+    }
+    sum.as_slice().iter().sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::lanes::levels;
+
+    #[test]
+    fn squares_are_those_of_linear_algebra() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        for (blocks, length, m) in [(1, 8, 1), (2, 8, 2), (1, 16, 3), (3, 8, 5), (2, 40, 24), (4, 24, 27)] {
+            let h: Vec<f64> = (0..blocks * length * m).map(|_| rng.random_range(-1.0..1.0)).collect();
+            let r = DVector::from_fn(blocks * length, |_, _| rng.random_range(-1.0..1.0));
+            let whole =
+                DMatrix::from_fn(blocks * length, m, |row, k| h[(row / length * m + k) * length + row % length]);
+            for level in levels() {
+                let (mut information, mut descent) = (DMatrix::identity(m, m), DVector::zeros(m));
+                add_squares(level, (&h, r.as_slice()), length, &mut information, &mut descent);
+                let expected = whole.tr_mul(&whole) + DMatrix::identity(m, m);
+                assert!((&information - expected).amax() < 1e-13 * r.len() as f64, "{level:?} {blocks} {length} {m}");
+                assert!(
+                    (descent - whole.tr_mul(&r)).amax() < 1e-13 * r.len() as f64,
+                    "{level:?} {blocks} {length} {m}"
+                );
+                assert_eq!(information, information.transpose());
+            }
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! What the data cost and their normal equations where nothing but points is measured: as many measurements at a time as a
+//! register holds.
+
+use fearless_simd::dispatch;
+use nalgebra::{DMatrix, DVector};
+
+use super::{
+    gram::add_squares,
+    posterior::{Measurement, Posterior},
+};
+use crate::{
+    lanes::{GROUP, groups},
+    model::Points,
+    sensing::Graduated,
+};
+
+/// Measurements whose rows are looked at together: few enough for the caches.
+const TOGETHER: usize = 32;
+
+/// Where rows and residuals are put, step after step of a search.
+#[derive(Default)]
+pub(super) struct Room {
+    rows: Vec<f64>,
+    readings: Vec<f64>,
+    factors: Vec<f64>,
+    residuals: Vec<f64>,
+}
+
+fn emptied(numbers: &mut Vec<f64>, count: usize) -> &mut [f64] {
+    numbers.clear();
+    numbers.resize(count, 0.0);
+    numbers
+}
+
+impl Posterior {
+    /// What all readings cost.
+    pub(super) fn cost_of_points(&self, loss: Graduated, points: &Points, room: &mut Room) -> f64 {
+        let readings = emptied(&mut room.readings, points.equations() * TOGETHER);
+        let mut cost = 0.0;
+        for measurements in self.measurements.chunks(TOGETHER) {
+            dispatch!(self.level, simd => points.readings(simd, measurements, readings));
+            for (seen, predicted) in measurements.iter().zip(readings.chunks_exact(points.equations())) {
+                self.rig.residuals_of(predicted, &seen.observation, |channel, whitened| {
+                    cost += loss.cost(self.squared(channel, whitened), whitened.len());
+                });
+            }
+        }
+        cost
+    }
+
+    /// Adds Σ w HᵀH/s² and Σ w Hᵀr/s² of all readings, and returns what they cost.
+    pub(super) fn add_points(
+        &self,
+        loss: Graduated,
+        points: &Points,
+        (information, descent): (&mut DMatrix<f64>, &mut DVector<f64>),
+        room: &mut Room,
+    ) -> f64 {
+        let (m, d) = (information.nrows(), points.equations());
+        let mut cost = 0.0;
+        for measurements in self.measurements.chunks(TOGETHER) {
+            let padded = d * GROUP * groups(measurements.len());
+            let rows = emptied(&mut room.rows, m * padded);
+            let readings = emptied(&mut room.readings, d * measurements.len());
+            dispatch!(self.level, simd => points.rows(simd, measurements, readings, rows));
+            let weighed = (emptied(&mut room.factors, padded), emptied(&mut room.residuals, padded));
+            cost += self.weigh_points(loss, measurements, readings, weighed);
+            if room.factors.iter().any(|factor| *factor != 1.0) {
+                let factors = room.factors.chunks_exact(d * GROUP);
+                for (rows, factors) in rows.chunks_exact_mut(m * d * GROUP).zip(factors) {
+                    for column in rows.chunks_exact_mut(d * GROUP) {
+                        column.iter_mut().zip(factors).for_each(|(x, factor)| *x *= factor);
+                    }
+                }
+            }
+            add_squares(self.level, (rows, &room.residuals), d * GROUP, information, descent);
+        }
+        cost
+    }
+
+    /// Writes √w/s and √w (y − h)/s of all equations of some measurements, nothing where nothing was read, and returns what they
+    /// cost.
+    fn weigh_points(
+        &self,
+        loss: Graduated,
+        measurements: &[Measurement],
+        readings: &[f64],
+        (factors, residuals): (&mut [f64], &mut [f64]),
+    ) -> f64 {
+        let d = readings.len() / measurements.len();
+        let mut cost = 0.0;
+        for (index, (seen, predicted)) in measurements.iter().zip(readings.chunks_exact(d)).enumerate() {
+            self.rig.residuals_of(predicted, &seen.observation, |channel, whitened| {
+                let squared = self.squared(channel, whitened);
+                cost += loss.cost(squared, whitened.len());
+                let root = loss.weight(squared, whitened.len()).sqrt();
+                for (noise, part) in self.noises(channel) {
+                    for row in part {
+                        let equation = whitened.len() * channel + row;
+                        let place = (index / GROUP * d + equation) * GROUP + index % GROUP;
+                        factors[place] = root / self.scales[noise];
+                        residuals[place] = factors[place] * whitened[row];
+                    }
+                }
+            });
+        }
+        cost
+    }
+}
