@@ -22,7 +22,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use nalgebra::{Isometry3, Point3};
 use rerun::{
-    Color, LineStrips3D, MediaType, Points3D, Radius, RecordingInfo, Scalars, SeriesPoints, TextDocument, Transform3D,
+    Color, LineStrips3D, MediaType, Points3D, Radius, RecordingInfo, SeriesPoints, TextDocument, Transform3D,
     ViewCoordinates,
     external::re_log_types::{ApplicationId, EntityPath, StoreId},
 };
@@ -41,7 +41,7 @@ use super::{
     rows::Rows,
     solid::{drum, quaternion, single, solid},
     stage::{GROUNDS, Stage},
-    uncertainty::{Drawn, Uncertainty},
+    uncertainty::{Uncertainty, drawn},
 };
 use crate::{
     calibration::{Calibration, Case, Reading, Residual, Unit},
@@ -98,9 +98,7 @@ pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &s
     let mut file = RrdFile::create(path)?;
     file.append(&[message::store_info(&store)])?;
     file.append(&arrangement(&scene.stage, application, found.report.unit())?)?;
-    let chunks = rows.drain(|_| true)?;
-    let steps = chunks.iter().filter_map(super::rows::by_steps);
-    let messages: Vec<_> = steps.map(|chunk| message::data(&store, &chunk)).collect::<Result<_, _>>()?;
+    let messages: Vec<_> = rows.steps()?.iter().map(|chunk| message::data(&store, chunk)).collect::<Result<_, _>>()?;
     file.append(&messages)?;
     file.finish()
 }
@@ -137,7 +135,7 @@ fn log_residuals(rows: &mut Rows, row: usize, unit: Unit, described: &[Residual]
     ];
     for ((path, ..), value) in SERIES.iter().zip(values) {
         if let Some(value) = value {
-            rows.at(step, &EntityPath::from(*path), &[&Scalars::new([value])]);
+            rows.number(step, &EntityPath::from(*path), value);
         }
     }
 }
@@ -210,8 +208,9 @@ impl Scene {
         let posture = Posture::of(&self.arm, &case.rows[row].positions);
         rows.at(step, &entity("arm"), &[&solid(&posture.capsules(reach_m, look()))]);
         let joints = case.scenario.robot.joint_descriptions();
-        let clouds = uncertainty.of_points(&self.model, &joints).unwrap_or_default();
-        rows.at(step, &entity("uncertainty"), &Drawn::new(&clouds, &posture.links, learner_color(0), CLOUD).parts());
+        let clouds = uncertainty.of_points(&self.model).unwrap_or_default();
+        let clouds_look = uncertainty.look(&clouds, &joints, "", (learner_color(0), CLOUD));
+        rows.drawn(step, &entity("uncertainty"), &[], drawn(&clouds, &posture.links), clouds_look);
         let measured: Vec<Point3<f64>> = readings.iter().filter_map(|reading| place(&reading.measured)).collect();
         let points = Points3D::new(measured.iter().map(|point| single(point.coords.into())))
             .with_colors([Color::from(MEASURED)])

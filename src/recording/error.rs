@@ -3,7 +3,7 @@
 use std::{io, path::PathBuf};
 
 use re_log_encoding::{CodecError, EncodeError};
-use rerun::log::ChunkError;
+use rerun::{external::arrow::error::ArrowError, log::ChunkError};
 
 /// Why a run could not be recorded. The experiment itself is not affected.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +38,12 @@ pub enum RecordingError {
 
 impl From<ChunkError> for RecordingError {
     fn from(source: ChunkError) -> Self {
+        Self::Encode(source.to_string())
+    }
+}
+
+impl From<ArrowError> for RecordingError {
+    fn from(source: ArrowError) -> Self {
         Self::Encode(source.to_string())
     }
 }

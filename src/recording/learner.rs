@@ -1,8 +1,10 @@
 //! What one learner's reports become.
 
+use std::{cell::RefCell, collections::HashMap};
+
 use nalgebra::{Isometry3, Translation3};
 use rerun::{
-    Points3D, Scalars, TextLog, Transform3D,
+    Points3D, TextLog, Transform3D,
     external::re_log_types::{EntityPath, EntityPathPart},
 };
 
@@ -11,15 +13,15 @@ use super::{
     colours::{label_on_dark, label_on_light},
     frames::Shown,
     head, metrics, model,
-    movement::Movement,
+    movement::{ERROR, MEASURED, Movement, NOT_SEEN, PREDICTED, SEEN, error_look, marker_look},
     partition::{self, Slice},
     posture::{ArmLook, Posture, bare},
     readings::Readings,
     rows::Rows,
     sight, sockets,
-    solid::{drum, quaternion, single, solid},
+    solid::{self, Capsule, drum, quaternion, single, solid},
     stage::Stage,
-    uncertainty::{Drawn, Uncertainty},
+    uncertainty::{Uncertainty, drawn},
 };
 use crate::{
     experiment::{ChannelReading, Description, LearnerReport, MovementReport},
@@ -56,6 +58,8 @@ pub(super) struct LearnerEntities {
     pub(super) colour: [u8; 3],
     pub(super) root: EntityPath,
     pub(super) metrics: Vec<EntityPath>,
+    /// Those below the root that were asked for: making a path takes longer than to log what stands there.
+    paths: RefCell<HashMap<&'static str, EntityPath>>,
     uncertainty: Uncertainty,
     readings: Readings,
     /// Its place in the row.
@@ -90,6 +94,7 @@ impl LearnerEntities {
             metrics: metrics::NAMES.iter().map(|name| metrics.join(&EntityPath::from(*name))).collect(),
             readings: Readings::new(&root, description),
             root,
+            paths: RefCell::default(),
             uncertainty: Uncertainty::new(description.joints.len(), ellipsoids),
             index,
             base: None,
@@ -111,8 +116,9 @@ impl LearnerEntities {
         series.map(|(series, _)| series.clone()).chain(others.map(|path| self.entity(path))).chain(readings)
     }
 
-    pub(super) fn entity(&self, path: &str) -> EntityPath {
-        self.root.join(&EntityPath::from(path))
+    pub(super) fn entity(&self, path: &'static str) -> EntityPath {
+        let mut paths = self.paths.borrow_mut();
+        paths.entry(path).or_insert_with(|| self.root.join(&EntityPath::from(path))).clone()
     }
 
     pub(super) fn arm_look(&self) -> ArmLook {
@@ -170,7 +176,7 @@ impl LearnerEntities {
         self.log_movement(rows, step, report, scenery);
         for (series, value) in self.metrics.iter().zip(metrics::values(report)) {
             if let Some(value) = value {
-                rows.at(step, series, &[&Scalars::new([value])]);
+                rows.number(step, series, value);
             }
         }
         if let (Some(failure), false) = (&report.failure, self.failed) {
@@ -204,14 +210,19 @@ impl LearnerEntities {
     fn log_at_zero(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
         let (colour, joints, arrow_m) = (self.colour, scenery.description.joints.as_slice(), scenery.arrow_m);
         let model = &report.estimate;
-        rows.at(step, &self.entity("zero/links"), &[&model::links(&model.skeleton_m(), colour, 2.0)]);
-        rows.at(step, &self.entity("zero/axes"), &[&model::axes(model, joints, arrow_m, colour)]);
-        if let Some(directions) = self.uncertainty.of_directions(model, joints, arrow_m) {
-            rows.at(
-                step,
-                &self.entity("zero/directions"),
-                &Drawn::new(&directions, &[], colour, opacity(joints.len())).parts(),
-            );
+        let links_look = || model::links_look(colour);
+        rows.drawn(
+            step,
+            &self.entity("zero/links"),
+            &[&model::links(&model.skeleton_m())],
+            Vec::new(),
+            (0, links_look),
+        );
+        let axes_look = || model::axes_look(joints, colour);
+        rows.drawn(step, &self.entity("zero/axes"), &[&model::axes(model, arrow_m)], Vec::new(), (0, axes_look));
+        if let Some(directions) = self.uncertainty.of_directions(model, arrow_m) {
+            let look = self.uncertainty.look(&directions, joints, "", (colour, opacity(joints.len())));
+            rows.drawn(step, &self.entity("zero/directions"), &[], drawn(&directions, &[]), look);
         }
     }
 
@@ -228,10 +239,14 @@ impl LearnerEntities {
         let estimate = model.state();
         let links = estimate.as_ref().map(|arm| Posture::of(arm, &configuration));
         let estimated = links.as_ref().map(|posture| posture.capsules(reach_m, self.arm_look())).unwrap_or_default();
-        rows.at(step, &self.entity("arm/estimate"), &[&solid(&estimated)]);
+        let log_arm = |rows: &mut Rows, path, capsules: &[Capsule]| {
+            let look = (capsules.len() as u64, || solid::look(capsules));
+            rows.drawn(step, &self.entity(path), &[&solid::lengths(capsules)], solid::poses(capsules), look);
+        };
+        log_arm(rows, "arm/estimate", &estimated);
         let truth = scenery.truth.map(|truth| Posture::of(truth, &configuration));
         if let Some(truth) = &truth {
-            rows.at(step, &self.entity("arm/truth"), &[&solid(&truth.capsules(reach_m, TRUE_ARM))]);
+            log_arm(rows, "arm/truth", &truth.capsules(reach_m, TRUE_ARM));
         }
         if let Some(posture) = truth.as_ref().or(links.as_ref()) {
             self.log_trunk(rows, step, 0, posture, scenery.stage);
@@ -246,19 +261,21 @@ impl LearnerEntities {
         }
         let links = links.map(|posture| posture.links).unwrap_or_default();
         let cloud = opacity(joints.len());
-        let points = self.uncertainty.of_points(model, joints);
-        let allowed = self.uncertainty.of_allowed(model, joints);
+        let points = self.uncertainty.of_points(model);
+        let allowed = self.uncertainty.of_allowed(model);
         let (had_points, had_allowed) = match &self.shown {
             Some(shown) => (shown.points.is_some(), shown.allowed.is_some()),
             None => (false, false),
         };
-        for (clouds, had, name, alpha) in
-            [(&points, had_points, "point_ellipsoids", cloud), (&allowed, had_allowed, "allowed_ellipsoids", ALLOWED)]
-        {
+        for (clouds, had, name, what, alpha) in [
+            (&points, had_points, "point_ellipsoids", "", cloud),
+            (&allowed, had_allowed, "allowed_ellipsoids", ", what data allow", ALLOWED),
+        ] {
             // Those that are no more must not stay with a later arm.
             if clouds.is_some() || had {
                 let clouds = clouds.as_deref().unwrap_or_default();
-                rows.at(step, &self.entity(name), &Drawn::new(clouds, &links, self.colour, alpha).parts());
+                let look = self.uncertainty.look(clouds, joints, what, (self.colour, alpha));
+                rows.drawn(step, &self.entity(name), &[], drawn(clouds, &links), look);
             }
         }
         let mut readings = report.movement.iter().flat_map(|movement| &movement.readings);
@@ -303,11 +320,18 @@ impl LearnerEntities {
             self.label = label;
         }
         // Of a learner that has stopped they are cleared.
-        let movement = Movement::of(report, self.colour, stage.figure.reach_m);
-        rows.at(step, &self.entity("marker/predicted"), &[&movement.predicted]);
-        rows.at(step, &self.entity("marker/measured"), &[&movement.measured]);
-        rows.at(step, &self.entity("marker/error"), &[&movement.error]);
-        rows.at(step, &self.entity("on_dark/error"), &[&movement.error_on_dark]);
+        let reach_m = stage.figure.reach_m;
+        let movement = Movement::of(report, reach_m);
+        let log_marker = |rows: &mut Rows, path, marker: &Points3D, label, colour| {
+            let look = || marker_look(colour, label, reach_m);
+            rows.drawn(step, &self.entity(path), &[marker], Vec::new(), (0, look));
+        };
+        let [on_light, on_dark] = [label_on_light(ERROR), label_on_dark(ERROR)];
+        log_marker(rows, "marker/predicted", &movement.predicted, PREDICTED, self.colour);
+        log_marker(rows, "marker/measured", &movement.measured, SEEN, MEASURED);
+        for (path, colour) in [("marker/error", on_light), ("on_dark/error", on_dark)] {
+            rows.drawn(step, &self.entity(path), &[&movement.error], Vec::new(), (0, || error_look(colour, reach_m)));
+        }
         if let Some(outlier) = &movement.outlier {
             rows.at(step, &self.entity("marker/outlier"), &[outlier]);
         }
@@ -315,8 +339,8 @@ impl LearnerEntities {
         if let Some(head) = &description.head {
             let gaze = report.and_then(|report| report.gaze.as_ref());
             rows.at(step, &self.entity("head/gaze"), &[&head::gaze(head, gaze, self.colour)]);
-            rows.at(step, &self.entity("marker/missed"), &[&movement.missed]);
-            rows.at(step, &self.entity("on_dark/missed"), &[&movement.missed_on_dark]);
+            log_marker(rows, "marker/missed", &movement.missed, NOT_SEEN, on_light);
+            log_marker(rows, "on_dark/missed", &movement.missed, NOT_SEEN, on_dark);
         }
         let Some(partition) = report.and_then(|report| report.partition.as_ref()) else { return };
         if self.plane.is_none()
@@ -328,10 +352,7 @@ impl LearnerEntities {
             rows.always(&self.entity("direct/criterion"), &[&partition::fill_transform()]);
         }
         if let Some(slice) = self.plane.and_then(|plane| Slice::of(partition, plane, joints)) {
-            rows.at(step, &self.entity("direct/criterion"), &[&slice.fill]);
-            rows.at(step, &self.entity("direct/boxes"), &[&slice.outlines]);
-            rows.at(step, &self.entity("direct/centres"), &[&slice.centres]);
-            rows.at(step, &self.entity("direct/chosen"), &[&slice.chosen]);
+            slice.log(rows, step, |path| self.entity(path));
         }
         rows.at(step, &self.entity("direct/leaves"), &[&partition::data(partition)]);
     }

@@ -217,7 +217,8 @@ impl LogSink for LiveLog {
 fn encode(message: &LogMsg) -> Result<Bytes, RecordingError> {
     let mut bytes = Vec::new();
     message.to_transport(EncodingOptions::PROTOBUF_COMPRESSED.compression)?.to_rrd_bytes(&mut bytes)?;
-    Ok(Bytes::from(bytes))
+    // Parts stay as long as their session: without the room that a growing vector has to spare.
+    Ok(Bytes::from(bytes.into_boxed_slice()))
 }
 
 /// Messages as one part.

@@ -91,6 +91,7 @@ mod readings;
 mod recorder;
 mod room;
 mod rows;
+mod sheet;
 mod sight;
 mod sockets;
 mod solid;

@@ -5,18 +5,25 @@ use rerun::{Arrows3D, Color, LineStrips3D, Radius};
 use super::solid::single;
 use crate::experiment::{JointDescription, ModelReport};
 
-/// An arm as one line through its points, `width` in points of the screen.
-pub(super) fn links(points_m: &[[f64; 3]], colour: [u8; 3], width: f32) -> LineStrips3D {
-    LineStrips3D::new([points_m.iter().copied().map(single)])
-        .with_colors([Color::from(colour)])
-        .with_radii([Radius::new_ui_points(width)])
+/// An arm as one line through its points.
+pub(super) fn links(points_m: &[[f64; 3]]) -> LineStrips3D {
+    LineStrips3D::update_fields().with_strips([points_m.iter().copied().map(single)])
+}
+
+/// How such lines look.
+pub(super) fn links_look(colour: [u8; 3]) -> LineStrips3D {
+    LineStrips3D::update_fields().with_colors([Color::from(colour)]).with_radii([Radius::new_ui_points(2.0)])
 }
 
 /// The axes as arrows `length_m` long, one per joint.
-pub(super) fn axes(model: &ModelReport, joints: &[JointDescription], length_m: f64, colour: [u8; 3]) -> Arrows3D {
+pub(super) fn axes(model: &ModelReport, length_m: f64) -> Arrows3D {
     let vectors = model.joints.iter().map(|joint| single(joint.axis.map(|x| x * length_m)));
-    Arrows3D::from_vectors(vectors)
-        .with_origins(origins(model).into_iter().map(single))
+    Arrows3D::update_fields().with_vectors(vectors).with_origins(origins(model).into_iter().map(single))
+}
+
+/// How such arrows look.
+pub(super) fn axes_look(joints: &[JointDescription], colour: [u8; 3]) -> Arrows3D {
+    Arrows3D::update_fields()
         .with_colors([Color::from(colour)])
         .with_radii([Radius::new_ui_points(2.0)])
         .with_labels(joints.iter().map(|joint| joint.name.clone()))

@@ -2,10 +2,7 @@
 
 use rerun::{Color, LineStrips3D, Points3D, Radius};
 
-use super::{
-    colours::{label_on_dark, label_on_light},
-    solid::single,
-};
+use super::solid::single;
 use crate::experiment::{ChannelReading, MovementReport};
 
 /// The colour of a measurement; no learner's, and it shows on dark and on light ground.
@@ -15,6 +12,10 @@ pub(super) const ERROR: [u8; 3] = [0xD6, 0x3B, 0x3B];
 /// Radius of a marker and of the line of an error, as parts of the arm's reach.
 const MARKER: f64 = 0.048;
 const LINE: f64 = 0.011;
+/// What markers are labelled with, the last for all to see.
+pub(super) const PREDICTED: &str = "predicted";
+pub(super) const SEEN: &str = "seen";
+pub(super) const NOT_SEEN: &str = "not seen";
 /// Half the width of the cross at an outlier.
 const CROSS: f64 = 0.1;
 
@@ -28,14 +29,11 @@ pub(super) struct Movement {
     pub(super) outlier: Option<LineStrips3D>,
     /// The true marker after a miss.
     pub(super) missed: Points3D,
-    /// The labelled ones with colours for dark ground.
-    pub(super) error_on_dark: LineStrips3D,
-    pub(super) missed_on_dark: Points3D,
 }
 
 impl Movement {
     /// Of a report; `None` for a learner that has stopped, or whose arm is on its way.
-    pub(super) fn of(report: Option<&MovementReport>, colour: [u8; 3], reach_m: f64) -> Self {
+    pub(super) fn of(report: Option<&MovementReport>, reach_m: f64) -> Self {
         let predicted = report.map(|report| report.predicted_marker_m).filter(finite);
         let measured = report.and_then(|report| report.measured_marker_m);
         let truth = report.and_then(|report| report.true_skeleton_m.as_ref()?.last().copied());
@@ -47,29 +45,33 @@ impl Movement {
             let distance = off((0..3).map(|i| (to[i] - from[i]).powi(2)).sum::<f64>().sqrt());
             if is_outlier { format!("outlier, {distance}") } else { distance }
         });
-        let error = |colour: [u8; 3]| {
-            LineStrips3D::new(ends.map(|(from, to)| [from, to].map(single)))
-                .with_colors([Color::from(colour)])
-                .with_radii([Radius::new_scene_units((LINE * reach_m) as f32)])
-                .with_labels(label.clone())
-                .with_show_labels(true)
-        };
-        let marker = |place: Option<[f64; 3]>, colour: [u8; 3], label: &'static str| {
-            Points3D::new(place.map(single))
-                .with_colors([Color::from(colour)])
-                .with_radii([Radius::new_scene_units((MARKER * reach_m) as f32)])
-                .with_labels([label])
-        };
+        let marker = |place: Option<[f64; 3]>| Points3D::update_fields().with_positions(place.map(single));
+        let line = ends.map(|(from, to)| [from, to].map(single));
         Self {
-            predicted: marker(predicted, colour, "predicted").with_show_labels(false),
-            measured: marker(measured, MEASURED, "seen").with_show_labels(false),
-            error: error(label_on_light(ERROR)),
+            predicted: marker(predicted),
+            measured: marker(measured),
+            error: LineStrips3D::update_fields().with_strips(line).with_labels(label),
             outlier: reading.map(|_| cross(measured.filter(|_| is_outlier), reach_m)),
-            missed: marker(missed, label_on_light(ERROR), "not seen").with_show_labels(true),
-            error_on_dark: error(label_on_dark(ERROR)),
-            missed_on_dark: marker(missed, label_on_dark(ERROR), "not seen").with_show_labels(true),
+            missed: marker(missed),
         }
     }
+}
+
+/// How a marker looks.
+pub(super) fn marker_look(colour: [u8; 3], label: &str, reach_m: f64) -> Points3D {
+    Points3D::update_fields()
+        .with_colors([Color::from(colour)])
+        .with_radii([Radius::new_scene_units((MARKER * reach_m) as f32)])
+        .with_labels([label])
+        .with_show_labels(label == NOT_SEEN)
+}
+
+/// How the line of an error looks.
+pub(super) fn error_look(colour: [u8; 3], reach_m: f64) -> LineStrips3D {
+    LineStrips3D::update_fields()
+        .with_colors([Color::from(colour)])
+        .with_radii([Radius::new_scene_units((LINE * reach_m) as f32)])
+        .with_show_labels(true)
 }
 
 /// Three lines that cross.

@@ -4,10 +4,13 @@ use std::sync::Arc;
 
 use rerun::{
     AsComponents, Boxes2D, Color, DynamicArchetype, Image, LineStrips2D, Points2D, Radius, Transform3D,
-    external::arrow::array::{BooleanArray, Float64Array, UInt8Array, UInt32Array},
+    external::{
+        arrow::array::{BooleanArray, Float64Array, UInt8Array, UInt32Array},
+        re_log_types::EntityPath,
+    },
 };
 
-use super::colours::viridis;
+use super::{colours::viridis, rows::Rows};
 use crate::{
     experiment::JointDescription,
     kinematics::JointKind,
@@ -86,10 +89,10 @@ pub(super) fn frame(plane: Plane, joints: &[JointDescription]) -> [Box<dyn AsCom
 
 /// What is drawn of a slice.
 pub(super) struct Slice {
-    pub(super) fill: Image,
-    pub(super) outlines: Boxes2D,
-    pub(super) centres: Points2D,
-    pub(super) chosen: Points2D,
+    fill: Image,
+    outlines: Boxes2D,
+    centres: Points2D,
+    chosen: Points2D,
 }
 
 impl Slice {
@@ -110,19 +113,31 @@ impl Slice {
                 .with_radii(
                     cut.iter()
                         .map(|rectangle| Radius::new_ui_points(if rectangle.potentially_optimal { 2.5 } else { 1.0 })),
-                )
-                .with_draw_order(10.0),
-            centres: Points2D::new(other.iter().map(|rectangle| window.face(rectangle).0))
-                .with_colors(other.iter().map(|rectangle| Color::from(colour(rectangle))))
-                .with_radii([Radius::new_ui_points(1.5)])
-                .with_draw_order(20.0),
-            chosen: Points2D::new([window.face(chosen).0])
+                ),
+            centres: Points2D::update_fields()
+                .with_positions(other.iter().map(|rectangle| window.face(rectangle).0))
+                .with_colors(other.iter().map(|rectangle| Color::from(colour(rectangle)))),
+            chosen: Points2D::update_fields().with_positions([window.face(chosen).0]),
+        })
+    }
+
+    /// Logs it, as the entities that `entity` names.
+    pub(super) fn log(&self, rows: &mut Rows, step: u64, entity: impl Fn(&'static str) -> EntityPath) {
+        let fill_look = || Image::update_fields().with_draw_order(-10.0);
+        rows.drawn(step, &entity("direct/criterion"), &[&self.fill], Vec::new(), (0, fill_look));
+        let outline_look = || Boxes2D::update_fields().with_draw_order(10.0);
+        rows.drawn(step, &entity("direct/boxes"), &[&self.outlines], Vec::new(), (0, outline_look));
+        let centre_look = || Points2D::update_fields().with_radii([Radius::new_ui_points(1.5)]).with_draw_order(20.0);
+        rows.drawn(step, &entity("direct/centres"), &[&self.centres], Vec::new(), (0, centre_look));
+        let chosen_look = || {
+            Points2D::update_fields()
                 .with_colors([Color::from(CHOSEN)])
                 .with_radii([Radius::new_ui_points(5.0)])
                 .with_labels(["chosen"])
                 .with_show_labels(false)
-                .with_draw_order(30.0),
-        })
+                .with_draw_order(30.0)
+        };
+        rows.drawn(step, &entity("direct/chosen"), &[&self.chosen], Vec::new(), (0, chosen_look));
     }
 }
 
@@ -145,7 +160,7 @@ fn fill(faces: impl Iterator<Item = (([f32; 2], [f32; 2]), [u8; 3])>) -> Image {
             }
         }
     }
-    Image::from_rgb24(pixels, [PIXELS as u32; 2]).with_draw_order(-10.0)
+    Image::from_rgb24(pixels, [PIXELS as u32; 2])
 }
 
 /// Puts the picture of a slice on the unit square.

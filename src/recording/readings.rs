@@ -1,7 +1,7 @@
 //! The series of readings: how far each is from the estimate, and how likely an outlier.
 
 use rerun::{
-    Color, Scalars, SeriesLines,
+    Color, SeriesLines,
     external::re_log_types::{EntityPath, EntityPathPart},
 };
 
@@ -50,7 +50,7 @@ impl Readings {
         {
             for (series, value) in [(residuals, reading.residual_sigmas), (outliers, reading.outlier_probability)] {
                 if let Some(value) = value.filter(|value| value.is_finite()) {
-                    rows.at(step, series, &[&Scalars::new([value])]);
+                    rows.number(step, series, value);
                 }
             }
         }

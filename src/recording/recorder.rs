@@ -1,9 +1,12 @@
 //! The observer that records.
 
-use std::collections::BTreeSet;
+use std::{
+    collections::HashSet,
+    time::{Duration, Instant},
+};
 
 use rerun::{
-    RecordingInfo, Scalars, SeriesLines, ViewCoordinates,
+    RecordingInfo, SeriesLines, ViewCoordinates,
     external::re_log_types::{ApplicationId, EntityPath, LogMsg, StoreId},
     log::Chunk,
 };
@@ -19,7 +22,7 @@ use super::{
     message, metrics, model,
     note::{key, note},
     room::Room,
-    rows::{Rows, by_steps, complete},
+    rows::{Rows, complete},
     stage::{GROUNDS, Stage},
 };
 use crate::{
@@ -28,11 +31,20 @@ use crate::{
     model::State,
 };
 
-/// So many steps are written at once unless somebody flushes earlier …
-const BATCH_STEPS: usize = 64;
+/// So many steps are written to a file at once unless somebody flushes earlier: a message costs more than the rows in it. A
+/// recorder with a live log takes fewer, as a server has many and what waits takes memory …
+const BATCH_STEPS: usize = 256;
+const LIVE_BATCH_STEPS: usize = 64;
 
-/// … or so many rectangles of partitions, some tens of megabytes.
+/// … or so many rectangles of partitions, some tens of megabytes, …
 const BATCH_RECTANGLES: usize = 200_000;
+
+/// … or steps take so long that a process that is killed would lose a while.
+const BATCH_TIME: Duration = Duration::from_secs(2);
+
+/// Of an entity with large rows, as pictures are, so many bytes are written at once: the memory is used again while the
+/// processor's cache still holds it.
+const LARGE_BYTES: usize = 1 << 18;
 
 /// Length of the arrows at θ = 0, as a part of the reach of the arm.
 const ARROW: f64 = 0.22;
@@ -41,9 +53,10 @@ const FARTHER: f64 = 0.6;
 
 /// Records an experiment, as the module's documentation lists it.
 ///
-/// Steps are gathered and written 64 at a time, or when [`flush`](Self::flush) or [`flush_shown`](Self::flush_shown) is
-/// called: a live view flushes when it wants to be up to date. [`finish`](Self::finish) writes what is left and the file's footer (its index); dropping the
-/// recorder does the same, but has nobody to tell of errors.
+/// Steps are gathered and written 256 at a time (64 with a live log), at least every other second, or when
+/// [`flush`](Self::flush) is called. A live view that wants to be up to date calls [`flush_shown`](Self::flush_shown).
+/// [`finish`](Self::finish) writes what is left and the file's footer (its index); dropping the recorder does the same, but
+/// has nobody to tell of errors.
 ///
 /// If the process is killed, the file holds everything up to the last batch. Viewers open it; `rerun rrd verify`
 /// complains of the missing footer, which `rerun rrd optimize` adds.
@@ -62,6 +75,8 @@ pub struct Recorder {
     description: Description,
     store: StoreId,
     rows: Rows,
+    /// What the arrangement of views does not show at first.
+    hidden: HashSet<EntityPath>,
     file: Option<RrdFile>,
     /// Why the file lacks what the log has.
     file_failure: Option<String>,
@@ -75,6 +90,7 @@ pub struct Recorder {
     incomplete: Option<u64>,
     waiting_steps: usize,
     waiting_rectangles: usize,
+    flushed: Instant,
     finished: bool,
 }
 
@@ -86,6 +102,11 @@ impl Recorder {
         // Viewers keep one arrangement per application: those of different learners must not meet.
         let application = format!("body-schema-{}-{}", description.scenario, names.join("-"));
         let recording = recording_id.unwrap_or_else(|| format!("{}-seed-{}", description.scenario, description.seed));
+        let learners: Vec<LearnerEntities> = (names.iter().zip(learner_slots(names.iter().copied())).enumerate())
+            .map(|(index, (name, slot))| {
+                LearnerEntities::new((index, learner_color(slot), name), description, ellipsoids)
+            })
+            .collect();
         let mut recorder = Self {
             description: description.clone(),
             store: StoreId::recording(ApplicationId::new_or_unknown(application), recording),
@@ -93,16 +114,14 @@ impl Recorder {
             file: file.as_deref().map(RrdFile::create).transpose()?,
             file_failure: None,
             live,
-            learners: (names.iter().zip(learner_slots(names.iter().copied())).enumerate())
-                .map(|(index, (name, slot))| {
-                    LearnerEntities::new((index, learner_color(slot), name), description, ellipsoids)
-                })
-                .collect(),
+            hidden: learners.iter().flat_map(LearnerEntities::hidden).collect(),
+            learners,
             stage: None,
             truth: description.truth.as_ref().and_then(ModelReport::state),
             incomplete: None,
             waiting_steps: 0,
             waiting_rectangles: 0,
+            flushed: Instant::now(),
             finished: false,
         };
         recorder.begin(ellipsoids)?;
@@ -146,10 +165,19 @@ impl Recorder {
         self.stage = Some(stage);
         self.incomplete = Some(report.step);
         self.waiting_steps += 1;
-        if self.waiting_steps >= BATCH_STEPS || self.waiting_rectangles >= BATCH_RECTANGLES {
-            self.flush()
-        } else {
-            Ok(())
+        let steps = if self.live.is_some() { LIVE_BATCH_STEPS } else { BATCH_STEPS };
+        let is_full = self.waiting_steps >= steps || self.waiting_rectangles >= BATCH_RECTANGLES;
+        if is_full || self.flushed.elapsed() >= BATCH_TIME { self.flush() } else { self.write_large() }
+    }
+
+    /// Writes the rows of large entities to a file that has no log beside it.
+    fn write_large(&mut self) -> Result<(), RecordingError> {
+        match &mut self.file {
+            Some(file) if self.live.is_none() => {
+                let large = self.rows.large_steps(LARGE_BYTES)?;
+                if large.is_empty() { Ok(()) } else { file.append(&messages(&self.store, &large)?) }
+            }
+            _ => Ok(()),
         }
     }
 
@@ -180,23 +208,43 @@ impl Recorder {
             .with_widths([1.5]);
         self.rows.always(&series, &[&line]);
         for design in designs {
-            self.rows.at(design.step, &series, &[&Scalars::new([design.best_design_trace])]);
+            self.rows.number(design.step, &series, design.best_design_trace);
         }
         self.flush()
     }
 
     /// Writes the steps that wait. When this returns they are in the log, and with the operating system.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
-        (self.waiting_steps, self.waiting_rectangles) = (0, 0);
-        self.write(|_| true)
+        (self.waiting_steps, self.waiting_rectangles, self.flushed) = (0, 0, Instant::now());
+        let live = self.publish(&HashSet::new());
+        let file = match &mut self.file {
+            Some(file) => {
+                let steps = self.rows.steps()?;
+                file.append(&messages(&self.store, &steps)?)
+            }
+            None => Ok(()),
+        };
+        // To both targets, whatever happens to the other.
+        self.settle(file).and(live)
     }
 
-    /// Writes only what the arrangement of views shows at first; the rest waits for the next [`flush`](Self::flush), at most 64
-    /// steps. Every message costs about a kilobyte, and most entities are series that no view shows: a live view that
-    /// is up to date at every step needs half the messages this way.
+    /// Brings those who watch live up to date with what the arrangement of views shows at first; the rest, and the file, wait
+    /// for the next [`flush`](Self::flush), at most 64 steps or two seconds of them. Every message costs about a kilobyte, and
+    /// most entities are series that no view shows: a live view that is up to date at every step needs half the messages
+    /// this way, and the file has few large ones.
     pub fn flush_shown(&mut self) -> Result<(), RecordingError> {
-        let hidden: BTreeSet<EntityPath> = self.learners.iter().flat_map(LearnerEntities::hidden).collect();
-        self.write(|entity| !hidden.contains(entity))
+        let hidden = std::mem::take(&mut self.hidden);
+        let published = self.publish(&hidden);
+        self.hidden = hidden;
+        published
+    }
+
+    /// Writes to the log what it does not have yet, but for what is hidden.
+    fn publish(&mut self, hidden: &HashSet<EntityPath>) -> Result<(), RecordingError> {
+        let Some(live) = &self.live else { return Ok(()) };
+        let mut news = self.rows.news(hidden, self.file.is_some())?;
+        news.extend(self.incomplete.take().map(complete).transpose()?);
+        live.append(&messages(&self.store, &news)?)
     }
 
     /// Why the file lacks steps that the log has: it could not be written. [`seal`](Self::seal) writes it anew.
@@ -213,24 +261,6 @@ impl Recorder {
             }
             written => written,
         }
-    }
-
-    /// To both targets, whatever happens to the other.
-    fn write(&mut self, wanted: impl Fn(&EntityPath) -> bool) -> Result<(), RecordingError> {
-        let chunks = self.rows.drain(wanted)?;
-        let messages = |chunks: &mut dyn Iterator<Item = Chunk>| -> Result<Vec<LogMsg>, RecordingError> {
-            chunks.map(|chunk| message::data(&self.store, &chunk)).collect()
-        };
-        let complete = self.incomplete.take().map(complete).transpose()?;
-        let live = self
-            .live
-            .as_ref()
-            .map_or(Ok(()), |live| live.append(&messages(&mut chunks.iter().cloned().chain(complete))?));
-        let file = match &mut self.file {
-            Some(file) => messages(&mut chunks.iter().filter_map(by_steps)).and_then(|steps| file.append(&steps)),
-            None => Ok(()),
-        };
-        self.settle(file).and(live)
     }
 
     /// Writes what is left, ends the file with its footer, and closes the log.
@@ -303,18 +333,19 @@ impl Recorder {
 
     /// The true arm at θ = 0 from a step on; at all times without a step.
     fn log_truth(&mut self, step: Option<u64>, truth: &ModelReport, arrow_m: f64) {
-        let links = model::links(&truth.skeleton_m(), TRUTH_COLOR, 2.0);
-        let axes = model::axes(truth, &self.description.joints, arrow_m, TRUTH_COLOR);
+        let links = [model::links(&truth.skeleton_m()), model::links_look(TRUTH_COLOR)];
+        let axes = [model::axes(truth, arrow_m), model::axes_look(&self.description.joints, TRUTH_COLOR)];
+        let ([links, links_look], [axes, axes_look]) = (&links, &axes);
         for learner in &self.learners {
             let (links_at, axes_at) = (learner.entity("zero/truth/links"), learner.entity("zero/truth/axes"));
             match step {
                 Some(step) => {
-                    self.rows.at(step, &links_at, &[&links]);
-                    self.rows.at(step, &axes_at, &[&axes]);
+                    self.rows.at(step, &links_at, &[links, links_look]);
+                    self.rows.at(step, &axes_at, &[axes, axes_look]);
                 }
                 None => {
-                    self.rows.always(&links_at, &[&links]);
-                    self.rows.always(&axes_at, &[&axes]);
+                    self.rows.always(&links_at, &[links, links_look]);
+                    self.rows.always(&axes_at, &[axes, axes_look]);
                 }
             }
         }
@@ -358,6 +389,10 @@ impl Recorder {
         self.settle(file).and(live)?;
         Ok(stage)
     }
+}
+
+fn messages(store: &StoreId, chunks: &[Chunk]) -> Result<Vec<LogMsg>, RecordingError> {
+    chunks.iter().map(|chunk| message::data(store, chunk)).collect()
 }
 
 impl Drop for Recorder {

@@ -1,9 +1,12 @@
-//! Rows that wait to be written, one batch per entity.
+//! Rows that wait to be written, one sheet per entity.
 //!
 //! Rerun's own stream batches in a thread and writes in another, where errors go to a log. Here rows are gathered and
 //! handed over when the recorder says so: many steps make one chunk per entity, and every error has a caller.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{HashMap, HashSet, hash_map::Entry},
+    sync::Arc,
+};
 
 use rerun::{
     AsComponents, ComponentIdentifier, DynamicArchetype, SerializedComponentBatch, Timeline,
@@ -12,18 +15,27 @@ use rerun::{
         re_log_types::EntityPath,
     },
     log::{Chunk, ChunkError, RowId},
-    time::TimePoint,
 };
 
-use super::{COMPLETE, MOTION, MOTION_PER_STEP, TIMELINE};
+use super::{
+    COMPLETE, MOTION, MOTION_PER_STEP, RecordingError, TIMELINE,
+    sheet::{Cell, Sheet, Timelines, When, sequence},
+};
 
-/// Rows by entity, in the order of their logging.
-#[derive(Default)]
+/// Rows by entity.
+///
+/// They have up to two readers: who watches live takes [`news`](Self::news), a file takes [`steps`](Self::steps). Rows wait
+/// until both have them.
 pub(super) struct Rows {
     // Rows of different timelines cannot share a chunk.
-    rows: BTreeMap<(EntityPath, When), Vec<Row>>,
+    sheets: Vec<Sheet>,
+    index: HashMap<(EntityPath, When), usize>,
     /// How entities look since their last row that said so.
-    looks: BTreeMap<(EntityPath, ComponentIdentifier), ArrayRef>,
+    looks: HashMap<(EntityPath, ComponentIdentifier), ArrayRef>,
+    /// What of a look depends on the data, see [`drawn`](Self::drawn).
+    kinds: HashMap<EntityPath, u64>,
+    step: Timeline,
+    motion: Timeline,
 }
 
 /// Components that say how something looks. They hold until they are logged again, and each costs some 300 bytes in
@@ -31,62 +43,101 @@ pub(super) struct Rows {
 const LOOKS: [&str; 8] =
     ["colors", "draw_order", "fill_mode", "labels", "lengths", "line_radii", "radii", "show_labels"];
 
-/// On which timelines rows stand.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum When {
-    /// On none: they hold at all times.
-    Always,
-    /// At a step.
-    Step,
-    /// Between two steps.
-    Between,
-}
-
-struct Row {
-    id: RowId,
-    time: TimePoint,
-    components: Vec<SerializedComponentBatch>,
+impl Default for Rows {
+    fn default() -> Self {
+        let [step, motion] = [TIMELINE, MOTION].map(Timeline::new_sequence);
+        let (sheets, index, looks, kinds) = Default::default();
+        Self { sheets, index, looks, kinds, step, motion }
+    }
 }
 
 impl Rows {
     /// What holds at all times.
     pub(super) fn always(&mut self, entity: &EntityPath, what: &[&dyn AsComponents]) {
-        self.push(entity, When::Always, TimePoint::default(), batches(what));
+        self.sheet(entity, When::Always).push(0, cells(batches(what)));
     }
 
     /// What holds from a step on, until the entity's next row.
     pub(super) fn at(&mut self, step: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
-        let time = TimePoint::from([(Timeline::new_sequence(TIMELINE), sequence(step)), motion(step, 0)]);
         let mut components = batches(what);
-        components.retain(|batch| {
-            let component = batch.descriptor.component;
-            let is_look = component.as_str().split_once(':').is_some_and(|(_, field)| LOOKS.contains(&field));
-            !is_look || self.looks.insert((entity.clone(), component), batch.array.clone()) != Some(batch.array.clone())
-        });
-        self.push(entity, When::Step, time, components);
+        self.drop_looks(entity, &mut components);
+        self.sheet(entity, When::Step).push(motion(step, 0), cells(components));
+    }
+
+    /// The same for what is drawn again and again: its look is asked for when the entity has no row yet, or its last one was
+    /// of another kind.
+    pub(super) fn drawn<L: AsComponents>(
+        &mut self,
+        step: u64,
+        entity: &EntityPath,
+        what: &[&dyn AsComponents],
+        numbers: Vec<Cell>,
+        (kind, look): (u64, impl FnOnce() -> L),
+    ) {
+        let mut components = batches(what);
+        self.drop_looks(entity, &mut components);
+        if self.kinds.get(entity) != Some(&kind) {
+            self.kinds.insert(entity.clone(), kind);
+            components.extend(look().as_serialized_batches());
+        }
+        self.sheet(entity, When::Step).push(motion(step, 0), cells(components).chain(numbers));
+    }
+
+    /// A number of a series at a step.
+    pub(super) fn number(&mut self, step: u64, series: &EntityPath, number: f64) {
+        self.sheet(series, When::Step).push_number(motion(step, 0), number);
     }
 
     /// What holds so many ticks after a step, until the entity's next row. Whoever sees steps alone does not see it.
     pub(super) fn after(&mut self, step: u64, ticks: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
-        self.push(entity, When::Between, TimePoint::from([motion(step, ticks)]), batches(what));
+        self.sheet(entity, When::Between).push(motion(step, ticks), cells(batches(what)));
     }
 
-    fn push(&mut self, entity: &EntityPath, when: When, time: TimePoint, components: Vec<SerializedComponentBatch>) {
-        self.rows.entry((entity.clone(), when)).or_default().push(Row { id: RowId::new(), time, components });
+    fn sheet(&mut self, entity: &EntityPath, when: When) -> &mut Sheet {
+        let index = *self.index.entry((entity.clone(), when)).or_insert_with(|| {
+            self.sheets.push(Sheet::new(entity.clone(), when));
+            self.sheets.len() - 1
+        });
+        &mut self.sheets[index]
     }
 
-    /// Takes out what `wanted` says, one chunk per entity and kind of time.
-    pub(super) fn drain(&mut self, wanted: impl Fn(&EntityPath) -> bool) -> Result<Vec<Chunk>, ChunkError> {
-        self.rows
-            .extract_if(.., |(entity, _), _| wanted(entity))
-            .map(|((entity, _), rows)| {
-                rows.into_iter()
-                    .fold(Chunk::builder(entity), |chunk, row| {
-                        chunk.with_serialized_batches(row.id, row.time, row.components)
-                    })
-                    .build()
-            })
-            .collect()
+    fn drop_looks(&mut self, entity: &EntityPath, components: &mut Vec<SerializedComponentBatch>) {
+        components.retain(|batch| {
+            let component = batch.descriptor.component;
+            let is_look = component.as_str().split_once(':').is_some_and(|(_, field)| LOOKS.contains(&field));
+            if !is_look {
+                return true;
+            }
+            let last = self.looks.entry((entity.clone(), component));
+            match last {
+                Entry::Occupied(last) if last.get() == &batch.array => false,
+                last => {
+                    last.insert_entry(batch.array.clone());
+                    true
+                }
+            }
+        });
+    }
+
+    /// For those who watch live: what they do not have yet, but for what is `hidden`; one chunk per entity and kind of time.
+    /// It is `kept` for [`steps`](Self::steps), or forgotten.
+    pub(super) fn news(&mut self, hidden: &HashSet<EntityPath>, kept: bool) -> Result<Vec<Chunk>, RecordingError> {
+        let named = Timelines { step: self.step, motion: Some(self.motion) };
+        let wanted = self.sheets.iter_mut().filter(|sheet| !hidden.contains(sheet.entity()));
+        wanted.filter_map(|sheet| sheet.news(&named, kept).transpose()).collect()
+    }
+
+    /// What a recording in a file has, since it was last asked for; one chunk per entity. All that waits is forgotten.
+    pub(super) fn steps(&mut self) -> Result<Vec<Chunk>, RecordingError> {
+        let named = Timelines { step: self.step, motion: None };
+        self.sheets.iter_mut().filter_map(|sheet| sheet.all(&named).transpose()).collect()
+    }
+
+    /// The same of those entities alone of which so many bytes wait.
+    pub(super) fn large_steps(&mut self, bytes: usize) -> Result<Vec<Chunk>, RecordingError> {
+        let named = Timelines { step: self.step, motion: None };
+        let large = self.sheets.iter_mut().filter(|sheet| sheet.bytes() >= bytes);
+        large.filter_map(|sheet| sheet.all(&named).transpose()).collect()
     }
 }
 
@@ -105,14 +156,84 @@ pub(super) fn complete(step: u64) -> Result<Chunk, ChunkError> {
     Chunk::builder(COMPLETE).with_serialized_batches(RowId::new(), time, mark.as_serialized_batches()).build()
 }
 
-fn motion(step: u64, ticks: u64) -> (Timeline, i64) {
-    (Timeline::new_sequence(MOTION), sequence(step.saturating_mul(MOTION_PER_STEP).saturating_add(ticks)))
+fn motion(step: u64, ticks: u64) -> u64 {
+    step.saturating_mul(MOTION_PER_STEP).saturating_add(ticks)
 }
 
-fn sequence(number: u64) -> i64 {
-    i64::try_from(number).unwrap_or(i64::MAX)
+fn cells(batches: Vec<SerializedComponentBatch>) -> impl Iterator<Item = Cell> {
+    batches.into_iter().map(|batch| (batch.descriptor.clone(), batch.into()))
 }
 
 fn batches(what: &[&dyn AsComponents]) -> Vec<SerializedComponentBatch> {
     what.iter().flat_map(|archetype| archetype.as_serialized_batches()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rerun::Points3D;
+
+    use super::*;
+
+    fn place(x: f32) -> Points3D {
+        Points3D::update_fields().with_positions([[x, 0.0, 0.0]])
+    }
+
+    /// Entity, number of rows and timelines of every chunk.
+    fn told(chunks: &[Chunk]) -> Vec<(String, usize, Vec<String>)> {
+        let of = |chunk: &Chunk| {
+            let mut timelines: Vec<String> = chunk.timelines().keys().map(ToString::to_string).collect();
+            timelines.sort();
+            (chunk.entity_path().to_string(), chunk.num_rows(), timelines)
+        };
+        chunks.iter().map(of).collect()
+    }
+
+    fn row(entity: &str, rows: usize, timelines: &[&str]) -> (String, usize, Vec<String>) {
+        (entity.to_owned(), rows, timelines.iter().map(ToString::to_string).collect())
+    }
+
+    #[test]
+    fn both_readers_get_every_row_once() {
+        let [hand, error] = ["hand", "error"].map(EntityPath::from);
+        let (mut rows, none) = (Rows::default(), HashSet::new());
+        let step = |rows: &mut Rows, step: u64| {
+            rows.at(step, &hand, &[&place(step as f32)]);
+            rows.after(step, 1, &hand, &[&place(0.5)]);
+            rows.number(step, &error, 0.1 * step as f64);
+        };
+        step(&mut rows, 0);
+        let hidden = HashSet::from([error.clone()]);
+        let both = ["motion", "step"];
+        let of_hand = [row("/hand", 1, &both), row("/hand", 1, &["motion"])];
+        assert_eq!(told(&rows.news(&hidden, true).unwrap()), of_hand);
+        step(&mut rows, 1);
+        let [now, between] = of_hand;
+        assert_eq!(told(&rows.news(&none, true).unwrap()), [now, between, row("/error", 2, &both)]);
+        assert_eq!(told(&rows.steps().unwrap()), [row("/hand", 2, &["step"]), row("/error", 2, &["step"])]);
+        assert!(rows.news(&none, true).unwrap().is_empty() && rows.steps().unwrap().is_empty());
+        // Without a file nothing waits for it.
+        step(&mut rows, 2);
+        assert_eq!(rows.news(&none, false).unwrap().len(), 3);
+        assert!(rows.steps().unwrap().is_empty());
+    }
+
+    #[test]
+    fn looks_are_said_when_they_change() {
+        let hand = EntityPath::from("hand");
+        let mut rows = Rows::default();
+        let look = |label: &'static str| move || Points3D::update_fields().with_labels([label]);
+        for (step, kind, label) in [(0, 0, "a"), (1, 0, "not asked for"), (2, 1, "b")] {
+            let labelled = place(step as f32).with_radii([0.1]);
+            rows.drawn(step, &hand, &[&labelled], Vec::new(), (kind, look(label)));
+        }
+        let chunks = rows.steps().unwrap();
+        let [chunk] = chunks.as_slice() else { panic!("one chunk, not {}", chunks.len()) };
+        let said = |component: &'static str| {
+            let list = chunk.components().get_array(component.into()).unwrap();
+            (0..3).map(|row| rerun::external::arrow::array::Array::is_valid(list, row)).collect::<Vec<_>>()
+        };
+        assert_eq!(said("Points3D:positions"), [true; 3]);
+        assert_eq!(said("Points3D:labels"), [true, false, true]);
+        assert_eq!(said("Points3D:radii"), [true, false, false]);
+    }
 }

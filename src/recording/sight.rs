@@ -104,7 +104,7 @@ pub(super) fn log(
 ) {
     let reach_m = scenery.stage.figure.reach_m;
     let [truth, estimate] = [truth, estimate].map(|arm| arm.map(|(arm, posture)| Sight::of(arm, posture, scenery)));
-    let mut put = |path: &str, what: &dyn rerun::AsComponents| {
+    let mut put = |path: &'static str, what: &dyn rerun::AsComponents| {
         let entity = learner.entity(path);
         if ticks == 0 { rows.at(step, &entity, &[what]) } else { rows.after(step, ticks, &entity, &[what]) }
     };

@@ -6,6 +6,8 @@ use rerun::{
     components::{RotationQuat, Translation3D},
 };
 
+use super::sheet::{Cell, Values};
+
 /// A point as Rerun takes it.
 pub(super) fn single([x, y, z]: [f64; 3]) -> [f32; 3] {
     [x as f32, y as f32, z as f32]
@@ -47,16 +49,33 @@ impl Capsule {
 
 /// Capsules as one entity.
 pub(super) fn solid(capsules: &[Capsule]) -> Capsules3D {
+    let Capsules3D { translations, quaternions, .. } = moved(capsules);
+    Capsules3D { translations, quaternions, ..look(capsules) }.with_lengths(capsules.iter().map(Capsule::length))
+}
+
+/// How long they are.
+pub(super) fn lengths(capsules: &[Capsule]) -> Capsules3D {
+    Capsules3D::update_fields().with_lengths(capsules.iter().map(Capsule::length))
+}
+
+/// Where they are.
+pub(super) fn poses(capsules: &[Capsule]) -> Vec<Cell> {
+    let translations = capsules.iter().map(|capsule| capsule.translation().0.0).collect();
+    let rotations = capsules.iter().map(|capsule| capsule.rotation().0.0).collect();
+    vec![
+        (Capsules3D::descriptor_translations(), Values::Triples(translations)),
+        (Capsules3D::descriptor_quaternions(), Values::Quads(rotations)),
+    ]
+}
+
+/// How they look. It is the same for an arm in all its postures.
+pub(super) fn look(capsules: &[Capsule]) -> Capsules3D {
     let colours =
         capsules.iter().map(|Capsule { colour: [r, g, b, a], .. }| Color::from_unmultiplied_rgba(*r, *g, *b, *a));
-    Capsules3D::from_lengths_and_radii(
-        capsules.iter().map(Capsule::length),
-        capsules.iter().map(|it| it.radius_m as f32),
-    )
-    .with_translations(capsules.iter().map(Capsule::translation))
-    .with_quaternions(capsules.iter().map(Capsule::rotation))
-    .with_colors(colours)
-    .with_fill_mode(FillMode::Solid)
+    Capsules3D::update_fields()
+        .with_radii(capsules.iter().map(|it| it.radius_m as f32))
+        .with_colors(colours)
+        .with_fill_mode(FillMode::Solid)
 }
 
 /// A rod with flat ends, which stands upright, as an entity.

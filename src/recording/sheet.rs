@@ -1,0 +1,273 @@
+//! The rows of one entity, column by column.
+//!
+//! Rerun's own builder of chunks takes rows. Kept by columns from the start, a row costs no more than its arrays, and a
+//! number of a series no array at all.
+
+use std::{mem::discriminant, ops::Range, sync::Arc};
+
+use rerun::{
+    ComponentDescriptor, Scalars, SerializedComponentBatch, Timeline,
+    external::{
+        arrow::{
+            array::{Array, ArrayRef, FixedSizeListArray, Float32Array, Float64Array, ListArray},
+            buffer::{NullBuffer, OffsetBuffer},
+            compute::concat,
+            datatypes::{DataType, Field},
+            error::ArrowError,
+        },
+        re_log_types::EntityPath,
+    },
+    log::{Chunk, ChunkId, RowId, TimeColumn},
+};
+
+use super::{MOTION_PER_STEP, RecordingError};
+
+/// On which timelines rows stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum When {
+    /// On none: they hold at all times.
+    Always,
+    /// At a step.
+    Step,
+    /// Between two steps.
+    Between,
+}
+
+/// Rows of one entity on the same timelines, in the order of their logging.
+pub(super) struct Sheet {
+    entity: EntityPath,
+    when: When,
+    ids: Vec<RowId>,
+    /// Where each row stands on the timeline of motion.
+    ticks: Vec<u64>,
+    columns: Vec<Column>,
+    /// The numbers of a series, which has no other components: one in each row.
+    numbers: Vec<f64>,
+    /// So many rows were handed out and are still needed.
+    handed_out: usize,
+    bytes: usize,
+}
+
+/// What the rows say of one component: rows that say nothing of it have no cell.
+struct Column {
+    descriptor: ComponentDescriptor,
+    /// Rows, and how many values each has.
+    cells: Vec<(usize, usize)>,
+    values: Values,
+}
+
+/// Values of a component. Numbers stand one after the other: an array for each row would cost ten times what is in it.
+pub(super) enum Values {
+    /// Points and vectors.
+    Triples(Vec<[f32; 3]>),
+    /// Quaternions.
+    Quads(Vec<[f32; 4]>),
+    Doubles(Vec<f64>),
+    /// All others, an array for each row.
+    Arrays(Vec<ArrayRef>),
+}
+
+/// What a row says of a component.
+pub(super) type Cell = (ComponentDescriptor, Values);
+
+impl Sheet {
+    pub(super) fn new(entity: EntityPath, when: When) -> Self {
+        let (ids, ticks, columns, numbers) = Default::default();
+        Self { entity, when, ids, ticks, columns, numbers, handed_out: 0, bytes: 0 }
+    }
+
+    pub(super) fn entity(&self) -> &EntityPath {
+        &self.entity
+    }
+
+    pub(super) fn push(&mut self, ticks: u64, components: impl IntoIterator<Item = Cell>) {
+        let row = self.begin_row(ticks);
+        for (descriptor, values) in components {
+            self.bytes += values.bytes();
+            let (length, kind) = (values.len(), discriminant(&values));
+            let is_it = |column: &&mut Column| column.descriptor == descriptor && discriminant(&column.values) == kind;
+            match self.columns.iter_mut().find(is_it) {
+                Some(column) => {
+                    column.cells.push((row, length));
+                    column.values.extend(values);
+                }
+                None => self.columns.push(Column { descriptor, cells: vec![(row, length)], values }),
+            }
+        }
+    }
+
+    /// How much the rows that wait hold, without what is small.
+    pub(super) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    pub(super) fn push_number(&mut self, ticks: u64, number: f64) {
+        self.begin_row(ticks);
+        self.numbers.push(number);
+    }
+
+    fn begin_row(&mut self, ticks: u64) -> usize {
+        self.ids.push(RowId::new());
+        self.ticks.push(ticks);
+        self.ids.len() - 1
+    }
+
+    /// The rows that were not handed out yet, on the timelines `named`; forgotten, unless they are `kept` for another reader.
+    pub(super) fn news(&mut self, named: &Timelines, kept: bool) -> Result<Option<Chunk>, RecordingError> {
+        let rows = self.handed_out..self.ids.len();
+        let chunk = self.chunk(rows, named);
+        self.handed_out = self.ids.len();
+        if !kept {
+            self.forget();
+        }
+        chunk
+    }
+
+    /// All rows, on the timelines `named`; forgotten.
+    pub(super) fn all(&mut self, named: &Timelines) -> Result<Option<Chunk>, RecordingError> {
+        let chunk = self.chunk(0..self.ids.len(), named);
+        self.forget();
+        chunk
+    }
+
+    fn forget(&mut self) {
+        let Self { ids, ticks, columns, numbers, handed_out, bytes, .. } = self;
+        ids.clear();
+        ticks.clear();
+        numbers.clear();
+        columns.iter_mut().for_each(|column| (column.cells.clear(), column.values.clear()).0);
+        (*handed_out, *bytes) = (0, 0);
+    }
+
+    /// `None` if there are no rows, or none on these timelines.
+    fn chunk(&self, rows: Range<usize>, named: &Timelines) -> Result<Option<Chunk>, RecordingError> {
+        let timelines = named.of(self.when, &self.ticks[rows.clone()]);
+        if rows.is_empty() || (timelines.is_empty() && self.when != When::Always) {
+            return Ok(None);
+        }
+        let mut components = Vec::with_capacity(self.columns.len().max(1));
+        for column in &self.columns {
+            components.extend(column.list(&rows)?.map(|list| (column.descriptor.clone(), list)));
+        }
+        if let Some(numbers) = self.numbers.get(rows.clone()).filter(|numbers| !numbers.is_empty()) {
+            let lengths = OffsetBuffer::from_lengths(std::iter::repeat_n(1, numbers.len()));
+            let list = list(lengths, Arc::new(Float64Array::from(numbers.to_vec())), None);
+            components.push((Scalars::descriptor_scalars(), list?));
+        }
+        let timelines = timelines.into_iter().map(|column| (*column.timeline().name(), column)).collect();
+        let (ids, components) = (&self.ids[rows], components.into_iter().collect());
+        Ok(Some(Chunk::from_native_row_ids(ChunkId::new(), self.entity.clone(), None, ids, timelines, components)?))
+    }
+}
+
+impl Column {
+    /// The cells of these rows, a list a row; `None` if they have none.
+    fn list(&self, rows: &Range<usize>) -> Result<Option<ListArray>, RecordingError> {
+        let first = self.cells.partition_point(|(row, _)| *row < rows.start);
+        let cells = &self.cells[first..];
+        if cells.is_empty() {
+            return Ok(None);
+        }
+        let skipped = self.cells[..first].iter().map(|(_, length)| length).sum();
+        let values = self.values.array(first, skipped)?;
+        let mut lengths = vec![0; rows.len()];
+        let mut is_there = vec![false; rows.len()];
+        for (row, length) in cells {
+            (lengths[row - rows.start], is_there[row - rows.start]) = (*length, true);
+        }
+        let nulls = (cells.len() < rows.len()).then(|| NullBuffer::from(is_there));
+        Ok(Some(list(OffsetBuffer::from_lengths(lengths), values, nulls)?))
+    }
+}
+
+impl Values {
+    /// How many values there are.
+    fn len(&self) -> usize {
+        match self {
+            Self::Triples(all) => all.len(),
+            Self::Quads(all) => all.len(),
+            Self::Doubles(all) => all.len(),
+            Self::Arrays(all) => all.iter().map(|array| array.len()).sum(),
+        }
+    }
+
+    /// How much memory arrays hold; the others are small.
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Arrays(all) => all.iter().map(|array| array.get_buffer_memory_size()).sum(),
+            _ => 0,
+        }
+    }
+
+    /// Appends values of the same kind.
+    fn extend(&mut self, more: Self) {
+        match (self, more) {
+            (Self::Triples(all), Self::Triples(more)) => all.extend(more),
+            (Self::Quads(all), Self::Quads(more)) => all.extend(more),
+            (Self::Doubles(all), Self::Doubles(more)) => all.extend(more),
+            (Self::Arrays(all), Self::Arrays(more)) => all.extend(more),
+            _ => {}
+        }
+    }
+
+    fn clear(&mut self) {
+        match self {
+            Self::Triples(all) => all.clear(),
+            Self::Quads(all) => all.clear(),
+            Self::Doubles(all) => all.clear(),
+            Self::Arrays(all) => all.clear(),
+        }
+    }
+
+    /// One array of all but the first cells, which hold so many values.
+    fn array(&self, cells: usize, skipped: usize) -> Result<ArrayRef, ArrowError> {
+        let fixed = |numbers: &[f32], width: i32| -> Result<ArrayRef, ArrowError> {
+            let item = Arc::new(Field::new("item", DataType::Float32, false));
+            let numbers = Arc::new(Float32Array::from(numbers.to_vec()));
+            Ok(Arc::new(FixedSizeListArray::try_new(item, width, numbers, None)?))
+        };
+        match self {
+            Self::Triples(all) => fixed(all[skipped..].as_flattened(), 3),
+            Self::Quads(all) => fixed(all[skipped..].as_flattened(), 4),
+            Self::Doubles(all) => Ok(Arc::new(Float64Array::from(all[skipped..].to_vec()))),
+            Self::Arrays(all) => match &all[cells..] {
+                [array] => Ok(array.clone()),
+                all => concat(&all.iter().map(AsRef::as_ref).collect::<Vec<&dyn Array>>()),
+            },
+        }
+    }
+}
+
+impl From<SerializedComponentBatch> for Values {
+    fn from(batch: SerializedComponentBatch) -> Self {
+        Self::Arrays(vec![batch.array])
+    }
+}
+
+fn list(lengths: OffsetBuffer<i32>, values: ArrayRef, nulls: Option<NullBuffer>) -> Result<ListArray, ArrowError> {
+    ListArray::try_new(Field::new_list_field(values.data_type().clone(), true).into(), lengths, values, nulls)
+}
+
+/// The timelines on which chunks stand.
+pub(super) struct Timelines {
+    pub(super) step: Timeline,
+    /// Of those who watch live.
+    pub(super) motion: Option<Timeline>,
+}
+
+impl Timelines {
+    fn of(&self, when: When, ticks: &[u64]) -> Vec<TimeColumn> {
+        let column = |timeline, per_tick: u64| {
+            let times: Vec<i64> = ticks.iter().map(|ticks| sequence(ticks / per_tick)).collect();
+            TimeColumn::new(None, timeline, times.into())
+        };
+        let step = (when == When::Step).then(|| column(self.step, MOTION_PER_STEP));
+        let motion = self.motion.filter(|_| when != When::Always).map(|motion| column(motion, 1));
+        step.into_iter().chain(motion).collect()
+    }
+}
+
+/// A number as a place on a timeline.
+pub(super) fn sequence(number: u64) -> i64 {
+    i64::try_from(number).unwrap_or(i64::MAX)
+}
