@@ -67,10 +67,10 @@ pub struct About {
     /// Of body-schema: another may compute other runs.
     version: String,
     /// The name of the scenario, and its file, which has to be the same for all.
-    pub scenario: String,
+    scenario: String,
     source: String,
-    pub learners: Vec<String>,
-    pub steps: u64,
+    learners: Vec<String>,
+    steps: u64,
     /// All seeds of the comparison, the first and the last.
     seeds: [u64; 2],
     shard: Shard,

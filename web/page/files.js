@@ -138,12 +138,6 @@ export async function ask(method, path, body) {
   }
 }
 
-/** A session's resource, null if it is gone. @param {string} id */
-export async function sessionOf(id) {
-  const session = sessions.get(id);
-  return session === undefined ? null : resource(session);
-}
-
 function problem(status, title, detail, more = {}) {
   return new ProblemError({ status, title, detail, ...more });
 }

@@ -61,7 +61,7 @@ export async function ask(method, path, body) {
  * @param {string} id
  * @returns {Promise<object | null | undefined>} null if it is gone, undefined if there is no answer
  */
-export function sessionOf(id) {
+function sessionOf(id) {
   return ask("GET", `/v1/sessions/${encodeURIComponent(id)}`).catch((error) => (error.status === 404 ? null : undefined));
 }
 

@@ -1,5 +1,5 @@
 //! The panel for those who do not see its canvas: AccessKit's tree in the reduced form from which the page builds real
-//! buttons, fields and tables, and what they ask for on its way back.
+//! buttons, fields and tables. What is done to them is in [`acts`](crate::acts).
 //!
 //! What is a table says so by the roles of its parts: [`Role::Table`], [`Role::Row`], and [`Role::ColumnHeader`] or
 //! [`Role::Cell`].
@@ -8,9 +8,9 @@ use std::collections::HashMap;
 
 use egui::{
     Role,
-    accesskit::{Action, ActionData, ActionRequest, Node, NodeId, Toggled, TreeId, TreeUpdate},
+    accesskit::{Node, NodeId, Toggled, TreeUpdate},
 };
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// An element of the page.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -228,67 +228,10 @@ impl Element {
     }
 }
 
-/// What was done to an element.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct Act {
-    /// The element.
-    id: String,
-    /// What was done.
-    #[serde(flatten)]
-    deed: Deed,
-}
-
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(tag = "act", rename_all = "snake_case")]
-enum Deed {
-    /// It was pressed.
-    Click,
-    /// It was pressed, in a list that is closed by that.
-    Choose,
-    /// It was given a number.
-    Set { number: f64 },
-    /// It was given a text.
-    Enter { text: String },
-    /// It is to be scrolled into view.
-    Show,
-}
-
-impl Act {
-    /// The events that do it in egui.
-    pub fn events(&self) -> Vec<egui::Event> {
-        let Ok(node) = self.id.parse() else { return Vec::new() };
-        let request = |action, data| {
-            let request = ActionRequest { action, target_tree: TreeId::ROOT, target_node: NodeId(node), data };
-            egui::Event::AccessKitActionRequest(request)
-        };
-        match &self.deed {
-            Deed::Click | Deed::Choose => vec![request(Action::Click, None)],
-            Deed::Set { number } => vec![request(Action::SetValue, Some(ActionData::NumericValue(*number)))],
-            Deed::Enter { text } => vec![request(Action::SetValue, Some(ActionData::Value(text.as_str().into())))],
-            Deed::Show => vec![request(Action::ScrollIntoView, None)],
-        }
-    }
-
-    /// What egui does only when a pointer is released: called a frame after the events.
-    pub fn finish(&self, ctx: &egui::Context) {
-        if self.deed == Deed::Choose {
-            egui::Popup::close_all(ctx);
-        }
-    }
-}
-
-/// Takes the focus from the widget that has it.
-pub fn release_focus(ctx: &egui::Context) {
-    ctx.memory_mut(|memory| {
-        if let Some(id) = memory.focused() {
-            memory.surrender_focus(id);
-        }
-    });
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::acts::Act;
 
     struct Form {
         ctx: egui::Context,

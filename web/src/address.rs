@@ -126,9 +126,9 @@ impl Settings {
         if !self.robot {
             add("scenario", &self.scenario);
             add("seed", &self.seed.to_string());
-        }
-        if !self.learners.is_empty() && !self.robot {
-            add("learners", &self.learners.join(","));
+            if !self.learners.is_empty() {
+                add("learners", &self.learners.join(","));
+            }
         }
         if let Some(step) = self.step {
             add("step", &step.to_string());

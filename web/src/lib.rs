@@ -15,7 +15,7 @@
 //! mirror    the state in words                           news       what is read out when it happens
 //! keys      the keyboard
 //! view/     how all of it looks
-//! access    the same for those who do not see it
+//! access    the same for those who do not see it         acts       what they do
 //! shell     the WebAssembly that a browser runs (only there)
 //! ```
 //!
@@ -25,6 +25,7 @@
 //! panel decides. So tests drive it natively, by the labels that a visitor reads.
 
 pub mod access;
+pub mod acts;
 mod address;
 mod bands;
 pub mod colours;

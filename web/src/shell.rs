@@ -11,7 +11,8 @@ use egui::accesskit::TreeUpdate;
 use wasm_bindgen::prelude::*;
 
 use crate::{
-    access::{self, Act, Element},
+    access::{self, Element},
+    acts::{self, Act},
     host::{Command, Event},
     panel::Panel,
 };
@@ -227,7 +228,7 @@ impl eframe::App for Shell {
         inbox.drawn_at = now();
         drop(inbox);
         if released {
-            access::release_focus(&ctx);
+            acts::release_focus(&ctx);
         }
         std::mem::replace(&mut self.acts, acts).iter().for_each(|act| act.finish(&ctx));
         if !self.acts.is_empty() {

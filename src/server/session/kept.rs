@@ -25,11 +25,7 @@ impl Kept {
     pub(super) fn of(report: &StepReport, description: &Description) -> Result<Self, Problem> {
         let failed = |error: String| Problem::new(Kind::Internal, format!("the report cannot be written: {error}"));
         let rows = rows(report, description).map_err(|error| failed(error.to_string()))?;
-        let mut report = report.clone();
-        for movement in report.learners.iter_mut().filter_map(|learner| learner.movement.as_mut()) {
-            movement.partition = None;
-        }
-        let json = to_raw_value(&report).map_err(|error| failed(error.to_string()))?;
+        let json = to_raw_value(report).map_err(|error| failed(error.to_string()))?;
         Ok(Self { step: report.step, json: json.into(), rows: rows.into() })
     }
 

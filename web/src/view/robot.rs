@@ -12,8 +12,11 @@ use crate::{
 
 impl Panel {
     pub(super) fn robot(&mut self, ui: &mut Ui) {
-        let Some(Standing { status, last, pending }) = self.robot.standing.clone() else { return };
+        if self.robot.standing.is_none() {
+            return;
+        }
         self.next_movement(ui);
+        let Some(Standing { status, last, pending }) = &self.robot.standing else { return };
         if pending.len() > 1 {
             let others = pending.iter().skip(1).map(|one| match &one.client {
                 Some(client) => format!("{} for {client}", one.id),
@@ -23,7 +26,7 @@ impl Panel {
             ui.add(Label::new(RichText::new(format!("Suggested too: {others}.")).weak()).wrap());
         }
         ui.add_space(6.0);
-        let words = standing(&status, last.as_ref());
+        let words = standing(status, last.as_ref());
         for (index, sentence) in words.iter().enumerate() {
             let text = RichText::new(sentence);
             // The first says how accurate it is.
@@ -44,8 +47,8 @@ impl Panel {
             );
             ui.add(Label::new(RichText::new(how).weak().small()).wrap().selectable(true));
         }
-        let failures = [&status.failure, &self.session.as_ref().and_then(|session| session.recording_failure.clone())];
-        for failure in failures.into_iter().flatten() {
+        let unrecorded = self.session.as_ref().and_then(|session| session.recording_failure.as_ref());
+        for failure in status.failure.iter().chain(unrecorded) {
             ui.add(Label::new(RichText::new(failure).color(alarm(ui))).wrap());
         }
     }
