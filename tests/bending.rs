@@ -230,7 +230,7 @@ fn keys_that_make_no_sense_are_refused_with_a_mend() {
     assert!(error.contains("`slide` slides") && error.contains("name a joint that turns"), "{error}");
     let not_finite = source.replacen("eccentricity_deg = [0.07, -0.19]", "compliance_deg_per_nm = [nan, 0.0]", 1);
     let error = Scenario::parse("nan.toml", &not_finite, &|_| Err(String::new())).expect_err("refused").to_string();
-    assert!(error.contains("`robot.joint[0].compliance_deg_per_nm`: it is not finite"), "{error}");
+    assert!(error.contains("`robot.joint[0].compliance_deg_per_nm`: it is out of range"), "{error}");
 }
 
 /// Of a real Panda gravity explains what one that pulls sideways does not.

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use crate::robot::{Robot, open};
 
-/// Axes off by up to 3° and 1 cm, marker and base unknown, σ = 0.5 mm: 20 movements predict it to 0.9 mm in the mean. The URDF that
+/// Axes off by up to 3° and 1 cm, marker and base unknown, σ = 0.5 mm: 20 movements predict it to 0.9 mm in the mean, and 25 are enough. The URDF that
 /// comes of them does, too.
 #[test]
 fn twenty_movements_predict_a_panda_to_nine_tenths_of_a_millimetre() {
@@ -22,6 +22,13 @@ fn twenty_movements_predict_a_panda_to_nine_tenths_of_a_millimetre() {
             session.observe(robot.sees(&next, 0.0), None).expect("seen");
         }
         assert!(robot.mean_error_mm(&session) < 0.9, "seed {seed}: {} mm", robot.mean_error_mm(&session));
+        // What is wanted, 1 mm, has to be expected five times in a row.
+        for _ in 20..25 {
+            if session.enough().is_none() {
+                let next = session.suggest(&Ask::default(), None).expect("one").suggestions.remove(0);
+                session.observe(robot.sees(&next, 0.0), None).expect("seen");
+            }
+        }
         assert!(session.enough().is_some(), "seed {seed}: {:?}", session.status());
     }
 }

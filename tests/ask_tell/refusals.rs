@@ -91,7 +91,7 @@ fn observations() {
         (misspelt, "measurements.maker", "did you mean `marker`"),
         (marker(json!([1, 2])), "measurements.marker", "[x, y, z] in metres"),
         (marker(json!({ "position": [1, 2, 3] })), "measurements.marker", "[x, y, z] in metres"),
-        (marker(json!([1e200, 0, 0])), "measurements", "lengths are metres"),
+        (marker(json!([1e200, 0, 0])), "measurements.marker", "[x, y, z] in metres"),
     ] {
         let Err(Refusal::Field(fault)) = session.observe(told, None) else { panic!("{field}") };
         assert!(fault.field == field && fault.mend.contains(mend), "{fault:?}");
