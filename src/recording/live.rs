@@ -20,6 +20,9 @@ use super::{
     compact::{Keep, put_together},
 };
 
+/// How large a part is that is put together of others.
+const MOST_TOGETHER_BYTES: usize = 1 << 18;
+
 /// A growing log of encoded parts, in memory, for any number of readers at any speed. Clones share one log.
 ///
 /// Part 0 is the 12-byte header of an .rrd stream; every further part is one message, but for one that holds all
@@ -87,12 +90,24 @@ impl LiveLog {
 
     /// The parts from `index` on; cheap, the bytes are shared.
     pub fn parts_from(&self, index: usize) -> Vec<Bytes> {
-        self.state().parts.get(index..).map(<[Bytes]>::to_vec).unwrap_or_default()
+        self.batch_from(index, usize::MAX)
+    }
+
+    /// The parts from `index` on, at most `most` of them, for readers that may be far behind.
+    pub fn batch_from(&self, index: usize, most: usize) -> Vec<Bytes> {
+        let state = self.state();
+        let end = index.saturating_add(most).min(state.parts.len());
+        state.parts.get(index..end).map(<[Bytes]>::to_vec).unwrap_or_default()
     }
 
     /// The same for a page that has curves of its own: the views are arranged for the scene alone.
     pub fn scene_parts_from(&self, index: usize) -> Vec<Bytes> {
-        let mut parts = self.parts_from(index);
+        self.scene_batch_from(index, usize::MAX)
+    }
+
+    /// The same, at most `most` of them.
+    pub fn scene_batch_from(&self, index: usize, most: usize) -> Vec<Bytes> {
+        let mut parts = self.batch_from(index, most);
         if let Some((place, scene)) = &self.state().scene
             && let Some(part) = place.checked_sub(index).and_then(|place| parts.get_mut(place))
         {
@@ -176,12 +191,21 @@ impl LiveLog {
         Ok(Encoder::encode(messages.into_iter().map(Ok))?)
     }
 
-    /// Some of its parts, without the header, as one: the many small chunks of a live session put together. Readers
-    /// that are far behind take in one large part much faster than a thousand small ones.
+    /// Some of its parts, without the header, as few: the many small chunks of a live session put together. Readers that are
+    /// far behind take in a few large parts much faster than a thousand small ones. Each is of whole messages, and has about
+    /// 256 KiB at most unless a single row is larger.
     ///
     /// Takes about as long as it took to encode the parts: run it where it may block.
-    pub fn put_together(&self, parts: &[Bytes]) -> Result<Bytes, RecordingError> {
-        encode_all(&put_together([&[self.header()], parts].concat().concat(), Keep::Motion)?)
+    pub fn put_together(&self, parts: &[Bytes]) -> Result<Vec<Bytes>, RecordingError> {
+        let mut together: Vec<Vec<u8>> = Vec::new();
+        for message in put_together([&[self.header()], parts].concat().concat(), Keep::Motion)? {
+            let bytes = encode(&message)?;
+            match together.last_mut() {
+                Some(part) if part.len() + bytes.len() <= MOST_TOGETHER_BYTES => part.extend_from_slice(&bytes),
+                _ => together.push(bytes.to_vec()),
+            }
+        }
+        Ok(together.into_iter().map(|part| Bytes::from(part.into_boxed_slice())).collect())
     }
 
     fn state(&self) -> MutexGuard<'_, State> {

@@ -124,8 +124,13 @@ impl Recorder {
             flushed: Instant::now(),
             finished: false,
         };
-        recorder.begin(ellipsoids)?;
-        Ok(recorder)
+        match recorder.begin(ellipsoids) {
+            Ok(()) => Ok(recorder),
+            Err(error) => {
+                recorder.discard();
+                Err(error)
+            }
+        }
     }
 
     /// The id of the recording.
@@ -266,6 +271,15 @@ impl Recorder {
     /// Writes what is left, ends the file with its footer, and closes the log.
     pub fn finish(mut self) -> Result<(), RecordingError> {
         self.end()
+    }
+
+    /// Gives the recording up: no file is left of it, and the log is closed.
+    pub fn discard(mut self) {
+        self.rows = Rows::default();
+        (self.finished, self.incomplete) = (true, None);
+        if let Some(file) = self.file.take() {
+            file.discard();
+        }
     }
 
     /// Writes what is left and ends the file with its footer: nothing is recorded after it. A file that could not be written

@@ -69,9 +69,19 @@ impl Program {
 
     /// Asks it to end. Tells its exit code, and what it said on the way.
     #[cfg(unix)]
-    pub fn terminate(mut self) -> (Option<i32>, String) {
+    pub fn terminate(self) -> (Option<i32>, String) {
+        self.signal("TERM");
+        self.end()
+    }
+
+    #[cfg(unix)]
+    pub fn signal(&self, name: &str) {
         let id = self.id().to_string();
-        assert!(Command::new("kill").args(["-TERM", &id]).status().expect("kill").success());
+        assert!(Command::new("kill").args([&format!("-{name}"), &id]).status().expect("kill").success());
+    }
+
+    /// Waits for its end.
+    pub fn end(mut self) -> (Option<i32>, String) {
         let mut said = String::new();
         self.output.read_to_string(&mut said).expect("text");
         self.process.stderr.take().expect("its errors").read_to_string(&mut said).expect("text");

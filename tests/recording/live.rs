@@ -122,7 +122,7 @@ fn a_step_is_said_to_be_complete_when_all_of_it_has_come() {
     }
     // So it is for those who take many parts at once.
     let together = live.put_together(&live.parts_from(1)).unwrap();
-    let entities: Vec<String> = reading::entities_in_order(&[live.header(), together].concat());
+    let entities: Vec<String> = reading::entities_in_order(&[vec![live.header()], together].concat().concat());
     assert_eq!(entities.iter().position(|entity| entity == "/complete"), Some(entities.len() - 1));
 }
 

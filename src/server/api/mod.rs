@@ -22,7 +22,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use serde::Serialize;
-use utoipa::{OpenApi, ToSchema, openapi::RefOr};
+use utoipa::{IntoResponses, OpenApi, ToSchema, openapi::RefOr};
 use utoipa_axum::{
     router::{OpenApiRouter, UtoipaMethodRouterExt},
     routes,
@@ -32,7 +32,7 @@ pub use scenarios::{ScenarioList, ScenarioResource};
 pub use sessions::{MadeSteps, SessionList, StepRequest};
 
 use super::{
-    App, MAX_SETUP_BODY_BYTES,
+    App, Limits,
     aside::aside,
     problem::{Kind, PROBLEM_JSON, Problem},
 };
@@ -81,11 +81,11 @@ pub enum Liveness {
 struct Document;
 
 /// All routes, and the document that describes them.
-pub(super) fn routes() -> (Router<Arc<App>>, Bytes) {
+pub(super) fn routes(limits: &Limits) -> (Router<Arc<App>>, Bytes) {
     let (router, mut document) = OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(scenarios::list))
         .routes(routes!(scenarios::get))
-        .routes(routes!(sessions::list, sessions::create).layer(DefaultBodyLimit::max(MAX_SETUP_BODY_BYTES)))
+        .routes(routes!(sessions::list, sessions::create).layer(DefaultBodyLimit::max(limits.setup_body_bytes())))
         .routes(routes!(sessions::get, sessions::delete))
         .routes(routes!(sessions::step))
         .routes(routes!(choices::selection))
@@ -119,18 +119,22 @@ pub(super) fn routes() -> (Router<Arc<App>>, Bytes) {
     (router, document.to_pretty_json().unwrap_or_default().into())
 }
 
-/// Says once for all routes that problems have their own media type.
+/// Says once for all routes what holds for every request, and that problems have their own media type.
 fn describe_problems(document: &mut utoipa::openapi::OpenApi) {
     for item in document.paths.paths.values_mut() {
-        let operations = [&mut item.get, &mut item.post, &mut item.put, &mut item.delete].into_iter().flatten();
-        let responses = operations.flat_map(|operation| &mut operation.responses.responses);
-        let errors = responses.filter(|(status, _)| status.starts_with(['4', '5']));
-        for response in errors.filter_map(|(_, response)| match response {
-            RefOr::T(response) => Some(response),
-            RefOr::Ref(_) => None,
-        }) {
-            let content = response.content.swap_remove(JSON);
-            response.content.extend(content.map(|content| (PROBLEM_JSON.to_owned(), content)));
+        for operation in [&mut item.get, &mut item.post, &mut item.put, &mut item.delete].into_iter().flatten() {
+            let responses = &mut operation.responses.responses;
+            for (status, response) in refusals::OfAll::responses() {
+                responses.entry(status).or_insert(response);
+            }
+            let errors = responses.iter_mut().filter(|(status, _)| status.starts_with(['4', '5']));
+            for response in errors.filter_map(|(_, response)| match response {
+                RefOr::T(response) => Some(response),
+                RefOr::Ref(_) => None,
+            }) {
+                let content = response.content.swap_remove(JSON);
+                response.content.extend(content.map(|content| (PROBLEM_JSON.to_owned(), content)));
+            }
         }
     }
 }

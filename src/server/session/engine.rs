@@ -18,10 +18,7 @@ use crate::{
     experiment::{AppraisalReport, Choice, Description, Experiment, RunResult},
     recording::{EllipsoidSize, Recorder, RecordingError, Target},
     scenario::builtin,
-    server::{
-        MAX_STEPS_PER_SESSION,
-        problem::{Kind, Problem},
-    },
+    server::problem::{Kind, Problem},
 };
 
 /// Within a long command, what was made is published this often.
@@ -40,6 +37,8 @@ pub(super) struct Setup {
     pub(super) ellipsoids: EllipsoidSize,
     /// The recording's file, if one is kept.
     pub(super) file: Option<PathBuf>,
+    /// How many steps it makes at most.
+    pub(super) most_steps: u64,
     pub(super) shared: Arc<Shared>,
     /// Held until the thread ends, so that ending sessions still count.
     pub(super) permit: OwnedSemaphorePermit,
@@ -98,23 +97,27 @@ pub(super) type Reply<T> = oneshot::Sender<Result<T, Problem>>;
 
 /// The body of the thread. `opened` hears of the description once the session stands.
 pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply<Description>) {
-    let Setup { id, scenario, seed, learners, ellipsoids, file, shared, permit } = setup;
+    let Setup { id, scenario, seed, learners, ellipsoids, file, most_steps, shared, permit } = setup;
     let open = || -> Result<(Experiment, Recorder, Kept), Problem> {
         let experiment = builtin(&scenario)?.experiment(seed, learners.as_deref())?;
         let target = Target::live(shared.live.clone()).with_recording_id(id.to_string()).with_ellipsoids(ellipsoids);
         let target = file.iter().fold(target, |target, file| target.and_file(file));
-        let mut recorder = Recorder::new(experiment.description(), target)
-            .and_then(|mut recorder| recorder.log(experiment.latest()).map(|()| recorder))
-            .map_err(|error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}")))?;
-        recorder.flush().map_err(recording_failed)?;
-        let start = Kept::of(experiment.latest(), experiment.description())?;
-        Ok((experiment, recorder, start))
+        let unbegun = |error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}"));
+        let mut recorder = Recorder::new(experiment.description(), target).map_err(unbegun)?;
+        let recorded = recorder.log(experiment.latest()).and_then(|()| recorder.flush()).map_err(unbegun);
+        match recorded.and_then(|()| Kept::of(experiment.latest(), experiment.description())) {
+            Ok(start) => Ok((experiment, recorder, start)),
+            Err(problem) => {
+                recorder.discard();
+                Err(problem)
+            }
+        }
     };
     match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
         Ok((experiment, mut recorder, start)) => {
             shared.publish(vec![start], experiment.remaining());
             if opened.send(Ok(experiment.description().clone())).is_ok() {
-                let mut engine = Engine { experiment, shared: &shared };
+                let mut engine = Engine { experiment, most_steps, shared: &shared };
                 let outcome = catch_unwind(AssertUnwindSafe(|| engine.serve(&commands, &mut recorder)));
                 if let Err(panic) = outcome {
                     shared.fail(panicked(&*panic).detail);
@@ -135,6 +138,7 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
 
 struct Engine<'a> {
     experiment: Experiment,
+    most_steps: u64,
     shared: &'a Shared,
 }
 
@@ -300,9 +304,10 @@ impl Engine<'_> {
         if let Some(left) = self.experiment.remaining().map(|left| left as u64).filter(|left| count > *left) {
             return Some(few(left, format!("the recorded data have {left} steps left, {count} were asked for")));
         }
-        let left = MAX_STEPS_PER_SESSION.saturating_sub(step);
+        let left = self.most_steps.saturating_sub(step);
         if count > left {
-            let detail = format!("a session makes at most {MAX_STEPS_PER_SESSION} steps: {left} are left, not {count}");
+            let most = self.most_steps;
+            let detail = format!("a session makes at most {most} steps: {left} are left, not {count}");
             return Some(few(left, detail));
         }
         self.has_no_room()

@@ -13,6 +13,7 @@ mod registry;
 mod resource;
 mod shared;
 mod standing;
+mod together;
 mod watching;
 
 use std::{
@@ -28,7 +29,7 @@ use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
-use engine::Command;
+use engine::{Command, recording_failed};
 pub(super) use kept::Kept;
 pub(super) use memory::Budget;
 pub(super) use outside::{Elsewhere, now_s};
@@ -38,7 +39,8 @@ pub use resource::SessionResource;
 use shared::Shared;
 pub use standing::NewOutsideSession;
 pub(super) use standing::Standing;
-pub(super) use watching::Watching;
+pub(super) use together::Together;
+pub(super) use watching::{Following, Watching};
 
 use super::problem::{Kind, Problem};
 use crate::{
@@ -58,8 +60,12 @@ pub(super) struct Session {
     shared: Arc<Shared>,
     /// When it was last asked for anything.
     used: Mutex<Instant>,
-    /// How many watch it.
+    /// How many watch it …
     watchers: AtomicUsize,
+    /// … and how many of them by a stream.
+    streams: AtomicUsize,
+    /// The recording for those who come late.
+    together: together::Kept,
     /// Of a robot elsewhere.
     report: AsyncMutex<Option<ReportFiles>>,
 }
