@@ -6,7 +6,7 @@ use body_schema::server::Limits;
 
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Limits")]
-pub struct Arguments {
+pub struct LimitArguments {
     /// Connections; never more than half of the descriptors that the process may open [default: 512]
     #[arg(long, value_name = "N")]
     max_connections: Option<NonZeroUsize>,
@@ -51,7 +51,7 @@ pub struct Arguments {
     session_idle: Option<Duration>,
 }
 
-impl Arguments {
+impl LimitArguments {
     pub fn limits(&self) -> Limits {
         let usual = Limits::default();
         let count = |given: Option<NonZeroUsize>, usual: usize| given.map_or(usual, NonZeroUsize::get);
@@ -94,7 +94,7 @@ mod tests {
     #[derive(Debug, Parser)]
     struct Program {
         #[command(flatten)]
-        limits: Arguments,
+        limits: LimitArguments,
     }
 
     fn limits(arguments: &[&str]) -> Result<Limits, clap::Error> {

@@ -198,6 +198,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_arguments_of_all_commands_go_together() {
+        use clap::CommandFactory;
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
     fn a_cause_is_told_once() {
         let cause = || std::io::Error::from(std::io::ErrorKind::NotFound);
         let named = PaperError::Write { path: "a".into(), source: cause() };

@@ -12,7 +12,7 @@ use body_schema::server::{FrameAncestor, HostName, Options, Server, Token, raise
 use tokio_util::sync::CancellationToken;
 
 use super::{
-    limits,
+    limits::LimitArguments,
     signals::{INSTANT, Interrupted, Signal, Signals},
 };
 
@@ -43,7 +43,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR", hide = true)]
     panel_dir: Option<PathBuf>,
     #[command(flatten)]
-    limits: limits::Arguments,
+    limits: LimitArguments,
 }
 
 const DEFAULT_ADDRESS: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
@@ -58,7 +58,7 @@ impl Default for Arguments {
             allow_hosts: Vec::new(),
             frame_ancestors: Vec::new(),
             panel_dir: None,
-            limits: limits::Arguments::default(),
+            limits: LimitArguments::default(),
         }
     }
 }

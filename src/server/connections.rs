@@ -30,6 +30,7 @@ use hyper::{
 };
 use hyper_util::{rt::TokioIo, service::TowerToHyperService};
 use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
     net::{TcpListener, TcpStream},
     sync::{OwnedSemaphorePermit, Semaphore, watch},
     time::{Instant, sleep, sleep_until, timeout},
@@ -45,6 +46,9 @@ use stream::Stream;
 
 /// What a connection that has to make room may take to end.
 const ROOM_WITHIN: Duration = Duration::from_millis(100);
+/// How many are told at a time that all are busy, and how long that may take.
+const MOST_REFUSALS: usize = 16;
+const REFUSED_WITHIN: Duration = Duration::from_millis(500);
 /// How long no connection is taken after the operating system has refused one, for want of descriptors or memory.
 const REST: Duration = Duration::from_millis(20);
 /// How long connections may take to end by themselves at shutdown …
@@ -61,8 +65,10 @@ pub(super) struct Connections {
     open: Mutex<Vec<Arc<Connection>>>,
     /// Breaks off all of them.
     broken: CancellationToken,
-    /// What is told where all are busy.
+    /// What is told where all are busy …
     busy: Bytes,
+    /// … and to how many more at a time.
+    refusals: Arc<Semaphore>,
 }
 
 /// What a connection is at.
@@ -115,6 +121,7 @@ impl Connections {
             open: Mutex::default(),
             broken: CancellationToken::new(),
             busy: refusal(&Problem::new(Kind::ServerFull, detail)),
+            refusals: Arc::new(Semaphore::new(MOST_REFUSALS)),
         })
     }
 
@@ -147,9 +154,7 @@ impl Connections {
         shutdown: &CancellationToken,
     ) {
         let Some(permit) = self.permit().await else {
-            // Whoever does not even take this is not waited for.
-            drop(stream.try_write(&self.busy));
-            return;
+            return self.refuse(stream);
         };
         let reached = stream.local_addr().ok();
         let connection = Arc::new(Connection {
@@ -159,6 +164,22 @@ impl Connections {
         self.lock().push(connection.clone());
         let place = Place { connection, all: self.clone(), _permit: permit };
         tokio::spawn(self.clone().attend(stream, place, reached, service.clone(), shutdown.clone()));
+    }
+
+    /// Tells a newcomer that all are busy, unless many are being told so.
+    fn refuse(&self, mut stream: TcpStream) {
+        let (busy, Ok(place)) = (self.busy.clone(), self.refusals.clone().try_acquire_owned()) else { return };
+        tokio::spawn(async move {
+            let told = async {
+                stream.write_all(&busy).await?;
+                stream.shutdown().await?;
+                // Were it closed with a request unread, the answer would be taken back.
+                while stream.read(&mut [0; 1 << 10]).await? > 0 {}
+                Ok::<_, io::Error>(())
+            };
+            drop(timeout(REFUSED_WITHIN, told).await);
+            drop(place);
+        });
     }
 
     async fn permit(&self) -> Option<OwnedSemaphorePermit> {

@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeSet, io::Cursor};
 
+use body_schema::server::{Limits, Options};
 use futures_util::{SinkExt, StreamExt};
 use re_log_encoding::DecoderApp;
 use reqwest::Method;
@@ -259,7 +260,9 @@ async fn whoever_is_far_behind_gets_parts_put_together() {
 
 #[tokio::test]
 async fn a_client_that_does_not_read_holds_nobody_up() {
-    let server = Server::start().await;
+    // However slow this machine is, it is not given up.
+    let limits = Limits { write_timeout: 10 * SOON, ..Limits::default() };
+    let server = Server::with(Options { limits, ..Options::default() }).await;
     let session = server.open_quick(1).await;
     let mut slow = follow(&server, &session, "").await;
     // More than the buffers between the two hold.
