@@ -98,7 +98,7 @@ mod tests {
     }
 
     fn limits(arguments: &[&str]) -> Result<Limits, clap::Error> {
-        Program::try_parse_from([&["program"], arguments].concat()).map(|program| program.limits.limits())
+        Program::try_parse_from([&["program"][..], arguments].concat()).map(|program| program.limits.limits())
     }
 
     #[test]

@@ -78,11 +78,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
     }
     bar.finish_and_clear();
-    let interrupted = interruption.signal().map(|signal| {
-        let step = experiment.latest().step;
-        let told = format!("{signal} came at step {step} of {steps}; files end with it, and are complete");
-        Interrupted { signal, told }
-    });
 
     let mut result = experiment.result();
     if arguments.limits {
@@ -91,6 +86,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             result = result.beside(designs);
         }
     }
+    let interrupted = interruption.signal().map(|signal| {
+        let step = experiment.latest().step;
+        let told = format!("{signal} came at step {step} of {steps}; files end with it, and are complete");
+        Interrupted { signal, told }
+    });
     if let Some(recorder) = &mut recorder {
         recorder.log_best_designs(&result.best_designs)?;
     }
