@@ -17,9 +17,9 @@ pub(super) struct OfAll;
 impl IntoResponses for OfAll {
     fn responses() -> Refusals {
         described(&[
-            ("400", "The request cannot be read"),
+            ("400", "The request cannot be read: its address, a parameter or a header"),
             ("401", "The server answers only those who carry its token"),
-            ("403", "The server is not meant by this `Host`"),
+            ("403", "The request is meant for another host, or comes from a foreign page"),
             ("503", "The server has as much to do as it can"),
         ])
     }
