@@ -70,6 +70,7 @@ pub(super) struct Parts {
 impl Parts {
     pub(super) fn new(session: &Arc<Session>, first: u64, read: fn(&LiveLog, usize) -> Vec<Bytes>) -> Self {
         let more = session.live().subscribe();
+        session.show();
         Self { next: usize::try_from(first).unwrap_or(usize::MAX), more, read, session: session.watch() }
     }
 

@@ -187,6 +187,7 @@ async fn follow(
     socket.send(text(&LiveEvent::Description(Box::new(description)))?).await?;
     // What it is now, as if it had just changed.
     standing.mark_changed();
+    let live = parts.live().clone();
     let mut ping = tokio::time::interval_at(tokio::time::Instant::now() + KEEP_ALIVE, KEEP_ALIVE);
     loop {
         // Parts first: they are published before the reports of their steps.
@@ -197,7 +198,7 @@ async fn follow(
                 Some(batch) => send_parts(&mut socket, &parts, batch).await?,
                 None => break,
             },
-            batch = reports.next() => {
+            batch = async { live.caught_up().await; reports.next().await } => {
                 // Both may have come since the parts were asked for.
                 let ready = parts.ready();
                 send_parts(&mut socket, &parts, ready).await?;
