@@ -52,9 +52,9 @@ const FARTHER: f64 = 0.6;
 
 /// Records an experiment, as the module's documentation lists it.
 ///
-/// Steps are gathered and written 256 at a time, at least every other second, or when [`flush`](Self::flush) is called. A live view that wants to be up to date calls [`flush_shown`](Self::flush_shown).
-/// [`finish`](Self::finish) writes what is left and the file's footer (its index); dropping the recorder does the same, but
-/// has nobody to tell of errors.
+/// Steps are gathered and written 256 at a time, at least every other second, or when [`flush`](Self::flush) is called. A live
+/// view that wants to be up to date calls [`flush_shown`](Self::flush_shown). [`finish`](Self::finish) writes what is left and
+/// the file's footer (its index); dropping the recorder does the same, but has nobody to tell of errors.
 ///
 /// If the process is killed, the file holds everything up to the last batch. Viewers open it; `rerun rrd verify`
 /// complains of the missing footer, which `rerun rrd optimize` adds.
