@@ -63,6 +63,8 @@ struct State {
     /// What arranges the views of a page anew.
     arranger: Option<Arc<Arranger>>,
     bytes: usize,
+    /// Steps wait that it would have if anybody had followed it.
+    behind: bool,
     closed: bool,
 }
 
@@ -127,9 +129,34 @@ impl LiveLog {
         self.state().bytes
     }
 
-    /// Is woken when parts are appended and when the log is closed; its value is the number of parts.
+    /// Is woken when parts are appended and when the log is closed; its value is the number of parts. Whoever holds it
+    /// follows the log.
     pub fn subscribe(&self) -> watch::Receiver<usize> {
+        // Under the lock: who comes after steps were left waiting sees that they were.
+        let _state = self.state();
         self.shared.length.subscribe()
+    }
+
+    /// Whether steps may wait because nobody follows the log. It is then said to be [behind](Self::is_behind) until
+    /// something is appended.
+    pub fn may_wait(&self) -> bool {
+        let mut state = self.state();
+        state.behind = self.shared.length.receiver_count() == 0;
+        state.behind
+    }
+
+    /// Whether steps wait that nobody wanted at once.
+    pub fn is_behind(&self) -> bool {
+        self.state().behind
+    }
+
+    /// Waits until it is not [behind](Self::is_behind), or closed. Cancelling loses nothing.
+    pub async fn caught_up(&self) {
+        if self.is_behind() {
+            let mut length = self.subscribe();
+            // Whoever holds the log holds the sender.
+            while self.is_behind() && !self.is_closed() && length.changed().await.is_ok() {}
+        }
     }
 
     /// Says that nothing more will come, so that readers end. What is there stays readable.
@@ -170,6 +197,7 @@ impl LiveLog {
     /// Appends parts, the first of which a page may take otherwise. A closed log ignores them.
     fn push(&self, parts: Vec<Bytes>, scene: Option<Bytes>) {
         let mut state = self.state();
+        state.behind = false;
         if state.closed {
             return;
         }

@@ -218,9 +218,12 @@ async fn the_websocket_carries_reports_and_recording_and_resumes() {
 async fn whoever_is_far_behind_gets_parts_put_together() {
     let server = Server::start().await;
     let session = server.open_quick(1).await;
+    // Somebody watches, so that each step is written at once.
+    let early = server.get(&format!("{session}/live.rrd")).await;
     for _ in 0..30 {
         server.step(&session, 1).await;
     }
+    drop(early);
     // A download completes the recording: nothing is left for a quiet moment, which might be now.
     assert!(server.get(&format!("{session}/recording.rrd")).await.status().is_success());
     // A late visitor: header, one part, the index of the next, and then every report.

@@ -73,6 +73,7 @@ pub(super) struct Parts {
 impl Parts {
     pub(super) fn new(session: &Arc<Session>, first: u64, read: Read) -> Self {
         let more = session.live().subscribe();
+        session.show();
         Self { next: usize::try_from(first).unwrap_or(usize::MAX), more, read, session: session.watch() }
     }
 

@@ -29,6 +29,9 @@ use crate::{
 /// A request draws at most so many postures on the way: each takes some kilobytes of the session's memory.
 const MAX_FRAMES_PER_REQUEST: u64 = 1000;
 
+/// So many reports are put together at once; of more, aside.
+const FEW_REPORTS: usize = 16;
+
 /// All sessions.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct SessionList {
@@ -237,5 +240,7 @@ pub(super) async fn step(
     let made = session.make_steps(count, expected_step, frames).await?;
     let step = made.last().map_or(session.step(), |report| report.step);
     let reports = if reports { made.into_iter().map(|report| report.json).collect() } else { Vec::new() };
-    json(MadeSteps { step, remaining: session.resource().remaining, reports }).await
+    let made = MadeSteps { step, remaining: session.remaining(), reports };
+    // Reports are written already, and few are soon put together.
+    if made.reports.len() <= FEW_REPORTS { Ok(Json(made).into_response()) } else { json(made).await }
 }

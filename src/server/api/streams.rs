@@ -225,6 +225,7 @@ async fn follow(
     }
     // What it is now, as if it had just changed.
     standing.mark_changed();
+    let live = parts.live().clone();
     let mut ping = tokio::time::interval_at(tokio::time::Instant::now() + KEEP_ALIVE, KEEP_ALIVE);
     loop {
         // Parts first: they are published before the reports of their steps.
@@ -235,7 +236,7 @@ async fn follow(
                 Some(batch) => send_parts(&mut socket, batch).await?,
                 None => break,
             },
-            batch = reports.next() => {
+            batch = async { live.caught_up().await; reports.next().await } => {
                 // Both may have come since the parts were asked for.
                 let published = parts.published();
                 while parts.next_index() < published {

@@ -80,6 +80,8 @@ pub(super) enum Command {
         learner: String,
         reply: Reply<Option<Vec<f64>>>,
     },
+    /// Somebody begins to follow the recording: brings it up to date.
+    Show,
     /// Completes the recording so far.
     Flush {
         reply: Reply<()>,
@@ -196,6 +198,8 @@ impl Engine<'_> {
                 let configuration = self.experiment.configuration(&learner).map_err(Problem::from);
                 drop(reply.send(configuration.map(|set| set.map(<[f64]>::to_vec))));
             }
+            // Whoever asks for the recording is told if it cannot be written.
+            Command::Show => drop(self.publish(&mut Batch::default(), recorder)),
             Command::Flush { reply } => drop(reply.send(self.flush(recorder))),
             Command::End { .. } | Command::Wake => {}
             #[cfg(test)]
@@ -252,7 +256,7 @@ impl Engine<'_> {
         if let Some(problem) = self.too_many(count, step).or_else(|| self.waits_for_a_person(count)) {
             return Err(problem.step(step));
         }
-        let mut batch = Batch { made: Vec::new(), published: 0, last: Instant::now() };
+        let mut batch = Batch::default();
         let mut outcome = Ok(());
         while outcome.is_ok() && (batch.made.len() as u64) < count {
             // A request that its client has given up, or a session that is to end, stops between two steps.
@@ -291,7 +295,9 @@ impl Engine<'_> {
     }
 
     fn publish(&self, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
-        let flushed = recorder.flush_shown().map_err(recording_failed);
+        // Steps that nobody watches are written in large chunks, with the next 256 of them or as soon as there is time.
+        let flushed = if self.shared.live.may_wait() { Ok(()) } else { recorder.flush_shown() };
+        let flushed = flushed.map_err(recording_failed);
         self.shared.note_recording(recorder.file_failure().map(str::to_owned));
         self.shared.publish(batch.made[batch.published..].to_vec(), self.experiment.remaining());
         (batch.published, batch.last) = (batch.made.len(), Instant::now());
@@ -342,6 +348,12 @@ struct Batch {
     made: Vec<Kept>,
     published: usize,
     last: Instant,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self { made: Vec::new(), published: 0, last: Instant::now() }
+    }
 }
 
 pub(super) fn recording_failed(error: impl std::fmt::Display) -> Problem {

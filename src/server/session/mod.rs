@@ -120,6 +120,21 @@ impl Session {
         &self.shared.live
     }
 
+    /// Brings the recording up to date for one who has begun to follow it: steps that nobody watched may wait.
+    pub(super) fn show(&self) {
+        // An engine of the other kind leaves nothing waiting, and one that has ended left nothing.
+        if let Engine::Steps(commands) = &self.engine
+            && self.live().is_behind()
+        {
+            drop(commands.send(Command::Show));
+        }
+    }
+
+    /// How many steps are left; `None` without an end.
+    pub(super) fn remaining(&self) -> Option<u64> {
+        Some(self.shared.remaining.load(Ordering::Relaxed)).filter(|left| *left != u64::MAX)
+    }
+
     /// Resolves when nothing more is coming.
     pub(super) fn ended(&self) -> &CancellationToken {
         &self.shared.ended
