@@ -16,6 +16,8 @@
 //! θ e₁, θ e₂,  e₃                                                        prismatic
 //! ```
 
+mod slopes;
+
 use fearless_simd::{ExtractToken, Simd, SimdBase, SimdFloat};
 use nalgebra::{Matrix3, Vector3};
 
@@ -24,6 +26,8 @@ use crate::{
     kinematics::{JointKind, chart},
     lanes::{Frame, GROUP, Lanes, Vector, sin_cos, splat, store},
 };
+
+pub use slopes::Posture;
 
 /// Points of one state, to be looked up at many postures.
 #[derive(Clone, Debug)]
@@ -187,29 +191,12 @@ impl Points {
     /// of each [group](GROUP) of candidates m × equations × GROUP numbers in `rows`, all zero at first.
     #[inline(always)]
     pub fn rows<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64], rows: &mut [f64]) {
-        self.pass(simd, candidates, readings, Some(rows));
-    }
-
-    /// The same without rows.
-    #[inline(always)]
-    pub fn readings<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64]) {
-        self.pass(simd, candidates, readings, None);
-    }
-
-    #[inline(always)]
-    fn pass<S: Simd, C: AsRef<[f64]>>(
-        &self,
-        simd: S,
-        candidates: &[C],
-        readings: &mut [f64],
-        mut rows: Option<&mut [f64]>,
-    ) {
         let mut turned: Vec<Turned<S>> = Vec::with_capacity(self.joints.len());
         let (d, width) = (self.equations(), Lanes::<S>::LEN);
         let of_group = self.dimension * d * GROUP;
         for (index, few) in candidates.chunks(width).enumerate() {
             let first = index * width;
-            let mut rows = rows.as_deref_mut().map(|rows| &mut rows[first / GROUP * of_group..][..of_group]);
+            let rows = &mut rows[first / GROUP * of_group..][..of_group];
             turned.clear();
             let mut places = self.places.iter().peekable();
             let mut frame = Frame::splat(simd, &self.first.0);
@@ -218,11 +205,9 @@ impl Points {
                 while let Some(place) = places.next_if(|place| place.link == link) {
                     let ((local, axes), fixed) = (&place.local, link == 0);
                     let x = if fixed { Vector::splat(simd, local) } else { pivot + frame.times(local) };
-                    if let Some(rows) = &mut rows {
-                        let axes = if fixed { Frame::splat(simd, axes) } else { frame.then(axes) };
-                        let first_row = 3 * place.index * GROUP + first % GROUP;
-                        self.put(place, (&x, &axes), &turned, first_row, rows);
-                    }
+                    let axes = if fixed { Frame::splat(simd, axes) } else { frame.then(axes) };
+                    let first_row = 3 * place.index * GROUP + first % GROUP;
+                    self.put(place, (&x, &axes), &turned, first_row, rows);
                     for (lane, reading) in readings[first * d..].chunks_mut(d).take(few.len()).enumerate() {
                         for (k, x) in x.0.iter().enumerate() {
                             reading[3 * place.index + k] = x[lane];
@@ -371,9 +356,6 @@ mod tests {
             for level in levels() {
                 let (mut rows, mut readings) = (vec![0.0; groups(count) * m * d * GROUP], vec![0.0; d * count]);
                 dispatch!(level, simd => points.rows(simd, &candidates, &mut readings, &mut rows));
-                let mut alone = vec![0.0; d * count];
-                dispatch!(level, simd => points.readings(simd, &candidates, &mut alone));
-                prop_assert_eq!(&alone, &readings, "without rows");
                 let mut pass = Pass::new(&state, &layout);
                 for (index, candidate) in candidates.iter().enumerate() {
                     pass.at(candidate);

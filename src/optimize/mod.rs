@@ -103,7 +103,7 @@ mod polish;
 pub use bayesian::bayesian;
 pub use minimum::Minimum;
 pub(crate) use minimum::least;
-pub use polish::{Polish, polish};
+pub use polish::{Polish, polish, polish_along};
 
 pub use direct::{
     Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Moment, Partition, Plane, Projection, Rectangle,
