@@ -72,6 +72,7 @@ pub mod experiment;
 pub mod export;
 pub mod kinematics;
 mod lanes;
+pub mod magnitude;
 pub mod model;
 pub mod optimize;
 #[cfg(feature = "app")]
@@ -85,6 +86,7 @@ pub mod sensing;
 pub mod server;
 mod similar;
 pub mod table;
+mod whole;
 
 /// The code in the README, compiled and run.
 #[cfg(doctest)]

@@ -243,7 +243,7 @@ fn bad_input_exits_with_two_and_says_what_to_do() {
     let measured = folder.path().join("measured.toml");
     std::fs::write(&measured, include_str!("../scenarios/tiago-mocap.toml")).expect("written");
     let (binary, measured) = (binary.to_str().expect("a plain path"), measured.to_str().expect("a plain path"));
-    let cases: [(&[&str], &[&str]); 18] = [
+    let cases: [(&[&str], &[&str]); 20] = [
         (&["check", file], &["bad.toml:", "`sensor.sigma`", "`sigma_m`"]),
         (&["run", "arm-6dofx"], &["did you mean `arm-6dof`"]),
         (&["run", "no/such.toml"], &["no/such.toml"]),
@@ -256,6 +256,11 @@ fn bad_input_exits_with_two_and_says_what_to_do() {
         (&["run", "tiago-mocap", "--steps", "28"], &["27 movements", "--steps 27"]),
         (&["compare", "arm-6dof", "--seeds", "9..3"], &["3..9"]),
         (&["compare", "arm-6dof", "--seeds", "0"], &["at least one seed"]),
+        (&["compare", "arm-6dof", "--threads", "100000"], &["--threads", "512"]),
+        (
+            &["sweep", "arm-6dof", "--learner", "active", "--set", "filter.x=1", "--threads", "0"],
+            &["--threads", "1..=512"],
+        ),
         (&["sweep", "arm-6dof", "--set", "filter.x=1"], &["--learner"]),
         (&["serve", "--frame-ancestors", "example.org"], &["`example.org`", "https://example.org"]),
         (&["serve", "--allow-host", "http://lab"], &["`http://lab` is no host name", "lab.example.org"]),
@@ -271,6 +276,14 @@ fn bad_input_exits_with_two_and_says_what_to_do() {
         }
         assert!(!message.contains("panicked"), "{message}");
     }
+}
+
+#[test]
+fn the_version_names_the_commit_and_rerun() {
+    let said = body_schema(&["--version"]);
+    let said = String::from_utf8(said.stdout).expect("text");
+    assert!(said.starts_with(concat!("body-schema ", env!("CARGO_PKG_VERSION"), " (")), "{said}");
+    assert!(said.contains("Rerun 0."), "{said}");
 }
 
 #[test]

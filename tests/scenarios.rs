@@ -102,9 +102,25 @@ fn numbers_that_are_no_numbers_or_out_of_range_are_refused() {
         ("every = 1 ", "every = 0 ", "filter.stabilising_noise.every"),
         ("steps = 1000", "steps = 0", "steps"),
         ("direction_rad = 0.6", "direction_rad = 0.0", "prior.direction_rad"),
+        // What overflows or vanishes where it is squared.
+        ("direction_rad = 0.6", "direction_rad = 1e-160", "prior.direction_rad"),
+        ("sigma_m = 0.01", "sigma_m = 1e-160", "sensor.sigma_m"),
+        ("sigma_m = 0.01", "sigma_m = 1e160", "sensor.sigma_m"),
+        ("limits_deg = [-90.0, 60.0]", "limits_deg = [-1e308, 1e308]", "robot.joint[1].limits_deg"),
+        ("point_m = [0.291, 0.0, 0.0]", "point_m = [0.291, 1e308, 0.0]", "robot.joint[3].point_m"),
     ] {
         let (problem, line) = one(ARM, from, to);
         assert_eq!((problem.key.as_str(), problem.line), (key, line), "{problem}");
+    }
+}
+
+#[test]
+fn a_body_does_not_change_beyond_all_measure() {
+    for (from, to, key) in [
+        ("by_m = [0.0, 0.0, 0.05]", "by_m = [0.0, 0.0, 1e308]", "change.shift.by_m"),
+        ("angle_deg = 10.0", "angle_deg = 1e308", "change.tilt.angle_deg"),
+    ] {
+        assert_eq!(one(include_str!("../scenarios/body-change.toml"), from, to).0.key, key);
     }
 }
 

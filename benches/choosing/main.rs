@@ -14,6 +14,9 @@
 //! | product | P (m × m) times m × 96 for every 32 candidates: the floor of any method that multiplies by P |
 //! | NLopt | `GN_DIRECT_L` with the same budget and the posterior's trace by the textbook's formula, with our Jacobian |
 //!
+//! SciPy's `direct` takes its turn in a script, `benches/choosing/scipy_direct.py`; `-- --write FILE` writes it the problems, `-- --once`
+//! prints what each costs us.
+//!
 //! P is that of the scenario's prior after ten random movements, hence dense. Below the tables stands how the cost of one evaluation
 //! grows with joints and with the budget.
 //!
@@ -34,8 +37,11 @@ use nalgebra::{DMatrix, Matrix3, MatrixXx3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+mod problem;
 #[cfg(feature = "nlopt")]
 mod textbook;
+
+const CASES: [&str; 3] = ["arm-6dof", "arm-12dof", "arm-20dof"];
 
 const SETTINGS: Settings = Settings { variant: Variant::LocallyBiased, epsilon: 1e-4, max_evaluations: 600 };
 const ROUNDS: usize = 41;
@@ -179,9 +185,26 @@ fn growth(title: &str, mut contestants: Vec<Contestant<'_>>, evaluations: impl F
     }
 }
 
+/// What one choice of each case takes, µs, and the least value it finds: medians, without a table.
+fn once() {
+    for name in CASES {
+        let case = Case::new(&builtin(name).expect("built in"));
+        let times = race(&mut [("choosing", Box::new(|| case.choose(SETTINGS.max_evaluations)))]);
+        println!("{name} {:.2} {:e}", spread(times[0].iter().copied())[0], case.choose(SETTINGS.max_evaluations));
+    }
+}
+
 fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    if let Some(option) = arguments.iter().position(|argument| argument == "--write") {
+        let file = arguments.get(option + 1).expect("--write FILE");
+        return problem::write(file);
+    }
+    if arguments.iter().any(|argument| argument == "--once") {
+        return once();
+    }
     println!("microseconds for 600 evaluations, and as a multiple of choosing: median (quartiles) of {ROUNDS} rounds");
-    for name in ["arm-6dof", "arm-12dof", "arm-20dof"] {
+    for name in CASES {
         let case = Case::new(&builtin(name).expect("built in"));
         let m = case.covariance().nrows();
         println!("\n{name}, m = {m}");

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::Fault;
 use crate::{
+    magnitude::is_usable,
     scenario::{Robot, SocketSpec},
     sensing::{Channel, Occasion, Rig},
 };
@@ -92,7 +93,7 @@ impl Shape {
         let refuse = |mend: &str| Err(Fault::new(field, format!("{} is no reading of it", shown(told)), mend));
         match self {
             Self::Position => numbers(told, 3).map_or_else(|| refuse("write [x, y, z] in metres"), Ok),
-            Self::Distance => match told.as_f64().filter(|x| x.is_finite()) {
+            Self::Distance => match told.as_f64().filter(|x| is_usable(*x)) {
                 Some(x) if x >= 0.0 => Ok(vec![x]),
                 _ => refuse("write a length in metres"),
             },
@@ -139,10 +140,10 @@ impl Shape {
     }
 }
 
-/// A list of so many finite numbers.
+/// A list of so many numbers that can be a reading.
 fn numbers(told: &Value, count: usize) -> Option<Vec<f64>> {
     let list = told.as_array().filter(|list| list.len() == count)?;
-    list.iter().map(|x| x.as_f64().filter(|x| x.is_finite())).collect()
+    list.iter().map(|x| x.as_f64().filter(|x| is_usable(*x))).collect()
 }
 
 /// A value in an error.

@@ -9,6 +9,7 @@ use super::{ChannelShape, Fault, Shape, channel::SOCKET};
 use crate::{
     experiment::Executed,
     kinematics::JointKind,
+    magnitude::is_usable,
     scenario::{Described, Scenario},
     selection::Movement,
     sensing::{Observation as Readings, Occasion},
@@ -103,9 +104,11 @@ impl Observation {
             let field = || format!("configuration.{name}");
             let position = self.configuration.get(name);
             let position = position.ok_or_else(|| Fault::new(field(), "missing", "tell where every joint was"))?;
-            match position.is_finite() {
+            match is_usable(*position) {
                 true => Ok(*position),
-                false => Err(Fault::new(field(), "it is no finite number", "write a number, in rad or m")),
+                false => {
+                    Err(Fault::new(field(), "it is no number that a joint can have", "write a number, in rad or m"))
+                }
             }
         };
         names.iter().map(of).collect()

@@ -36,7 +36,7 @@ pub struct Setup {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub agent: Option<String>,
     /// Of all that is drawn.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "crate::whole::whole")]
     pub seed: u64,
 }
 

@@ -99,6 +99,7 @@ impl From<Outcome> for SuggestionState {
 #[serde(default, deny_unknown_fields)]
 pub struct Ask {
     /// How many pending suggestions the client wants to have, 1 unless told otherwise.
+    #[serde(deserialize_with = "crate::whole::whole_or_none")]
     pub count: Option<u64>,
     /// Who asks.
     pub client: Option<String>,

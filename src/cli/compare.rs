@@ -16,7 +16,7 @@ use comfy_table::Table;
 use rayon::prelude::*;
 
 use super::{
-    ScenarioArguments, Seeds, designs, output,
+    ScenarioArguments, Seeds, Threads, designs, output,
     part::{self, About, Shard},
     progress, steps_of,
 };
@@ -40,9 +40,8 @@ pub struct Arguments {
     /// Where the part is written
     #[arg(long, value_name = "FILE", requires = "shard")]
     part: Option<PathBuf>,
-    /// Run on so many threads [default: one per core]; the outcome does not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<std::num::NonZeroUsize>,
+    #[command(flatten)]
+    threads: Threads,
     /// Set the best possible designs of 5, 10, 20, … movements beside the learners: what nobody can beat with as many.
     /// It takes a second for 6 joints, half a minute for 12, minutes for 20
     #[arg(long)]
@@ -74,7 +73,7 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
         arguments.seeds.count() * steps,
         &format!("{} × {} seeds", scenario.name, arguments.seeds.count()),
     );
-    let comparison = super::on_threads(arguments.threads, || {
+    let comparison = arguments.threads.run(|| {
         let comparison = over_seeds(&scenario, learners, &arguments.seeds, steps, &|| bar.inc(1))?;
         Ok(if arguments.limits {
             comparison.beside(best_designs(&scenario.design_stretches(steps)))
@@ -126,7 +125,7 @@ fn one_part(
     let writer = Mutex::new(part::Writer::begin(path, &about)?);
     let bar = progress::bar(seeds.len() as u64 * steps, &format!("{} × {} seeds", scenario.name, seeds.len()));
     let count = seeds.len();
-    super::on_threads(arguments.threads, || {
+    arguments.threads.run(|| {
         seeds.into_par_iter().try_for_each(|seed| {
             let trace =
                 Trace::run(scenario.experiment(seed, learners)?, steps, || bar.inc(1)).map_err(ScenarioError::from)?;

@@ -19,11 +19,14 @@ mod serve;
 mod sweep;
 mod until;
 
+use std::sync::LazyLock;
+
 use anyhow::{Context, Result};
 use body_schema::{
     calibration::CalibrationError,
     export::ExportError,
     paper::PaperError,
+    recording::rerun_version,
     scenario::{LearnerSpec, PolicyKind, Scenario, ScenarioError},
 };
 use clap::{Parser, Subcommand};
@@ -31,11 +34,18 @@ use clap::{Parser, Subcommand};
 use input::load_scenario;
 use seeds::Seeds;
 
+/// The version with the commit that it was built from, where that is known, and the version of Rerun whose recordings it writes.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let commit = git_version::git_version!(args = ["--always", "--abbrev=9", "--exclude=*"], fallback = "");
+    let commit = if commit.is_empty() { String::new() } else { format!("commit {commit}, ") };
+    format!("{} ({commit}Rerun {})", env!("CARGO_PKG_VERSION"), rerun_version())
+});
+
 /// Learn a robot's kinematic body schema from a few well-chosen movements, and watch it happen.
 ///
 /// Without a command: `serve`.
 #[derive(Debug, Parser)]
-#[command(version, about, max_term_width = 100, subcommand_negates_reqs = true)]
+#[command(version = VERSION.as_str(), about, max_term_width = 100, subcommand_negates_reqs = true)]
 pub struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
@@ -123,15 +133,25 @@ pub fn run(arguments: Arguments) -> Result<()> {
     }
 }
 
-/// Runs `work` on so many threads, or on the common pool.
-fn on_threads<T: Send>(threads: Option<std::num::NonZeroUsize>, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
-    match threads {
-        None => work(),
-        Some(count) => rayon::ThreadPoolBuilder::new()
-            .num_threads(count.get())
-            .build()
-            .with_context(|| format!("cannot start {count} threads"))?
-            .install(work),
+/// On how many threads work is done.
+#[derive(Debug, clap::Args)]
+struct Threads {
+    /// Run on so many threads, 512 at most [default: one per core]; only times depend on it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=512))]
+    threads: Option<u16>,
+}
+
+impl Threads {
+    /// Runs `work` on them, or on the common pool.
+    fn run<T: Send>(&self, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+        match self.threads {
+            None => work(),
+            Some(count) => rayon::ThreadPoolBuilder::new()
+                .num_threads(count.into())
+                .build()
+                .with_context(|| format!("cannot start {count} threads"))?
+                .install(work),
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use anyhow::Result;
 use body_schema::paper::{self, Agreement, EXPERIMENTS, Ending, PaperExperiment, Plan, Progress};
 use indicatif::ProgressBar;
 
-use super::{output, progress};
+use super::{Threads, output, progress};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -23,9 +23,8 @@ pub struct Arguments {
     /// Write the table as JSON to FILE as well, or to standard output for `-`
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Run on so many threads [default: one per core]; only times depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<std::num::NonZeroUsize>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// One bar per experiment.
@@ -63,7 +62,7 @@ pub fn paper(arguments: &Arguments) -> Result<()> {
         only: arguments.only.clone(),
         out: arguments.out.clone().unwrap_or_else(|| paper::default_folder(arguments.quick)),
     };
-    let report = super::on_threads(arguments.threads, || Ok(paper::run(&plan, &Bars(Mutex::new(None)))?))?;
+    let report = arguments.threads.run(|| Ok(paper::run(&plan, &Bars(Mutex::new(None)))?))?;
     if let Some(path) = &arguments.json {
         output::write_json(path, &report)?;
     }

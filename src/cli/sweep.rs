@@ -12,7 +12,7 @@ use body_schema::{
 use serde::Serialize;
 use toml::Value;
 
-use super::{BadInput, ScenarioArguments, Seeds, compare::over_seeds, output, progress, steps_of};
+use super::{BadInput, ScenarioArguments, Seeds, Threads, compare::over_seeds, output, progress, steps_of};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -30,9 +30,8 @@ pub struct Arguments {
     /// Write the ranking as JSON to FILE, or to standard output for `-`
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Run on so many threads [default: one per core]; the outcome does not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<std::num::NonZeroUsize>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// One axis of the grid.
@@ -90,9 +89,8 @@ pub fn sweep(arguments: &Arguments) -> Result<()> {
     let mut trials = Vec::new();
     for values in grid {
         let scenario = with_values(&base, &values)?;
-        let comparison = super::on_threads(arguments.threads, || {
-            over_seeds(&scenario, learners, &arguments.seeds, steps, &|| bar.inc(1))
-        })?;
+        let comparison =
+            arguments.threads.run(|| over_seeds(&scenario, learners, &arguments.seeds, steps, &|| bar.inc(1)))?;
         let Some(outcome) = comparison.learners.into_iter().next() else { continue };
         let end = outcome.curve.last();
         trials.push(Trial {

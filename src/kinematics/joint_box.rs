@@ -2,6 +2,8 @@
 
 use rand::{Rng, RngExt};
 
+use crate::magnitude::is_usable;
+
 /// The limits of every joint, and the map between them and the unit cube [0, 1]ⁿ:
 ///
 /// ```text
@@ -48,10 +50,9 @@ impl JointBox {
     ///
     /// # Errors
     ///
-    /// [`JointBoxError`] if limits are not finite, are so far apart that their difference is not, or are in the wrong
-    /// order.
+    /// [`JointBoxError`] if limits are not finite, beyond [`GREATEST`](crate::magnitude::GREATEST), or in the wrong order.
     pub fn new(joints: Vec<(f64, f64)>) -> Result<Self, JointBoxError> {
-        let is_range = |(lower, upper): (f64, f64)| lower <= upper && (upper - lower).is_finite();
+        let is_range = |(lower, upper): (f64, f64)| lower <= upper && is_usable(lower) && is_usable(upper);
         match joints.iter().position(|&limits| !is_range(limits)) {
             Some(joint) => Err(JointBoxError { joint, lower: joints[joint].0, upper: joints[joint].1 }),
             None => Ok(Self { joints }),

@@ -111,6 +111,11 @@ pub use self::{
     target::Target,
 };
 
+/// The version of Rerun whose recordings are written, and whose viewer opens them.
+pub fn rerun_version() -> String {
+    re_log_encoding::CrateVersion::LOCAL.to_string()
+}
+
 /// The timeline of a recording: the step of the experiment, counted from 0.
 pub const TIMELINE: &str = "step";
 

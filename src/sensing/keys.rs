@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Point3};
 use serde::{Deserialize, Serialize};
 
 use super::Facing;
+use crate::magnitude::{are_usable, is_not_negative};
 
 /// The keys of a sensor. A channel takes those that it knows and refuses the others.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -92,7 +93,7 @@ impl Keys {
 
     pub(super) fn to_m(&self) -> Result<Point3<f64>, KeyError> {
         let given = self.to_m.as_deref().unwrap_or_default();
-        let is_point = given.len() == 3 && given.iter().all(|x| x.is_finite());
+        let is_point = given.len() == 3 && are_usable(given);
         let what = self.to_m.as_ref().map_or("missing".to_owned(), |given| format!("{given:?} is no point"));
         let mend = "write `to_m = [x, y, z]`, in metres, in the frame of the measurements";
         is_point.then(|| Point3::from_slice(given)).ok_or_else(|| KeyError::new("to_m", what, mend))
@@ -107,7 +108,7 @@ impl Keys {
             return Err(KeyError::new("covariance_m2", "it is not 3 × 3", mend));
         }
         let matrix = Matrix3::from_fn(|row, column| given[row][column]);
-        let is_symmetric = (matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
+        let is_symmetric = are_usable(&matrix) && (matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
         if is_symmetric { Ok(Some(matrix)) } else { Err(KeyError::new("covariance_m2", "it is not symmetric", mend)) }
     }
 
@@ -141,7 +142,7 @@ impl Keys {
 
 fn sigma(key: &str, given: Option<f64>, unit: &str) -> Result<f64, KeyError> {
     let sigma = given.ok_or_else(|| KeyError::new(key, "missing", format!("add `{key} = …`, in {unit}")))?;
-    let holds = sigma.is_finite() && sigma >= 0.0;
+    let holds = is_not_negative(sigma);
     let error = || KeyError::new(key, format!("{sigma} is out of range"), "write a number that is 0 or more");
     holds.then_some(sigma).ok_or_else(error)
 }

@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 
 use super::Rig;
+use crate::magnitude::is_usable;
 
 /// The readings of one movement, one entry per channel of its [`Rig`]; `None` where the channel had none.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +24,7 @@ pub enum Refused {
         wanted: usize,
     },
     /// A joint position that is no finite number.
-    #[error("the position of joint {joint} (counted from 0) is {value}, not a finite number")]
+    #[error("the position of joint {joint} (counted from 0) is {value}, not a number from -1e12 to 1e12")]
     Position {
         /// The joint.
         joint: usize,
@@ -52,7 +53,7 @@ pub enum Refused {
     #[error("the readings are farther from what is expected than numbers reach")]
     Absurd,
     /// A reading that is no finite number.
-    #[error("the reading of channel {channel} (counted from 0) is {value}, not a finite number")]
+    #[error("the reading of channel {channel} (counted from 0) is {value}, not a number from -1e12 to 1e12")]
     Reading {
         /// The channel.
         channel: usize,
@@ -108,7 +109,7 @@ impl Observation {
         if positions.len() != joints {
             return Err(Refused::Joints { found: positions.len(), wanted: joints });
         }
-        if let Some((joint, value)) = positions.iter().enumerate().find(|(_, value)| !value.is_finite()) {
+        if let Some((joint, value)) = positions.iter().enumerate().find(|(_, value)| !is_usable(**value)) {
             return Err(Refused::Position { joint, value: *value });
         }
         let wanted = rig.channels().len();
@@ -120,7 +121,7 @@ impl Observation {
             if reading.len() != sensor.equations() {
                 return Err(Refused::Length { channel, found: reading.len(), wanted: sensor.equations() });
             }
-            if let Some(value) = reading.iter().find(|value| !value.is_finite()) {
+            if let Some(value) = reading.iter().find(|value| !is_usable(**value)) {
                 return Err(Refused::Reading { channel, value: *value });
             }
         }

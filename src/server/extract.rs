@@ -13,7 +13,7 @@ use super::{
     problem::{Kind, Problem},
 };
 
-/// A JSON body. An absent body counts as `{}`, so that defaults need no body.
+/// A JSON body. An absent one, and `null`, count as `{}`, so that defaults need no body.
 pub(super) struct JsonBody<T>(pub(super) T);
 
 /// What is read from a body. Whatever serde reads is read by [`parse`].
@@ -48,7 +48,8 @@ impl<S: Send + Sync, T: FromJson> FromRequest<S> for JsonBody<T> {
             let detail = "send the body as JSON, with the header `Content-Type: application/json`";
             return Err(Problem::new(Kind::UnsupportedMediaType, detail).field("Content-Type"));
         }
-        T::from_json(if bytes.is_empty() { b"{}" } else { &bytes }).map(Self)
+        let is_nothing = bytes.is_empty() || bytes.trim_ascii() == b"null";
+        T::from_json(if is_nothing { b"{}" } else { &bytes }).map(Self)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::{TableError, error::AS_TEXT};
-use crate::similar::similar;
+use crate::{magnitude::is_usable, similar::similar};
 
 /// What a column's numbers measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -135,7 +135,7 @@ impl Titles {
 /// A finite number. A comma in it is refused: it may separate decimals or thousands.
 pub(super) fn number(text: &str, place: &dyn Fn() -> String) -> Result<f64, TableError> {
     match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
+        Ok(value) if is_usable(value) => Ok(value),
         _ if text.is_empty() => {
             Err(TableError::new(format!("{} is empty", place()), "write a number, or remove the line"))
         }

@@ -17,6 +17,8 @@ async fn bodies() {
         (sessions, json!({ "scenario": "arm-7dof" }), 422, Some("scenario")),
         (sessions, json!({ "scenario": "arm-6dof", "seed": "one" }), 422, Some("seed")),
         (sessions, json!({ "scenario": "arm-6dof", "seed": -1 }), 422, Some("seed")),
+        (sessions, json!({ "scenario": "arm-6dof", "seed": 1_u64 << 63 }), 422, Some("seed")),
+        (sessions, Value::Null, 422, Some("scenario")),
         (sessions, json!({ "scenario": "arm-6dof", "learners": ["activ"] }), 422, Some("learners")),
         (sessions, json!({ "scenario": "arm-6dof", "learners": [] }), 422, Some("learners")),
         (sessions, json!({ "scenario": "arm-6dof", "learners": ["random", "random"] }), 422, Some("learners")),
@@ -51,6 +53,10 @@ async fn bodies() {
     let none = server.request(Method::POST, &steps).send().await.expect("an answer");
     assert_eq!(none.status(), StatusCode::OK, "no body is one step");
     assert_eq!(none.json::<Value>().await.expect("JSON")["step"], 1);
+    let null = server.post(&steps, Value::Null).await;
+    assert_eq!(null.json::<Value>().await.expect("JSON")["step"], 2, "null is one step too");
+    let whole = server.post(&steps, json!({ "count": 2.0, "expected_step": 2.0, "frames": 0.0 })).await;
+    assert_eq!(whole.json::<Value>().await.expect("JSON")["step"], 4, "to JSON Schema 2.0 is whole");
     server.stop().await;
 }
 

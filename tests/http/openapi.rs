@@ -63,6 +63,9 @@ async fn the_document_lists_every_route() {
         let operation = &document["paths"][path][method];
         assert!(operation["summary"].is_string() && operation["operationId"].is_string(), "{method} {path}");
         ids.push(operation["operationId"].as_str().expect("an id"));
+        for status in ["400", "401", "403"] {
+            assert!(operation["responses"][status].is_object(), "{method} {path} {status}");
+        }
         for (status, response) in operation["responses"].as_object().expect("responses") {
             assert!(response["description"].is_string());
             if status.starts_with(['4', '5']) {
@@ -71,6 +74,9 @@ async fn the_document_lists_every_route() {
             }
         }
     }
+    let events =
+        &document["paths"]["/v1/sessions/{id}/events"]["get"]["responses"]["200"]["content"]["text/event-stream"];
+    assert!(events["schema"].is_null() && events["x-itemSchema"]["properties"]["data"].is_object(), "{events}");
     ids.sort_unstable();
     ids.dedup();
     assert_eq!(ids.len(), ROUTES.len(), "every operation has an id of its own");

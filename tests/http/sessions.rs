@@ -131,3 +131,23 @@ async fn sessions_do_not_mix_and_requests_queue() {
     }
     server.stop().await;
 }
+
+#[tokio::test]
+async fn a_recording_does_not_wait_for_the_steps_to_come() {
+    let server = Server::start().await;
+    let session = server.open(json!({ "scenario": "arm-12dof", "learners": ["global"] })).await;
+    let path = format!("{session}/steps");
+    let stepping = server.post(&path, json!({ "count": 1000, "reports": false }));
+    let taking = async {
+        while server.get_json(&session).await["step"] == 0 {
+            tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+        }
+        let recording = server.get(&format!("{session}/recording.rrd")).await.bytes().await.expect("a recording");
+        let made = crate::streams::steps_of_recording(&recording).len();
+        assert!((2..1001).contains(&made), "{made} steps");
+        server.delete(&session).await;
+    };
+    let (stepped, ()) = tokio::join!(stepping, taking);
+    problem(stepped, 503, None).await;
+    server.stop().await;
+}

@@ -117,7 +117,7 @@ pub const STORIES: [Story; 6] = [
         title: "Ten movements are enough",
         teaser: "Three learners, one arm: who asks needs fewer movements",
         scenario: "arm-6dof",
-        seed: 1,
+        seed: 3,
         learners: &[],
         step: 1,
         cards: &[

@@ -116,14 +116,15 @@ fn a_run_stops_when_all_that_judge_themselves_have_settled_and_plays_on() {
 
 #[test]
 fn convergence_and_divergence_are_shown() {
-    let mut page = Page::open("learners=active,random,gradient&speed=100&to=80&stop=never");
+    let mut page = Page::open("learners=global,random,gradient&speed=100&to=80&stop=never");
     // A gradient whose steps are far too large.
     page.server.edit("gradient.rate", 1e6);
     page.begin();
     page.press(Key::Space);
     page.make_steps(80);
     let result = page.server.experiment().result();
-    let converged = result.learners[0].converged_at.expect("the active learner converges within 80 movements");
+    let global = result.learners.iter().find(|learner| learner.name == "global").expect("chosen");
+    let converged = global.converged_at.expect("it converges within 80 movements");
     assert!(page.has(&format!("learned in {converged}")) && page.has("ran away"));
     // Going back undoes the verdict: it is that of the step that is shown.
     page.tell(json!({ "is": "scrubbed", "step": converged + 7 }));

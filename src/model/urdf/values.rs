@@ -5,7 +5,7 @@ use std::ops::Range;
 use roxmltree::{Attribute, Node};
 
 use super::UrdfError;
-use crate::similar::similar;
+use crate::{magnitude::is_usable, similar::similar};
 
 /// How xacro files are turned into what can be read here.
 pub const EXPAND: &str = "expand it first: `xacro robot.urdf.xacro > robot.urdf` (part of ROS; without it, `pip install \
@@ -61,7 +61,7 @@ pub fn numbers<const N: usize>(node: Node, attribute: &Attribute) -> Result<[f64
     let mut numbers = Vec::with_capacity(N);
     for word in value.split_ascii_whitespace() {
         match word.parse::<f64>() {
-            Ok(number) if number.is_finite() => numbers.push(number),
+            Ok(number) if is_usable(number) => numbers.push(number),
             _ => {
                 let mend = "write numbers such as 0.03, with spaces between them".to_owned();
                 return Err(wrong(format!("`{word}` in `{name}` is not a finite number"), mend));

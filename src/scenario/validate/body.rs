@@ -8,6 +8,7 @@ use toml::Spanned;
 use super::{Check, described::Links, equipment::Outfit, raw};
 use crate::{
     kinematics::{Joint, JointBox, JointKind, Line},
+    magnitude::are_usable,
     model::{Block, Correction, Layout, Load, Loads, State},
     scenario::Robot,
     sensing::TargetKind,
@@ -171,11 +172,11 @@ impl Check<'_> {
             self.problem(span, key("eccentricity"), what, "remove it");
         } else if let Some(given) = &raw.eccentricity_deg {
             let [sine, cosine] = given.get_ref().0;
-            if !(sine.is_finite() && cosine.is_finite()) {
+            if !are_usable(&[sine, cosine]) {
                 self.problem(
                     given.span(),
                     key("eccentricity_deg"),
-                    "it is not finite",
+                    "it is out of range",
                     "write `[sine, cosine]`, in degrees",
                 );
             }
@@ -220,8 +221,8 @@ impl Check<'_> {
             return None;
         };
         let raw::Exactly([lower, upper]) = *given.get_ref();
-        if !(lower.is_finite() && upper.is_finite()) {
-            self.problem(given.span(), key(wanted), "a limit is not finite", format!("write two numbers, in {unit}"));
+        if !are_usable(&[lower, upper]) {
+            self.problem(given.span(), key(wanted), "a limit is out of range", format!("write two numbers, in {unit}"));
             return None;
         }
         if lower >= upper {

@@ -5,6 +5,7 @@ use toml::Spanned;
 
 use super::{Check, described::Links, raw};
 use crate::{
+    magnitude::{are_usable, is_positive},
     model::{Block, Device, Hand, Place, State, Target},
     scenario::Known,
     sensing::{CameraKind, Equipment, Facing, TargetKind},
@@ -66,7 +67,7 @@ impl Check<'_> {
             |points| points.get_ref().iter().map(|raw::Exactly(point)| Point3::from(*point)).collect(),
         );
         if let Some(given) = &raw.points_m
-            && (points.is_empty() || points.iter().any(|point| !point.coords.iter().all(|x| x.is_finite())))
+            && (points.is_empty() || points.iter().any(|point| !are_usable(&point.coords)))
         {
             let mend = "write at least one point, three finite numbers each, in metres";
             self.problem(given.span(), field("points_m"), "these are no points", mend);
@@ -125,7 +126,7 @@ impl Check<'_> {
         };
         let mut pair = |name: &str, value: &Spanned<raw::Exactly<f64, 2>>| {
             let raw::Exactly(pair) = *value.get_ref();
-            if !pair.iter().all(|x| x.is_finite() && *x > 0.0) {
+            if !pair.iter().all(|x| is_positive(*x)) {
                 self.problem(
                     value.span(),
                     field(name),
@@ -201,8 +202,8 @@ impl Check<'_> {
 
     fn rotation(&mut self, key: &str, value: &Spanned<raw::Exactly<f64, 3>>) -> UnitQuaternion<f64> {
         let raw::Exactly(angles) = *value.get_ref();
-        if !angles.iter().all(|x| x.is_finite()) {
-            self.problem(value.span(), key, "an angle is not finite", "write roll, pitch and yaw, in degrees");
+        if !are_usable(&angles) {
+            self.problem(value.span(), key, "an angle is out of range", "write roll, pitch and yaw, in degrees");
             return UnitQuaternion::identity();
         }
         let [roll, pitch, yaw] = angles.map(f64::to_radians);

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::{Check, raw};
 use crate::{
     kinematics::{Joint, JointKind},
+    magnitude::are_usable,
     scenario::{Gravity, error::similar},
 };
 
@@ -45,9 +46,9 @@ impl Check<'_> {
         }
         let Some(given) = given else { return [0.0; 2] };
         let raw::Exactly(numbers) = *given.get_ref();
-        if !numbers.iter().all(|number| number.is_finite()) {
+        if !are_usable(&numbers) {
             let mend = "write `[target, elbow]`, in degrees per N·m of 1 kg there";
-            self.problem(given.span(), key("compliance_deg_per_nm"), "it is not finite", mend);
+            self.problem(given.span(), key("compliance_deg_per_nm"), "it is out of range", mend);
         }
         numbers.map(f64::to_radians)
     }

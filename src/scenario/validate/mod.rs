@@ -32,6 +32,7 @@ use crate::{
     estimation::{HypothesisSettings, StabilisingNoise},
     experiment::Thresholds,
     kinematics::JointKind,
+    magnitude::{are_usable, is_not_negative, is_positive, is_usable},
     model::Block,
     optimize::{Settings, Variant},
     selection::{CriterionUnits, Planning},
@@ -120,18 +121,18 @@ impl Check<'_> {
     /// A number that satisfies `holds`; NaN satisfies nothing.
     fn number(&mut self, key: &str, value: &Spanned<f64>, holds: impl Fn(f64) -> bool, mend: &str) -> f64 {
         let number = *value.get_ref();
-        if !number.is_finite() || !holds(number) {
+        if !is_usable(number) || !holds(number) {
             self.problem(value.span(), key, format!("{number} is out of range"), format!("write {mend}"));
         }
         number
     }
 
     fn positive(&mut self, key: &str, value: &Spanned<f64>) -> f64 {
-        self.number(key, value, |number| number > 0.0, "a number above 0")
+        self.number(key, value, is_positive, "a number above 0, from 1e-18 to 1e12")
     }
 
     fn not_negative(&mut self, key: &str, value: &Spanned<f64>) -> f64 {
-        self.number(key, value, |number| number >= 0.0, "a number that is 0 or more")
+        self.number(key, value, is_not_negative, "a number that is 0 or more")
     }
 
     fn at_least_one(&mut self, key: &str, value: &Spanned<u64>) -> u64 {
@@ -143,8 +144,8 @@ impl Check<'_> {
 
     fn point(&mut self, key: &str, value: &Spanned<raw::Exactly<f64, 3>>) -> Point3<f64> {
         let raw::Exactly(coordinates) = *value.get_ref();
-        if !coordinates.iter().all(|x| x.is_finite()) {
-            self.problem(value.span(), key, "a coordinate is not finite", "write three finite numbers, in metres");
+        if !are_usable(&coordinates) {
+            self.problem(value.span(), key, "a coordinate is out of range", "write three finite numbers, in metres");
         }
         Point3::from(coordinates)
     }

@@ -22,7 +22,11 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use serde::Serialize;
-use utoipa::{OpenApi, ToSchema, openapi::RefOr};
+use serde_json::json;
+use utoipa::{
+    OpenApi, ToSchema,
+    openapi::{RefOr, extensions::ExtensionsBuilder},
+};
 use utoipa_axum::{
     router::{OpenApiRouter, UtoipaMethodRouterExt},
     routes,
@@ -39,6 +43,7 @@ use super::{
 use crate::experiment::StepReport;
 
 const JSON: &str = "application/json";
+const EVENT_STREAM: &str = "text/event-stream";
 
 /// Whether the server works.
 #[derive(Clone, Debug, Serialize, ToSchema)]
@@ -114,24 +119,40 @@ pub(super) fn routes() -> (Router<Arc<App>>, Bytes) {
         .routes(routes!(openapi))
         .routes(routes!(health))
         .split_for_parts();
-    describe_problems(&mut document);
+    describe_what_holds_for_all(&mut document);
+    describe_events(&mut document);
     // The document consists of strings, so that it can always be written.
     (router, document.to_pretty_json().unwrap_or_default().into())
 }
 
-/// Says once for all routes that problems have their own media type.
-fn describe_problems(document: &mut utoipa::openapi::OpenApi) {
+/// Says once for all routes what any of them may refuse, and that problems have their own media type.
+fn describe_what_holds_for_all(document: &mut utoipa::openapi::OpenApi) {
     for item in document.paths.paths.values_mut() {
-        let operations = [&mut item.get, &mut item.post, &mut item.put, &mut item.delete].into_iter().flatten();
-        let responses = operations.flat_map(|operation| &mut operation.responses.responses);
-        let errors = responses.filter(|(status, _)| status.starts_with(['4', '5']));
-        for response in errors.filter_map(|(_, response)| match response {
-            RefOr::T(response) => Some(response),
-            RefOr::Ref(_) => None,
-        }) {
-            let content = response.content.swap_remove(JSON);
-            response.content.extend(content.map(|content| (PROBLEM_JSON.to_owned(), content)));
+        for operation in [&mut item.get, &mut item.post, &mut item.put, &mut item.delete].into_iter().flatten() {
+            let described = &mut operation.responses.responses;
+            for (status, refusal) in refusals::of_all() {
+                described.entry(status).or_insert(refusal);
+            }
+            for (_, response) in described.iter_mut().filter(|(status, _)| status.starts_with(['4', '5'])) {
+                let RefOr::T(response) = response else { continue };
+                let content = response.content.swap_remove(JSON);
+                response.content.extend(content.map(|content| (PROBLEM_JSON.to_owned(), content)));
+            }
         }
+    }
+}
+
+/// Server-sent events are no JSON and no string: OpenAPI 3.1 has no word for them. What each carries is said as 3.2 says it.
+fn describe_events(document: &mut utoipa::openapi::OpenApi) {
+    let operations = document.paths.paths.values_mut().filter_map(|item| item.get.as_mut());
+    let responses = operations.flat_map(|operation| operation.responses.responses.values_mut());
+    for response in responses {
+        let RefOr::T(response) = response else { continue };
+        let Some(RefOr::T(content)) = response.content.get_mut(EVENT_STREAM) else { continue };
+        content.schema = None;
+        let report = json!({ "$ref": "#/components/schemas/StepReport" });
+        let event = json!({ "type": "object", "properties": { "id": { "type": "string" }, "data": report } });
+        content.extensions = Some(ExtensionsBuilder::new().add("x-itemSchema", event).build());
     }
 }
 

@@ -51,6 +51,15 @@ impl IntoResponses for OfRobots {
     }
 }
 
+/// Of every route, whatever it does.
+pub(super) fn of_all() -> Refusals {
+    described(&[
+        ("400", "The request cannot be read: its address, a parameter or a header"),
+        ("401", "The server answers only those who carry its token"),
+        ("403", "The request is meant for another host, or comes from a foreign page"),
+    ])
+}
+
 /// Problems, by their status.
 fn described(refusals: &[(&str, &str)]) -> Refusals {
     let problem = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build();

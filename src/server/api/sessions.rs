@@ -23,6 +23,7 @@ use crate::{
         problem::{Kind, Problem},
         session::{NewOutsideSession, NewSession, SessionResource},
     },
+    whole::{whole, whole_or_none},
 };
 
 /// A request draws at most so many postures on the way: each takes some kilobytes of the session's memory.
@@ -40,15 +41,15 @@ pub struct SessionList {
 #[serde(deny_unknown_fields)]
 pub struct StepRequest {
     /// How many steps to make.
-    #[serde(default = "one")]
+    #[serde(default = "one", deserialize_with = "whole")]
     #[schema(default = 1, minimum = 1, maximum = 1000)]
     pub count: u64,
     /// The step that the session must be at; otherwise nothing is stepped (409). It makes a repeated request safe.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "whole_or_none")]
     pub expected_step: Option<u64>,
     /// So many postures are drawn on the way to each step in the live recording, on its timeline `motion`; downloads have
     /// none of them. At most 1000 in one request.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "whole")]
     #[schema(default = 0, maximum = 30)]
     pub frames: u64,
     /// Whether the answer carries the reports of the steps. Whoever follows the session's events or its WebSocket gets

@@ -4,6 +4,7 @@
 //! goes to [`Shared`], in the order recording, then reports: whoever sees a report finds its recording already there.
 
 use std::{
+    collections::VecDeque,
     panic::{AssertUnwindSafe, catch_unwind},
     path::PathBuf,
     sync::{Arc, atomic::Ordering, mpsc},
@@ -114,8 +115,8 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
         Ok((experiment, mut recorder, start)) => {
             shared.publish(vec![start], experiment.remaining());
             if opened.send(Ok(experiment.description().clone())).is_ok() {
-                let mut engine = Engine { experiment, shared: &shared };
-                let outcome = catch_unwind(AssertUnwindSafe(|| engine.serve(&commands, &mut recorder)));
+                let mut engine = Engine { experiment, shared: &shared, commands: &commands, waiting: VecDeque::new() };
+                let outcome = catch_unwind(AssertUnwindSafe(|| engine.serve(&mut recorder)));
                 if let Err(panic) = outcome {
                     shared.fail(panicked(&*panic).detail);
                 }
@@ -136,16 +137,20 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
 struct Engine<'a> {
     experiment: Experiment,
     shared: &'a Shared,
+    commands: &'a mpsc::Receiver<Command>,
+    /// Commands that came while steps were made, and wait for their turn.
+    waiting: VecDeque<Command>,
 }
 
 impl Engine<'_> {
     /// Takes commands until told to stop or until nobody can send any more.
-    fn serve(&mut self, commands: &mpsc::Receiver<Command>, recorder: &mut Recorder) {
+    fn serve(&mut self, recorder: &mut Recorder) {
         loop {
-            let command = commands.recv_timeout(COMPLETE_AFTER).or_else(|_| {
+            let command = self.waiting.pop_front().map_or_else(|| self.commands.recv_timeout(COMPLETE_AFTER), Ok);
+            let command = command.or_else(|_| {
                 // Whoever asks for the recording is told if it cannot be written.
                 drop(self.flush(recorder));
-                commands.recv()
+                self.commands.recv()
             });
             if self.shared.stop.is_cancelled() {
                 return;
@@ -252,6 +257,7 @@ impl Engine<'_> {
                 outcome = Err(Problem::new(Kind::ShuttingDown, detail));
                 break;
             }
+            self.complete_for_those_who_ask(recorder);
             outcome = self.step(frames, &mut batch, recorder);
             if outcome.is_ok() && batch.last.elapsed() >= PUBLISH_EVERY {
                 outcome = self.publish(&mut batch, recorder);
@@ -259,6 +265,16 @@ impl Engine<'_> {
         }
         let published = self.publish(&mut batch, recorder);
         outcome.and(published).map(|()| batch.made).map_err(|problem| problem.step(self.experiment.latest().step))
+    }
+
+    /// Whoever wants the recording so far need not wait for the steps to come.
+    fn complete_for_those_who_ask(&mut self, recorder: &mut Recorder) {
+        while let Ok(command) = self.commands.try_recv() {
+            match command {
+                Command::Flush { reply } => drop(reply.send(self.flush(recorder))),
+                command => self.waiting.push_back(command),
+            }
+        }
     }
 
     fn step(&mut self, frames: u64, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {

@@ -186,7 +186,8 @@ impl Session {
         self.ask(|reply| Command::Configuration { learner, reply }).await
     }
 
-    /// Completes the recording so far, after whatever the session is busy with. That of a failed engine is complete.
+    /// Completes the recording so far, after the step that is being made, or with a robot elsewhere after whatever the session is
+    /// busy with. That of a failed engine is complete.
     pub(super) async fn flush(&self) -> Result<(), Problem> {
         if self.is_elsewhere() {
             return self.tell(|robot| robot.complete()).await;

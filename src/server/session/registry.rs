@@ -37,7 +37,7 @@ pub struct NewSession {
     #[schema(example = "arm-6dof")]
     pub scenario: String,
     /// Seed of all random streams.
-    #[serde(default = "first_seed")]
+    #[serde(default = "first_seed", deserialize_with = "crate::whole::whole")]
     #[schema(default = 1)]
     pub seed: u64,
     /// The learners to compare, by their names in the scenario; all of the scenario's if absent or null.

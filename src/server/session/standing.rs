@@ -31,7 +31,7 @@ pub struct NewOutsideSession {
     #[serde(default)]
     pub agent: Option<String>,
     /// Seed of all that is drawn.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "crate::whole::whole")]
     pub seed: u64,
     /// How large the ellipsoids of its recording are.
     #[serde(default)]
