@@ -9,12 +9,13 @@ use super::{GROUP, Lanes, load, splat, store};
 /// Unlike a general product it packs nothing, so that few candidates cost little.
 pub fn times(level: Level, d: usize, rows: &[f64], p: &[f64]) -> Vec<f64> {
     let mut found = vec![0.0; rows.len()];
-    dispatch!(level, simd => all(simd, d, (rows, p), &mut found));
+    dispatch!(level, simd => write_times(simd, d, (rows, p), &mut found));
     found
 }
 
+/// The same, written to `found`.
 #[inline(always)]
-fn all<S: Simd>(simd: S, d: usize, (rows, p): (&[f64], &[f64]), found: &mut [f64]) {
+pub fn write_times<S: Simd>(simd: S, d: usize, (rows, p): (&[f64], &[f64]), found: &mut [f64]) {
     let (m, stride) = (p.len().isqrt(), d * GROUP);
     let of_group = (m * stride).max(1);
     for (rows, found) in rows.chunks_exact(of_group).zip(found.chunks_exact_mut(of_group)) {
