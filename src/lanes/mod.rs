@@ -17,7 +17,7 @@ use fearless_simd::{Simd, SimdBase};
 
 pub use rotor::sin_cos;
 pub use space::{Frame, Vector};
-pub use symmetric::{times, times_few};
+pub use symmetric::{times, times_few, write_times};
 
 /// As many numbers as a register holds.
 pub type Lanes<S> = <S as Simd>::f64s;

@@ -16,6 +16,7 @@
 //! θ e₁, θ e₂,  e₃                                                        prismatic
 //! ```
 
+mod posture;
 mod slopes;
 
 use fearless_simd::{ExtractToken, Simd, SimdBase, SimdFloat};
@@ -27,7 +28,7 @@ use crate::{
     lanes::{Frame, GROUP, Lanes, Vector, sin_cos, splat, store},
 };
 
-pub use slopes::Posture;
+pub use posture::Posture;
 
 /// Points of one state, to be looked up at many postures.
 #[derive(Clone, Debug)]
@@ -85,9 +86,19 @@ pub enum Whitening {
 struct Turned<S: Simd> {
     swept: [Vector<S>; 2],
     axis: Vector<S>,
+    /// f₁ and f₂.
+    basis: [Vector<S>; 2],
     pivot: Vector<S>,
     /// The joint's reading, its sine and cosine.
     reading: [Lanes<S>; 3],
+}
+
+/// What is wanted of postures beside the places of points.
+enum Wanted<'a> {
+    /// The rows of each group.
+    Rows(&'a mut [f64]),
+    /// Of what multiplies the rows of each group, the derivatives of the product.
+    Slopes(&'a [f64], &'a mut [f64]),
 }
 
 /// Where the rows of one point at a few postures of a group are put: of each tangent coordinate all equations, of each of them
@@ -191,12 +202,16 @@ impl Points {
     /// of each [group](GROUP) of candidates m × equations × GROUP numbers in `rows`, all zero at first.
     #[inline(always)]
     pub fn rows<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64], rows: &mut [f64]) {
+        self.pass(simd, candidates, readings, Wanted::Rows(rows));
+    }
+
+    #[inline(always)]
+    fn pass<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64], mut wanted: Wanted<'_>) {
         let mut turned: Vec<Turned<S>> = Vec::with_capacity(self.joints.len());
         let (d, width) = (self.equations(), Lanes::<S>::LEN);
-        let of_group = self.dimension * d * GROUP;
+        let (of_group, of_slopes) = (self.dimension * d * GROUP, self.joints.len() * GROUP);
         for (index, few) in candidates.chunks(width).enumerate() {
             let first = index * width;
-            let rows = &mut rows[first / GROUP * of_group..][..of_group];
             turned.clear();
             let mut places = self.places.iter().peekable();
             let mut frame = Frame::splat(simd, &self.first.0);
@@ -206,8 +221,18 @@ impl Points {
                     let ((local, axes), fixed) = (&place.local, link == 0);
                     let x = if fixed { Vector::splat(simd, local) } else { pivot + frame.times(local) };
                     let axes = if fixed { Frame::splat(simd, axes) } else { frame.then(axes) };
-                    let first_row = 3 * place.index * GROUP + first % GROUP;
-                    self.put(place, (&x, &axes), &turned, first_row, rows);
+                    let (group, first_row) = (first / GROUP, 3 * place.index * GROUP + first % GROUP);
+                    match &mut wanted {
+                        Wanted::Rows(rows) => {
+                            let rows = &mut rows[group * of_group..][..of_group];
+                            self.put(place, (&x, &axes), &turned, first_row, rows);
+                        }
+                        Wanted::Slopes(factors, slopes) => {
+                            let factors = &factors[group * of_group..][..of_group];
+                            let slopes = &mut slopes[group * of_slopes..][..of_slopes];
+                            self.slope(place, (&x, &axes), &turned, (first_row, factors), slopes);
+                        }
+                    }
                     for (lane, reading) in readings[first * d..].chunks_mut(d).take(few.len()).enumerate() {
                         for (k, x) in x.0.iter().enumerate() {
                             reading[3 * place.index + k] = x[lane];
@@ -312,7 +337,7 @@ impl Turn {
                 [e1.scaled(theta), e2.scaled(theta)]
             }
         };
-        Turned { swept, axis, pivot: *pivot, reading: of_reading }
+        Turned { swept, axis, basis: [frame.0[0], frame.0[1]], pivot: *pivot, reading: of_reading }
     }
 }
 

@@ -27,7 +27,7 @@ pub struct Polish {
 /// Half the distance of central differences, in sides of the cube.
 const DIFFERENCE: f64 = 1e-4;
 /// The longest first step of a coordinate.
-const FIRST_STEP: f64 = 0.15;
+pub(super) const FIRST_STEP: f64 = 0.15;
 /// Step lengths tried at once.
 const LENGTHS: [f64; 7] = [1.0, 2.0, 0.5, 0.25, 0.1, 0.03, 0.01];
 
@@ -125,7 +125,11 @@ fn differences(x: &[f64], value: f64, evaluate: &mut impl FnMut(&[Vec<f64>]) -> 
 }
 
 /// The BFGS update of the inverse Hessian; as it was, where the curvature along the step is not positive.
-fn updated(before: Option<DMatrix<f64>>, step: &DVector<f64>, change: &DVector<f64>) -> Option<DMatrix<f64>> {
+pub(super) fn updated(
+    before: Option<DMatrix<f64>>,
+    step: &DVector<f64>,
+    change: &DVector<f64>,
+) -> Option<DMatrix<f64>> {
     let curvature = step.dot(change);
     if curvature <= 1e-12 * step.norm() * change.norm() {
         return before;
