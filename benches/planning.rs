@@ -12,16 +12,21 @@ fn main() {
 
 /// Movements of a run that are timed together, from the first on: those that a robot is learned by.
 const MOVEMENTS: usize = 25;
-const SEED: u64 = 1001;
+/// Several, since runs differ by how long rivals last.
+const SEEDS: std::ops::RangeInclusive<u64> = 1001..=1004;
 
-#[divan::bench(args = ["arm-6dof", "arm-12dof", "arm-20dof"], sample_count = 5)]
+#[divan::bench(args = ["arm-6dof", "arm-12dof", "arm-20dof"], sample_count = 1)]
 fn a_run_of_global(bencher: Bencher<'_, '_>, name: &str) {
     let scenario = builtin(name).expect("built in");
-    let begin = || scenario.experiment(SEED, Some(&["global".to_owned()])).expect("an experiment");
-    bencher.counter(ItemsCount::new(MOVEMENTS)).with_inputs(begin).bench_local_values(|mut experiment: Experiment| {
-        for _ in 0..MOVEMENTS {
-            experiment.step().expect("a step");
+    let begin = |seed| scenario.experiment(seed, Some(&["global".to_owned()])).expect("an experiment");
+    let all = || SEEDS.map(begin).collect::<Vec<Experiment>>();
+    let count = ItemsCount::new(MOVEMENTS * SEEDS.count());
+    bencher.counter(count).with_inputs(all).bench_local_values(|mut runs: Vec<Experiment>| {
+        for experiment in &mut runs {
+            for _ in 0..MOVEMENTS {
+                experiment.step().expect("a step");
+            }
         }
-        experiment
+        runs
     });
 }

@@ -77,6 +77,11 @@ fn c_thirty_measurements_of_6_joints_with_outliers_after(bencher: Bencher<'_, '_
     time(bencher, "arm-6dof", before, Loss::MIXTURE);
 }
 
+#[divan::bench(args = BEFORE, sample_count = 20)]
+fn d_thirty_measurements_of_12_joints_with_outliers_after(bencher: Bencher<'_, '_>, before: usize) {
+    time(bencher, "arm-12dof", before, Loss::MIXTURE);
+}
+
 fn time(bencher: Bencher<'_, '_>, name: &str, before: usize, loss: Loss) {
     let (smoother, next) = case(name, before, loss);
     bencher.counter(ItemsCount::new(TIMED)).with_inputs(|| smoother.clone()).bench_local_values(|mut smoother| {

@@ -14,7 +14,7 @@ fn main() -> ExitCode {
         Err(error) => {
             // Standard error may be closed; there is nobody left to tell then.
             let _ = writeln!(std::io::stderr(), "error: {}", cli::told(&error));
-            ExitCode::from(if cli::is_bad_input(&error) { 2 } else { 1 })
+            ExitCode::from(cli::exit_code(&error))
         }
     }
 }

@@ -1,6 +1,8 @@
 //! The command line as a user meets it.
 #![cfg(feature = "app")]
 
+#[path = "cli/interrupted.rs"]
+mod interrupted;
 #[path = "cli/merge.rs"]
 mod merge;
 

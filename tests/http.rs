@@ -6,8 +6,12 @@ mod support;
 
 #[path = "http/choices.rs"]
 mod choices;
+#[path = "http/connections.rs"]
+mod connections;
 #[path = "http/crashes.rs"]
 mod crashes;
+#[path = "http/crowd.rs"]
+mod crowd;
 #[path = "http/disk.rs"]
 mod disk;
 #[path = "http/errors.rs"]
@@ -34,6 +38,8 @@ mod scene;
 mod sessions;
 #[path = "http/shutdown.rs"]
 mod shutdown;
+#[path = "http/signals.rs"]
+mod signals;
 #[path = "http/strangers.rs"]
 mod strangers;
 #[path = "http/streams.rs"]

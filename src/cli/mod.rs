@@ -6,6 +6,7 @@ mod designs;
 mod export;
 mod init;
 mod input;
+mod limits;
 mod merge;
 mod observability;
 mod output;
@@ -16,6 +17,7 @@ mod run;
 mod scenarios;
 mod seeds;
 mod serve;
+mod signals;
 mod sweep;
 mod until;
 
@@ -161,7 +163,7 @@ impl Threads {
 struct BadInput(String);
 
 /// Whether the error lies in what was asked, and not in carrying it out.
-pub fn is_bad_input(error: &anyhow::Error) -> bool {
+fn is_bad_input(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.is::<BadInput>()
             || cause.downcast_ref::<ExportError>().is_some_and(ExportError::is_bad_input)
@@ -169,6 +171,15 @@ pub fn is_bad_input(error: &anyhow::Error) -> bool {
             || cause.downcast_ref::<PaperError>().is_some_and(PaperError::is_bad_input)
             || cause.downcast_ref::<ScenarioError>().is_some_and(|error| !matches!(error, ScenarioError::Experiment(_)))
     })
+}
+
+/// With what the program ends: 2 where the error lies in what was asked, as a shell has it after a signal, else 1.
+pub fn exit_code(error: &anyhow::Error) -> u8 {
+    match error.downcast_ref::<signals::Interrupted>() {
+        Some(interrupted) => interrupted.signal.exit_code(),
+        None if is_bad_input(error) => 2,
+        None => 1,
+    }
 }
 
 /// The error with its causes. Many of our errors name their cause in the midst of what they say, before the mend: a
@@ -205,6 +216,12 @@ fn steps_of(scenario: &Scenario, asked: Option<u64>) -> Result<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_arguments_of_all_commands_go_together() {
+        use clap::CommandFactory;
+        Arguments::command().debug_assert();
+    }
 
     #[test]
     fn a_cause_is_told_once() {

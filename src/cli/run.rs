@@ -10,7 +10,9 @@ use body_schema::{
 };
 
 use super::{
-    ScenarioArguments, designs, output, progress, steps_of,
+    ScenarioArguments, designs, output, progress,
+    signals::{Interrupted, Interruption},
+    steps_of,
     until::{Ending, Until},
 };
 
@@ -54,13 +56,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let specs = scenario.chosen(learners)?;
     let ending = arguments.until.map(|Until::Settled| Ending::of(&scenario, &specs)).transpose()?;
     let mut experiment = scenario.experiment(arguments.seed, learners)?;
+    let interruption = Interruption::watch()?;
     let mut recorder =
         arguments.rrd.as_deref().map(|path| recorder(&experiment, path, arguments.ellipsoids)).transpose()?;
-    let mut csv = arguments.csv.as_deref().map(|path| steps_csv(&experiment, path)).transpose()?;
+    let mut csv = match arguments.csv.as_deref().map(|path| steps_csv(&experiment, path)).transpose() {
+        Ok(csv) => csv,
+        Err(error) => {
+            recorder.into_iter().for_each(Recorder::discard);
+            return Err(error);
+        }
+    };
 
     let bar = progress::bar(steps, &scenario.name);
     observe(&experiment, recorder.as_mut(), csv.as_mut())?;
-    for _ in 0..steps {
+    while experiment.latest().step < steps && interruption.signal().is_none() {
         experiment.step()?;
         observe(&experiment, recorder.as_mut(), csv.as_mut())?;
         bar.inc(1);
@@ -73,8 +82,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut result = experiment.result();
     if arguments.limits {
         let stretches = scenario.design_stretches(result.steps);
-        result = result.beside(best_designs(&stretches));
+        if let Some(designs) = interruption.unless(move || best_designs(&stretches)) {
+            result = result.beside(designs);
+        }
     }
+    let interrupted = interruption.signal().map(|signal| {
+        let step = experiment.latest().step;
+        let told = format!("{signal} came at step {step} of {steps}; files end with it, and are complete");
+        Interrupted { signal, told }
+    });
     if let Some(recorder) = &mut recorder {
         recorder.log_best_designs(&result.best_designs)?;
     }
@@ -96,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             output::say(format!("wrote {}", path.display()))?;
         }
     }
-    Ok(())
+    interrupted.map_or(Ok(()), |interrupted| Err(interrupted.into()))
 }
 
 type CsvFile = StepsCsv<std::io::BufWriter<std::fs::File>>;

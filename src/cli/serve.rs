@@ -4,11 +4,17 @@ use std::{
     io::Write,
     net::{Ipv4Addr, SocketAddr},
     path::PathBuf,
+    sync::{Arc, OnceLock},
 };
 
 use anyhow::{Context, Result};
-use body_schema::server::{FrameAncestor, HostName, Options, Server, Token};
+use body_schema::server::{FrameAncestor, HostName, Options, Server, Token, raise_descriptors};
 use tokio_util::sync::CancellationToken;
+
+use super::{
+    limits::LimitArguments,
+    signals::{INSTANT, Interrupted, Signal, Signals},
+};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -36,6 +42,8 @@ pub struct Arguments {
     /// Show the page with the panel in DIR, which `cargo run -p body-schema-bundle -- DIR` built
     #[arg(long, value_name = "DIR", hide = true)]
     panel_dir: Option<PathBuf>,
+    #[command(flatten)]
+    limits: LimitArguments,
 }
 
 const DEFAULT_ADDRESS: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
@@ -50,6 +58,7 @@ impl Default for Arguments {
             allow_hosts: Vec::new(),
             frame_ancestors: Vec::new(),
             panel_dir: None,
+            limits: LimitArguments::default(),
         }
     }
 }
@@ -57,14 +66,15 @@ impl Default for Arguments {
 pub fn serve(arguments: &Arguments) -> Result<()> {
     let data_dir = data_dir(arguments)?;
     let token = token(arguments)?;
+    raise_descriptors();
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().context("cannot start")?;
-    runtime.block_on(async {
+    let served = runtime.block_on(async {
         let listener = tokio::net::TcpListener::bind(arguments.bind).await.with_context(|| {
             format!("cannot listen on {}; another program may be using it, try --bind 127.0.0.1:0", arguments.bind)
         })?;
         let address = listener.local_addr().context("cannot tell the address")?;
         let shutdown = CancellationToken::new();
-        tokio::spawn(cancel_on_signal(shutdown.clone()));
+        let ordered = end_by_signals(shutdown.clone())?;
         let options = Options {
             data_dir: data_dir.clone(),
             keep_recordings: arguments.data_dir.is_some(),
@@ -72,7 +82,7 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
             allow_hosts: arguments.allow_hosts.clone(),
             panel_dir: arguments.panel_dir.clone(),
             frame_ancestors: arguments.frame_ancestors.clone(),
-            sleep_after: None,
+            limits: arguments.limits.limits(),
         };
         let server = Server::new(listener, options, shutdown)?;
         let mut out = std::io::stdout();
@@ -98,9 +108,15 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
         }
         out.flush()?;
         server.run().await?;
+        if let Some(&signal) = ordered.get() {
+            return Err(Interrupted { signal, told: format!("ended at once, by a second {signal}") }.into());
+        }
         writeln!(out, "ended; every recording is complete")?;
         Ok(())
-    })
+    });
+    // Answers that nobody waits for any longer are left.
+    runtime.shutdown_timeout(INSTANT);
+    served
 }
 
 /// Where sessions are kept; `None` if nowhere.
@@ -141,24 +157,18 @@ fn reachable(address: SocketAddr) -> SocketAddr {
     }
 }
 
-/// Ctrl-C, and where there is one the terminate signal.
-async fn cancel_on_signal(shutdown: CancellationToken) {
-    #[cfg(unix)]
-    {
-        use tokio::signal::unix::{SignalKind, signal};
-        match signal(SignalKind::terminate()) {
-            Ok(mut terminate) => {
-                tokio::select! {
-                    _ = terminate.recv() => {}
-                    _ = tokio::signal::ctrl_c() => {}
-                }
-            }
-            Err(_) => _ = tokio::signal::ctrl_c().await,
-        }
-    }
-    #[cfg(not(unix))]
-    {
-        _ = tokio::signal::ctrl_c().await;
-    }
-    shutdown.cancel();
+/// The first signal asks the server to end, the second ends the program. Tells of the second, if it came.
+fn end_by_signals(shutdown: CancellationToken) -> Result<Arc<OnceLock<Signal>>> {
+    let mut signals = Signals::new().context("cannot wait for signals")?;
+    let ordered = Arc::new(OnceLock::new());
+    let order = ordered.clone();
+    tokio::spawn(async move {
+        signals.next().await;
+        shutdown.cancel();
+        let second = signals.next().await;
+        let signal = *order.get_or_init(|| second);
+        tokio::time::sleep(INSTANT).await;
+        std::process::exit(signal.exit_code().into());
+    });
+    Ok(ordered)
 }

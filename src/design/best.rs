@@ -43,7 +43,8 @@ const SHORTEST: u64 = 5;
 const GAP: f64 = 0.01;
 
 /// The best designs of 5, 10, 20, … movements and of all, stretch by stretch, in the order of steps; none for a sensor
-/// without noise. A development build takes a second for 6 joints, half a minute for 12, some minutes for 20.
+/// without noise. Each takes a core a few hundredths of a second for 6 joints, half a second for 12, some seconds for 20
+/// (`docs/speed.md`).
 pub fn best_designs(stretches: &[Stretch]) -> Vec<BestDesign> {
     let mut found = Vec::new();
     for Stretch { problem, from, to } in stretches {

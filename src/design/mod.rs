@@ -15,18 +15,22 @@
 //!   φ(θ) = N tr(H M⁻¹ W M⁻¹ Hᵀ),    M = Λ₀ + N Σ pᵢ HᵢᵀHᵢ
 //!   ```
 //!
-//!   favours most joins the design, and the weights are balanced by pᵢ ← pᵢ √φᵢ / Σ pⱼ √φⱼ (Silvey, Titterington and
-//!   Torsney 1978). By the equivalence theorem (Kiefer and Wolfowitz 1960) the design is optimal where φ nowhere
-//!   exceeds Σ pᵢ φᵢ, and its trace is above the optimum by at most the difference.
+//!   favours most joins the design, and the shares are balanced by Newton's method over the simplex. By the equivalence
+//!   theorem (Kiefer and Wolfowitz 1960) the design is optimal where φ nowhere exceeds Σ pᵢ φᵢ, and its trace is above the
+//!   optimum by at most the difference.
 //!   Where a head watches, only movements after which it sees the marker are candidates.
 //! * *Before any measurement* ([`observability`]): what can be determined at all, and how well by how many movements, at the robot as
 //!   it is described.
 //! * *Counting.* As many independent equations as there are directions that can be determined. A yardstick, not a bound.
 
+mod balance;
 mod best;
 mod counting;
+#[cfg(test)]
+mod laws;
 pub mod observability;
 mod search;
+mod sensitivity;
 
 pub use best::{BestDesign, Stretch, best_designs};
 pub use counting::{General, general_movements, movements_by_counting};
@@ -74,10 +78,12 @@ impl Problem {
 
     /// Hᵀ at the truth (m × d); `None` where the marker is not seen.
     fn seen(&self, configuration: &[f64]) -> Option<DMatrix<f64>> {
-        if self.head.is_some_and(|head| !head.sees(&self.truth.marker_at(configuration))) {
-            return None;
-        }
-        Some(self.rig.jacobian(&self.truth, &self.layout, configuration))
+        self.sees(configuration).then(|| self.rig.jacobian(&self.truth, &self.layout, configuration))
+    }
+
+    /// Whether the marker is seen.
+    fn sees(&self, configuration: &[f64]) -> bool {
+        self.head.is_none_or(|head| head.sees(&self.truth.marker_at(configuration)))
     }
 
     /// The covariance F⁻¹ that the information F allows, in the chart at the truth; `None` if F is singular.

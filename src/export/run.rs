@@ -79,7 +79,7 @@ pub(super) fn record(
     write_json(&folder.join("description.json"), experiment.description())?;
     write_packed(&folder.join("reports.ndjson.gz"), &reports)?;
     let messages = live.put_together(&live.scene_parts_from(1))?;
-    write(&folder.join("scene.rrd"), &[live.header(), messages].concat())?;
+    write(&folder.join("scene.rrd"), &[vec![live.header()], messages].concat().concat())?;
     for (theme, name) in [(Theme::Light, "light"), (Theme::Dark, "dark")] {
         for aspect in ASPECTS {
             // There is one from step 0 on.

@@ -17,7 +17,7 @@ use fearless_simd::{Simd, SimdBase};
 
 pub use rotor::sin_cos;
 pub use space::{Frame, Vector};
-pub use symmetric::times;
+pub use symmetric::{times, times_few, write_times};
 
 /// As many numbers as a register holds.
 pub type Lanes<S> = <S as Simd>::f64s;
@@ -41,6 +41,25 @@ pub fn load<S: Simd>(simd: S, numbers: &[f64], first: usize) -> Lanes<S> {
 #[inline(always)]
 pub fn store<S: Simd>(lanes: Lanes<S>, numbers: &mut [f64], first: usize) {
     lanes.store_slice(&mut numbers[first..first + Lanes::<S>::LEN]);
+}
+
+/// Of each of these registers the sum of its lanes: neighbours are added and two registers put into one, until these hold sums
+/// alone.
+#[inline(always)]
+pub fn sums<S: Simd>(mut of: [Lanes<S>; GROUP]) -> [f64; GROUP] {
+    let (mut count, mut width) = (GROUP, Lanes::<S>::LEN);
+    while width > 1 {
+        (count, width) = (count / 2, width / 2);
+        for index in 0..count {
+            let (even, odd) = of[2 * index].deinterleave(of[2 * index + 1]);
+            of[index] = even + odd;
+        }
+    }
+    let mut found = [0.0; GROUP];
+    for (of, found) in of.into_iter().zip(found.chunks_exact_mut(Lanes::<S>::LEN)) {
+        of.store_slice(found);
+    }
+    found
 }
 
 /// Groups that hold so many candidates.

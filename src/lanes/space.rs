@@ -39,6 +39,13 @@ impl<S: Simd> Vector<S> {
         Self([y.mul_sub(c, z * b), z.mul_sub(a, x * c), x.mul_sub(b, y * a)])
     }
 
+    /// v · other.
+    #[inline(always)]
+    pub fn dot(self, other: Self) -> Lanes<S> {
+        let ([x, y, z], [a, b, c]) = (self.0, other.0);
+        x.mul_add(a, y.mul_add(b, z * c))
+    }
+
     /// A v, for the same A in all lanes.
     #[inline(always)]
     pub fn through(self, a: &Matrix3<f64>) -> Self {

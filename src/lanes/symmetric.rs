@@ -9,12 +9,13 @@ use super::{GROUP, Lanes, load, splat, store};
 /// Unlike a general product it packs nothing, so that few candidates cost little.
 pub fn times(level: Level, d: usize, rows: &[f64], p: &[f64]) -> Vec<f64> {
     let mut found = vec![0.0; rows.len()];
-    dispatch!(level, simd => all(simd, d, (rows, p), &mut found));
+    dispatch!(level, simd => write_times(simd, d, (rows, p), &mut found));
     found
 }
 
+/// The same, written to `found`.
 #[inline(always)]
-fn all<S: Simd>(simd: S, d: usize, (rows, p): (&[f64], &[f64]), found: &mut [f64]) {
+pub fn write_times<S: Simd>(simd: S, d: usize, (rows, p): (&[f64], &[f64]), found: &mut [f64]) {
     let (m, stride) = (p.len().isqrt(), d * GROUP);
     let of_group = (m * stride).max(1);
     for (rows, found) in rows.chunks_exact(of_group).zip(found.chunks_exact_mut(of_group)) {
@@ -83,6 +84,38 @@ impl Strip {
     }
 }
 
+/// P x of a few x alone, which stand in `columns` one behind the other, m numbers each: lanes run along P's columns.
+pub fn times_few(level: Level, columns: &[f64], p: &[f64], m: usize) -> Vec<f64> {
+    let mut found = vec![0.0; columns.len()];
+    dispatch!(level, simd => {
+        let pairs = columns.chunks_exact(m.max(1)).zip(found.chunks_exact_mut(m.max(1)));
+        for (x, found) in pairs { along(simd, x, p, found) }
+    });
+    found
+}
+
+/// Two registers of sums at a time, then one number after the other.
+#[inline(always)]
+fn along<S: Simd>(simd: S, x: &[f64], p: &[f64], found: &mut [f64]) {
+    let (m, width) = (x.len(), 2 * Lanes::<S>::LEN);
+    for first in (0..m / width * width).step_by(width) {
+        // Even columns and odd ones: four sums in turn, that none waits for itself.
+        let mut sums = [[splat(simd, 0.0); 2]; 2];
+        for (x, columns) in x.chunks(2).zip(p.chunks(2 * m)) {
+            for ((x, column), sums) in x.iter().zip(columns.chunks_exact(m)).zip(&mut sums) {
+                let x = splat(simd, *x);
+                sums[0] = x.mul_add(load(simd, column, first), sums[0]);
+                sums[1] = x.mul_add(load(simd, column, first + Lanes::<S>::LEN), sums[1]);
+            }
+        }
+        store::<S>(sums[0][0] + sums[1][0], found, first);
+        store::<S>(sums[0][1] + sums[1][1], found, first + Lanes::<S>::LEN);
+    }
+    for row in m / width * width..m {
+        found[row] = x.iter().zip(p[row * m..].iter()).map(|(x, p)| x * p).sum();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::DMatrix;
@@ -95,7 +128,8 @@ mod tests {
     #[test]
     fn products_are_those_of_linear_algebra() {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
-        for (d, count, m) in [(0, 4, 4), (1, 1, 4), (2, 5, 7), (3, 9, 24), (4, 17, 5), (6, 9, 13), (8, 4, 3), (3, 3, 0)]
+        for (d, count, m) in
+            [(0, 4, 4), (1, 1, 4), (2, 5, 7), (3, 9, 24), (3, 1, 35), (4, 17, 5), (6, 9, 13), (8, 4, 3), (3, 3, 0)]
         {
             let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-1.0..1.0));
             let p = &root * root.transpose();
@@ -105,8 +139,11 @@ mod tests {
                 for candidate in 0..count {
                     let at = |row, k| ((candidate / GROUP * m + k) * d + row) * GROUP + candidate % GROUP;
                     let h = DMatrix::from_fn(d, m, |row, k| rows[at(row, k)]);
-                    let apart = DMatrix::from_fn(d, m, |row, k| found[at(row, k)]) - h * &p;
+                    let apart = DMatrix::from_fn(d, m, |row, k| found[at(row, k)]) - &h * &p;
                     assert!(apart.iter().all(|x| x.abs() < 1e-12), "{level:?} {d} {count} {m}");
+                    let alone = times_few(level, h.transpose().as_slice(), p.as_slice(), m);
+                    let apart = DMatrix::from_vec(m, d, alone) - &p * h.transpose();
+                    assert!(apart.iter().all(|x| x.abs() < 1e-12), "{level:?} {d} {m}");
                 }
             }
         }

@@ -16,6 +16,9 @@
 //! θ e₁, θ e₂,  e₃                                                        prismatic
 //! ```
 
+mod posture;
+mod slopes;
+
 use fearless_simd::{ExtractToken, Simd, SimdBase, SimdFloat};
 use nalgebra::{Matrix3, Vector3};
 
@@ -24,6 +27,8 @@ use crate::{
     kinematics::{JointKind, chart},
     lanes::{Frame, GROUP, Lanes, Vector, sin_cos, splat, store},
 };
+
+pub use posture::Posture;
 
 /// Points of one state, to be looked up at many postures.
 #[derive(Clone, Debug)]
@@ -81,9 +86,19 @@ pub enum Whitening {
 struct Turned<S: Simd> {
     swept: [Vector<S>; 2],
     axis: Vector<S>,
+    /// f₁ and f₂.
+    basis: [Vector<S>; 2],
     pivot: Vector<S>,
     /// The joint's reading, its sine and cosine.
     reading: [Lanes<S>; 3],
+}
+
+/// What is wanted of postures beside the places of points.
+enum Wanted<'a> {
+    /// The rows of each group.
+    Rows(&'a mut [f64]),
+    /// Of what multiplies the rows of each group, the derivatives of the product.
+    Slopes(&'a [f64], &'a mut [f64]),
 }
 
 /// Where the rows of one point at a few postures of a group are put: of each tangent coordinate all equations, of each of them
@@ -187,29 +202,16 @@ impl Points {
     /// of each [group](GROUP) of candidates m × equations × GROUP numbers in `rows`, all zero at first.
     #[inline(always)]
     pub fn rows<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64], rows: &mut [f64]) {
-        self.pass(simd, candidates, readings, Some(rows));
-    }
-
-    /// The same without rows.
-    #[inline(always)]
-    pub fn readings<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64]) {
-        self.pass(simd, candidates, readings, None);
+        self.pass(simd, candidates, readings, Wanted::Rows(rows));
     }
 
     #[inline(always)]
-    fn pass<S: Simd, C: AsRef<[f64]>>(
-        &self,
-        simd: S,
-        candidates: &[C],
-        readings: &mut [f64],
-        mut rows: Option<&mut [f64]>,
-    ) {
+    fn pass<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64], mut wanted: Wanted<'_>) {
         let mut turned: Vec<Turned<S>> = Vec::with_capacity(self.joints.len());
         let (d, width) = (self.equations(), Lanes::<S>::LEN);
-        let of_group = self.dimension * d * GROUP;
+        let (of_group, of_slopes) = (self.dimension * d * GROUP, self.joints.len() * GROUP);
         for (index, few) in candidates.chunks(width).enumerate() {
             let first = index * width;
-            let mut rows = rows.as_deref_mut().map(|rows| &mut rows[first / GROUP * of_group..][..of_group]);
             turned.clear();
             let mut places = self.places.iter().peekable();
             let mut frame = Frame::splat(simd, &self.first.0);
@@ -218,10 +220,18 @@ impl Points {
                 while let Some(place) = places.next_if(|place| place.link == link) {
                     let ((local, axes), fixed) = (&place.local, link == 0);
                     let x = if fixed { Vector::splat(simd, local) } else { pivot + frame.times(local) };
-                    if let Some(rows) = &mut rows {
-                        let axes = if fixed { Frame::splat(simd, axes) } else { frame.then(axes) };
-                        let first_row = 3 * place.index * GROUP + first % GROUP;
-                        self.put(place, (&x, &axes), &turned, first_row, rows);
+                    let axes = if fixed { Frame::splat(simd, axes) } else { frame.then(axes) };
+                    let (group, first_row) = (first / GROUP, 3 * place.index * GROUP + first % GROUP);
+                    match &mut wanted {
+                        Wanted::Rows(rows) => {
+                            let rows = &mut rows[group * of_group..][..of_group];
+                            self.put(place, (&x, &axes), &turned, first_row, rows);
+                        }
+                        Wanted::Slopes(factors, slopes) => {
+                            let factors = &factors[group * of_group..][..of_group];
+                            let slopes = &mut slopes[group * of_slopes..][..of_slopes];
+                            self.slope(place, (&x, &axes), &turned, (first_row, factors), slopes);
+                        }
                     }
                     for (lane, reading) in readings[first * d..].chunks_mut(d).take(few.len()).enumerate() {
                         for (k, x) in x.0.iter().enumerate() {
@@ -327,7 +337,7 @@ impl Turn {
                 [e1.scaled(theta), e2.scaled(theta)]
             }
         };
-        Turned { swept, axis, pivot: *pivot, reading: of_reading }
+        Turned { swept, axis, basis: [frame.0[0], frame.0[1]], pivot: *pivot, reading: of_reading }
     }
 }
 
@@ -371,9 +381,6 @@ mod tests {
             for level in levels() {
                 let (mut rows, mut readings) = (vec![0.0; groups(count) * m * d * GROUP], vec![0.0; d * count]);
                 dispatch!(level, simd => points.rows(simd, &candidates, &mut readings, &mut rows));
-                let mut alone = vec![0.0; d * count];
-                dispatch!(level, simd => points.readings(simd, &candidates, &mut alone));
-                prop_assert_eq!(&alone, &readings, "without rows");
                 let mut pass = Pass::new(&state, &layout);
                 for (index, candidate) in candidates.iter().enumerate() {
                     pass.at(candidate);

@@ -1,8 +1,8 @@
 //! Derivative-free minimisation over the unit cube: DIRECT and its locally biased form DIRECT-l.
 //!
 //! [`Direct`] is the ask-and-tell minimiser and [`minimize`] the loop around it; nothing in them is random. For
-//! comparison there is [`bayesian()`], Bayesian optimisation with a Gaussian process. Nothing in this module knows what
-//! is being minimised.
+//! comparison there is [`bayesian()`], Bayesian optimisation with a Gaussian process. [`polish()`] finishes what they began;
+//! [`descend`] does so from many points, with gradients. Nothing in this module knows what is being minimised.
 //!
 //! # Algorithm
 //!
@@ -96,14 +96,16 @@
 //!   2001. His code, in the C translation that NLopt distributes, served as the reference for order and ties.
 
 mod bayesian;
+mod descent;
 mod direct;
 mod minimum;
 mod polish;
 
 pub use bayesian::bayesian;
+pub use descent::{Slopes, descend};
 pub use minimum::Minimum;
 pub(crate) use minimum::least;
-pub use polish::{Polish, polish};
+pub use polish::{Polish, polish, polish_along};
 
 pub use direct::{
     Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Moment, Partition, Plane, Projection, Rectangle,

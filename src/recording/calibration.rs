@@ -98,7 +98,8 @@ pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &s
     let mut file = RrdFile::create(path)?;
     file.append(&[message::store_info(&store)])?;
     file.append(&arrangement(&scene.stage, application, found.report.unit())?)?;
-    let messages: Vec<_> = rows.steps()?.iter().map(|chunk| message::data(&store, chunk)).collect::<Result<_, _>>()?;
+    let messages: Vec<_> =
+        rows.steps(|_| true)?.iter().map(|chunk| message::data(&store, chunk)).collect::<Result<_, _>>()?;
     file.append(&messages)?;
     file.finish()
 }
@@ -210,7 +211,7 @@ impl Scene {
         let joints = case.scenario.robot.joint_descriptions();
         let clouds = uncertainty.of_points(&self.model).unwrap_or_default();
         let clouds_look = uncertainty.look(&clouds, &joints, "", (learner_color(0), CLOUD));
-        rows.drawn(step, &entity("uncertainty"), &[], drawn(&clouds, &posture.links), clouds_look);
+        rows.drawn(step, &entity("uncertainty"), drawn(&clouds, &posture.links), clouds_look);
         let measured: Vec<Point3<f64>> = readings.iter().filter_map(|reading| place(&reading.measured)).collect();
         let points = Points3D::new(measured.iter().map(|point| single(point.coords.into())))
             .with_colors([Color::from(MEASURED)])

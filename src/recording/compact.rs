@@ -4,7 +4,10 @@ use std::{collections::BTreeMap, io::Cursor};
 
 use re_log_encoding::DecoderApp;
 use rerun::{
-    external::re_log_types::{EntityPath, StoreId},
+    external::{
+        re_byte_size::SizeBytes,
+        re_log_types::{EntityPath, StoreId},
+    },
     log::{Chunk, LogMsg},
 };
 
@@ -58,7 +61,7 @@ pub(super) fn put_together(stream: Vec<u8>, keep: Keep) -> Result<Vec<LogMsg>, R
         }
     }
     for (store, chunks) in chunks.into_values() {
-        for chunk in merged(chunks)? {
+        for chunk in merged(chunks, keep)? {
             messages.push(message::data(&store, &chunk)?);
         }
     }
@@ -67,16 +70,28 @@ pub(super) fn put_together(stream: Vec<u8>, keep: Keep) -> Result<Vec<LogMsg>, R
 
 /// Beyond this many rows chunks are no longer put together: viewers load by chunk.
 const ROWS: usize = 1024;
+/// Nor beyond so many bytes, where they are followed: each reader holds one message at a time.
+const FOLLOWED_BYTES: u64 = 1 << 18;
+
+impl Keep {
+    /// Whether two neighbouring chunks may become one.
+    fn joins(self, left: &Chunk, right: &Chunk) -> bool {
+        let bytes = || left.heap_size_bytes() + right.heap_size_bytes();
+        left.num_rows() + right.num_rows() <= ROWS
+            && (self == Self::Steps || bytes() <= FOLLOWED_BYTES)
+            && left.concatenable(right)
+    }
+}
 
 /// Puts neighbouring chunks of one entity together, by halves: each row is copied only log₂ n times.
-fn merged(mut chunks: Vec<Chunk>) -> Result<Vec<Chunk>, RecordingError> {
+fn merged(mut chunks: Vec<Chunk>, keep: Keep) -> Result<Vec<Chunk>, RecordingError> {
     if chunks.len() < 2 {
         return Ok(chunks);
     }
-    let mut right = merged(chunks.split_off(chunks.len() / 2))?.into_iter();
-    let mut left = merged(chunks)?;
+    let mut right = merged(chunks.split_off(chunks.len() / 2), keep)?.into_iter();
+    let mut left = merged(chunks, keep)?;
     if let (Some(last), Some(first)) = (left.pop(), right.next()) {
-        if last.num_rows() + first.num_rows() <= ROWS && last.concatenable(&first) {
+        if keep.joins(&last, &first) {
             left.push(Chunk::concat_and_sort(&last, &first)?);
         } else {
             left.extend([last, first]);

@@ -24,9 +24,15 @@ impl RrdFile {
     pub(super) fn create(path: &Path) -> Result<Self, RecordingError> {
         let create = |source| RecordingError::Create { path: path.to_owned(), source };
         let file = BufWriter::new(File::create(path).map_err(create)?);
-        let encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, file)
-            .map_err(|source| failure(path, source))?;
+        let encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, file);
+        let encoder = encoder.map_err(|source| failure(path, source)).inspect_err(|_| discard(path))?;
         Ok(Self { path: path.to_owned(), encoder, broken: false })
+    }
+
+    /// Leaves no file, unless it was none: a device stays.
+    pub(super) fn discard(mut self) {
+        self.encoder.do_not_emit_footer();
+        discard(&self.path);
     }
 
     /// Appends messages and hands them to the operating system, so that they survive the death of the process.
@@ -69,6 +75,13 @@ impl RrdFile {
             self.encoder.do_not_emit_footer();
             failure(&self.path, source)
         })
+    }
+}
+
+fn discard(path: &Path) {
+    if fs::metadata(path).is_ok_and(|file| file.is_file()) {
+        // Whoever asked for it is told of a worse failure already.
+        drop(fs::remove_file(path));
     }
 }
 

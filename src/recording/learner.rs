@@ -22,6 +22,7 @@ use super::{
     solid::{self, Capsule, drum, quaternion, single, solid},
     stage::Stage,
     uncertainty::{Uncertainty, drawn},
+    values::Cell,
 };
 use crate::{
     experiment::{ChannelReading, Description, LearnerReport, MovementReport},
@@ -211,18 +212,12 @@ impl LearnerEntities {
         let (colour, joints, arrow_m) = (self.colour, scenery.description.joints.as_slice(), scenery.arrow_m);
         let model = &report.estimate;
         let links_look = || model::links_look(colour);
-        rows.drawn(
-            step,
-            &self.entity("zero/links"),
-            &[&model::links(&model.skeleton_m())],
-            Vec::new(),
-            (0, links_look),
-        );
+        rows.drawn(step, &self.entity("zero/links"), model::links(&model.skeleton_m()), (0, links_look));
         let axes_look = || model::axes_look(joints, colour);
-        rows.drawn(step, &self.entity("zero/axes"), &[&model::axes(model, arrow_m)], Vec::new(), (0, axes_look));
+        rows.drawn(step, &self.entity("zero/axes"), model::axes(model, arrow_m), (0, axes_look));
         if let Some(directions) = self.uncertainty.of_directions(model, arrow_m) {
             let look = self.uncertainty.look(&directions, joints, "", (colour, opacity(joints.len())));
-            rows.drawn(step, &self.entity("zero/directions"), &[], drawn(&directions, &[]), look);
+            rows.drawn(step, &self.entity("zero/directions"), drawn(&directions, &[]), look);
         }
     }
 
@@ -241,7 +236,7 @@ impl LearnerEntities {
         let estimated = links.as_ref().map(|posture| posture.capsules(reach_m, self.arm_look())).unwrap_or_default();
         let log_arm = |rows: &mut Rows, path, capsules: &[Capsule]| {
             let look = (capsules.len() as u64, || solid::look(capsules));
-            rows.drawn(step, &self.entity(path), &[&solid::lengths(capsules)], solid::poses(capsules), look);
+            rows.drawn(step, &self.entity(path), solid::shapes(capsules), look);
         };
         log_arm(rows, "arm/estimate", &estimated);
         let truth = scenery.truth.map(|truth| Posture::of(truth, &configuration));
@@ -275,7 +270,7 @@ impl LearnerEntities {
             if clouds.is_some() || had {
                 let clouds = clouds.as_deref().unwrap_or_default();
                 let look = self.uncertainty.look(clouds, joints, what, (self.colour, alpha));
-                rows.drawn(step, &self.entity(name), &[], drawn(clouds, &links), look);
+                rows.drawn(step, &self.entity(name), drawn(clouds, &links), look);
             }
         }
         let mut readings = report.movement.iter().flat_map(|movement| &movement.readings);
@@ -322,15 +317,15 @@ impl LearnerEntities {
         // Of a learner that has stopped they are cleared.
         let reach_m = stage.figure.reach_m;
         let movement = Movement::of(report, reach_m);
-        let log_marker = |rows: &mut Rows, path, marker: &Points3D, label, colour| {
+        let log_marker = |rows: &mut Rows, path, marker: &[Cell], label, colour| {
             let look = || marker_look(colour, label, reach_m);
-            rows.drawn(step, &self.entity(path), &[marker], Vec::new(), (0, look));
+            rows.drawn(step, &self.entity(path), marker.to_vec(), (0, look));
         };
         let [on_light, on_dark] = [label_on_light(ERROR), label_on_dark(ERROR)];
         log_marker(rows, "marker/predicted", &movement.predicted, PREDICTED, self.colour);
         log_marker(rows, "marker/measured", &movement.measured, SEEN, MEASURED);
         for (path, colour) in [("marker/error", on_light), ("on_dark/error", on_dark)] {
-            rows.drawn(step, &self.entity(path), &[&movement.error], Vec::new(), (0, || error_look(colour, reach_m)));
+            rows.drawn(step, &self.entity(path), movement.error.to_vec(), (0, || error_look(colour, reach_m)));
         }
         if let Some(outlier) = &movement.outlier {
             rows.at(step, &self.entity("marker/outlier"), &[outlier]);
@@ -354,7 +349,7 @@ impl LearnerEntities {
         if let Some(slice) = self.plane.and_then(|plane| Slice::of(partition, plane, joints)) {
             slice.log(rows, step, |path| self.entity(path));
         }
-        rows.at(step, &self.entity("direct/leaves"), &[&partition::data(partition)]);
+        rows.plain(step, &self.entity("direct/leaves"), partition::data(partition));
     }
 }
 

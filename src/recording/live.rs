@@ -20,6 +20,9 @@ use super::{
     compact::{Keep, put_together},
 };
 
+/// How large a part is that is put together of others.
+const MOST_TOGETHER_BYTES: usize = 1 << 18;
+
 /// A growing log of encoded parts, in memory, for any number of readers at any speed. Clones share one log.
 ///
 /// Part 0 is the 12-byte header of an .rrd stream; every further part is one message, but for one that holds all
@@ -60,6 +63,8 @@ struct State {
     /// What arranges the views of a page anew.
     arranger: Option<Arc<Arranger>>,
     bytes: usize,
+    /// Steps wait that it would have if anybody had followed it.
+    behind: bool,
     closed: bool,
 }
 
@@ -87,12 +92,24 @@ impl LiveLog {
 
     /// The parts from `index` on; cheap, the bytes are shared.
     pub fn parts_from(&self, index: usize) -> Vec<Bytes> {
-        self.state().parts.get(index..).map(<[Bytes]>::to_vec).unwrap_or_default()
+        self.batch_from(index, usize::MAX)
+    }
+
+    /// The parts from `index` on, at most `most` of them, for readers that may be far behind.
+    pub fn batch_from(&self, index: usize, most: usize) -> Vec<Bytes> {
+        let state = self.state();
+        let end = index.saturating_add(most).min(state.parts.len());
+        state.parts.get(index..end).map(<[Bytes]>::to_vec).unwrap_or_default()
     }
 
     /// The same for a page that has curves of its own: the views are arranged for the scene alone.
     pub fn scene_parts_from(&self, index: usize) -> Vec<Bytes> {
-        let mut parts = self.parts_from(index);
+        self.scene_batch_from(index, usize::MAX)
+    }
+
+    /// The same, at most `most` of them.
+    pub fn scene_batch_from(&self, index: usize, most: usize) -> Vec<Bytes> {
+        let mut parts = self.batch_from(index, most);
         if let Some((place, scene)) = &self.state().scene
             && let Some(part) = place.checked_sub(index).and_then(|place| parts.get_mut(place))
         {
@@ -112,9 +129,34 @@ impl LiveLog {
         self.state().bytes
     }
 
-    /// Is woken when parts are appended and when the log is closed; its value is the number of parts.
+    /// Is woken when parts are appended and when the log is closed; its value is the number of parts. Whoever holds it
+    /// follows the log.
     pub fn subscribe(&self) -> watch::Receiver<usize> {
+        // Under the lock: who comes after steps were left waiting sees that they were.
+        let _state = self.state();
         self.shared.length.subscribe()
+    }
+
+    /// Whether steps may wait because nobody follows the log. It is then said to be [behind](Self::is_behind) until
+    /// something is appended.
+    pub fn may_wait(&self) -> bool {
+        let mut state = self.state();
+        state.behind = self.shared.length.receiver_count() == 0;
+        state.behind
+    }
+
+    /// Whether steps wait that nobody wanted at once.
+    pub fn is_behind(&self) -> bool {
+        self.state().behind
+    }
+
+    /// Waits until it is not [behind](Self::is_behind), or closed. Cancelling loses nothing.
+    pub async fn caught_up(&self) {
+        if self.is_behind() {
+            let mut length = self.subscribe();
+            // Whoever holds the log holds the sender.
+            while self.is_behind() && !self.is_closed() && length.changed().await.is_ok() {}
+        }
     }
 
     /// Says that nothing more will come, so that readers end. What is there stays readable.
@@ -155,6 +197,7 @@ impl LiveLog {
     /// Appends parts, the first of which a page may take otherwise. A closed log ignores them.
     fn push(&self, parts: Vec<Bytes>, scene: Option<Bytes>) {
         let mut state = self.state();
+        state.behind = false;
         if state.closed {
             return;
         }
@@ -176,12 +219,21 @@ impl LiveLog {
         Ok(Encoder::encode(messages.into_iter().map(Ok))?)
     }
 
-    /// Some of its parts, without the header, as one: the many small chunks of a live session put together. Readers
-    /// that are far behind take in one large part much faster than a thousand small ones.
+    /// Some of its parts, without the header, as few: the many small chunks of a live session put together. Readers that are
+    /// far behind take in a few large parts much faster than a thousand small ones. Each is of whole messages, and has about
+    /// 256 KiB at most unless a single row is larger.
     ///
     /// Takes about as long as it took to encode the parts: run it where it may block.
-    pub fn put_together(&self, parts: &[Bytes]) -> Result<Bytes, RecordingError> {
-        encode_all(&put_together([&[self.header()], parts].concat().concat(), Keep::Motion)?)
+    pub fn put_together(&self, parts: &[Bytes]) -> Result<Vec<Bytes>, RecordingError> {
+        let mut together: Vec<Vec<u8>> = Vec::new();
+        for message in put_together([&[self.header()], parts].concat().concat(), Keep::Motion)? {
+            let bytes = encode(&message)?;
+            match together.last_mut() {
+                Some(part) if part.len() + bytes.len() <= MOST_TOGETHER_BYTES => part.extend_from_slice(&bytes),
+                _ => together.push(bytes.to_vec()),
+            }
+        }
+        Ok(together.into_iter().map(|part| Bytes::from(part.into_boxed_slice())).collect())
     }
 
     fn state(&self) -> MutexGuard<'_, State> {

@@ -98,6 +98,7 @@ mod solid;
 mod stage;
 mod target;
 mod uncertainty;
+mod values;
 
 pub use self::{
     blueprint::{Shape, Theme},

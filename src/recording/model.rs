@@ -2,12 +2,16 @@
 
 use rerun::{Arrows3D, Color, LineStrips3D, Radius};
 
-use super::solid::single;
+use super::{
+    solid::single,
+    values::{Cell, Values},
+};
 use crate::experiment::{JointDescription, ModelReport};
 
 /// An arm as one line through its points.
-pub(super) fn links(points_m: &[[f64; 3]]) -> LineStrips3D {
-    LineStrips3D::update_fields().with_strips([points_m.iter().copied().map(single)])
+pub(super) fn links(points_m: &[[f64; 3]]) -> Vec<Cell> {
+    let line = Values::line(points_m.iter().copied().map(single).collect());
+    vec![(LineStrips3D::descriptor_strips(), line)]
 }
 
 /// How such lines look.
@@ -16,9 +20,13 @@ pub(super) fn links_look(colour: [u8; 3]) -> LineStrips3D {
 }
 
 /// The axes as arrows `length_m` long, one per joint.
-pub(super) fn axes(model: &ModelReport, length_m: f64) -> Arrows3D {
-    let vectors = model.joints.iter().map(|joint| single(joint.axis.map(|x| x * length_m)));
-    Arrows3D::update_fields().with_vectors(vectors).with_origins(origins(model).into_iter().map(single))
+pub(super) fn axes(model: &ModelReport, length_m: f64) -> Vec<Cell> {
+    let vectors = model.joints.iter().map(|joint| single(joint.axis.map(|x| x * length_m))).collect();
+    let origins = origins(model).into_iter().map(single).collect();
+    vec![
+        (Arrows3D::descriptor_vectors(), Values::Triples(vectors)),
+        (Arrows3D::descriptor_origins(), Values::Triples(origins)),
+    ]
 }
 
 /// How such arrows look.

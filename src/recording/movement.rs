@@ -1,8 +1,13 @@
 //! What a step showed: the marker as predicted, as seen, and how far apart.
 
-use rerun::{Color, LineStrips3D, Points3D, Radius};
+use std::sync::Arc;
 
-use super::solid::single;
+use rerun::{Color, LineStrips3D, Points3D, Radius, external::arrow::array::StringArray};
+
+use super::{
+    solid::single,
+    values::{Cell, Values},
+};
 use crate::experiment::{ChannelReading, MovementReport};
 
 /// The colour of a measurement; no learner's, and it shows on dark and on light ground.
@@ -21,14 +26,14 @@ const CROSS: f64 = 0.1;
 
 /// The entities of a movement, all of them at each step: what a step does not have is empty, not the last step's.
 pub(super) struct Movement {
-    pub(super) predicted: Points3D,
-    pub(super) measured: Points3D,
+    pub(super) predicted: [Cell; 1],
+    pub(super) measured: [Cell; 1],
     /// From the one to the other, labelled with its length.
-    pub(super) error: LineStrips3D,
+    pub(super) error: [Cell; 2],
     /// A cross where the learner takes what was measured for an outlier; `None` if it weighs no readings.
     pub(super) outlier: Option<LineStrips3D>,
     /// The true marker after a miss.
-    pub(super) missed: Points3D,
+    pub(super) missed: [Cell; 1],
 }
 
 impl Movement {
@@ -45,12 +50,17 @@ impl Movement {
             let distance = off((0..3).map(|i| (to[i] - from[i]).powi(2)).sum::<f64>().sqrt());
             if is_outlier { format!("outlier, {distance}") } else { distance }
         });
-        let marker = |place: Option<[f64; 3]>| Points3D::update_fields().with_positions(place.map(single));
-        let line = ends.map(|(from, to)| [from, to].map(single));
+        let marker = |place: Option<[f64; 3]>| {
+            let place = Values::Triples(place.map(single).into_iter().collect());
+            [(Points3D::descriptor_positions(), place)]
+        };
+        let line: Vec<_> = ends.iter().flat_map(|(from, to)| [from, to]).copied().map(single).collect();
+        let lines = Values::Lists(ends.iter().map(|_| line.len()).collect(), Box::new(Values::Triples(line)));
+        let labels = Values::Arrays(vec![Arc::new(StringArray::from_iter_values(label))]);
         Self {
             predicted: marker(predicted),
             measured: marker(measured),
-            error: LineStrips3D::update_fields().with_strips(line).with_labels(label),
+            error: [(LineStrips3D::descriptor_strips(), lines), (LineStrips3D::descriptor_labels(), labels)],
             outlier: reading.map(|_| cross(measured.filter(|_| is_outlier), reach_m)),
             missed: marker(missed),
         }

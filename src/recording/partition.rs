@@ -1,16 +1,17 @@
 //! DIRECT's partition of the joint box: a slice to look at, and all of it as data.
 
-use std::sync::Arc;
-
 use rerun::{
-    AsComponents, Boxes2D, Color, DynamicArchetype, Image, LineStrips2D, Points2D, Radius, Transform3D,
-    external::{
-        arrow::array::{BooleanArray, Float64Array, UInt8Array, UInt32Array},
-        re_log_types::EntityPath,
-    },
+    AsComponents, Boxes2D, Color, ComponentDescriptor, Image, LineStrips2D, Points2D, Radius, Transform3D,
+    components::ImageFormat,
+    datatypes::{ChannelDatatype, ColorModel},
+    external::re_log_types::EntityPath,
 };
 
-use super::{colours::viridis, rows::Rows};
+use super::{
+    colours::viridis,
+    rows::Rows,
+    values::{Cell, Values},
+};
 use crate::{
     experiment::JointDescription,
     kinematics::JointKind,
@@ -89,46 +90,55 @@ pub(super) fn frame(plane: Plane, joints: &[JointDescription]) -> [Box<dyn AsCom
 
 /// What is drawn of a slice.
 pub(super) struct Slice {
-    fill: Image,
-    outlines: Boxes2D,
-    centres: Points2D,
-    chosen: Points2D,
+    fill: Vec<Cell>,
+    outlines: Vec<Cell>,
+    centres: Vec<Cell>,
+    chosen: Vec<Cell>,
 }
 
 impl Slice {
     /// The slice of a partition through its chosen rectangle, in the joint box; `None` if it has none.
     pub(super) fn of(partition: &Partition, plane: Plane, joints: &[JointDescription]) -> Option<Self> {
         let chosen = partition.leaves.get(partition.chosen)?;
-        let colour = scale(partition);
-        let (mut cut, other): (Vec<&Leaf>, Vec<&Leaf>) =
-            partition.leaves.iter().partition(|leaf| plane.cuts(&leaf.centre, &leaf.levels, &chosen.centre));
+        let (window, colour) = (Window::of(partition, plane, joints), scale(partition));
+        let faces = partition.leaves.iter().map(|leaf| Face { leaf, place: window.face(leaf), colour: colour(leaf) });
+        let (mut cut, other): (Vec<Face<'_>>, Vec<Face<'_>>) =
+            faces.partition(|face| plane.cuts(&face.leaf.centre, &face.leaf.levels, &chosen.centre));
         // Potentially optimal ones last, on top of their neighbours.
-        cut.sort_by_key(|rectangle| rectangle.potentially_optimal);
-        let window = Window::of(partition, plane, joints);
-        let faces = || cut.iter().map(|rectangle| window.face(rectangle));
+        cut.sort_by_key(|face| face.leaf.potentially_optimal);
+        let pixels = fill(cut.iter().map(|face| (face.place, face.colour)));
+        let radius = |face: &Face<'_>| Radius::new_ui_points(if face.leaf.potentially_optimal { 2.5 } else { 1.0 }).0.0;
+        let centres = |faces: &[Face<'_>]| Values::Pairs(faces.iter().map(|face| face.place.0).collect());
+        let colours =
+            |faces: &[Face<'_>]| Values::Words(faces.iter().map(|face| Color::from(face.colour).to_u32()).collect());
         Some(Self {
-            fill: fill(cut.iter().map(|rectangle| (window.face(rectangle), colour(rectangle)))),
-            outlines: Boxes2D::from_centers_and_half_sizes(faces().map(|(c, _)| c), faces().map(|(_, h)| h))
-                .with_colors(cut.iter().map(|rectangle| Color::from(colour(rectangle))))
-                .with_radii(
-                    cut.iter()
-                        .map(|rectangle| Radius::new_ui_points(if rectangle.potentially_optimal { 2.5 } else { 1.0 })),
-                ),
-            centres: Points2D::update_fields()
-                .with_positions(other.iter().map(|rectangle| window.face(rectangle).0))
-                .with_colors(other.iter().map(|rectangle| Color::from(colour(rectangle)))),
-            chosen: Points2D::update_fields().with_positions([window.face(chosen).0]),
+            fill: vec![(
+                Image::descriptor_buffer(),
+                Values::Lists(vec![pixels.len()], Box::new(Values::Bytes(pixels))),
+            )],
+            outlines: vec![
+                (Boxes2D::descriptor_centers(), centres(&cut)),
+                (Boxes2D::descriptor_half_sizes(), Values::Pairs(cut.iter().map(|face| face.place.1).collect())),
+                (Boxes2D::descriptor_colors(), colours(&cut)),
+                (Boxes2D::descriptor_radii(), Values::Singles(cut.iter().map(radius).collect())),
+            ],
+            centres: vec![
+                (Points2D::descriptor_positions(), centres(&other)),
+                (Points2D::descriptor_colors(), colours(&other)),
+            ],
+            chosen: vec![(Points2D::descriptor_positions(), Values::Pairs(vec![window.face(chosen).0]))],
         })
     }
 
     /// Logs it, as the entities that `entity` names.
-    pub(super) fn log(&self, rows: &mut Rows, step: u64, entity: impl Fn(&'static str) -> EntityPath) {
-        let fill_look = || Image::update_fields().with_draw_order(-10.0);
-        rows.drawn(step, &entity("direct/criterion"), &[&self.fill], Vec::new(), (0, fill_look));
+    pub(super) fn log(self, rows: &mut Rows, step: u64, entity: impl Fn(&'static str) -> EntityPath) {
+        let format = ImageFormat::from_color_model([PIXELS as u32; 2], ColorModel::RGB, ChannelDatatype::U8);
+        let fill_look = || Image::update_fields().with_format(format).with_draw_order(-10.0);
+        rows.drawn(step, &entity("direct/criterion"), self.fill, (0, fill_look));
         let outline_look = || Boxes2D::update_fields().with_draw_order(10.0);
-        rows.drawn(step, &entity("direct/boxes"), &[&self.outlines], Vec::new(), (0, outline_look));
+        rows.drawn(step, &entity("direct/boxes"), self.outlines, (0, outline_look));
         let centre_look = || Points2D::update_fields().with_radii([Radius::new_ui_points(1.5)]).with_draw_order(20.0);
-        rows.drawn(step, &entity("direct/centres"), &[&self.centres], Vec::new(), (0, centre_look));
+        rows.drawn(step, &entity("direct/centres"), self.centres, (0, centre_look));
         let chosen_look = || {
             Points2D::update_fields()
                 .with_colors([Color::from(CHOSEN)])
@@ -137,12 +147,20 @@ impl Slice {
                 .with_show_labels(false)
                 .with_draw_order(30.0)
         };
-        rows.drawn(step, &entity("direct/chosen"), &[&self.chosen], Vec::new(), (0, chosen_look));
+        rows.drawn(step, &entity("direct/chosen"), self.chosen, (0, chosen_look));
     }
 }
 
+/// A rectangle as it is drawn.
+struct Face<'a> {
+    leaf: &'a Leaf,
+    /// Its centre and half-sizes in the slice.
+    place: ([f32; 2], [f32; 2]),
+    colour: [u8; 3],
+}
+
 /// The faces as a picture; Rerun's boxes are outlines.
-fn fill(faces: impl Iterator<Item = (([f32; 2], [f32; 2]), [u8; 3])>) -> Image {
+fn fill(faces: impl Iterator<Item = (([f32; 2], [f32; 2]), [u8; 3])>) -> Vec<u8> {
     let mut pixels = vec![0; PIXELS * PIXELS * 3];
     for ((centre, half), colour) in faces {
         // Of faces smaller than a pixel the last one gets it.
@@ -160,7 +178,7 @@ fn fill(faces: impl Iterator<Item = (([f32; 2], [f32; 2]), [u8; 3])>) -> Image {
             }
         }
     }
-    Image::from_rgb24(pixels, [PIXELS as u32; 2])
+    pixels
 }
 
 /// Puts the picture of a slice on the unit square.
@@ -185,40 +203,29 @@ fn scale(partition: &Partition) -> impl Fn(&Leaf) -> [u8; 3] {
 }
 
 /// All rectangles as plain data.
-pub(super) fn data(partition: &Partition) -> DynamicArchetype {
-    let rectangles = &partition.leaves;
-    let dimension = rectangles.first().map_or(0, |rectangle| rectangle.levels.len());
-    DynamicArchetype::new_without_archetype()
-        .with_component_from_data(
-            "centres",
-            Arc::new(Float64Array::from_iter_values(
-                rectangles.iter().flat_map(|rectangle| rectangle.centre.iter().copied()),
-            )),
-        )
-        .with_component_from_data(
-            "levels",
-            Arc::new(UInt8Array::from_iter_values(
-                rectangles.iter().flat_map(|rectangle| rectangle.levels.iter().copied()),
-            )),
-        )
-        .with_component_from_data(
-            "values",
-            Arc::new(Float64Array::from_iter_values(
-                rectangles.iter().map(|rectangle| rectangle.value.unwrap_or(f64::NAN)),
-            )),
-        )
-        .with_component_from_data(
-            "generations",
-            Arc::new(UInt32Array::from_iter_values(
-                rectangles.iter().map(|rectangle| u32::try_from(rectangle.generation).unwrap_or(u32::MAX)),
-            )),
-        )
-        .with_component_from_data(
-            "potentially_optimal",
-            Arc::new(rectangles.iter().map(|rectangle| Some(rectangle.potentially_optimal)).collect::<BooleanArray>()),
-        )
-        .with_component_from_data("dimension", Arc::new(UInt32Array::from_iter_values([dimension as u32])))
-        .with_component_from_data("chosen", Arc::new(UInt32Array::from_iter_values([partition.chosen as u32])))
+pub(super) fn data(partition: &Partition) -> Vec<Cell> {
+    let leaves = &partition.leaves;
+    let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+    let dimension = leaves.first().map_or(0, |leaf| leaf.levels.len());
+    let component = |name: &'static str, values| (ComponentDescriptor::partial(name), values);
+    let (mut centres, mut levels) =
+        (Vec::with_capacity(dimension * leaves.len()), Vec::with_capacity(dimension * leaves.len()));
+    for leaf in leaves {
+        centres.extend_from_slice(&leaf.centre);
+        levels.extend_from_slice(&leaf.levels);
+    }
+    let values = leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)).collect();
+    let generations = leaves.iter().map(|leaf| count(leaf.generation)).collect();
+    let potentially_optimal = leaves.iter().map(|leaf| leaf.potentially_optimal).collect();
+    vec![
+        component("centres", Values::Doubles(centres)),
+        component("levels", Values::Bytes(levels)),
+        component("values", Values::Doubles(values)),
+        component("generations", Values::Words(generations)),
+        component("potentially_optimal", Values::Flags(potentially_optimal)),
+        component("dimension", Values::Words(vec![count(dimension)])),
+        component("chosen", Values::Words(vec![count(partition.chosen)])),
+    ]
 }
 
 #[cfg(test)]

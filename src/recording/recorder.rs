@@ -24,6 +24,7 @@ use super::{
     room::Room,
     rows::{Rows, complete},
     stage::{GROUNDS, Stage},
+    values::cells,
 };
 use crate::{
     design::BestDesign,
@@ -31,10 +32,8 @@ use crate::{
     model::State,
 };
 
-/// So many steps are written to a file at once unless somebody flushes earlier: a message costs more than the rows in it. A
-/// recorder with a live log takes fewer, as a server has many and what waits takes memory …
+/// So many steps are written at once unless somebody flushes earlier: a message costs more than the rows in it …
 const BATCH_STEPS: usize = 256;
-const LIVE_BATCH_STEPS: usize = 64;
 
 /// … or so many rectangles of partitions, some tens of megabytes, …
 const BATCH_RECTANGLES: usize = 200_000;
@@ -43,7 +42,7 @@ const BATCH_RECTANGLES: usize = 200_000;
 const BATCH_TIME: Duration = Duration::from_secs(2);
 
 /// Of an entity with large rows, as pictures are, so many bytes are written at once: the memory is used again while the
-/// processor's cache still holds it.
+/// processor's cache still holds it, and a server has many recorders.
 const LARGE_BYTES: usize = 1 << 18;
 
 /// Length of the arrows at θ = 0, as a part of the reach of the arm.
@@ -53,10 +52,9 @@ const FARTHER: f64 = 0.6;
 
 /// Records an experiment, as the module's documentation lists it.
 ///
-/// Steps are gathered and written 256 at a time (64 with a live log), at least every other second, or when
-/// [`flush`](Self::flush) is called. A live view that wants to be up to date calls [`flush_shown`](Self::flush_shown).
-/// [`finish`](Self::finish) writes what is left and the file's footer (its index); dropping the recorder does the same, but
-/// has nobody to tell of errors.
+/// Steps are gathered and written 256 at a time, at least every other second, or when [`flush`](Self::flush) is called. A live
+/// view that wants to be up to date calls [`flush_shown`](Self::flush_shown). [`finish`](Self::finish) writes what is left and
+/// the file's footer (its index); dropping the recorder does the same, but has nobody to tell of errors.
 ///
 /// If the process is killed, the file holds everything up to the last batch. Viewers open it; `rerun rrd verify`
 /// complains of the missing footer, which `rerun rrd optimize` adds.
@@ -124,8 +122,13 @@ impl Recorder {
             flushed: Instant::now(),
             finished: false,
         };
-        recorder.begin(ellipsoids)?;
-        Ok(recorder)
+        match recorder.begin(ellipsoids) {
+            Ok(()) => Ok(recorder),
+            Err(error) => {
+                recorder.discard();
+                Err(error)
+            }
+        }
     }
 
     /// The id of the recording.
@@ -165,20 +168,25 @@ impl Recorder {
         self.stage = Some(stage);
         self.incomplete = Some(report.step);
         self.waiting_steps += 1;
-        let steps = if self.live.is_some() { LIVE_BATCH_STEPS } else { BATCH_STEPS };
-        let is_full = self.waiting_steps >= steps || self.waiting_rectangles >= BATCH_RECTANGLES;
+        let is_full = self.waiting_steps >= BATCH_STEPS || self.waiting_rectangles >= BATCH_RECTANGLES;
         if is_full || self.flushed.elapsed() >= BATCH_TIME { self.flush() } else { self.write_large() }
     }
 
-    /// Writes the rows of large entities to a file that has no log beside it.
+    /// Writes the rows of entities of which much waits.
     fn write_large(&mut self) -> Result<(), RecordingError> {
-        match &mut self.file {
-            Some(file) if self.live.is_none() => {
-                let large = self.rows.large_steps(LARGE_BYTES)?;
-                if large.is_empty() { Ok(()) } else { file.append(&messages(&self.store, &large)?) }
-            }
-            _ => Ok(()),
+        if !self.rows.has_large(LARGE_BYTES) {
+            return Ok(());
         }
+        let Self { rows, store, live, file, .. } = self;
+        let kept = file.is_some();
+        let live = live.as_ref().map_or(Ok(()), |live| {
+            live.append(&messages(store, &rows.news(|sheet| sheet.bytes() >= LARGE_BYTES, kept)?)?)
+        });
+        let file = file
+            .as_mut()
+            .map_or(Ok(()), |file| file.append(&messages(store, &rows.steps(|sheet| sheet.bytes() >= LARGE_BYTES)?)?));
+        // To both targets, whatever happens to the other.
+        self.settle(file).and(live)
     }
 
     /// Draws an arm through these points (axis points in order, then the marker, metres) beside the learner's, for those
@@ -219,7 +227,7 @@ impl Recorder {
         let live = self.publish(&HashSet::new());
         let file = match &mut self.file {
             Some(file) => {
-                let steps = self.rows.steps()?;
+                let steps = self.rows.steps(|_| true)?;
                 file.append(&messages(&self.store, &steps)?)
             }
             None => Ok(()),
@@ -229,7 +237,7 @@ impl Recorder {
     }
 
     /// Brings those who watch live up to date with what the arrangement of views shows at first; the rest, and the file, wait
-    /// for the next [`flush`](Self::flush), at most 64 steps or two seconds of them. Every message costs about a kilobyte, and
+    /// for the next [`flush`](Self::flush), at most 256 steps or two seconds of them. Every message costs about a kilobyte, and
     /// most entities are series that no view shows: a live view that is up to date at every step needs half the messages
     /// this way, and the file has few large ones.
     pub fn flush_shown(&mut self) -> Result<(), RecordingError> {
@@ -242,7 +250,7 @@ impl Recorder {
     /// Writes to the log what it does not have yet, but for what is hidden.
     fn publish(&mut self, hidden: &HashSet<EntityPath>) -> Result<(), RecordingError> {
         let Some(live) = &self.live else { return Ok(()) };
-        let mut news = self.rows.news(hidden, self.file.is_some())?;
+        let mut news = self.rows.news(|sheet| !hidden.contains(sheet.entity()), self.file.is_some())?;
         news.extend(self.incomplete.take().map(complete).transpose()?);
         live.append(&messages(&self.store, &news)?)
     }
@@ -266,6 +274,15 @@ impl Recorder {
     /// Writes what is left, ends the file with its footer, and closes the log.
     pub fn finish(mut self) -> Result<(), RecordingError> {
         self.end()
+    }
+
+    /// Gives the recording up: no file is left of it, and the log is closed.
+    pub fn discard(mut self) {
+        self.rows = Rows::default();
+        (self.finished, self.incomplete) = (true, None);
+        if let Some(file) = self.file.take() {
+            file.discard();
+        }
     }
 
     /// Writes what is left and ends the file with its footer: nothing is recorded after it. A file that could not be written
@@ -333,19 +350,15 @@ impl Recorder {
 
     /// The true arm at θ = 0 from a step on; at all times without a step.
     fn log_truth(&mut self, step: Option<u64>, truth: &ModelReport, arrow_m: f64) {
-        let links = [model::links(&truth.skeleton_m()), model::links_look(TRUTH_COLOR)];
-        let axes = [model::axes(truth, arrow_m), model::axes_look(&self.description.joints, TRUTH_COLOR)];
-        let ([links, links_look], [axes, axes_look]) = (&links, &axes);
+        let axes_look = model::axes_look(&self.description.joints, TRUTH_COLOR);
+        let links = [model::links(&truth.skeleton_m()), cells([&model::links_look(TRUTH_COLOR) as _])].concat();
+        let axes = [model::axes(truth, arrow_m), cells([&axes_look as _])].concat();
         for learner in &self.learners {
-            let (links_at, axes_at) = (learner.entity("zero/truth/links"), learner.entity("zero/truth/axes"));
-            match step {
-                Some(step) => {
-                    self.rows.at(step, &links_at, &[links, links_look]);
-                    self.rows.at(step, &axes_at, &[axes, axes_look]);
-                }
-                None => {
-                    self.rows.always(&links_at, &[links, links_look]);
-                    self.rows.always(&axes_at, &[axes, axes_look]);
+            for (path, what) in [("zero/truth/links", &links), ("zero/truth/axes", &axes)] {
+                let (entity, what) = (learner.entity(path), what.clone());
+                match step {
+                    Some(step) => self.rows.plain(step, &entity, what),
+                    None => self.rows.always_plain(&entity, what),
                 }
             }
         }

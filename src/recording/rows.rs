@@ -4,22 +4,20 @@
 //! handed over when the recorder says so: many steps make one chunk per entity, and every error has a caller.
 
 use std::{
-    collections::{HashMap, HashSet, hash_map::Entry},
+    collections::{HashMap, hash_map::Entry},
     sync::Arc,
 };
 
 use rerun::{
-    AsComponents, ComponentIdentifier, DynamicArchetype, SerializedComponentBatch, Timeline,
-    external::{
-        arrow::array::{ArrayRef, UInt64Array},
-        re_log_types::EntityPath,
-    },
+    AsComponents, ComponentIdentifier, DynamicArchetype, Timeline,
+    external::{arrow::array::UInt64Array, re_log_types::EntityPath},
     log::{Chunk, ChunkError, RowId},
 };
 
 use super::{
     COMPLETE, MOTION, MOTION_PER_STEP, RecordingError, TIMELINE,
-    sheet::{Cell, Sheet, Timelines, When, sequence},
+    sheet::{Sheet, Timelines, When, sequence},
+    values::{Cell, Values, cells},
 };
 
 /// Rows by entity.
@@ -31,7 +29,7 @@ pub(super) struct Rows {
     sheets: Vec<Sheet>,
     index: HashMap<(EntityPath, When), usize>,
     /// How entities look since their last row that said so.
-    looks: HashMap<(EntityPath, ComponentIdentifier), ArrayRef>,
+    looks: HashMap<(EntityPath, ComponentIdentifier), Values>,
     /// What of a look depends on the data, see [`drawn`](Self::drawn).
     kinds: HashMap<EntityPath, u64>,
     step: Timeline,
@@ -54,14 +52,23 @@ impl Default for Rows {
 impl Rows {
     /// What holds at all times.
     pub(super) fn always(&mut self, entity: &EntityPath, what: &[&dyn AsComponents]) {
-        self.sheet(entity, When::Always).push(0, cells(batches(what)));
+        self.always_plain(entity, cells(what.iter().copied()));
+    }
+
+    /// The same where components are told one by one.
+    pub(super) fn always_plain(&mut self, entity: &EntityPath, cells: Vec<Cell>) {
+        self.sheet(entity, When::Always).push(0, cells);
     }
 
     /// What holds from a step on, until the entity's next row.
     pub(super) fn at(&mut self, step: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
-        let mut components = batches(what);
-        self.drop_looks(entity, &mut components);
-        self.sheet(entity, When::Step).push(motion(step, 0), cells(components));
+        self.plain(step, entity, cells(what.iter().copied()));
+    }
+
+    /// The same where components are told one by one.
+    pub(super) fn plain(&mut self, step: u64, entity: &EntityPath, mut cells: Vec<Cell>) {
+        self.drop_looks(entity, &mut cells);
+        self.sheet(entity, When::Step).push(motion(step, 0), cells);
     }
 
     /// The same for what is drawn again and again: its look is asked for when the entity has no row yet, or its last one was
@@ -70,17 +77,14 @@ impl Rows {
         &mut self,
         step: u64,
         entity: &EntityPath,
-        what: &[&dyn AsComponents],
-        numbers: Vec<Cell>,
+        mut what: Vec<Cell>,
         (kind, look): (u64, impl FnOnce() -> L),
     ) {
-        let mut components = batches(what);
-        self.drop_looks(entity, &mut components);
         if self.kinds.get(entity) != Some(&kind) {
             self.kinds.insert(entity.clone(), kind);
-            components.extend(look().as_serialized_batches());
+            what.extend(cells([&look() as &dyn AsComponents]));
         }
-        self.sheet(entity, When::Step).push(motion(step, 0), cells(components).chain(numbers));
+        self.plain(step, entity, what);
     }
 
     /// A number of a series at a step.
@@ -90,7 +94,7 @@ impl Rows {
 
     /// What holds so many ticks after a step, until the entity's next row. Whoever sees steps alone does not see it.
     pub(super) fn after(&mut self, step: u64, ticks: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
-        self.sheet(entity, When::Between).push(motion(step, ticks), cells(batches(what)));
+        self.sheet(entity, When::Between).push(motion(step, ticks), cells(what.iter().copied()));
     }
 
     fn sheet(&mut self, entity: &EntityPath, when: When) -> &mut Sheet {
@@ -101,43 +105,43 @@ impl Rows {
         &mut self.sheets[index]
     }
 
-    fn drop_looks(&mut self, entity: &EntityPath, components: &mut Vec<SerializedComponentBatch>) {
-        components.retain(|batch| {
-            let component = batch.descriptor.component;
+    fn drop_looks(&mut self, entity: &EntityPath, cells: &mut Vec<Cell>) {
+        cells.retain(|(descriptor, values)| {
+            let component = descriptor.component;
             let is_look = component.as_str().split_once(':').is_some_and(|(_, field)| LOOKS.contains(&field));
             if !is_look {
                 return true;
             }
             let last = self.looks.entry((entity.clone(), component));
             match last {
-                Entry::Occupied(last) if last.get() == &batch.array => false,
+                Entry::Occupied(last) if last.get() == values => false,
                 last => {
-                    last.insert_entry(batch.array.clone());
+                    last.insert_entry(values.clone());
                     true
                 }
             }
         });
     }
 
-    /// For those who watch live: what they do not have yet, but for what is `hidden`; one chunk per entity and kind of time.
-    /// It is `kept` for [`steps`](Self::steps), or forgotten.
-    pub(super) fn news(&mut self, hidden: &HashSet<EntityPath>, kept: bool) -> Result<Vec<Chunk>, RecordingError> {
+    /// For those who watch live: what they do not have yet of the sheets that are `wanted`; one chunk per entity and kind
+    /// of time. It is `kept` for [`steps`](Self::steps), or forgotten.
+    pub(super) fn news(&mut self, wanted: impl Fn(&Sheet) -> bool, kept: bool) -> Result<Vec<Chunk>, RecordingError> {
         let named = Timelines { step: self.step, motion: Some(self.motion) };
-        let wanted = self.sheets.iter_mut().filter(|sheet| !hidden.contains(sheet.entity()));
+        let wanted = self.sheets.iter_mut().filter(|sheet| wanted(sheet));
         wanted.filter_map(|sheet| sheet.news(&named, kept).transpose()).collect()
     }
 
-    /// What a recording in a file has, since it was last asked for; one chunk per entity. All that waits is forgotten.
-    pub(super) fn steps(&mut self) -> Result<Vec<Chunk>, RecordingError> {
+    /// What a recording in a file has of the sheets that are `wanted`, since it was last asked for; one chunk per entity. It
+    /// is forgotten.
+    pub(super) fn steps(&mut self, wanted: impl Fn(&Sheet) -> bool) -> Result<Vec<Chunk>, RecordingError> {
         let named = Timelines { step: self.step, motion: None };
-        self.sheets.iter_mut().filter_map(|sheet| sheet.all(&named).transpose()).collect()
+        let wanted = self.sheets.iter_mut().filter(|sheet| wanted(sheet));
+        wanted.filter_map(|sheet| sheet.all(&named).transpose()).collect()
     }
 
-    /// The same of those entities alone of which so many bytes wait.
-    pub(super) fn large_steps(&mut self, bytes: usize) -> Result<Vec<Chunk>, RecordingError> {
-        let named = Timelines { step: self.step, motion: None };
-        let large = self.sheets.iter_mut().filter(|sheet| sheet.bytes() >= bytes);
-        large.filter_map(|sheet| sheet.all(&named).transpose()).collect()
+    /// Whether so many bytes of one entity wait.
+    pub(super) fn has_large(&self, bytes: usize) -> bool {
+        self.sheets.iter().any(|sheet| sheet.bytes() >= bytes)
     }
 }
 
@@ -158,14 +162,6 @@ pub(super) fn complete(step: u64) -> Result<Chunk, ChunkError> {
 
 fn motion(step: u64, ticks: u64) -> u64 {
     step.saturating_mul(MOTION_PER_STEP).saturating_add(ticks)
-}
-
-fn cells(batches: Vec<SerializedComponentBatch>) -> impl Iterator<Item = Cell> {
-    batches.into_iter().map(|batch| (batch.descriptor.clone(), batch.into()))
-}
-
-fn batches(what: &[&dyn AsComponents]) -> Vec<SerializedComponentBatch> {
-    what.iter().flat_map(|archetype| archetype.as_serialized_batches()).collect()
 }
 
 #[cfg(test)]
@@ -195,26 +191,26 @@ mod tests {
     #[test]
     fn both_readers_get_every_row_once() {
         let [hand, error] = ["hand", "error"].map(EntityPath::from);
-        let (mut rows, none) = (Rows::default(), HashSet::new());
+        let mut rows = Rows::default();
         let step = |rows: &mut Rows, step: u64| {
             rows.at(step, &hand, &[&place(step as f32)]);
             rows.after(step, 1, &hand, &[&place(0.5)]);
             rows.number(step, &error, 0.1 * step as f64);
         };
         step(&mut rows, 0);
-        let hidden = HashSet::from([error.clone()]);
+        let is_shown = |sheet: &Sheet| sheet.entity() != &error;
         let both = ["motion", "step"];
         let of_hand = [row("/hand", 1, &both), row("/hand", 1, &["motion"])];
-        assert_eq!(told(&rows.news(&hidden, true).unwrap()), of_hand);
+        assert_eq!(told(&rows.news(is_shown, true).unwrap()), of_hand);
         step(&mut rows, 1);
         let [now, between] = of_hand;
-        assert_eq!(told(&rows.news(&none, true).unwrap()), [now, between, row("/error", 2, &both)]);
-        assert_eq!(told(&rows.steps().unwrap()), [row("/hand", 2, &["step"]), row("/error", 2, &["step"])]);
-        assert!(rows.news(&none, true).unwrap().is_empty() && rows.steps().unwrap().is_empty());
+        assert_eq!(told(&rows.news(|_| true, true).unwrap()), [now, between, row("/error", 2, &both)]);
+        assert_eq!(told(&rows.steps(|_| true).unwrap()), [row("/hand", 2, &["step"]), row("/error", 2, &["step"])]);
+        assert!(rows.news(|_| true, true).unwrap().is_empty() && rows.steps(|_| true).unwrap().is_empty());
         // Without a file nothing waits for it.
         step(&mut rows, 2);
-        assert_eq!(rows.news(&none, false).unwrap().len(), 3);
-        assert!(rows.steps().unwrap().is_empty());
+        assert_eq!(rows.news(|_| true, false).unwrap().len(), 3);
+        assert!(rows.steps(|_| true).unwrap().is_empty());
     }
 
     #[test]
@@ -223,10 +219,12 @@ mod tests {
         let mut rows = Rows::default();
         let look = |label: &'static str| move || Points3D::update_fields().with_labels([label]);
         for (step, kind, label) in [(0, 0, "a"), (1, 0, "not asked for"), (2, 1, "b")] {
-            let labelled = place(step as f32).with_radii([0.1]);
-            rows.drawn(step, &hand, &[&labelled], Vec::new(), (kind, look(label)));
+            let place = Values::Triples(vec![[step as f32, 0.0, 0.0]]);
+            let what =
+                [(Points3D::descriptor_positions(), place), (Points3D::descriptor_radii(), Values::Singles(vec![0.1]))];
+            rows.drawn(step, &hand, what.to_vec(), (kind, look(label)));
         }
-        let chunks = rows.steps().unwrap();
+        let chunks = rows.steps(|_| true).unwrap();
         let [chunk] = chunks.as_slice() else { panic!("one chunk, not {}", chunks.len()) };
         let said = |component: &'static str| {
             let list = chunk.components().get_array(component.into()).unwrap();

@@ -6,13 +6,12 @@
 use std::{mem::discriminant, ops::Range, sync::Arc};
 
 use rerun::{
-    ComponentDescriptor, Scalars, SerializedComponentBatch, Timeline,
+    ComponentDescriptor, Scalars, Timeline,
     external::{
         arrow::{
-            array::{Array, ArrayRef, FixedSizeListArray, Float32Array, Float64Array, ListArray},
+            array::{ArrayRef, Float64Array, ListArray},
             buffer::{NullBuffer, OffsetBuffer},
-            compute::concat,
-            datatypes::{DataType, Field},
+            datatypes::Field,
             error::ArrowError,
         },
         re_log_types::EntityPath,
@@ -20,7 +19,10 @@ use rerun::{
     log::{Chunk, ChunkId, RowId, TimeColumn},
 };
 
-use super::{MOTION_PER_STEP, RecordingError};
+use super::{
+    MOTION_PER_STEP, RecordingError,
+    values::{Cell, Values},
+};
 
 /// On which timelines rows stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -56,20 +58,6 @@ struct Column {
     values: Values,
 }
 
-/// Values of a component. Numbers stand one after the other: an array for each row would cost ten times what is in it.
-pub(super) enum Values {
-    /// Points and vectors.
-    Triples(Vec<[f32; 3]>),
-    /// Quaternions.
-    Quads(Vec<[f32; 4]>),
-    Doubles(Vec<f64>),
-    /// All others, an array for each row.
-    Arrays(Vec<ArrayRef>),
-}
-
-/// What a row says of a component.
-pub(super) type Cell = (ComponentDescriptor, Values);
-
 impl Sheet {
     pub(super) fn new(entity: EntityPath, when: When) -> Self {
         let (ids, ticks, columns, numbers) = Default::default();
@@ -96,7 +84,7 @@ impl Sheet {
         }
     }
 
-    /// How much the rows that wait hold, without what is small.
+    /// How many bytes the components hold that wait.
     pub(super) fn bytes(&self) -> usize {
         self.bytes
     }
@@ -177,70 +165,6 @@ impl Column {
         }
         let nulls = (cells.len() < rows.len()).then(|| NullBuffer::from(is_there));
         Ok(Some(list(OffsetBuffer::from_lengths(lengths), values, nulls)?))
-    }
-}
-
-impl Values {
-    /// How many values there are.
-    fn len(&self) -> usize {
-        match self {
-            Self::Triples(all) => all.len(),
-            Self::Quads(all) => all.len(),
-            Self::Doubles(all) => all.len(),
-            Self::Arrays(all) => all.iter().map(|array| array.len()).sum(),
-        }
-    }
-
-    /// How much memory arrays hold; the others are small.
-    fn bytes(&self) -> usize {
-        match self {
-            Self::Arrays(all) => all.iter().map(|array| array.get_buffer_memory_size()).sum(),
-            _ => 0,
-        }
-    }
-
-    /// Appends values of the same kind.
-    fn extend(&mut self, more: Self) {
-        match (self, more) {
-            (Self::Triples(all), Self::Triples(more)) => all.extend(more),
-            (Self::Quads(all), Self::Quads(more)) => all.extend(more),
-            (Self::Doubles(all), Self::Doubles(more)) => all.extend(more),
-            (Self::Arrays(all), Self::Arrays(more)) => all.extend(more),
-            _ => {}
-        }
-    }
-
-    fn clear(&mut self) {
-        match self {
-            Self::Triples(all) => all.clear(),
-            Self::Quads(all) => all.clear(),
-            Self::Doubles(all) => all.clear(),
-            Self::Arrays(all) => all.clear(),
-        }
-    }
-
-    /// One array of all but the first cells, which hold so many values.
-    fn array(&self, cells: usize, skipped: usize) -> Result<ArrayRef, ArrowError> {
-        let fixed = |numbers: &[f32], width: i32| -> Result<ArrayRef, ArrowError> {
-            let item = Arc::new(Field::new("item", DataType::Float32, false));
-            let numbers = Arc::new(Float32Array::from(numbers.to_vec()));
-            Ok(Arc::new(FixedSizeListArray::try_new(item, width, numbers, None)?))
-        };
-        match self {
-            Self::Triples(all) => fixed(all[skipped..].as_flattened(), 3),
-            Self::Quads(all) => fixed(all[skipped..].as_flattened(), 4),
-            Self::Doubles(all) => Ok(Arc::new(Float64Array::from(all[skipped..].to_vec()))),
-            Self::Arrays(all) => match &all[cells..] {
-                [array] => Ok(array.clone()),
-                all => concat(&all.iter().map(AsRef::as_ref).collect::<Vec<&dyn Array>>()),
-            },
-        }
-    }
-}
-
-impl From<SerializedComponentBatch> for Values {
-    fn from(batch: SerializedComponentBatch) -> Self {
-        Self::Arrays(vec![batch.array])
     }
 }
 

@@ -6,7 +6,7 @@ use rerun::{
     components::{RotationQuat, Translation3D},
 };
 
-use super::sheet::{Cell, Values};
+use super::values::{Cell, Values};
 
 /// A point as Rerun takes it.
 pub(super) fn single([x, y, z]: [f64; 3]) -> [f32; 3] {
@@ -53,16 +53,13 @@ pub(super) fn solid(capsules: &[Capsule]) -> Capsules3D {
     Capsules3D { translations, quaternions, ..look(capsules) }.with_lengths(capsules.iter().map(Capsule::length))
 }
 
-/// How long they are.
-pub(super) fn lengths(capsules: &[Capsule]) -> Capsules3D {
-    Capsules3D::update_fields().with_lengths(capsules.iter().map(Capsule::length))
-}
-
-/// Where they are.
-pub(super) fn poses(capsules: &[Capsule]) -> Vec<Cell> {
+/// How long they are, and where.
+pub(super) fn shapes(capsules: &[Capsule]) -> Vec<Cell> {
     let translations = capsules.iter().map(|capsule| capsule.translation().0.0).collect();
     let rotations = capsules.iter().map(|capsule| capsule.rotation().0.0).collect();
+    let lengths = capsules.iter().map(Capsule::length).collect();
     vec![
+        (Capsules3D::descriptor_lengths(), Values::Singles(lengths)),
         (Capsules3D::descriptor_translations(), Values::Triples(translations)),
         (Capsules3D::descriptor_quaternions(), Values::Quads(rotations)),
     ]

@@ -6,8 +6,8 @@ use rerun::{Color, ComponentDescriptor, Ellipsoids3D, FillMode, components::Rota
 use super::{
     ellipsoid::{Axes, Ellipsoid, EllipsoidSize},
     model::origins,
-    sheet::{Cell, Values},
     solid::{quaternion, single},
+    values::{Cell, Values},
 };
 use crate::experiment::{JointDescription, ModelReport};
 

@@ -15,6 +15,8 @@
 //!
 //! The criterion adds square metres and square radians. W decides what a radian is worth.
 
+mod slope;
+
 use std::sync::Arc;
 
 use fearless_simd::Level;
@@ -28,6 +30,8 @@ use crate::{
     model::{Layout, Points, State, Workspace, jacobian},
     sensing::Rig,
 };
+
+pub(super) use slope::Slope;
 
 /// How it enters the criterion that not everything is seen.
 #[derive(Clone, Copy, Debug)]

@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 use super::{
     Appraisal, Criterion, Optimality, SelectionError, Sight, Weights,
-    criterion::{in_chunks, points},
+    criterion::{Slope, in_chunks, points},
     prediction::{Predictions, told_apart},
     views::Views,
 };
@@ -178,6 +178,26 @@ impl<'a> Outlook<'a> {
         estimate.appraisal(candidate, self.before, value)
     }
 
+    /// C(θ) of a candidate, and its derivative by every joint's reading (rad or m); `None` where only differences tell it: where not
+    /// everything is seen, something else than points is measured, or by criterion E.
+    pub(super) fn slope(&self, candidate: &[f64]) -> Option<(f64, Vec<f64>)> {
+        let slopes = self.hypotheses.iter().map(|(weight, criterion)| criterion.slope(*weight, candidate));
+        let mut slopes = slopes.collect::<Option<Vec<Slope<'_>>>>()?;
+        let mut gain: f64 = self.hypotheses.iter().zip(&slopes).map(|((weight, _), slope)| weight * slope.gain()).sum();
+        for &(j, k, between) in self.pairs_left() {
+            let (before, rest) = slopes.split_at_mut(k);
+            gain += between * before[j].tell_apart(&mut rest[0], self.rig, between);
+        }
+        let mut gradient = vec![0.0; candidate.len()];
+        slopes.iter().for_each(|slope| slope.add_to(&mut gradient));
+        Some((self.before - gain, gradient))
+    }
+
+    /// Pairs of hypotheses of which it still counts whether they are told apart.
+    fn pairs_left(&self) -> impl Iterator<Item = &(usize, usize, f64)> {
+        self.pairs.iter().filter(|pair| pair.2 > SPENT * self.before)
+    }
+
     fn predictions<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<Predictions> {
         self.hypotheses.iter().map(|(_, criterion)| criterion.predictions(candidates)).collect()
     }
@@ -200,7 +220,7 @@ impl<'a> Outlook<'a> {
             }
             gain += weight * of.chance(index) * gains[index];
         }
-        for &(j, k, between) in self.pairs.iter().filter(|pair| pair.2 > SPENT * self.before) {
+        for &(j, k, between) in self.pairs_left() {
             let told = told_apart(self.rig, &predicted[j], &predicted[k], index);
             gain += between * 0.5 * (predicted[j].chance(index) + predicted[k].chance(index)) * told;
         }
@@ -280,6 +300,47 @@ mod tests {
             let apart = (rival.marker_at(theta) - belief.state.marker_at(theta)).norm();
             assert!(value <= outlook.before());
             assert!(apart < 0.5 || value < 0.01 * outlook.before(), "{apart} m apart: {value}");
+        }
+    }
+
+    /// The derivative by every joint is that of central differences, with and without rivals; criterion E has none.
+    #[test]
+    fn gradients_are_those_of_central_differences() {
+        for (seed, optimality) in
+            (0..12).map(|seed| (seed, [Optimality::A, Optimality::D, Optimality::I][seed as usize % 3]))
+        {
+            let (mut belief, weights, candidates) = case(seed);
+            let workspace = Workspace::from(candidates.clone());
+            if seed % 2 == 1 {
+                let covariance = belief.covariance.as_ref().expect("kept") * 0.01;
+                let moved = |by: f64| DVector::from_element(belief.layout.dimension(), by);
+                belief.alternatives = [0.02, -0.1]
+                    .map(|by| Alternative {
+                        weight: 0.3,
+                        state: belief.state.retract(&belief.layout, &moved(by)),
+                        covariance: covariance.clone(),
+                    })
+                    .to_vec();
+            }
+            let outlook = Outlook::new(&belief, &weights, optimality, &workspace).expect("a covariance");
+            for theta in &candidates[..5] {
+                let (value, gradient) = outlook.slope(theta).expect("of points");
+                let apart = (value - outlook.evaluate(&[theta])[0]).abs();
+                assert!(apart < 1e-10 * outlook.before().abs(), "{seed} {optimality:?}: {value}, {apart:e} apart");
+                for (joint, slope) in gradient.iter().enumerate() {
+                    let moved = [1e-5, -1e-5].map(|step| {
+                        let mut moved = theta.clone();
+                        moved[joint] += step;
+                        moved
+                    });
+                    let values = outlook.evaluate(&moved);
+                    let difference = (values[0] - values[1]) / 2e-5;
+                    let scale = outlook.before().abs() + slope.abs();
+                    assert!((slope - difference).abs() < 1e-5 * scale, "{seed} {optimality:?}: {slope} {difference}");
+                }
+            }
+            let worst = Outlook::new(&belief, &weights, Optimality::E, &workspace).expect("a covariance");
+            assert!(worst.slope(&candidates[0]).is_none());
         }
     }
 

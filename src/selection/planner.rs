@@ -18,7 +18,7 @@ use crate::{
     estimation::Belief,
     kinematics::JointBox,
     model::Workspace,
-    optimize::{Polish, Settings, least, polish},
+    optimize::{Polish, Settings, least, polish_along},
 };
 
 /// How movements are planned.
@@ -268,8 +268,7 @@ impl<'a> Scene<'a> {
                 let pose = plan.remove(0);
                 let found = {
                     let outlook = self.outlook(&plan)?;
-                    let evaluate = |points: &[Vec<f64>]| ground.evaluate(&outlook, &plan.poses, points);
-                    polish(&searched.to_unit(&pose), self.planner.planning.exchange, evaluate).0
+                    ground.polish(&outlook, &plan.poses, &searched.to_unit(&pose), self.planner.planning.exchange).0
                 };
                 let found = searched.from_unit(&found);
                 // On the edge of what is feasible rounding alone may put the pose beyond it.
@@ -302,9 +301,8 @@ impl<'a> Scene<'a> {
         ground.search.get_or_insert(search);
         // What is in view may be too small as well.
         let familiar = ground.familiar.clone();
-        let mut evaluate = |points: &[Vec<f64>]| ground.evaluate(&outlook, &plan.poses, points);
         let polished = starts.into_iter().map(|(_, start)| start).chain(familiar);
-        let best = least(polished.map(|start| polish(&start, planning.polish, &mut evaluate)));
+        let best = least(polished.map(|start| ground.polish(&outlook, &plan.poses, &start, planning.polish)));
         let best = best.map(|(point, value)| (searched.from_unit(&point), value));
         Ok(least(best.into_iter().chain(feasible)).map(|(pose, _)| pose))
     }
@@ -333,6 +331,19 @@ impl<'a> Ground<'a> {
     fn evaluate(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], points: &[Vec<f64>]) -> Vec<f64> {
         let postures: Vec<Vec<f64>> = points.iter().map(|point| self.searched.from_unit(point)).collect();
         self.evaluate_postures(outlook, poses, &postures)
+    }
+
+    /// Descends by the criterion from a point of the unit cube, beside the `poses` of a plan.
+    fn polish(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], start: &[f64], how: Polish) -> (Vec<f64>, f64) {
+        let (scope, searched) = (self.scope, self.searched);
+        // What is not feasible, and what travel costs, only differences tell.
+        let slope = |point: &[f64]| {
+            let free = (!scope.is_constrained()).then(|| searched.from_unit(point));
+            let (value, mut slope) = outlook.slope(&free?)?;
+            slope.iter_mut().zip(searched.joints()).for_each(|(slope, (lower, upper))| *slope *= upper - lower);
+            Some((value, slope))
+        };
+        polish_along(start, how, |points| self.evaluate(outlook, poses, points), slope)
     }
 
     /// The same at postures of the box, rad or m.

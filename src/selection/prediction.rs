@@ -183,6 +183,14 @@ impl Predictions {
     }
 }
 
+/// From this distance on, what two hypotheses are confused by is lost in rounding.
+const FAR_APART: f64 = 40.0;
+
+/// 1 − e^{−B}.
+fn share(distance: f64) -> f64 {
+    if distance > FAR_APART { 1.0 } else { -(-distance).exp_m1() }
+}
+
 /// 1 − e^{−B} of two hypotheses that predict a candidate, with B the Bhattacharyya distance of their readings.
 pub(super) fn told_apart(rig: &Rig, a: &Predictions, b: &Predictions, index: usize) -> f64 {
     let d = a.equations;
@@ -195,10 +203,10 @@ pub(super) fn told_apart(rig: &Rig, a: &Predictions, b: &Predictions, index: usi
         rig.difference(a.reading(index), b.reading(index), &mut difference);
         let difference = Vector3::from(difference);
         let s = Matrix3::from_fn(mean).cholesky();
-        return s.map_or(0.0, |s| -(-0.125 * difference.dot(&s.solve(&difference))).exp_m1());
+        return s.map_or(0.0, |s| share(0.125 * difference.dot(&s.solve(&difference))));
     }
     let mut difference = DVector::zeros(d);
     rig.difference(a.reading(index), b.reading(index), difference.as_mut_slice());
     let s = Cholesky::new(DMatrix::from_fn(d, d, mean));
-    s.map_or(0.0, |s| -(-0.125 * difference.dot(&s.solve(&difference))).exp_m1())
+    s.map_or(0.0, |s| share(0.125 * difference.dot(&s.solve(&difference))))
 }

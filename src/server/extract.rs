@@ -1,5 +1,7 @@
 //! Reads requests, and says what is wrong with them in terms of the request.
 
+use std::sync::Arc;
+
 use axum::{
     body::Bytes,
     extract::{FromRequest, Request},
@@ -8,8 +10,10 @@ use axum::{
 };
 use serde::de::{DeserializeOwned, IgnoredAny, IntoDeserializer};
 
+use tokio::time::timeout;
+
 use super::{
-    MAX_BODY_BYTES,
+    App, Limits,
     problem::{Kind, Problem},
 };
 
@@ -18,29 +22,34 @@ pub(super) struct JsonBody<T>(pub(super) T);
 
 /// What is read from a body. Whatever serde reads is read by [`parse`].
 pub(super) trait FromJson: Sized {
-    fn from_json(bytes: &[u8]) -> Result<Self, Problem>;
+    fn from_json(bytes: &[u8], limits: &Limits) -> Result<Self, Problem>;
 
     /// What is told of a body beyond the limit of its route.
-    fn too_large() -> Problem {
-        Problem::body_too_large(MAX_BODY_BYTES)
+    fn too_large(limits: &Limits) -> Problem {
+        Problem::body_too_large(limits.body_bytes)
     }
 }
 
 impl<T: DeserializeOwned> FromJson for T {
-    fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
+    fn from_json(bytes: &[u8], _: &Limits) -> Result<Self, Problem> {
         parse(bytes)
     }
 }
 
-impl<S: Send + Sync, T: FromJson> FromRequest<S> for JsonBody<T> {
+impl<T: FromJson> FromRequest<Arc<App>> for JsonBody<T> {
     type Rejection = Problem;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+    async fn from_request(request: Request, app: &Arc<App>) -> Result<Self, Problem> {
+        let limits = &app.limits;
         let is_json = is_json(request.headers());
-        let bytes = Bytes::from_request(request, state).await.map_err(|rejection| {
+        let read = timeout(limits.body_timeout, Bytes::from_request(request, app)).await.map_err(|_| {
+            let detail = format!("the body must be there within {} s", limits.body_timeout.as_secs_f64());
+            Problem::new(Kind::BodyTooSlow, detail)
+        })?;
+        let bytes = read.map_err(|rejection| {
             let response = rejection.into_response();
             match response.status() {
-                StatusCode::PAYLOAD_TOO_LARGE => T::too_large(),
+                StatusCode::PAYLOAD_TOO_LARGE => T::too_large(limits),
                 _ => Problem::new(Kind::Malformed, "the body broke off before its end"),
             }
         })?;
@@ -49,7 +58,7 @@ impl<S: Send + Sync, T: FromJson> FromRequest<S> for JsonBody<T> {
             return Err(Problem::new(Kind::UnsupportedMediaType, detail).field("Content-Type"));
         }
         let is_nothing = bytes.is_empty() || bytes.trim_ascii() == b"null";
-        T::from_json(if is_nothing { b"{}" } else { &bytes }).map(Self)
+        T::from_json(if is_nothing { b"{}" } else { &bytes }, limits).map(Self)
     }
 }
 

@@ -12,7 +12,7 @@ use axum::{
 };
 
 use super::{
-    App, FrameAncestor, MAX_BODY_BYTES,
+    App, FrameAncestor,
     problem::{Kind, PROBLEM_JSON, Problem},
     strangers::Reached,
 };
@@ -21,6 +21,9 @@ use super::{
 /// the viewer from calling its makers' telemetry and from loading fonts.
 pub(crate) const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
      style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'";
+
+/// So much is read of what an error that no handler made says.
+const MOST_SAID_BYTES: usize = 64 << 10;
 
 /// The headers of every response.
 #[derive(Clone)]
@@ -57,7 +60,7 @@ pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>, always: Headers)
         .fallback(async |uri: Uri| {
             Problem::new(Kind::UnknownRoute, format!("there is nothing at `{}`; see /v1/openapi.json", uri.path()))
         })
-        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES));
+        .layer(DefaultBodyLimit::max(app.limits.body_bytes));
     // Around the router as a whole: what is wrong with a method is known only there.
     Router::new()
         .fallback_service(router.with_state(app.clone()))
@@ -69,7 +72,11 @@ pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>, always: Headers)
 /// Who has no business here: under a foreign name, without the token, or from a page of another origin, which must neither
 /// change anything nor open a WebSocket.
 async fn refuse_strangers(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
-    let host = request.headers().get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
+    let mut hosts = request.headers().get_all(header::HOST).into_iter();
+    let (Some(host), None) = (hosts.next().and_then(|host| host.to_str().ok()), hosts.next()) else {
+        let detail = "a request has one header `Host`: the name or the address of the server, with its port";
+        return Problem::new(Kind::Malformed, detail).field("Host").into_response();
+    };
     let reached = request.extensions().get::<ConnectInfo<Reached>>().map(|ConnectInfo(reached)| *reached);
     if !app.strangers.are_meant_by(host, reached) {
         let detail = format!("this server does not answer to `{host}`; start it with --allow-host if it is to");
@@ -102,7 +109,7 @@ async fn as_problem(response: Response) -> Response {
         return response;
     }
     let (mut parts, body) = response.into_parts();
-    let said = to_bytes(body, MAX_BODY_BYTES).await.unwrap_or_default();
+    let said = to_bytes(body, MOST_SAID_BYTES).await.unwrap_or_default();
     let said = String::from_utf8_lossy(&said).into_owned();
     let problem = match status {
         StatusCode::METHOD_NOT_ALLOWED => {

@@ -8,25 +8,27 @@
 //! guard     foreign pages, headers, stray errors        assets   the page and Rerun's viewer
 //! aside     work that holds up nobody                    gzip     answers, compressed
 //! strangers who may ask at all                           frame    who may embed the page
+//! connections  how long each may keep us waiting          limits   how much is taken on
 //! ```
 //!
-//! Every session's engine computes on its own thread; the runtime's workers only carry messages and bytes. Memory is
-//! bounded: [`MAX_SESSIONS`] sessions of [`MAX_STEPS_PER_SESSION`] steps, as many with robots elsewhere (the others of them are
-//! in the store), and [`MAX_MEMORY_BYTES`] for the reports and recordings of them all.
+//! Every session's engine computes on its own thread; the runtime's workers only carry messages and bytes. What is taken on,
+//! from connections to memory, is bounded by [`Limits`].
 
 mod api;
 mod aside;
 mod assets;
+mod connections;
 mod extract;
 mod frame;
 mod guard;
 mod gzip;
+mod limits;
 mod problem;
 mod session;
 mod store;
 mod strangers;
 
-use std::{future::IntoFuture, io, net::SocketAddr, path::PathBuf, sync::Arc, time::Duration};
+use std::{io, net::SocketAddr, path::PathBuf, sync::Arc};
 
 use axum::Router;
 use tokio::net::TcpListener;
@@ -34,35 +36,16 @@ use tokio_util::sync::CancellationToken;
 
 pub use api::{Health, Liveness, MadeSteps, ScenarioList, ScenarioResource, SessionList, StepRequest};
 pub(crate) use assets::{INDEX, PageFile, page_files};
+use connections::Connections;
 pub use frame::{FrameAncestor, NoOrigin};
 pub(crate) use guard::CONTENT_SECURITY_POLICY;
+pub use limits::{Limits, raise_descriptors};
 pub use problem::{PROBLEM_JSON, Problem};
 use session::{Budget, Keeping, Sessions};
 pub use session::{NewOutsideSession, NewSession, SessionResource};
-pub use store::{MOST_STORED_SESSIONS, Shown, Store, StoreError, Stored};
+pub use store::{Shown, Store, StoreError, Stored};
+use strangers::Strangers;
 pub use strangers::{HostName, NoHostName, NoToken, Token};
-use strangers::{Reached, Strangers};
-
-use crate::ask_tell::MOST_SETUP_BYTES;
-
-/// How many sessions there are at most. When one more is asked for, one that was idle for [`IDLE_AFTER`] makes room.
-pub const MAX_SESSIONS: usize = 32;
-/// How many steps a session makes at most.
-pub const MAX_STEPS_PER_SESSION: u64 = 100_000;
-/// How many steps one request makes at most.
-pub const MAX_STEPS_PER_REQUEST: u64 = 1000;
-/// What reports and recordings of all sessions may take together; beyond it no session makes steps.
-pub const MAX_MEMORY_BYTES: usize = 2 << 30;
-/// How large a request's body may be.
-pub const MAX_BODY_BYTES: usize = 64 << 10;
-/// How large the body may be that opens a session with a robot elsewhere.
-pub const MAX_SETUP_BODY_BYTES: usize = MOST_SETUP_BYTES + MAX_BODY_BYTES;
-/// After this time without a request and without anyone watching, a session may have to make room for another. One with a
-/// robot elsewhere leaves memory then, and comes back when it is asked for.
-pub const IDLE_AFTER: Duration = Duration::from_secs(15 * 60);
-
-/// How long open connections may take to end at shutdown.
-const DRAIN_WITHIN: Duration = Duration::from_secs(15);
 
 /// How a server is set up.
 #[derive(Clone, Debug, Default)]
@@ -75,8 +58,8 @@ pub struct Options {
     pub token: Option<Token>,
     /// Names under which it is meant, beside those of this machine and the address at which it was reached.
     pub allow_hosts: Vec<HostName>,
-    /// After how much time a session with a robot elsewhere leaves memory; [`IDLE_AFTER`] unless told otherwise.
-    pub sleep_after: Option<Duration>,
+    /// How much it takes on.
+    pub limits: Limits,
     /// A folder with another build of the page's panel than the one that is part of this program, for those who work
     /// on it.
     pub panel_dir: Option<PathBuf>,
@@ -119,6 +102,7 @@ struct App {
     /// The OpenAPI document, as it is sent.
     openapi: bytes::Bytes,
     strangers: Strangers,
+    limits: Limits,
 }
 
 /// A server that is ready to serve.
@@ -144,17 +128,19 @@ impl Server {
             Some(directory) => Store::open(directory)?,
             None => Store::in_memory()?,
         };
+        let limits = options.limits;
         let keeping = Keeping {
-            store,
+            store: store.holding(limits.stored_sessions),
             recordings: options.data_dir.filter(|_| options.keep_recordings),
-            sleep_after: options.sleep_after.unwrap_or(IDLE_AFTER),
+            limits: limits.clone(),
         };
-        let (routes, document) = api::routes();
+        let (routes, document) = api::routes(&limits);
         let app = Arc::new(App {
-            sessions: Sessions::new(Budget::new(MAX_MEMORY_BYTES), keeping, shutdown.clone())?,
+            sessions: Sessions::new(Budget::new(limits.memory_bytes), keeping, shutdown.clone())?,
             assets: assets::Assets::load(options.panel_dir.as_deref())?,
             openapi: document,
             strangers: Strangers::new(options.token, options.allow_hosts, address.port()),
+            limits,
         });
         let router = Router::new().merge(routes).merge(assets::routes(&app.assets));
         let router = guard::layered(router, &app, guard::Headers::new(&options.frame_ancestors));
@@ -162,29 +148,19 @@ impl Server {
     }
 
     /// Serves until it is to end; then ends sessions, so that their recordings are complete, and open streams with them, and
-    /// returns within half a minute at most.
+    /// returns within five seconds, whatever its clients do.
     ///
     /// # Errors
     ///
-    /// [`ServerError`] where the socket fails, and where recordings could not be completed.
+    /// [`ServerError::Incomplete`] where recordings could not be completed.
     pub async fn run(self) -> Result<(), ServerError> {
         let Self { listener, app, router, shutdown } = self;
-        let service = router.into_make_service_with_connect_info::<Reached>();
-        let serving = axum::serve(listener, service).with_graceful_shutdown(shutdown.clone().cancelled_owned());
-        let ending = async {
-            shutdown.cancelled().await;
-            app.sessions.close_all().await;
-            tokio::time::sleep(DRAIN_WITHIN).await;
-        };
-        // Serving ends by itself once all connections have; a connection that does not end is given up.
-        let ended = tokio::select! {
-            ended = serving.into_future() => Some(ended),
-            () = ending => None,
-            () = app.sessions.watch_over() => None,
-        };
-        // Without any connection serving may end before the recordings are complete.
-        let incomplete = app.sessions.close_all().await;
-        ended.unwrap_or(Ok(()))?;
+        let connections = Connections::new(app.limits.clone());
+        tokio::select! {
+            () = connections.serve(listener, router, &shutdown) => {}
+            () = app.sessions.watch_over() => {}
+        }
+        let (incomplete, ()) = tokio::join!(app.sessions.close_all(), connections.end());
         if incomplete.is_empty() { Ok(()) } else { Err(ServerError::Incomplete(incomplete)) }
     }
 }

@@ -17,6 +17,9 @@ use crate::{
 /// Media type of every error.
 pub const PROBLEM_JSON: &str = "application/problem+json";
 
+/// After how many seconds it is worth asking again where there is too much to do.
+pub(super) const RETRY_AFTER_S: u64 = 10;
+
 /// What went wrong (RFC 9457). Optional members are left out where they say nothing.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct Problem {
@@ -66,7 +69,9 @@ pub(super) enum Kind {
     NoConfiguration,
     ChoosesItself,
     BodyTooLarge,
+    BodyTooSlow,
     UnsupportedMediaType,
+    TooManyStreams,
     InvalidValue,
     TooFewStepsLeft,
     EngineFailed,
@@ -107,10 +112,12 @@ impl Kind {
             Self::NothingToShow => (409, urn!("nothing-to-show"), "There is nothing to show yet"),
             Self::NoConfiguration => (409, urn!("no-configuration"), "A person has not chosen the next movement"),
             Self::ChoosesItself => (409, urn!("chooses-itself"), "The learner chooses its movements itself"),
+            Self::BodyTooSlow => (408, urn!("body-too-slow"), "The body did not come in time"),
             Self::BodyTooLarge => (413, urn!("body-too-large"), "The body is too large"),
             Self::UnsupportedMediaType => (415, urn!("unsupported-media-type"), "The body is not JSON"),
             Self::InvalidValue => (422, urn!("invalid-value"), "A value is not valid"),
             Self::TooFewStepsLeft => (422, urn!("too-few-steps-left"), "The session cannot make so many more steps"),
+            Self::TooManyStreams => (429, urn!("too-many-streams"), "Too many follow the session"),
             Self::EngineFailed => (500, urn!("engine-failed"), "The session's engine has failed"),
             Self::Internal => (500, urn!("internal"), "The server has failed"),
             Self::ServerFull => (503, urn!("server-full"), "The server holds as much as it can"),
@@ -272,10 +279,14 @@ impl IntoResponse for Problem {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let body = serde_json::to_vec(&self).unwrap_or_default();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
-        if matches!(status, StatusCode::SERVICE_UNAVAILABLE) {
+        if matches!(status, StatusCode::SERVICE_UNAVAILABLE | StatusCode::TOO_MANY_REQUESTS) {
             // A session that has left memory is back at once.
-            let after = if self.is(Kind::Dormant) { "0" } else { "10" };
-            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static(after));
+            let after = if self.is(Kind::Dormant) { 0 } else { RETRY_AFTER_S };
+            response.headers_mut().insert(header::RETRY_AFTER, after.into());
+        }
+        if matches!(status, StatusCode::REQUEST_TIMEOUT) {
+            // What is still coming is no next request.
+            response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
         }
         if matches!(status, StatusCode::UNAUTHORIZED) {
             response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));

@@ -6,13 +6,11 @@
 use std::{fmt, net::SocketAddr, str::FromStr};
 
 use axum::{
-    extract::{Request, connect_info::Connected},
+    extract::Request,
     http::{HeaderMap, HeaderValue, Method, StatusCode, header},
     response::{IntoResponse, Response},
-    serve::IncomingStream,
 };
 use subtle::ConstantTimeEq;
-use tokio::net::TcpListener;
 
 use super::problem::{Kind, Problem};
 
@@ -99,9 +97,9 @@ impl FromStr for HostName {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reached(Option<SocketAddr>);
 
-impl Connected<IncomingStream<'_, TcpListener>> for Reached {
-    fn connect_info(stream: IncomingStream<'_, TcpListener>) -> Self {
-        Self(stream.io().local_addr().ok())
+impl Reached {
+    pub(super) fn at(address: Option<SocketAddr>) -> Self {
+        Self(address)
     }
 }
 

@@ -154,7 +154,7 @@ async fn foreign_pages_and_host_names() {
 async fn too_many_sessions() {
     let server = Server::start().await;
     let mut sessions = Vec::new();
-    for seed in 0..body_schema::server::MAX_SESSIONS as u64 {
+    for seed in 0..body_schema::server::Limits::default().sessions as u64 {
         sessions.push(server.open_quick(seed).await);
     }
     let one_more = json!({ "scenario": "arm-6dof", "learners": ["random"] });

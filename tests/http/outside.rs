@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use body_schema::{
     ask_tell::{Ask, Session, Setup},
-    server::Options,
+    server::{Limits, Options},
 };
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
@@ -363,8 +363,9 @@ async fn nobody_waits_for_the_planning_of_another() {
 #[tokio::test]
 async fn sessions_outlive_the_server_and_leave_memory_meanwhile() {
     let folder = tempfile::tempdir().expect("a folder");
-    let options = |sleep_after| Options { data_dir: Some(folder.path().to_owned()), sleep_after, ..Options::default() };
-    let server = Server::with(options(Some(Duration::from_millis(30)))).await;
+    let options = |limits| Options { data_dir: Some(folder.path().to_owned()), limits, ..Options::default() };
+    let brief = Limits { idle_after: Duration::from_millis(30), ..Limits::default() };
+    let server = Server::with(options(brief)).await;
     let session = server.open(robot::opening()).await;
     let asked = posted(&server, &format!("{session}/suggestions"), json!({ "count": 2 })).await;
     tell(&server, &session, 0..3).await;
@@ -379,7 +380,7 @@ async fn sessions_outlive_the_server_and_leave_memory_meanwhile() {
     let simulated = server.open_quick(1).await;
     server.stop().await;
 
-    let server = Server::with(options(None)).await;
+    let server = Server::with(options(Limits::default())).await;
     let listed = server.get_json("/v1/sessions").await;
     assert_eq!(listed["sessions"].as_array().expect("a list").len(), 1);
     assert_eq!((&listed["sessions"][0]["id"], &listed["sessions"][0]["step"]), (&before["id"], &json!(3)));
@@ -391,7 +392,7 @@ async fn sessions_outlive_the_server_and_leave_memory_meanwhile() {
     server.delete(&session).await;
     server.stop().await;
 
-    let server = Server::with(options(None)).await;
+    let server = Server::with(options(Limits::default())).await;
     assert_eq!(server.get_json("/v1/sessions").await, json!({ "sessions": [] }));
     server.stop().await;
 }

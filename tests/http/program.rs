@@ -20,15 +20,20 @@ pub struct Program {
 }
 
 impl Program {
-    fn serve(environment: &[(&str, &str)]) -> Self {
+    fn serve(environment: &[(&str, &str)], arguments: &[&str]) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_body-schema"));
-        command.args(["serve", "--bind", "127.0.0.1:0", "--ephemeral"]).envs(environment.iter().copied());
-        Self::start(&mut command)
+        command.args(["serve", "--bind", "127.0.0.1:0", "--ephemeral"]).args(arguments);
+        Self::start(command.envs(environment.iter().copied()))
     }
 
     /// That keeps nothing.
     pub fn ephemeral() -> Self {
-        Self::serve(&[])
+        Self::with(&[])
+    }
+
+    /// The same with further arguments.
+    pub fn with(arguments: &[&str]) -> Self {
+        Self::serve(&[], arguments)
     }
 
     /// That keeps its sessions in a folder.
@@ -69,9 +74,19 @@ impl Program {
 
     /// Asks it to end. Tells its exit code, and what it said on the way.
     #[cfg(unix)]
-    pub fn terminate(mut self) -> (Option<i32>, String) {
+    pub fn terminate(self) -> (Option<i32>, String) {
+        self.signal("TERM");
+        self.end()
+    }
+
+    #[cfg(unix)]
+    pub fn signal(&self, name: &str) {
         let id = self.id().to_string();
-        assert!(Command::new("kill").args(["-TERM", &id]).status().expect("kill").success());
+        assert!(Command::new("kill").args([&format!("-{name}"), &id]).status().expect("kill").success());
+    }
+
+    /// Waits for its end.
+    pub fn end(mut self) -> (Option<i32>, String) {
         let mut said = String::new();
         self.output.read_to_string(&mut said).expect("text");
         self.process.stderr.take().expect("its errors").read_to_string(&mut said).expect("text");
@@ -99,7 +114,7 @@ impl Drop for Program {
 async fn sessions_leave_no_threads_behind() {
     /// Workers come and go; one thread left behind by each session would be 150.
     const MARGIN: usize = 8;
-    let program = Program::serve(&[]);
+    let program = Program::ephemeral();
     let open_and_delete = async || {
         let session = program.api.open(json!({ "scenario": "arm-6dof", "learners": ["random"] })).await;
         program.api.step(&session, 1).await;
@@ -119,7 +134,7 @@ async fn sessions_leave_no_threads_behind() {
 /// Rerun's own switch is for programs that log on the side; a session is asked for.
 #[tokio::test]
 async fn sessions_are_recorded_although_reruns_switch_is_off() {
-    let program = Program::serve(&[("RERUN", "off")]);
+    let program = Program::serve(&[("RERUN", "off")], &[]);
     let session = program.api.open_quick(1).await;
     assert_eq!(steps(&program.api.step(&session, 2).await["reports"]), [1, 2]);
     let recording = program.api.get(&format!("{session}/recording.rrd")).await.bytes().await.expect("a recording");

@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeSet, io::Cursor};
 
+use body_schema::server::{Limits, Options};
 use futures_util::{SinkExt, StreamExt};
 use re_log_encoding::DecoderApp;
 use reqwest::Method;
@@ -217,9 +218,12 @@ async fn the_websocket_carries_reports_and_recording_and_resumes() {
 async fn whoever_is_far_behind_gets_parts_put_together() {
     let server = Server::start().await;
     let session = server.open_quick(1).await;
+    // Somebody watches, so that each step is written at once.
+    let early = server.get(&format!("{session}/live.rrd")).await;
     for _ in 0..30 {
         server.step(&session, 1).await;
     }
+    drop(early);
     // A download completes the recording: nothing is left for a quiet moment, which might be now.
     assert!(server.get(&format!("{session}/recording.rrd")).await.status().is_success());
     // A late visitor: header, one part, the index of the next, and then every report.
@@ -259,7 +263,9 @@ async fn whoever_is_far_behind_gets_parts_put_together() {
 
 #[tokio::test]
 async fn a_client_that_does_not_read_holds_nobody_up() {
-    let server = Server::start().await;
+    // However slow this machine is, it is not given up.
+    let limits = Limits { write_timeout: 10 * SOON, ..Limits::default() };
+    let server = Server::with(Options { limits, ..Options::default() }).await;
     let session = server.open_quick(1).await;
     let mut slow = follow(&server, &session, "").await;
     // More than the buffers between the two hold.

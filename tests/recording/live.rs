@@ -3,6 +3,7 @@
 use std::fs;
 
 use body_schema::recording::{LiveLog, Recorder, Target, Theme};
+use futures_util::FutureExt;
 
 use crate::{
     checks::check,
@@ -29,6 +30,26 @@ fn a_page_with_curves_of_its_own_takes_the_scene_alone() {
     assert!(views(&whole[place]) > 0 && views(&scene[place]) == 0);
     assert_eq!(live.scene_parts_from(place)[0], scene[place]);
     assert_eq!(live.scene_parts_from(place + 1), live.parts_from(place + 1));
+}
+
+#[test]
+fn steps_wait_as_long_as_nobody_follows() {
+    let (description, reports) = run("arm-6dof", 2);
+    let live = LiveLog::new();
+    let mut recorder = Recorder::new(&description, Target::live(live.clone())).unwrap();
+    recorder.log(&reports[0]).unwrap();
+    assert!(!live.is_behind() && live.may_wait() && live.is_behind());
+    // Whoever comes now waits until it has caught up.
+    let follower = live.subscribe();
+    assert_eq!(live.caught_up().now_or_never(), None);
+    recorder.flush_shown().unwrap();
+    assert_eq!(live.caught_up().now_or_never(), Some(()));
+    assert!(!live.may_wait(), "somebody follows");
+    drop(follower);
+    assert!(live.may_wait());
+    // What is closed has all that it will ever have.
+    drop(recorder);
+    assert_eq!(live.caught_up().now_or_never(), Some(()));
 }
 
 #[test]
@@ -122,7 +143,7 @@ fn a_step_is_said_to_be_complete_when_all_of_it_has_come() {
     }
     // So it is for those who take many parts at once.
     let together = live.put_together(&live.parts_from(1)).unwrap();
-    let entities: Vec<String> = reading::entities_in_order(&[live.header(), together].concat());
+    let entities: Vec<String> = reading::entities_in_order(&[vec![live.header()], together].concat().concat());
     assert_eq!(entities.iter().position(|entity| entity == "/complete"), Some(entities.len() - 1));
 }
 

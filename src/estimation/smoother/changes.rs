@@ -8,12 +8,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{HypothesisSettings, KEPT, Smoother, mode::Effort};
+use super::{CALM, HypothesisSettings, KEPT, Smoother, mode::Effort};
 use crate::{
     estimation::{Estimator, Update},
     kinematics::{Joint, Line},
     model::{Layout, Prior, State, laws::random_arm},
-    sensing::{Observation, Rig},
+    sensing::{Loss, Observation, Rig},
 };
 
 const JOINTS: usize = 4;
@@ -109,6 +109,29 @@ fn compression_keeps_the_answer() {
         assert!(moved.dot(&(&mode.information * &moved)) < 0.04, "seed {seed}");
         let whitened: DMatrix<f64> = belief.covariance.as_ref().expect("kept") * &mode.information;
         assert!((whitened.trace() / whitened.nrows() as f64 - 1.0).abs() < 0.02, "seed {seed}");
+        assert!(run.error() < 6.0, "seed {seed}: {}", run.error());
+    }
+}
+
+/// However many outliers there were, the readings that are looked at one by one stay few, and no other hypothesis is searched
+/// for any more.
+#[test]
+fn outliers_do_not_pile_up() {
+    for seed in 1001..1004 {
+        let mut run = Run::new(seed);
+        run.smoother = run.smoother.with_loss(Loss::MIXTURE);
+        for index in 0..500 {
+            let theta = run.posture();
+            let sigma = if index % 5 == 4 { 50.0 * SIGMA } else { SIGMA };
+            let noise = Vector3::from_fn(|_, _| sigma * run.rng.sample::<f64, _>(StandardNormal));
+            let seen = Observation::seen(run.truth.marker_at(&theta) + noise);
+            let update = run.smoother.update(&theta, &seen).expect("an update");
+            if index >= 100 {
+                let kept = run.smoother.posterior.measurements.len();
+                assert!(!update.change_noticed && kept <= KEPT, "seed {seed}: {kept} after {index}");
+                assert!(run.smoother.hypotheses.calm >= CALM, "seed {seed}: searched anew after {index}");
+            }
+        }
         assert!(run.error() < 6.0, "seed {seed}: {}", run.error());
     }
 }

@@ -178,10 +178,15 @@ fn backward<S: Simd>(simd: S, n: usize, l: &[f64], x: &mut [f64]) {
         let lanes = index / WIDTH * WIDTH;
         let own = x[index];
         x[index] = 0.0;
-        let mut sum = f64x4::splat(simd, 0.0);
-        for (x, column) in x[lanes..].chunks_exact(WIDTH).zip(column[lanes..].chunks_exact(WIDTH)) {
-            sum = f64x4::from_slice(simd, column).mul_add(f64x4::from_slice(simd, x), sum);
+        // In turn, that none waits for itself.
+        let mut sums = [f64x4::splat(simd, 0.0); 4];
+        for (x, column) in x[lanes..].chunks(4 * WIDTH).zip(column[lanes..].chunks(4 * WIDTH)) {
+            let pairs = x.chunks_exact(WIDTH).zip(column.chunks_exact(WIDTH));
+            for ((x, column), sum) in pairs.zip(&mut sums) {
+                *sum = f64x4::from_slice(simd, column).mul_add(f64x4::from_slice(simd, x), *sum);
+            }
         }
+        let sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
         let found: f64 = sum.as_slice().iter().sum();
         x[index] = (own - found) / column[index];
     }

@@ -4,7 +4,7 @@
 use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
 use nalgebra::{DMatrix, DVector};
 
-use crate::lanes::{Lanes, load, splat};
+use crate::lanes::{self, Lanes, load, splat};
 
 /// Columns of a tile: each number that is read serves several products.
 const ACROSS: usize = 4;
@@ -57,12 +57,11 @@ fn squares<S: Simd>(simd: S, rows: &[f64], length: usize, sums: &mut DMatrix<f64
                     }
                 }
             }
-            for (i, tile) in tile.iter().enumerate() {
-                for (j, sum) in tile.iter().enumerate() {
-                    let (row, column) = (left + i, right + j);
-                    if row <= column && column < m {
-                        sums[(row, column)] += sum.as_slice().iter().sum::<f64>();
-                    }
+            let [a, b, c, d] = tile;
+            let found = lanes::sums::<S>([a[0], b[0], c[0], d[0], a[1], b[1], c[1], d[1]]);
+            for (column, found) in (right..m).zip(found.chunks_exact(ACROSS)) {
+                for (row, found) in (left..=column).zip(found) {
+                    sums[(row, column)] += found;
                 }
             }
         }

@@ -46,7 +46,8 @@ const NEGLIGIBLE: f64 = 1e-5;
 const HOPELESS: f64 = 40.0;
 
 const WARM: Effort = Effort { steps: 30, tolerance: 1e-6, hopeless: f64::INFINITY };
-const COLD: Effort = Effort { steps: 40, tolerance: 1e-4, hopeless: f64::INFINITY };
+/// What is found is followed after the next measurement: until then its share of the evidence is known to a hundredth.
+const COLD: Effort = Effort { steps: 40, tolerance: 1e-2, hopeless: f64::INFINITY };
 
 impl Hypotheses {
     /// Searches every mode again after the posterior has changed.
@@ -59,7 +60,7 @@ impl Hypotheses {
     /// half of these suspect some of the readings: they begin where all others are explained.
     pub fn spawn(&mut self, count: usize, posterior: &Posterior, layout: &Layout, rng: &mut impl Rng) {
         let best = self.modes.iter().map(|mode| mode.cost).fold(f64::INFINITY, f64::min);
-        let effort = Effort { hopeless: (best + HOPELESS) * 10.0 + 1e3, ..COLD };
+        let effort = Effort { hopeless: best + 2.0 * HOPELESS, ..COLD };
         let before = self.modes.len();
         // All that is drawn is drawn before the first search, so that these may be in any order.
         let searches: Vec<(Option<Posterior>, State)> = (0..count)

@@ -270,12 +270,18 @@ impl Smoother {
         equations >= 2.0 * m as f64 || (equations >= m as f64 && self.posterior.rank(state, layout) >= m)
     }
 
-    /// Whether the data cost of the heaviest hypothesis is what noise alone explains, 2E ~ χ² with as many degrees of
-    /// freedom as equations at most: within five standard deviations.
+    /// Whether what the heaviest hypothesis leaves of normal readings is what noise alone explains, Σ w ‖r‖² ~ χ² with Σ w d degrees
+    /// of freedom at most: within five standard deviations.
+    ///
+    /// An outlier says nothing here: it is weighed down until its square is as large as that of a normal reading, but it is no
+    /// equation, and among many readings that would be taken for a misfit. Nor do readings that have settled, which were
+    /// explained when they did.
     fn explains(&self) -> bool {
-        let (state, layout) = (&self.belief.state, &self.belief.layout);
-        let degrees = self.posterior.equations(state, layout);
-        let cost = 2.0 * self.posterior.misfit(state, layout);
+        let normal = self.posterior.readings(&self.belief.state).filter(|reading| reading.weight > 0.5);
+        let (cost, degrees) = normal.fold((0.0, 0.0), |(cost, degrees), reading| {
+            let (squared, equations) = (reading.residual_sigmas.powi(2), reading.equations as f64);
+            (cost + reading.weight * squared, degrees + reading.weight * equations)
+        });
         cost <= degrees + 5.0 * (2.0 * degrees).sqrt()
     }
 }

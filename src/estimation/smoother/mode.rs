@@ -35,7 +35,8 @@ pub(super) struct Effort {
     pub steps: usize,
     /// It has converged when a step promises to lower the cost by less than this.
     pub tolerance: f64,
-    /// It is given up when, half way through, the cost is still above this.
+    /// It is given up when the cost would stay above this even if every step that is left lowered it by as much as the next one
+    /// promises.
     pub hopeless: f64,
 }
 
@@ -95,7 +96,9 @@ impl Posterior {
     /// The local minimum reached from where `others`, some of the measurements, are explained by least squares.
     pub fn mode_through(&self, others: &Self, start: &State, layout: &Layout, effort: Effort) -> Option<Mode> {
         let least_squares = Graduated { loss: self.loss, width: f64::INFINITY };
-        let (state, _) = others.descend(least_squares, start, layout, effort)?;
+        // By least squares what is still no outlier may cost much.
+        let patient = Effort { hopeless: effort.hopeless * 10.0 + 1e3, ..effort };
+        let (state, _) = others.descend(least_squares, start, layout, patient)?;
         self.mode(&state, layout, effort)
     }
 
@@ -105,25 +108,28 @@ impl Posterior {
         let mut normal = self.normal_by(loss, &state, layout, &mut room)?;
         let (mut lambda, mut growth) = (1e-3, 2.0);
         for step in 0..effort.steps {
-            if step == effort.steps / 2 && normal.cost > effort.hopeless {
-                return None;
-            }
             let mut delta = Factor::new(self.level, &normal.information, lambda)?.solve(&normal.descent);
-            let length = length(&delta, layout);
+            // With D = diag Λ, Λ δ = descent − λ D δ; of a shortened step δ/l accordingly.
+            let slope = delta.dot(&normal.descent);
+            let damped = delta.iter().zip(normal.information.diagonal().iter()).map(|(x, d)| d * x * x).sum::<f64>();
+            let length = length(&delta, layout).max(1.0);
+            let predicted = slope / length - 0.5 * (slope - lambda * damped) / (length * length);
             if length > 1.0 {
                 delta /= length;
             }
-            let predicted = delta.dot(&normal.descent) - 0.5 * delta.dot(&(&normal.information * &delta));
-            if !predicted.is_finite() {
+            let left = (effort.steps - step) as f64;
+            let is_hopeless = normal.cost.is_finite() && normal.cost - left * predicted > effort.hopeless;
+            if is_hopeless || !predicted.is_finite() {
                 return None;
             }
             let mut next = state.retract(layout, &delta);
             next.slide_towards(&self.pins);
-            let cost = self.cost_by(loss, &next, layout, &mut room);
-            let ratio = (normal.cost - cost) / predicted;
-            if ratio > 0.0 {
-                state = next;
-                normal = self.normal_by(loss, &state, layout, &mut room)?;
+            // Hardly any step is refused, so that what it costs is not asked beforehand. Outside the chart of settled measurements
+            // none is taken.
+            let found = self.normal_by(loss, &next, layout, &mut room);
+            let ratio = found.as_ref().map_or(f64::NEG_INFINITY, |found| (normal.cost - found.cost) / predicted);
+            if let Some(found) = found.filter(|_| ratio > 0.0) {
+                (state, normal) = (next, found);
                 lambda = (lambda * (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0)).max(1e-9);
                 growth = 2.0;
             } else {

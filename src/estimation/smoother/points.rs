@@ -33,21 +33,6 @@ fn emptied(numbers: &mut Vec<f64>, count: usize) -> &mut [f64] {
 }
 
 impl Posterior {
-    /// What all readings cost.
-    pub(super) fn cost_of_points(&self, loss: Graduated, points: &Points, room: &mut Room) -> f64 {
-        let readings = emptied(&mut room.readings, points.equations() * TOGETHER);
-        let mut cost = 0.0;
-        for measurements in self.measurements.chunks(TOGETHER) {
-            dispatch!(self.level, simd => points.readings(simd, measurements, readings));
-            for (seen, predicted) in measurements.iter().zip(readings.chunks_exact(points.equations())) {
-                self.rig.residuals_of(predicted, &seen.observation, |channel, whitened| {
-                    cost += loss.cost(self.squared(channel, whitened), whitened.len());
-                });
-            }
-        }
-        cost
-    }
-
     /// Adds Σ w HᵀH/s² and Σ w Hᵀr/s² of all readings, and returns what they cost.
     pub(super) fn add_points(
         &self,

@@ -187,36 +187,21 @@ impl Posterior {
         self.noises(channel).map(|(noise, part)| norm_squared(&whitened[part]) / self.scales[noise].powi(2)).sum()
     }
 
-    /// E(x); infinite where x is too far from where settled measurements were linearised. Axes are written with their
-    /// points nearest to the pins.
+    /// E(x), reading by reading; infinite where x is too far from where settled measurements were linearised. Axes are written
+    /// with their points nearest to the pins.
     #[cfg(test)]
     pub fn cost(&self, state: &State, layout: &Layout) -> f64 {
-        self.cost_by(self.loss.into(), state, layout, &mut Room::default())
-    }
-
-    /// The same by another loss.
-    pub fn cost_by(&self, loss: Graduated, state: &State, layout: &Layout, room: &mut Room) -> f64 {
-        let errors = match self.points(state, layout) {
-            Some(points) => self.cost_of_points(loss, &points, room),
-            None => self.cost_of_readings(loss, state),
-        };
-        let settled = self.settled.as_ref().map_or(0.0, |settled| {
-            settled.state.local(layout, state).map_or(f64::INFINITY, |delta| {
-                let of = settled.noises.iter().zip(&self.scales);
-                settled.excess + of.map(|(of, scale)| of.misfit_at(&delta) / (scale * scale)).sum::<f64>()
-            })
-        });
-        self.prior.cost(state, None) + errors + settled
-    }
-
-    fn cost_of_readings(&self, loss: Graduated, state: &State) -> f64 {
-        let mut cost = 0.0;
+        let (loss, mut cost) = (Graduated::from(self.loss), self.prior.cost(state, None));
         for seen in &self.measurements {
             self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
                 cost += loss.cost(self.squared(channel, whitened), whitened.len());
             });
         }
-        cost
+        let Some(settled) = &self.settled else { return cost };
+        settled.state.local(layout, state).map_or(f64::INFINITY, |delta| {
+            let of = settled.noises.iter().zip(&self.scales);
+            cost + settled.excess + of.map(|(of, scale)| of.misfit_at(&delta) / (scale * scale)).sum::<f64>()
+        })
     }
 
     /// By kind of noise, how well the data are fitted at `state`: for one that is as assumed `squared` is χ² distributed with
@@ -243,6 +228,7 @@ impl Posterior {
     }
 
     /// The part of the cost at `state` that is due to normal readings: twice it is χ² distributed at the truth.
+    #[cfg(test)]
     pub fn misfit(&self, state: &State, layout: &Layout) -> f64 {
         self.fit(state, layout).iter().zip(&self.scales).map(|(fit, scale)| 0.5 * fit.squared / (scale * scale)).sum()
     }

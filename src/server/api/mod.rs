@@ -24,7 +24,7 @@ use axum::{
 use serde::Serialize;
 use serde_json::json;
 use utoipa::{
-    OpenApi, ToSchema,
+    IntoResponses, OpenApi, ToSchema,
     openapi::{RefOr, extensions::ExtensionsBuilder},
 };
 use utoipa_axum::{
@@ -36,7 +36,7 @@ pub use scenarios::{ScenarioList, ScenarioResource};
 pub use sessions::{MadeSteps, SessionList, StepRequest};
 
 use super::{
-    App, MAX_SETUP_BODY_BYTES,
+    App, Limits,
     aside::aside,
     problem::{Kind, PROBLEM_JSON, Problem},
 };
@@ -86,11 +86,11 @@ pub enum Liveness {
 struct Document;
 
 /// All routes, and the document that describes them.
-pub(super) fn routes() -> (Router<Arc<App>>, Bytes) {
+pub(super) fn routes(limits: &Limits) -> (Router<Arc<App>>, Bytes) {
     let (router, mut document) = OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(scenarios::list))
         .routes(routes!(scenarios::get))
-        .routes(routes!(sessions::list, sessions::create).layer(DefaultBodyLimit::max(MAX_SETUP_BODY_BYTES)))
+        .routes(routes!(sessions::list, sessions::create).layer(DefaultBodyLimit::max(limits.setup_body_bytes())))
         .routes(routes!(sessions::get, sessions::delete))
         .routes(routes!(sessions::step))
         .routes(routes!(choices::selection))
@@ -130,7 +130,7 @@ fn describe_what_holds_for_all(document: &mut utoipa::openapi::OpenApi) {
     for item in document.paths.paths.values_mut() {
         for operation in [&mut item.get, &mut item.post, &mut item.put, &mut item.delete].into_iter().flatten() {
             let described = &mut operation.responses.responses;
-            for (status, refusal) in refusals::of_all() {
+            for (status, refusal) in refusals::OfAll::responses() {
                 described.entry(status).or_insert(refusal);
             }
             for (_, response) in described.iter_mut().filter(|(status, _)| status.starts_with(['4', '5'])) {

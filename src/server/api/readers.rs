@@ -8,10 +8,10 @@ use tokio::sync::watch;
 
 use crate::{
     recording::LiveLog,
-    server::session::{Kept, Session, Watching},
+    server::session::{Kept, Session, Together, Watching},
 };
 
-/// How many reports are taken from the history at a time.
+/// How many reports are taken from the history, and parts from the recording, at a time.
 const BATCH: usize = 64;
 
 /// Reads reports from an index on.
@@ -59,17 +59,21 @@ impl Reports {
     }
 }
 
+/// Reads so many parts at most.
+type Read = fn(&LiveLog, usize, usize) -> Vec<Bytes>;
+
 /// Reads parts of the recording from an index on.
 pub(super) struct Parts {
     session: Watching,
-    read: fn(&LiveLog, usize) -> Vec<Bytes>,
+    read: Read,
     next: usize,
     more: watch::Receiver<usize>,
 }
 
 impl Parts {
-    pub(super) fn new(session: &Arc<Session>, first: u64, read: fn(&LiveLog, usize) -> Vec<Bytes>) -> Self {
+    pub(super) fn new(session: &Arc<Session>, first: u64, read: Read) -> Self {
         let more = session.live().subscribe();
+        session.show();
         Self { next: usize::try_from(first).unwrap_or(usize::MAX), more, read, session: session.watch() }
     }
 
@@ -89,9 +93,9 @@ impl Parts {
         }
     }
 
-    /// Those that are there already.
+    /// Those that are there already, or some of them.
     pub(super) fn ready(&mut self) -> Vec<Bytes> {
-        let batch = (self.read)(self.session.live(), self.next);
+        let batch = (self.read)(self.session.live(), self.next, BATCH);
         self.next += batch.len();
         batch
     }
@@ -101,9 +105,21 @@ impl Parts {
         self.next
     }
 
-    /// The log that it reads.
-    pub(super) fn live(&self) -> &LiveLog {
-        self.session.live()
+    /// How many there are so far.
+    pub(super) fn published(&self) -> usize {
+        self.session.live().len()
+    }
+
+    /// The recording from its beginning in few parts, after which this goes on with what has come since; `None` if it was not at
+    /// the beginning, or there are not many.
+    pub(super) async fn together(&mut self) -> Option<(Bytes, Arc<Together>)> {
+        if self.next > 0 {
+            return None;
+        }
+        // One by one they are as good.
+        let together = self.session.together().await.ok().flatten()?;
+        self.next = together.next;
+        Some((self.session.live().header(), together))
     }
 }
 

@@ -11,6 +11,20 @@ use super::JSON;
 
 type Refusals = BTreeMap<String, RefOr<Response>>;
 
+/// Of every route, by what holds for every request.
+pub(super) struct OfAll;
+
+impl IntoResponses for OfAll {
+    fn responses() -> Refusals {
+        described(&[
+            ("400", "The request cannot be read: its address, a parameter or a header"),
+            ("401", "The server answers only those who carry its token"),
+            ("403", "The request is meant for another host, or comes from a foreign page"),
+            ("503", "The server has as much to do as it can"),
+        ])
+    }
+}
+
 /// Of a route with a body.
 pub(super) struct OfBodies;
 
@@ -18,9 +32,19 @@ impl IntoResponses for OfBodies {
     fn responses() -> Refusals {
         described(&[
             ("403", "The request comes from a foreign page"),
+            ("408", "The body did not come in time"),
             ("413", "The body is too large"),
             ("415", "The body is not said to be JSON"),
         ])
+    }
+}
+
+/// Of a stream.
+pub(super) struct OfStreams;
+
+impl IntoResponses for OfStreams {
+    fn responses() -> Refusals {
+        described(&[("429", "As many follow the session as may")])
     }
 }
 
@@ -49,15 +73,6 @@ impl IntoResponses for OfRobots {
             ("503", "The server's memory is full, or it is shutting down"),
         ])
     }
-}
-
-/// Of every route, whatever it does.
-pub(super) fn of_all() -> Refusals {
-    described(&[
-        ("400", "The request cannot be read: its address, a parameter or a header"),
-        ("401", "The server answers only those who carry its token"),
-        ("403", "The request is meant for another host, or comes from a foreign page"),
-    ])
 }
 
 /// Problems, by their status.

@@ -18,7 +18,7 @@ use crate::{
     experiment::StepReport,
     recording::MOST_FRAMES,
     server::{
-        App, MAX_BODY_BYTES, MAX_SETUP_BODY_BYTES, MAX_STEPS_PER_REQUEST,
+        App, Limits,
         extract::{FromJson, JsonBody, parse},
         problem::{Kind, Problem},
         session::{NewOutsideSession, NewSession, SessionResource},
@@ -28,6 +28,9 @@ use crate::{
 
 /// A request draws at most so many postures on the way: each takes some kilobytes of the session's memory.
 const MAX_FRAMES_PER_REQUEST: u64 = 1000;
+
+/// So many reports are put together at once; of more, aside.
+const FEW_REPORTS: usize = 16;
 
 /// All sessions.
 #[derive(Clone, Debug, Serialize, ToSchema)]
@@ -105,7 +108,7 @@ pub(super) enum Opening {
 }
 
 impl FromJson for Opening {
-    fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
+    fn from_json(bytes: &[u8], limits: &Limits) -> Result<Self, Problem> {
         #[derive(Deserialize)]
         struct Which {
             world: Option<IgnoredAny>,
@@ -114,13 +117,13 @@ impl FromJson for Opening {
         let is_outside = serde_json::from_slice(bytes).is_ok_and(|Which { world }| world.is_some());
         match is_outside {
             true => parse(bytes).map(Self::Outside),
-            false if bytes.len() > MAX_BODY_BYTES => Err(Problem::body_too_large(MAX_BODY_BYTES)),
+            false if bytes.len() > limits.body_bytes => Err(Problem::body_too_large(limits.body_bytes)),
             false => parse(bytes).map(Self::Scenario),
         }
     }
 
-    fn too_large() -> Problem {
-        Problem::body_too_large(MAX_SETUP_BODY_BYTES).field("calibration")
+    fn too_large(limits: &Limits) -> Problem {
+        Problem::body_too_large(limits.setup_body_bytes()).field("calibration")
     }
 }
 
@@ -217,8 +220,9 @@ pub(super) async fn step(
     JsonBody(StepRequest { count, expected_step, frames, reports }): JsonBody<StepRequest>,
 ) -> Result<Response, Problem> {
     let session = app.sessions.get(&id).await?;
-    if !(1..=MAX_STEPS_PER_REQUEST).contains(&count) {
-        let detail = format!("`count` must be from 1 to {MAX_STEPS_PER_REQUEST}, not {count}");
+    let most = app.limits.steps_per_request;
+    if !(1..=most).contains(&count) {
+        let detail = format!("`count` must be from 1 to {most}, not {count}");
         return Err(Problem::new(Kind::InvalidValue, detail).field("count"));
     }
     if frames > MOST_FRAMES {
@@ -236,5 +240,7 @@ pub(super) async fn step(
     let made = session.make_steps(count, expected_step, frames).await?;
     let step = made.last().map_or(session.step(), |report| report.step);
     let reports = if reports { made.into_iter().map(|report| report.json).collect() } else { Vec::new() };
-    json(MadeSteps { step, remaining: session.resource().remaining, reports }).await
+    let made = MadeSteps { step, remaining: session.remaining(), reports };
+    // Reports are written already, and few are soon put together.
+    if made.reports.len() <= FEW_REPORTS { Ok(Json(made).into_response()) } else { json(made).await }
 }

@@ -17,24 +17,33 @@ use axum::{
 use futures_util::{Stream, stream::unfold};
 use serde::Serialize;
 use serde_json::value::RawValue;
-use tokio::sync::watch;
+use tokio::{sync::watch, time::sleep};
 use utoipa::ToSchema;
 
-use super::readers::{Parts, Reports};
+use super::{
+    readers::{Parts, Reports},
+    refusals::OfStreams,
+};
 use crate::{
     experiment::{Description, StepReport},
     recording::LiveLog,
     server::{
         App, extract,
         problem::Problem,
-        session::{Kept, Standing},
+        session::{Following, Kept, Standing},
     },
 };
 
-/// From so many waiting parts on, a WebSocket gets them put together: a viewer takes some dozens a frame.
-const MANY_PARTS: usize = 200;
 /// Silence after which a comment or a ping shows that the connection still stands.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
+/// How long a client may take to hear that its session has ended.
+const END_WITHIN: Duration = Duration::from_secs(1);
+/// What a WebSocket holds of what it writes, beyond the message that it is at …
+const WRITE_BUFFER_BYTES: usize = 8 << 10;
+/// … and with it. No message comes near that: parts have one row, or some 256 KiB.
+const MOST_BUFFERED_BYTES: usize = 64 << 20;
+/// Clients have nothing to say; what they say must not fill the memory.
+const READ_BUFFER_BYTES: usize = 1 << 10;
 /// Why the WebSocket was closed: the session was deleted …
 const CLOSE_DELETED: u16 = 4404;
 /// … or its history was rewritten, so that whoever follows it begins anew …
@@ -56,7 +65,7 @@ pub(super) enum LiveEvent {
     /// One for each step, from the one asked for on.
     #[schema(value_type = StepReport)]
     Step(#[serde(serialize_with = "report")] Arc<RawValue>),
-    /// After several parts of the recording were sent as one: which part is the next, to resume from.
+    /// After parts of the recording that were put together: from which part on to resume.
     Parts {
         /// Its index.
         next: usize,
@@ -81,6 +90,7 @@ fn report<S: serde::Serializer>(report: &Arc<RawValue>, serializer: S) -> Result
             body = String, content_type = "text/event-stream"),
         (status = 400, description = "Last-Event-ID is not a step", body = Problem),
         (status = 404, description = "There is no such session", body = Problem),
+        OfStreams,
     )
 )]
 pub(super) async fn events(
@@ -90,7 +100,9 @@ pub(super) async fn events(
 ) -> Result<Response, Problem> {
     let session = app.sessions.get(&id).await?;
     let first = extract::last_event_id(&headers)?.map_or(0, |last| last.saturating_add(1));
-    let events = unfold((Reports::new(&session, first), Vec::new().into_iter()), |(mut reports, mut batch)| async {
+    let following = session.follow(app.limits.streams_per_session)?;
+    let reader = (following, Reports::new(&session, first), Vec::new().into_iter());
+    let events = unfold(reader, |(following, mut reports, mut batch)| async {
         let report: Kept = match batch.next() {
             Some(report) => report,
             None => {
@@ -99,7 +111,7 @@ pub(super) async fn events(
             }
         };
         let event = Event::default().id(report.step.to_string()).data(report.json.get());
-        Some((Ok::<_, Infallible>(event), (reports, batch)))
+        Some((Ok::<_, Infallible>(event), (following, reports, batch)))
     });
     Ok(Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
 }
@@ -111,16 +123,18 @@ pub(super) async fn events(
         (status = 200, description = "The recording so far, then all that is added to it. The stream ends with the session.",
             body = Vec<u8>, content_type = "application/octet-stream"),
         (status = 404, description = "There is no such session", body = Problem),
+        OfStreams,
     )
 )]
 pub(super) async fn live_recording(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
     let session = app.sessions.get(&id).await?;
-    let body = Body::from_stream(parts(Parts::new(&session, 0, LiveLog::parts_from)));
+    let following = session.follow(app.limits.streams_per_session)?;
+    let body = Body::from_stream(parts(following, Parts::new(&session, 0, LiveLog::batch_from)));
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], body).into_response())
 }
 
-fn parts(parts: Parts) -> impl Stream<Item = Result<Bytes, Infallible>> {
-    unfold((parts, Vec::new().into_iter()), |(mut parts, mut batch)| async {
+fn parts(following: Following, parts: Parts) -> impl Stream<Item = Result<Bytes, Infallible>> {
+    unfold((following, parts, Vec::new().into_iter()), |(following, mut parts, mut batch)| async {
         let part: Bytes = match batch.next() {
             Some(part) => part,
             None => {
@@ -128,7 +142,7 @@ fn parts(parts: Parts) -> impl Stream<Item = Result<Bytes, Infallible>> {
                 batch.next()?
             }
         };
-        Some((Ok(part), (parts, batch)))
+        Some((Ok(part), (following, parts, batch)))
     })
 }
 
@@ -136,8 +150,9 @@ fn parts(parts: Parts) -> impl Stream<Item = Result<Bytes, Infallible>> {
 ///
 /// A binary message is one part of the recording: part 0 is the 12-byte header of an .rrd stream, and any part after it
 /// makes a valid stream with the header in front. Views are arranged for the scene alone, as a page has curves of its
-/// own. Many parts at once are put together into one, and a `parts` event says which is the next. A report comes after
-/// the part that records it.
+/// own. Whoever asks for a long recording from part 0 on gets what there is of it put together in a few messages, after each of
+/// which a `parts` event says from which part on to resume. A report comes after the part that records it. Who takes nothing
+/// of what is sent for a while is given up, and may resume.
 #[utoipa::path(get, path = "/v1/sessions/{id}/live", tag = "sessions", operation_id = "followSession",
     params(
         ("id" = String, Path, description = "The session's id", format = "uuid"),
@@ -152,6 +167,7 @@ fn parts(parts: Parts) -> impl Stream<Item = Result<Bytes, Infallible>> {
         (status = 403, description = "The request comes from a foreign page", body = Problem),
         (status = 404, description = "There is no such session", body = Problem),
         (status = 426, description = "The connection cannot be upgraded", body = Problem),
+        OfStreams,
     )
 )]
 pub(super) async fn live(
@@ -166,14 +182,25 @@ pub(super) async fn live(
         Ok(upgrade) => upgrade,
         Err(rejection) => return Ok(rejection.into_response()),
     };
-    let readers =
-        (Reports::new(&session, step.unwrap_or(0)), Parts::new(&session, from.unwrap_or(0), LiveLog::scene_parts_from));
+    let following = session.follow(app.limits.streams_per_session)?;
+    let reports = Reports::new(&session, step.unwrap_or(0));
+    let parts = Parts::new(&session, from.unwrap_or(0), LiveLog::scene_batch_from);
     let (description, standing) = (session.description().clone(), session.standing());
-    // Clients have nothing to say; what they say must not fill the memory.
-    let upgrade = upgrade.max_message_size(1 << 10);
-    Ok(upgrade.on_upgrade(|socket| async move {
-        // A client that goes away needs no answer.
-        drop(follow(socket, &app, description, standing, readers).await);
+    let upgrade = upgrade
+        .max_message_size(READ_BUFFER_BYTES)
+        .read_buffer_size(READ_BUFFER_BYTES)
+        .write_buffer_size(WRITE_BUFFER_BYTES)
+        .max_write_buffer_size(MOST_BUFFERED_BYTES);
+    Ok(upgrade.on_upgrade(async move |socket| {
+        let ended = async {
+            following.ended().cancelled().await;
+            sleep(END_WITHIN).await;
+        };
+        // A client that goes away needs no answer, and one that does not read hears none.
+        tokio::select! {
+            _ = follow(socket, &app, description, standing, (reports, parts)) => {}
+            () = ended => {}
+        }
     }))
 }
 
@@ -185,8 +212,20 @@ async fn follow(
     (mut reports, mut parts): (Reports, Parts),
 ) -> Result<(), axum::Error> {
     socket.send(text(&LiveEvent::Description(Box::new(description)))?).await?;
+    if let Some((header, together)) = parts.together().await {
+        socket.send(Message::Binary(header)).await?;
+        let (last, others) = together.parts.split_last().unzip();
+        for part in others.unwrap_or_default() {
+            socket.send(Message::Binary(part.clone())).await?;
+            // Without the rest it holds nothing whole: single parts, all but the header, are to come then.
+            socket.send(text(&LiveEvent::Parts { next: 1 })?).await?;
+        }
+        socket.send(Message::Binary(last.cloned().unwrap_or_default())).await?;
+        socket.send(text(&LiveEvent::Parts { next: together.next })?).await?;
+    }
     // What it is now, as if it had just changed.
     standing.mark_changed();
+    let live = parts.live().clone();
     let mut ping = tokio::time::interval_at(tokio::time::Instant::now() + KEEP_ALIVE, KEEP_ALIVE);
     loop {
         // Parts first: they are published before the reports of their steps.
@@ -194,13 +233,16 @@ async fn follow(
             biased;
             message = socket.recv() => if message.transpose()?.is_none() { return Ok(()) },
             batch = parts.next() => match batch {
-                Some(batch) => send_parts(&mut socket, &parts, batch).await?,
+                Some(batch) => send_parts(&mut socket, batch).await?,
                 None => break,
             },
-            batch = reports.next() => {
+            batch = async { live.caught_up().await; reports.next().await } => {
                 // Both may have come since the parts were asked for.
-                let ready = parts.ready();
-                send_parts(&mut socket, &parts, ready).await?;
+                let published = parts.published();
+                while parts.next_index() < published {
+                    let ready = parts.ready();
+                    send_parts(&mut socket, ready).await?;
+                }
                 for report in batch.into_iter().flatten() {
                     socket.send(text(&LiveEvent::Step(report.json))?).await?;
                 }
@@ -229,21 +271,11 @@ async fn follow(
     socket.send(Message::Close(Some(CloseFrame { code, reason: reason.into() }))).await
 }
 
-/// Sends parts that have just been read: one by one, or put together if there are many.
-async fn send_parts(socket: &mut WebSocket, parts: &Parts, mut batch: Vec<Bytes>) -> Result<(), axum::Error> {
-    if batch.len() < MANY_PARTS {
-        for part in batch {
-            socket.send(Message::Binary(part)).await?;
-        }
-        return Ok(());
+async fn send_parts(socket: &mut WebSocket, batch: Vec<Bytes>) -> Result<(), axum::Error> {
+    for part in batch {
+        socket.send(Message::Binary(part)).await?;
     }
-    let live = parts.live().clone();
-    if batch[0] == live.header() {
-        socket.send(Message::Binary(batch.remove(0))).await?;
-    }
-    let made = tokio::task::spawn_blocking(move || live.put_together(&batch)).await.map_err(axum::Error::new)?;
-    socket.send(Message::Binary(made.map_err(axum::Error::new)?)).await?;
-    socket.send(text(&LiveEvent::Parts { next: parts.next_index() })?).await
+    Ok(())
 }
 
 fn text(event: &LiveEvent) -> Result<Message, axum::Error> {

@@ -99,8 +99,22 @@ impl Sessions {
         spawn(move || outside::run(beginning, &receiver, opened))?;
         let description = opening.await.map_err(|_| no_engine())??;
         let engine = Engine::Elsewhere(jobs);
-        let (used, watchers, report) = (Mutex::new(Instant::now()), 0.into(), Default::default());
-        Ok(self.enter(Session { id, description, file: None, made_s, engine, shared, used, watchers, report }))
+        let (used, watchers, streams) = (Mutex::new(Instant::now()), 0.into(), 0.into());
+        let (together, report) = (Default::default(), Default::default());
+        let file = None;
+        Ok(self.enter(Session {
+            id,
+            description,
+            file,
+            made_s,
+            engine,
+            shared,
+            used,
+            watchers,
+            streams,
+            together,
+            report,
+        }))
     }
 
     /// A place in memory, if need be that of the one that was not asked for longest.
@@ -134,8 +148,8 @@ impl Sessions {
     /// Takes sessions out of memory that nobody asks for, now and then, for ever.
     pub(in crate::server) async fn watch_over(&self) {
         loop {
-            sleep(self.sleep_after.min(LOOK_EVERY)).await;
-            while let Some(session) = self.idle_longest(Session::is_elsewhere, self.sleep_after) {
+            sleep(self.limits.idle_after.min(LOOK_EVERY)).await;
+            while let Some(session) = self.idle_longest(Session::is_elsewhere, self.limits.idle_after) {
                 self.put_to_sleep(&session).await;
             }
         }

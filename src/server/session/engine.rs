@@ -19,10 +19,7 @@ use crate::{
     experiment::{AppraisalReport, Choice, Description, Experiment, RunResult},
     recording::{EllipsoidSize, Recorder, RecordingError, Target},
     scenario::builtin,
-    server::{
-        MAX_STEPS_PER_SESSION,
-        problem::{Kind, Problem},
-    },
+    server::problem::{Kind, Problem},
 };
 
 /// Within a long command, what was made is published this often.
@@ -41,6 +38,8 @@ pub(super) struct Setup {
     pub(super) ellipsoids: EllipsoidSize,
     /// The recording's file, if one is kept.
     pub(super) file: Option<PathBuf>,
+    /// How many steps it makes at most.
+    pub(super) most_steps: u64,
     pub(super) shared: Arc<Shared>,
     /// Held until the thread ends, so that ending sessions still count.
     pub(super) permit: OwnedSemaphorePermit,
@@ -81,6 +80,8 @@ pub(super) enum Command {
         learner: String,
         reply: Reply<Option<Vec<f64>>>,
     },
+    /// Somebody begins to follow the recording: brings it up to date.
+    Show,
     /// Completes the recording so far.
     Flush {
         reply: Reply<()>,
@@ -99,23 +100,28 @@ pub(super) type Reply<T> = oneshot::Sender<Result<T, Problem>>;
 
 /// The body of the thread. `opened` hears of the description once the session stands.
 pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply<Description>) {
-    let Setup { id, scenario, seed, learners, ellipsoids, file, shared, permit } = setup;
+    let Setup { id, scenario, seed, learners, ellipsoids, file, most_steps, shared, permit } = setup;
     let open = || -> Result<(Experiment, Recorder, Kept), Problem> {
         let experiment = builtin(&scenario)?.experiment(seed, learners.as_deref())?;
         let target = Target::live(shared.live.clone()).with_recording_id(id.to_string()).with_ellipsoids(ellipsoids);
         let target = file.iter().fold(target, |target, file| target.and_file(file));
-        let mut recorder = Recorder::new(experiment.description(), target)
-            .and_then(|mut recorder| recorder.log(experiment.latest()).map(|()| recorder))
-            .map_err(|error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}")))?;
-        recorder.flush().map_err(recording_failed)?;
-        let start = Kept::of(experiment.latest(), experiment.description())?;
-        Ok((experiment, recorder, start))
+        let unbegun = |error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}"));
+        let mut recorder = Recorder::new(experiment.description(), target).map_err(unbegun)?;
+        let recorded = recorder.log(experiment.latest()).and_then(|()| recorder.flush()).map_err(unbegun);
+        match recorded.and_then(|()| Kept::of(experiment.latest(), experiment.description())) {
+            Ok(start) => Ok((experiment, recorder, start)),
+            Err(problem) => {
+                recorder.discard();
+                Err(problem)
+            }
+        }
     };
     match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
         Ok((experiment, mut recorder, start)) => {
             shared.publish(vec![start], experiment.remaining());
             if opened.send(Ok(experiment.description().clone())).is_ok() {
-                let mut engine = Engine { experiment, shared: &shared, commands: &commands, waiting: VecDeque::new() };
+                let waiting = VecDeque::new();
+                let mut engine = Engine { experiment, most_steps, shared: &shared, commands: &commands, waiting };
                 let outcome = catch_unwind(AssertUnwindSafe(|| engine.serve(&mut recorder)));
                 if let Err(panic) = outcome {
                     shared.fail(panicked(&*panic).detail);
@@ -136,6 +142,7 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
 
 struct Engine<'a> {
     experiment: Experiment,
+    most_steps: u64,
     shared: &'a Shared,
     commands: &'a mpsc::Receiver<Command>,
     /// Commands that came while steps were made, and wait for their turn.
@@ -191,6 +198,8 @@ impl Engine<'_> {
                 let configuration = self.experiment.configuration(&learner).map_err(Problem::from);
                 drop(reply.send(configuration.map(|set| set.map(<[f64]>::to_vec))));
             }
+            // Whoever asks for the recording is told if it cannot be written.
+            Command::Show => drop(self.publish(&mut Batch::default(), recorder)),
             Command::Flush { reply } => drop(reply.send(self.flush(recorder))),
             Command::End { .. } | Command::Wake => {}
             #[cfg(test)]
@@ -247,7 +256,7 @@ impl Engine<'_> {
         if let Some(problem) = self.too_many(count, step).or_else(|| self.waits_for_a_person(count)) {
             return Err(problem.step(step));
         }
-        let mut batch = Batch { made: Vec::new(), published: 0, last: Instant::now() };
+        let mut batch = Batch::default();
         let mut outcome = Ok(());
         while outcome.is_ok() && (batch.made.len() as u64) < count {
             // A request that its client has given up, or a session that is to end, stops between two steps.
@@ -286,7 +295,9 @@ impl Engine<'_> {
     }
 
     fn publish(&self, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
-        let flushed = recorder.flush_shown().map_err(recording_failed);
+        // Steps that nobody watches are written in large chunks, with the next 256 of them or as soon as there is time.
+        let flushed = if self.shared.live.may_wait() { Ok(()) } else { recorder.flush_shown() };
+        let flushed = flushed.map_err(recording_failed);
         self.shared.note_recording(recorder.file_failure().map(str::to_owned));
         self.shared.publish(batch.made[batch.published..].to_vec(), self.experiment.remaining());
         (batch.published, batch.last) = (batch.made.len(), Instant::now());
@@ -316,9 +327,10 @@ impl Engine<'_> {
         if let Some(left) = self.experiment.remaining().map(|left| left as u64).filter(|left| count > *left) {
             return Some(few(left, format!("the recorded data have {left} steps left, {count} were asked for")));
         }
-        let left = MAX_STEPS_PER_SESSION.saturating_sub(step);
+        let left = self.most_steps.saturating_sub(step);
         if count > left {
-            let detail = format!("a session makes at most {MAX_STEPS_PER_SESSION} steps: {left} are left, not {count}");
+            let most = self.most_steps;
+            let detail = format!("a session makes at most {most} steps: {left} are left, not {count}");
             return Some(few(left, detail));
         }
         self.has_no_room()
@@ -336,6 +348,12 @@ struct Batch {
     made: Vec<Kept>,
     published: usize,
     last: Instant,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self { made: Vec::new(), published: 0, last: Instant::now() }
+    }
 }
 
 pub(super) fn recording_failed(error: impl std::fmt::Display) -> Problem {

@@ -1,6 +1,11 @@
 //! What sessions keep, counted: all of them together stay within one budget.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{
+    Arc,
+    atomic::{AtomicUsize, Ordering},
+};
+
+use axum::body::Bytes;
 
 /// The memory that all sessions share for their reports and recordings.
 #[derive(Debug)]
@@ -25,5 +30,30 @@ impl Budget {
 
     pub(super) fn give_back(&self, bytes: usize) {
         self.used.fetch_sub(bytes, Ordering::Relaxed);
+    }
+}
+
+/// Bytes that count among what sessions keep, as long as anyone has them.
+pub(in crate::server) struct Counted {
+    bytes: Vec<u8>,
+    budget: Arc<Budget>,
+}
+
+impl Counted {
+    pub(super) fn shared(bytes: Vec<u8>, budget: &Arc<Budget>) -> Bytes {
+        budget.take(bytes.len());
+        Bytes::from_owner(Self { bytes, budget: budget.clone() })
+    }
+}
+
+impl AsRef<[u8]> for Counted {
+    fn as_ref(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.budget.give_back(self.bytes.len());
     }
 }

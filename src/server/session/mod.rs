@@ -13,6 +13,7 @@ mod registry;
 mod resource;
 mod shared;
 mod standing;
+mod together;
 mod watching;
 
 use std::{
@@ -28,7 +29,7 @@ use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
-use engine::Command;
+use engine::{Command, recording_failed};
 pub(super) use kept::Kept;
 pub(super) use memory::Budget;
 pub(super) use outside::{Elsewhere, now_s};
@@ -38,7 +39,8 @@ pub use resource::SessionResource;
 use shared::Shared;
 pub use standing::NewOutsideSession;
 pub(super) use standing::Standing;
-pub(super) use watching::Watching;
+pub(super) use together::Together;
+pub(super) use watching::{Following, Watching};
 
 use super::problem::{Kind, Problem};
 use crate::{
@@ -58,8 +60,12 @@ pub(super) struct Session {
     shared: Arc<Shared>,
     /// When it was last asked for anything.
     used: Mutex<Instant>,
-    /// How many watch it.
+    /// How many watch it …
     watchers: AtomicUsize,
+    /// … and how many of them by a stream.
+    streams: AtomicUsize,
+    /// The recording for those who come late.
+    together: together::Kept,
     /// Of a robot elsewhere.
     report: AsyncMutex<Option<ReportFiles>>,
 }
@@ -112,6 +118,21 @@ impl Session {
     /// The recording so far.
     pub(super) fn live(&self) -> &LiveLog {
         &self.shared.live
+    }
+
+    /// Brings the recording up to date for one who has begun to follow it: steps that nobody watched may wait.
+    pub(super) fn show(&self) {
+        // An engine of the other kind leaves nothing waiting, and one that has ended left nothing.
+        if let Engine::Steps(commands) = &self.engine
+            && self.live().is_behind()
+        {
+            drop(commands.send(Command::Show));
+        }
+    }
+
+    /// How many steps are left; `None` without an end.
+    pub(super) fn remaining(&self) -> Option<u64> {
+        Some(self.shared.remaining.load(Ordering::Relaxed)).filter(|left| *left != u64::MAX)
     }
 
     /// Resolves when nothing more is coming.

@@ -20,14 +20,16 @@ use super::{Budget, Engine, Session, Shared, dormant::Known, engine, lock, outsi
 use crate::{
     recording::EllipsoidSize,
     server::{
-        IDLE_AFTER, MAX_SESSIONS,
+        Limits,
         problem::{Kind, Problem},
         store::{Store, StoreError},
     },
 };
 
-/// How long a session may take to end after it was told to.
+/// How long a session may take to end after it was told to …
 pub(super) const END_WITHIN: Duration = Duration::from_secs(10);
+/// … and when the server ends with it.
+const SHUT_DOWN_WITHIN: Duration = Duration::from_secs(4);
 
 /// What a session is made from.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
@@ -59,8 +61,8 @@ pub(in crate::server) struct Keeping {
     pub(in crate::server) store: Store,
     /// Where the recordings of all others are kept as files, if they are.
     pub(in crate::server) recordings: Option<PathBuf>,
-    /// After how much time without a request a session with a robot elsewhere leaves memory.
-    pub(in crate::server) sleep_after: Duration,
+    /// How much there may be of them.
+    pub(in crate::server) limits: Limits,
 }
 
 /// All sessions of a server.
@@ -76,7 +78,7 @@ pub(in crate::server) struct Sessions {
     pub(super) budget: Arc<Budget>,
     pub(super) store: Arc<Store>,
     recordings: Option<PathBuf>,
-    pub(super) sleep_after: Duration,
+    pub(super) limits: Limits,
     pub(super) shutdown: CancellationToken,
 }
 
@@ -86,17 +88,17 @@ impl Sessions {
         keeping: Keeping,
         shutdown: CancellationToken,
     ) -> Result<Self, StoreError> {
-        let Keeping { store, recordings, sleep_after } = keeping;
+        let Keeping { store, recordings, limits } = keeping;
         let known = store.all()?.into_iter().map(|(id, made_s)| Arc::new(Known::new(id, made_s))).collect();
         Ok(Self {
             all: Mutex::default(),
             known: Mutex::new(known),
-            permits: Arc::new(Semaphore::new(MAX_SESSIONS)),
-            places: Arc::new(Semaphore::new(MAX_SESSIONS)),
+            permits: Arc::new(Semaphore::new(limits.sessions)),
+            places: Arc::new(Semaphore::new(limits.sessions)),
             budget: Arc::new(budget),
             store: Arc::new(store),
             recordings,
-            sleep_after,
+            limits,
             shutdown,
         })
     }
@@ -115,6 +117,7 @@ impl Sessions {
             learners: new.learners,
             ellipsoids: new.ellipsoids,
             file: self.recordings.as_ref().zip(file.as_ref()).map(|(directory, file)| directory.join(file)),
+            most_steps: self.limits.steps_per_session,
             shared: shared.clone(),
             permit,
         };
@@ -131,6 +134,8 @@ impl Sessions {
             shared,
             used: Mutex::new(Instant::now()),
             watchers: 0.into(),
+            streams: 0.into(),
+            together: Default::default(),
             report: Default::default(),
         };
         Ok(self.enter(session))
@@ -157,11 +162,12 @@ impl Sessions {
         if let Ok(permit) = self.permits.clone().try_acquire_owned() {
             return Ok(permit);
         }
-        if let Some(session) = self.idle_longest(|session| !session.is_elsewhere(), IDLE_AFTER) {
+        if let Some(session) = self.idle_longest(|session| !session.is_elsewhere(), self.limits.idle_after) {
             self.close(session.id).await?;
         }
         self.permits.clone().try_acquire_owned().map_err(|_| {
-            Problem::new(Kind::ServerFull, format!("there are {MAX_SESSIONS} sessions already; delete one first"))
+            let most = self.limits.sessions;
+            Problem::new(Kind::ServerFull, format!("there are {most} sessions already; delete one first"))
         })
     }
 
@@ -237,7 +243,7 @@ impl Sessions {
                 session.ended().cancelled().await;
             }
         };
-        drop(timeout(END_WITHIN, ended).await);
+        drop(timeout(SHUT_DOWN_WITHIN, ended).await);
         all.iter().filter_map(|session| session.unfinished()).collect()
     }
 }
@@ -260,7 +266,7 @@ mod tests {
 
     fn sessions(memory: usize) -> Sessions {
         let store = Store::in_memory().expect("a store");
-        let keeping = Keeping { store, recordings: None, sleep_after: IDLE_AFTER };
+        let keeping = Keeping { store, recordings: None, limits: Limits::default() };
         Sessions::new(Budget::new(memory), keeping, CancellationToken::new()).expect("sessions")
     }
 

@@ -1,7 +1,5 @@
 //! A session as its resource shows it.
 
-use std::sync::atomic::Ordering;
-
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -56,7 +54,7 @@ impl Session {
             world,
             description: self.description.clone(),
             step: standing.as_deref().map_or(self.step(), |standing| standing.step()),
-            remaining: Some(self.shared.remaining.load(Ordering::Relaxed)).filter(|left| *left != u64::MAX),
+            remaining: self.remaining(),
             recording: Some(standing.as_deref().map_or(self.id.to_string(), |standing| standing.recording.clone())),
             file: self.file.clone(),
             recording_failure: lock(&self.shared.recording_failure).clone(),

@@ -27,8 +27,6 @@ use crate::{
 
 /// The file within the data directory.
 const FILE: &str = "sessions.sqlite";
-/// How many sessions are kept at most.
-pub const MOST_STORED_SESSIONS: usize = 10_000;
 /// How large a store in memory may be.
 const MOST_MEMORY_BYTES: i64 = 1 << 30;
 
@@ -37,6 +35,8 @@ pub struct Store {
     connection: Mutex<Connection>,
     /// What errors call it.
     path: PathBuf,
+    /// How many sessions are kept at most.
+    most: usize,
     /// Held as long as the store is.
     _lock: Option<Lock>,
 }
@@ -112,14 +112,19 @@ impl Store {
             Connection::open_with_flags(&path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE).map_err(told)?;
         connection.pragma_update(None, "query_only", true).map_err(told)?;
         schema::check(&connection, &path)?;
-        Ok(Self { connection: Mutex::new(connection), path, _lock: None })
+        Ok(Self { connection: Mutex::new(connection), path, most: usize::MAX, _lock: None })
     }
 
     fn ready(mut connection: Connection, path: PathBuf, lock: Option<Lock>) -> Result<Self, StoreError> {
         schema::migrate(&mut connection, &path)?;
         let told = |source| StoreError::Sqlite { path: path.clone(), source };
         connection.pragma_update(None, "foreign_keys", true).map_err(told)?;
-        Ok(Self { connection: Mutex::new(connection), path, _lock: lock })
+        Ok(Self { connection: Mutex::new(connection), path, most: usize::MAX, _lock: lock })
+    }
+
+    /// The same, but that it takes in no session beyond so many.
+    pub fn holding(self, most: usize) -> Self {
+        Self { most, ..self }
     }
 
     /// Keeps a new session, and what happened in it so far.
@@ -138,8 +143,8 @@ impl Store {
         let (setup, shown) = (json(setup), json(&shown));
         let mut connection = self.connection();
         let count = connection.query_row("SELECT count(*) FROM session", [], |row| row.get::<_, i64>(0));
-        if count.map_err(self.told())? >= MOST_STORED_SESSIONS as i64 {
-            return Err(StoreError::Full(MOST_STORED_SESSIONS));
+        if usize::try_from(count.map_err(self.told())?).is_ok_and(|count| count >= self.most) {
+            return Err(StoreError::Full(self.most));
         }
         let written = (|| {
             let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;

@@ -1,0 +1,125 @@
+//! How much a server takes on, as arguments.
+
+use std::{num::NonZeroUsize, time::Duration};
+
+use body_schema::server::Limits;
+
+#[derive(Debug, Default, clap::Args)]
+#[command(next_help_heading = "Limits")]
+pub struct LimitArguments {
+    /// Connections; never more than half of the descriptors that the process may open [default: 512]
+    #[arg(long, value_name = "N")]
+    max_connections: Option<NonZeroUsize>,
+    /// Streams that follow one session: events, growing recordings, WebSockets [default: 64]
+    #[arg(long, value_name = "N")]
+    max_streams_per_session: Option<NonZeroUsize>,
+    /// Sessions in memory, and as many again with robots elsewhere [default: 32]
+    #[arg(long, value_name = "N")]
+    max_sessions: Option<NonZeroUsize>,
+    /// Sessions with robots elsewhere that are kept [default: 10000]
+    #[arg(long, value_name = "N")]
+    max_stored_sessions: Option<NonZeroUsize>,
+    /// Steps of a session [default: 100000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    max_steps: Option<u64>,
+    /// Steps of one request [default: 1000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    max_steps_per_request: Option<u64>,
+    /// Memory for reports and recordings of all sessions, MiB [default: 2048]
+    #[arg(long, value_name = "MIB")]
+    max_memory: Option<NonZeroUsize>,
+    /// Body of a request, KiB [default: 64]
+    #[arg(long, value_name = "KIB")]
+    max_body: Option<NonZeroUsize>,
+    /// Head of a request, KiB [default: 32]
+    #[arg(long, value_name = "KIB")]
+    max_header: Option<NonZeroUsize>,
+    /// Seconds that the head of a request may take to come [default: 10]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    header_timeout: Option<Duration>,
+    /// Seconds that its body may take [default: 30]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    body_timeout: Option<Duration>,
+    /// Seconds that a connection may wait for its next request [default: 60]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    idle_timeout: Option<Duration>,
+    /// Seconds that a client may take nothing of what is sent to it [default: 30]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    write_timeout: Option<Duration>,
+    /// Seconds without a request or anyone who watches, after which a session may have to make room [default: 900]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    session_idle: Option<Duration>,
+}
+
+impl LimitArguments {
+    pub fn limits(&self) -> Limits {
+        let usual = Limits::default();
+        let count = |given: Option<NonZeroUsize>, usual: usize| given.map_or(usual, NonZeroUsize::get);
+        let size = |given: Option<NonZeroUsize>, unit: usize, usual: usize| {
+            given.map_or(usual, |given| given.get().saturating_mul(unit))
+        };
+        Limits {
+            connections: count(self.max_connections, usual.connections),
+            streams_per_session: count(self.max_streams_per_session, usual.streams_per_session),
+            sessions: count(self.max_sessions, usual.sessions),
+            stored_sessions: count(self.max_stored_sessions, usual.stored_sessions),
+            steps_per_session: self.max_steps.unwrap_or(usual.steps_per_session),
+            steps_per_request: self.max_steps_per_request.unwrap_or(usual.steps_per_request),
+            memory_bytes: size(self.max_memory, 1 << 20, usual.memory_bytes),
+            body_bytes: size(self.max_body, 1 << 10, usual.body_bytes),
+            header_bytes: size(self.max_header, 1 << 10, usual.header_bytes),
+            header_timeout: self.header_timeout.unwrap_or(usual.header_timeout),
+            body_timeout: self.body_timeout.unwrap_or(usual.body_timeout),
+            idle_timeout: self.idle_timeout.unwrap_or(usual.idle_timeout),
+            write_timeout: self.write_timeout.unwrap_or(usual.write_timeout),
+            idle_after: self.session_idle.unwrap_or(usual.idle_after),
+            ..usual
+        }
+    }
+}
+
+/// As long as a day at most: more is meant as something else.
+fn seconds(text: &str) -> Result<Duration, String> {
+    const DAY_S: f64 = 24.0 * 3600.0;
+    let seconds: Option<f64> = text.parse().ok().filter(|seconds| *seconds > 0.0 && *seconds <= DAY_S);
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| format!("not a number of seconds above 0, at most {DAY_S}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Program {
+        #[command(flatten)]
+        limits: LimitArguments,
+    }
+
+    fn limits(arguments: &[&str]) -> Result<Limits, clap::Error> {
+        Program::try_parse_from([&["program"][..], arguments].concat()).map(|program| program.limits.limits())
+    }
+
+    #[test]
+    fn what_is_not_given_is_as_usual() {
+        assert_eq!(limits(&[]).expect("none"), Limits::default());
+        let some = limits(&["--max-memory", "3", "--header-timeout", "0.5", "--max-sessions", "4"]).expect("three");
+        let (memory_bytes, header_timeout, sessions) = (3 << 20, Duration::from_millis(500), 4);
+        assert_eq!(some, Limits { memory_bytes, header_timeout, sessions, ..Limits::default() });
+    }
+
+    #[test]
+    fn nothing_and_nonsense_are_refused() {
+        for (option, value) in [
+            ("--max-connections", "0"),
+            ("--max-steps", "0"),
+            ("--max-body", "-1"),
+            ("--idle-timeout", "0"),
+            ("--idle-timeout", "nan"),
+            ("--write-timeout", "1e300"),
+        ] {
+            limits(&[option, value]).expect_err(option);
+        }
+    }
+}

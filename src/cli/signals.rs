@@ -1,0 +1,154 @@
+//! Signals that ask the program to end.
+//!
+//! The first is a request: what is under way is brought to a good end. The second is an order.
+
+use std::{
+    fmt,
+    sync::{
+        Arc,
+        atomic::{AtomicU8, Ordering},
+        mpsc,
+    },
+    thread,
+    time::Duration,
+};
+
+use anyhow::{Context, Result};
+
+/// A signal that asks to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Signal(u8);
+
+impl Signal {
+    const HANG_UP: Self = Self(1);
+    const INTERRUPT: Self = Self(2);
+    const TERMINATE: Self = Self(15);
+
+    /// What a shell expects of a program that it has ended.
+    pub fn exit_code(self) -> u8 {
+        128 + self.0
+    }
+}
+
+impl fmt::Display for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match *self {
+            Self::HANG_UP => "SIGHUP",
+            Self::TERMINATE => "SIGTERM",
+            _ => "Ctrl-C",
+        })
+    }
+}
+
+/// All that ask to end, from when this is made on.
+pub struct Signals {
+    #[cfg(unix)]
+    unix: [tokio::signal::unix::Signal; 3],
+}
+
+impl Signals {
+    /// Within a runtime.
+    pub fn new() -> std::io::Result<Self> {
+        #[cfg(unix)]
+        {
+            use tokio::signal::unix::{SignalKind, signal};
+            let unix =
+                [signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?, signal(SignalKind::hangup())?];
+            Ok(Self { unix })
+        }
+        #[cfg(not(unix))]
+        Ok(Self {})
+    }
+
+    /// The next of them.
+    pub async fn next(&mut self) -> Signal {
+        #[cfg(unix)]
+        {
+            let [interrupt, terminate, hang_up] = &mut self.unix;
+            tokio::select! {
+                _ = interrupt.recv() => Signal::INTERRUPT,
+                _ = terminate.recv() => Signal::TERMINATE,
+                _ = hang_up.recv() => Signal::HANG_UP,
+            }
+        }
+        #[cfg(not(unix))]
+        {
+            // Without Ctrl-C there is none.
+            if tokio::signal::ctrl_c().await.is_err() {
+                std::future::pending::<()>().await;
+            }
+            Signal::INTERRUPT
+        }
+    }
+}
+
+/// For work that no runtime does: whether it was asked to end. A second signal ends the program at once.
+#[derive(Clone)]
+pub struct Interruption(Arc<AtomicU8>);
+
+/// What the program may still take after it was ordered to end: files want their footers.
+pub const INSTANT: Duration = Duration::from_millis(250);
+
+/// How often work that cannot be interrupted is looked after.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+
+impl Interruption {
+    /// From now on.
+    pub fn watch() -> Result<Self> {
+        let told = Self(Arc::default());
+        let number = told.0.clone();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().context("cannot start")?;
+        let mut signals = {
+            let _within = runtime.enter();
+            Signals::new().context("cannot wait for signals")?
+        };
+        let wait = move || {
+            runtime.block_on(async {
+                number.store(signals.next().await.0, Ordering::Relaxed);
+                let order = signals.next().await;
+                tokio::time::sleep(INSTANT).await;
+                std::process::exit(order.exit_code().into());
+            })
+        };
+        thread::Builder::new().name("signals".to_owned()).spawn(wait).context("cannot start")?;
+        Ok(told)
+    }
+
+    /// The signal that came, if one did.
+    pub fn signal(&self) -> Option<Signal> {
+        match self.0.load(Ordering::Relaxed) {
+            0 => None,
+            number => Some(Signal(number)),
+        }
+    }
+
+    /// Does work that cannot be interrupted, and leaves it to itself if a signal comes.
+    pub fn unless<T: Send + 'static>(&self, work: impl FnOnce() -> T + Send + 'static) -> Option<T> {
+        if self.signal().is_some() {
+            return None;
+        }
+        let (send, done) = mpsc::channel();
+        // Nobody waits for work that was left.
+        let working = thread::spawn(move || drop(send.send(work())));
+        loop {
+            match done.recv_timeout(LOOK_EVERY) {
+                Ok(done) => return Some(done),
+                Err(mpsc::RecvTimeoutError::Timeout) if self.signal().is_none() => {}
+                Err(mpsc::RecvTimeoutError::Timeout) => return None,
+                // It has panicked, and so does whoever wanted it.
+                Err(mpsc::RecvTimeoutError::Disconnected) => {
+                    return working.join().map_or_else(|panic| std::panic::resume_unwind(panic), |()| None);
+                }
+            }
+        }
+    }
+}
+
+/// What was asked for was not done to the end, because of a signal.
+#[derive(Debug, thiserror::Error)]
+#[error("{told}")]
+pub struct Interrupted {
+    pub signal: Signal,
+    /// What was done, and what is left of it.
+    pub told: String,
+}

@@ -1,0 +1,143 @@
+//! What the search for designs must keep.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{Problem, balance::Shares, search::Search, sensitivity::Sensitivity};
+use crate::{
+    kinematics::JointBox,
+    model::{
+        Layout,
+        laws::{all_blocks, random_state},
+    },
+    scenario::builtin,
+    selection::{CriterionUnits, Weights},
+    sensing::{Channel, Position, Rig, examples},
+};
+
+/// A robot of which anything may be learned, by one channel.
+fn random_problem(rng: &mut ChaCha8Rng, joints: usize, channel: Option<usize>) -> Problem {
+    let mut truth = random_state(rng, joints);
+    let channels = examples(rng, &truth);
+    let rig = match channel {
+        Some(channel) => Rig::new(vec![channels[channel % channels.len()].clone()]),
+        None => {
+            truth.corrections.iter_mut().for_each(|correction| correction.compliance = [0.0; 2]);
+            Rig::new(vec![Arc::new(Position::of_marker(rng.random_range(0.1..1.0))) as Arc<dyn Channel>])
+        }
+    };
+    let is_light = |block: &crate::model::Block| !matches!(block, crate::model::Block::Compliance(..));
+    let blocks = all_blocks(&truth).into_iter().filter(|block| channel.is_some() || is_light(block));
+    let layout = Layout::new(&truth, blocks);
+    let m = layout.dimension();
+    let limits = (0..joints).map(|_| (rng.random_range(-3.0..-1.0), rng.random_range(1.0..3.0))).collect();
+    let deviations = DVector::from_element(m, 1.0);
+    Problem {
+        rig: Arc::new(rig),
+        limits: JointBox::new(limits).expect("in order"),
+        head: None,
+        prior: DMatrix::identity(m, m),
+        weights: Weights::new(CriterionUnits::CharacteristicLength(rng.random_range(0.2..2.0)), &layout, &deviations),
+        layout,
+        truth,
+    }
+}
+
+fn random_poses(rng: &mut ChaCha8Rng, problem: &Problem, count: usize) -> Vec<Vec<f64>> {
+    let n = problem.limits.dimension();
+    (0..count).map(|_| problem.limits.from_unit(&(0..n).map(|_| rng.random()).collect::<Vec<f64>>())).collect()
+}
+
+fn random_matrix(rng: &mut ChaCha8Rng, m: usize) -> DMatrix<f64> {
+    let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-1.0..1.0));
+    &root * root.transpose()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(600))]
+
+    /// Sensitivities are those of the rows, and their slopes are their differences: of points in vector registers, and of every
+    /// other channel.
+    #[test]
+    fn slopes_are_differences_of_the_sensitivity(seed: u64, joints in 1_usize..=8, channel in prop::option::of(0_usize..12)) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let problem = random_problem(&mut rng, joints, channel);
+        let s = random_matrix(&mut rng, problem.layout.dimension());
+        let sensitivity = Sensitivity::new(&problem);
+        let poses = random_poses(&mut rng, &problem, 3);
+        let found = sensitivity.slopes(&s, &poses);
+        prop_assert_eq!(&found.values, &sensitivity.values(&s, &poses), "without slopes");
+        for (pose, (phi, slopes)) in poses.iter().zip(found.values.iter().zip(found.gradients.chunks(joints))) {
+            let wanted = problem.information(pose).dot(&s);
+            prop_assert!((phi - wanted).abs() <= 1e-10 * wanted, "{phi} {wanted}");
+            for (joint, slope) in slopes.iter().enumerate() {
+                let step = 1e-4;
+                let moved = [1.0, -1.0, 2.0, -2.0].map(|steps| {
+                    let mut moved = pose.clone();
+                    moved[joint] += steps * step;
+                    moved
+                });
+                let values = sensitivity.values(&s, &moved);
+                let wanted = (8.0 * (values[0] - values[1]) - (values[2] - values[3])) / (12.0 * step);
+                prop_assert!((slope - wanted).abs() <= 1e-6 * phi.max(slope.abs()), "{joint}: {slope} {wanted} {phi}");
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// The equivalence theorem over the poses that there are.
+    #[test]
+    fn balanced_shares_are_optimal(seed: u64, joints in 1_usize..=5, count in 1_usize..=60, movements in 1_usize..200) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let problem = random_problem(&mut rng, joints, None);
+        let poses = random_poses(&mut rng, &problem, count);
+        let mut shares = Shares::new(&problem, movements as f64, &poses, vec![1.0 / count as f64; count]);
+        let before = shares.standing().expect("a prior").trace;
+        let (kept, standing) = shares.balance(1e-6).expect("a prior");
+        prop_assert!((shares.shares().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        prop_assert!(standing.trace <= before * (1.0 + 1e-12));
+        let mut shares = shares.shares().iter();
+        for (pose, kept) in poses.iter().zip(kept) {
+            let phi = problem.information(pose).dot(&standing.sensitivity);
+            let share = if kept { *shares.next().expect("kept") } else { 0.0 };
+            // What little shares have been dropped is felt, too.
+            let most = 1e-3 * standing.trace;
+            prop_assert!(phi - standing.mean <= most, "{share}: {phi} {}", standing.mean);
+            prop_assert!(share * (standing.mean - phi) <= most, "{share}: {phi} {}", standing.mean);
+        }
+    }
+}
+
+/// Whoever climbs from elsewhere finds no pose that the certificate did not allow for, and nobody has found a better design:
+/// the traces are those of 60 exchanges of six poses each, balanced by multiplication, with their gaps 0.7, 8.1 and 0.1 %.
+#[test]
+fn certificates_hold() {
+    for (name, seed, found_before) in [
+        ("arm-6dof", 1001, 3.228_829e-3),
+        ("arm-12dof", 1002, 8.622_693e-3),
+        ("head-fov", 1003, 4.441_355e-3),
+        ("arm-6dof-camera", 1004, f64::INFINITY),
+    ] {
+        let problem = builtin(name).expect("built in").design_problem().expect("simulated");
+        let design = problem.best_design(40, 0.01).expect("noise");
+        assert!(design.gap <= 0.01 && design.trace < found_before, "{name}: {} {}", design.trace, design.gap);
+        let mut search = Search::new(&problem, 40, Some(&design));
+        let standing = search.balance(1.0).expect("informative");
+        assert!((standing.trace / design.trace - 1.0).abs() < 1e-9, "{name}");
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        search.candidates = random_poses(&mut rng, &problem, 100_000);
+        search.candidates.retain(|pose| problem.sees(pose));
+        let greatest = search.favoured(&standing, 300)[0].1;
+        let excess = (greatest - standing.mean) / standing.trace;
+        // Nobody follows the border of what a head sees.
+        let missed = if problem.head.is_some() { 0.03 } else { 1e-4 };
+        assert!(excess <= design.gap + missed, "{name}: {excess} and {}", design.gap);
+    }
+}

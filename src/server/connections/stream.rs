@@ -1,0 +1,97 @@
+//! The stream of a connection, which gives up on a client that takes nothing of what is written to it.
+
+use std::{
+    future::Future,
+    io::{self, IoSlice},
+    pin::Pin,
+    task::{Context, Poll, ready},
+    time::Duration,
+};
+
+use tokio::{
+    io::{AsyncRead, AsyncWrite, ReadBuf},
+    net::TcpStream,
+    time::{Sleep, sleep},
+};
+use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
+
+use super::Place;
+
+/// A TCP stream with its place among the connections. It fails when nothing of what is to be written was taken for a while, and
+/// when all connections are broken off; a WebSocket that takes it over keeps both.
+pub(super) struct Stream {
+    tcp: TcpStream,
+    write_timeout: Duration,
+    /// Runs while something is to be written and nothing is taken.
+    stalled: Option<Pin<Box<Sleep>>>,
+    broken: Pin<Box<WaitForCancellationFutureOwned>>,
+    place: Place,
+}
+
+impl Stream {
+    pub(super) fn new(tcp: TcpStream, write_timeout: Duration, broken: CancellationToken, place: Place) -> Self {
+        Self { tcp, write_timeout, stalled: None, broken: Box::pin(broken.cancelled_owned()), place }
+    }
+
+    fn check_broken(&mut self, cx: &mut Context<'_>) -> io::Result<()> {
+        match self.broken.as_mut().poll(cx) {
+            Poll::Ready(()) => Err(io::ErrorKind::ConnectionAborted.into()),
+            Poll::Pending => Ok(()),
+        }
+    }
+
+    /// Writes, and minds the time.
+    fn written<T>(
+        &mut self,
+        cx: &mut Context<'_>,
+        write: impl FnOnce(Pin<&mut TcpStream>, &mut Context<'_>) -> Poll<io::Result<T>>,
+    ) -> Poll<io::Result<T>> {
+        self.check_broken(cx)?;
+        let written = write(Pin::new(&mut self.tcp), cx);
+        if written.is_ready() {
+            self.stalled = None;
+            return written;
+        }
+        let (stalled, write_timeout) = (&mut self.stalled, self.write_timeout);
+        ready!(stalled.get_or_insert_with(|| Box::pin(sleep(write_timeout))).as_mut().poll(cx));
+        Poll::Ready(Err(io::ErrorKind::TimedOut.into()))
+    }
+}
+
+impl AsyncRead for Stream {
+    fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+        self.check_broken(cx)?;
+        let before = buffer.filled().len();
+        ready!(Pin::new(&mut self.tcp).poll_read(cx, buffer))?;
+        if buffer.filled().len() > before {
+            self.place.connection.heard();
+        }
+        Poll::Ready(Ok(()))
+    }
+}
+
+impl AsyncWrite for Stream {
+    fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        self.written(cx, |tcp, cx| tcp.poll_write(cx, bytes))
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        slices: &[IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        self.written(cx, |tcp, cx| tcp.poll_write_vectored(cx, slices))
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        self.tcp.is_write_vectored()
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.tcp).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.tcp).poll_shutdown(cx)
+    }
+}

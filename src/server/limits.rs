@@ -1,0 +1,116 @@
+//! How much a server takes on. Whatever is beyond is answered at once: 408, 413, 422, 429, 431, or 503 with `Retry-After`.
+
+use std::time::Duration;
+
+use crate::ask_tell::MOST_SETUP_BYTES;
+
+/// How much a server takes on, all in one place. `docs/trust.md` has the same as a table, with what is answered beyond each.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// How many connections there are at most, and never more than half of the descriptors that the process may open. When
+    /// one more comes, the one that has waited longest for a request makes room.
+    pub connections: usize,
+    /// How long a request's head may take to come.
+    pub header_timeout: Duration,
+    /// How long a connection may wait for its next request.
+    pub idle_timeout: Duration,
+    /// How large a request's head may be, bytes.
+    pub header_bytes: usize,
+    /// How many header fields it may have.
+    pub headers: usize,
+    /// How long a request's body may take to come. What is then done with it takes as long as it takes.
+    pub body_timeout: Duration,
+    /// How large a body may be, bytes; that which opens a session with a robot elsewhere may be
+    /// [larger](Self::setup_body_bytes).
+    pub body_bytes: usize,
+    /// How long a client may take nothing of what is written to it.
+    pub write_timeout: Duration,
+    /// How many follow one session at most: its events, its growing recording, its WebSocket.
+    pub streams_per_session: usize,
+    /// How many sessions there are in memory at most, and as many again with robots elsewhere. When one more is asked for, one
+    /// that was idle for [`idle_after`](Self::idle_after) makes room.
+    pub sessions: usize,
+    /// How many sessions with robots elsewhere are kept at most.
+    pub stored_sessions: usize,
+    /// How many steps a session makes at most.
+    pub steps_per_session: u64,
+    /// How many steps one request makes at most.
+    pub steps_per_request: u64,
+    /// What reports and recordings of all sessions may take together, bytes; beyond it no session makes steps.
+    pub memory_bytes: usize,
+    /// After this time without a request and without anyone watching, a session may have to make room for another. One with a
+    /// robot elsewhere leaves memory then, and comes back when it is asked for.
+    pub idle_after: Duration,
+}
+
+/// So much of a head is read at a time.
+const LEAST_HEADER_BYTES: usize = 8 << 10;
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            connections: 512,
+            header_timeout: Duration::from_secs(10),
+            idle_timeout: Duration::from_secs(60),
+            header_bytes: 32 << 10,
+            headers: 100,
+            body_timeout: Duration::from_secs(30),
+            body_bytes: 64 << 10,
+            write_timeout: Duration::from_secs(30),
+            streams_per_session: 64,
+            sessions: 32,
+            stored_sessions: 10_000,
+            steps_per_session: 100_000,
+            steps_per_request: 1000,
+            memory_bytes: 2 << 30,
+            idle_after: Duration::from_secs(15 * 60),
+        }
+    }
+}
+
+impl Limits {
+    /// How large the body may be that opens a session with a robot elsewhere, bytes.
+    pub fn setup_body_bytes(&self) -> usize {
+        MOST_SETUP_BYTES + self.body_bytes
+    }
+
+    /// How much of a head or of an answer is held at a time: no less than HTTP asks for.
+    pub(super) fn buffer_bytes(&self) -> usize {
+        self.header_bytes.max(LEAST_HEADER_BYTES)
+    }
+
+    /// As many connections as these limits and the process's descriptors allow; the other half is for files and the rest.
+    pub(super) fn connections_within(&self, descriptors: Option<u64>) -> usize {
+        let half = descriptors.and_then(|all| usize::try_from(all / 2).ok()).unwrap_or(usize::MAX);
+        self.connections.min(half).max(1)
+    }
+}
+
+/// How many descriptors this process may open; `None` where the platform does not say.
+pub(super) fn descriptors() -> Option<u64> {
+    #[cfg(unix)]
+    return rlimit::Resource::NOFILE.get_soft().ok();
+    #[cfg(not(unix))]
+    None
+}
+
+/// Has this process open as many descriptors as it may ask for, where the platform has such a limit. For programs, at their
+/// start.
+pub fn raise_descriptors() {
+    // With fewer there are fewer connections.
+    drop(rlimit::increase_nofile_limit(u64::MAX));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn connections_leave_half_of_the_descriptors() {
+        let limits = Limits::default();
+        assert_eq!(limits.connections_within(None), limits.connections);
+        assert_eq!(limits.connections_within(Some(1 << 20)), limits.connections);
+        assert_eq!(limits.connections_within(Some(64)), 32);
+        assert_eq!(limits.connections_within(Some(1)), 1, "one can always be served");
+    }
+}
