@@ -113,7 +113,7 @@ impl Points {
             }
             let mut by_position = own + velocity.dot(moved);
             if is_revolute {
-                by_position = by_position - turned.axis.dot(turning);
+                by_position -= turned.axis.dot(turning);
             }
             add::<S>(joint.rate(turned) * by_position + by_reading, slopes, index * GROUP + lane);
         }

@@ -105,6 +105,11 @@ impl Parts {
         self.next
     }
 
+    /// The recording.
+    pub(super) fn live(&self) -> &LiveLog {
+        self.session.live()
+    }
+
     /// How many there are so far.
     pub(super) fn published(&self) -> usize {
         self.session.live().len()
