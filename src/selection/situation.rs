@@ -27,6 +27,7 @@ pub struct History {
     posture: Option<Vec<f64>>,
     misses: VecDeque<Vec<f64>>,
     seen: VecDeque<Vec<f64>>,
+    misses_in_a_row: usize,
     plan: Option<Planned>,
 }
 
@@ -57,7 +58,9 @@ impl History {
         self.expect(&movement.configuration);
         self.made.push(movement.configuration.as_slice().into());
         if let Actions::Box(limits) = actions {
-            let latest = if observation.is_miss() { &mut self.misses } else { &mut self.seen };
+            let is_miss = observation.is_miss();
+            self.misses_in_a_row = if is_miss { self.misses_in_a_row + 1 } else { 0 };
+            let latest = if is_miss { &mut self.misses } else { &mut self.seen };
             latest.push_back(limits.to_unit(&movement.configuration));
             if latest.len() > MEMORY {
                 latest.pop_front();
@@ -94,6 +97,11 @@ impl History {
     /// The latest movements after which anything was seen, scaled likewise.
     pub fn seen(&self) -> &VecDeque<Vec<f64>> {
         &self.seen
+    }
+
+    /// How many of the latest movements were misses, one after the other.
+    pub fn misses_in_a_row(&self) -> usize {
+        self.misses_in_a_row
     }
 
     /// The plan of the latest proposal.

@@ -25,10 +25,10 @@ impl Watch {
         limits: &'a JointBox,
     ) -> Option<Sight<'a>> {
         let head = watch.and_then(|watch| watch.head.as_ref());
-        let misses = situation.history.misses();
+        let history = situation.history;
         // What has missed once can miss again, for whatever reason.
-        let matters = head.is_some() || situation.belief.rig.has_view() || !misses.is_empty();
-        matters.then(|| Sight::Chance(Visibility::new(head, misses), limits))
+        let matters = head.is_some() || situation.belief.rig.has_view() || !history.misses().is_empty();
+        matters.then(|| Sight::Chance(Visibility::new(head, history), limits))
     }
 
     /// The first movement of all, where anybody watches: to where the marker is known to be seen, or as near to it as may be.
@@ -52,6 +52,10 @@ impl Watch {
 /// How much a miss says about its neighbourhood, in units of the joint box (each joint's range is 1): at this distance
 /// a movement's chance is discounted by a factor of 1 − e^{−1/2}.
 const RADIUS: f64 = 0.15;
+/// By how much that grows with every further miss in a row …
+const GROWTH: f64 = 0.05;
+/// … and how far.
+const WIDEST: f64 = 0.6;
 /// The least chance that misses leave: where constraints leave one posture only, it is tried again.
 const HOPE: f64 = 1e-6;
 /// Misses that are remembered, the latest ones.
@@ -69,18 +73,23 @@ pub(super) const CAUTION: f64 = 4.0;
 /// The first factor is [`Head::chance`], with κ = 2, as a filter that linearises is surer than it should be. The
 /// second discounts what lies near the latest misses θₖ, with u the position in the joint box scaled to the unit cube and
 /// ρ = 0.15: a miss changes no estimate, so without it a learner that wrongly believes the marker in view would choose
-/// the same movement again and again.
+/// the same movement again and again. Where sensors themselves see or do not, ρ grows with misses in a row: what is believed of
+/// their view is wrong farther from them, too.
 #[derive(Clone, Copy, Debug)]
 pub struct Visibility<'a> {
     head: Option<&'a Head>,
     /// The latest misses, scaled to the unit cube.
     misses: &'a VecDeque<Vec<f64>>,
+    /// ρ.
+    radius: f64,
 }
 
 impl<'a> Visibility<'a> {
     /// Of what `head` sees, or without one of all, with the misses that there were.
-    pub fn new(head: Option<&'a Head>, misses: &'a VecDeque<Vec<f64>>) -> Self {
-        Self { head, misses }
+    pub fn new(head: Option<&'a Head>, history: &'a History) -> Self {
+        let in_a_row = if head.is_some() { 0 } else { history.misses_in_a_row().saturating_sub(1) };
+        let radius = (RADIUS + GROWTH * in_a_row as f64).min(WIDEST);
+        Self { head, misses: history.misses(), radius }
     }
 
     /// The head that watches.
@@ -104,7 +113,7 @@ impl<'a> Visibility<'a> {
     pub fn discount(&self, scaled: &[f64]) -> f64 {
         let discount = self.misses.iter().fold(1.0, |chance, miss| {
             let squared: f64 = scaled.iter().zip(miss).map(|(a, b)| (a - b).powi(2)).sum();
-            chance * -(-0.5 * squared / (RADIUS * RADIUS)).exp_m1()
+            chance * -(-0.5 * squared / (self.radius * self.radius)).exp_m1()
         });
         f64::max(discount, HOPE)
     }
@@ -138,7 +147,7 @@ mod tests {
             history.moved(&movement(at), &Actions::Box(limits.clone()), &Observation::missed(1));
         };
         let chance = |history: &History, at: f64| {
-            let visibility = Visibility::new(Some(&head), history.misses());
+            let visibility = Visibility::new(Some(&head), history);
             visibility.chance(&[at, 0.5], &Point3::new(1.0, 0.0, 0.0), &Matrix3::zeros())
         };
         assert_eq!(chance(&history, 0.5), 1.0);

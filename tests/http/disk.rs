@@ -78,7 +78,13 @@ async fn steps_go_on_without_their_file_which_is_written_anew_at_the_end() {
     for step in 1..=40 {
         assert_eq!(program.api.step(&session, 5).await["step"], step * 5, "what is answered has happened");
     }
-    let resource = program.api.get_json(&session).await;
+    // Steps that nobody watches are written in large parts, at the latest once nothing is asked for.
+    let mut resource = program.api.get_json(&session).await;
+    let began = std::time::Instant::now();
+    while resource["recording_failure"].is_null() && began.elapsed() < SOON {
+        tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+        resource = program.api.get_json(&session).await;
+    }
     let failure = resource["recording_failure"].as_str().expect("the file is too large").to_owned();
     let file = resource["file"].as_str().expect("a file").to_owned();
     assert!(failure.contains(&file), "{failure}");
