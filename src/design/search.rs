@@ -20,9 +20,9 @@ pub struct Design {
     /// tr(W M⁻¹).
     pub trace: f64,
     /// By how much the trace may exceed the optimum, as a fraction of it: the gap of the equivalence theorem over 4500
-    /// candidates, the best third of them and the poses of the design polished. Where a head watches, the polish cannot follow
-    /// the border of what it sees: there all candidates that it sees are polished, and the gap may still be too small, by some
-    /// percent.
+    /// candidates, the best third of them and the poses of the design polished. Some maxima draw from nearby alone: climbing from
+    /// 100 000 other poses finds up to 0.01 more. Where a head watches, the polish cannot follow the border of what it sees: there
+    /// all candidates that it sees are polished, and 0.07 more was found.
     pub gap: f64,
 }
 
