@@ -3,7 +3,7 @@
 use crate::{
     Server,
     driver::Browser,
-    pointer::{click, place, reads},
+    pointer::{CONTROLS, click, place, reads},
 };
 
 pub async fn visit(page: &Browser, server: Server) {
@@ -37,7 +37,7 @@ pub async fn visit(page: &Browser, server: Server) {
     click(page, "Play to the end").await;
     page.wait_for_state("the end", "state.phase === 'stopped' && Number(state.step) > 20").await;
     reads(page, "times fewer movements than random.").await;
-    reads(page, "global 10").await;
+    page.wait_for("how many global needed", &format!("/global [0-9]+/.test({CONTROLS})")).await;
 
     page.click(next[0], next[1]).await;
     reads(page, "Was it luck?").await;

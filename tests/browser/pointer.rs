@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::driver::Browser;
 
 /// What the panel says, as it is read out.
-const CONTROLS: &str = "document.getElementById('controls').textContent";
+pub const CONTROLS: &str = "document.getElementById('controls').textContent";
 
 /// The middle of a button that can be pressed, once it is there.
 pub async fn place(page: &Browser, name: &str) -> [f64; 2] {

@@ -26,7 +26,7 @@ async fn wait_for_words(page: &Browser, words: &str) {
 }
 
 pub async fn steps(page: &Browser, server: Server) {
-    page.open(&server.at("")).await;
+    page.open(&server.at("?v=1&scenario=arm-6dof&seed=1")).await;
 
     // The first movement is shown without anybody's doing.
     page.wait_for_state("step 1", "state.phase === 'ready' && state.step === '1'").await;

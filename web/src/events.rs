@@ -12,6 +12,7 @@ use crate::{
     robot::Robot,
     seeds::SeedRuns,
     settings::{HUMAN, MAX_RESTORED, Settings},
+    stories::STORIES,
     why::Why,
     wire::{Problem, Session},
 };
@@ -66,6 +67,11 @@ impl Panel {
         self.seed_text = self.settings.seed.to_string();
         notices.into_iter().for_each(|notice| self.notice(notice));
         self.tour = Some(0).filter(|_| !known && !self.settings.embed);
+        // Whom no link leads to a run is shown the one that the first story tells of.
+        if self.tour.is_some() && self.server && query.trim_start_matches('?').is_empty() {
+            self.settings.seed = STORIES[0].seed;
+            self.seed_text = STORIES[0].seed.to_string();
+        }
         self.ask(Command::Scenarios);
         if self.server {
             self.ask(Command::Robots);

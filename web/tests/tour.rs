@@ -25,8 +25,19 @@ fn who_comes_for_the_first_time_is_told_the_first_story() {
     page.tell(json!({ "is": "begin", "query": "", "known": false }));
     page.begin();
     assert!(page.has("1 of 5: What is learned"));
+    let shown = page.harness.state().description().map(|run| (run.scenario.clone(), run.seed));
+    assert_eq!(shown, Some((STORIES[0].scenario.to_owned(), STORIES[0].seed)), "the run that it tells of");
     page.press(Key::Escape);
     assert!(page.harness.state().tour.is_none() && page.commands().contains(&Command::Known));
+}
+
+#[test]
+fn a_link_shows_its_own_run_to_newcomers_too() {
+    let mut page = Page::open("");
+    page.tell(json!({ "is": "begin", "query": "?v=1&scenario=arm-6dof&seed=1", "known": false }));
+    page.begin();
+    assert!(page.has("1 of 5: What is learned"));
+    assert_eq!(page.harness.state().description().map(|run| run.seed), Some(1));
 }
 
 #[test]
