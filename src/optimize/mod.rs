@@ -100,6 +100,7 @@ mod descent;
 mod direct;
 mod minimum;
 mod polish;
+mod quasi_newton;
 
 pub use bayesian::bayesian;
 pub use descent::{Slopes, descend};

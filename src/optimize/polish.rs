@@ -7,13 +7,16 @@
 //! x ← clamp(x − t B g, 0, 1)
 //! ```
 //!
-//! with g the gradient, by central differences where nobody gives it, B the BFGS estimate of the inverse Hessian, both
-//! restricted to the coordinates that are not pressed against a bound (Bertsekas 1982), and t the best of a few step lengths.
+//! with g the gradient, by central differences where nobody gives it, −B g the direction that `quasi_newton.rs` tells, and t
+//! the best of a few step lengths.
 //! Like DIRECT it evaluates in batches.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::least;
+use super::{
+    least,
+    quasi_newton::{Aim, aim, updated},
+};
 
 /// How far a polish goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,8 +29,6 @@ pub struct Polish {
 
 /// Half the distance of central differences, in sides of the cube.
 const DIFFERENCE: f64 = 1e-4;
-/// The longest first step of a coordinate.
-pub(super) const FIRST_STEP: f64 = 0.15;
 /// Step lengths tried at once.
 const LENGTHS: [f64; 7] = [1.0, 2.0, 0.5, 0.25, 0.1, 0.03, 0.01];
 
@@ -64,19 +65,7 @@ pub fn polish_along(
             inverse_hessian = updated(inverse_hessian.take(), &(&here - x_before), &(&gradient - g_before));
         }
         before = Some((here.clone(), gradient.clone()));
-        let pressed = |k: usize| (x[k] <= 0.0 && gradient[k] >= 0.0) || (x[k] >= 1.0 && gradient[k] <= 0.0);
-        let free = DVector::from_fn(n, |k, _| f64::from(!pressed(k)));
-        let restricted = gradient.component_mul(&free);
-        let steepness = restricted.amax();
-        // Where finite values differ by more than the greatest number, no direction can be computed.
-        if steepness == 0.0 || !steepness.is_finite() {
-            break;
-        }
-        let steepest = &restricted * (-FIRST_STEP / steepness);
-        let newton = inverse_hessian.as_ref().map(|b| -(b * &restricted).component_mul(&free));
-        let is_descent = |d: &DVector<f64>| d.dot(&restricted) < 0.0 && d.iter().all(|d| d.is_finite());
-        let is_newton = newton.as_ref().is_some_and(is_descent);
-        let direction = newton.filter(is_descent).unwrap_or(steepest);
+        let Some(Aim { direction, is_newton, .. }) = aim(&x, &gradient, inverse_hessian.as_ref()) else { break };
         let trials: Vec<Vec<f64>> = LENGTHS
             .iter()
             .map(|t| x.iter().zip(&direction).map(|(x, d)| (x + t * d).clamp(0.0, 1.0)).collect())
@@ -122,27 +111,6 @@ fn differences(x: &[f64], value: f64, evaluate: &mut impl FnMut(&[Vec<f64>]) -> 
         let distance = above.0 - below.0;
         if distance > 0.0 { (above.1 - below.1) / distance } else { 0.0 }
     })
-}
-
-/// The BFGS update of the inverse Hessian; as it was, where the curvature along the step is not positive.
-pub(super) fn updated(
-    before: Option<DMatrix<f64>>,
-    step: &DVector<f64>,
-    change: &DVector<f64>,
-) -> Option<DMatrix<f64>> {
-    let curvature = step.dot(change);
-    if curvature <= 1e-12 * step.norm() * change.norm() {
-        return before;
-    }
-    let n = step.len();
-    let mut b = before.unwrap_or_else(|| DMatrix::identity(n, n) * (curvature / change.norm_squared()));
-    // (I − s yᵀ/c) B (I − y sᵀ/c) + s sᵀ/c, multiplied out.
-    let carried = &b * change;
-    let own = (1.0 + change.dot(&carried) / curvature) / curvature;
-    b.ger(own, step, step, 1.0);
-    b.ger(-1.0 / curvature, &carried, step, 1.0);
-    b.ger(-1.0 / curvature, step, &carried, 1.0);
-    Some(b)
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use super::{
 use crate::{
     kinematics::{Joint, Line},
     model::{Block, Layout, State},
+    parallel::mapped,
 };
 
 /// How many modes are kept, and how hard new ones are searched for.
@@ -52,7 +53,7 @@ const COLD: Effort = Effort { steps: 40, tolerance: 1e-2, hopeless: f64::INFINIT
 impl Hypotheses {
     /// Searches every mode again after the posterior has changed.
     pub fn follow(&mut self, posterior: &Posterior, layout: &Layout) {
-        let found = each(&self.modes, |mode| posterior.mode(&mode.state, layout, WARM));
+        let found = mapped(&self.modes, |mode| posterior.mode(&mode.state, layout, WARM));
         self.modes = found.into_iter().flatten().collect();
     }
 
@@ -76,7 +77,7 @@ impl Hypotheses {
                 (None, mutated(&self.modes[rng.random_range(0..before)].state, &drawn, layout, rng))
             })
             .collect();
-        let found = each(&searches, |(others, start)| match others {
+        let found = mapped(&searches, |(others, start)| match others {
             Some(others) => posterior.mode_through(others, start, layout, effort),
             None => posterior.mode_from_afar(start, layout, effort),
         });
@@ -108,17 +109,6 @@ impl Hypotheses {
         distinct.retain(|mode| mode.weight >= NEGLIGIBLE);
         self.modes = distinct;
     }
-}
-
-/// What becomes of each, in order: on several cores with the feature `parallel`.
-fn each<T: Sync, R: Send>(all: &[T], of: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
-    #[cfg(feature = "parallel")]
-    {
-        use rayon::prelude::*;
-        all.par_iter().map(of).collect()
-    }
-    #[cfg(not(feature = "parallel"))]
-    all.iter().map(of).collect()
 }
 
 /// `state` with one to three of its learned axes drawn anew or turned round; of other blocks, where no axis is learned.
