@@ -18,7 +18,7 @@ use crate::{
     estimation::Belief,
     kinematics::JointBox,
     model::Workspace,
-    optimize::{Polish, Settings, least, polish_along},
+    optimize::{Polish, Settings, Slopes, descend, least, polish},
 };
 
 /// How movements are planned.
@@ -335,15 +335,24 @@ impl<'a> Ground<'a> {
 
     /// Descends by the criterion from a point of the unit cube, beside the `poses` of a plan.
     fn polish(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], start: &[f64], how: Polish) -> (Vec<f64>, f64) {
-        let (scope, searched) = (self.scope, self.searched);
-        // What is not feasible, and what travel costs, only differences tell.
+        let searched = self.searched;
         let slope = |point: &[f64]| {
-            let free = (!scope.is_constrained()).then(|| searched.from_unit(point));
-            let (value, mut slope) = outlook.slope(&free?)?;
+            let (value, mut slope) = outlook.slope(&searched.from_unit(point))?;
             slope.iter_mut().zip(searched.joints()).for_each(|(slope, (lower, upper))| *slope *= upper - lower);
             Some((value, slope))
         };
-        polish_along(start, how, |points| self.evaluate(outlook, poses, points), slope)
+        // What is not feasible, and what travel costs, only differences tell.
+        if self.scope.is_constrained() || !outlook.has_slope() {
+            return polish(start, how, |points| self.evaluate(outlook, poses, points));
+        }
+        let slopes = |points: &[Vec<f64>]| {
+            let nothing = || (f64::INFINITY, vec![0.0; searched.dimension()]);
+            let (values, gradients): (Vec<f64>, Vec<Vec<f64>>) =
+                points.iter().map(|point| slope(point).unwrap_or_else(nothing)).unzip();
+            self.evaluations += points.len();
+            Slopes { values, gradients: gradients.concat() }
+        };
+        descend(vec![start.to_vec()], how, slopes).pop().unwrap_or_else(|| (start.to_vec(), f64::INFINITY))
     }
 
     /// The same at postures of the box, rad or m.
