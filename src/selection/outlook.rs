@@ -23,13 +23,14 @@ use std::sync::Arc;
 
 use super::{
     Appraisal, Criterion, Optimality, SelectionError, Sight, Weights,
-    criterion::{Slope, in_chunks, points},
+    criterion::{Slope, points},
     prediction::{Predictions, told_apart},
     views::Views,
 };
 use crate::{
     estimation::Belief,
     model::{Block, Element, Layout, Points, State, Workspace},
+    parallel::in_chunks,
     sensing::Rig,
 };
 
