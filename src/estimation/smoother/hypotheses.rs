@@ -46,9 +46,9 @@ const NEGLIGIBLE: f64 = 1e-5;
 /// Logarithm of the evidence ratio from which on another mode does not count.
 const HOPELESS: f64 = 40.0;
 
-const WARM: Effort = Effort { steps: 30, tolerance: 1e-6, hopeless: f64::INFINITY };
+const WARM: Effort<'_> = Effort { steps: 30, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
 /// What is found is followed after the next measurement: until then its share of the evidence is known to a hundredth.
-const COLD: Effort = Effort { steps: 40, tolerance: 1e-2, hopeless: f64::INFINITY };
+const COLD: Effort<'_> = Effort { steps: 40, tolerance: 1e-2, hopeless: f64::INFINITY, known: &[] };
 
 impl Hypotheses {
     /// Searches every mode again after the posterior has changed.
@@ -61,7 +61,7 @@ impl Hypotheses {
     /// half of these suspect some of the readings: they begin where all others are explained.
     pub fn spawn(&mut self, count: usize, posterior: &Posterior, layout: &Layout, rng: &mut impl Rng) {
         let best = self.modes.iter().map(|mode| mode.cost).fold(f64::INFINITY, f64::min);
-        let effort = Effort { hopeless: best + 2.0 * HOPELESS, ..COLD };
+        let effort = Effort { hopeless: best + 2.0 * HOPELESS, known: &self.modes, ..COLD };
         let before = self.modes.len();
         // All that is drawn is drawn before the first search, so that these may be in any order.
         let searches: Vec<(Option<Posterior>, State)> = (0..count)
@@ -94,12 +94,8 @@ impl Hypotheses {
             if mode.log_evidence < best - HOPELESS || distinct.len() >= kept {
                 break;
             }
-            let is_new = distinct.iter().all(|other| {
-                other
-                    .state
-                    .local(layout, &mode.state)
-                    .is_none_or(|delta| delta.dot(&(&other.information * &delta)) > MERGED)
-            });
+            let apart = |other: &Mode| other.distance(layout, &mode.state).is_none_or(|squared| squared > MERGED);
+            let is_new = distinct.iter().all(apart);
             if is_new {
                 distinct.push(mode);
             }
