@@ -6,6 +6,26 @@
 //!
 //! > R. Martinez-Cantin, M. Lopes, L. Montesano: *Body Schema Acquisition through Active Learning*, ICRA 2010.
 //!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! use body_schema::scenario::builtin;
+//!
+//! // Two learners in front of the same simulated arm: one chooses its movements, one draws them.
+//! let learners = ["active".to_owned(), "random".to_owned()];
+//! let mut experiment = builtin("arm-6dof")?.experiment(1, Some(&learners[..]))?;
+//! let before = experiment.latest().learners[0].metrics.prediction_m;
+//! for _ in 0..40 {
+//!     experiment.step()?;
+//! }
+//! let after = experiment.latest().learners[0].metrics.prediction_m;
+//! assert!(after < before.map(|metres| metres / 4.0));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Without scenarios: [`estimation::Rls`] learns from movements that somebody made, [`selection::Active`] chooses the next
+//! one, and [`ask_tell::Session`] does both for a robot elsewhere.
+//!
 //! # Map
 //!
 //! Each module uses only those above it.

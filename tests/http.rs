@@ -4,6 +4,8 @@
 #[path = "http/support.rs"]
 mod support;
 
+#[path = "http/alone.rs"]
+mod alone;
 #[path = "http/choices.rs"]
 mod choices;
 #[path = "http/connections.rs"]
@@ -18,6 +20,10 @@ mod disk;
 mod errors;
 #[path = "http/exported.rs"]
 mod exported;
+#[path = "http/logs.rs"]
+mod logs;
+#[path = "http/metrics.rs"]
+mod metrics;
 #[path = "http/openapi.rs"]
 mod openapi;
 #[path = "http/outside.rs"]

@@ -7,6 +7,7 @@ mod export;
 mod init;
 mod input;
 mod limits;
+mod logging;
 mod merge;
 mod observability;
 mod output;

@@ -13,6 +13,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::{
     limits::LimitArguments,
+    logging::LoggingArguments,
     signals::{INSTANT, Interrupted, Signal, Signals},
 };
 
@@ -43,6 +44,8 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR", hide = true)]
     panel_dir: Option<PathBuf>,
     #[command(flatten)]
+    logging: LoggingArguments,
+    #[command(flatten)]
     limits: LimitArguments,
 }
 
@@ -58,6 +61,7 @@ impl Default for Arguments {
             allow_hosts: Vec::new(),
             frame_ancestors: Vec::new(),
             panel_dir: None,
+            logging: LoggingArguments::default(),
             limits: LimitArguments::default(),
         }
     }
@@ -66,6 +70,7 @@ impl Default for Arguments {
 pub fn serve(arguments: &Arguments) -> Result<()> {
     let data_dir = data_dir(arguments)?;
     let token = token(arguments)?;
+    let _log = arguments.logging.begin()?;
     raise_descriptors();
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().context("cannot start")?;
     let served = runtime.block_on(async {
@@ -85,6 +90,9 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
             limits: arguments.limits.limits(),
         };
         let server = Server::new(listener, options, shutdown)?;
+        let (version, folder) =
+            (env!("CARGO_PKG_VERSION"), data_dir.as_deref().map(|folder| folder.display().to_string()));
+        tracing::info!(version, %address, folder, needs_token = token.is_some(), "listening");
         let mut out = std::io::stdout();
         writeln!(out, "body-schema is at http://{address}/ (Ctrl-C ends it)")?;
         match (&data_dir, &arguments.data_dir) {
@@ -163,9 +171,11 @@ fn end_by_signals(shutdown: CancellationToken) -> Result<Arc<OnceLock<Signal>>> 
     let ordered = Arc::new(OnceLock::new());
     let order = ordered.clone();
     tokio::spawn(async move {
-        signals.next().await;
+        let first = signals.next().await;
+        tracing::info!(signal = %first, "asked to end");
         shutdown.cancel();
         let second = signals.next().await;
+        tracing::warn!(signal = %second, "asked to end at once");
         let signal = *order.get_or_init(|| second);
         tokio::time::sleep(INSTANT).await;
         std::process::exit(signal.exit_code().into());

@@ -37,6 +37,40 @@ impl StabilisingNoise {
 }
 
 /// Recursive least squares after Martinez-Cantin, Lopes and Montesano 2010.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use body_schema::{
+///     estimation::{Belief, Estimator, Rls},
+///     kinematics::{Joint, Line},
+///     model::{Layout, State},
+///     sensing::{Observation, Rig},
+/// };
+/// use nalgebra::{DMatrix, Point3, Vector3};
+///
+/// // Two parallel axes and a marker half a metre from the first, in the frame in which the marker is measured.
+/// let axis = |x| Joint::Revolute(Line { point: Point3::new(x, 0.0, 0.0), direction: Vector3::z_axis() });
+/// let marker = Point3::new(0.5, 0.0, 0.0);
+/// let truth = State::arm(vec![axis(0.0), axis(0.31)], marker);
+/// let guess = State::arm(vec![axis(0.02), axis(0.28)], marker);
+///
+/// // Both axes are learned, the marker is known; readings have σ = 1 mm, the guess 10 cm and 0.1 rad.
+/// let layout = Layout::of_arm(&guess, &[true, true], false);
+/// let covariance = DMatrix::from_diagonal_element(layout.dimension(), layout.dimension(), 0.01);
+/// let belief = Belief::new(guess, layout.into(), Rig::tracker(0.001).into());
+/// let mut rls = Rls::new(belief, covariance, None);
+/// for step in 0..30 {
+///     let positions = [0.1 * f64::from(step) - 1.5, 1.5 - 0.07 * f64::from(step)];
+///     rls.update(&positions, &Observation::seen(truth.marker_at(&positions)))?;
+/// }
+/// let elbow = rls.belief().state.joints[1].line().expect("it turns");
+/// assert!(elbow.distance_to(&Point3::new(0.31, 0.0, 0.0)) < 1e-3);
+///
+/// // What is none of this robot's is refused, and changes nothing.
+/// assert!(rls.update(&[0.0], &Observation::seen(marker)).is_err());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Rls {
     belief: Belief,

@@ -1,21 +1,20 @@
 //! How a viewer arranges a recording when it opens it.
 
-use rerun::{
-    blueprint::components::{BackgroundKind, Corner2D, VisualBounds2D},
-    datatypes::Range2D,
-    external::{
-        re_log_types::{ApplicationId, EntityPath, LogMsg},
-        re_sdk_types::blueprint::archetypes::{
-            Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, VisualBounds2D as Bounds,
-        },
-    },
-};
 use serde::{Deserialize, Serialize};
 
 use super::{
     RecordingError,
     charts::{BEST_DESIGN, CHARTS, CHARTS_WITHOUT_TRUTH, TRACE},
     layout::{Container, Part, Time, View},
+    rerun::{
+        ApplicationId, EntityPath, LogMsg, Range2D,
+        blueprint::{
+            archetypes::{
+                Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, VisualBounds2D as Bounds,
+            },
+            components::{BackgroundKind, Corner2D, VisualBounds2D},
+        },
+    },
     solid::single,
     stage::{GROUNDS, Stage},
 };

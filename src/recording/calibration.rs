@@ -21,11 +21,6 @@
 use std::{collections::BTreeMap, path::Path};
 
 use nalgebra::{Isometry3, Point3};
-use rerun::{
-    Color, LineStrips3D, MediaType, Points3D, Radius, RecordingInfo, SeriesPoints, TextDocument, Transform3D,
-    ViewCoordinates,
-    external::re_log_types::{ApplicationId, EntityPath, StoreId},
-};
 
 use super::{
     EllipsoidSize, RecordingError, TRUTH_COLOR,
@@ -37,6 +32,10 @@ use super::{
     message,
     movement::MEASURED,
     posture::{ArmLook, Posture},
+    rerun::{
+        ApplicationId, Color, EntityPath, LineStrips3D, MediaType, Points3D, Radius, RecordingInfo, SeriesPoints,
+        StoreId, TextDocument, Transform3D, ViewCoordinates,
+    },
     room::Room,
     rows::Rows,
     solid::{drum, quaternion, single, solid},

@@ -3,15 +3,12 @@
 use std::{collections::BTreeMap, io::Cursor};
 
 use re_log_encoding::DecoderApp;
-use rerun::{
-    external::{
-        re_byte_size::SizeBytes,
-        re_log_types::{EntityPath, StoreId},
-    },
-    log::{Chunk, LogMsg},
-};
 
-use super::{COMPLETE, RecordingError, message, rows::by_steps};
+use super::{
+    COMPLETE, RecordingError, message,
+    rerun::{Chunk, EntityPath, LogMsg, StoreId, re_byte_size::SizeBytes},
+    rows::by_steps,
+};
 
 /// What of a live recording is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

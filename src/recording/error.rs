@@ -3,7 +3,8 @@
 use std::{io, path::PathBuf};
 
 use re_log_encoding::{CodecError, EncodeError};
-use rerun::{external::arrow::error::ArrowError, log::ChunkError};
+
+use super::rerun::{ChunkError, arrow::error::ArrowError};
 
 /// Why a run could not be recorded. The experiment itself is not affected.
 #[derive(Debug, thiserror::Error)]

@@ -7,9 +7,8 @@ use std::{
 };
 
 use re_log_encoding::{CrateVersion, EncodeError, Encoder, EncodingOptions};
-use rerun::log::LogMsg;
 
-use super::RecordingError;
+use super::{RecordingError, rerun::LogMsg};
 
 /// An .rrd file that is being written. Its footer, the index, is written at the end; dropping it tries to.
 pub(super) struct RrdFile {

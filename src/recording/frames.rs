@@ -1,11 +1,10 @@
 //! The way from one step's posture to the next, for those who watch live.
 
-use rerun::{LineStrips3D, Points3D};
-
 use super::{
     MOTION_PER_STEP,
     learner::{LearnerEntities, Scenery, TRUE_ARM},
     posture::{Posture, between},
+    rerun::{LineStrips3D, Points3D},
     rows::Rows,
     sight,
     solid::moved,

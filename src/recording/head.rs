@@ -1,9 +1,12 @@
 //! The head that watches: what its lens takes in, where it can turn, and where it looks.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use rerun::{Color, LineStrips3D, Radius};
 
-use super::{colours::tint, solid::single};
+use super::{
+    colours::tint,
+    rerun::{Color, LineStrips3D, Radius},
+    solid::single,
+};
 use crate::{
     experiment::{GazeReport, HeadDescription},
     sensing::Head,

@@ -3,11 +3,14 @@
 //! A blueprint is a store beside the recording's. Views and containers are entities of it, `view/{uuid}` and
 //! `container/{uuid}`; a container names its contents by their paths, and `viewport` names the outermost one.
 
-use rerun::{
-    Archetype, AsComponents, SerializedComponentBatch, StoreKind, Timeline,
-    external::{
-        re_log_types::{ApplicationId, BlueprintActivationCommand, EntityPath, LogMsg, StoreId},
-        re_sdk_types::blueprint::{
+use uuid::Uuid;
+
+use super::{
+    MOTION, RecordingError, TIMELINE, message,
+    rerun::{
+        ApplicationId, Archetype, AsComponents, BlueprintActivationCommand, Chunk, EntityPath, LogMsg, RowId,
+        SerializedComponentBatch, StoreId, StoreKind, Timeline,
+        blueprint::{
             archetypes::{
                 ContainerBlueprint, EntityBehavior, PanelBlueprint, TimePanelBlueprint, ViewBlueprint, ViewContents,
                 ViewportBlueprint,
@@ -15,11 +18,7 @@ use rerun::{
             components::{ContainerKind, PanelState, PlayState, RootContainer},
         },
     },
-    log::{Chunk, RowId},
 };
-use uuid::Uuid;
-
-use super::{MOTION, RecordingError, TIMELINE, message};
 
 /// Who moves the time.
 #[derive(Clone, Copy, Debug)]

@@ -3,10 +3,6 @@
 use std::{cell::RefCell, collections::HashMap};
 
 use nalgebra::{Isometry3, Translation3};
-use rerun::{
-    Points3D, TextLog, Transform3D,
-    external::re_log_types::{EntityPath, EntityPathPart},
-};
 
 use super::{
     EllipsoidSize, charts,
@@ -17,6 +13,7 @@ use super::{
     partition::{self, Slice},
     posture::{ArmLook, Posture, bare},
     readings::Readings,
+    rerun::{Color, EntityPath, EntityPathPart, Points3D, Radius, TextLog, Transform3D},
     rows::Rows,
     sight, sockets,
     solid::{self, Capsule, drum, quaternion, single, solid},
@@ -150,8 +147,8 @@ impl LearnerEntities {
         }
         for (path, colour) in [("name", label_on_light(self.colour)), ("on_dark/name", label_on_dark(self.colour))] {
             let name = Points3D::new([single(stage.figure.name.coords.into())])
-                .with_colors([rerun::Color::from(colour)])
-                .with_radii([rerun::Radius::new_scene_units(1e-3)])
+                .with_colors([Color::from(colour)])
+                .with_radii([Radius::new_scene_units(1e-3)])
                 .with_show_labels(true);
             rows.always(&self.entity(path), &[&name]);
         }

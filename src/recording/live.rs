@@ -1,23 +1,16 @@
 //! A recording that is followed while it grows.
 
-use std::{
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-    time::Duration,
-};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bytes::Bytes;
 use re_log_encoding::{CrateVersion, Encodable, Encoder, EncodingOptions, StreamHeader, ToTransport};
-use rerun::{
-    external::re_log,
-    log::LogMsg,
-    sink::{LogSink, SinkFlushError},
-};
 use tokio::sync::watch;
 
 use super::{
     RecordingError, Shape, Theme,
     blueprint::Arranger,
     compact::{Keep, put_together},
+    rerun::LogMsg,
 };
 
 /// How large a part is that is put together of others.
@@ -79,7 +72,7 @@ impl LiveLog {
         let mut bytes = Vec::new();
         // Writing twelve bytes to memory does not fail; were the header missing, every reader would say so.
         if let Err(error) = header.to_rrd_bytes(&mut bytes) {
-            re_log::error!("no header for the live recording: {error}");
+            tracing::error!("no header for the live recording: {error}");
         }
         let state = State { bytes: bytes.len(), parts: vec![Bytes::from(bytes)], ..State::default() };
         Self { shared: Arc::new(Shared { state: Mutex::new(state), length: watch::Sender::new(1) }) }
@@ -245,24 +238,6 @@ impl LiveLog {
 impl Default for LiveLog {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-/// Lets a Rerun stream of one's own write to the log as well.
-impl LogSink for LiveLog {
-    fn send(&self, message: LogMsg) {
-        self.send_all(vec![message]);
-    }
-
-    fn send_all(&self, messages: Vec<LogMsg>) {
-        // The trait has no way to return an error.
-        if let Err(error) = self.append(&messages) {
-            re_log::error!("{error}");
-        }
-    }
-
-    fn flush_blocking(&self, _timeout: Duration) -> Result<(), SinkFlushError> {
-        Ok(())
     }
 }
 

@@ -4,12 +4,10 @@
 //! log, and falls silent when the environment says `RERUN=off`. A recording here is asked for by name, so that it is
 //! made of the messages themselves.
 
-use rerun::{
-    external::re_log_types::{LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource},
-    log::{Chunk, RowId},
+use super::{
+    RecordingError,
+    rerun::{Chunk, LogMsg, RowId, SetStoreInfo, StoreId, StoreInfo, StoreSource},
 };
-
-use super::RecordingError;
 
 /// The first message of a store: what it is.
 pub(super) fn store_info(store: &StoreId) -> LogMsg {

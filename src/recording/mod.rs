@@ -89,6 +89,7 @@ mod partition;
 mod posture;
 mod readings;
 mod recorder;
+mod rerun;
 mod room;
 mod rows;
 mod sheet;

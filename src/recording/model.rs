@@ -1,8 +1,7 @@
 //! An arm at θ = 0, as lines: its links and its axes.
 
-use rerun::{Arrows3D, Color, LineStrips3D, Radius};
-
 use super::{
+    rerun::{Arrows3D, Color, LineStrips3D, Radius},
     solid::single,
     values::{Cell, Values},
 };

@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use rerun::{Color, LineStrips3D, Points3D, Radius, external::arrow::array::StringArray};
-
 use super::{
+    rerun::{Color, LineStrips3D, Points3D, Radius, arrow::array::StringArray},
     solid::single,
     values::{Cell, Values},
 };

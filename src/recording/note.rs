@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use clap::ValueEnum;
 use nalgebra::Point3;
-use rerun::{Color, MediaType, Points3D, Radius, TextDocument};
 
 use super::{
     EllipsoidSize, TRUTH_COLOR,
     colours::{hex, learner_color, learner_slots},
+    rerun::{Color, MediaType, Points3D, Radius, TextDocument},
     solid::single,
 };
 use crate::{experiment::Description, kinematics::JointKind};

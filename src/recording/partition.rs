@@ -1,14 +1,11 @@
 //! DIRECT's partition of the joint box: a slice to look at, and all of it as data.
 
-use rerun::{
-    AsComponents, Boxes2D, Color, ComponentDescriptor, Image, LineStrips2D, Points2D, Radius, Transform3D,
-    components::ImageFormat,
-    datatypes::{ChannelDatatype, ColorModel},
-    external::re_log_types::EntityPath,
-};
-
 use super::{
     colours::viridis,
+    rerun::{
+        AsComponents, Boxes2D, ChannelDatatype, Color, ColorModel, ComponentDescriptor, EntityPath, Image, ImageFormat,
+        LineStrips2D, Points2D, Radius, Transform3D,
+    },
     rows::Rows,
     values::{Cell, Values},
 };

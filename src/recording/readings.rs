@@ -1,11 +1,9 @@
 //! The series of readings: how far each is from the estimate, and how likely an outlier.
 
-use rerun::{
-    Color, SeriesLines,
-    external::re_log_types::{EntityPath, EntityPathPart},
+use super::{
+    rerun::{Color, EntityPath, EntityPathPart, SeriesLines},
+    rows::Rows,
 };
-
-use super::rows::Rows;
 use crate::experiment::{ChannelReading, Description};
 
 /// The series of one learner, by channel.

@@ -5,12 +5,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use rerun::{
-    RecordingInfo, SeriesLines, ViewCoordinates,
-    external::re_log_types::{ApplicationId, EntityPath, LogMsg, StoreId},
-    log::Chunk,
-};
-
 use super::{
     EllipsoidSize, LiveLog, MOST_FRAMES, RecordingError, TRUTH_COLOR, Target, Theme,
     blueprint::Arranger,
@@ -21,6 +15,7 @@ use super::{
     learner::{LearnerEntities, Scenery},
     message, metrics, model,
     note::{key, note},
+    rerun::{ApplicationId, Chunk, Color, EntityPath, LogMsg, RecordingInfo, SeriesLines, StoreId, ViewCoordinates},
     room::Room,
     rows::{Rows, complete},
     stage::{GROUNDS, Stage},
@@ -210,10 +205,8 @@ impl Recorder {
             return Ok(());
         }
         let series = EntityPath::from(BEST_DESIGN);
-        let line = SeriesLines::new()
-            .with_colors([rerun::Color::from(TRUTH_COLOR)])
-            .with_names(["best design"])
-            .with_widths([1.5]);
+        let line =
+            SeriesLines::new().with_colors([Color::from(TRUTH_COLOR)]).with_names(["best design"]).with_widths([1.5]);
         self.rows.always(&series, &[&line]);
         for design in designs {
             self.rows.number(design.step, &series, design.best_design_trace);
@@ -338,10 +331,8 @@ impl Recorder {
                     "bound_trace" => (format!("{name}: what its data allow"), tint(colour, 0.45), 1.2),
                     _ => (name.clone(), colour, 2.0),
                 };
-                let line = SeriesLines::new()
-                    .with_colors([rerun::Color::from(colour)])
-                    .with_names([name])
-                    .with_widths([width]);
+                let line =
+                    SeriesLines::new().with_colors([Color::from(colour)]).with_names([name]).with_widths([width]);
                 rows.always(series, &[&line]);
             }
         }
@@ -411,7 +402,7 @@ fn messages(store: &StoreId, chunks: &[Chunk]) -> Result<Vec<LogMsg>, RecordingE
 impl Drop for Recorder {
     fn drop(&mut self) {
         if let Err(error) = self.end() {
-            rerun::external::re_log::error!("{error}");
+            tracing::error!("{error}");
         }
     }
 }

@@ -8,14 +8,12 @@ use std::{
     sync::Arc,
 };
 
-use rerun::{
-    AsComponents, ComponentIdentifier, DynamicArchetype, Timeline,
-    external::{arrow::array::UInt64Array, re_log_types::EntityPath},
-    log::{Chunk, ChunkError, RowId},
-};
-
 use super::{
     COMPLETE, MOTION, MOTION_PER_STEP, RecordingError, TIMELINE,
+    rerun::{
+        AsComponents, Chunk, ChunkError, ComponentIdentifier, DynamicArchetype, EntityPath, RowId, Timeline,
+        arrow::array::UInt64Array,
+    },
     sheet::{Sheet, Timelines, When, sequence},
     values::{Cell, Values, cells},
 };
@@ -166,7 +164,7 @@ fn motion(step: u64, ticks: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use rerun::Points3D;
+    use crate::recording::rerun::{Points3D, arrow::array::Array};
 
     use super::*;
 
@@ -228,7 +226,7 @@ mod tests {
         let [chunk] = chunks.as_slice() else { panic!("one chunk, not {}", chunks.len()) };
         let said = |component: &'static str| {
             let list = chunk.components().get_array(component.into()).unwrap();
-            (0..3).map(|row| rerun::external::arrow::array::Array::is_valid(list, row)).collect::<Vec<_>>()
+            (0..3).map(|row| Array::is_valid(list, row)).collect::<Vec<_>>()
         };
         assert_eq!(said("Points3D:positions"), [true; 3]);
         assert_eq!(said("Points3D:labels"), [true, false, true]);

@@ -5,22 +5,17 @@
 
 use std::{mem::discriminant, ops::Range, sync::Arc};
 
-use rerun::{
-    ComponentDescriptor, Scalars, Timeline,
-    external::{
+use super::{
+    MOTION_PER_STEP, RecordingError,
+    rerun::{
+        Chunk, ChunkId, ComponentDescriptor, EntityPath, RowId, Scalars, TimeColumn, Timeline,
         arrow::{
             array::{ArrayRef, Float64Array, ListArray},
             buffer::{NullBuffer, OffsetBuffer},
             datatypes::Field,
             error::ArrowError,
         },
-        re_log_types::EntityPath,
     },
-    log::{Chunk, ChunkId, RowId, TimeColumn},
-};
-
-use super::{
-    MOTION_PER_STEP, RecordingError,
     values::{Cell, Values},
 };
 

@@ -1,12 +1,12 @@
 //! What cameras see: their pictures' planes, the known points of targets, and the rays from one to the other.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use rerun::{Color, LineStrips3D, Points3D, Radius};
 
 use super::{
     TRUTH_COLOR,
     learner::{LearnerEntities, Scenery},
     posture::Posture,
+    rerun::{AsComponents, Color, LineStrips3D, Points3D, Radius},
     rows::Rows,
     solid::single,
 };
@@ -104,7 +104,7 @@ pub(super) fn log(
 ) {
     let reach_m = scenery.stage.figure.reach_m;
     let [truth, estimate] = [truth, estimate].map(|arm| arm.map(|(arm, posture)| Sight::of(arm, posture, scenery)));
-    let mut put = |path: &'static str, what: &dyn rerun::AsComponents| {
+    let mut put = |path: &'static str, what: &dyn AsComponents| {
         let entity = learner.entity(path);
         if ticks == 0 { rows.at(step, &entity, &[what]) } else { rows.after(step, ticks, &entity, &[what]) }
     };

@@ -1,8 +1,9 @@
 //! The sockets in which targets are held.
 
-use rerun::{Color, Points3D, Radius};
-
-use super::solid::single;
+use super::{
+    rerun::{Color, Points3D, Radius},
+    solid::single,
+};
 use crate::experiment::SocketDescription;
 
 /// Of those that are learned from, and of those that are held out.

@@ -1,12 +1,11 @@
 //! Solid shapes: what arms and bodies are made of.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use rerun::{
-    Capsules3D, Color, Cylinders3D, FillMode, Quaternion,
-    components::{RotationQuat, Translation3D},
-};
 
-use super::values::{Cell, Values};
+use super::{
+    rerun::{Capsules3D, Color, Cylinders3D, FillMode, Quaternion, RotationQuat, Translation3D},
+    values::{Cell, Values},
+};
 
 /// A point as Rerun takes it.
 pub(super) fn single([x, y, z]: [f64; 3]) -> [f32; 3] {

@@ -2,9 +2,12 @@
 
 use nalgebra::{Point3, Vector3};
 
-use rerun::{Color, LineStrips3D, Radius};
-
-use super::{body::Figure, room::Room, solid::single};
+use super::{
+    body::Figure,
+    rerun::{Color, LineStrips3D, Radius},
+    room::Room,
+    solid::single,
+};
 
 /// The direction in which the camera is, as seen from the middle of the learners, by its angles from straight ahead of
 /// the robots and above the ground, radians: in a wide view and in a tall one. Robots stand in a row across the wide

@@ -1,11 +1,11 @@
 //! How uncertain a learner is of its arm, as ellipsoids that move with it.
 
 use nalgebra::{Isometry3, Matrix3, Point3};
-use rerun::{Color, ComponentDescriptor, Ellipsoids3D, FillMode, components::RotationQuat};
 
 use super::{
     ellipsoid::{Axes, Ellipsoid, EllipsoidSize},
     model::origins,
+    rerun::{Color, ComponentDescriptor, Ellipsoids3D, FillMode, RotationQuat},
     solid::{quaternion, single},
     values::{Cell, Values},
 };

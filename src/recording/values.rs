@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use rerun::{
+use super::rerun::{
     AsComponents, ComponentDescriptor, SerializedComponentBatch,
-    external::arrow::{
+    arrow::{
         array::{
             Array, ArrayRef, BooleanArray, FixedSizeListArray, Float32Array, Float64Array, ListArray, UInt8Array,
             UInt32Array,

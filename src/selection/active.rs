@@ -22,6 +22,41 @@ use crate::{
 ///
 /// Where a head watches ([`watched`](Self::watched)), the first movement goes to the pose that is known to be visible,
 /// the gain is weighed by the chance of being seen, and misses are remembered.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use body_schema::{
+///     estimation::Belief,
+///     kinematics::{Joint, JointBox, Line},
+///     model::{Layout, State},
+///     optimize::Settings,
+///     selection::{Actions, Active, CriterionUnits, History, Minimiser, Policy, Situation, Weights},
+///     sensing::Rig,
+/// };
+/// use nalgebra::{DMatrix, DVector, Point3, Vector3};
+/// use rand::SeedableRng;
+/// use rand_chacha::ChaCha8Rng;
+///
+/// // Two parallel axes, known to 10 cm and 0.1 rad, and a marker that is measured with σ = 1 mm.
+/// let axis = |x| Joint::Revolute(Line { point: Point3::new(x, 0.0, 0.0), direction: Vector3::z_axis() });
+/// let guess = State::arm(vec![axis(0.0), axis(0.3)], Point3::new(0.5, 0.0, 0.0));
+/// let layout = Layout::of_arm(&guess, &[true, true], false);
+/// let deviations = DVector::from_element(layout.dimension(), 0.1);
+/// let weights = Weights::new(CriterionUnits::CharacteristicLength(1.0), &layout, &deviations);
+/// let belief = Belief::new(guess, layout.into(), Rig::tracker(0.001).into())
+///     .with_covariance(DMatrix::from_diagonal(&deviations.map(|deviation| deviation * deviation)));
+///
+/// let actions = Actions::Box(JointBox::new(vec![(-1.5, 1.5), (0.2, 2.5)])?);
+/// let history = History::default();
+/// let situation = Situation { belief: &belief, actions: &actions, history: &history, constraints: None };
+/// let active = Active::new(weights, Minimiser::Direct(Settings { max_evaluations: 300, ..Settings::default() }));
+/// let selection = active.select(&situation, &mut ChaCha8Rng::seed_from_u64(1))?;
+/// // The movement (rad), and by how much it is expected to reduce tr(W P).
+/// assert_eq!(selection.movement.configuration.len(), 2);
+/// assert!(selection.gain > Some(0.0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Active {
     weights: Weights,

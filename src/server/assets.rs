@@ -33,12 +33,12 @@ const PANEL_SCRIPT: &str = "/panel/panel.js";
 const PANEL_WASM: &str = "/panel/panel_bg.wasm";
 
 /// The page itself, whose addresses of the other files are still without versions.
-pub(crate) const INDEX: &str = include_str!("../../web/page/index.html");
+pub(crate) const INDEX: &str = include_str!("../../assets/page/index.html");
 
 /// A file of the page: its path and its content.
 macro_rules! embedded {
     ($name:literal) => {
-        (concat!("/", $name), include_bytes!(concat!("../../web/page/", $name)) as &[u8])
+        (concat!("/", $name), include_bytes!(concat!("../../assets/page/", $name)) as &[u8])
     };
 }
 
@@ -112,8 +112,8 @@ impl Assets {
                 (read("panel.js")?, read("panel_bg.wasm.gz")?)
             }
             None => (
-                Bytes::from_static(include_bytes!("../../web/dist/panel.js")),
-                Bytes::from_static(include_bytes!("../../web/dist/panel_bg.wasm.gz")),
+                Bytes::from_static(include_bytes!("../../assets/panel/panel.js")),
+                Bytes::from_static(include_bytes!("../../assets/panel/panel_bg.wasm.gz")),
             ),
         };
         let page = PAGE.map(|(path, bytes)| Asset::new(path, media_type(path), Bytes::from_static(bytes)));
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn every_file_of_the_page_is_embedded() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("web/page");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/page");
         let files = fs::read_dir(folder).expect("the page's folder");
         let names = files.map(|file| file.expect("a file").file_name().into_string().expect("a name"));
         let there: BTreeSet<String> =

@@ -38,8 +38,10 @@ use tokio::{
 use tokio_util::sync::CancellationToken;
 
 use super::{
-    limits::{Limits, descriptors},
+    limits::Limits,
+    metrics::Metrics,
     problem::{Kind, PROBLEM_JSON, Problem},
+    rarely::Rarely,
     strangers::Reached,
 };
 use stream::Stream;
@@ -69,6 +71,9 @@ pub(super) struct Connections {
     busy: Bytes,
     /// … and to how many more at a time.
     refusals: Arc<Semaphore>,
+    metrics: Arc<Metrics>,
+    /// Of those that could not be taken.
+    rarely: Rarely,
 }
 
 /// What a connection is at.
@@ -111,8 +116,8 @@ impl Connection {
 }
 
 impl Connections {
-    pub(super) fn new(limits: Limits) -> Arc<Self> {
-        let most = limits.connections_within(descriptors()).min(Semaphore::MAX_PERMITS);
+    pub(super) fn new(limits: Limits, metrics: Arc<Metrics>) -> Arc<Self> {
+        let most = limits.possible_connections();
         let detail = format!("the server has {most} connections, and all are busy; try again later");
         Arc::new(Self {
             limits,
@@ -122,7 +127,14 @@ impl Connections {
             broken: CancellationToken::new(),
             busy: refusal(&Problem::new(Kind::ServerFull, detail)),
             refusals: Arc::new(Semaphore::new(MOST_REFUSALS)),
+            metrics,
+            rarely: Rarely::default(),
         })
+    }
+
+    /// How many are open.
+    pub(super) fn count(&self) -> usize {
+        self.lock().len()
     }
 
     /// Serves those who come until the server shuts down.
@@ -139,7 +151,8 @@ impl Connections {
                 // It went away before it was met.
                 Err(error) if is_of_connection(&error) => {}
                 // No descriptor is left, or no memory.
-                Err(_) => {
+                Err(error) => {
+                    self.rarely.tell(|times| tracing::warn!(times, %error, "no connection could be taken"));
                     self.make_room();
                     sleep(REST).await;
                 }
@@ -154,6 +167,9 @@ impl Connections {
         shutdown: &CancellationToken,
     ) {
         let Some(permit) = self.permit().await else {
+            self.metrics.refused_connections.inc();
+            let most = self.most;
+            self.rarely.tell(|times| tracing::warn!(times, most, "all connections are busy"));
             return self.refuse(stream);
         };
         let reached = stream.local_addr().ok();
@@ -198,7 +214,10 @@ impl Connections {
         let waiting = open.iter().filter(|connection| !connection.evicted.is_cancelled());
         let waiting = waiting.filter_map(|connection| Some((connection.waiting_since()?, connection)));
         let longest = waiting.min_by_key(|(since, _)| *since);
-        longest.map(|(_, connection)| connection.evicted.cancel()).is_some()
+        let Some((_, connection)) = longest else { return false };
+        connection.evicted.cancel();
+        self.metrics.evicted_connections.inc();
+        true
     }
 
     /// Serves one connection to its end.

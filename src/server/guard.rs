@@ -7,13 +7,14 @@ use axum::{
     body::to_bytes,
     extract::{ConnectInfo, DefaultBodyLimit, Request, State},
     http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header},
-    middleware::{Next, from_fn_with_state, map_response},
+    middleware::{Next, from_fn, from_fn_with_state, map_response},
     response::{IntoResponse, Response},
 };
 
 use super::{
     App, FrameAncestor,
     problem::{Kind, PROBLEM_JSON, Problem},
+    requests,
     strangers::Reached,
 };
 
@@ -60,13 +61,15 @@ pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>, always: Headers)
         .fallback(async |uri: Uri| {
             Problem::new(Kind::UnknownRoute, format!("there is nothing at `{}`; see /v1/openapi.json", uri.path()))
         })
-        .layer(DefaultBodyLimit::max(app.limits.body_bytes));
+        .layer(DefaultBodyLimit::max(app.limits.body_bytes))
+        .layer(from_fn(requests::routed));
     // Around the router as a whole: what is wrong with a method is known only there.
     Router::new()
         .fallback_service(router.with_state(app.clone()))
         .layer(from_fn_with_state(app.clone(), refuse_strangers))
         .layer(map_response(as_problem))
         .layer(map_response(move |response| with_headers(always.clone(), response)))
+        .layer(from_fn_with_state(app.metrics.clone(), requests::attended))
 }
 
 /// Who has no business here: under a foreign name, without the token, or from a page of another origin, which must neither
@@ -124,6 +127,7 @@ async fn as_problem(response: Response) -> Response {
     parts.headers.remove(header::CONTENT_LENGTH);
     let (made, body) = problem.into_response().into_parts();
     parts.headers.extend(made.headers);
+    parts.extensions.extend(made.extensions);
     Response::from_parts(parts, body)
 }
 

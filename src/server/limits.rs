@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use tokio::sync::Semaphore;
+
 use crate::ask_tell::MOST_SETUP_BYTES;
 
 /// How much a server takes on, all in one place. `docs/trust.md` has the same as a table, with what is answered beyond each.
@@ -79,15 +81,20 @@ impl Limits {
         self.header_bytes.max(LEAST_HEADER_BYTES)
     }
 
+    /// As many connections as there can be in this process.
+    pub(super) fn possible_connections(&self) -> usize {
+        self.connections_within(descriptors()).min(Semaphore::MAX_PERMITS)
+    }
+
     /// As many connections as these limits and the process's descriptors allow; the other half is for files and the rest.
-    pub(super) fn connections_within(&self, descriptors: Option<u64>) -> usize {
+    fn connections_within(&self, descriptors: Option<u64>) -> usize {
         let half = descriptors.and_then(|all| usize::try_from(all / 2).ok()).unwrap_or(usize::MAX);
         self.connections.min(half).max(1)
     }
 }
 
 /// How many descriptors this process may open; `None` where the platform does not say.
-pub(super) fn descriptors() -> Option<u64> {
+fn descriptors() -> Option<u64> {
     #[cfg(unix)]
     return rlimit::Resource::NOFILE.get_soft().ok();
     #[cfg(not(unix))]

@@ -9,6 +9,7 @@
 //! aside     work that holds up nobody                    gzip     answers, compressed
 //! strangers who may ask at all                           frame    who may embed the page
 //! connections  how long each may keep us waiting          limits   how much is taken on
+//! requests  their ids and lines in the log                metrics  figures for Prometheus
 //! ```
 //!
 //! Every session's engine computes on its own thread; the runtime's workers only carry messages and bytes. What is taken on,
@@ -23,7 +24,10 @@ mod frame;
 mod guard;
 mod gzip;
 mod limits;
+mod metrics;
 mod problem;
+mod rarely;
+mod requests;
 mod session;
 mod store;
 mod strangers;
@@ -40,6 +44,7 @@ use connections::Connections;
 pub use frame::{FrameAncestor, NoOrigin};
 pub(crate) use guard::CONTENT_SECURITY_POLICY;
 pub use limits::{Limits, raise_descriptors};
+use metrics::{Metrics, Most};
 pub use problem::{PROBLEM_JSON, Problem};
 use session::{Budget, Keeping, Sessions};
 pub use session::{NewOutsideSession, NewSession, SessionResource};
@@ -103,6 +108,8 @@ struct App {
     openapi: bytes::Bytes,
     strangers: Strangers,
     limits: Limits,
+    metrics: Arc<Metrics>,
+    connections: Arc<Connections>,
 }
 
 /// A server that is ready to serve.
@@ -134,13 +141,17 @@ impl Server {
             recordings: options.data_dir.filter(|_| options.keep_recordings),
             limits: limits.clone(),
         };
+        let most = Most { connections: limits.possible_connections(), memory_bytes: limits.memory_bytes };
+        let metrics = Arc::new(Metrics::new(&most));
         let (routes, document) = api::routes(&limits);
         let app = Arc::new(App {
-            sessions: Sessions::new(Budget::new(limits.memory_bytes), keeping, shutdown.clone())?,
+            sessions: Sessions::new(Budget::new(limits.memory_bytes), keeping, metrics.clone(), shutdown.clone())?,
             assets: assets::Assets::load(options.panel_dir.as_deref())?,
             openapi: document,
             strangers: Strangers::new(options.token, options.allow_hosts, address.port()),
+            connections: Connections::new(limits.clone(), metrics.clone()),
             limits,
+            metrics,
         });
         let router = Router::new().merge(routes).merge(assets::routes(&app.assets));
         let router = guard::layered(router, &app, guard::Headers::new(&options.frame_ancestors));
@@ -155,12 +166,16 @@ impl Server {
     /// [`ServerError::Incomplete`] where recordings could not be completed.
     pub async fn run(self) -> Result<(), ServerError> {
         let Self { listener, app, router, shutdown } = self;
-        let connections = Connections::new(app.limits.clone());
         tokio::select! {
-            () = connections.serve(listener, router, &shutdown) => {}
+            () = app.connections.serve(listener, router, &shutdown) => {}
             () = app.sessions.watch_over() => {}
         }
-        let (incomplete, ()) = tokio::join!(app.sessions.close_all(), connections.end());
+        tracing::info!("ending");
+        let (incomplete, ()) = tokio::join!(app.sessions.close_all(), app.connections.end());
+        for why in &incomplete {
+            tracing::error!(why, "a recording lacks its end");
+        }
+        tracing::info!("ended");
         if incomplete.is_empty() { Ok(()) } else { Err(ServerError::Incomplete(incomplete)) }
     }
 }

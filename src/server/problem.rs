@@ -7,7 +7,7 @@ use axum::{
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::store::StoreError;
+use super::{requests, store::StoreError};
 use crate::{
     ask_tell::{Refusal, ReplayError, ResultsError, SetupError},
     experiment::ChoiceError,
@@ -42,7 +42,32 @@ pub struct Problem {
     /// How many steps can still be made, where that is too few.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remaining: Option<u64>,
+    /// The id of the request, as in the answer's `X-Request-Id` and in the server's log.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub request_id: Option<String>,
 }
+
+/// What an answer that is a problem carries for the log.
+#[derive(Clone, Debug)]
+pub(super) struct Refused {
+    kind: &'static str,
+    /// What went wrong, where that is the server's own affair: to clients' mistakes their words may belong.
+    why: Option<String>,
+}
+
+impl Refused {
+    /// Its kind, without the words that all kinds have in common.
+    pub(super) fn kind(&self) -> &'static str {
+        self.kind.strip_prefix(URN).unwrap_or("other")
+    }
+
+    pub(super) fn why(&self) -> Option<&str> {
+        self.why.as_deref()
+    }
+}
+
+/// How the kinds' names begin.
+const URN: &str = "urn:body-schema:problem:";
 
 /// The kinds of problems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -132,7 +157,8 @@ impl Kind {
 impl Problem {
     pub(super) fn new(kind: Kind, detail: impl Into<String>) -> Self {
         let (status, urn, title) = kind.parts();
-        Self { kind: urn, title, status, detail: detail.into(), field: None, step: None, remaining: None }
+        let detail = detail.into();
+        Self { kind: urn, title, status, detail, field: None, step: None, remaining: None, request_id: None }
     }
 
     pub(super) fn field(self, field: impl Into<String>) -> Self {
@@ -277,11 +303,14 @@ impl From<StoreError> for Problem {
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        let body = serde_json::to_vec(&self).unwrap_or_default();
+        let refused = Refused { kind: self.kind, why: status.is_server_error().then(|| self.detail.clone()) };
+        let told = Self { request_id: requests::id(), ..self };
+        let body = serde_json::to_vec(&told).unwrap_or_default();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
+        response.extensions_mut().insert(refused);
         if matches!(status, StatusCode::SERVICE_UNAVAILABLE | StatusCode::TOO_MANY_REQUESTS) {
             // A session that has left memory is back at once.
-            let after = if self.is(Kind::Dormant) { 0 } else { RETRY_AFTER_S };
+            let after = if told.is(Kind::Dormant) { 0 } else { RETRY_AFTER_S };
             response.headers_mut().insert(header::RETRY_AFTER, after.into());
         }
         if matches!(status, StatusCode::REQUEST_TIMEOUT) {

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::support::{Server, timeless};
 
-const ROUTES: [(&str, &str); 36] = [
+const ROUTES: [(&str, &str); 37] = [
     ("get", "/v1/scenarios"),
     ("get", "/v1/scenarios/{name}"),
     ("get", "/v1/sessions"),
@@ -42,6 +42,7 @@ const ROUTES: [(&str, &str); 36] = [
     ("get", "/v1/sessions/{id}/result.json"),
     ("get", "/v1/openapi.json"),
     ("get", "/healthz"),
+    ("get", "/metrics"),
 ];
 
 #[tokio::test]

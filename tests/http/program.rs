@@ -10,6 +10,9 @@ use serde_json::json;
 
 use crate::support::{Api, steps};
 
+/// Names the level of the program's log.
+pub const LOG: &str = "BODY_SCHEMA_LOG";
+
 /// The program, serving on a port of its own; it is killed when this goes.
 pub struct Program {
     process: Child,
@@ -20,7 +23,7 @@ pub struct Program {
 }
 
 impl Program {
-    fn serve(environment: &[(&str, &str)], arguments: &[&str]) -> Self {
+    pub fn serve(environment: &[(&str, &str)], arguments: &[&str]) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_body-schema"));
         command.args(["serve", "--bind", "127.0.0.1:0", "--ephemeral"]).args(arguments);
         Self::start(command.envs(environment.iter().copied()))
@@ -42,8 +45,11 @@ impl Program {
         Self::start(command.args(["serve", "--bind", "127.0.0.1:0", "--data-dir"]).arg(folder))
     }
 
-    /// Waits until it says where it is, and all that it says beside.
+    /// Waits until it says where it is, and all that it says beside. It keeps no log, unless it is told to.
     pub fn start(command: &mut Command) -> Self {
+        if !command.get_envs().any(|(name, _)| name == LOG) {
+            command.env(LOG, "off");
+        }
         let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts");
         let mut output = BufReader::new(process.stdout.take().expect("its output"));
         let mut said = String::new();

@@ -2,8 +2,9 @@
 
 use std::{collections::BTreeSet, io::Cursor};
 
+use re_chunk::Chunk;
 use re_log_encoding::DecoderApp;
-use rerun::log::{Chunk, LogMsg};
+use re_log_types::LogMsg;
 use serde_json::json;
 
 use crate::support::{Server, problem, steps};

@@ -4,9 +4,10 @@ use std::{collections::BTreeSet, io::Cursor};
 
 use body_schema::server::{Limits, Options};
 use futures_util::{SinkExt, StreamExt};
+use re_chunk::Chunk;
 use re_log_encoding::DecoderApp;
+use re_log_types::LogMsg;
 use reqwest::Method;
-use rerun::log::{Chunk, LogMsg};
 use serde_json::Value;
 use tokio::{net::TcpStream, time::timeout};
 use tokio_tungstenite::{

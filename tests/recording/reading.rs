@@ -2,14 +2,15 @@
 
 use std::{collections::BTreeMap, io::Cursor};
 
+use re_chunk::Chunk;
 use re_log_encoding::DecoderApp;
-use rerun::{
+use re_log_types::LogMsg;
+use re_sdk_types::{
     Component,
     components::{
         Color, HalfSize2D, HalfSize3D, Length, LineStrip3D, Name, Position2D, Position3D, RotationQuat, Text,
         Translation3D, Vector3D,
     },
-    log::{Chunk, LogMsg},
 };
 
 /// All messages of a stream.

@@ -38,6 +38,7 @@ pub use sessions::{MadeSteps, SessionList, StepRequest};
 use super::{
     App, Limits,
     aside::aside,
+    metrics::OPEN_METRICS,
     problem::{Kind, PROBLEM_JSON, Problem},
 };
 use crate::experiment::StepReport;
@@ -118,6 +119,7 @@ pub(super) fn routes(limits: &Limits) -> (Router<Arc<App>>, Bytes) {
         .routes(routes!(downloads::result))
         .routes(routes!(openapi))
         .routes(routes!(health))
+        .routes(routes!(metrics))
         .split_for_parts();
     describe_what_holds_for_all(&mut document);
     describe_events(&mut document);
@@ -170,6 +172,17 @@ async fn openapi(State(app): State<Arc<App>>) -> Response {
 ))]
 async fn health() -> Json<Health> {
     Json(Health { status: Liveness::Ok, version: env!("CARGO_PKG_VERSION") })
+}
+
+/// What the server does and holds, in figures for Prometheus.
+#[utoipa::path(get, path = "/metrics", tag = "server", responses(
+    (status = 200, description = "Counters since the start, and what there is now, in the text form of OpenMetrics 1.0",
+        body = String, content_type = "application/openmetrics-text")
+))]
+async fn metrics(State(app): State<Arc<App>>) -> Result<Response, Problem> {
+    let text = app.metrics.text(&app.sessions.present(app.connections.count()));
+    let text = text.map_err(|error| Problem::new(Kind::Internal, format!("no figures: {error}")))?;
+    Ok(([(header::CONTENT_TYPE, OPEN_METRICS)], text).into_response())
 }
 
 /// A file to take away.

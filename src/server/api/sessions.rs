@@ -21,6 +21,7 @@ use crate::{
         App, Limits,
         extract::{FromJson, JsonBody, parse},
         problem::{Kind, Problem},
+        requests,
         session::{NewOutsideSession, NewSession, SessionResource},
     },
     whole::{whole, whole_or_none},
@@ -192,7 +193,7 @@ pub(super) async fn delete(State(app): State<Arc<App>>, Path(id): Path<String>) 
 async fn to_its_end<T: Send + 'static>(
     work: impl Future<Output = Result<T, Problem>> + Send + 'static,
 ) -> Result<T, Problem> {
-    let done = tokio::spawn(work).await;
+    let done = tokio::spawn(requests::carried(work)).await;
     done.unwrap_or_else(|error| Err(Problem::new(Kind::Internal, format!("a part of the server failed: {error}"))))
 }
 

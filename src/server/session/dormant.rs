@@ -16,7 +16,7 @@ use tokio::{
 use uuid::Uuid;
 
 use super::{
-    Elsewhere, Engine, NewOutsideSession, Session, SessionResource, Sessions, Shared, Standing, lock,
+    Elsewhere, Engine, NewOutsideSession, Session, SessionResource, Sessions, Standing, lock,
     outside::{self, Beginning, Origin, now_s},
     registry::{END_WITHIN, no_engine, spawn},
 };
@@ -26,6 +26,7 @@ use crate::{
     server::{
         aside::aside,
         problem::{Kind, Problem},
+        requests,
         store::{Shown, Stored},
     },
 };
@@ -67,6 +68,7 @@ impl Sessions {
         let known = Arc::new(Known::new(Uuid::new_v4(), now_s()));
         let origin = Origin::New(Setup { calibration, agent, seed }, Shown { ellipsoids }, events);
         let session = self.begin(&known, origin).await?;
+        tracing::info!(request = requests::id(), session = %session.id, "a session with a robot elsewhere was opened");
         lock(&self.known).push(known);
         Ok(session)
     }
@@ -86,13 +88,15 @@ impl Sessions {
         }
         self.check_open()?;
         let stored = self.load(id).await?.ok_or_else(unknown)?;
-        self.begin(&known, Origin::Store(stored)).await
+        let session = self.begin(&known, Origin::Store(stored)).await?;
+        tracing::info!(request = requests::id(), session = %id, "a session is back in memory");
+        Ok(session)
     }
 
     async fn begin(&self, known: &Known, origin: Origin) -> Result<Arc<Session>, Problem> {
         let permit = self.place().await?;
         let Known { id, made_s, .. } = *known;
-        let shared = Arc::new(Shared::new(self.shutdown.child_token(), self.budget.clone()));
+        let shared = Arc::new(self.shared(id));
         let beginning = Beginning { id, origin, made_s, store: self.store.clone(), shared: shared.clone(), permit };
         let (jobs, receiver) = mpsc::channel();
         let (opened, opening) = oneshot::channel();
@@ -143,6 +147,7 @@ impl Sessions {
         session.stop();
         // However long that takes: nobody else may write its events meanwhile.
         session.ended().cancelled().await;
+        tracing::info!(session = %session.id, "a session has left memory");
     }
 
     /// Takes sessions out of memory that nobody asks for, now and then, for ever.
@@ -162,6 +167,7 @@ impl Sessions {
         self.known(id).ok_or_else(|| Problem::unknown_session(id))?;
         aside(move || store.delete(id)).await?;
         lock(&self.known).retain(|other| other.id != id);
+        tracing::info!(request = requests::id(), session = %id, "a session was deleted");
         if let Some(session) = self.leave(id) {
             session.stop();
             // An engine that is choosing ends a little later, and can write nothing any more.

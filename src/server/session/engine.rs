@@ -288,6 +288,7 @@ impl Engine<'_> {
 
     fn step(&mut self, frames: u64, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
         self.experiment.step().map_err(|error| Problem::new(Kind::EngineFailed, error.to_string()))?;
+        self.shared.metrics.steps.inc();
         let report = self.experiment.latest();
         // The step stands even if it cannot be recorded.
         batch.made.push(Kept::of(report, self.experiment.description())?);

@@ -21,7 +21,12 @@ impl Budget {
 
     /// Whether more steps may be made. The last command before the limit may overshoot it by what it makes.
     pub(super) fn has_room(&self) -> bool {
-        self.used.load(Ordering::Relaxed) < self.limit
+        self.used() < self.limit
+    }
+
+    /// What is taken of it, bytes.
+    pub(super) fn used(&self) -> usize {
+        self.used.load(Ordering::Relaxed)
     }
 
     pub(super) fn take(&self, bytes: usize) {

@@ -157,7 +157,11 @@ impl Elsewhere {
                 Ok(job) => return Ok(job),
                 Err(mpsc::RecvTimeoutError::Disconnected) => return Err(mpsc::RecvError),
                 // What cannot be written is tried again.
-                Err(mpsc::RecvTimeoutError::Timeout) => drop(self.expire()),
+                Err(mpsc::RecvTimeoutError::Timeout) => {
+                    if let Err(problem) = self.expire() {
+                        tracing::error!(session = %self.id, why = problem.detail, "a suggestion cannot be ended");
+                    }
+                }
             }
         }
     }
@@ -211,6 +215,7 @@ impl Elsewhere {
             }
         })?;
         let answer = self.commit(prepared, key)?;
+        self.shared.metrics.observations.inc();
         self.keys.extend(key.map(|key| (key.to_owned(), answer.observation)));
         Ok((answer, false))
     }

@@ -2,7 +2,7 @@
 
 use std::{
     path::PathBuf,
-    sync::{Arc, Mutex, mpsc},
+    sync::{Arc, Mutex, atomic::Ordering, mpsc},
     thread,
     time::{Duration, Instant},
 };
@@ -19,9 +19,12 @@ use uuid::Uuid;
 use super::{Budget, Engine, Session, Shared, dormant::Known, engine, lock, outside::now_s};
 use crate::{
     recording::EllipsoidSize,
+    scenario::WorldKind,
     server::{
         Limits,
+        metrics::{Metrics, Present},
         problem::{Kind, Problem},
+        requests,
         store::{Store, StoreError},
     },
 };
@@ -76,6 +79,7 @@ pub(in crate::server) struct Sessions {
     /// One for each session with a robot elsewhere that is in memory.
     pub(super) places: Arc<Semaphore>,
     pub(super) budget: Arc<Budget>,
+    pub(super) metrics: Arc<Metrics>,
     pub(super) store: Arc<Store>,
     recordings: Option<PathBuf>,
     pub(super) limits: Limits,
@@ -86,6 +90,7 @@ impl Sessions {
     pub(in crate::server) fn new(
         budget: Budget,
         keeping: Keeping,
+        metrics: Arc<Metrics>,
         shutdown: CancellationToken,
     ) -> Result<Self, StoreError> {
         let Keeping { store, recordings, limits } = keeping;
@@ -96,6 +101,7 @@ impl Sessions {
             permits: Arc::new(Semaphore::new(limits.sessions)),
             places: Arc::new(Semaphore::new(limits.sessions)),
             budget: Arc::new(budget),
+            metrics,
             store: Arc::new(store),
             recordings,
             limits,
@@ -107,12 +113,12 @@ impl Sessions {
     pub(in crate::server) async fn open(&self, new: NewSession) -> Result<Arc<Session>, Problem> {
         let permit = self.permit().await?;
         let id = Uuid::new_v4();
-        let shared = Arc::new(Shared::new(self.shutdown.child_token(), self.budget.clone()));
+        let shared = Arc::new(self.shared(id));
         // An unknown scenario's name becomes part of no path: the engine refuses it before it opens the file.
         let file = self.recordings.as_ref().map(|_| format!("{}-seed{}-{id}.rrd", new.scenario, new.seed));
         let setup = engine::Setup {
             id,
-            scenario: new.scenario,
+            scenario: new.scenario.clone(),
             seed: new.seed,
             learners: new.learners,
             ellipsoids: new.ellipsoids,
@@ -138,7 +144,14 @@ impl Sessions {
             together: Default::default(),
             report: Default::default(),
         };
+        let NewSession { scenario, seed, .. } = new;
+        tracing::info!(request = requests::id(), session = %id, scenario, seed, "a session was opened");
         Ok(self.enter(session))
+    }
+
+    /// What the engine of a session is to leave.
+    pub(super) fn shared(&self, id: Uuid) -> Shared {
+        Shared::new(id, self.shutdown.child_token(), self.budget.clone(), self.metrics.clone())
     }
 
     /// Adds a session to those in memory.
@@ -163,6 +176,7 @@ impl Sessions {
             return Ok(permit);
         }
         if let Some(session) = self.idle_longest(|session| !session.is_elsewhere(), self.limits.idle_after) {
+            tracing::info!(request = requests::id(), session = %session.id, "an idle session makes room for another");
             self.close(session.id).await?;
         }
         self.permits.clone().try_acquire_owned().map_err(|_| {
@@ -212,6 +226,12 @@ impl Sessions {
         if let Some(known) = self.known(id) {
             return self.forget(&known).await;
         }
+        self.end(id).await?;
+        tracing::info!(request = requests::id(), session = %id, "a session was deleted");
+        Ok(())
+    }
+
+    async fn end(&self, id: Uuid) -> Result<(), Problem> {
         let session = self.in_memory(id).ok_or_else(|| Problem::unknown_session(id))?;
         match timeout(END_WITHIN, session.end()).await {
             Ok(ended) => ended?,
@@ -230,6 +250,19 @@ impl Sessions {
         let mut all = lock(&self.all);
         let index = all.iter().position(|session| session.id == id)?;
         Some(all.remove(index))
+    }
+
+    /// What there is at the moment, beside so many open connections.
+    pub(in crate::server) fn present(&self, connections: usize) -> Present {
+        let all = lock(&self.all);
+        let of = |world| (world, all.iter().filter(|session| session.world() == world).count());
+        Present {
+            sessions: [WorldKind::Simulated, WorldKind::Measured, WorldKind::Outside].map(of),
+            stored_sessions: lock(&self.known).len(),
+            streams: all.iter().map(|session| session.streams.load(Ordering::Relaxed)).sum(),
+            connections,
+            memory_bytes: self.budget.used(),
+        }
     }
 
     /// Ends all sessions and waits, within bounds, until their recordings are complete. Tells which are not, and why.
@@ -263,11 +296,13 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::server::metrics::Most;
 
     fn sessions(memory: usize) -> Sessions {
         let store = Store::in_memory().expect("a store");
         let keeping = Keeping { store, recordings: None, limits: Limits::default() };
-        Sessions::new(Budget::new(memory), keeping, CancellationToken::new()).expect("sessions")
+        let metrics = Arc::new(Metrics::new(&Most { connections: 1, memory_bytes: memory }));
+        Sessions::new(Budget::new(memory), keeping, metrics, CancellationToken::new()).expect("sessions")
     }
 
     #[tokio::test]

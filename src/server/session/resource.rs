@@ -42,16 +42,20 @@ pub struct SessionResource {
 }
 
 impl Session {
+    /// Where its movements are made.
+    pub(super) fn world(&self) -> WorldKind {
+        match self.description.movements_available {
+            _ if self.is_elsewhere() => WorldKind::Outside,
+            Some(_) => WorldKind::Measured,
+            None => WorldKind::Simulated,
+        }
+    }
+
     pub(in crate::server) fn resource(&self) -> SessionResource {
         let standing = self.shared.standing.borrow().clone();
-        let world = match (&standing, self.description.movements_available) {
-            (Some(_), _) => WorldKind::Outside,
-            (None, Some(_)) => WorldKind::Measured,
-            (None, None) => WorldKind::Simulated,
-        };
         SessionResource {
             id: self.id.to_string(),
-            world,
+            world: self.world(),
             description: self.description.clone(),
             step: standing.as_deref().map_or(self.step(), |standing| standing.step()),
             remaining: self.remaining(),

@@ -7,12 +7,14 @@ use std::sync::{
 
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
+use uuid::Uuid;
 
 use super::{Budget, Kept, Standing, lock};
-use crate::recording::LiveLog;
+use crate::{recording::LiveLog, server::metrics::Metrics};
 
 /// What an engine leaves for everyone to read.
 pub(super) struct Shared {
+    id: Uuid,
     /// One report per step, from step 0.
     pub(super) history: RwLock<Vec<Kept>>,
     /// The length of `history`, to wait on.
@@ -35,6 +37,8 @@ pub(super) struct Shared {
     /// The engine has ended: nothing more is coming and the recording's file is complete.
     pub(super) ended: CancellationToken,
     pub(super) budget: Arc<Budget>,
+    /// Counts what engines do.
+    pub(super) metrics: Arc<Metrics>,
     /// What this session has taken of the budget …
     taken: AtomicUsize,
     /// … and how much of it for reports.
@@ -42,8 +46,9 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    pub(super) fn new(stop: CancellationToken, budget: Arc<Budget>) -> Self {
+    pub(super) fn new(id: Uuid, stop: CancellationToken, budget: Arc<Budget>, metrics: Arc<Metrics>) -> Self {
         Self {
+            id,
             history: RwLock::default(),
             reports: watch::Sender::new(0),
             live: LiveLog::new(),
@@ -56,6 +61,7 @@ impl Shared {
             stop,
             ended: CancellationToken::new(),
             budget,
+            metrics,
             taken: AtomicUsize::new(0),
             reported: AtomicUsize::new(0),
         }
@@ -77,10 +83,19 @@ impl Shared {
     }
 
     pub(super) fn note_recording(&self, failure: Option<String>) {
-        *lock(&self.recording_failure) = failure;
+        let session = tracing::field::display(self.id);
+        let mut known = lock(&self.recording_failure);
+        match (&*known, &failure) {
+            (None, Some(why)) => tracing::error!(session, why, "the recording cannot be written"),
+            (Some(_), None) => tracing::info!(session, "the recording is written again"),
+            _ => {}
+        }
+        *known = failure;
     }
 
     pub(super) fn fail(&self, why: String) {
+        tracing::error!(session = %self.id, why, "the session has failed");
+        self.metrics.failed_sessions.inc();
         *lock(&self.failure) = Some(why);
     }
 }

@@ -1,12 +1,12 @@
-//! Builds the page's panel into `web/dist`, which the server embeds:
+//! Builds the page's panel into `assets/panel`, which the server embeds:
 //!
 //! ```sh
 //! rustup target add wasm32-unknown-unknown    # once
-//! cargo run -p body-schema-bundle             # --check only tells whether web/dist is of these sources
+//! cargo run -p body-schema-bundle             # --check only tells whether assets/panel is of these sources
 //! ```
 //!
 //! Where rustup has no such target, Debian's `rustc-web cargo-web rust-web-src lld-19` do it: set
-//! `BODY_SCHEMA_DEBIAN_RUST=1`. A folder as argument takes the place of `web/dist`.
+//! `BODY_SCHEMA_DEBIAN_RUST=1`. A folder as argument takes the place of `assets/panel`.
 
 mod stamp;
 
@@ -30,7 +30,7 @@ fn main() -> ExitCode {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let arguments: Vec<String> = env::args().skip(1).collect();
     let folder = arguments.iter().find(|argument| !argument.starts_with("--"));
-    let folder = folder.map_or_else(|| workspace.join("web/dist"), PathBuf::from);
+    let folder = folder.map_or_else(|| workspace.join("assets/panel"), PathBuf::from);
     let outcome = if arguments.iter().any(|argument| argument == "--check") {
         check(&workspace, &folder)
     } else {

@@ -1,0 +1,48 @@
+//! Lines in the log about what may happen many times a second.
+
+use std::{
+    sync::{Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+
+/// At most one line in this time.
+const APART: Duration = Duration::from_secs(10);
+
+/// Tells of something that may happen often now and then, with how often it has happened since it was last told.
+#[derive(Default)]
+pub(super) struct Rarely(Mutex<Untold>);
+
+#[derive(Default)]
+struct Untold {
+    times: u64,
+    told: Option<Instant>,
+}
+
+impl Rarely {
+    /// It has happened; `line` tells of it, unless that was done a moment ago.
+    pub(super) fn tell(&self, line: impl FnOnce(u64)) {
+        let mut untold = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        untold.times += 1;
+        if untold.told.is_none_or(|told| told.elapsed() >= APART) {
+            untold.told = Some(Instant::now());
+            line(std::mem::take(&mut untold.times));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_times_are_one_line_and_none_is_lost() {
+        let (rarely, mut lines) = (Rarely::default(), Vec::new());
+        for _ in 0..5 {
+            rarely.tell(|times| lines.push(times));
+        }
+        assert_eq!(lines, [1]);
+        rarely.0.lock().expect("unharmed").told = None;
+        rarely.tell(|times| lines.push(times));
+        assert_eq!(lines, [1, 5]);
+    }
+}
