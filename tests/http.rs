@@ -4,6 +4,8 @@
 #[path = "http/support.rs"]
 mod support;
 
+#[path = "http/bounds.rs"]
+mod bounds;
 #[path = "http/choices.rs"]
 mod choices;
 #[path = "http/connections.rs"]
@@ -18,6 +20,8 @@ mod disk;
 mod errors;
 #[path = "http/exported.rs"]
 mod exported;
+#[path = "http/faults.rs"]
+mod faults;
 #[path = "http/openapi.rs"]
 mod openapi;
 #[path = "http/outside.rs"]
@@ -28,6 +32,8 @@ mod pages;
 mod program;
 #[path = "http/python.rs"]
 mod python;
+#[path = "http/repeated.rs"]
+mod repeated;
 #[path = "http/results.rs"]
 mod results;
 #[path = "http/robot.rs"]

@@ -85,6 +85,10 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
             limits: arguments.limits.limits(),
         };
         let server = Server::new(listener, options, shutdown)?;
+        for damage in server.damage() {
+            // Whoever closed standard error is served all the same.
+            drop(writeln!(std::io::stderr(), "warning: {damage}"));
+        }
         let mut out = std::io::stdout();
         writeln!(out, "body-schema is at http://{address}/ (Ctrl-C ends it)")?;
         match (&data_dir, &arguments.data_dir) {

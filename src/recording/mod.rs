@@ -89,6 +89,7 @@ mod partition;
 mod posture;
 mod readings;
 mod recorder;
+mod repair;
 mod room;
 mod rows;
 mod sheet;
@@ -109,6 +110,7 @@ pub use self::{
     error::RecordingError,
     live::LiveLog,
     recorder::Recorder,
+    repair::{Condition, examine, restore},
     target::Target,
 };
 

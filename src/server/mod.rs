@@ -42,8 +42,8 @@ pub(crate) use guard::CONTENT_SECURITY_POLICY;
 pub use limits::{Limits, raise_descriptors};
 pub use problem::{PROBLEM_JSON, Problem};
 use session::{Budget, Keeping, Sessions};
-pub use session::{NewOutsideSession, NewSession, SessionResource};
-pub use store::{Shown, Store, StoreError, Stored};
+pub use session::{DamagedSession, NewOutsideSession, NewSession, SessionResource};
+pub use store::{Finding, Held, Shown, State, Store, StoreError, Stored};
 use strangers::Strangers;
 pub use strangers::{HostName, NoHostName, NoToken, Token};
 
@@ -111,6 +111,7 @@ pub struct Server {
     app: Arc<App>,
     router: Router,
     shutdown: CancellationToken,
+    damage: Vec<String>,
 }
 
 impl Server {
@@ -129,8 +130,9 @@ impl Server {
             None => Store::in_memory()?,
         };
         let limits = options.limits;
+        let damage = store.damage().to_vec();
         let keeping = Keeping {
-            store: store.holding(limits.stored_sessions),
+            store: store.holding(limits.stored_sessions, limits.stored_bytes),
             recordings: options.data_dir.filter(|_| options.keep_recordings),
             limits: limits.clone(),
         };
@@ -144,7 +146,12 @@ impl Server {
         });
         let router = Router::new().merge(routes).merge(assets::routes(&app.assets));
         let router = guard::layered(router, &app, guard::Headers::new(&options.frame_ancestors));
-        Ok(Self { listener, app, router, shutdown })
+        Ok(Self { listener, app, router, shutdown, damage })
+    }
+
+    /// What of the data directory was found damaged, in words: the rest is served.
+    pub fn damage(&self) -> &[String] {
+        &self.damage
     }
 
     /// Serves until it is to end; then ends sessions, so that their recordings are complete, and open streams with them, and
@@ -154,7 +161,7 @@ impl Server {
     ///
     /// [`ServerError::Incomplete`] where recordings could not be completed.
     pub async fn run(self) -> Result<(), ServerError> {
-        let Self { listener, app, router, shutdown } = self;
+        let Self { listener, app, router, shutdown, damage: _ } = self;
         let connections = Connections::new(app.limits.clone());
         tokio::select! {
             () = connections.serve(listener, router, &shutdown) => {}
