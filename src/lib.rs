@@ -77,6 +77,7 @@ pub mod model;
 pub mod optimize;
 #[cfg(feature = "app")]
 pub mod paper;
+mod parallel;
 #[cfg(feature = "app")]
 pub mod recording;
 pub mod scenario;

@@ -11,6 +11,14 @@ pub fn is_usable(x: f64) -> bool {
     x.abs() <= GREATEST
 }
 
+/// What is wrong with a text that says no [usable](is_usable) number.
+pub(crate) fn what_is_wrong(text: &str) -> &'static str {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() => "is beyond ±1e12",
+        _ => "is not a finite number",
+    }
+}
+
 /// Whether x can be what has to be above 0: between [`LEAST`] and [`GREATEST`].
 pub fn is_positive(x: f64) -> bool {
     (LEAST..=GREATEST).contains(&x)

@@ -131,6 +131,7 @@ fn what_is_wrong_has_line_column_and_mend() {
         ("elbow,x\n1,2\n1\n", "line 3 has 1 values, line 1 names 2 columns", "one value per column"),
         ("elbow\nnan\n", "line 2, column `elbow`: `nan` is not a finite number", "0.03"),
         ("elbow\n1\ninf\n", "line 3, column `elbow`: `inf` is not a finite number", "0.03"),
+        ("elbow\n-2e12\n", "line 2, column `elbow`: `-2e12` is beyond ±1e12", "0.03"),
         ("elbow,x\n1,1\n,1\n", "line 3, column `elbow` is empty", "remove the line"),
         ("elbow\n\"1,5\"\n", "`1,5` is not a finite number", "decimal point: 1.5"),
         ("elbow\n1\0\n", "is not text: its byte 8 is 0", "export the table"),

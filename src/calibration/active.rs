@@ -7,7 +7,8 @@ use nalgebra::DMatrix;
 use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
 
-use super::{CalibrationError, Case, Figures, Fit, Progress, Split, parallel::mapped};
+use super::{CalibrationError, Case, Figures, Fit, Progress, Split};
+use crate::parallel::mapped;
 use crate::{
     experiment::Stream,
     model::{Layout, State, Workspace},

@@ -5,7 +5,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{CalibrationError, Case, Figures, Fit, Residual, Split, Unit, parallel::mapped};
+use super::{CalibrationError, Case, Figures, Fit, Residual, Split, Unit};
+use crate::parallel::mapped;
 use crate::{
     kinematics::JointKind,
     model::{Block, Layout, State},

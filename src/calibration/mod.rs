@@ -39,7 +39,6 @@ mod init;
 mod learned;
 mod loads;
 mod outcome;
-mod parallel;
 mod progress;
 #[cfg(feature = "app")]
 pub mod report;

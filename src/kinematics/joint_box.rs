@@ -30,7 +30,7 @@ pub struct JointBox {
 /// Why limits make no joint box.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "joint {joint} (counted from 0) has the limits {lower} and {upper} (rad or m): give finite numbers, the lower first"
+    "joint {joint} (counted from 0) has the limits {lower} and {upper} (rad or m): give numbers within ±1e12, the lower first"
 )]
 pub struct JointBoxError {
     /// The first joint at fault, counted from 0.

@@ -87,32 +87,57 @@ impl Strip {
 /// P x of a few x alone, which stand in `columns` one behind the other, m numbers each: lanes run along P's columns.
 pub fn times_few(level: Level, columns: &[f64], p: &[f64], m: usize) -> Vec<f64> {
     let mut found = vec![0.0; columns.len()];
+    let together = 3 * m.max(1);
     dispatch!(level, simd => {
-        let pairs = columns.chunks_exact(m.max(1)).zip(found.chunks_exact_mut(m.max(1)));
-        for (x, found) in pairs { along(simd, x, p, found) }
+        for (columns, found) in columns.chunks(together).zip(found.chunks_mut(together)) {
+            match columns.len() / m.max(1) {
+                1 => along::<_, 1>(simd, columns, p, found),
+                2 => along::<_, 2>(simd, columns, p, found),
+                _ => along::<_, 3>(simd, columns, p, found),
+            }
+        }
     });
     found
 }
 
-/// Two registers of sums at a time, then one number after the other.
+/// Of E columns: two registers of sums of each at a time, then one, then one number after the other.
 #[inline(always)]
-fn along<S: Simd>(simd: S, x: &[f64], p: &[f64], found: &mut [f64]) {
-    let (m, width) = (x.len(), 2 * Lanes::<S>::LEN);
-    for first in (0..m / width * width).step_by(width) {
-        // Even columns and odd ones: four sums in turn, that none waits for itself.
-        let mut sums = [[splat(simd, 0.0); 2]; 2];
-        for (x, columns) in x.chunks(2).zip(p.chunks(2 * m)) {
-            for ((x, column), sums) in x.iter().zip(columns.chunks_exact(m)).zip(&mut sums) {
-                let x = splat(simd, *x);
-                sums[0] = x.mul_add(load(simd, column, first), sums[0]);
-                sums[1] = x.mul_add(load(simd, column, first + Lanes::<S>::LEN), sums[1]);
+fn along<S: Simd, const E: usize>(simd: S, columns: &[f64], p: &[f64], found: &mut [f64]) {
+    let (m, width) = (columns.len() / E, Lanes::<S>::LEN);
+    let twos = m / (2 * width) * 2 * width;
+    let ones = m / width * width;
+    (0..twos).step_by(2 * width).for_each(|first| sums_from::<S, E, 2>(simd, first, (columns, p), found));
+    (twos..ones).step_by(width).for_each(|first| sums_from::<S, E, 1>(simd, first, (columns, p), found));
+    for (x, found) in columns.chunks_exact(m.max(1)).zip(found.chunks_exact_mut(m.max(1))) {
+        for row in ones..m {
+            found[row] = x.iter().zip(&p[row * m..]).map(|(x, p)| x * p).sum();
+        }
+    }
+}
+
+/// W registers of every column's product, from a row on.
+#[inline(always)]
+fn sums_from<S: Simd, const E: usize, const W: usize>(
+    simd: S,
+    first: usize,
+    (columns, p): (&[f64], &[f64]),
+    found: &mut [f64],
+) {
+    let m = columns.len() / E;
+    let mut sums = [[splat(simd, 0.0); W]; E];
+    for (k, p) in p.chunks_exact(m).enumerate() {
+        let p = &p[first..first + W * Lanes::<S>::LEN];
+        for (e, sums) in sums.iter_mut().enumerate() {
+            let x = splat(simd, columns[e * m + k]);
+            for (w, sum) in sums.iter_mut().enumerate() {
+                *sum = x.mul_add(load(simd, p, w * Lanes::<S>::LEN), *sum);
             }
         }
-        store::<S>(sums[0][0] + sums[1][0], found, first);
-        store::<S>(sums[0][1] + sums[1][1], found, first + Lanes::<S>::LEN);
     }
-    for row in m / width * width..m {
-        found[row] = x.iter().zip(p[row * m..].iter()).map(|(x, p)| x * p).sum();
+    for (e, sums) in sums.into_iter().enumerate() {
+        for (w, sum) in sums.into_iter().enumerate() {
+            store::<S>(sum, found, e * m + first + w * Lanes::<S>::LEN);
+        }
     }
 }
 

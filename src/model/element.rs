@@ -17,8 +17,8 @@
 //! | numbers | as many | x + δ |
 
 use nalgebra::{
-    DMatrix, DVector, DVectorView, Isometry3, Matrix2, Matrix3, Matrix4, Point3, Translation3, UnitVector3, Vector2,
-    Vector3, Vector4,
+    DMatrix, DVector, DVectorView, Isometry3, Matrix2, Matrix3, Matrix3x2, Matrix4, Point3, Translation3, UnitVector3,
+    Vector2, Vector3, Vector4,
 };
 
 use crate::kinematics::{Joint, Line, chart, rotation};
@@ -211,7 +211,7 @@ pub(super) fn line_displaced(guess: &Line, line: &Line) -> Vector4<f64> {
 fn displaced_by(guess: &Line, line: &Line, parallel: &Parallel) -> Vector4<f64> {
     let offset = line.point - guess.point;
     let across = offset - line.direction.into_inner() * line.direction.dot(&offset);
-    let shift = chart::basis(&guess.direction).transpose() * (parallel.matrix * across);
+    let shift = chart::basis(&guess.direction).transpose() * parallel.carry(&across);
     let angle = turned(&guess.direction, &line.direction);
     Vector4::new(shift.x, shift.y, angle.x, angle.y)
 }
@@ -219,10 +219,10 @@ fn displaced_by(guess: &Line, line: &Line, parallel: &Parallel) -> Vector4<f64> 
 /// The displacement of a line: its value, derivative and slope.
 pub(super) fn line_displacement(guess: &Line, line: &Line) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64>) {
     let (w0, w) = (guess.direction, line.direction);
-    let (basis0, basis) = (chart::basis(&w0), chart::basis(&w));
+    let bases = (chart::basis(&w0), chart::basis(&w));
     let parallel = Parallel::new(&w, &w0);
     let value = displaced_by(guess, line, &parallel);
-    let (carried, exact) = directions(&w0, &w, &parallel);
+    let (carried, exact) = parallel.directions((&bases.0, &bases.1), value[2].hypot(value[3]));
     let offset = line.point - guess.point;
     let along = w.dot(&offset);
     let across = offset - w.into_inner() * along;
@@ -234,22 +234,13 @@ pub(super) fn line_displacement(guess: &Line, line: &Line) -> (Vector4<f64>, Mat
     slope.fixed_view_mut::<2, 2>(2, 2).copy_from(&carried);
     derivative.fixed_view_mut::<2, 2>(2, 2).copy_from(&exact);
     for k in 0..2 {
-        let e: Vector3<f64> = basis.column(k).into_owned();
         // The parallel transport turns as well.
-        let column = basis0.transpose() * (parallel.along(&e) * across);
+        let column = bases.0.transpose() * parallel.along(&bases.1.column(k).into_owned(), &across);
         for row in 0..2 {
             derivative[(row, 2 + k)] += column[row];
         }
     }
     (value, derivative, slope)
-}
-
-/// How the angle from w₀ to w changes with w, by its coordinates: carried along in parallel, and exactly, where that is finite.
-fn directions(w0: &UnitVector3<f64>, w: &UnitVector3<f64>, parallel: &Parallel) -> (Matrix2<f64>, Matrix2<f64>) {
-    let carried = chart::basis(w0).transpose() * parallel.matrix * chart::basis(w);
-    let exact = chart::direction_transport(w0, &turned(w0, w), w).try_inverse();
-    let finite = |matrix: &Matrix2<f64>| matrix.iter().all(|x| x.is_finite());
-    (carried, exact.filter(finite).unwrap_or(carried))
 }
 
 /// The displacement of an axis.
@@ -266,34 +257,54 @@ fn axis(guess: &Joint, joint: &Joint) -> Displacement {
         }
         _ => {
             let (w0, w) = (guess.direction(), joint.direction());
-            let (carried, exact) = directions(&w0, &w, &Parallel::new(&w, &w0));
+            let bases = (&chart::basis(&w0), &chart::basis(&w));
+            let (carried, exact) = Parallel::new(&w, &w0).directions(bases, turned(&w0, &w).norm());
             (dynamic(exact.as_slice()), dynamic(carried.as_slice()))
         }
     };
     Displacement { value, derivative, slope }
 }
 
-/// The smallest rotation that carries w into w₀: `I + [k]× + [k]×²/(1 + c)` with k = w × w₀, c = w·w₀.
+/// The smallest rotation that carries w into w₀, `Q x = x + k × x + k × (k × x)/(1 + c)` with k = w × w₀, c = w·w₀.
 struct Parallel {
     to: Vector3<f64>,
-    cross: Matrix3<f64>,
+    cross: Vector3<f64>,
     cosine: f64,
-    matrix: Matrix3<f64>,
 }
 
 impl Parallel {
     fn new(from: &UnitVector3<f64>, to: &UnitVector3<f64>) -> Self {
-        let cross = from.cross(to).cross_matrix();
-        let cosine = from.dot(to).max(-1.0 + 1e-12);
-        let matrix = Matrix3::identity() + cross + cross * cross / (1.0 + cosine);
-        Self { to: to.into_inner(), cross, cosine, matrix }
+        Self { to: to.into_inner(), cross: from.cross(to), cosine: from.dot(to).max(-1.0 + 1e-12) }
     }
 
-    /// The derivative as w moves by `e` ⟂ w.
-    fn along(&self, e: &Vector3<f64>) -> Matrix3<f64> {
-        let change = e.cross(&self.to).cross_matrix();
+    fn carry(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        let swept = self.cross.cross(x);
+        x + swept + self.cross.cross(&swept) / (1.0 + self.cosine)
+    }
+
+    /// The derivative of Q x as w moves by `e` ⟂ w.
+    fn along(&self, e: &Vector3<f64>, x: &Vector3<f64>) -> Vector3<f64> {
+        let (change, swept) = (e.cross(&self.to), self.cross.cross(x));
         let rest = 1.0 + self.cosine;
-        change + (change * self.cross + self.cross * change) / rest
-            - self.cross * self.cross * (e.dot(&self.to) / (rest * rest))
+        let twice = change.cross(&swept) + self.cross.cross(&change.cross(x));
+        change.cross(x) + twice / rest - self.cross.cross(&swept) * (e.dot(&self.to) / (rest * rest))
+    }
+
+    /// How the angle φ from w₀ to w changes with w, by its coordinates in the bases B₀ and B: carried along in parallel, B₀ᵀ Q B,
+    /// and exactly, where that is finite: great circles diverge, so that what moves w along k turns the circle by φ/sin φ as much.
+    fn directions(
+        &self,
+        (basis0, basis): (&Matrix3x2<f64>, &Matrix3x2<f64>),
+        angle: f64,
+    ) -> (Matrix2<f64>, Matrix2<f64>) {
+        let column = |k: usize| basis0.transpose() * self.carry(&basis.column(k).into_owned());
+        let carried = Matrix2::from_columns(&[column(0), column(1)]);
+        // k has the length sin φ.
+        let diverging = match angle {
+            small if small < 1e-3 => 1.0 / 6.0 + 0.075 * small * small,
+            angle => (angle / angle.sin() - 1.0) / self.cross.norm_squared(),
+        };
+        let exact = carried + basis0.transpose() * self.cross * (self.cross.transpose() * basis) * diverging;
+        (carried, if exact.iter().all(|x| x.is_finite()) { exact } else { carried })
     }
 }

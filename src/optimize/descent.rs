@@ -6,14 +6,14 @@
 //! x ← clamp(x − t B g, 0, 1)
 //! ```
 //!
-//! B estimated and restricted likewise, but with t from backtracking (Armijo 1966), and all that still descend ask for their
+//! −B g told by `quasi_newton.rs` likewise, but with t from backtracking (Armijo 1966), and all that still descend ask for their
 //! next values together, so that an objective can evaluate them side by side.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::{
     Polish,
-    polish::{FIRST_STEP, updated},
+    quasi_newton::{Aim, aim, updated},
 };
 
 /// Values of a batch of points, and the gradient of each.
@@ -133,18 +133,9 @@ impl Descent {
 
     /// Where to go from here; `false` if nothing is lower nearby.
     fn aim(&mut self) -> bool {
-        let (x, gradient) = (&self.x, &self.gradient);
-        let pressed = |k: usize| (x[k] <= 0.0 && gradient[k] >= 0.0) || (x[k] >= 1.0 && gradient[k] <= 0.0);
-        self.free = DVector::from_fn(x.len(), |k, _| f64::from(!pressed(k)));
-        let restricted = gradient.component_mul(&self.free);
-        let steepness = restricted.amax();
-        if steepness == 0.0 || !steepness.is_finite() {
-            return false;
-        }
-        let newton = self.inverse_hessian.as_ref().map(|b| -(b * &restricted).component_mul(&self.free));
-        let newton = newton.filter(|d| d.dot(&restricted) < 0.0 && d.iter().all(|d| d.is_finite()));
-        self.is_newton = newton.is_some();
-        self.direction = newton.unwrap_or_else(|| &restricted * (-FIRST_STEP / steepness));
+        let aim = aim(self.x.as_slice(), &self.gradient, self.inverse_hessian.as_ref());
+        let Some(Aim { direction, free, is_newton }) = aim else { return false };
+        (self.direction, self.free, self.is_newton) = (direction, free, is_newton);
         self.length = 1.0;
         self.ask();
         true

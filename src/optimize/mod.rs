@@ -100,12 +100,13 @@ mod descent;
 mod direct;
 mod minimum;
 mod polish;
+mod quasi_newton;
 
 pub use bayesian::bayesian;
 pub use descent::{Slopes, descend};
 pub use minimum::Minimum;
 pub(crate) use minimum::least;
-pub use polish::{Polish, polish, polish_along};
+pub use polish::{Polish, polish};
 
 pub use direct::{
     Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Moment, Partition, Plane, Projection, Rectangle,

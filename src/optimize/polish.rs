@@ -7,13 +7,15 @@
 //! x ← clamp(x − t B g, 0, 1)
 //! ```
 //!
-//! with g the gradient, by central differences where nobody gives it, B the BFGS estimate of the inverse Hessian, both
-//! restricted to the coordinates that are not pressed against a bound (Bertsekas 1982), and t the best of a few step lengths.
-//! Like DIRECT it evaluates in batches.
+//! with g the gradient by central differences, −B g the direction that `quasi_newton.rs` tells, and t the best of a few step
+//! lengths. Like DIRECT it evaluates in batches.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::least;
+use super::{
+    least,
+    quasi_newton::{Aim, aim, updated},
+};
 
 /// How far a polish goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,57 +28,28 @@ pub struct Polish {
 
 /// Half the distance of central differences, in sides of the cube.
 const DIFFERENCE: f64 = 1e-4;
-/// The longest first step of a coordinate.
-pub(super) const FIRST_STEP: f64 = 0.15;
 /// Step lengths tried at once.
 const LENGTHS: [f64; 7] = [1.0, 2.0, 0.5, 0.25, 0.1, 0.03, 0.01];
 
 /// The minimum over the unit cube that descent from `start` reaches, and its value. `evaluate` returns the values of
 /// a batch of points; one that is not finite marks an infeasible point. The result is never worse than `start`.
-pub fn polish(start: &[f64], settings: Polish, evaluate: impl FnMut(&[Vec<f64>]) -> Vec<f64>) -> (Vec<f64>, f64) {
-    polish_along(start, settings, evaluate, |_| None)
-}
-
-/// The same where `slope` gives the value at a point and its gradient; by central differences where it does not.
-pub fn polish_along(
-    start: &[f64],
-    settings: Polish,
-    mut evaluate: impl FnMut(&[Vec<f64>]) -> Vec<f64>,
-    slope: impl Fn(&[f64]) -> Option<(f64, Vec<f64>)>,
-) -> (Vec<f64>, f64) {
+pub fn polish(start: &[f64], settings: Polish, mut evaluate: impl FnMut(&[Vec<f64>]) -> Vec<f64>) -> (Vec<f64>, f64) {
     let n = start.len();
     let mut x: Vec<f64> = start.iter().map(|x| x.clamp(0.0, 1.0)).collect();
-    let mut known = slope(&x);
-    let value = known.as_ref().map(|(value, _)| *value);
-    let mut value = value.or_else(|| evaluate(std::slice::from_ref(&x)).first().copied()).unwrap_or(f64::INFINITY);
+    let mut value = evaluate(std::slice::from_ref(&x)).first().copied().unwrap_or(f64::INFINITY);
     if !value.is_finite() || n == 0 {
         return (x, value);
     }
     let mut inverse_hessian: Option<DMatrix<f64>> = None;
     let mut before: Option<(DVector<f64>, DVector<f64>)> = None;
     for _ in 0..settings.steps {
-        let gradient = match known.take().or_else(|| slope(&x)) {
-            Some((_, gradient)) => DVector::from_vec(gradient),
-            None => differences(&x, value, &mut evaluate),
-        };
+        let gradient = differences(&x, value, &mut evaluate);
         let here = DVector::from_column_slice(&x);
         if let Some((x_before, g_before)) = before.take() {
             inverse_hessian = updated(inverse_hessian.take(), &(&here - x_before), &(&gradient - g_before));
         }
         before = Some((here.clone(), gradient.clone()));
-        let pressed = |k: usize| (x[k] <= 0.0 && gradient[k] >= 0.0) || (x[k] >= 1.0 && gradient[k] <= 0.0);
-        let free = DVector::from_fn(n, |k, _| f64::from(!pressed(k)));
-        let restricted = gradient.component_mul(&free);
-        let steepness = restricted.amax();
-        // Where finite values differ by more than the greatest number, no direction can be computed.
-        if steepness == 0.0 || !steepness.is_finite() {
-            break;
-        }
-        let steepest = &restricted * (-FIRST_STEP / steepness);
-        let newton = inverse_hessian.as_ref().map(|b| -(b * &restricted).component_mul(&free));
-        let is_descent = |d: &DVector<f64>| d.dot(&restricted) < 0.0 && d.iter().all(|d| d.is_finite());
-        let is_newton = newton.as_ref().is_some_and(is_descent);
-        let direction = newton.filter(is_descent).unwrap_or(steepest);
+        let Some(Aim { direction, is_newton, .. }) = aim(&x, &gradient, inverse_hessian.as_ref()) else { break };
         let trials: Vec<Vec<f64>> = LENGTHS
             .iter()
             .map(|t| x.iter().zip(&direction).map(|(x, d)| (x + t * d).clamp(0.0, 1.0)).collect())
@@ -124,27 +97,6 @@ fn differences(x: &[f64], value: f64, evaluate: &mut impl FnMut(&[Vec<f64>]) -> 
     })
 }
 
-/// The BFGS update of the inverse Hessian; as it was, where the curvature along the step is not positive.
-pub(super) fn updated(
-    before: Option<DMatrix<f64>>,
-    step: &DVector<f64>,
-    change: &DVector<f64>,
-) -> Option<DMatrix<f64>> {
-    let curvature = step.dot(change);
-    if curvature <= 1e-12 * step.norm() * change.norm() {
-        return before;
-    }
-    let n = step.len();
-    let mut b = before.unwrap_or_else(|| DMatrix::identity(n, n) * (curvature / change.norm_squared()));
-    // (I − s yᵀ/c) B (I − y sᵀ/c) + s sᵀ/c, multiplied out.
-    let carried = &b * change;
-    let own = (1.0 + change.dot(&carried) / curvature) / curvature;
-    b.ger(own, step, step, 1.0);
-    b.ger(-1.0 / curvature, &carried, step, 1.0);
-    b.ger(-1.0 / curvature, step, &carried, 1.0);
-    Some(b)
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -167,15 +119,6 @@ mod tests {
             };
             let batch = |points: &[Vec<f64>]| points.iter().map(|x| f(x)).collect::<Vec<f64>>();
             let (x, value) = polish(&start, SETTINGS, batch);
-            let slope = |x: &[f64]| {
-                let own = |k: usize| 2.0 * (1.0 + k as f64) * (x[k] - centre[k]);
-                let mut slope: Vec<f64> = (0..4).map(own).collect();
-                slope[0] += 0.5 * (x[1] - centre[1]);
-                slope[1] += 0.5 * (x[0] - centre[0]);
-                Some((f(x), slope))
-            };
-            let (_, along) = polish_along(&start, SETTINGS, batch, slope);
-            prop_assert!((along - value).abs() < 1e-9 * (1.0 + value.abs()), "{along} {value}");
             prop_assert!(value <= f(&start));
             prop_assert!(x.iter().all(|x| (0.0..=1.0).contains(x)));
             for k in 0..4 {

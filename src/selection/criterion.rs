@@ -22,26 +22,15 @@ use std::sync::Arc;
 use fearless_simd::Level;
 use nalgebra::{DMatrix, Matrix3, Point3};
 
-use super::{Optimality, SelectionError, Visibility, Weights, optimality, prediction::Predictions, views::Views};
+use super::{Optimality, SelectionError, Sight, Weights, optimality, prediction::Predictions, views::Views};
 use crate::{
     estimation::Belief,
-    kinematics::JointBox,
-    lanes::GROUP,
     model::{Layout, Points, State, Workspace, jacobian},
+    parallel::in_chunks,
     sensing::Rig,
 };
 
 pub(super) use slope::Slope;
-
-/// How it enters the criterion that not everything is seen.
-#[derive(Clone, Copy, Debug)]
-pub enum Sight<'a> {
-    /// The gain times the chance of being seen, by a head that watches or by the sensors themselves; not finite where that is
-    /// certainly 0.
-    Chance(Visibility<'a>, &'a JointBox),
-    /// The naive form, for comparison: the plain criterion, not finite unless the *predicted* marker is in view.
-    Predicted(Visibility<'a>),
-}
 
 /// The criterion under one hypothesis.
 #[derive(Clone)]
@@ -81,29 +70,6 @@ pub struct Appraisal {
     pub marker_covariance: Matrix3<f64>,
     /// The believed chance that it is seen; 1 where no head watches.
     pub chance: f64,
-}
-
-/// Candidates per batch product at most: enough to fill the matrix kernel, few enough for the caches and to share among cores.
-const CHUNK: usize = 16;
-
-/// Into chunks of which size so many candidates are divided: alike, as a small one costs nearly as much as a large one.
-fn chunk(candidates: usize) -> usize {
-    candidates.div_ceil(candidates.div_ceil(CHUNK)).next_multiple_of(GROUP)
-}
-
-/// The values of all candidates, in order, a chunk at a time: on several cores with the feature `parallel`.
-pub(super) fn in_chunks<C: Sync>(candidates: &[C], evaluate: impl Fn(&[C]) -> Vec<f64> + Sync) -> Vec<f64> {
-    match candidates.len() {
-        0 => Vec::new(),
-        1..=CHUNK => evaluate(candidates),
-        #[cfg(feature = "parallel")]
-        count => {
-            use rayon::prelude::*;
-            candidates.par_chunks(chunk(count)).flat_map_iter(&evaluate).collect()
-        }
-        #[cfg(not(feature = "parallel"))]
-        count => candidates.chunks(chunk(count)).flat_map(evaluate).collect(),
-    }
 }
 
 /// What is measured in a state, where that is the place of points and nothing else.
@@ -301,29 +267,6 @@ impl<'a> Criterion<'a> {
             (Some(sight), None) => sight.chance(candidate, &marker, &spread),
         };
         (marker, spread, chance)
-    }
-}
-
-impl Sight<'_> {
-    /// What states drawn from a belief would see, where the sensors do not see everything.
-    pub(super) fn views(
-        &self,
-        state: &State,
-        layout: &Layout,
-        covariance: &DMatrix<f64>,
-        rig: &Rig,
-    ) -> Option<Arc<Views>> {
-        let Self::Chance(visibility, limits) = self else { return None };
-        let misses = visibility.misses().map(|miss| limits.from_unit(miss));
-        rig.has_view().then(|| Arc::new(Views::new(state, layout, covariance, rig, misses)))
-    }
-
-    /// p(θ), given the distribution of the predicted marker.
-    fn chance(&self, candidate: &[f64], marker: &Point3<f64>, spread: &Matrix3<f64>) -> f64 {
-        match self {
-            Self::Predicted(visibility) => f64::from(visibility.head().is_none_or(|head| head.sees(marker))),
-            Self::Chance(visibility, limits) => visibility.chance(&limits.to_unit(candidate), marker, spread),
-        }
     }
 }
 

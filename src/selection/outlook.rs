@@ -23,13 +23,14 @@ use std::sync::Arc;
 
 use super::{
     Appraisal, Criterion, Optimality, SelectionError, Sight, Weights,
-    criterion::{Slope, in_chunks, points},
+    criterion::{Slope, points},
     prediction::{Predictions, told_apart},
     views::Views,
 };
 use crate::{
     estimation::Belief,
     model::{Block, Element, Layout, Points, State, Workspace},
+    parallel::in_chunks,
     sensing::Rig,
 };
 
@@ -178,8 +179,14 @@ impl<'a> Outlook<'a> {
         estimate.appraisal(candidate, self.before, value)
     }
 
-    /// C(θ) of a candidate, and its derivative by every joint's reading (rad or m); `None` where only differences tell it: where not
-    /// everything is seen, something else than points is measured, or by criterion E.
+    /// Whether derivatives by the joints' readings are to be had. They are not where something may stay unseen, where something
+    /// else than points is measured, and by criterion E: there only differences tell.
+    pub(super) fn has_slope(&self) -> bool {
+        self.hypotheses.iter().all(|(_, criterion)| criterion.has_slope())
+    }
+
+    /// C(θ) of a candidate, and its derivative by every joint's reading (rad or m); `None` without [slopes](Self::has_slope), and
+    /// where the value is no number.
     pub(super) fn slope(&self, candidate: &[f64]) -> Option<(f64, Vec<f64>)> {
         let slopes = self.hypotheses.iter().map(|(weight, criterion)| criterion.slope(*weight, candidate));
         let mut slopes = slopes.collect::<Option<Vec<Slope<'_>>>>()?;

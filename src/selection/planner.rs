@@ -1,5 +1,7 @@
 //! Selection that plans: the movements that are still needed, chosen together, under all hypotheses.
 
+mod ground;
+
 use std::sync::Arc;
 
 use rand_chacha::ChaCha8Rng;
@@ -18,8 +20,9 @@ use crate::{
     estimation::Belief,
     kinematics::JointBox,
     model::Workspace,
-    optimize::{Polish, Settings, least, polish_along},
+    optimize::{Polish, Settings, least},
 };
+use ground::Ground;
 
 /// How movements are planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,19 +102,6 @@ struct Scene<'a> {
     sight: Option<(Sight<'a>, Vec<Option<Arc<Views>>>)>,
 }
 
-/// Where the movements of a plan are sought.
-struct Ground<'a> {
-    scope: &'a Scope<'a>,
-    /// The box to search.
-    searched: &'a JointBox,
-    /// Postures in view, scaled to the unit cube of that box, where the sensors see some only.
-    familiar: Vec<Vec<f64>>,
-    /// Evaluations of the criterion so far.
-    evaluations: usize,
-    /// What DIRECT's first search left.
-    search: Option<Search>,
-}
-
 impl Planner {
     /// Planning by the criterion with `weights`; `workspace` holds the configurations over which criterion I predicts.
     pub fn new(weights: Weights, search: Settings, planning: Planning, workspace: Workspace) -> Self {
@@ -157,7 +147,7 @@ impl Planner {
         searched: &JointBox,
     ) -> Result<Selection, SelectionError> {
         let scene = Scene::new(self, situation, limits);
-        let mut ground = Ground::new(self, situation, limits, scope, searched);
+        let mut ground = Ground::new(situation, limits, scope, searched, self.planning.polished);
         // As many movements are needed as bring one independent equation for each unknown. How many one brings is much the
         // same at any posture off the middle, where axes may be in line.
         let equations = scene.now.equations(&limits.from_unit(&vec![0.37; limits.dimension()]));
@@ -308,51 +298,6 @@ impl<'a> Scene<'a> {
     }
 }
 
-impl<'a> Ground<'a> {
-    fn new(
-        planner: &Planner,
-        situation: &Situation<'_>,
-        limits: &JointBox,
-        scope: &'a Scope<'a>,
-        searched: &'a JointBox,
-    ) -> Self {
-        let scaled = |point: &Vec<f64>| match scope.is_constrained() {
-            true => searched.to_unit(&limits.from_unit(point)),
-            false => point.clone(),
-        };
-        let familiar = match situation.belief.rig.has_view() {
-            true => situation.history.seen().iter().rev().take(planner.planning.polished).map(scaled).collect(),
-            false => Vec::new(),
-        };
-        Self { scope, searched, familiar, evaluations: 0, search: None }
-    }
-
-    /// The criterion at points of the unit cube, beside the `poses` of a plan.
-    fn evaluate(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], points: &[Vec<f64>]) -> Vec<f64> {
-        let postures: Vec<Vec<f64>> = points.iter().map(|point| self.searched.from_unit(point)).collect();
-        self.evaluate_postures(outlook, poses, &postures)
-    }
-
-    /// Descends by the criterion from a point of the unit cube, beside the `poses` of a plan.
-    fn polish(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], start: &[f64], how: Polish) -> (Vec<f64>, f64) {
-        let (scope, searched) = (self.scope, self.searched);
-        // What is not feasible, and what travel costs, only differences tell.
-        let slope = |point: &[f64]| {
-            let free = (!scope.is_constrained()).then(|| searched.from_unit(point));
-            let (value, mut slope) = outlook.slope(&free?)?;
-            slope.iter_mut().zip(searched.joints()).for_each(|(slope, (lower, upper))| *slope *= upper - lower);
-            Some((value, slope))
-        };
-        polish_along(start, how, |points| self.evaluate(outlook, poses, points), slope)
-    }
-
-    /// The same at postures of the box, rad or m.
-    fn evaluate_postures(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], postures: &[Vec<f64>]) -> Vec<f64> {
-        self.evaluations += postures.len();
-        self.scope.evaluate_beside(poses, postures, |feasible| outlook.evaluate(feasible))
-    }
-}
-
 impl Policy for Planner {
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
         let scope = Scope::of(situation)?;
@@ -408,7 +353,7 @@ impl Policy for Planner {
     fn explain(&self, situation: &Situation<'_>, limits: &JointBox) -> Result<Option<Search>, SelectionError> {
         let scene = Scene::new(self, situation, limits);
         let Some((scope, searched)) = Scope::around(situation, limits)? else { return Ok(None) };
-        let mut ground = Ground::new(self, situation, limits, &scope, &searched);
+        let mut ground = Ground::new(situation, limits, &scope, &searched, self.planning.polished);
         let outlook = scene.outlook(&scene.now)?;
         let at = |postures: &[Vec<f64>]| ground.evaluate_postures(&outlook, &[], postures);
         Ok(Some(direct(&scope, &searched, self.search, at)?))

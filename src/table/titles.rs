@@ -3,7 +3,10 @@
 use std::collections::HashMap;
 
 use super::{TableError, error::AS_TEXT};
-use crate::{magnitude::is_usable, similar::similar};
+use crate::{
+    magnitude::{is_usable, what_is_wrong},
+    similar::similar,
+};
 
 /// What a column's numbers measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -147,7 +150,7 @@ pub(super) fn number(text: &str, place: &dyn Fn() -> String) -> Result<f64, Tabl
             } else {
                 "write a number such as 0.03, or remove the line".to_owned()
             };
-            Err(TableError::new(format!("{}: `{text}` is not a finite number", place()), mend))
+            Err(TableError::new(format!("{}: `{text}` {}", place(), what_is_wrong(text)), mend))
         }
     }
 }

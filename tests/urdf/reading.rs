@@ -99,6 +99,7 @@ fn what_is_wrong_has_line_column_and_mend() {
     refused("0 0 1\"", "0 0\"", (8, 18), "`xyz` holds 2 numbers", "write 3");
     refused("0 0 1\"", "0 0 1,5\"", (8, 18), "`1,5` in `xyz` is not a finite number", "0.03");
     refused("0 0 1\"", "0 0 inf\"", (8, 18), "`inf` in `xyz` is not a finite number", "0.03");
+    refused("0 0 1\"", "0 0 1e13\"", (8, 18), "`1e13` in `xyz` is beyond ±1e12", "0.03");
     refused("0 0 1\"", "0 0 ${height}\"", (8, 18), "expression of xacro", "xacro robot.urdf.xacro");
     refused("type=\"revolute\"", "type=\"ball\"", (7, 32), "type `ball`", "revolute, continuous, prismatic and fixed");
     refused(" type=\"revolute\"", "", (7, 3), "<joint> has no `type`", "add type");

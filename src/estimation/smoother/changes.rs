@@ -18,7 +18,7 @@ use crate::{
 
 const JOINTS: usize = 4;
 const SIGMA: f64 = 0.01;
-const THOROUGH: Effort = Effort { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY };
+const THOROUGH: Effort<'_> = Effort { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY, known: &[] };
 
 /// A robot, and a smoother that began with a guess near it.
 struct Run {

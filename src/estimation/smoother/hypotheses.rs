@@ -13,6 +13,7 @@ use super::{
 use crate::{
     kinematics::{Joint, Line},
     model::{Block, Layout, State},
+    parallel::mapped,
 };
 
 /// How many modes are kept, and how hard new ones are searched for.
@@ -45,14 +46,14 @@ const NEGLIGIBLE: f64 = 1e-5;
 /// Logarithm of the evidence ratio from which on another mode does not count.
 const HOPELESS: f64 = 40.0;
 
-const WARM: Effort = Effort { steps: 30, tolerance: 1e-6, hopeless: f64::INFINITY };
+const WARM: Effort<'_> = Effort { steps: 30, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
 /// What is found is followed after the next measurement: until then its share of the evidence is known to a hundredth.
-const COLD: Effort = Effort { steps: 40, tolerance: 1e-2, hopeless: f64::INFINITY };
+const COLD: Effort<'_> = Effort { steps: 40, tolerance: 1e-2, hopeless: f64::INFINITY, known: &[] };
 
 impl Hypotheses {
     /// Searches every mode again after the posterior has changed.
     pub fn follow(&mut self, posterior: &Posterior, layout: &Layout) {
-        let found = each(&self.modes, |mode| posterior.mode(&mode.state, layout, WARM));
+        let found = mapped(&self.modes, |mode| posterior.mode(&mode.state, layout, WARM));
         self.modes = found.into_iter().flatten().collect();
     }
 
@@ -60,7 +61,7 @@ impl Hypotheses {
     /// half of these suspect some of the readings: they begin where all others are explained.
     pub fn spawn(&mut self, count: usize, posterior: &Posterior, layout: &Layout, rng: &mut impl Rng) {
         let best = self.modes.iter().map(|mode| mode.cost).fold(f64::INFINITY, f64::min);
-        let effort = Effort { hopeless: best + 2.0 * HOPELESS, ..COLD };
+        let effort = Effort { hopeless: best + 2.0 * HOPELESS, known: &self.modes, ..COLD };
         let before = self.modes.len();
         // All that is drawn is drawn before the first search, so that these may be in any order.
         let searches: Vec<(Option<Posterior>, State)> = (0..count)
@@ -76,7 +77,7 @@ impl Hypotheses {
                 (None, mutated(&self.modes[rng.random_range(0..before)].state, &drawn, layout, rng))
             })
             .collect();
-        let found = each(&searches, |(others, start)| match others {
+        let found = mapped(&searches, |(others, start)| match others {
             Some(others) => posterior.mode_through(others, start, layout, effort),
             None => posterior.mode_from_afar(start, layout, effort),
         });
@@ -93,12 +94,8 @@ impl Hypotheses {
             if mode.log_evidence < best - HOPELESS || distinct.len() >= kept {
                 break;
             }
-            let is_new = distinct.iter().all(|other| {
-                other
-                    .state
-                    .local(layout, &mode.state)
-                    .is_none_or(|delta| delta.dot(&(&other.information * &delta)) > MERGED)
-            });
+            let apart = |other: &Mode| other.distance(layout, &mode.state).is_none_or(|squared| squared > MERGED);
+            let is_new = distinct.iter().all(apart);
             if is_new {
                 distinct.push(mode);
             }
@@ -108,17 +105,6 @@ impl Hypotheses {
         distinct.retain(|mode| mode.weight >= NEGLIGIBLE);
         self.modes = distinct;
     }
-}
-
-/// What becomes of each, in order: on several cores with the feature `parallel`.
-fn each<T: Sync, R: Send>(all: &[T], of: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
-    #[cfg(feature = "parallel")]
-    {
-        use rayon::prelude::*;
-        all.par_iter().map(of).collect()
-    }
-    #[cfg(not(feature = "parallel"))]
-    all.iter().map(of).collect()
 }
 
 /// `state` with one to three of its learned axes drawn anew or turned round; of other blocks, where no axis is learned.

@@ -19,7 +19,7 @@ use crate::{
     sensing::{Observation, Rig},
 };
 
-const THOROUGH: Effort = Effort { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY };
+const THOROUGH: Effort<'_> = Effort { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY, known: &[] };
 const SIGMA: f64 = 0.01;
 
 /// A truth, a guess near it, and the posterior after some noisy measurements.

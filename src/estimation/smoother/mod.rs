@@ -80,7 +80,7 @@ const CALM: usize = 6;
 /// of what it does explain is below.
 const SURPRISING: f64 = 2.326;
 /// The search for another body that explains what is surprising.
-const THOROUGH: Effort = Effort { steps: 60, tolerance: 1e-6, hopeless: f64::INFINITY };
+const THOROUGH: Effort<'_> = Effort { steps: 60, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
 /// Equations beyond the number of parameters that must agree on another body.
 const AGREEING: usize = 6;
 /// The number of what is known before the first movement.
@@ -154,7 +154,7 @@ impl Smoother {
     /// The modes before any measurement: the guess, or without one draws of the prior.
     fn begin(&mut self) {
         let layout = self.belief.layout.clone();
-        let once = Effort { steps: 0, tolerance: 0.0, hopeless: f64::INFINITY };
+        let once = Effort { steps: 0, tolerance: 0.0, hopeless: f64::INFINITY, known: &[] };
         let prior = &self.posterior.prior;
         let starts = if prior.is_vague() {
             (0..self.settings.kept.max(1)).map(|_| prior.draw(&layout, &mut self.rng)).collect()

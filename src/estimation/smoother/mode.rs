@@ -30,11 +30,13 @@ pub(super) struct Mode {
 
 /// When a search ends.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Effort {
+pub(super) struct Effort<'a> {
     /// Steps at most, accepted or not.
     pub steps: usize,
     /// It has converged when a step promises to lower the cost by less than this.
     pub tolerance: f64,
+    /// It finds nothing new when the next step leads to one of these.
+    pub known: &'a [Mode],
     /// It is given up when the cost would stay above this even if every step that is left lowered it by as much as the next one
     /// promises.
     pub hopeless: f64,
@@ -65,17 +67,18 @@ impl Posterior {
     /// The local minimum that Levenberg–Marquardt reaches from `start`, and the Gaussian there.
     ///
     /// Steps solve `(Λ + λ diag Λ) δ = descent`; λ follows the ratio of found to predicted descent (Nielsen's rule).
-    pub fn mode(&self, start: &State, layout: &Layout, effort: Effort) -> Option<Mode> {
+    pub fn mode(&self, start: &State, layout: &Layout, effort: Effort<'_>) -> Option<Mode> {
         let (state, normal) = self.descend(self.loss.into(), start, layout, effort)?;
         Mode::at(self.level, state, normal)
     }
 
     /// The same from a start that may be far from where the search ends: a robust loss narrows on the way.
-    pub fn mode_from_afar(&self, start: &State, layout: &Layout, effort: Effort) -> Option<Mode> {
+    pub fn mode_from_afar(&self, start: &State, layout: &Layout, effort: Effort<'_>) -> Option<Mode> {
         if !self.loss.is_robust() {
             return self.mode(start, layout, effort);
         }
-        let coarse = Effort { steps: STEPS_AT_WIDTH, tolerance: effort.tolerance * 1e2, hopeless: f64::INFINITY };
+        let tolerance = effort.tolerance * 1e2;
+        let coarse = Effort { steps: STEPS_AT_WIDTH, tolerance, hopeless: f64::INFINITY, known: &[] };
         let mut state = start.clone();
         for width in WIDTHS.into_iter().filter(|width| *width > 1.0) {
             let steps = if width.is_infinite() { Effort { steps: effort.steps, ..coarse } } else { coarse };
@@ -94,15 +97,15 @@ impl Posterior {
     }
 
     /// The local minimum reached from where `others`, some of the measurements, are explained by least squares.
-    pub fn mode_through(&self, others: &Self, start: &State, layout: &Layout, effort: Effort) -> Option<Mode> {
+    pub fn mode_through(&self, others: &Self, start: &State, layout: &Layout, effort: Effort<'_>) -> Option<Mode> {
         let least_squares = Graduated { loss: self.loss, width: f64::INFINITY };
         // By least squares what is still no outlier may cost much.
-        let patient = Effort { hopeless: effort.hopeless * 10.0 + 1e3, ..effort };
+        let patient = Effort { hopeless: effort.hopeless * 10.0 + 1e3, known: &[], ..effort };
         let (state, _) = others.descend(least_squares, start, layout, patient)?;
         self.mode(&state, layout, effort)
     }
 
-    fn descend(&self, loss: Graduated, start: &State, layout: &Layout, effort: Effort) -> Option<(State, Normal)> {
+    fn descend(&self, loss: Graduated, start: &State, layout: &Layout, effort: Effort<'_>) -> Option<(State, Normal)> {
         let mut state = start.slid_towards(&self.pins);
         let mut room = Room::default();
         let mut normal = self.normal_by(loss, &state, layout, &mut room)?;
@@ -122,8 +125,14 @@ impl Posterior {
             if is_hopeless || !predicted.is_finite() {
                 return None;
             }
+            if predicted < effort.tolerance {
+                break;
+            }
             let mut next = state.retract(layout, &delta);
             next.slide_towards(&self.pins);
+            if effort.known.iter().any(|mode| mode.is_reached(layout, &next, normal.cost - predicted)) {
+                return None;
+            }
             // Hardly any step is refused, so that what it costs is not asked beforehand. Outside the chart of settled measurements
             // none is taken.
             let found = self.normal_by(loss, &next, layout, &mut room);
@@ -136,7 +145,7 @@ impl Posterior {
                 lambda *= growth;
                 growth *= 2.0;
             }
-            if predicted < effort.tolerance || lambda > 1e12 {
+            if lambda > 1e12 {
                 break;
             }
         }
@@ -144,7 +153,21 @@ impl Posterior {
     }
 }
 
+/// A step that leads so near to a mode (squared, in standard deviations), and promises its cost but for this, leads to it.
+const REACHED: f64 = 0.1;
+
 impl Mode {
+    /// Whether a step to `state`, where `cost` is promised, leads to this mode.
+    fn is_reached(&self, layout: &Layout, state: &State, cost: f64) -> bool {
+        (cost - self.cost).abs() < REACHED && self.distance(layout, state).is_some_and(|squared| squared < REACHED)
+    }
+
+    /// How far `state` is from it, squared, in standard deviations; `None` outside its chart.
+    pub fn distance(&self, layout: &Layout, state: &State) -> Option<f64> {
+        let delta = self.state.local(layout, state)?;
+        Some(delta.dot(&(&self.information * &delta)))
+    }
+
     fn at(level: Level, state: State, normal: Normal) -> Option<Self> {
         let Normal { cost, information, .. } = normal;
         let factor = Factor::new(level, &information, 0.0)?;

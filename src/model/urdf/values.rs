@@ -5,7 +5,10 @@ use std::ops::Range;
 use roxmltree::{Attribute, Node};
 
 use super::UrdfError;
-use crate::{magnitude::is_usable, similar::similar};
+use crate::{
+    magnitude::{is_usable, what_is_wrong},
+    similar::similar,
+};
 
 /// How xacro files are turned into what can be read here.
 pub const EXPAND: &str = "expand it first: `xacro robot.urdf.xacro > robot.urdf` (part of ROS; without it, `pip install \
@@ -64,7 +67,7 @@ pub fn numbers<const N: usize>(node: Node, attribute: &Attribute) -> Result<[f64
             Ok(number) if is_usable(number) => numbers.push(number),
             _ => {
                 let mend = "write numbers such as 0.03, with spaces between them".to_owned();
-                return Err(wrong(format!("`{word}` in `{name}` is not a finite number"), mend));
+                return Err(wrong(format!("`{word}` in `{name}` {}", what_is_wrong(word)), mend));
             }
         }
     }

@@ -34,12 +34,16 @@ pub(in crate::selection) struct Slope<'a> {
 }
 
 impl Criterion<'_> {
-    /// Of −`weight` times what seeing the movement to a posture gains; `None` where not everything is seen, something else than
-    /// points is measured, the derivative is not known, or the gain is no number.
+    /// Whether [`slope`](Self::slope) tells derivatives: everything is seen, points are measured, and they are known.
+    pub(in crate::selection) fn has_slope(&self) -> bool {
+        self.points.is_some() && self.sees_all() && self.optimality != Optimality::E
+    }
+
+    /// Of −`weight` times what seeing the movement to a posture gains; `None` without [derivatives](Self::has_slope), or where the
+    /// gain is no number.
     pub(in crate::selection) fn slope(&self, weight: f64, posture: &[f64]) -> Option<Slope<'_>> {
-        let points = self.points.as_ref().filter(|_| self.sees_all() && self.optimality != Optimality::E)?;
-        let posture = points.at(posture);
-        let (m, d) = (self.covariance.nrows(), points.equations());
+        let posture = self.points.as_ref().filter(|_| self.has_slope())?.at(posture);
+        let (m, d) = (self.covariance.nrows(), posture.readings().len());
         let times =
             |rows: &[f64], by: &DMatrix<f64>| DMatrix::from_vec(m, d, times_few(self.level, rows, by.as_slice(), m));
         let gains = times(posture.rows(), self.covariance);

@@ -1,0 +1,75 @@
+//! Where a planner searches.
+
+use crate::{
+    kinematics::JointBox,
+    optimize::{Polish, Slopes, descend, polish},
+    selection::{Outlook, Scope, Search, Situation},
+};
+
+/// Where the movements of a plan are sought.
+pub(super) struct Ground<'a> {
+    pub scope: &'a Scope<'a>,
+    /// The box to search.
+    pub searched: &'a JointBox,
+    /// Postures in view, scaled to the unit cube of that box, where the sensors see some only.
+    pub familiar: Vec<Vec<f64>>,
+    /// Evaluations of the criterion so far.
+    pub evaluations: usize,
+    /// What DIRECT's first search left.
+    pub search: Option<Search>,
+}
+
+impl<'a> Ground<'a> {
+    /// `familiar` tells how many postures in view are begun from.
+    pub fn new(
+        situation: &Situation<'_>,
+        limits: &JointBox,
+        scope: &'a Scope<'a>,
+        searched: &'a JointBox,
+        familiar: usize,
+    ) -> Self {
+        let scaled = |point: &Vec<f64>| match scope.is_constrained() {
+            true => searched.to_unit(&limits.from_unit(point)),
+            false => point.clone(),
+        };
+        let familiar = match situation.belief.rig.has_view() {
+            true => situation.history.seen().iter().rev().take(familiar).map(scaled).collect(),
+            false => Vec::new(),
+        };
+        Self { scope, searched, familiar, evaluations: 0, search: None }
+    }
+
+    /// The criterion at points of the unit cube, beside the `poses` of a plan.
+    fn evaluate(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], points: &[Vec<f64>]) -> Vec<f64> {
+        let postures: Vec<Vec<f64>> = points.iter().map(|point| self.searched.from_unit(point)).collect();
+        self.evaluate_postures(outlook, poses, &postures)
+    }
+
+    /// Descends by the criterion from a point of the unit cube, beside the `poses` of a plan.
+    pub fn polish(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], start: &[f64], how: Polish) -> (Vec<f64>, f64) {
+        let searched = self.searched;
+        let slope = |point: &[f64]| {
+            let (value, mut slope) = outlook.slope(&searched.from_unit(point))?;
+            slope.iter_mut().zip(searched.joints()).for_each(|(slope, (lower, upper))| *slope *= upper - lower);
+            Some((value, slope))
+        };
+        // What is not feasible, and what travel costs, only differences tell.
+        if self.scope.is_constrained() || !outlook.has_slope() {
+            return polish(start, how, |points| self.evaluate(outlook, poses, points));
+        }
+        let slopes = |points: &[Vec<f64>]| {
+            let nothing = || (f64::INFINITY, vec![0.0; searched.dimension()]);
+            let (values, gradients): (Vec<f64>, Vec<Vec<f64>>) =
+                points.iter().map(|point| slope(point).unwrap_or_else(nothing)).unzip();
+            self.evaluations += points.len();
+            Slopes { values, gradients: gradients.concat() }
+        };
+        descend(vec![start.to_vec()], how, slopes).pop().unwrap_or_else(|| (start.to_vec(), f64::INFINITY))
+    }
+
+    /// The criterion at postures of the box, rad or m.
+    pub fn evaluate_postures(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], postures: &[Vec<f64>]) -> Vec<f64> {
+        self.evaluations += postures.len();
+        self.scope.evaluate_beside(poses, postures, |feasible| outlook.evaluate(feasible))
+    }
+}
