@@ -159,11 +159,12 @@ fn chain(joints: usize) -> Scenario {
     };
     let text = format!(
         "name = \"chain\"\ntitle = \"A chain\"\nsteps = 10\n[robot]\nmarker_m = [{:?}, 0.05, 0.05]\nlearn_marker = false\n{}\
+         [sensor]\nsigma_m = 0.01\n[initial_error]\ndraw = \"up_to\"\nangle_deg = 45.0\npoint_m = 0.4\n\
          [prior]\ndirection_rad = 0.6\npoint_m = 0.4\n\
          [filter]\nmeasurement_variance_m2 = 0.005\nstabilising_noise = {{ variance = 0.01, first_step = 1, every = 1 }}\n\
          [selection]\nvariant = \"direct-l\"\nepsilon = 1e-4\nevaluations = 300\n\
          units = \"characteristic_length\"\ncharacteristic_length_m = 1.0\n\
-         [thresholds]\norientation_deg = 5.0\nlocation_m = 0.02\n\
+         [thresholds]\norientation_deg = 5.0\nlocation_m = 0.02\n[settled]\nexpected_prediction_m = 0.025\n\
          [[learner]]\nname = \"active\"\nestimator = \"rls\"\npolicy = \"active\"\n",
         0.1 * joints as f64,
         (0..joints).map(joint).collect::<String>(),

@@ -108,7 +108,7 @@ fn in_lanes<S: Simd>(
     let mut slopes = Vec::new();
     for (index, (group, values)) in poses.chunks(GROUP).zip(values.chunks_mut(GROUP)).enumerate() {
         points.rows(simd, group, &mut readings, &mut rows);
-        write_times(simd, d, (&rows, s.as_slice()), &mut products);
+        write_times(simd, [d, GROUP], (&rows, s.as_slice()), &mut products);
         let mut sums = [0.0; GROUP];
         for lane in (0..GROUP).step_by(Lanes::<S>::LEN) {
             let mut sum = splat(simd, 0.0);

@@ -13,7 +13,9 @@ mod rotor;
 mod space;
 mod symmetric;
 
-use fearless_simd::{Simd, SimdBase};
+use std::ops::Range;
+
+use fearless_simd::{Level, Simd, SimdBase};
 
 pub use rotor::sin_cos;
 pub use space::{Frame, Vector};
@@ -62,6 +64,34 @@ pub fn sums<S: Simd>(mut of: [Lanes<S>; GROUP]) -> [f64; GROUP] {
     found
 }
 
+/// Groups of candidates that are computed alike.
+pub struct Run {
+    /// The instructions that serve best.
+    pub level: Level,
+    /// Which groups.
+    pub groups: Range<usize>,
+    /// How many candidates each holds.
+    pub candidates: usize,
+}
+
+/// All groups of so many candidates: those that are full, and the last one, of which half may be empty. A register of half the
+/// width is enough for what is in that, and gives the same bits.
+pub fn runs(level: Level, candidates: usize) -> impl Iterator<Item = Run> {
+    let (full, left) = (candidates / GROUP, candidates % GROUP);
+    let full_ones = Run { level, groups: 0..full, candidates: GROUP };
+    let last = Run { level: narrowed(level, left), groups: full..groups(candidates), candidates: left };
+    [full_ones, last].into_iter().filter(|run| !run.groups.is_empty())
+}
+
+/// The same instructions, on no more lanes than so many candidates need. Those of SSE alone cannot multiply and add at once.
+fn narrowed(level: Level, candidates: usize) -> Level {
+    #[cfg(target_arch = "x86_64")]
+    if candidates <= GROUP / 2 && level.as_avx512().is_some() {
+        return level.as_avx2().map_or(level, Level::Avx2);
+    }
+    level
+}
+
 /// Groups that hold so many candidates.
 pub fn groups(candidates: usize) -> usize {
     candidates.div_ceil(GROUP)
@@ -69,8 +99,7 @@ pub fn groups(candidates: usize) -> usize {
 
 /// Every level of instructions that this processor has, the plainest first.
 #[cfg(test)]
-pub fn levels() -> Vec<fearless_simd::Level> {
-    use fearless_simd::Level;
+pub fn levels() -> Vec<Level> {
     let mut levels = vec![Level::baseline()];
     #[cfg(target_arch = "x86_64")]
     {

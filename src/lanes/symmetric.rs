@@ -2,24 +2,29 @@
 
 use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
 
-use super::{GROUP, Lanes, load, splat, store};
+use super::{GROUP, Lanes, Run, load, runs, splat, store};
 
-/// H P of every candidate: `rows` hold m × d rows of lanes for each [group](GROUP), P is symmetric (m × m).
+/// H P of all candidates, of d equations each: `rows` hold m × d rows of lanes for each [group](GROUP), P is symmetric (m × m).
 ///
 /// Unlike a general product it packs nothing, so that few candidates cost little.
-pub fn times(level: Level, d: usize, rows: &[f64], p: &[f64]) -> Vec<f64> {
+pub fn times(level: Level, [d, candidates]: [usize; 2], rows: &[f64], p: &[f64]) -> Vec<f64> {
     let mut found = vec![0.0; rows.len()];
-    dispatch!(level, simd => write_times(simd, d, (rows, p), &mut found));
+    let of_group = p.len().isqrt() * d * GROUP;
+    for Run { level, groups, candidates } in runs(level, candidates) {
+        let place = groups.start * of_group..groups.end * of_group;
+        let (rows, found) = (&rows[place.clone()], &mut found[place]);
+        dispatch!(level, simd => write_times(simd, [d, candidates], (rows, p), found));
+    }
     found
 }
 
-/// The same, written to `found`.
+/// The same, written to `found`; every group holds so many candidates.
 #[inline(always)]
-pub fn write_times<S: Simd>(simd: S, d: usize, (rows, p): (&[f64], &[f64]), found: &mut [f64]) {
+pub fn write_times<S: Simd>(simd: S, [d, candidates]: [usize; 2], (rows, p): (&[f64], &[f64]), found: &mut [f64]) {
     let (m, stride) = (p.len().isqrt(), d * GROUP);
     let of_group = (m * stride).max(1);
     for (rows, found) in rows.chunks_exact(of_group).zip(found.chunks_exact_mut(of_group)) {
-        for lane in (0..GROUP).step_by(Lanes::<S>::LEN) {
+        for lane in (0..candidates).step_by(Lanes::<S>::LEN) {
             for equation in (0..d).step_by(3) {
                 let strip = Strip { m, stride, first: equation * GROUP + lane };
                 match d - equation {
@@ -160,7 +165,7 @@ mod tests {
             let p = &root * root.transpose();
             let rows: Vec<f64> = (0..groups(count) * m * d * GROUP).map(|_| rng.random_range(-1.0..1.0)).collect();
             for level in levels() {
-                let found = times(level, d, &rows, p.as_slice());
+                let found = times(level, [d, count], &rows, p.as_slice());
                 for candidate in 0..count {
                     let at = |row, k| ((candidate / GROUP * m + k) * d + row) * GROUP + candidate % GROUP;
                     let h = DMatrix::from_fn(d, m, |row, k| rows[at(row, k)]);

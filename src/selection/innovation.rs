@@ -4,7 +4,7 @@
 
 use fearless_simd::{Level, Select, Simd, SimdBase, SimdFloat, dispatch};
 
-use crate::lanes::{GROUP, Lanes, load, splat, store};
+use crate::lanes::{GROUP, Lanes, Run, groups, load, runs, splat, store};
 
 /// Different entries of a symmetric matrix of d rows.
 pub(super) fn entries(d: usize) -> usize {
@@ -22,17 +22,27 @@ fn entry(row: usize, column: usize) -> usize {
     column * (column + 1) / 2 + row
 }
 
-/// Σₖ wₖ aₖ bₖᵀ of every candidate, which must be symmetric: `a` and `b` hold m × d rows of lanes for each group, and without
+/// Σₖ wₖ aₖ bₖᵀ of all candidates, which must be symmetric: `a` and `b` hold m × d rows of lanes for each group, and without
 /// `weights` wₖ = 1.
-pub(super) fn products(level: Level, [m, d]: [usize; 2], a: &[f64], b: &[f64], weights: Option<&[f64]>) -> Vec<f64> {
-    let of_group = (m * d * GROUP).max(1);
-    let mut found = vec![0.0; a.len() / of_group * entries(d) * GROUP];
-    let groups = a.chunks_exact(of_group).zip(b.chunks_exact(of_group));
-    let groups = groups.zip(found.chunks_exact_mut((entries(d) * GROUP).max(1)));
-    dispatch!(level, simd => match d {
-        3 => for ((a, b), found) in groups { three(simd, (a, b, weights), found) },
-        _ => for ((a, b), found) in groups { pairs(simd, d, (a, b, weights), found) },
-    });
+pub(super) fn products(
+    level: Level,
+    [m, d, candidates]: [usize; 3],
+    a: &[f64],
+    b: &[f64],
+    weights: Option<&[f64]>,
+) -> Vec<f64> {
+    let (of_group, of_found) = (m * d * GROUP, entries(d) * GROUP);
+    let mut found = vec![0.0; groups(candidates) * of_found];
+    for Run { level, groups, candidates } in runs(level, candidates) {
+        let place = groups.start * of_group..groups.end * of_group;
+        let found = &mut found[groups.start * of_found..groups.end * of_found];
+        let both = a[place.clone()].chunks_exact(of_group.max(1)).zip(b[place].chunks_exact(of_group.max(1)));
+        let each = both.zip(found.chunks_exact_mut(of_found.max(1)));
+        dispatch!(level, simd => match d {
+            3 => for ((a, b), found) in each { three(simd, candidates, (a, b, weights), found) },
+            _ => for ((a, b), found) in each { pairs(simd, [d, candidates], (a, b, weights), found) },
+        });
+    }
     found
 }
 
@@ -43,9 +53,9 @@ fn weight(weights: Option<&[f64]>, k: usize) -> f64 {
 
 /// Of three equations: what is read once serves all six entries.
 #[inline(always)]
-fn three<S: Simd>(simd: S, (a, b, weights): (&[f64], &[f64], Option<&[f64]>), found: &mut [f64]) {
+fn three<S: Simd>(simd: S, candidates: usize, (a, b, weights): (&[f64], &[f64], Option<&[f64]>), found: &mut [f64]) {
     let row = |first: usize| [first, GROUP + first, 2 * GROUP + first];
-    for first in (0..GROUP).step_by(Lanes::<S>::LEN) {
+    for first in (0..candidates).step_by(Lanes::<S>::LEN) {
         let mut sums = [splat(simd, 0.0); 6];
         for (k, (a, b)) in a.chunks_exact(3 * GROUP).zip(b.chunks_exact(3 * GROUP)).enumerate() {
             let w = splat(simd, weight(weights, k));
@@ -67,11 +77,16 @@ fn three<S: Simd>(simd: S, (a, b, weights): (&[f64], &[f64], Option<&[f64]>), fo
 
 /// Of any number of equations, entry by entry.
 #[inline(always)]
-fn pairs<S: Simd>(simd: S, d: usize, (a, b, weights): (&[f64], &[f64], Option<&[f64]>), found: &mut [f64]) {
+fn pairs<S: Simd>(
+    simd: S,
+    [d, candidates]: [usize; 2],
+    (a, b, weights): (&[f64], &[f64], Option<&[f64]>),
+    found: &mut [f64],
+) {
     for column in 0..d {
         for row in 0..=column {
             let found = &mut found[entry(row, column) * GROUP..][..GROUP];
-            for first in (0..GROUP).step_by(Lanes::<S>::LEN) {
+            for first in (0..candidates).step_by(Lanes::<S>::LEN) {
                 let mut sum = splat(simd, 0.0);
                 for (k, (a, b)) in a.chunks_exact(d * GROUP).zip(b.chunks_exact(d * GROUP)).enumerate() {
                     let w = splat(simd, weight(weights, k));
@@ -160,7 +175,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::lanes::{groups, levels};
+    use crate::lanes::levels;
 
     /// Products and traces against nalgebra's, for as many equations as one likes and any number of candidates, at every level.
     #[test]
@@ -174,8 +189,10 @@ mod tests {
                 DMatrix::from_fn(d, m, |row, k| a[at(row, k)])
             };
             for level in levels() {
-                let (spreads, leverages) =
-                    (products(level, [m, d], &a, &a, None), products(level, [m, d], &a, &a, Some(&weights)));
+                let (spreads, leverages) = (
+                    products(level, [m, d, count], &a, &a, None),
+                    products(level, [m, d, count], &a, &a, Some(&weights)),
+                );
                 let traces = traces(level, d, &spreads, &leverages);
                 for (candidate, trace) in traces.iter().take(count).enumerate() {
                     let a = of(candidate);

@@ -12,7 +12,7 @@ use super::{
     views::Views,
 };
 use crate::{
-    lanes::{GROUP, groups, times},
+    lanes::{GROUP, Run, groups, runs, times},
     model::{Layout, Pass, Points, State},
     sensing::Rig,
 };
@@ -78,7 +78,12 @@ impl Predictions {
         let [m, d] = [covariance.nrows(), points.equations()];
         let mut rows = vec![0.0; groups(candidates.len()) * m * d * GROUP];
         let mut readings = vec![0.0; d * candidates.len()];
-        dispatch!(level, simd => points.rows(simd, candidates, &mut readings, &mut rows));
+        for Run { level, groups, .. } in runs(level, candidates.len()) {
+            let few = groups.start * GROUP..candidates.len().min(groups.end * GROUP);
+            let readings = &mut readings[few.start * d..few.end * d];
+            let rows = &mut rows[groups.start * m * d * GROUP..groups.end * m * d * GROUP];
+            dispatch!(level, simd => points.rows(simd, &candidates[few], readings, rows));
+        }
         Self::from_rows(level, [m, d], covariance, (readings, rows), vec![1.0; candidates.len()])
     }
 
@@ -89,8 +94,9 @@ impl Predictions {
         (readings, rows): (Vec<f64>, Vec<f64>),
         chances: Vec<f64>,
     ) -> Self {
-        let gains = times(level, equations, &rows, covariance.as_slice());
-        let spreads = products(level, [dimension, equations], &rows, &gains, None);
+        let candidates = chances.len();
+        let gains = times(level, [equations, candidates], &rows, covariance.as_slice());
+        let spreads = products(level, [dimension, equations, candidates], &rows, &gains, None);
         Self { level, equations, dimension, readings, rows, gains, spreads, chances }
     }
 
@@ -104,8 +110,8 @@ impl Predictions {
     ) {
         let (Some(marker), d) = (rig.marker_place(), self.equations) else { return };
         let other = doubt.map(|doubt| {
-            let gains = times(self.level, d, &self.rows, doubt.as_slice());
-            products(self.level, [self.dimension, d], &self.rows, &gains, None)
+            let gains = times(self.level, [d, self.len()], &self.rows, doubt.as_slice());
+            products(self.level, [self.dimension, d, self.len()], &self.rows, &gains, None)
         });
         let spreads = other.as_ref().unwrap_or(&self.spreads);
         for index in 0..self.chances.len() {
@@ -163,11 +169,12 @@ impl Predictions {
 
     /// tr(S⁻¹ G M Gᵀ) of every candidate, M symmetric; NaN where S is not positive.
     pub fn traces_by(&self, metric: &DMatrix<f64>) -> Vec<f64> {
-        self.traces_of(&times(self.level, self.equations, &self.gains, metric.as_slice()), None)
+        self.traces_of(&times(self.level, [self.equations, self.len()], &self.gains, metric.as_slice()), None)
     }
 
     fn traces_of(&self, gains: &[f64], weights: Option<&[f64]>) -> Vec<f64> {
-        let leverages = products(self.level, [self.dimension, self.equations], &self.gains, gains, weights);
+        let sizes = [self.dimension, self.equations, self.len()];
+        let leverages = products(self.level, sizes, &self.gains, gains, weights);
         let mut traces = traces(self.level, self.equations, &self.spreads, &leverages);
         // Without any equation there is nothing to be gained.
         traces.resize(self.len(), 0.0);
