@@ -8,7 +8,7 @@ use serde::{
 };
 
 /// The greatest whole number that is taken, that of OpenAPI's `int64`.
-const MOST: u64 = i64::MAX as u64;
+pub const MOST: u64 = i64::MAX as u64;
 
 /// A whole number from 0 as JSON Schema means it, for serde: `100.0` and `1e2` are 100.
 pub fn whole<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {

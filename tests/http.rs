@@ -6,6 +6,8 @@ mod support;
 
 #[path = "http/alone.rs"]
 mod alone;
+#[path = "http/bounds.rs"]
+mod bounds;
 #[path = "http/choices.rs"]
 mod choices;
 #[path = "http/connections.rs"]
@@ -20,6 +22,8 @@ mod disk;
 mod errors;
 #[path = "http/exported.rs"]
 mod exported;
+#[path = "http/faults.rs"]
+mod faults;
 #[path = "http/logs.rs"]
 mod logs;
 #[path = "http/metrics.rs"]
@@ -34,6 +38,8 @@ mod pages;
 mod program;
 #[path = "http/python.rs"]
 mod python;
+#[path = "http/repeated.rs"]
+mod repeated;
 #[path = "http/results.rs"]
 mod results;
 #[path = "http/robot.rs"]

@@ -24,3 +24,23 @@ pub const MOST_PENDING: usize = 60;
 pub const MOST_CLIENT_CHARACTERS: usize = 100;
 /// Characters of a reason.
 pub const MOST_REASON_CHARACTERS: usize = 1000;
+/// Evaluations of the criterion for each movement.
+pub const MOST_EVALUATIONS: usize = 100_000;
+
+/// How large the robot of a session may be, and how much is computed for each movement. The greatest there may be by default; a
+/// server may have less to give.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Most {
+    /// Joints that move.
+    pub joints: usize,
+    /// Targets.
+    pub targets: usize,
+    /// Evaluations of the criterion for each movement.
+    pub evaluations: usize,
+}
+
+impl Default for Most {
+    fn default() -> Self {
+        Self { joints: MOST_JOINTS, targets: MOST_TARGETS, evaluations: MOST_EVALUATIONS }
+    }
+}

@@ -22,7 +22,7 @@ use crate::{
 #[serde(deny_unknown_fields)]
 pub struct Observation {
     /// The suggestion that it carries out, if it does.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "crate::whole::whole_or_none", skip_serializing_if = "Option::is_none")]
     pub suggestion_id: Option<u64>,
     /// Where the joints were, by name, in the units of the URDF (rad, m).
     pub configuration: BTreeMap<String, f64>,

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::{
     Answer, Ask, ChannelShape, Document, Event, Observation, Outcome, Prepared, Refusal, ReplayError, Setup,
-    SetupError, Suggestion, Suggestions, Told, VERSION, ledger::Ledger,
+    SetupError, Suggestion, Suggestions, Told, VERSION, ledger::Ledger, limits::Most, setup::check_size,
 };
 use crate::{
     estimation::Belief,
@@ -76,6 +76,15 @@ impl Session {
         }
         let Document { setup, events, .. } = serde_json::from_str(text).map_err(not_a_session)?;
         Self::replay(setup, events)
+    }
+
+    /// Whether the session keeps within these bounds.
+    ///
+    /// # Errors
+    ///
+    /// [`SetupError::Invalid`] names the key of the calibration that goes beyond.
+    pub fn check_within(&self, most: &Most) -> Result<(), SetupError> {
+        Ok(check_size(&self.ledger.scenario, most)?)
     }
 
     /// The whole session: version, setup and events.

@@ -98,7 +98,7 @@ impl Setup {
             }
             other => SetupError::Agent(other),
         })?;
-        check_size(&scenario)?;
+        check_size(&scenario, &Most::default())?;
         Ok(scenario)
     }
 
@@ -176,16 +176,17 @@ fn below(path: &str, key: &str) -> String {
 }
 
 /// That a session of it has bounds.
-fn check_size(scenario: &Scenario) -> Result<(), Fault> {
+pub(super) fn check_size(scenario: &Scenario, most: &Most) -> Result<(), Fault> {
     let robot = &scenario.robot;
     let points = robot.equipment.targets.iter().map(|target| target.points.len()).sum();
     let counts = [
-        ("robot.urdf", "joints that move", robot.names.len(), MOST_JOINTS),
-        ("target", "targets", robot.equipment.targets.len(), MOST_TARGETS),
+        ("robot.urdf", "joints that move", robot.names.len(), most.joints),
+        ("target", "targets", robot.equipment.targets.len(), most.targets),
         ("target.points_m", "points of targets", points, MOST_POINTS),
         ("camera", "cameras", robot.equipment.cameras.len(), MOST_CAMERAS),
         ("socket", "sockets", robot.sockets.len(), MOST_SOCKETS),
         ("sensor", "channels", scenario.rig.channels().len(), MOST_CHANNELS),
+        ("selection.evaluations", "evaluations", scenario.selection.search.max_evaluations, most.evaluations),
     ];
     match counts.into_iter().find(|(_, _, count, most)| count > most) {
         Some((field, what, count, most)) => Err(Fault::new(

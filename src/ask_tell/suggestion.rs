@@ -100,12 +100,15 @@ impl From<Outcome> for SuggestionState {
 pub struct Ask {
     /// How many pending suggestions the client wants to have, 1 unless told otherwise.
     #[serde(deserialize_with = "crate::whole::whole_or_none")]
+    #[cfg_attr(feature = "app", schema(minimum = 1, maximum = 20))]
     pub count: Option<u64>,
     /// Who asks.
+    #[cfg_attr(feature = "app", schema(min_length = 1, max_length = 100))]
     pub client: Option<String>,
     /// Whether the client's pending suggestions are to be replaced.
     pub replan: bool,
     /// How long new suggestions stay pending, seconds; for ever unless told otherwise.
+    #[cfg_attr(feature = "app", schema(exclusive_minimum = 0.0))]
     pub expires_s: Option<f64>,
 }
 

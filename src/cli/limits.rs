@@ -19,6 +19,21 @@ pub struct LimitArguments {
     /// Sessions with robots elsewhere that are kept [default: 10000]
     #[arg(long, value_name = "N")]
     max_stored_sessions: Option<NonZeroUsize>,
+    /// Size of the file in which they are kept, MiB [default: 8192]
+    #[arg(long, value_name = "MIB")]
+    max_stored: Option<NonZeroUsize>,
+    /// Size of all recordings that are kept as files together, MiB [default: 32768]
+    #[arg(long, value_name = "MIB")]
+    max_recordings: Option<NonZeroUsize>,
+    /// Joints that move of a robot elsewhere, never more than 40 [default: 40]
+    #[arg(long, value_name = "N")]
+    max_joints: Option<NonZeroUsize>,
+    /// Targets of a robot elsewhere, never more than 16 [default: 16]
+    #[arg(long, value_name = "N")]
+    max_targets: Option<NonZeroUsize>,
+    /// Evaluations of the criterion for each movement of a robot elsewhere, never more than 100000 [default: 100000]
+    #[arg(long, value_name = "N")]
+    max_evaluations: Option<NonZeroUsize>,
     /// Steps of a session [default: 100000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     max_steps: Option<u64>,
@@ -58,11 +73,19 @@ impl LimitArguments {
         let size = |given: Option<NonZeroUsize>, unit: usize, usual: usize| {
             given.map_or(usual, |given| given.get().saturating_mul(unit))
         };
+        let bytes = |given: Option<NonZeroUsize>, usual: u64| {
+            given.map_or(usual, |given| (given.get() as u64).saturating_mul(1 << 20))
+        };
         Limits {
             connections: count(self.max_connections, usual.connections),
             streams_per_session: count(self.max_streams_per_session, usual.streams_per_session),
             sessions: count(self.max_sessions, usual.sessions),
             stored_sessions: count(self.max_stored_sessions, usual.stored_sessions),
+            stored_bytes: bytes(self.max_stored, usual.stored_bytes),
+            recordings_bytes: bytes(self.max_recordings, usual.recordings_bytes),
+            joints: count(self.max_joints, usual.joints).min(usual.joints),
+            targets: count(self.max_targets, usual.targets).min(usual.targets),
+            evaluations: count(self.max_evaluations, usual.evaluations).min(usual.evaluations),
             steps_per_session: self.max_steps.unwrap_or(usual.steps_per_session),
             steps_per_request: self.max_steps_per_request.unwrap_or(usual.steps_per_request),
             memory_bytes: size(self.max_memory, 1 << 20, usual.memory_bytes),

@@ -14,6 +14,7 @@ mod output;
 mod paper;
 mod part;
 mod progress;
+mod repair;
 mod run;
 mod scenarios;
 mod seeds;
@@ -76,6 +77,8 @@ enum Command {
     Paper(paper::Arguments),
     /// Write the page with recorded runs to a folder that any static host serves
     Export(export::Arguments),
+    /// Mend what a crash left of sessions that a server keeps, or of a recording
+    Repair(repair::Arguments),
     /// List the built-in scenarios
     Scenarios(scenarios::ListArguments),
     /// Say whether a scenario file is valid, and if not, what to mend
@@ -131,6 +134,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Some(Command::Observability(arguments)) => observability::observability(&arguments),
         Some(Command::Paper(arguments)) => paper::paper(&arguments),
         Some(Command::Export(arguments)) => export::export(&arguments),
+        Some(Command::Repair(arguments)) => repair::repair(&arguments),
         Some(Command::Scenarios(arguments)) => scenarios::list(&arguments),
         Some(Command::Check(arguments)) => scenarios::check(&arguments),
     }

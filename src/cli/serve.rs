@@ -93,6 +93,10 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
         let (version, folder) =
             (env!("CARGO_PKG_VERSION"), data_dir.as_deref().map(|folder| folder.display().to_string()));
         tracing::info!(version, %address, folder, needs_token = token.is_some(), "listening");
+        for damage in server.damage() {
+            // Whoever closed standard error is served all the same.
+            drop(writeln!(std::io::stderr(), "warning: {damage}"));
+        }
         let mut out = std::io::stdout();
         writeln!(out, "body-schema is at http://{address}/ (Ctrl-C ends it)")?;
         match (&data_dir, &arguments.data_dir) {

@@ -29,6 +29,22 @@ pub enum RecordingError {
         /// Why.
         source: io::Error,
     },
+    /// The file could not be read.
+    #[error("cannot read the recording {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file is no recording, or nothing of it can be read.
+    #[error("nothing of {} can be read as a recording: {why}", path.display())]
+    NoRecording {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        why: String,
+    },
     /// Rerun could not arrange or encode the data.
     #[error("cannot encode the recording: {0}; please report this as a bug, with the scenario and the seed")]
     Encode(String),

@@ -89,6 +89,7 @@ mod partition;
 mod posture;
 mod readings;
 mod recorder;
+mod repair;
 mod rerun;
 mod room;
 mod rows;
@@ -110,6 +111,7 @@ pub use self::{
     error::RecordingError,
     live::LiveLog,
     recorder::Recorder,
+    repair::{Condition, examine, restore},
     target::Target,
 };
 

@@ -16,6 +16,7 @@ use super::{
     App, Limits,
     problem::{Kind, Problem},
 };
+use crate::whole::MOST as MOST_WHOLE;
 
 /// A JSON body. An absent one, and `null`, count as `{}`, so that defaults need no body.
 pub(super) struct JsonBody<T>(pub(super) T);
@@ -81,11 +82,15 @@ pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
         let message = error.inner().to_string();
         let path = error.path().to_string();
-        // Missing, unknown and repeated fields are named in the message only.
+        // Missing, unknown and repeated fields are named in the message only; the path may end above them.
         let named = message.split_once("field `").and_then(|(_, rest)| rest.split_once('`')).map(|(name, _)| name);
-        let field = match named {
-            Some(name) => Some(name.to_owned()),
-            None => (path != ".").then_some(path),
+        let field = match (named, path.as_str()) {
+            (Some(name), ".") => Some(name.to_owned()),
+            (None, ".") => None,
+            (Some(name), path) if path != name && !path.ends_with(&format!(".{name}")) => {
+                Some(format!("{path}.{name}"))
+            }
+            (_, path) => Some(path.to_owned()),
         };
         let what = message.split(" at line ").next().unwrap_or(&message);
         let detail = match &field {
@@ -150,7 +155,7 @@ pub(super) fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Pro
 }
 
 fn whole_number(name: &str, value: &str) -> Result<u64, Problem> {
-    value.parse().map_err(|_| {
+    value.parse().ok().filter(|number| *number <= MOST_WHOLE).ok_or_else(|| {
         Problem::new(Kind::Malformed, format!("`{name}` must be a whole number from 0, not `{value}`")).field(name)
     })
 }
@@ -170,6 +175,16 @@ mod tests {
         #[serde(default)]
         #[allow(dead_code)]
         configuration: Vec<f64>,
+        #[serde(default)]
+        #[allow(dead_code)]
+        parts: Vec<Part>,
+    }
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Part {
+        #[allow(dead_code)]
+        length: f64,
     }
 
     #[test]
@@ -184,6 +199,9 @@ mod tests {
             (r#"{"scenario":"a","learners":["b",2]}"#, 422, Some("learners[1]")),
             (r#"{"scenario":"a","learners":"b"}"#, 422, Some("learners")),
             (r#"{"scenario":"a","configuration":[0,1e999]}"#, 422, Some("configuration[1]")),
+            (r#"{"scenario":"a","parts":[{"length":1},{"lengths":1}]}"#, 422, Some("parts[1].lengths")),
+            (r#"{"scenario":"a","parts":[{"length":1},{}]}"#, 422, Some("parts[1].length")),
+            (r#"{"scenario":"a","parts":[{"length":1,"length":2}]}"#, 422, Some("parts[0].length")),
             (r#"{"scenario":"a","configuration":[NaN]}"#, 400, None),
             (" 1", 422, None),
         ] {
@@ -196,7 +214,7 @@ mod tests {
     fn query_parameters_are_whole_numbers() {
         assert_eq!(whole_numbers(Some("after=3"), ["from", "after"]).expect("valid"), [None, Some(3)]);
         assert_eq!(whole_numbers(None, ["from"]).expect("valid"), [None]);
-        for query in ["from=", "from=x", "from=-1", "from=1.5"] {
+        for query in ["from=", "from=x", "from=-1", "from=1.5", "from=9223372036854775808"] {
             let problem = whole_numbers(Some(query), ["from"]).expect_err(query);
             assert_eq!((problem.status, problem.field.as_deref()), (400, Some("from")));
         }

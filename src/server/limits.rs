@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use tokio::sync::Semaphore;
 
-use crate::ask_tell::MOST_SETUP_BYTES;
+use crate::ask_tell::{MOST_EVALUATIONS, MOST_JOINTS, MOST_SETUP_BYTES, MOST_TARGETS, Most};
 
 /// How much a server takes on, all in one place. `docs/trust.md` has the same as a table, with what is answered beyond each.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,6 +34,17 @@ pub struct Limits {
     pub sessions: usize,
     /// How many sessions with robots elsewhere are kept at most.
     pub stored_sessions: usize,
+    /// How large the file may be in which they are kept, bytes; beyond it nothing is taken in.
+    pub stored_bytes: u64,
+    /// How large the recordings may be together that are kept as files, bytes; beyond it no session is opened whose recording
+    /// would be.
+    pub recordings_bytes: u64,
+    /// How many joints a robot elsewhere may have that move.
+    pub joints: usize,
+    /// How many targets it may have.
+    pub targets: usize,
+    /// How often its criterion may be evaluated for each movement.
+    pub evaluations: usize,
     /// How many steps a session makes at most.
     pub steps_per_session: u64,
     /// How many steps one request makes at most.
@@ -62,6 +73,11 @@ impl Default for Limits {
             streams_per_session: 64,
             sessions: 32,
             stored_sessions: 10_000,
+            stored_bytes: 8 << 30,
+            recordings_bytes: 32 << 30,
+            joints: MOST_JOINTS,
+            targets: MOST_TARGETS,
+            evaluations: MOST_EVALUATIONS,
             steps_per_session: 100_000,
             steps_per_request: 1000,
             memory_bytes: 2 << 30,
@@ -74,6 +90,11 @@ impl Limits {
     /// How large the body may be that opens a session with a robot elsewhere, bytes.
     pub fn setup_body_bytes(&self) -> usize {
         MOST_SETUP_BYTES + self.body_bytes
+    }
+
+    /// How large a session with a robot elsewhere may be.
+    pub(super) fn most(&self) -> Most {
+        Most { joints: self.joints, targets: self.targets, evaluations: self.evaluations }
     }
 
     /// How much of a head or of an answer is held at a time: no less than HTTP asks for.

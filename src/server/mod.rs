@@ -47,8 +47,8 @@ pub use limits::{Limits, raise_descriptors};
 use metrics::{Metrics, Most};
 pub use problem::{PROBLEM_JSON, Problem};
 use session::{Budget, Keeping, Sessions};
-pub use session::{NewOutsideSession, NewSession, SessionResource};
-pub use store::{Shown, Store, StoreError, Stored};
+pub use session::{DamagedSession, NewOutsideSession, NewSession, SessionResource};
+pub use store::{Finding, Held, Shown, State, Store, StoreError, Stored};
 use strangers::Strangers;
 pub use strangers::{HostName, NoHostName, NoToken, Token};
 
@@ -118,6 +118,7 @@ pub struct Server {
     app: Arc<App>,
     router: Router,
     shutdown: CancellationToken,
+    damage: Vec<String>,
 }
 
 impl Server {
@@ -136,8 +137,9 @@ impl Server {
             None => Store::in_memory()?,
         };
         let limits = options.limits;
+        let damage = store.damage().to_vec();
         let keeping = Keeping {
-            store: store.holding(limits.stored_sessions),
+            store: store.holding(limits.stored_sessions, limits.stored_bytes),
             recordings: options.data_dir.filter(|_| options.keep_recordings),
             limits: limits.clone(),
         };
@@ -155,7 +157,12 @@ impl Server {
         });
         let router = Router::new().merge(routes).merge(assets::routes(&app.assets));
         let router = guard::layered(router, &app, guard::Headers::new(&options.frame_ancestors));
-        Ok(Self { listener, app, router, shutdown })
+        Ok(Self { listener, app, router, shutdown, damage })
+    }
+
+    /// What of the data directory was found damaged, in words: the rest is served.
+    pub fn damage(&self) -> &[String] {
+        &self.damage
     }
 
     /// Serves until it is to end; then ends sessions, so that their recordings are complete, and open streams with them, and
@@ -165,7 +172,7 @@ impl Server {
     ///
     /// [`ServerError::Incomplete`] where recordings could not be completed.
     pub async fn run(self) -> Result<(), ServerError> {
-        let Self { listener, app, router, shutdown } = self;
+        let Self { listener, app, router, shutdown, damage: _ } = self;
         tokio::select! {
             () = app.connections.serve(listener, router, &shutdown) => {}
             () = app.sessions.watch_over() => {}

@@ -105,6 +105,7 @@ pub(super) enum Kind {
     ShuttingDown,
     Dormant,
     Storage,
+    Damaged,
     Other(StatusCode),
 }
 
@@ -144,6 +145,7 @@ impl Kind {
             Self::TooFewStepsLeft => (422, urn!("too-few-steps-left"), "The session cannot make so many more steps"),
             Self::TooManyStreams => (429, urn!("too-many-streams"), "Too many follow the session"),
             Self::EngineFailed => (500, urn!("engine-failed"), "The session's engine has failed"),
+            Self::Damaged => (500, urn!("damaged"), "What was kept is damaged"),
             Self::Internal => (500, urn!("internal"), "The server has failed"),
             Self::ServerFull => (503, urn!("server-full"), "The server holds as much as it can"),
             Self::ShuttingDown => (503, urn!("shutting-down"), "The server is shutting down"),
@@ -289,7 +291,12 @@ impl From<ResultsError> for Problem {
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         match error {
-            StoreError::Full(_) => Self::new(Kind::ServerFull, error.to_string()),
+            StoreError::Full(_) | StoreError::Large(_) => Self::new(Kind::ServerFull, error.to_string()),
+            StoreError::Damaged { .. } => {
+                let mend = "end the server and run `body-schema repair` on its folder to keep what is before that";
+                Self::new(Kind::Damaged, format!("{error}; {mend}"))
+            }
+            StoreError::Gone { .. } => Self::new(Kind::Storage, format!("it has not happened: {error}")),
             _ if error.is_for_want_of_space() => {
                 let detail =
                     format!("it could not be written, and has not happened: {error}; free some space and ask again");

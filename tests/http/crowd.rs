@@ -30,17 +30,6 @@ async fn follow(api: &Api, session: &str) -> WebSocketStream<TcpStream> {
     client_async(format!("ws://{}{session}/live", api.address), stream).await.expect("a WebSocket").0
 }
 
-/// Bytes of memory that the program holds.
-fn memory(program: &Program) -> u64 {
-    let status = std::fs::read_to_string(format!("/proc/{}/status", program.id())).expect("its status");
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("a line on memory");
-    line.trim().trim_end_matches("kB").trim().parse::<u64>().expect("a number") << 10
-}
-
-fn descriptors(program: &Program) -> usize {
-    std::fs::read_dir(format!("/proc/{}/fd", program.id())).expect("its descriptors").count()
-}
-
 /// Reads until the report of a step; returns how many bytes of the recording came.
 async fn read_to(socket: &mut WebSocketStream<TcpStream>, last: u64) -> usize {
     let mut bytes = 0;
@@ -72,7 +61,7 @@ async fn a_crowd_that_does_not_read_shares_one_recording_and_holds_up_nobody() {
     // What is put together is so now.
     let recording = read_to(&mut follow(api, &session).await, 1000).await as u64;
     assert!(recording > 2 * MIB, "each of its own would be seen: {recording} bytes");
-    let (before, few) = (memory(&program), descriptors(&program));
+    let (before, few) = (program.memory(), program.descriptors());
 
     let mut sockets = Vec::new();
     for _ in 0..crowd {
@@ -82,7 +71,7 @@ async fn a_crowd_that_does_not_read_shares_one_recording_and_holds_up_nobody() {
     for _ in 0..10 {
         api.step(&session, 20).await;
     }
-    let (after, took) = (memory(&program), begun.elapsed());
+    let (after, took) = (program.memory(), begun.elapsed());
     let each = after.saturating_sub(before) / crowd as u64;
     println!("{crowd} sockets: {each} bytes each, of a recording of {recording}; 200 steps took {took:?}");
     assert!(each < MIB, "{each} bytes each, of a recording of {recording}");
@@ -93,8 +82,8 @@ async fn a_crowd_that_does_not_read_shares_one_recording_and_holds_up_nobody() {
 
     let begun = Instant::now();
     api.delete(&session).await;
-    while descriptors(&program) > few + 2 {
-        assert!(begun.elapsed() < SOON, "{} descriptors, {few} before", descriptors(&program));
+    while program.descriptors() > few + 2 {
+        assert!(begun.elapsed() < SOON, "{} descriptors, {few} before", program.descriptors());
         sleep(Duration::from_millis(20)).await;
     }
     // Nobody waits for them to read, but a moment.

@@ -25,9 +25,18 @@ fn limited(folder: &Path, bytes: u32) -> Program {
 
 /// There is room again.
 fn lift(program: &Program) {
+    limit(program, "unlimited");
+}
+
+/// There is room for nothing any more, however small.
+fn fill(program: &Program) {
+    limit(program, "1");
+}
+
+fn limit(program: &Program, bytes: &str) {
     let id = program.id().to_string();
-    let lifted = Command::new("prlimit").args(["--pid", &id, "--fsize=unlimited:unlimited"]).status();
-    assert!(lifted.expect("prlimit").success());
+    let limited = Command::new("prlimit").args(["--pid", &id, &format!("--fsize={bytes}:unlimited")]).status();
+    assert!(limited.expect("prlimit").success());
 }
 
 async fn delete(program: &Program, session: &str) -> reqwest::Response {
@@ -52,6 +61,8 @@ async fn what_a_full_disk_refuses_has_not_happened() {
     assert!(accepted > 3, "{accepted}");
     let refused = problem(refused, 507, None).await;
     assert!(refused["detail"].as_str().expect("text").contains("has not happened"), "{refused}");
+    // What is shorter might still have found room.
+    fill(&program);
     problem(program.api.post(&format!("{session}/suggestions"), json!({})).await, 507, None).await;
     problem(program.api.post("/v1/sessions", robot::opening()).await, 507, None).await;
     problem(delete(&program, &session).await, 507, None).await;

@@ -1,5 +1,6 @@
 //! The description of the server, held against the server.
 
+use body_schema::server::{Limits, Options};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -75,12 +76,44 @@ async fn the_document_lists_every_route() {
             }
         }
     }
+    let nowhere: Vec<&str> =
+        references(&document).into_iter().filter(|at| document.pointer(&at[1..]).is_none()).collect();
+    assert!(nowhere.is_empty(), "{nowhere:?} are referred to and not there");
+    for (path, item) in paths {
+        for (method, operation) in item.as_object().expect("an item") {
+            for parameter in operation["parameters"].as_array().into_iter().flatten() {
+                let schema = parameter["schema"].to_string();
+                assert!(!schema.contains("null"), "{method} {path}: {parameter} cannot be null");
+            }
+        }
+    }
     let events =
         &document["paths"]["/v1/sessions/{id}/events"]["get"]["responses"]["200"]["content"]["text/event-stream"];
     assert!(events["schema"].is_null() && events["x-itemSchema"]["properties"]["data"].is_object(), "{events}");
     ids.sort_unstable();
     ids.dedup();
     assert_eq!(ids.len(), ROUTES.len(), "every operation has an id of its own");
+    server.stop().await;
+}
+
+/// All that a document refers to.
+fn references(value: &Value) -> Vec<&str> {
+    match value {
+        Value::Array(values) => values.iter().flat_map(references).collect(),
+        Value::Object(members) => {
+            let at = members.get("$ref").and_then(Value::as_str);
+            at.into_iter().chain(members.values().flat_map(references)).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+#[tokio::test]
+async fn the_document_tells_the_limits_of_this_server() {
+    let limits = Limits { steps_per_request: 7, ..Limits::default() };
+    let server = Server::with(Options { limits, ..Options::default() }).await;
+    let document = server.get_json("/v1/openapi.json").await;
+    assert_eq!(document["components"]["schemas"]["StepRequest"]["properties"]["count"]["maximum"], 7);
     server.stop().await;
 }
 
@@ -164,6 +197,9 @@ async fn responses_are_as_described() {
     check(("put", "/v1/sessions/{id}/observations/{n}/included"), 200, included.json().await.expect("JSON"));
     check(("get", "/v1/sessions/{id}"), 200, server.get_json(&session).await);
     let live = json!({ "$ref": "#/components/schemas/LiveEvent" });
+    let path = format!("{session}/learners/global/configuration");
+    let nobody = server.get(&path).await;
+    check(("get", "/v1/sessions/{id}/learners/{name}/configuration"), 409, nobody.json().await.expect("JSON"));
     for event in crate::streams::first_messages(&server, &session, 1).await {
         contract.check_schema(&live, &event);
     }

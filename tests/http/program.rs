@@ -100,10 +100,26 @@ impl Program {
     }
 
     #[cfg(target_os = "linux")]
-    fn threads(&self) -> usize {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).expect("its status");
-        let threads = status.lines().find_map(|line| line.strip_prefix("Threads:")).expect("a line on threads");
-        threads.trim().parse().expect("a number")
+    pub fn threads(&self) -> usize {
+        self.status("Threads:")
+    }
+
+    /// Bytes of memory that it holds.
+    #[cfg(target_os = "linux")]
+    pub fn memory(&self) -> u64 {
+        (self.status("VmRSS:") as u64) << 10
+    }
+
+    #[cfg(target_os = "linux")]
+    pub fn descriptors(&self) -> usize {
+        std::fs::read_dir(format!("/proc/{}/fd", self.id())).expect("its descriptors").count()
+    }
+
+    #[cfg(target_os = "linux")]
+    fn status(&self, name: &str) -> usize {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.id())).expect("its status");
+        let line = status.lines().find_map(|line| line.strip_prefix(name)).expect("such a line");
+        line.trim().trim_end_matches("kB").trim().parse().expect("a number")
     }
 }
 
@@ -115,26 +131,33 @@ impl Drop for Program {
     }
 }
 
+/// A thousand sessions, opened and deleted: as many threads and descriptors as after the tenth, and no more memory for each
+/// than what an allocator holds back.
 #[cfg(target_os = "linux")]
 #[tokio::test]
-async fn sessions_leave_no_threads_behind() {
-    /// Workers come and go; one thread left behind by each session would be 150.
+async fn sessions_leave_nothing_behind() {
+    const SESSIONS: u64 = 1000;
+    /// Workers and connections come and go; one left behind by each session would be a thousand.
     const MARGIN: usize = 8;
+    /// A session of one learner holds ten times as much.
+    const KEPT_BYTES: u64 = 8 << 10;
     let program = Program::ephemeral();
-    let open_and_delete = async || {
-        let session = program.api.open(json!({ "scenario": "arm-6dof", "learners": ["random"] })).await;
+    let open_and_delete = async |number: u64| {
+        let session = program.api.open(json!({ "scenario": "arm-6dof", "learners": ["random"], "seed": number })).await;
         program.api.step(&session, 1).await;
         program.api.delete(&session).await;
     };
-    for _ in 0..5 {
-        open_and_delete().await;
+    for number in 0..10 {
+        open_and_delete(number).await;
     }
-    let before = program.threads();
-    for _ in 0..150 {
-        open_and_delete().await;
+    let before = (program.threads(), program.descriptors(), program.memory());
+    for number in 10..SESSIONS {
+        open_and_delete(number).await;
     }
-    let after = program.threads();
-    assert!(after <= before + MARGIN, "{before} threads before 150 sessions, {after} after");
+    let after = (program.threads(), program.descriptors(), program.memory());
+    assert!(after.0 <= before.0 + MARGIN, "threads: {before:?}, then {after:?}");
+    assert!(after.1 <= before.1 + MARGIN, "descriptors: {before:?}, then {after:?}");
+    assert!(after.2 <= before.2 + SESSIONS * KEPT_BYTES, "memory: {before:?}, then {after:?}");
 }
 
 /// Rerun's own switch is for programs that log on the side; a session is asked for.

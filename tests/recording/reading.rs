@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, io::Cursor};
 use re_chunk::Chunk;
 use re_log_encoding::DecoderApp;
 use re_log_types::LogMsg;
-use re_sdk_types::{
+use rerun::{
     Component,
     components::{
         Color, HalfSize2D, HalfSize3D, Length, LineStrip3D, Name, Position2D, Position3D, RotationQuat, Text,

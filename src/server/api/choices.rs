@@ -88,6 +88,7 @@ pub(super) async fn evaluate(
     responses(
         (status = 200, description = "What is set for the next step", body = Configuration),
         (status = 404, description = "There is no such session or learner", body = Problem),
+        (status = 409, description = "The learner chooses its movements itself, or a robot elsewhere moves", body = Problem),
         (status = 500, description = "The session's engine has failed", body = Problem),
     )
 )]

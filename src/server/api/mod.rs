@@ -25,7 +25,12 @@ use serde::Serialize;
 use serde_json::json;
 use utoipa::{
     IntoResponses, OpenApi, ToSchema,
-    openapi::{RefOr, extensions::ExtensionsBuilder},
+    openapi::{
+        Object, OneOf, RefOr, Schema,
+        extensions::ExtensionsBuilder,
+        path::Parameter,
+        schema::{SchemaType, Type},
+    },
 };
 use utoipa_axum::{
     router::{OpenApiRouter, UtoipaMethodRouterExt},
@@ -41,7 +46,10 @@ use super::{
     metrics::OPEN_METRICS,
     problem::{Kind, PROBLEM_JSON, Problem},
 };
-use crate::experiment::StepReport;
+use crate::{
+    experiment::StepReport,
+    recording::{Shape, Theme},
+};
 
 const JSON: &str = "application/json";
 const EVENT_STREAM: &str = "text/event-stream";
@@ -82,7 +90,8 @@ pub enum Liveness {
         (name = "server", description = "The server itself")
     ),
     // What streams carry, and so no route returns.
-    components(schemas(StepReport, streams::LiveEvent))
+    // The last two are words of parameters, which utoipa names without taking them up.
+    components(schemas(StepReport, streams::LiveEvent, Shape, Theme))
 )]
 struct Document;
 
@@ -123,6 +132,7 @@ pub(super) fn routes(limits: &Limits) -> (Router<Arc<App>>, Bytes) {
         .split_for_parts();
     describe_what_holds_for_all(&mut document);
     describe_events(&mut document);
+    describe_limits(&mut document, limits);
     // The document consists of strings, so that it can always be written.
     (router, document.to_pretty_json().unwrap_or_default().into())
 }
@@ -131,6 +141,11 @@ pub(super) fn routes(limits: &Limits) -> (Router<Arc<App>>, Bytes) {
 fn describe_what_holds_for_all(document: &mut utoipa::openapi::OpenApi) {
     for item in document.paths.paths.values_mut() {
         for operation in [&mut item.get, &mut item.post, &mut item.put, &mut item.delete].into_iter().flatten() {
+            for parameter in operation.parameters.iter_mut().flatten() {
+                if let RefOr::T(Parameter { schema: Some(RefOr::T(schema)), .. }) = parameter {
+                    never_null(schema);
+                }
+            }
             let described = &mut operation.responses.responses;
             for (status, refusal) in refusals::OfAll::responses() {
                 described.entry(status).or_insert(refusal);
@@ -141,6 +156,27 @@ fn describe_what_holds_for_all(document: &mut utoipa::openapi::OpenApi) {
                 response.content.extend(content.map(|content| (PROBLEM_JSON.to_owned(), content)));
             }
         }
+    }
+}
+
+/// A parameter may be absent, but what is there is a number or a text: the null of JSON cannot be written.
+fn never_null(schema: &mut Schema) {
+    match schema {
+        Schema::Object(Object { schema_type: SchemaType::Array(types), .. }) => types.retain(|of| *of != Type::Null),
+        Schema::OneOf(OneOf { items, .. }) => items.retain(|item| {
+            !matches!(item, RefOr::T(Schema::Object(Object { schema_type: SchemaType::Type(Type::Null), .. })))
+        }),
+        _ => {}
+    }
+}
+
+/// Says how much this server takes where that is not said with the type.
+fn describe_limits(document: &mut utoipa::openapi::OpenApi, limits: &Limits) {
+    let steps = document.components.as_mut().and_then(|components| components.schemas.get_mut("StepRequest"));
+    if let Some(RefOr::T(Schema::Object(request))) = steps
+        && let Some(RefOr::T(Schema::Object(count))) = request.properties.get_mut("count")
+    {
+        count.maximum = Some(limits.steps_per_request.into());
     }
 }
 

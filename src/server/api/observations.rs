@@ -55,7 +55,8 @@ impl From<&Told> for ToldObservation {
 #[utoipa::path(post, path = "/v1/sessions/{id}/observations", tag = "robots", operation_id = "observe",
     params(
         ("id" = String, Path, description = "The session's id", format = "uuid"),
-        ("Idempotency-Key" = Option<String>, Header, description = "A text of the client's own, another for each observation"),
+        ("Idempotency-Key" = Option<String>, Header, description = "A text of the client's own, another for each observation",
+            max_length = 200, pattern = "^[!-~]([ -~]*[!-~])?$"),
     ),
     request_body = Observation,
     responses(

@@ -41,7 +41,7 @@ pub(super) async fn urdf(State(app): State<Arc<App>>, Path(id): Path<String>) ->
 #[utoipa::path(get, path = "/v1/sessions/{id}/kinematics.yaml", tag = "results", operation_id = "getKinematics",
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
-        (status = 200, description = "YAML", body = String, content_type = "application/yaml"),
+        (status = 200, description = "YAML", body = Object, content_type = "application/yaml"),
         (status = 409, description = "Nothing was observed, nothing explains it, or the session has no robot elsewhere", body = Problem),
         OfEngines,
     )

@@ -22,7 +22,7 @@ use crate::{
         extract::{FromJson, JsonBody, parse},
         problem::{Kind, Problem},
         requests,
-        session::{NewOutsideSession, NewSession, SessionResource},
+        session::{DamagedSession, NewOutsideSession, NewSession, SessionResource},
     },
     whole::{whole, whole_or_none},
 };
@@ -38,6 +38,8 @@ const FEW_REPORTS: usize = 16;
 pub struct SessionList {
     /// Oldest first.
     pub sessions: Vec<SessionResource>,
+    /// Sessions with robots elsewhere that were kept, and cannot be relied on any more: `body-schema repair` mends what can be.
+    pub damaged: Vec<DamagedSession>,
 }
 
 /// How far to go.
@@ -46,7 +48,7 @@ pub struct SessionList {
 pub struct StepRequest {
     /// How many steps to make.
     #[serde(default = "one", deserialize_with = "whole")]
-    #[schema(default = 1, minimum = 1, maximum = 1000)]
+    #[schema(default = 1, minimum = 1)]
     pub count: u64,
     /// The step that the session must be at; otherwise nothing is stepped (409). It makes a repeated request safe.
     #[serde(default, deserialize_with = "whole_or_none")]
@@ -94,7 +96,8 @@ fn all<S: Serializer>(reports: &[Arc<RawValue>], serializer: S) -> Result<S::Ok,
     (status = 500, description = "The sessions with robots elsewhere cannot be read", body = Problem),
 ))]
 pub(super) async fn list(State(app): State<Arc<App>>) -> Result<Json<SessionList>, Problem> {
-    Ok(Json(SessionList { sessions: app.sessions.list().await? }))
+    let (sessions, damaged) = app.sessions.list().await?;
+    Ok(Json(SessionList { sessions, damaged }))
 }
 
 /// What a session is made from: a scenario of ours, or a robot elsewhere.

@@ -42,6 +42,7 @@ pub(super) struct NewOutcome {
     state: Outcome,
     /// The same in words, for people.
     #[serde(default)]
+    #[schema(max_length = 1000)]
     reason: Option<String>,
 }
 

@@ -16,7 +16,7 @@ use tokio::{
 use uuid::Uuid;
 
 use super::{
-    Elsewhere, Engine, NewOutsideSession, Session, SessionResource, Sessions, Standing, lock,
+    DamagedSession, Elsewhere, Engine, NewOutsideSession, Session, SessionResource, Sessions, Standing, lock,
     outside::{self, Beginning, Origin, now_s},
     registry::{END_WITHIN, no_engine, spawn},
 };
@@ -97,7 +97,8 @@ impl Sessions {
         let permit = self.place().await?;
         let Known { id, made_s, .. } = *known;
         let shared = Arc::new(self.shared(id));
-        let beginning = Beginning { id, origin, made_s, store: self.store.clone(), shared: shared.clone(), permit };
+        let (store, most) = (self.store.clone(), self.limits.most());
+        let beginning = Beginning { id, origin, made_s, store, most, shared: shared.clone(), permit };
         let (jobs, receiver) = mpsc::channel();
         let (opened, opening) = oneshot::channel();
         spawn(move || outside::run(beginning, &receiver, opened))?;
@@ -199,22 +200,29 @@ impl Sessions {
         standing.ok_or_else(|| Problem::not_outside(id))
     }
 
-    /// All sessions, oldest first.
-    pub(in crate::server) async fn list(&self) -> Result<Vec<SessionResource>, Problem> {
+    /// All sessions, oldest first, and those that are damaged.
+    pub(in crate::server) async fn list(&self) -> Result<(Vec<SessionResource>, Vec<DamagedSession>), Problem> {
         let all = lock(&self.all).clone();
         let steps = all.iter().filter(|session| !session.is_elsewhere());
         let mut resources: Vec<(f64, SessionResource)> =
             steps.map(|session| (session.made_s, session.resource())).collect();
-        let known = lock(&self.known).clone();
+        let (known, mut damaged) = (lock(&self.known).clone(), Vec::new());
         for known in known {
             let resource = match all.iter().find(|session| session.id == known.id) {
                 Some(session) => Some(session.resource()),
-                None => self.described(&known).await?,
+                None => match self.described(&known).await {
+                    // One that cannot be read keeps nobody from the others.
+                    Err(problem) if problem.is(Kind::Damaged) => {
+                        damaged.push(DamagedSession { id: known.id.to_string(), detail: problem.detail });
+                        None
+                    }
+                    described => described?,
+                },
             };
             resources.extend(resource.map(|resource| (known.made_s, resource)));
         }
         resources.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-        Ok(resources.into_iter().map(|(_, resource)| resource).collect())
+        Ok((resources.into_iter().map(|(_, resource)| resource).collect(), damaged))
     }
 
     /// A session as it can be shown without replaying it. `None` for one that this program cannot take up: who asks for it is

@@ -35,7 +35,7 @@ pub(super) use memory::Budget;
 pub(super) use outside::{Elsewhere, now_s};
 pub use registry::NewSession;
 pub(super) use registry::{Keeping, Sessions};
-pub use resource::SessionResource;
+pub use resource::{DamagedSession, SessionResource};
 use shared::Shared;
 pub use standing::NewOutsideSession;
 pub(super) use standing::Standing;

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     ask_tell::{
-        self, Answer, Ask, ChannelShape, Observation, Outcome, Prepared, ReplayError, Setup, Status, Suggestion,
+        self, Answer, Ask, ChannelShape, Most, Observation, Outcome, Prepared, ReplayError, Setup, Status, Suggestion,
         Suggestions, Told,
     },
     experiment::{Description, Experiment},
@@ -51,6 +51,8 @@ pub(super) struct Beginning {
     /// When it was made, seconds since 1970.
     pub(super) made_s: f64,
     pub(super) store: Arc<Store>,
+    /// How large a new one may be.
+    pub(super) most: Most,
     pub(super) shared: Arc<Shared>,
     /// Held until the thread ends, so that ending sessions still count.
     pub(super) permit: OwnedSemaphorePermit,
@@ -62,8 +64,8 @@ pub(super) fn run(
     jobs: &mpsc::Receiver<Job>,
     opened: oneshot::Sender<Result<Description, Problem>>,
 ) {
-    let (shared, permit) = (beginning.shared.clone(), beginning.permit);
-    let open = || Elsewhere::open(beginning.id, beginning.origin, beginning.made_s, beginning.store, shared.clone());
+    let Beginning { id, origin, made_s, store, most, shared, permit } = beginning;
+    let open = || Elsewhere::open((id, made_s), origin, &most, store, shared.clone());
     match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
         Ok(mut robot) => {
             if opened.send(Ok(robot.session.description().clone())).is_ok() {
@@ -98,7 +100,13 @@ pub(in crate::server) struct Elsewhere {
 }
 
 impl Elsewhere {
-    fn open(id: Uuid, origin: Origin, made_s: f64, store: Arc<Store>, shared: Arc<Shared>) -> Result<Self, Problem> {
+    fn open(
+        (id, made_s): (Uuid, f64),
+        origin: Origin,
+        most: &Most,
+        store: Arc<Store>,
+        shared: Arc<Shared>,
+    ) -> Result<Self, Problem> {
         let (is_new, (setup, shown), events, keys) = match origin {
             Origin::New(setup, shown, events) => (true, (setup, shown), events, BTreeMap::new()),
             Origin::Store(Stored { setup, shown, events, keys }) => (false, (setup, shown), events, keys),
@@ -106,6 +114,9 @@ impl Elsewhere {
         let mut history = Vec::new();
         let replayed = ask_tell::Session::replay_telling(setup, events, &mut |report| history.push(report));
         let session = replayed.map_err(|error| if is_new { unusable(error) } else { error.into() })?;
+        if is_new {
+            session.check_within(most)?;
+        }
         // Each life of a session in memory records anew: viewers must not take two recordings for one.
         let target = Target::live(shared.live.clone()).with_recording_id(Uuid::new_v4().to_string());
         let begun = Recorder::new(session.description(), target.with_ellipsoids(shown.ellipsoids));

@@ -1,7 +1,7 @@
 //! All sessions of a server.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, Mutex, atomic::Ordering, mpsc},
     thread,
     time::{Duration, Instant},
@@ -22,6 +22,7 @@ use crate::{
     scenario::WorldKind,
     server::{
         Limits,
+        aside::aside,
         metrics::{Metrics, Present},
         problem::{Kind, Problem},
         requests,
@@ -111,6 +112,7 @@ impl Sessions {
 
     /// Opens a session: a thread, an experiment, its recording.
     pub(in crate::server) async fn open(&self, new: NewSession) -> Result<Arc<Session>, Problem> {
+        self.has_room_for_recordings().await?;
         let permit = self.permit().await?;
         let id = Uuid::new_v4();
         let shared = Arc::new(self.shared(id));
@@ -152,6 +154,20 @@ impl Sessions {
     /// What the engine of a session is to leave.
     pub(super) fn shared(&self, id: Uuid) -> Shared {
         Shared::new(id, self.shutdown.child_token(), self.budget.clone(), self.metrics.clone())
+    }
+
+    /// Whether one more recording may be kept as a file.
+    async fn has_room_for_recordings(&self) -> Result<(), Problem> {
+        let Some(directory) = self.recordings.clone() else { return Ok(()) };
+        let (most, used) =
+            (self.limits.recordings_bytes, aside(move || Ok::<_, Problem>(recordings_bytes(&directory))).await?);
+        match used < most {
+            true => Ok(()),
+            false => Err(Problem::new(
+                Kind::ServerFull,
+                format!("the recordings in the server's data directory take {used} bytes of {most}; move some away"),
+            )),
+        }
     }
 
     /// Adds a session to those in memory.
@@ -279,6 +295,13 @@ impl Sessions {
         drop(timeout(SHUT_DOWN_WITHIN, ended).await);
         all.iter().filter_map(|session| session.unfinished()).collect()
     }
+}
+
+/// How much the recordings in a directory take. What cannot be looked at counts for nothing: the recording itself will tell.
+fn recordings_bytes(directory: &Path) -> u64 {
+    let files = std::fs::read_dir(directory).into_iter().flatten().flatten();
+    let recordings = files.filter(|file| file.path().extension().is_some_and(|extension| extension == "rrd"));
+    recordings.filter_map(|file| Some(file.metadata().ok()?.len())).sum()
 }
 
 /// Begins the thread of a session.

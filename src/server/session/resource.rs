@@ -68,3 +68,12 @@ impl Session {
         }
     }
 }
+
+/// A session that was kept, and is not as it was written.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct DamagedSession {
+    /// Its id.
+    pub id: String,
+    /// What is wrong with it.
+    pub detail: String,
+}

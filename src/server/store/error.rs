@@ -46,7 +46,7 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
-    /// What was read cannot be understood.
+    /// What was read is not what was written.
     #[error("{} is damaged: {what}", path.display())]
     Damaged {
         /// The file.
@@ -54,9 +54,18 @@ pub enum StoreError {
         /// What is wrong.
         what: String,
     },
+    /// The file was moved or removed while it was in use: what is written to it would be lost.
+    #[error("{} is not there any more; put it back, or start the server again", path.display())]
+    Gone {
+        /// The file.
+        path: PathBuf,
+    },
     /// As many sessions as may be.
     #[error("{0} sessions are kept already, the most that there may be; delete some")]
     Full(usize),
+    /// The file is as large as it may be.
+    #[error("the sessions that are kept take {0} bytes, the most that they may; delete some")]
+    Large(u64),
     /// SQLite has failed.
     #[error("{}: {source}", path.display())]
     Sqlite {
@@ -70,10 +79,13 @@ pub enum StoreError {
 impl StoreError {
     /// Whether what failed is to write, as on a full disk: it may succeed later.
     pub fn is_for_want_of_space(&self) -> bool {
+        if matches!(self, Self::Gone { .. }) {
+            return true;
+        }
         let Self::Sqlite { source, .. } = self else { return false };
         matches!(
             source.sqlite_error_code(),
-            Some(ErrorCode::DiskFull | ErrorCode::SystemIoFailure | ErrorCode::CannotOpen)
+            Some(ErrorCode::DiskFull | ErrorCode::SystemIoFailure | ErrorCode::CannotOpen | ErrorCode::ReadOnly)
         )
     }
 

@@ -3,8 +3,11 @@
 //! A session is its setup and its events, and they are all that is written. Whoever appends is told once they are on the
 //! disk (write-ahead log, full synchronisation); an error means that nothing was written.
 
+mod checks;
 mod error;
 mod lock;
+mod repair;
+mod salvage;
 mod schema;
 
 use std::{
@@ -17,8 +20,10 @@ use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, 
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
+use checks::{Place, checksum};
 pub use error::StoreError;
 use lock::Lock;
+pub use repair::{Finding, Held, State};
 
 use crate::{
     ask_tell::{Event, Happened, Setup, VERSION},
@@ -35,8 +40,16 @@ pub struct Store {
     connection: Mutex<Connection>,
     /// What errors call it.
     path: PathBuf,
+    /// Where the file was when it was opened.
+    place: Option<Place>,
+    /// The version of its form.
+    version: u32,
     /// How many sessions are kept at most.
     most: usize,
+    /// How large the file may be, bytes.
+    most_bytes: u64,
+    /// What was found damaged when it was opened.
+    damage: Vec<String>,
     /// Held as long as the store is.
     _lock: Option<Lock>,
 }
@@ -79,25 +92,29 @@ impl Store {
 
     /// That of a data directory, which is made if need be, for this process alone until it ends.
     ///
+    /// A damaged file is put aside under another name, and what can be read of it is kept; [`damage`](Self::damage) tells of it.
+    ///
     /// # Errors
     ///
     /// [`StoreError`] where the directory cannot be written, another process holds it, or a later version has written it.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         let folder = |source| StoreError::Folder { path: directory.to_owned(), source };
         std::fs::create_dir_all(directory).map_err(folder)?;
-        let lock = Lock::take(directory)?;
+        Self::held(directory, Lock::take(directory)?)
+    }
+
+    fn held(directory: &Path, lock: Lock) -> Result<Self, StoreError> {
         let path = directory.join(FILE);
-        let opened = Connection::open(&path).and_then(|connection| {
-            connection.pragma_update(None, "journal_mode", "WAL")?;
-            connection.pragma_update(None, "synchronous", "FULL")?;
-            Ok(connection)
-        });
-        let opened = opened.map_err(|source| StoreError::Sqlite { path: path.clone(), source });
-        opened.and_then(|connection| Self::ready(connection, path, Some(lock))).map_err(|error| match error {
+        let damage = salvage::salvage(&path)?;
+        let opened = connected(&path).and_then(|connection| Self::ready(connection, path, Some(lock)));
+        let store = opened.map_err(|error| match error {
             // What keeps a store from being made: the folder, or the disk that it is on.
-            StoreError::Sqlite { source, .. } => folder(std::io::Error::other(source)),
+            StoreError::Sqlite { source, .. } => {
+                StoreError::Folder { path: directory.to_owned(), source: std::io::Error::other(source) }
+            }
             error => error,
-        })
+        })?;
+        Ok(Self { damage, ..store })
     }
 
     /// That of a data directory for reading alone, also while a server holds it.
@@ -111,20 +128,31 @@ impl Store {
         let connection =
             Connection::open_with_flags(&path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE).map_err(told)?;
         connection.pragma_update(None, "query_only", true).map_err(told)?;
-        schema::check(&connection, &path)?;
-        Ok(Self { connection: Mutex::new(connection), path, most: usize::MAX, _lock: None })
+        let version = schema::check(&connection, &path)?;
+        Ok(Self::of(connection, path, version, None))
     }
 
     fn ready(mut connection: Connection, path: PathBuf, lock: Option<Lock>) -> Result<Self, StoreError> {
         schema::migrate(&mut connection, &path)?;
         let told = |source| StoreError::Sqlite { path: path.clone(), source };
         connection.pragma_update(None, "foreign_keys", true).map_err(told)?;
-        Ok(Self { connection: Mutex::new(connection), path, most: usize::MAX, _lock: lock })
+        Ok(Self::of(connection, path, schema::KNOWN, lock))
     }
 
-    /// The same, but that it takes in no session beyond so many.
-    pub fn holding(self, most: usize) -> Self {
-        Self { most, ..self }
+    fn of(connection: Connection, path: PathBuf, version: u32, lock: Option<Lock>) -> Self {
+        let (place, connection) = (Place::of(&path), Mutex::new(connection));
+        let (most, most_bytes, damage) = (usize::MAX, u64::MAX, Vec::new());
+        Self { connection, path, place, version, most, most_bytes, damage, _lock: lock }
+    }
+
+    /// What was found damaged when it was opened, in words.
+    pub fn damage(&self) -> &[String] {
+        &self.damage
+    }
+
+    /// The same, but that it takes in no session beyond so many, and nothing once its file has so many bytes.
+    pub fn holding(self, most: usize, most_bytes: u64) -> Self {
+        Self { most, most_bytes, ..self }
     }
 
     /// Keeps a new session, and what happened in it so far.
@@ -142,15 +170,15 @@ impl Store {
     ) -> Result<(), StoreError> {
         let (setup, shown) = (json(setup), json(&shown));
         let mut connection = self.connection();
-        let count = connection.query_row("SELECT count(*) FROM session", [], |row| row.get::<_, i64>(0));
-        if usize::try_from(count.map_err(self.told())?).is_ok_and(|count| count >= self.most) {
+        self.can_grow(&connection)?;
+        if self.count_in(&connection)? >= self.most {
             return Err(StoreError::Full(self.most));
         }
         let written = (|| {
             let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
             transaction.execute(
-                "INSERT INTO session (id, made_s, form, setup, shown) VALUES (?1, ?2, ?3, ?4, ?5)",
-                params![id.to_string(), made_s, VERSION, setup, shown],
+                "INSERT INTO session (id, made_s, form, setup, shown, checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+                params![id.to_string(), made_s, VERSION, setup, shown, checksum([&setup, &shown])],
             )?;
             insert_events(&transaction, id, 0, events, None)?;
             transaction.commit()
@@ -165,6 +193,7 @@ impl Store {
     /// [`StoreError`]: none is appended then.
     pub fn append(&self, id: Uuid, revision: usize, events: &[Event], key: Option<&str>) -> Result<(), StoreError> {
         let mut connection = self.connection();
+        self.can_grow(&connection)?;
         let written = (|| {
             let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
             insert_events(&transaction, id, revision, events, key)?;
@@ -177,38 +206,75 @@ impl Store {
     ///
     /// # Errors
     ///
-    /// [`StoreError`] where it cannot be read.
+    /// [`StoreError`] where it cannot be read, or is not as it was written: half a session is none.
     pub fn load(&self, id: Uuid) -> Result<Option<Stored>, StoreError> {
+        let Some((stored, damage)) = self.load_so_far(id)? else { return Ok(None) };
+        match damage {
+            Some(what) => Err(self.damaged(format!("session {id}: {what}"))),
+            None => Ok(Some(stored)),
+        }
+    }
+
+    /// A session up to where it is damaged, and how.
+    fn load_so_far(&self, id: Uuid) -> Result<Option<(Stored, Option<String>)>, StoreError> {
         let connection = self.connection();
-        let session = connection.query_row(
-            "SELECT number, form, setup, shown FROM session WHERE id = ?1",
-            [id.to_string()],
-            |row| {
-                Ok((row.get::<_, i64>(0)?, row.get::<_, u32>(1)?, row.get::<_, String>(2)?, row.get::<_, String>(3)?))
-            },
-        );
-        let Some((number, form, setup, shown)) = session.optional().map_err(self.told())? else { return Ok(None) };
+        let (checked, damage) = match self.version >= schema::CHECKED {
+            true => ("checksum", "damage"),
+            false => ("NULL", "NULL"),
+        };
+        let select = format!("SELECT number, form, setup, shown, {checked}, {damage} FROM session WHERE id = ?1");
+        let session = connection.query_row(&select, [id.to_string()], |row| {
+            let (number, form): (i64, u32) = (row.get(0)?, row.get(1)?);
+            let (setup, shown): (String, String) = (row.get(2)?, row.get(3)?);
+            let (checksum, damage): (Option<u32>, Option<String>) = (row.get(4)?, row.get(5)?);
+            Ok((number, form, setup, shown, checksum, damage))
+        });
+        let found = session.optional().map_err(self.told())?;
+        let Some((number, form, setup, shown, sum, damage)) = found else { return Ok(None) };
         if form > VERSION {
             return Err(StoreError::Newer { path: self.path.clone(), found: form, known: VERSION });
         }
-        let rows = (|| {
-            let mut select = connection
-                .prepare_cached("SELECT event, idempotency_key FROM event WHERE session = ?1 ORDER BY number")?;
-            let rows =
-                select.query_map([number], |row| Ok((row.get::<_, String>(0)?, row.get::<_, Option<String>>(1)?)))?;
-            rows.collect::<Result<Vec<_>, _>>()
-        })();
-        let (mut events, mut keys, mut observations) = (Vec::new(), BTreeMap::new(), 0);
-        for (event, key) in rows.map_err(self.told())? {
-            let event: Event = self.parsed(&event)?;
-            observations += u64::from(matches!(event.happened, Happened::Observed { .. }));
-            events.push(event);
-            keys.extend(key.map(|key| (key, observations)));
+        let unusable = |what: String| self.damaged(format!("session {id}: its setup {what}"));
+        if sum.is_some_and(|sum| sum != checksum([&setup, &shown])) {
+            return Err(unusable("is not as it was written".to_owned()));
         }
-        Ok(Some(Stored { setup: self.parsed(&setup)?, shown: self.parsed(&shown)?, events, keys }))
+        let cannot = |error: serde_json::Error| unusable(format!("cannot be read: {error}"));
+        let (setup, shown) =
+            (serde_json::from_str(&setup).map_err(cannot)?, serde_json::from_str(&shown).map_err(cannot)?);
+        let mut stored = Stored { setup, shown, events: Vec::new(), keys: BTreeMap::new() };
+        let select =
+            format!("SELECT number, event, idempotency_key, {checked} FROM event WHERE session = ?1 ORDER BY number");
+        let mut select = connection.prepare_cached(&select).map_err(self.told())?;
+        let rows = select.query_map([number], |row| {
+            let (number, event): (i64, String) = (row.get(0)?, row.get(1)?);
+            let (key, checksum): (Option<String>, Option<u32>) = (row.get(2)?, row.get(3)?);
+            Ok((number, event, key, checksum))
+        });
+        let mut observations = 0;
+        for (row, expected) in rows.map_err(self.told())?.zip(1_i64..) {
+            let broken = match row {
+                Err(error) => format!("event {expected} cannot be read: {error}"),
+                Ok((number, ..)) if number != expected => format!("event {expected} is missing"),
+                Ok((_, event, key, sum)) if sum.is_some_and(|sum| sum != event_checksum(&event, key.as_deref())) => {
+                    format!("event {expected} is not as it was written")
+                }
+                Ok((_, event, key, _)) => match serde_json::from_str::<Event>(&event) {
+                    Err(error) => format!("event {expected} cannot be read: {error}"),
+                    Ok(event) => {
+                        observations += u64::from(matches!(event.happened, Happened::Observed { .. }));
+                        stored.events.push(event);
+                        stored.keys.extend(key.map(|key| (key, observations)));
+                        continue;
+                    }
+                },
+            };
+            return Ok(Some((stored, Some(broken))));
+        }
+        Ok(Some((stored, damage)))
     }
 
-    /// The ids of all sessions and when they were made, seconds since 1970, oldest first.
+    /// The ids of all sessions and when they were made, seconds since 1970, oldest first. One without a readable id cannot be
+    /// asked for, and [`Held::repair`] tells of it.
     ///
     /// # Errors
     ///
@@ -220,11 +286,8 @@ impl Store {
             let rows = select.query_map([], |row| Ok((row.get::<_, String>(0)?, row.get(1)?)))?;
             rows.collect::<Result<Vec<_>, _>>()
         })();
-        let parsed = |(id, made_s): (String, f64)| match Uuid::parse_str(&id) {
-            Ok(id) => Ok((id, made_s)),
-            Err(error) => Err(self.damaged(error)),
-        };
-        rows.map_err(self.told())?.into_iter().map(parsed).collect()
+        let rows = rows.map_err(self.told())?.into_iter();
+        Ok(rows.filter_map(|(id, made_s)| Some((Uuid::parse_str(&id).ok()?, made_s))).collect())
     }
 
     /// Forgets a session and all its events.
@@ -233,6 +296,7 @@ impl Store {
     ///
     /// [`StoreError`]: it is kept then.
     pub fn delete(&self, id: Uuid) -> Result<(), StoreError> {
+        self.is_there()?;
         let deleted = self.connection().execute("DELETE FROM session WHERE id = ?1", [id.to_string()]);
         deleted.map(drop).map_err(self.told())
     }
@@ -246,13 +310,53 @@ impl Store {
         |source| StoreError::Sqlite { path: self.path.clone(), source }
     }
 
-    fn parsed<T: for<'a> Deserialize<'a>>(&self, text: &str) -> Result<T, StoreError> {
-        serde_json::from_str(text).map_err(|error| self.damaged(error))
+    fn count(&self) -> Result<usize, StoreError> {
+        self.count_in(&self.connection())
+    }
+
+    fn count_in(&self, connection: &Connection) -> Result<usize, StoreError> {
+        let count = connection.query_row("SELECT count(*) FROM session", [], |row| row.get::<_, u32>(0));
+        Ok(count.map_err(self.told())? as usize)
+    }
+
+    /// Whether what is written now would still be found.
+    fn is_there(&self) -> Result<(), StoreError> {
+        match &self.place {
+            Some(place) if Place::of(&self.path).as_ref() != Some(place) => {
+                Err(StoreError::Gone { path: self.path.clone() })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn can_grow(&self, connection: &Connection) -> Result<(), StoreError> {
+        self.is_there()?;
+        if self.most_bytes == u64::MAX {
+            return Ok(());
+        }
+        let number = |name| connection.pragma_query_value(None, name, |row| row.get::<_, u32>(0)).map_err(self.told());
+        // Pages that were freed by sessions that are no more are used again first.
+        let used = number("page_count")?.saturating_sub(number("freelist_count")?);
+        let bytes = u64::from(used) * u64::from(number("page_size")?);
+        if bytes < self.most_bytes { Ok(()) } else { Err(StoreError::Large(self.most_bytes)) }
     }
 
     fn damaged(&self, error: impl std::fmt::Display) -> StoreError {
         StoreError::Damaged { path: self.path.clone(), what: error.to_string() }
     }
+}
+
+fn connected(path: &Path) -> Result<Connection, StoreError> {
+    let opened = Connection::open(path).and_then(|connection| {
+        connection.pragma_update(None, "journal_mode", "WAL")?;
+        connection.pragma_update(None, "synchronous", "FULL")?;
+        Ok(connection)
+    });
+    opened.map_err(|source| StoreError::Sqlite { path: path.to_owned(), source })
+}
+
+fn event_checksum(event: &str, key: Option<&str>) -> u32 {
+    checksum([event, key.unwrap_or_default()])
 }
 
 fn insert_events(
@@ -263,12 +367,13 @@ fn insert_events(
     key: Option<&str>,
 ) -> Result<(), rusqlite::Error> {
     let mut insert = transaction.prepare_cached(
-        "INSERT INTO event (session, number, event, idempotency_key)
-         VALUES ((SELECT number FROM session WHERE id = ?1), ?2, ?3, ?4)",
+        "INSERT INTO event (session, number, event, idempotency_key, checksum)
+         VALUES ((SELECT number FROM session WHERE id = ?1), ?2, ?3, ?4, ?5)",
     )?;
     for (number, event) in (revision as i64 + 1..).zip(events) {
         let key = key.filter(|_| matches!(event.happened, Happened::Observed { .. }));
-        insert.execute(params![id.to_string(), number, json(event), key])?;
+        let event = json(event);
+        insert.execute(params![id.to_string(), number, event, key, event_checksum(&event, key)])?;
     }
     Ok(())
 }

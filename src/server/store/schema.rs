@@ -10,7 +10,8 @@ use super::StoreError;
 const APPLICATION: u32 = 0x626f_6479;
 
 /// The step from each version to the next. The version is in `user_version`; an empty file is of version 0.
-const MIGRATIONS: [&str; 1] = ["
+const MIGRATIONS: [&str; 2] = [
+    "
     CREATE TABLE session (
         number INTEGER PRIMARY KEY AUTOINCREMENT,
         id TEXT NOT NULL UNIQUE,
@@ -27,10 +28,18 @@ const MIGRATIONS: [&str; 1] = ["
         PRIMARY KEY (session, number)
     ) STRICT, WITHOUT ROWID;
     CREATE UNIQUE INDEX event_by_key ON event (session, idempotency_key) WHERE idempotency_key IS NOT NULL;
-"];
+",
+    "
+    ALTER TABLE session ADD COLUMN checksum INTEGER; -- of what is written beside it; null in rows of version 1
+    ALTER TABLE session ADD COLUMN damage TEXT;      -- why events are missing, if any are
+    ALTER TABLE event ADD COLUMN checksum INTEGER;
+",
+];
 
 /// The version that this program writes.
 pub(super) const KNOWN: u32 = MIGRATIONS.len() as u32;
+/// The first version with checksums.
+pub(super) const CHECKED: u32 = 2;
 
 /// Refuses the file of another program, and one of a later version. Tells the version.
 pub(super) fn check(connection: &Connection, path: &Path) -> Result<u32, StoreError> {

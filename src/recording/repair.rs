@@ -1,0 +1,110 @@
+//! Recordings that broke off, as where a process was killed or a disk was full.
+
+use std::{
+    fs::File,
+    io::{BufRead, BufReader, Read, Seek, SeekFrom},
+    path::Path,
+};
+
+use re_log_encoding::{Decodable, DecoderApp, StreamFooter};
+
+use super::{RecordingError, file::RrdFile, rerun::LogMsg};
+
+/// So many messages are held at a time.
+const BATCH: usize = 64;
+
+/// How much of a recording can be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Condition {
+    /// Messages, from the first to the last before anything that cannot be read.
+    pub messages: u64,
+    /// Whether it has its footer, and nothing that cannot be read.
+    pub is_complete: bool,
+    /// Why reading ended, if not at the end.
+    pub damage: Option<String>,
+}
+
+/// Reads a recording (.rrd) from one end to the other.
+///
+/// # Errors
+///
+/// [`RecordingError::Read`] where the file cannot be read, [`RecordingError::NoRecording`] where it is none.
+pub fn examine(path: &Path) -> Result<Condition, RecordingError> {
+    read(path, |_| Ok(()))
+}
+
+/// Writes all of a recording that can be read to a new file, with a footer, so that viewers open it. The recording itself is
+/// left as it is.
+///
+/// # Errors
+///
+/// The same, and [`RecordingError::Create`] where there is a file at `out`, or it cannot be written.
+pub fn restore(path: &Path, out: &Path) -> Result<Condition, RecordingError> {
+    // Before anything is created: what is no recording leaves no file.
+    examine(path)?;
+    File::create_new(out).map_err(|source| RecordingError::Create { path: out.to_owned(), source })?;
+    let mut file = RrdFile::create(out)?;
+    let written = read(path, |messages| file.append(messages)).and_then(|condition| {
+        file.finish()?;
+        Ok(condition)
+    });
+    match written {
+        Ok(condition) => Ok(condition),
+        Err(error) => {
+            file.discard();
+            Err(error)
+        }
+    }
+}
+
+fn read(path: &Path, take: impl FnMut(&[LogMsg]) -> Result<(), RecordingError>) -> Result<Condition, RecordingError> {
+    let unreadable = |source| RecordingError::Read { path: path.to_owned(), source };
+    let mut file = File::open(path).map_err(unreadable)?;
+    let has_footer = has_footer(&mut file).map_err(unreadable)?;
+    let (messages, damage) = with_messages(BufReader::new(file), take)?;
+    if messages == 0 {
+        let why = damage.unwrap_or_else(|| "it holds no whole message".to_owned());
+        return Err(RecordingError::NoRecording { path: path.to_owned(), why });
+    }
+    Ok(Condition { messages, is_complete: has_footer && damage.is_none(), damage })
+}
+
+/// Takes every message up to the first that cannot be read. Tells how many there were, and why that one cannot.
+pub(super) fn with_messages(
+    stream: impl BufRead,
+    mut take: impl FnMut(&[LogMsg]) -> Result<(), RecordingError>,
+) -> Result<(u64, Option<String>), RecordingError> {
+    let mut decoded = match DecoderApp::decode_eager(stream) {
+        Ok(decoded) => decoded,
+        Err(error) => return Ok((0, Some(error.to_string()))),
+    };
+    let (mut count, mut batch) = (0, Vec::new());
+    let damage = loop {
+        match decoded.next() {
+            None => break None,
+            Some(Err(error)) => break Some(error.to_string()),
+            Some(Ok(message)) => {
+                count += 1;
+                batch.push(message);
+                if batch.len() == BATCH {
+                    take(&batch)?;
+                    batch.clear();
+                }
+            }
+        }
+    };
+    take(&batch)?;
+    Ok((count, damage))
+}
+
+fn has_footer(file: &mut File) -> std::io::Result<bool> {
+    let size = StreamFooter::ENCODED_SIZE_BYTES;
+    let is_long = file.metadata()?.len() >= size as u64;
+    let mut end = Vec::with_capacity(size);
+    if is_long {
+        file.seek(SeekFrom::End(-(size as i64)))?;
+        file.read_to_end(&mut end)?;
+        file.rewind()?;
+    }
+    Ok(is_long && StreamFooter::from_rrd_bytes(&end).is_ok())
+}
