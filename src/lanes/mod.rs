@@ -84,6 +84,7 @@ pub fn runs(level: Level, candidates: usize) -> impl Iterator<Item = Run> {
 }
 
 /// The same instructions, on no more lanes than so many candidates need. Those of SSE alone cannot multiply and add at once.
+#[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables))]
 fn narrowed(level: Level, candidates: usize) -> Level {
     #[cfg(target_arch = "x86_64")]
     if candidates <= GROUP / 2 && level.as_avx512().is_some() {

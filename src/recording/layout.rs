@@ -37,7 +37,6 @@ pub(super) enum Part {
 
 /// One view of the recording.
 pub(super) struct View {
-    path: EntityPath,
     archetype: ViewBlueprint,
     contents: Vec<String>,
     properties: Vec<(EntityPath, Vec<SerializedComponentBatch>)>,
@@ -47,7 +46,6 @@ impl View {
     /// A view of a class of Rerun's, `3D` say, with a title.
     pub(super) fn new(class: &str, title: &str, origin: &EntityPath) -> Self {
         Self {
-            path: format!("view/{}", Uuid::new_v4()).into(),
             archetype: ViewBlueprint::new(class).with_display_name(title).with_space_origin(origin.to_string()),
             contents: vec!["$origin/**".to_owned()],
             properties: Vec::new(),
@@ -76,17 +74,13 @@ impl View {
 
 /// Views and containers side by side, or one behind the other.
 pub(super) struct Container {
-    id: Uuid,
     archetype: ContainerBlueprint,
     contents: Vec<Part>,
 }
 
 impl Container {
     fn new(kind: ContainerKind, contents: impl IntoIterator<Item = Part>) -> Self {
-        let contents: Vec<Part> = contents.into_iter().collect();
-        let paths = contents.iter().map(|part| part.path().to_string());
-        let archetype = ContainerBlueprint::new(kind).with_contents(paths);
-        Self { id: Uuid::new_v4(), archetype, contents }
+        Self { archetype: ContainerBlueprint::new(kind), contents: contents.into_iter().collect() }
     }
 
     pub(super) fn horizontal(contents: impl IntoIterator<Item = Part>) -> Self {
@@ -104,16 +98,13 @@ impl Container {
         Self::new(ContainerKind::Tabs, contents)
     }
 
-    fn path(&self) -> EntityPath {
-        format!("container/{}", self.id).into()
-    }
-
     /// The messages of a blueprint of this container alone, with all panels out of the way: those of the blueprint's
     /// store, the command that activates it last. `application` is that of the recording.
     pub(super) fn messages(self, application: ApplicationId, time: Time) -> Result<Vec<LogMsg>, RecordingError> {
         let store = StoreId::random(StoreKind::Blueprint, application);
-        let mut blueprint = Blueprint { messages: vec![message::store_info(&store)], store };
-        let viewport = ViewportBlueprint::new().with_root_container(RootContainer(self.id.into()));
+        let mut blueprint = Blueprint { messages: vec![message::store_info(&store)], store, parts: 0 };
+        let root = blueprint.add_part(self.into())?.id;
+        let viewport = ViewportBlueprint::new().with_root_container(RootContainer(root.into()));
         blueprint.add("viewport", &viewport.with_auto_layout(false).with_auto_views(false))?;
         blueprint.add("blueprint_panel", &PanelBlueprint::new().with_state(PanelState::Hidden))?;
         blueprint.add("selection_panel", &PanelBlueprint::new().with_state(PanelState::Hidden))?;
@@ -123,17 +114,7 @@ impl Container {
         };
         let panel = TimePanelBlueprint::new().with_state(time.0).with_timeline(time.1).with_play_state(time.2);
         blueprint.add("time_panel", &panel)?;
-        blueprint.add_part(&self.into())?;
         Ok(blueprint.activated())
-    }
-}
-
-impl Part {
-    fn path(&self) -> EntityPath {
-        match self {
-            Self::View(view) => view.path.clone(),
-            Self::Container(container) => container.path(),
-        }
     }
 }
 
@@ -153,22 +134,42 @@ impl From<Container> for Part {
 struct Blueprint {
     store: StoreId,
     messages: Vec<LogMsg>,
+    /// How many views and containers it has.
+    parts: u128,
+}
+
+/// A view or a container that is written.
+struct Written {
+    id: Uuid,
+    path: EntityPath,
 }
 
 impl Blueprint {
-    fn add_part(&mut self, part: &Part) -> Result<(), RecordingError> {
-        match part {
+    /// Writes a part and all that is in it. Parts are numbered within their blueprint: Rerun keeps every path that it has ever met
+    /// in memory, so that other ones in each recording would fill that of a server.
+    fn add_part(&mut self, part: Part) -> Result<Written, RecordingError> {
+        self.parts += 1;
+        let id = Uuid::from_u128(self.parts);
+        let path = match part {
             Part::View(view) => {
-                let below = |name: &str| view.path.join(&EntityPath::from(name));
-                self.add(view.path.clone(), &view.archetype)?;
-                self.add(below("ViewContents"), &ViewContents::new(view.contents.iter().map(String::as_str)))?;
-                view.properties.iter().try_for_each(|(place, property)| self.add(view.path.join(place), property))
+                let path = EntityPath::from(format!("view/{id}"));
+                self.add(path.clone(), &view.archetype)?;
+                let contents = ViewContents::new(view.contents.iter().map(String::as_str));
+                self.add(path.join(&EntityPath::from("ViewContents")), &contents)?;
+                view.properties.iter().try_for_each(|(place, property)| self.add(path.join(place), property))?;
+                path
             }
             Part::Container(container) => {
-                self.add(container.path(), &container.archetype)?;
-                container.contents.iter().try_for_each(|part| self.add_part(part))
+                let Container { archetype, contents } = *container;
+                let contents = contents.into_iter().map(|part| self.add_part(part));
+                let contents = contents.collect::<Result<Vec<Written>, RecordingError>>()?;
+                let path = EntityPath::from(format!("container/{id}"));
+                let paths = contents.iter().map(|part| part.path.to_string());
+                self.add(path.clone(), &archetype.with_contents(paths))?;
+                path
             }
-        }
+        };
+        Ok(Written { id, path })
     }
 
     fn add(&mut self, entity: impl Into<EntityPath>, what: &dyn AsComponents) -> Result<(), RecordingError> {

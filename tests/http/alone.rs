@@ -33,11 +33,15 @@ fn watched(trace: &Path) -> Option<Command> {
 
 /// What was written down of a process that has ended.
 fn calls(trace: &Path, id: u32) -> Vec<String> {
-    let end = format!("{id} +++ exited");
+    // Identifiers are padded to a width.
+    let is_end = |line: &str| {
+        line.split_once(' ')
+            .is_some_and(|(of, what)| of == id.to_string() && what.trim_start().starts_with("+++ exited"))
+    };
     let begun = Instant::now();
     loop {
         let text = std::fs::read_to_string(trace).expect("a trace");
-        if text.lines().any(|line| line.starts_with(&end)) {
+        if text.lines().any(is_end) {
             return text.lines().map(str::to_owned).collect();
         }
         assert!(begun.elapsed() < SOON, "the trace has no end: {text}");

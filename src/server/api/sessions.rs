@@ -39,6 +39,7 @@ pub struct SessionList {
     /// Oldest first.
     pub sessions: Vec<SessionResource>,
     /// Sessions with robots elsewhere that were kept, and cannot be relied on any more: `body-schema repair` mends what can be.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub damaged: Vec<DamagedSession>,
 }
 
