@@ -97,7 +97,7 @@ pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
             Some(field) => format!("`{field}`: {what}"),
             None => what.to_owned(),
         };
-        Problem { field, ..Problem::new(Kind::InvalidValue, detail) }
+        Problem { field: field.map(Into::into), ..Problem::new(Kind::InvalidValue, detail) }
     })
 }
 

@@ -32,10 +32,12 @@ pub struct Problem {
     /// The HTTP status code.
     pub status: u16,
     /// What went wrong this time, and how to mend it.
-    pub detail: String,
+    #[schema(value_type = String)]
+    pub detail: Box<str>,
     /// The body field, parameter or header that is to blame.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub field: Option<String>,
+    #[schema(value_type = Option<String>)]
+    pub field: Option<Box<str>>,
     /// The session's actual step, where it matters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<u64>,
@@ -44,7 +46,8 @@ pub struct Problem {
     pub remaining: Option<u64>,
     /// The id of the request, as in the answer's `X-Request-Id` and in the server's log.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub request_id: Option<String>,
+    #[schema(value_type = Option<String>)]
+    pub request_id: Option<Box<str>>,
 }
 
 /// What an answer that is a problem carries for the log.
@@ -159,12 +162,12 @@ impl Kind {
 impl Problem {
     pub(super) fn new(kind: Kind, detail: impl Into<String>) -> Self {
         let (status, urn, title) = kind.parts();
-        let detail = detail.into();
+        let detail = detail.into().into();
         Self { kind: urn, title, status, detail, field: None, step: None, remaining: None, request_id: None }
     }
 
     pub(super) fn field(self, field: impl Into<String>) -> Self {
-        Self { field: Some(field.into()), ..self }
+        Self { field: Some(field.into().into()), ..self }
     }
 
     pub(super) fn step(self, step: u64) -> Self {
@@ -310,8 +313,8 @@ impl From<StoreError> for Problem {
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        let refused = Refused { kind: self.kind, why: status.is_server_error().then(|| self.detail.clone()) };
-        let told = Self { request_id: requests::id(), ..self };
+        let refused = Refused { kind: self.kind, why: status.is_server_error().then(|| self.detail.to_string()) };
+        let told = Self { request_id: requests::id().map(Into::into), ..self };
         let body = serde_json::to_vec(&told).unwrap_or_default();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
         response.extensions_mut().insert(refused);

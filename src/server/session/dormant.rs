@@ -213,7 +213,7 @@ impl Sessions {
                 None => match self.described(&known).await {
                     // One that cannot be read keeps nobody from the others.
                     Err(problem) if problem.is(Kind::Damaged) => {
-                        damaged.push(DamagedSession { id: known.id.to_string(), detail: problem.detail });
+                        damaged.push(DamagedSession { id: known.id.to_string(), detail: problem.detail.into() });
                         None
                     }
                     described => described?,

@@ -124,7 +124,7 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
                 let mut engine = Engine { experiment, most_steps, shared: &shared, commands: &commands, waiting };
                 let outcome = catch_unwind(AssertUnwindSafe(|| engine.serve(&mut recorder)));
                 if let Err(panic) = outcome {
-                    shared.fail(panicked(&*panic).detail);
+                    shared.fail(panicked(&*panic).detail.into());
                 }
             }
             // A file that cannot be completed is told of when the server ends.

@@ -71,7 +71,7 @@ pub(super) fn run(
             if opened.send(Ok(robot.session.description().clone())).is_ok() {
                 let served = catch_unwind(AssertUnwindSafe(|| robot.serve(jobs)));
                 if let Err(panic) = served {
-                    shared.fail(panicked(&*panic).detail);
+                    shared.fail(panicked(&*panic).detail.into());
                 }
             }
         }
@@ -170,7 +170,7 @@ impl Elsewhere {
                 // What cannot be written is tried again.
                 Err(mpsc::RecvTimeoutError::Timeout) => {
                     if let Err(problem) = self.expire() {
-                        tracing::error!(session = %self.id, why = problem.detail, "a suggestion cannot be ended");
+                        tracing::error!(session = %self.id, why = &*problem.detail, "a suggestion cannot be ended");
                     }
                 }
             }
@@ -317,7 +317,7 @@ impl Elsewhere {
             self.recorded = report.step;
             self.recorder.log(report)?;
             let kept = Kept::of(report, self.session.description());
-            reports.push(kept.map_err(|problem| RecordingError::Encode(problem.detail))?);
+            reports.push(kept.map_err(|problem| RecordingError::Encode(problem.detail.into()))?);
         }
         self.show()?;
         Ok(reports)
