@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{
     Polish,
-    quasi_newton::{Aim, aim, updated},
+    quasi_newton::{Aim, aim, lengthened, updated},
 };
 
 /// Values of a batch of points, and the gradient of each.
@@ -27,8 +27,10 @@ pub struct Slopes {
 
 /// Of what a step promises to first order, how much it must keep.
 const KEPT: f64 = 1e-4;
-/// The shortest fraction of a step that is tried.
-const SHORTEST: f64 = 1e-4;
+/// The shortest fraction of a step that is tried: of Newton's, and of the steepest, whose length knows nothing of the valley.
+const SHORTEST: [f64; 2] = [1e-4, 1e-9];
+/// The least of a step that is kept when it is drawn back, of either.
+const LEAST: [f64; 2] = [0.1, 1e-4];
 
 /// The minima over the unit cube that descents from `starts` reach, with their values, in the same order. `evaluate` is asked
 /// for batches of points, at most one for each start. No result is worse than its start.
@@ -98,15 +100,16 @@ impl Descent {
         let moved = &self.trial - &self.x;
         let promised = self.gradient.dot(&moved);
         if !(promised < 0.0 && value <= self.value + KEPT * promised) {
-            return self.draw_back(value, promised);
+            return self.draw_back(value, promised, settings);
         }
         let gained = self.value - value;
         let gradient = DVector::from_column_slice(gradient);
         // Coordinates that were held tell nothing of the curvature along the others.
         let change = (&gradient - &self.gradient).component_mul(&self.free);
-        // Over a ridge the way is long, and no parabola tells how long.
-        let before = self.inverse_hessian.take().filter(|_| moved.dot(&change) > 0.0);
-        self.inverse_hessian = updated(before, &moved, &change);
+        let before = self.inverse_hessian.take();
+        let is_valley = moved.dot(&change) > 0.0;
+        self.inverse_hessian =
+            if is_valley { updated(before, &moved, &change) } else { lengthened(before, &moved, &gradient) };
         (self.value, self.gradient) = (value, gradient);
         self.x.copy_from(&self.trial);
         self.steps += 1;
@@ -117,11 +120,15 @@ impl Descent {
     }
 
     /// A shorter step; once more along the gradient before giving up.
-    fn draw_back(&mut self, value: f64, promised: f64) -> bool {
+    fn draw_back(&mut self, value: f64, promised: f64, settings: Polish) -> bool {
+        let drawn = self.length;
+        let kind = usize::from(!self.is_newton);
         // Where a parabola through what is known is least.
         let least = -0.5 * promised / (value - self.value - promised);
-        self.length *= if least.is_finite() { least.clamp(0.1, 0.5) } else { 0.25 };
-        if promised < 0.0 && self.length >= SHORTEST {
+        self.length *= if least.is_finite() { least.clamp(LEAST[kind], 0.5) } else { 0.25 };
+        // Not where even the slope promises less than would count.
+        let is_worth_it = -promised * self.length / drawn > settings.tolerance * self.value.abs();
+        if is_worth_it && self.length >= SHORTEST[kind] {
             self.ask();
             return true;
         }

@@ -52,3 +52,19 @@ pub(super) fn updated(
     b.ger(-1.0 / curvature, step, &carried, 1.0);
     Some(b)
 }
+
+/// The estimate after a descent over a ridge, where the slope steepened along the step: B + σ s sᵀ, with σ such that the next
+/// step goes on along s by as much as a first one, while the other directions keep what was learned of them.
+pub(super) fn lengthened(
+    before: Option<DMatrix<f64>>,
+    step: &DVector<f64>,
+    gradient: &DVector<f64>,
+) -> Option<DMatrix<f64>> {
+    let mut b = before?;
+    let slope = step.dot(gradient);
+    let sigma = FIRST_STEP / (step.amax() * -slope);
+    if sigma > 0.0 && sigma.is_finite() {
+        b.ger(sigma, step, step, 1.0);
+    }
+    Some(b)
+}

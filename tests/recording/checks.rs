@@ -22,7 +22,7 @@ pub fn check(reading: &Reading, description: &Description, reports: &[StepReport
     for report in reports {
         for learner in &report.learners {
             check_estimate(reading, report.step, learner);
-            check_arms(reading, report.step, learner, description);
+            check_arms(reading, report.step, learner);
             check_metrics(reading, report.step, learner);
             check_movement(reading, report.step, learner, description);
         }
@@ -64,15 +64,15 @@ fn check_estimate(reading: &Reading, step: u64, learner: &LearnerReport) {
 }
 
 /// In the configuration of the movement.
-fn check_arms(reading: &Reading, step: u64, learner: &LearnerReport, description: &Description) {
+fn check_arms(reading: &Reading, step: u64, learner: &LearnerReport) {
     let (name, model) = (&learner.name, &learner.estimate);
     let movement = learner.movement.as_ref();
     let skeleton = movement.map(|movement| movement.estimated_skeleton_m.as_slice());
     if let Some(skeleton) = skeleton {
-        check_capsules(reading, &format!("/{name}/arm/estimate"), step, skeleton, description);
+        check_capsules(reading, &format!("/{name}/arm/estimate"), step, skeleton, model);
     }
     if let Some(truth) = movement.and_then(|movement| movement.true_skeleton_m.as_ref()) {
-        check_capsules(reading, &format!("/{name}/arm/truth"), step, truth, description);
+        check_capsules(reading, &format!("/{name}/arm/truth"), step, truth, model);
     }
     // Prismatic joints have no point, and so no ellipsoid.
     let pivots = (model.joints.iter().filter(|joint| joint.point_m.is_some()).enumerate())
@@ -83,15 +83,15 @@ fn check_arms(reading: &Reading, step: u64, learner: &LearnerReport, description
 }
 
 /// Links from pivot to pivot and on to the marker, then the pins of the joints.
-fn check_capsules(reading: &Reading, entity: &str, step: u64, skeleton: &[[f64; 3]], description: &Description) {
-    let joints = description.joints.len();
-    let capsules = reading.capsules(entity, step);
-    assert_eq!(capsules.len(), 2 * joints, "{entity}");
-    let links = capsules[..joints].iter().filter(|(from, to)| from != to || skeleton.len() > joints);
+fn check_capsules(reading: &Reading, entity: &str, step: u64, skeleton: &[[f64; 3]], model: &ModelReport) {
+    assert_eq!(reading.capsules(entity, step).len(), 2 * model.joints.len(), "{entity}");
+    // Where a joint has no point, nothing begins.
+    let links =
+        reading.capsules(entity, step).into_iter().zip(&model.joints).filter(|(_, joint)| joint.point_m.is_some());
     let (mut points, mut end): (Vec<_>, _) = (Vec::new(), None);
-    for (from, to) in links {
-        points.push(*from);
-        end = Some(*to);
+    for ((from, to), _) in links {
+        points.push(from);
+        end = Some(to);
     }
     points.extend(end);
     close(&points.concat(), &skeleton.concat(), entity);
