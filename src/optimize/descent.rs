@@ -123,9 +123,9 @@ impl Descent {
     fn draw_back(&mut self, value: f64, promised: f64, settings: Polish) -> bool {
         let drawn = self.length;
         let kind = usize::from(!self.is_newton);
-        // Where a parabola through what is known is least.
+        // Where a parabola through what is known is least; what is infeasible tells nothing of it.
         let least = -0.5 * promised / (value - self.value - promised);
-        self.length *= if least.is_finite() { least.clamp(LEAST[kind], 0.5) } else { 0.25 };
+        self.length *= if value.is_finite() && least.is_finite() { least.clamp(LEAST[kind], 0.5) } else { 0.25 };
         // Not where even the slope promises less than would count.
         let is_worth_it = -promised * self.length / drawn > settings.tolerance * self.value.abs();
         if is_worth_it && self.length >= SHORTEST[kind] {

@@ -7,11 +7,12 @@ use serde_json::{Value, json};
 use crate::{
     program::Program,
     robot,
+    streams::rows_of_recording,
     support::{Api, timeless},
 };
 
-/// A session's reports without times, and its table without the column of them.
-async fn simulated(api: &Api) -> (Vec<Value>, String, Value) {
+/// A session's reports without times, its table without the column of them, and the rows of its recording.
+async fn simulated(api: &Api) -> (Vec<Value>, String, Value, Vec<String>) {
     let session = api.open(json!({ "scenario": "arm-6dof-camera", "seed": 7 })).await;
     let made = api.step(&session, 12).await;
     let reports = made["reports"].as_array().expect("reports").iter().map(timeless).collect();
@@ -23,8 +24,11 @@ async fn simulated(api: &Api) -> (Vec<Value>, String, Value) {
     };
     let table: Vec<String> = table.lines().map(timeless).collect();
     let result = api.get_json(&format!("{session}/result.json")).await;
+    let recording = api.get(&format!("{session}/recording.rrd")).await.bytes().await.expect("a recording");
+    let rows = rows_of_recording(&recording);
+    assert!(rows.len() > 1000, "{} rows", rows.len());
     api.delete(&session).await;
-    (reports, table.join("\n"), result)
+    (reports, table.join("\n"), result, rows)
 }
 
 #[tokio::test]
@@ -55,6 +59,8 @@ async fn taken_away(api: &Api, session: &str) -> Vec<String> {
         assert!(answer.status().is_success(), "{file}: {}", answer.status());
         files.push(answer.text().await.expect("text"));
     }
+    let recording = api.get(&format!("{session}/recording.rrd")).await.bytes().await.expect("a recording");
+    files.extend(rows_of_recording(&recording));
     files
 }
 
@@ -77,5 +83,8 @@ async fn the_same_events_give_the_same_suggestions_and_files_across_a_restart() 
     for (turn, (a, b)) in through.0.iter().zip(&restarted.0).enumerate() {
         assert_eq!(a, b, "answer {turn}");
     }
-    assert_eq!(through.1, restarted.1);
+    for (a, b) in through.1.iter().zip(&restarted.1) {
+        assert_eq!(a, b);
+    }
+    assert_eq!(through.1.len(), restarted.1.len());
 }

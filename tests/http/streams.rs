@@ -31,6 +31,31 @@ pub fn steps_of_recording(bytes: &[u8]) -> BTreeSet<i64> {
     steps
 }
 
+/// What a recording says of an experiment, row by row in an order of its own: without times, and without the ids that Rerun draws.
+pub fn rows_of_recording(bytes: &[u8]) -> Vec<String> {
+    let messages = DecoderApp::decode_eager(Cursor::new(bytes.to_vec())).expect("a recording");
+    let mut rows = Vec::new();
+    for message in messages {
+        let LogMsg::ArrowMsg(store, message) = message.expect("a message") else { continue };
+        let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
+        let entity = chunk.entity_path().to_string();
+        if !store.is_recording() || entity.ends_with("/selection_ms") {
+            continue;
+        }
+        let steps = chunk.timelines().get(&"step".into()).map(|steps| steps.times_raw().to_vec());
+        for component in chunk.components_identifiers().filter(|one| !one.as_str().ends_with("start_time")) {
+            for (row, id) in chunk.row_ids().enumerate() {
+                if let Some(cell) = chunk.cell(id, component) {
+                    let step = steps.as_ref().map(|steps| steps[row]);
+                    rows.push(format!("{entity} {step:?} {component} {cell:?}"));
+                }
+            }
+        }
+    }
+    rows.sort();
+    rows
+}
+
 /// The WebSocket of a session.
 async fn follow(server: &Server, session: &str, query: &str) -> WebSocketStream<TcpStream> {
     let stream = TcpStream::connect(server.address).await.expect("a connection");
