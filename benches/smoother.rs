@@ -52,7 +52,8 @@ fn case(name: &str, before: usize, loss: Loss, hypotheses: Option<usize>) -> (Sm
         })
         .collect();
     let next = seen.split_off(before);
-    let settings = hypotheses.map_or(scenario.smoother.hypotheses, |count| HypothesisSettings { spawned: count, kept: count });
+    let settings =
+        hypotheses.map_or(scenario.smoother.hypotheses, |count| HypothesisSettings { spawned: count, kept: count });
     let mut smoother = Smoother::new(prior, layout.into(), Rig::tracker(sigma_m).into(), settings, rng).with_loss(loss);
     observe(&mut smoother, &seen);
     (smoother, next)
