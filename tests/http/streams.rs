@@ -17,36 +17,41 @@ use tokio_tungstenite::{
 
 use crate::support::{SOON, Server, timeless};
 
+/// The chunks of a recording, without those of its blueprint.
+fn chunks_of_recording(bytes: &[u8]) -> impl Iterator<Item = Chunk> {
+    let messages = DecoderApp::decode_eager(Cursor::new(bytes.to_vec())).expect("a recording");
+    messages.filter_map(|message| match message.expect("a message") {
+        LogMsg::ArrowMsg(store, message) if store.is_recording() => {
+            Some(Chunk::from_arrow_msg(&message).expect("a chunk"))
+        }
+        _ => None,
+    })
+}
+
 /// All steps for which a recording holds data.
 pub fn steps_of_recording(bytes: &[u8]) -> BTreeSet<i64> {
-    let messages = DecoderApp::decode_eager(Cursor::new(bytes.to_vec())).expect("a recording");
-    let mut steps = BTreeSet::new();
-    for message in messages {
-        let LogMsg::ArrowMsg(store, message) = message.expect("a message") else { continue };
-        let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
-        if store.is_recording() && !chunk.is_static() {
-            steps.extend(chunk.iter_indices(&"step".into()).map(|(step, _)| step.as_i64()));
-        }
-    }
-    steps
+    let moving = chunks_of_recording(bytes).filter(|chunk| !chunk.is_static());
+    moving
+        .flat_map(|chunk| {
+            let steps = chunk.iter_indices(&"step".into()).map(|(step, _)| step.as_i64());
+            steps.collect::<Vec<_>>()
+        })
+        .collect()
 }
 
 /// What a recording says of an experiment, row by row in an order of its own: without times, and without the ids that Rerun draws.
 pub fn rows_of_recording(bytes: &[u8]) -> Vec<String> {
-    let messages = DecoderApp::decode_eager(Cursor::new(bytes.to_vec())).expect("a recording");
     let mut rows = Vec::new();
-    for message in messages {
-        let LogMsg::ArrowMsg(store, message) = message.expect("a message") else { continue };
-        let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
+    for chunk in chunks_of_recording(bytes) {
         let entity = chunk.entity_path().to_string();
-        if !store.is_recording() || entity.ends_with("/selection_ms") {
+        if entity.ends_with("/selection_ms") {
             continue;
         }
-        let steps = chunk.timelines().get(&"step".into()).map(|steps| steps.times_raw().to_vec());
+        let steps = chunk.timelines().get(&"step".into()).map(|steps| steps.times_raw());
         for component in chunk.components_identifiers().filter(|one| !one.as_str().ends_with("start_time")) {
             for (row, id) in chunk.row_ids().enumerate() {
                 if let Some(cell) = chunk.cell(id, component) {
-                    let step = steps.as_ref().map(|steps| steps[row]);
+                    let step = steps.map(|steps| steps[row]);
                     rows.push(format!("{entity} {step:?} {component} {cell:?}"));
                 }
             }

@@ -84,10 +84,10 @@ fn check_arms(reading: &Reading, step: u64, learner: &LearnerReport) {
 
 /// Links from pivot to pivot and on to the marker, then the pins of the joints.
 fn check_capsules(reading: &Reading, entity: &str, step: u64, skeleton: &[[f64; 3]], model: &ModelReport) {
-    assert_eq!(reading.capsules(entity, step).len(), 2 * model.joints.len(), "{entity}");
+    let capsules = reading.capsules(entity, step);
+    assert_eq!(capsules.len(), 2 * model.joints.len(), "{entity}");
     // Where a joint has no point, nothing begins.
-    let links =
-        reading.capsules(entity, step).into_iter().zip(&model.joints).filter(|(_, joint)| joint.point_m.is_some());
+    let links = capsules.into_iter().zip(&model.joints).filter(|(_, joint)| joint.point_m.is_some());
     let (mut points, mut end): (Vec<_>, _) = (Vec::new(), None);
     for ((from, to), _) in links {
         points.push(from);
