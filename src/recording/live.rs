@@ -130,12 +130,21 @@ impl LiveLog {
         self.shared.length.subscribe()
     }
 
-    /// Whether steps may wait because nobody follows the log. It is then said to be [behind](Self::is_behind) until
-    /// something is appended.
+    /// Whether steps may wait because nobody follows the log. It is then said to be [behind](Self::is_behind) until the
+    /// recorder has written all that views show.
     pub fn may_wait(&self) -> bool {
         let mut state = self.state();
-        state.behind = self.shared.length.receiver_count() == 0;
-        state.behind
+        let may_wait = self.shared.length.receiver_count() == 0;
+        // What waits is still to be written when somebody has come.
+        state.behind |= may_wait;
+        may_wait
+    }
+
+    /// Says that nothing waits any more, after all that did was appended or could not be.
+    pub(super) fn catch_up(&self) {
+        if std::mem::take(&mut self.state().behind) {
+            self.shared.length.send_modify(|_| ());
+        }
     }
 
     /// Whether steps wait that nobody wanted at once.
@@ -190,7 +199,6 @@ impl LiveLog {
     /// Appends parts, the first of which a page may take otherwise. A closed log ignores them.
     fn push(&self, parts: Vec<Bytes>, scene: Option<Bytes>) {
         let mut state = self.state();
-        state.behind = false;
         if state.closed {
             return;
         }

@@ -242,10 +242,14 @@ impl Recorder {
 
     /// Writes to the log what it does not have yet, but for what is hidden.
     fn publish(&mut self, hidden: &HashSet<EntityPath>) -> Result<(), RecordingError> {
-        let Some(live) = &self.live else { return Ok(()) };
-        let mut news = self.rows.news(|sheet| !hidden.contains(sheet.entity()), self.file.is_some())?;
-        news.extend(self.incomplete.take().map(complete).transpose()?);
-        live.append(&messages(&self.store, &news)?)
+        let Self { rows, incomplete, store, file, live, .. } = self;
+        let Some(live) = live else { return Ok(()) };
+        let news = rows.news(|sheet| !hidden.contains(sheet.entity()), file.is_some()).and_then(|mut news| {
+            news.extend(incomplete.take().map(complete).transpose()?);
+            live.append(&messages(store, &news)?)
+        });
+        live.catch_up();
+        news
     }
 
     /// Why the file lacks steps that the log has: it could not be written. [`seal`](Self::seal) writes it anew.

@@ -42,6 +42,10 @@ fn steps_wait_as_long_as_nobody_follows() {
     // Whoever comes now waits until it has caught up.
     let follower = live.subscribe();
     assert_eq!(live.caught_up().now_or_never(), None);
+    // Also while it is being brought up to date, and when a part of what waits was written.
+    assert!(!live.may_wait(), "somebody follows");
+    live.append(&[]).unwrap();
+    assert_eq!(live.caught_up().now_or_never(), None);
     recorder.flush_shown().unwrap();
     assert_eq!(live.caught_up().now_or_never(), Some(()));
     assert!(!live.may_wait(), "somebody follows");
