@@ -111,3 +111,25 @@ pub fn events(bytes: &[u8]) {
         assert_eq!(Session::from_json(&again).expect("its own").to_json(), again);
     }
 }
+
+/// A recording, mended as `repair` does, and read by a page that follows late: what is kept of it is whole.
+#[cfg(feature = "app")]
+pub fn recording(bytes: &[u8]) {
+    use std::fs;
+
+    use body_schema::recording::{LiveLog, examine, restore};
+
+    thread_local!(static FOLDER: tempfile::TempDir = tempfile::tempdir().expect("a folder"));
+    FOLDER.with(|folder| {
+        let [broken, out] = ["broken.rrd", "out.rrd"].map(|name| folder.path().join(name));
+        fs::write(&broken, bytes).expect("written");
+        drop(fs::remove_file(&out));
+        if let Ok(condition) = restore(&broken, &out) {
+            let again = examine(&out).expect("what was restored can be read");
+            assert!(again.is_complete && again.messages == condition.messages, "{condition:?}, then {again:?}");
+        }
+    });
+    // A part of a live recording stands without the header.
+    let part = bytes.get(LiveLog::new().header().len()..).unwrap_or_default();
+    drop(LiveLog::new().put_together(&[part.to_vec().into()]));
+}
