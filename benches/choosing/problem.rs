@@ -19,7 +19,7 @@ pub fn write(file: &str) {
 }
 
 fn problem(name: &str) -> Value {
-    let case = Case::new(&builtin(name).expect("built in"));
+    let case = Case::new(&builtin(name).expect("built in"), super::SEED);
     let state = &case.belief.state;
     let joint = |joint: &Joint| {
         let line = joint.line().expect("revolute");

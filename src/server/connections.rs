@@ -242,8 +242,8 @@ impl Connections {
         let serving = http1::Builder::new()
             // Phases have their own times.
             .header_read_timeout(None)
-            .max_headers(self.limits.headers)
-            .max_header_size(self.limits.header_bytes)
+            .max_headers(self.limits.most_headers())
+            .max_header_size(self.limits.buffer_bytes())
             .max_buf_size(self.limits.buffer_bytes())
             .serve_connection(TokioIo::new(stream), service);
         let mut serving = pin!(serving.with_upgrades());
@@ -253,7 +253,13 @@ impl Connections {
             let deadline = self.deadline(*phase.borrow_and_update());
             tokio::select! {
                 // Whether it broke off or came to an end is all the same here.
-                _ = serving.as_mut() => break,
+                served = serving.as_mut() => {
+                    if served.is_err_and(|error| error.is_parse_too_large()) {
+                        self.metrics.refused_heads.inc();
+                        self.rarely.tell(|times| tracing::warn!(times, "a head was too large to be read"));
+                    }
+                    break;
+                }
                 () = shutdown.cancelled(), if !is_ending => {
                     is_ending = true;
                     serving.as_mut().graceful_shutdown();

@@ -67,9 +67,18 @@ pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>, always: Headers)
     Router::new()
         .fallback_service(router.with_state(app.clone()))
         .layer(from_fn_with_state(app.clone(), refuse_strangers))
+        .layer(from_fn_with_state(app.clone(), refuse_large_heads))
         .layer(map_response(as_problem))
         .layer(map_response(move |response| with_headers(always.clone(), response)))
         .layer(from_fn_with_state(app.metrics.clone(), requests::attended))
+}
+
+/// A head that is larger than it may be, though not so large that it was not read.
+async fn refuse_large_heads(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    match app.limits.too_large_a_head(request.method(), request.uri(), request.headers()) {
+        Some(detail) => Problem::new(Kind::HeadTooLarge, detail).into_response(),
+        None => next.run(request).await,
+    }
 }
 
 /// Who has no business here: under a foreign name, without the token, or from a page of another origin, which must neither

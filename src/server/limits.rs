@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use axum::http::{HeaderMap, Method, Uri};
 use tokio::sync::Semaphore;
 
 use crate::ask_tell::{MOST_EVALUATIONS, MOST_JOINTS, MOST_SETUP_BYTES, MOST_TARGETS, Most};
@@ -58,6 +59,8 @@ pub struct Limits {
 
 /// So much of a head is read at a time.
 const LEAST_HEADER_BYTES: usize = 8 << 10;
+/// So many times as large as it may be a head is still read, so that it gets an answer that says what is wrong.
+const READ_BEYOND: usize = 4;
 
 impl Default for Limits {
     fn default() -> Self {
@@ -97,9 +100,25 @@ impl Limits {
         Most { joints: self.joints, targets: self.targets, evaluations: self.evaluations }
     }
 
-    /// How much of a head or of an answer is held at a time: no less than HTTP asks for.
+    /// How much of a head is read, and of an answer held, at a time: no less than HTTP asks for.
     pub(super) fn buffer_bytes(&self) -> usize {
-        self.header_bytes.max(LEAST_HEADER_BYTES)
+        self.header_bytes.saturating_mul(READ_BEYOND).max(LEAST_HEADER_BYTES)
+    }
+
+    /// How many header fields are read.
+    pub(super) fn most_headers(&self) -> usize {
+        self.headers.saturating_mul(READ_BEYOND)
+    }
+
+    /// Why a request's head is too large, if it is.
+    pub(super) fn too_large_a_head(&self, method: &Method, address: &Uri, headers: &HeaderMap) -> Option<String> {
+        let line = method.as_str().len() + address.path_and_query().map_or(0, |path| path.as_str().len());
+        let fields: usize = headers.iter().map(|(name, value)| name.as_str().len() + value.len() + 4).sum();
+        let (bytes, most) = (line + " HTTP/1.1\r\n\r\n".len() + 1 + fields, self.header_bytes);
+        if headers.len() > self.headers {
+            return Some(format!("a request may have {} header fields, not {}", self.headers, headers.len()));
+        }
+        (bytes > most).then(|| format!("address and header fields together may have {most} bytes, not {bytes}"))
     }
 
     /// As many connections as there can be in this process.

@@ -37,6 +37,8 @@ pub(super) struct Metrics {
     pub(super) refused_connections: Counter,
     /// … and those that made room for another.
     pub(super) evicted_connections: Counter,
+    /// Heads that were too large to be read.
+    pub(super) refused_heads: Counter,
     sessions: Family<InWorld, Gauge>,
     stored_sessions: Gauge,
     streams: Gauge,
@@ -105,6 +107,7 @@ impl Metrics {
             observations: Counter::default(),
             failed_sessions: Counter::default(),
             refused_connections: Counter::default(),
+            refused_heads: Counter::default(),
             evicted_connections: Counter::default(),
             sessions: Family::default(),
             stored_sessions: Gauge::default(),
@@ -140,6 +143,8 @@ impl Metrics {
         all.register("connections_limit", "How many there may be", constant(most.connections));
         let refused = "Connections that were closed because all were busy";
         all.register("connections_refused", refused, self.refused_connections.clone());
+        let unread = "Heads that were several times too large, and were not read";
+        all.register("heads_refused", unread, self.refused_heads.clone());
         let evicted = "Waiting connections that were closed to make room";
         all.register("connections_evicted", evicted, self.evicted_connections.clone());
         let held = "What reports and recordings of all sessions take";

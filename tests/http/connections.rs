@@ -130,12 +130,33 @@ async fn a_body_that_does_not_come_in_time_is_told() {
 #[tokio::test]
 async fn a_head_that_is_too_large_is_told() {
     let server = server(Limits::default()).await;
-    let long = format!("GET /healthz HTTP/1.1\r\nHost: {}\r\nX: {}\r\n\r\n", server.address, "a".repeat(40_000));
-    let many = format!("GET /healthz HTTP/1.1\r\nHost: {}\r\n{}\r\n", server.address, "X: a\r\n".repeat(200));
-    for head in [long, many] {
+    let long = format!(
+        "GET /healthz HTTP/1.1\r\nHost: {}\r\nConnection: close\r\nX: {}\r\n\r\n",
+        server.address,
+        "a".repeat(40_000)
+    );
+    let many = format!(
+        "GET /healthz HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n{}\r\n",
+        server.address,
+        "X: a\r\n".repeat(200)
+    );
+    for (head, names) in [(long, "32768 bytes"), (many, "100 header fields")] {
         let answer = rest(&mut sent(&server, &head).await).await;
-        assert!(answer.starts_with("HTTP/1.1 431 "), "{answer}");
+        let (head, body) = answer.split_once("\r\n\r\n").expect("a body");
+        assert!(head.starts_with("HTTP/1.1 431 ") && head.contains("x-request-id: "), "{head}");
+        let problem: Value = serde_json::from_str(body).expect("JSON");
+        assert_eq!(problem["type"], "urn:body-schema:problem:head-too-large");
+        assert!(problem["detail"].as_str().is_some_and(|detail| detail.contains(names)), "{problem}");
     }
+    // Not even read, and counted all the same.
+    let endless = format!("GET /healthz HTTP/1.1\r\nHost: {}\r\nX: {}\r\n\r\n", server.address, "a".repeat(400_000));
+    let mut stream = connect(&server).await;
+    // It is closed in the midst of this.
+    drop(stream.write_all(endless.as_bytes()).await);
+    let answer = rest(&mut stream).await;
+    assert!(answer.is_empty() || answer.starts_with("HTTP/1.1 431 "), "{answer}");
+    let figures = server.get("/metrics").await.text().await.expect("figures");
+    assert!(figures.contains("body_schema_heads_refused_total 1\n"), "{figures}");
     server.stop().await;
 }
 

@@ -20,6 +20,7 @@ impl IntoResponses for OfAll {
             ("400", "The request cannot be read: its address, a parameter or a header"),
             ("401", "The server answers only those who carry its token"),
             ("403", "The request is meant for another host, or comes from a foreign page"),
+            ("431", "The address and the header fields are too large together, or too many"),
             ("500", "The server has failed, or what it kept is damaged"),
             ("503", "The server has as much to do as it can"),
         ])
