@@ -39,66 +39,66 @@ pub fn in_chunks<C: Sync>(candidates: &[C], evaluate: impl Fn(&[C]) -> Vec<f64> 
 /// The threads that all share.
 #[cfg(feature = "parallel")]
 mod pool {
-    use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
-    static TAKEN: Mutex<()> = Mutex::new(());
+    /// How many who have come from elsewhere work there.
+    static TAKEN: AtomicUsize = AtomicUsize::new(0);
 
-    /// Of one who has come from elsewhere, until it is dropped; of one of the pool's own threads nothing.
-    pub struct Taken(#[expect(dead_code, reason = "held")] Option<MutexGuard<'static, ()>>);
+    /// The place of one who has come from elsewhere, until it is dropped; one of the pool's own threads needs none.
+    pub struct Place {
+        is_counted: bool,
+    }
 
-    /// The pool, or `None` while another has it: one who has little to do does not wait behind those who have much, as the
-    /// sessions of a server would, but works alone meanwhile.
-    pub fn taken() -> Option<Taken> {
+    /// How many places there are: with two threads for each nobody waits long.
+    pub fn places() -> usize {
+        (rayon::current_num_threads() / 2).max(1)
+    }
+
+    /// A place in the pool, or `None` while all are taken: one who has little to do does not wait behind those who have much, as
+    /// the sessions of a server would, but works alone meanwhile.
+    pub fn taken() -> Option<Place> {
         if rayon::current_thread_index().is_some() {
-            return Some(Taken(None));
+            return Some(Place { is_counted: false });
         }
-        match TAKEN.try_lock() {
-            Ok(pool) => Some(Taken(Some(pool))),
-            Err(TryLockError::Poisoned(pool)) => Some(Taken(Some(PoisonError::into_inner(pool)))),
-            Err(TryLockError::WouldBlock) => None,
+        let places = places();
+        let one_more = |taken| (taken < places).then_some(taken + 1);
+        TAKEN.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_more).ok().map(|_| Place { is_counted: true })
+    }
+
+    impl Drop for Place {
+        fn drop(&mut self) {
+            if self.is_counted {
+                TAKEN.fetch_sub(1, Ordering::Relaxed);
+            }
         }
     }
 }
 
 #[cfg(all(test, feature = "parallel"))]
 mod tests {
-    use std::{
-        sync::{Barrier, mpsc},
-        thread,
-        time::Duration,
-    };
+    use std::thread;
 
     use super::*;
 
     #[test]
-    fn nobody_waits_behind_those_who_have_the_pool() {
-        let items: Vec<f64> = (0..40 * rayon::current_num_threads()).map(|item| item as f64).collect();
+    fn nobody_waits_for_a_place_in_the_pool() {
+        let items: Vec<f64> = (0..100).map(f64::from).collect();
         let doubled: Vec<f64> = items.iter().map(|item| 2.0 * item).collect();
-        let begun = Barrier::new(2);
-        let (done, waits) = mpsc::channel::<()>();
-        thread::scope(|scope| {
-            let (begun, items) = (&begun, &items);
-            scope.spawn(move || {
-                let first = std::sync::Once::new();
-                let waits = std::sync::Mutex::new(waits);
-                // Every thread of the pool stands until the other is done, or has given up.
-                mapped(items, |item| {
-                    first.call_once(|| {
-                        begun.wait();
-                    });
-                    let _held = waits.lock().unwrap().recv_timeout(Duration::from_secs(20));
-                    2.0 * item
-                });
-            });
-            begun.wait();
-            let (answer, answered) = mpsc::channel();
-            scope.spawn(move || {
-                let chunked = in_chunks(items, |chunk| chunk.iter().map(|item| 2.0 * item).collect());
-                answer.send((mapped(items, |item| 2.0 * item), chunked)).unwrap();
-            });
-            let answer = answered.recv_timeout(Duration::from_secs(10));
-            drop(done);
-            assert_eq!(answer.expect("an answer, at once"), (doubled.clone(), doubled));
-        });
+        let mut held = Vec::new();
+        // Other tests come and go.
+        while held.len() < pool::places() {
+            held.extend(pool::taken());
+            thread::yield_now();
+        }
+        let here = thread::current().id();
+        let double = |item: &f64| {
+            assert_eq!(thread::current().id(), here);
+            2.0 * item
+        };
+        assert_eq!(mapped(&items, double), doubled);
+        assert_eq!(in_chunks(&items, |chunk| chunk.iter().map(double).collect()), doubled);
+        drop(held);
+        // The same where it has one.
+        assert_eq!(mapped(&items, |item| 2.0 * item), doubled);
     }
 }
