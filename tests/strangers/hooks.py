@@ -144,7 +144,10 @@ def filter_failure(context, failure, case, response):
     if failure.code != "ST202":
         return True
     fields = UNSAID.get(case.operation.definition.raw.get("operationId", ""), ())
-    field = json.loads(response.content).get("field", "").split(".")[0].split("[")[0]
+    told = json.loads(response.content).get("field", "")
+    field = told.split(".")[0].split("[")[0]
     described = [parameter.name for parameter in case.operation.query]
-    is_misspelt = response.status_code == 400 and field in (case.query or {}) and field not in described
+    # Names of parameters are told as they came.
+    given = urllib.parse.unquote(told)
+    is_misspelt = response.status_code == 400 and given in (case.query or {}) and given not in described
     return not (is_misspelt or response.status_code == 422 and field in fields)
