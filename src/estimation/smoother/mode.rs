@@ -37,10 +37,14 @@ pub(super) struct Effort<'a> {
     pub tolerance: f64,
     /// It finds nothing new when the next step leads to one of these.
     pub known: &'a [Mode],
-    /// It is given up when the cost would stay above this even if every step that is left lowered it by as much as the next one
-    /// promises.
+    /// It is given up when the cost would stay above this even if a [few](FEW) steps more, or as many as are left, lowered it by as
+    /// much as the next one promises.
     pub hopeless: f64,
 }
+
+/// Steps that lead down to where the measurements are explained promise a large part of what is to be gained, and those along a
+/// valley that does not explain them hardly anything.
+const FEW: usize = 3;
 
 /// The widths of a loss through which a search goes that begins far from its end, the last being the loss itself.
 const WIDTHS: [f64; 4] = [f64::INFINITY, 10.0, 3.0, 1.0];
@@ -120,7 +124,7 @@ impl Posterior {
             if length > 1.0 {
                 delta /= length;
             }
-            let left = (effort.steps - step) as f64;
+            let left = (effort.steps - step).min(FEW) as f64;
             let is_hopeless = normal.cost.is_finite() && normal.cost - left * predicted > effort.hopeless;
             if is_hopeless || !predicted.is_finite() {
                 return None;
