@@ -14,7 +14,8 @@
 //! | product | P (m × m) times m × 96 for every 32 candidates: the floor of any method that multiplies by P |
 //! | NLopt | `GN_DIRECT_L` with the same budget and the posterior's trace by the textbook's formula, with our Jacobian |
 //!
-//! Which of the two finds the lower value is a matter of the problem: `-- --least` compares them over 40 of each size.
+//! Which of the two finds the lower value is a matter of the problem: `-- --least` compares them over 40 of each size. With
+//! `--features parallel`, `-- --threads` lets a choice on two threads take turns with one on a single thread.
 //!
 //! SciPy's `direct` takes its turn in a script, `benches/choosing/scipy_direct.py`; `-- --write FILE` writes it the problems, `-- --once`
 //! prints what each costs us.
@@ -45,7 +46,8 @@ mod textbook;
 
 const CASES: [&str; 3] = ["arm-6dof", "arm-12dof", "arm-20dof"];
 
-const SETTINGS: Settings = Settings { variant: Variant::LocallyBiased, epsilon: 1e-4, max_evaluations: 600 };
+/// NLopt has no ε.
+const SETTINGS: Settings = Settings { variant: Variant::LocallyBiased, epsilon: 0.0, max_evaluations: 600 };
 const ROUNDS: usize = 41;
 /// Of the movements before the choice.
 const SEED: u64 = 3;
@@ -229,6 +231,24 @@ fn least() {
     }
 }
 
+/// One choice on a single thread and on two.
+#[cfg(feature = "parallel")]
+fn threads() {
+    println!(
+        "microseconds for a choice by 600 evaluations on one thread and on two, and times faster: median (quartiles)"
+    );
+    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    let (one, two) = (pool(1), pool(2));
+    for name in CASES {
+        let case = Case::new(&builtin(name).expect("built in"), SEED);
+        let choose = || case.choose(SETTINGS.max_evaluations);
+        let times = race(&mut [("one", Box::new(|| one.install(choose))), ("two", Box::new(|| two.install(choose)))]);
+        let medians = [&times[0], &times[1]].map(|times| spread(times.iter().copied())[0]);
+        let [ratio, least, most] = spread(times[0].iter().zip(&times[1]).map(|(one, two)| one / two));
+        println!("  {name:10} {:8.1} {:8.1}   {ratio:5.2} ({least:.2} to {most:.2})", medians[0], medians[1]);
+    }
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     if let Some(option) = arguments.iter().position(|argument| argument == "--write") {
@@ -237,6 +257,10 @@ fn main() {
     }
     if arguments.iter().any(|argument| argument == "--once") {
         return once();
+    }
+    #[cfg(feature = "parallel")]
+    if arguments.iter().any(|argument| argument == "--threads") {
+        return threads();
     }
     #[cfg(feature = "nlopt")]
     if arguments.iter().any(|argument| argument == "--least") {

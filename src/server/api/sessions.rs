@@ -37,7 +37,8 @@ const FEW_REPORTS: usize = 16;
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct SessionList {
     /// Oldest first.
-    pub sessions: Vec<SessionResource>,
+    #[schema(value_type = Vec<SessionResource>)]
+    pub sessions: Vec<Box<RawValue>>,
     /// Sessions with robots elsewhere that were kept, and cannot be relied on any more: `body-schema repair` mends what can be.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub damaged: Vec<DamagedSession>,

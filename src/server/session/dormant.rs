@@ -8,6 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use serde_json::value::RawValue;
 use tokio::{
     sync::{Mutex as AsyncMutex, OwnedSemaphorePermit, oneshot},
     task::spawn_blocking,
@@ -19,6 +20,7 @@ use super::{
     DamagedSession, Elsewhere, Engine, NewOutsideSession, Session, SessionResource, Sessions, Standing, lock,
     outside::{self, Beginning, Origin, now_s},
     registry::{END_WITHIN, no_engine, spawn},
+    resource::Remembered,
 };
 use crate::{
     ask_tell::{self, MOST_EVENTS, ReplayError, Setup, VERSION},
@@ -43,7 +45,7 @@ pub(super) struct Known {
     /// Held while it comes or goes, so that it is never in memory twice.
     moving: AsyncMutex<()>,
     /// As it was when it left memory, or without its status as it was described at first.
-    resource: Mutex<Option<SessionResource>>,
+    resource: Mutex<Option<Remembered>>,
 }
 
 impl Known {
@@ -143,7 +145,8 @@ impl Sessions {
         if session.is_watched() {
             return;
         }
-        *lock(&known.resource) = Some(SessionResource { recording: None, ..session.resource() });
+        // What cannot be remembered is read from the store again.
+        *lock(&known.resource) = Remembered::of(&SessionResource { recording: None, ..session.resource() }).ok();
         self.leave(session.id);
         session.stop();
         // However long that takes: nobody else may write its events meanwhile.
@@ -201,22 +204,22 @@ impl Sessions {
     }
 
     /// All sessions, oldest first, and those that are damaged.
-    pub(in crate::server) async fn list(&self) -> Result<(Vec<SessionResource>, Vec<DamagedSession>), Problem> {
+    pub(in crate::server) async fn list(&self) -> Result<(Vec<Box<RawValue>>, Vec<DamagedSession>), Problem> {
         let all = lock(&self.all).clone();
         let steps = all.iter().filter(|session| !session.is_elsewhere());
-        let mut resources: Vec<(f64, SessionResource)> =
-            steps.map(|session| (session.made_s, session.resource())).collect();
+        let written = |session: &Arc<Session>| Ok((session.made_s, session.resource().written()?));
+        let mut resources = steps.map(written).collect::<Result<Vec<_>, Problem>>()?;
         let (known, mut damaged) = (lock(&self.known).clone(), Vec::new());
         for known in known {
             let resource = match all.iter().find(|session| session.id == known.id) {
-                Some(session) => Some(session.resource()),
+                Some(session) => Some(session.resource().written()?),
                 None => match self.described(&known).await {
                     // One that cannot be read keeps nobody from the others.
                     Err(problem) if problem.is(Kind::Damaged) => {
                         damaged.push(DamagedSession { id: known.id.to_string(), detail: problem.detail.into() });
                         None
                     }
-                    described => described?,
+                    described => described?.map(|resource| resource.written()).transpose()?,
                 },
             };
             resources.extend(resource.map(|resource| (known.made_s, resource)));
@@ -227,7 +230,7 @@ impl Sessions {
 
     /// A session as it can be shown without replaying it. `None` for one that this program cannot take up: who asks for it is
     /// told why.
-    async fn described(&self, known: &Known) -> Result<Option<SessionResource>, Problem> {
+    async fn described(&self, known: &Known) -> Result<Option<Remembered>, Problem> {
         let remembered = lock(&known.resource).clone();
         if remembered.is_some() {
             return Ok(remembered);
@@ -248,8 +251,9 @@ impl Sessions {
             status: None,
             channels: session.channels().to_vec(),
         };
-        *lock(&known.resource) = Some(resource.clone());
-        Ok(Some(resource))
+        let remembered = Remembered::of(&resource)?;
+        *lock(&known.resource) = Some(remembered.clone());
+        Ok(Some(remembered))
     }
 
     async fn load(&self, id: Uuid) -> Result<Option<Stored>, Problem> {

@@ -1,6 +1,8 @@
 //! A session as its resource shows it.
 
+use bytes::Bytes;
 use serde::Serialize;
+use serde_json::value::{RawValue, to_raw_value};
 use utoipa::ToSchema;
 
 use super::{Session, lock};
@@ -8,6 +10,10 @@ use crate::{
     ask_tell::{ChannelShape, Status},
     experiment::Description,
     scenario::WorldKind,
+    server::{
+        gzip::{gzip, unpack},
+        problem::{Kind, Problem},
+    },
 };
 
 /// A session as its resource shows it.
@@ -39,6 +45,33 @@ pub struct SessionResource {
     pub status: Option<Status>,
     /// With a robot elsewhere: its channels, by their names among the measurements of an observation; empty for all others.
     pub channels: Vec<ChannelShape>,
+}
+
+impl SessionResource {
+    /// As it is written.
+    pub(super) fn written(&self) -> Result<Box<RawValue>, Problem> {
+        to_raw_value(self).map_err(|error| unwritten(&error.to_string()))
+    }
+}
+
+fn unwritten(why: &str) -> Problem {
+    Problem::new(Kind::Internal, format!("the session cannot be shown: {why}"))
+}
+
+/// The resource of a session that is not in memory, compressed: it takes a tenth of the room, and there may be thousands.
+#[derive(Clone)]
+pub(super) struct Remembered(Bytes);
+
+impl Remembered {
+    pub(super) fn of(resource: &SessionResource) -> Result<Self, Problem> {
+        let written = resource.written()?;
+        gzip(written.get().as_bytes()).map(Self).ok_or_else(|| unwritten("it does not compress"))
+    }
+
+    pub(super) fn written(&self) -> Result<Box<RawValue>, Problem> {
+        let text = String::from_utf8(unpack(&self.0).into()).map_err(|error| unwritten(&error.to_string()))?;
+        RawValue::from_string(text).map_err(|error| unwritten(&error.to_string()))
+    }
 }
 
 impl Session {
