@@ -43,7 +43,7 @@ pub struct Planning {
     pub polished: usize,
     /// How far.
     pub polish: Polish,
-    /// How often every pose of a plan is exchanged when it is made; one that stands from before is gone through once.
+    /// How often every pose of a plan is exchanged.
     pub sweeps: usize,
     /// How far a pose is polished when it is exchanged.
     pub exchange: Polish,
@@ -230,9 +230,6 @@ impl<'a> Scene<'a> {
     fn plan(&self, horizon: usize, standing: Vec<Vec<f64>>, ground: &mut Ground<'_>) -> Result<Plan, SelectionError> {
         let searched = ground.searched;
         let mut plan = self.now.clone();
-        // It is gone through again after every movement.
-        let sweeps =
-            if standing.is_empty() { self.planner.planning.sweeps } else { self.planner.planning.sweeps.min(1) };
         for pose in standing.into_iter().take(horizon) {
             self.add(&mut plan, pose)?;
         }
@@ -256,7 +253,7 @@ impl<'a> Scene<'a> {
             self.add(&mut plan, pose)?;
         }
         if plan.poses.len() > 1 {
-            for _ in 0..sweeps * plan.poses.len() {
+            for _ in 0..self.planner.planning.sweeps * plan.poses.len() {
                 // Always the first; what replaces it goes to the end.
                 let pose = plan.remove(0);
                 let found = {
