@@ -43,8 +43,7 @@ impl Compressed {
     }
 }
 
-/// Compressed at once; `None` if that cannot be done.
-pub(super) fn gzip(bytes: &[u8]) -> Option<Bytes> {
+fn gzip(bytes: &[u8]) -> Option<Bytes> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(bytes).ok()?;
     encoder.finish().ok().map(Bytes::from)

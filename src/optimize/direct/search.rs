@@ -1,7 +1,5 @@
 //! The search itself: ask, tell, divide, choose.
 
-use std::cmp::Reverse;
-
 use super::batch::Batch;
 use super::classes::SizeClasses;
 use super::hull::{HullPoint, lower_right_hull};
@@ -36,11 +34,11 @@ use super::ternary::MAX_LEVEL;
 ///
 /// # Budget
 ///
-/// The budget is never exceeded. An iteration that would exceed it is the last, and divides its rectangles from the smallest
-/// size to the largest, so that what is left of the budget goes to where the best are; with the first whose samples do not all
-/// fit, the search ends, even if a later one would. A few evaluations, fewer than twice the dimension, may thus remain unspent.
-/// Up to that iteration the points of a search are the first points of the same search on a larger budget. (Gablonsky's code
-/// completes the iteration, and exceeds the budget.)
+/// The budget is never exceeded. The rectangles of an iteration are divided in the order of
+/// [`potentially_optimal`](Self::potentially_optimal) as long as all samples of a rectangle fit; with the first
+/// that does not, the search ends, even if a later one would. A few evaluations, fewer than twice the dimension,
+/// may thus remain unspent. In return the points of a search are always the first points of the same search on a
+/// larger budget. (Gablonsky's code completes the iteration, and exceeds the budget.)
 #[derive(Debug, Clone)]
 pub struct Direct {
     settings: Settings,
@@ -188,7 +186,7 @@ impl Direct {
     /// The numbers of the potentially optimal rectangles, in the order in which they are divided: the vertices of
     /// the [hull](Self::hull) that passed the ε test, then, in the original variant, the rectangles that tie with
     /// them. While no feasible point is known, the eldest of the largest rectangles. At the end of the budget some
-    /// or all of them are left undivided, and the smallest come first.
+    /// or all of them are left undivided.
     pub fn potentially_optimal(&self) -> &[usize] {
         &self.chosen
     }
@@ -305,11 +303,6 @@ impl Direct {
     /// Samples around the chosen rectangles as far as the budget goes.
     fn sample(&mut self) {
         self.dividing = 0;
-        let (rectangles, variant) = (&self.rectangles, self.settings.variant);
-        let wanted: usize = self.chosen.iter().map(|parent| 2 * rectangles.long_sides(*parent)).sum();
-        if rectangles.len() + wanted > self.settings.max_evaluations {
-            self.chosen.sort_by_key(|parent| Reverse(variant.class(rectangles.levels(*parent))));
-        }
         for &parent in &self.chosen {
             let points = self.rectangles.len() + self.rectangles.pending() + 2 * self.rectangles.long_sides(parent);
             self.exhausted |= points > self.settings.max_evaluations;

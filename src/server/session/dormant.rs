@@ -20,7 +20,6 @@ use super::{
     DamagedSession, Elsewhere, Engine, NewOutsideSession, Session, SessionResource, Sessions, Standing, lock,
     outside::{self, Beginning, Origin, now_s},
     registry::{END_WITHIN, no_engine, spawn},
-    resource::Remembered,
 };
 use crate::{
     ask_tell::{self, MOST_EVENTS, ReplayError, Setup, VERSION},
@@ -45,7 +44,7 @@ pub(super) struct Known {
     /// Held while it comes or goes, so that it is never in memory twice.
     moving: AsyncMutex<()>,
     /// As it was when it left memory, or without its status as it was described at first.
-    resource: Mutex<Option<Remembered>>,
+    resource: Mutex<Option<Arc<RawValue>>>,
 }
 
 impl Known {
@@ -146,7 +145,7 @@ impl Sessions {
             return;
         }
         // What cannot be remembered is read from the store again.
-        *lock(&known.resource) = Remembered::of(&SessionResource { recording: None, ..session.resource() }).ok();
+        *lock(&known.resource) = SessionResource { recording: None, ..session.resource() }.written().ok();
         self.leave(session.id);
         session.stop();
         // However long that takes: nobody else may write its events meanwhile.
@@ -204,7 +203,7 @@ impl Sessions {
     }
 
     /// All sessions, oldest first, and those that are damaged.
-    pub(in crate::server) async fn list(&self) -> Result<(Vec<Box<RawValue>>, Vec<DamagedSession>), Problem> {
+    pub(in crate::server) async fn list(&self) -> Result<(Vec<Arc<RawValue>>, Vec<DamagedSession>), Problem> {
         let all = lock(&self.all).clone();
         let steps = all.iter().filter(|session| !session.is_elsewhere());
         let written = |session: &Arc<Session>| Ok((session.made_s, session.resource().written()?));
@@ -219,7 +218,7 @@ impl Sessions {
                         damaged.push(DamagedSession { id: known.id.to_string(), detail: problem.detail.into() });
                         None
                     }
-                    described => described?.map(|resource| resource.written()).transpose()?,
+                    described => described?,
                 },
             };
             resources.extend(resource.map(|resource| (known.made_s, resource)));
@@ -230,7 +229,7 @@ impl Sessions {
 
     /// A session as it can be shown without replaying it. `None` for one that this program cannot take up: who asks for it is
     /// told why.
-    async fn described(&self, known: &Known) -> Result<Option<Remembered>, Problem> {
+    async fn described(&self, known: &Known) -> Result<Option<Arc<RawValue>>, Problem> {
         let remembered = lock(&known.resource).clone();
         if remembered.is_some() {
             return Ok(remembered);
@@ -251,7 +250,7 @@ impl Sessions {
             status: None,
             channels: session.channels().to_vec(),
         };
-        let remembered = Remembered::of(&resource)?;
+        let remembered = resource.written()?;
         *lock(&known.resource) = Some(remembered.clone());
         Ok(Some(remembered))
     }

@@ -1,6 +1,7 @@
 //! A session as its resource shows it.
 
-use bytes::Bytes;
+use std::sync::Arc;
+
 use serde::Serialize;
 use serde_json::value::{RawValue, to_raw_value};
 use utoipa::ToSchema;
@@ -10,10 +11,7 @@ use crate::{
     ask_tell::{ChannelShape, Status},
     experiment::Description,
     scenario::WorldKind,
-    server::{
-        gzip::{gzip, unpack},
-        problem::{Kind, Problem},
-    },
+    server::problem::{Kind, Problem},
 };
 
 /// A session as its resource shows it.
@@ -48,29 +46,10 @@ pub struct SessionResource {
 }
 
 impl SessionResource {
-    /// As it is written.
-    pub(super) fn written(&self) -> Result<Box<RawValue>, Problem> {
-        to_raw_value(self).map_err(|error| unwritten(&error.to_string()))
-    }
-}
-
-fn unwritten(why: &str) -> Problem {
-    Problem::new(Kind::Internal, format!("the session cannot be shown: {why}"))
-}
-
-/// The resource of a session that is not in memory, compressed: it takes a tenth of the room, and there may be thousands.
-#[derive(Clone)]
-pub(super) struct Remembered(Bytes);
-
-impl Remembered {
-    pub(super) fn of(resource: &SessionResource) -> Result<Self, Problem> {
-        let written = resource.written()?;
-        gzip(written.get().as_bytes()).map(Self).ok_or_else(|| unwritten("it does not compress"))
-    }
-
-    pub(super) fn written(&self) -> Result<Box<RawValue>, Problem> {
-        let text = String::from_utf8(unpack(&self.0).into()).map_err(|error| unwritten(&error.to_string()))?;
-        RawValue::from_string(text).map_err(|error| unwritten(&error.to_string()))
+    /// As it is written. Clones share the text.
+    pub(super) fn written(&self) -> Result<Arc<RawValue>, Problem> {
+        let unwritten = |error| Problem::new(Kind::Internal, format!("the session cannot be shown: {error}"));
+        Ok(to_raw_value(self).map_err(unwritten)?.into())
     }
 }
 
