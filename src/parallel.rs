@@ -22,21 +22,17 @@ fn chunk(candidates: usize) -> usize {
 
 /// The values of all candidates, in order, a chunk at a time: on several cores with the feature `parallel`.
 pub fn in_chunks<C: Sync>(candidates: &[C], evaluate: impl Fn(&[C]) -> Vec<f64> + Sync) -> Vec<f64> {
-    let count = candidates.len();
-    #[cfg(feature = "parallel")]
-    if count > GROUP
-        && let Some(_pool) = pool::taken()
-    {
-        use rayon::prelude::*;
-        // A few are shared out evenly; of many whoever is ready takes the next.
-        let share = count.div_ceil(rayon::current_num_threads()).next_multiple_of(GROUP);
-        let chunk = if share <= 2 * CHUNK { share } else { CHUNK };
-        return candidates.par_chunks(chunk).flat_map_iter(&evaluate).collect();
-    }
-    match count {
+    match candidates.len() {
         0 => Vec::new(),
         1..=CHUNK => evaluate(candidates),
-        _ => candidates.chunks(chunk(count)).flat_map(evaluate).collect(),
+        count => {
+            #[cfg(feature = "parallel")]
+            if let Some(_pool) = pool::taken() {
+                use rayon::prelude::*;
+                return candidates.par_chunks(chunk(count)).flat_map_iter(&evaluate).collect();
+            }
+            candidates.chunks(chunk(count)).flat_map(evaluate).collect()
+        }
     }
 }
 

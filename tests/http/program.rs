@@ -104,10 +104,10 @@ impl Program {
         self.status("Threads:")
     }
 
-    /// Bytes of memory that it holds.
+    /// Bytes of memory that it holds, without the program's own text: of that, parts come and go as they are run.
     #[cfg(target_os = "linux")]
     pub fn memory(&self) -> u64 {
-        (self.status("VmRSS:") as u64) << 10
+        (self.status("RssAnon:") as u64) << 10
     }
 
     #[cfg(target_os = "linux")]

@@ -37,9 +37,7 @@ const FEW_REPORTS: usize = 16;
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct SessionList {
     /// Oldest first.
-    #[serde(serialize_with = "all")]
-    #[schema(value_type = Vec<SessionResource>)]
-    pub sessions: Vec<Arc<RawValue>>,
+    pub sessions: Vec<SessionResource>,
     /// Sessions with robots elsewhere that were kept, and cannot be relied on any more: `body-schema repair` mends what can be.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub damaged: Vec<DamagedSession>,
@@ -89,8 +87,8 @@ pub struct MadeSteps {
     pub reports: Vec<Arc<RawValue>>,
 }
 
-fn all<S: Serializer>(written: &[Arc<RawValue>], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(written.iter().map(AsRef::as_ref))
+fn all<S: Serializer>(reports: &[Arc<RawValue>], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(reports.iter().map(AsRef::as_ref))
 }
 
 /// All sessions.

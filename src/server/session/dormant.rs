@@ -8,7 +8,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use serde_json::value::RawValue;
 use tokio::{
     sync::{Mutex as AsyncMutex, OwnedSemaphorePermit, oneshot},
     task::spawn_blocking,
@@ -44,7 +43,7 @@ pub(super) struct Known {
     /// Held while it comes or goes, so that it is never in memory twice.
     moving: AsyncMutex<()>,
     /// As it was when it left memory, or without its status as it was described at first.
-    resource: Mutex<Option<Arc<RawValue>>>,
+    resource: Mutex<Option<SessionResource>>,
 }
 
 impl Known {
@@ -144,8 +143,7 @@ impl Sessions {
         if session.is_watched() {
             return;
         }
-        // What cannot be remembered is read from the store again.
-        *lock(&known.resource) = SessionResource { recording: None, ..session.resource() }.written().ok();
+        *lock(&known.resource) = Some(SessionResource { recording: None, ..session.resource() });
         self.leave(session.id);
         session.stop();
         // However long that takes: nobody else may write its events meanwhile.
@@ -203,15 +201,15 @@ impl Sessions {
     }
 
     /// All sessions, oldest first, and those that are damaged.
-    pub(in crate::server) async fn list(&self) -> Result<(Vec<Arc<RawValue>>, Vec<DamagedSession>), Problem> {
+    pub(in crate::server) async fn list(&self) -> Result<(Vec<SessionResource>, Vec<DamagedSession>), Problem> {
         let all = lock(&self.all).clone();
         let steps = all.iter().filter(|session| !session.is_elsewhere());
-        let written = |session: &Arc<Session>| Ok((session.made_s, session.resource().written()?));
-        let mut resources = steps.map(written).collect::<Result<Vec<_>, Problem>>()?;
+        let mut resources: Vec<(f64, SessionResource)> =
+            steps.map(|session| (session.made_s, session.resource())).collect();
         let (known, mut damaged) = (lock(&self.known).clone(), Vec::new());
         for known in known {
             let resource = match all.iter().find(|session| session.id == known.id) {
-                Some(session) => Some(session.resource().written()?),
+                Some(session) => Some(session.resource()),
                 None => match self.described(&known).await {
                     // One that cannot be read keeps nobody from the others.
                     Err(problem) if problem.is(Kind::Damaged) => {
@@ -229,7 +227,7 @@ impl Sessions {
 
     /// A session as it can be shown without replaying it. `None` for one that this program cannot take up: who asks for it is
     /// told why.
-    async fn described(&self, known: &Known) -> Result<Option<Arc<RawValue>>, Problem> {
+    async fn described(&self, known: &Known) -> Result<Option<SessionResource>, Problem> {
         let remembered = lock(&known.resource).clone();
         if remembered.is_some() {
             return Ok(remembered);
@@ -250,9 +248,8 @@ impl Sessions {
             status: None,
             channels: session.channels().to_vec(),
         };
-        let remembered = resource.written()?;
-        *lock(&known.resource) = Some(remembered.clone());
-        Ok(Some(remembered))
+        *lock(&known.resource) = Some(resource.clone());
+        Ok(Some(resource))
     }
 
     async fn load(&self, id: Uuid) -> Result<Option<Stored>, Problem> {

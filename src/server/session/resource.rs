@@ -1,9 +1,6 @@
 //! A session as its resource shows it.
 
-use std::sync::Arc;
-
 use serde::Serialize;
-use serde_json::value::{RawValue, to_raw_value};
 use utoipa::ToSchema;
 
 use super::{Session, lock};
@@ -11,7 +8,6 @@ use crate::{
     ask_tell::{ChannelShape, Status},
     experiment::Description,
     scenario::WorldKind,
-    server::problem::{Kind, Problem},
 };
 
 /// A session as its resource shows it.
@@ -43,14 +39,6 @@ pub struct SessionResource {
     pub status: Option<Status>,
     /// With a robot elsewhere: its channels, by their names among the measurements of an observation; empty for all others.
     pub channels: Vec<ChannelShape>,
-}
-
-impl SessionResource {
-    /// As it is written. Clones share the text.
-    pub(super) fn written(&self) -> Result<Arc<RawValue>, Problem> {
-        let unwritten = |error| Problem::new(Kind::Internal, format!("the session cannot be shown: {error}"));
-        Ok(to_raw_value(self).map_err(unwritten)?.into())
-    }
 }
 
 impl Session {
