@@ -154,8 +154,8 @@ impl Active {
         let Minimiser::Direct(settings) = self.minimiser else { return Ok(None) };
         let criterion = self.criterion(situation.belief, situation, limits)?;
         let Some((scope, searched)) = Scope::around(situation, limits)? else { return Ok(None) };
-        let at = |postures: &[Vec<f64>]| scope.evaluate(postures, |feasible| criterion.evaluate(feasible));
-        Ok(Some(direct(&scope, &searched, settings, at)?))
+        let at = |postures: &[Vec<f64>]| scope.evaluate(postures, |feasible| criterion.evaluate_here(feasible));
+        Ok(Some(direct(&scope, &searched, settings, &at)?))
     }
 
     /// The criterion in one socket.
@@ -196,20 +196,25 @@ impl Active {
             .iter()
             .map(|belief| self.criterion(belief, situation, limits))
             .collect::<Result<Vec<_>, SelectionError>>()?;
-        let plainly = |candidates: &[Vec<f64>]| {
+        let mean = |candidates: &[Vec<f64>], by: fn(&Criterion<'_>, &[Vec<f64>]) -> Vec<f64>| {
             if let [criterion] = criteria.as_slice() {
-                return criterion.evaluate(candidates);
+                return by(criterion, candidates);
             }
             let mut sums = vec![0.0; candidates.len()];
             for criterion in &criteria {
-                sums.iter_mut().zip(criterion.evaluate(candidates)).for_each(|(sum, value)| *sum += value);
+                sums.iter_mut().zip(by(criterion, candidates)).for_each(|(sum, value)| *sum += value);
             }
             sums.iter().map(|sum| sum / criteria.len() as f64).collect::<Vec<f64>>()
         };
-        let evaluate = |candidates: &[Vec<f64>]| scope.evaluate(candidates, plainly);
+        let evaluate = |candidates: &[Vec<f64>]| {
+            scope.evaluate(candidates, |feasible| mean(feasible, |criterion, all| criterion.evaluate(all)))
+        };
         let (mut best, mut evaluations, search) = match self.minimiser {
             Minimiser::Direct(settings) => {
-                let search = direct(scope, searched, settings, evaluate)?;
+                let here = |candidates: &[Vec<f64>]| {
+                    scope.evaluate(candidates, |feasible| mean(feasible, |criterion, all| criterion.evaluate_here(all)))
+                };
+                let search = direct(scope, searched, settings, &here)?;
                 let best = search.best().map(|(point, value)| (searched.from_unit(point), value));
                 (best, search.evaluations(), Some(search))
             }

@@ -26,7 +26,7 @@ use super::{Optimality, SelectionError, Sight, Weights, optimality, prediction::
 use crate::{
     estimation::Belief,
     model::{Layout, Points, State, Workspace, jacobian},
-    parallel::in_chunks,
+    parallel::{in_chunks, in_turn},
     sensing::Rig,
 };
 
@@ -196,14 +196,21 @@ impl<'a> Criterion<'a> {
     /// C(θ) of every candidate, in order. Chunks run on several cores with the feature `parallel`; the values do not
     /// depend on how many.
     pub fn evaluate<C: AsRef<[f64]> + Sync>(&self, candidates: &[C]) -> Vec<f64> {
-        in_chunks(candidates, |chunk| {
-            let predictions = self.predictions(chunk);
-            let mut values = self.gains(&predictions);
-            for (index, value) in values.iter_mut().enumerate() {
-                *value = self.expected(predictions.chance(index), *value);
-            }
-            values
-        })
+        in_chunks(candidates, |chunk| self.evaluate_chunk(chunk))
+    }
+
+    /// The same on this thread alone.
+    pub(super) fn evaluate_here<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {
+        in_turn(candidates, |chunk| self.evaluate_chunk(chunk))
+    }
+
+    fn evaluate_chunk<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {
+        let predictions = self.predictions(candidates);
+        let mut values = self.gains(&predictions);
+        for (index, value) in values.iter_mut().enumerate() {
+            *value = self.expected(predictions.chance(index), *value);
+        }
+        values
     }
 
     /// The expectation over seeing and missing; not finite where nothing is to be seen or the gain is no number.

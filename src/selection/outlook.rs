@@ -30,7 +30,7 @@ use super::{
 use crate::{
     estimation::Belief,
     model::{Block, Element, Layout, Points, State, Workspace},
-    parallel::in_chunks,
+    parallel::{in_chunks, in_turn},
     sensing::Rig,
 };
 
@@ -170,6 +170,11 @@ impl<'a> Outlook<'a> {
     /// C(θ) of every candidate, in order. The values do not depend on the number of cores.
     pub fn evaluate<C: AsRef<[f64]> + Sync>(&self, candidates: &[C]) -> Vec<f64> {
         in_chunks(candidates, |chunk| self.evaluate_chunk(chunk))
+    }
+
+    /// The same on this thread alone.
+    pub fn evaluate_here<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {
+        in_turn(candidates, |chunk| self.evaluate_chunk(chunk))
     }
 
     /// The criterion of one candidate and what it rests on; the marker is predicted by the estimate.

@@ -13,7 +13,6 @@ use super::{
     herding::herd,
     outlook::Setting,
     plan::Plan,
-    search::direct,
     views::Views,
 };
 use crate::{
@@ -274,8 +273,7 @@ impl<'a> Scene<'a> {
         let Planner { search, planning, .. } = self.planner;
         let (scope, searched) = (ground.scope, ground.searched);
         let outlook = self.outlook(plan)?;
-        let at = |postures: &[Vec<f64>]| ground.evaluate_postures(&outlook, &plan.poses, postures);
-        let search = direct(scope, searched, *search, at)?;
+        let search = ground.search(&outlook, &plan.poses, *search)?;
         let mut starts = search.best_of_all(planning.polished.max(1));
         // The best of some that are feasible. Scaled to the unit cube and back, one on the edge may be so no more.
         let mut feasible = None;
@@ -355,7 +353,6 @@ impl Policy for Planner {
         let Some((scope, searched)) = Scope::around(situation, limits)? else { return Ok(None) };
         let mut ground = Ground::new(situation, limits, &scope, &searched, self.planning.polished);
         let outlook = scene.outlook(&scene.now)?;
-        let at = |postures: &[Vec<f64>]| ground.evaluate_postures(&outlook, &[], postures);
-        Ok(Some(direct(&scope, &searched, self.search, at)?))
+        Ok(Some(ground.search(&outlook, &[], self.search)?))
     }
 }

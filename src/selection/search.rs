@@ -4,6 +4,7 @@ use super::{Partition, Scope, SelectionError};
 use crate::{
     kinematics::JointBox,
     optimize::{Direct, Settings},
+    parallel::shared,
 };
 
 /// How DIRECT searched the joint box, and what came of it.
@@ -23,17 +24,21 @@ pub(super) fn direct(
     scope: &Scope<'_>,
     limits: &JointBox,
     settings: Settings,
-    mut evaluate: impl FnMut(&[Vec<f64>]) -> Vec<f64>,
+    evaluate: &(dyn Fn(&[Vec<f64>]) -> Vec<f64> + Sync),
 ) -> Result<Search, SelectionError> {
     let mut direct = Direct::new(limits.dimension(), settings).map_err(SelectionError::Search)?;
-    // One batch after the other is written to the same place.
-    let mut postures: Vec<Vec<f64>> = Vec::new();
-    while let Some(batch) = direct.ask() {
-        let asked = batch.len();
-        postures.resize_with(asked.max(postures.len()), || vec![0.0; limits.dimension()]);
-        postures.iter_mut().zip(batch).for_each(|(posture, point)| limits.write_from_unit(point, posture));
-        direct.tell(&evaluate(&postures[..asked])).map_err(SelectionError::Search)?;
-    }
+    shared(evaluate, |batches| {
+        // One batch after the other is written to the same place.
+        let (mut postures, mut spare): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
+        while let Some(batch) = direct.ask() {
+            spare.extend(postures.drain(batch.len().min(postures.len())..));
+            postures.resize_with(batch.len(), || spare.pop().unwrap_or_else(|| vec![0.0; limits.dimension()]));
+            postures.iter_mut().zip(batch).for_each(|(posture, point)| limits.write_from_unit(point, posture));
+            direct.tell(&batches.evaluate(&mut postures))?;
+        }
+        Ok(())
+    })
+    .map_err(SelectionError::Search)?;
     Ok(Search { direct: Box::new(direct), limits: scope.is_constrained().then(|| limits.clone()), chosen: None })
 }
 

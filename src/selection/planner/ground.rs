@@ -2,8 +2,8 @@
 
 use crate::{
     kinematics::JointBox,
-    optimize::{Polish, Slopes, descend, polish},
-    selection::{Outlook, Scope, Search, Situation},
+    optimize::{Polish, Settings, Slopes, descend, polish},
+    selection::{Outlook, Scope, Search, SelectionError, Situation, search::direct},
 };
 
 /// Where the movements of a plan are sought.
@@ -42,7 +42,8 @@ impl<'a> Ground<'a> {
     /// The criterion at points of the unit cube, beside the `poses` of a plan.
     fn evaluate(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], points: &[Vec<f64>]) -> Vec<f64> {
         let postures: Vec<Vec<f64>> = points.iter().map(|point| self.searched.from_unit(point)).collect();
-        self.evaluate_postures(outlook, poses, &postures)
+        self.evaluations += postures.len();
+        self.scope.evaluate_beside(poses, &postures, |feasible| outlook.evaluate(feasible))
     }
 
     /// Descends by the criterion from a point of the unit cube, beside the `poses` of a plan.
@@ -67,9 +68,18 @@ impl<'a> Ground<'a> {
         descend(vec![start.to_vec()], how, slopes).pop().unwrap_or_else(|| (start.to_vec(), f64::INFINITY))
     }
 
-    /// The criterion at postures of the box, rad or m.
-    pub fn evaluate_postures(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], postures: &[Vec<f64>]) -> Vec<f64> {
-        self.evaluations += postures.len();
-        self.scope.evaluate_beside(poses, postures, |feasible| outlook.evaluate(feasible))
+    /// DIRECT over the box by the criterion, beside the `poses` of a plan.
+    pub fn search(
+        &mut self,
+        outlook: &Outlook<'_>,
+        poses: &[Vec<f64>],
+        settings: Settings,
+    ) -> Result<Search, SelectionError> {
+        let at = |postures: &[Vec<f64>]| {
+            self.scope.evaluate_beside(poses, postures, |feasible| outlook.evaluate_here(feasible))
+        };
+        let search = direct(self.scope, self.searched, settings, &at)?;
+        self.evaluations += search.evaluations();
+        Ok(search)
     }
 }

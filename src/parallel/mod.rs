@@ -1,6 +1,10 @@
 //! Independent work on several cores.
 
+mod batches;
+
 use crate::lanes::GROUP;
+
+pub use batches::shared;
 
 /// `of` of every item, in order: on several cores with the feature `parallel`. The results do not depend on how many.
 pub fn mapped<T: Sync, R: Send>(items: &[T], of: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
@@ -22,17 +26,22 @@ fn chunk(candidates: usize) -> usize {
 
 /// The values of all candidates, in order, a chunk at a time: on several cores with the feature `parallel`.
 pub fn in_chunks<C: Sync>(candidates: &[C], evaluate: impl Fn(&[C]) -> Vec<f64> + Sync) -> Vec<f64> {
+    #[cfg(feature = "parallel")]
+    if candidates.len() > CHUNK
+        && let Some(_pool) = pool::taken()
+    {
+        use rayon::prelude::*;
+        return candidates.par_chunks(chunk(candidates.len())).flat_map_iter(&evaluate).collect();
+    }
+    in_turn(candidates, evaluate)
+}
+
+/// The values of all candidates, in order, a chunk at a time, here.
+pub fn in_turn<C>(candidates: &[C], evaluate: impl Fn(&[C]) -> Vec<f64>) -> Vec<f64> {
     match candidates.len() {
         0 => Vec::new(),
         1..=CHUNK => evaluate(candidates),
-        count => {
-            #[cfg(feature = "parallel")]
-            if let Some(_pool) = pool::taken() {
-                use rayon::prelude::*;
-                return candidates.par_chunks(chunk(count)).flat_map_iter(&evaluate).collect();
-            }
-            candidates.chunks(chunk(count)).flat_map(evaluate).collect()
-        }
+        count => candidates.chunks(chunk(count)).flat_map(evaluate).collect(),
     }
 }
 
@@ -79,6 +88,28 @@ mod tests {
     use std::thread;
 
     use super::*;
+
+    /// However many help, and whether they come in time or not.
+    #[test]
+    fn shared_batches_say_what_is_said_alone() {
+        let squares = |batch: &[f64]| batch.iter().map(|x| x * x).collect::<Vec<f64>>();
+        for threads in [1, 2, 3, 8] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let check = || {
+                shared(&squares, |batches| {
+                    for size in (0..2000).map(|round| round % 61) {
+                        let all: Vec<f64> = (0..size).map(f64::from).collect();
+                        let mut batch = all.clone();
+                        assert_eq!(batches.evaluate(&mut batch), squares(&all), "{size} by {threads}");
+                        assert_eq!(batch, all, "{size} by {threads}");
+                    }
+                });
+            };
+            pool.install(check);
+            // Who is not of the pool, and others who have taken it.
+            thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(|| pool.install(check)))));
+        }
+    }
 
     #[test]
     fn nobody_waits_for_a_place_in_the_pool() {
