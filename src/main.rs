@@ -6,6 +6,11 @@ use clap::Parser;
 
 mod cli;
 
+/// One that gives memory back: sessions come and go in a server that runs for weeks.
+#[cfg(target_os = "linux")]
+#[global_allocator]
+static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
+
 fn main() -> ExitCode {
     let arguments = cli::Arguments::parse();
     match cli::run(arguments) {
