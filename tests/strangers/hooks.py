@@ -3,6 +3,7 @@
 Two in three valid requests are turned into such ones, and all that it made invalid stay as they are.
 """
 
+import collections
 import itertools
 import json
 import math
@@ -103,6 +104,9 @@ class Sessions:
 
 
 SESSIONS = Sessions()
+#: Sessions that tested requests have opened, oldest first. So many are left for requests that go on with them; the server is not
+#: to be full of those that nobody uses.
+OPENED, LEFT = collections.deque(), 16
 TURNS = itertools.count()
 LOCK = threading.Lock()
 
@@ -115,6 +119,15 @@ def before_call(context, case, kwargs):
         session = str((case.path_parameters or {}).get("id"))
         path = f"/v1/sessions/{urllib.parse.quote(session, safe='')}"
         threading.Timer(STREAM_S, ask, ("DELETE", path)).start()
+
+
+@schemathesis.hook
+def after_call(context, case, response):
+    if case.operation.definition.raw.get("operationId") != "openSession" or response.status_code != 201:
+        return
+    OPENED.append(json.loads(response.content)["id"])
+    while len(OPENED) > LEFT:
+        ask("DELETE", f"/v1/sessions/{OPENED.popleft()}")
 
 
 def mend(case, operation):
