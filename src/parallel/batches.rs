@@ -101,6 +101,10 @@ fn next<T>(from: &Receiver<T>) -> Option<T> {
 
 impl<C> Batches<'_, C> {
     /// The values of all candidates, in order.
+    #[cfg_attr(
+        not(feature = "parallel"),
+        expect(clippy::ptr_arg, reason = "parts of a batch go to others and come back")
+    )]
     pub fn evaluate(&mut self, candidates: &mut Vec<C>) -> Vec<f64> {
         #[cfg(feature = "parallel")]
         if !self.helpers.is_empty() && candidates.len() > 2 * SHARE {
