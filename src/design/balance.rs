@@ -55,8 +55,6 @@ const PATIENCE: usize = 3;
 const STEPS: usize = 60;
 /// Poses with a smaller share leave the design.
 const NEGLIGIBLE: f64 = 1e-5;
-/// Poses whose columns of the second derivatives are computed together: enough to fill the matrix kernel, few enough for the caches.
-const PANEL: usize = 32;
 
 impl<'a> Shares<'a> {
     /// Of the given poses.
@@ -217,30 +215,25 @@ impl<'a> Shares<'a> {
         (total.is_finite() && total > 0.0).then_some(aim)
     }
 
-    /// ∂²f of these shares: what stands above the diagonal, a panel of columns at a time, and its reflection.
+    /// ∂²f of these shares.
     fn hessian(&self, standing: &Standing, open: &[usize]) -> DMatrix<f64> {
         let d = self.problem.rig.equations();
         let rows = self.rows.select_columns(&equations(d, open));
         let transposed = rows.transpose();
-        let [mut spread, mut weighed] = [0, 1].map(|_| DMatrix::zeros(rows.ncols(), d * PANEL));
+        let spread = &transposed * (&standing.inverse * &rows);
+        let weighed = &transposed * (&standing.sensitivity * &rows);
+        let block = |i: usize, j: usize| -> f64 {
+            (d * j..d * (j + 1))
+                .map(|column| {
+                    (d * i..d * (i + 1)).map(|row| spread[(row, column)] * weighed[(row, column)]).sum::<f64>()
+                })
+                .sum()
+        };
         let mut hessian = DMatrix::zeros(open.len(), open.len());
-        for first in (0..open.len()).step_by(PANEL) {
-            let last = open.len().min(first + PANEL);
-            let (columns, above) = (d * (last - first), transposed.rows(0, d * last));
-            let of_panel = rows.columns(d * first, columns);
-            for (product, by) in [(&mut spread, &standing.inverse), (&mut weighed, &standing.sensitivity)] {
-                product.view_mut((0, 0), (d * last, columns)).gemm(1.0, &above, &(by * of_panel), 0.0);
-            }
-            for j in first..last {
-                let columns = d * (j - first)..d * (j + 1 - first);
-                for i in 0..=j {
-                    let products = columns.clone().map(|column| {
-                        let of = |product: &DMatrix<f64>, row| product[(d * i + row, column)];
-                        (0..d).map(|row| of(&spread, row) * of(&weighed, row)).sum::<f64>()
-                    });
-                    hessian[(i, j)] = 2.0 * self.movements * products.sum::<f64>();
-                    hessian[(j, i)] = hessian[(i, j)];
-                }
+        for j in 0..open.len() {
+            for i in 0..=j {
+                hessian[(i, j)] = 2.0 * self.movements * block(i, j);
+                hessian[(j, i)] = hessian[(i, j)];
             }
         }
         hessian
