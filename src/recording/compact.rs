@@ -2,10 +2,8 @@
 
 use std::{collections::BTreeMap, io::Cursor};
 
-use re_log_encoding::DecoderApp;
-
 use super::{
-    COMPLETE, RecordingError, message,
+    COMPLETE, RecordingError, decoded, message,
     rerun::{Chunk, EntityPath, LogMsg, StoreId, re_byte_size::SizeBytes},
     rows::by_steps,
 };
@@ -31,12 +29,11 @@ enum Place {
 
 /// The messages of a stream, with the chunks of each entity put together; what is static comes first.
 pub(super) fn put_together(stream: Vec<u8>, keep: Keep) -> Result<Vec<LogMsg>, RecordingError> {
-    let decoded = |source: re_log_encoding::DecodeError| RecordingError::Encode(source.to_string());
     let mut messages = Vec::new();
     let last = EntityPath::from(COMPLETE);
     let mut chunks: BTreeMap<(Place, EntityPath), (StoreId, Vec<Chunk>)> = BTreeMap::new();
-    for message in DecoderApp::decode_eager(Cursor::new(stream)).map_err(decoded)? {
-        match message.map_err(decoded)? {
+    for message in decoded::messages(Cursor::new(stream)) {
+        match message.map_err(RecordingError::Encode)? {
             LogMsg::ArrowMsg(store, message) if store.is_recording() => {
                 let chunk = Chunk::from_arrow_msg(&message)?;
                 let (chunk, is_between) = match by_steps(&chunk) {

@@ -72,6 +72,7 @@ mod charts;
 mod colours;
 mod compact;
 mod csv;
+mod decoded;
 mod ellipsoid;
 mod error;
 mod file;

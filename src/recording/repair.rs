@@ -6,9 +6,9 @@ use std::{
     path::Path,
 };
 
-use re_log_encoding::{Decodable, DecoderApp, StreamFooter};
+use re_log_encoding::{Decodable, StreamFooter};
 
-use super::{RecordingError, file::RrdFile, rerun::LogMsg};
+use super::{RecordingError, decoded::messages, file::RrdFile, rerun::LogMsg};
 
 /// So many messages are held at a time.
 const BATCH: usize = 64;
@@ -74,16 +74,11 @@ pub(super) fn with_messages(
     stream: impl BufRead,
     mut take: impl FnMut(&[LogMsg]) -> Result<(), RecordingError>,
 ) -> Result<(u64, Option<String>), RecordingError> {
-    let mut decoded = match DecoderApp::decode_eager(stream) {
-        Ok(decoded) => decoded,
-        Err(error) => return Ok((0, Some(error.to_string()))),
-    };
-    let (mut count, mut batch) = (0, Vec::new());
-    let damage = loop {
-        match decoded.next() {
-            None => break None,
-            Some(Err(error)) => break Some(error.to_string()),
-            Some(Ok(message)) => {
+    let (mut count, mut batch, mut damage) = (0, Vec::new(), None);
+    for message in messages(stream) {
+        match message {
+            Err(why) => damage = Some(why),
+            Ok(message) => {
                 count += 1;
                 batch.push(message);
                 if batch.len() == BATCH {
@@ -92,7 +87,7 @@ pub(super) fn with_messages(
                 }
             }
         }
-    };
+    }
     take(&batch)?;
     Ok((count, damage))
 }
