@@ -2,29 +2,24 @@
 
 use std::{
     any::Any,
+    cell::Cell,
     io::BufRead,
-    panic::{AssertUnwindSafe, catch_unwind},
+    panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
+    sync::Once,
 };
 
-use re_log_encoding::DecoderApp;
+use re_log_encoding::{DecodeError, DecoderApp};
 
-use super::rerun::LogMsg;
+use super::{rerun::LogMsg, stream::Frames};
 
 /// The messages of a recording up to the first that cannot be read, and why it cannot.
 pub(super) fn messages(stream: impl BufRead) -> impl Iterator<Item = Result<LogMsg, String>> {
-    let (mut decoded, mut damage) = match guarded(|| DecoderApp::decode_eager(stream)) {
-        Ok(Ok(decoded)) => (Some(decoded), None),
-        Ok(Err(error)) => (None, Some(error.to_string())),
-        Err(why) => (None, Some(why)),
-    };
+    let mut decoded = Some(DecoderApp::decode_lazy(Frames::new(stream)));
     std::iter::from_fn(move || {
-        if let Some(why) = damage.take() {
-            return Some(Err(why));
-        }
         let why = match guarded(|| decoded.as_mut()?.next()) {
             Ok(None) => return None,
             Ok(Some(Ok(message))) => return Some(Ok(message)),
-            Ok(Some(Err(error))) => error.to_string(),
+            Ok(Some(Err(error))) => what(error),
             Err(why) => why,
         };
         decoded = None;
@@ -32,9 +27,33 @@ pub(super) fn messages(stream: impl BufRead) -> impl Iterator<Item = Result<LogM
     })
 }
 
-/// What reads Arrow's buffers panics where a damaged message tells lengths beyond its end.
+fn what(error: DecodeError) -> String {
+    match error {
+        DecodeError::Read(error) => error.to_string(),
+        other => other.to_string(),
+    }
+}
+
+thread_local! {
+    static IS_GUARDED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What reads Arrow's buffers panics where a damaged message tells lengths beyond its end. That is told as damage, and by nobody
+/// else.
 fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| said(&*panic))
+    static QUIET: Once = Once::new();
+    QUIET.call_once(|| {
+        let others = take_hook();
+        set_hook(Box::new(move |panic| {
+            if !IS_GUARDED.get() {
+                others(panic);
+            }
+        }));
+    });
+    IS_GUARDED.set(true);
+    let done = catch_unwind(AssertUnwindSafe(work));
+    IS_GUARDED.set(false);
+    done.map_err(|panic| said(&*panic))
 }
 
 fn said(panic: &(dyn Any + Send)) -> String {

@@ -99,6 +99,7 @@ mod sight;
 mod sockets;
 mod solid;
 mod stage;
+mod stream;
 mod target;
 mod uncertainty;
 mod values;
