@@ -19,7 +19,7 @@ use fearless_simd::{Level, Simd, SimdBase};
 
 pub use rotor::sin_cos;
 pub use space::{Frame, Vector};
-pub use symmetric::{times, times_few, write_times};
+pub use symmetric::{add_few_squares, times, times_few, write_times};
 
 /// As many numbers as a register holds.
 pub type Lanes<S> = <S as Simd>::f64s;

@@ -146,6 +146,56 @@ fn sums_from<S: Simd, const E: usize, const W: usize>(
     }
 }
 
+/// P + c Σ x xᵀ of a few x, which stand in `columns` one behind the other, m numbers each.
+pub fn add_few_squares(level: Level, columns: &[f64], c: f64, p: &mut [f64]) {
+    let m = p.len().isqrt().max(1);
+    dispatch!(level, simd => {
+        for columns in columns.chunks(3 * m) {
+            match columns.len() / m {
+                1 => add_squares::<_, 1>(simd, columns, c, p),
+                2 => add_squares::<_, 2>(simd, columns, c, p),
+                _ => add_squares::<_, 3>(simd, columns, c, p),
+            }
+        }
+    });
+}
+
+/// Both triangles, all of them in lanes: of c xᵢ xⱼ and c xⱼ xᵢ the factors are the same two numbers but for the sign where c is ±1,
+/// so that P stays symmetric to the last bit.
+#[inline(always)]
+fn add_squares<S: Simd, const E: usize>(simd: S, columns: &[f64], c: f64, p: &mut [f64]) {
+    let (m, width) = (columns.len() / E, Lanes::<S>::LEN);
+    let whole = m / width * width;
+    // What is left of each column, in a register of its own.
+    let mut rest = [[0.0; GROUP]; E];
+    for (rest, column) in rest.iter_mut().zip(columns.chunks_exact(m)) {
+        rest[..m - whole].copy_from_slice(&column[whole..]);
+    }
+    for (index, p) in p.chunks_exact_mut(m).enumerate() {
+        let mut factors = [splat(simd, 0.0); E];
+        for (e, factor) in factors.iter_mut().enumerate() {
+            *factor = splat(simd, c * columns[e * m + index]);
+        }
+        for first in (0..whole).step_by(width) {
+            let mut sum = load(simd, p, first);
+            for (e, factor) in factors.iter().enumerate() {
+                sum = load(simd, columns, e * m + first).mul_add(*factor, sum);
+            }
+            store::<S>(sum, p, first);
+        }
+        if whole < m {
+            let mut last = [0.0; GROUP];
+            last[..m - whole].copy_from_slice(&p[whole..]);
+            let mut sum = load(simd, &last, 0);
+            for (rest, factor) in rest.iter().zip(&factors) {
+                sum = load(simd, rest, 0).mul_add(*factor, sum);
+            }
+            store::<S>(sum, &mut last, 0);
+            p[whole..].copy_from_slice(&last[..m - whole]);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::DMatrix;
@@ -173,6 +223,11 @@ mod tests {
                     assert!(apart.iter().all(|x| x.abs() < 1e-12), "{level:?} {d} {count} {m}");
                     let alone = times_few(level, h.transpose().as_slice(), p.as_slice(), m);
                     let apart = DMatrix::from_vec(m, d, alone) - &p * h.transpose();
+                    assert!(apart.iter().all(|x| x.abs() < 1e-12), "{level:?} {d} {m}");
+                    let mut more = p.clone();
+                    add_few_squares(level, h.transpose().as_slice(), -1.0, more.as_mut_slice());
+                    assert_eq!(more, more.transpose(), "{level:?} {d} {m}");
+                    let apart = more - (&p - h.tr_mul(&h));
                     assert!(apart.iter().all(|x| x.abs() < 1e-12), "{level:?} {d} {m}");
                 }
             }

@@ -30,7 +30,7 @@ use crate::{
     sensing::Rig,
 };
 
-pub(super) use slope::Slope;
+pub(super) use slope::{Shown, Slope};
 
 /// The criterion under one hypothesis.
 #[derive(Clone)]

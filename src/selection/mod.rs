@@ -14,6 +14,7 @@
 //! A policy chooses, explains and appraises, each time from the situation alone: it remembers nothing.
 
 mod active;
+mod apart;
 mod criterion;
 mod exchange;
 mod feasible;
@@ -31,6 +32,7 @@ mod planner;
 mod prediction;
 mod random;
 mod search;
+mod setting;
 mod sight;
 mod situation;
 mod sockets;

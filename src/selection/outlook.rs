@@ -21,15 +21,18 @@
 
 use std::sync::Arc;
 
+use nalgebra::DMatrix;
+
 use super::{
     Appraisal, Criterion, Optimality, SelectionError, Sight, Weights,
-    criterion::{Slope, points},
+    criterion::{Shown, Slope},
     prediction::{Predictions, told_apart},
+    setting::Setting,
     views::Views,
 };
 use crate::{
     estimation::Belief,
-    model::{Block, Element, Layout, Points, State, Workspace},
+    model::Workspace,
     parallel::{in_chunks, in_turn},
     sensing::Rig,
 };
@@ -43,38 +46,15 @@ pub struct Outlook<'a> {
     before: f64,
 }
 
-/// What the hypotheses of a belief have to do with each other and with what is measured, whatever their covariances.
-pub(super) struct Setting {
-    /// By hypothesis: the points that are measured, where nothing else is.
-    points: Vec<Option<Arc<Points>>>,
-    /// Pairs of hypotheses, and πⱼ πₖ ‖xⱼ − xₖ‖²_W.
-    pairs: Vec<(usize, usize, f64)>,
-}
-
-impl Setting {
-    /// Of `belief`.
-    pub fn new(belief: &Belief, weights: &Weights, optimality: Optimality, workspace: &Workspace) -> Self {
-        let others = belief.alternatives.iter().map(|alternative| (alternative.weight, &alternative.state));
-        let hypotheses: Vec<(f64, &State)> = std::iter::once((belief.weight(), &belief.state)).chain(others).collect();
-        let mut pairs = Vec::new();
-        for (k, (weight, state)) in hypotheses.iter().enumerate() {
-            for (j, (other_weight, other)) in hypotheses[..k].iter().enumerate() {
-                let distance = match optimality {
-                    Optimality::A | Optimality::E => squared_distance(other, state, &belief.layout, weights),
-                    Optimality::I => apart(other, state, workspace),
-                    Optimality::D => 1.0,
-                };
-                pairs.push((j, k, other_weight * weight * distance));
-            }
-        }
-        if optimality == Optimality::D {
-            // Which hypothesis holds is worth the entropy of the weights, in shares of the pairs.
-            let entropy: f64 = hypotheses.iter().map(|(weight, _)| -weight * weight.max(f64::MIN_POSITIVE).ln()).sum();
-            let sum: f64 = pairs.iter().map(|pair| pair.2).sum();
-            pairs.iter_mut().filter(|_| sum > 0.0).for_each(|pair| pair.2 *= entropy / sum);
-        }
-        Self { points: hypotheses.iter().map(|(_, state)| points(belief, state)).collect(), pairs }
-    }
+/// What is expected of one movement.
+#[derive(Default)]
+pub(super) struct Expected {
+    /// By hypothesis the chance that it is seen.
+    pub chances: Vec<f64>,
+    /// By pair of hypotheses how far it tells them apart, B.
+    pub told: Vec<f64>,
+    /// By hypothesis Hᵀ, whitened, where that is known already.
+    pub rows: Option<Vec<DMatrix<f64>>>,
 }
 
 impl<'a> Outlook<'a> {
@@ -135,18 +115,26 @@ impl<'a> Outlook<'a> {
         self
     }
 
-    /// The chance of being seen under every hypothesis, and B of every pair, at one candidate.
-    pub(super) fn expectations(&self, candidate: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    /// What is expected of one candidate.
+    pub(super) fn expectations(&self, candidate: &[f64]) -> Expected {
+        let certain = || vec![1.0; self.hypotheses.len()];
         if self.pairs.is_empty() && self.hypotheses.iter().all(|(_, criterion)| criterion.sees_all()) {
-            return (vec![1.0; self.hypotheses.len()], Vec::new());
+            return Expected { chances: certain(), ..Expected::default() };
+        }
+        let shown = self.hypotheses.iter().map(|(_, criterion)| criterion.shown(candidate));
+        if let Some(shown) = shown.collect::<Option<Vec<Shown<'_>>>>() {
+            let distance = |&(j, k, _): &(usize, usize, f64)| shown[j].distance(&shown[k], self.rig);
+            let told = self.pairs.iter().map(|pair| distance(pair).min(-CONFUSED.ln())).collect();
+            return Expected { chances: certain(), told, rows: Some(shown.iter().map(Shown::rows).collect()) };
         }
         let predicted = self.predictions(&[candidate]);
         let told = self.pairs.iter().map(|&(j, k, _)| {
             let chance = 0.5 * (predicted[j].chance(0) + predicted[k].chance(0));
             let told = told_apart(self.rig, &predicted[j], &predicted[k], 0);
-            -(-(chance * told).min(1.0 - 1e-12)).ln_1p()
+            -(-(chance * told).min(1.0 - CONFUSED)).ln_1p()
         });
-        (predicted.iter().map(|prediction| prediction.chance(0)).collect(), told.collect())
+        let chances = predicted.iter().map(|prediction| prediction.chance(0)).collect();
+        Expected { chances, told: told.collect(), rows: None }
     }
 
     /// The same where a head watches.
@@ -240,31 +228,11 @@ impl<'a> Outlook<'a> {
     }
 }
 
+/// The chance that two hypotheses are confused after one movement is never less.
+const CONFUSED: f64 = 1e-12;
 /// What is left between two hypotheses that a plan will have told apart counts for nothing, below this share of the criterion:
 /// rounding is a hundred times as much.
 const SPENT: f64 = 1e-18;
-
-/// ‖x − x'‖²_W: squared angles between directions and rotations, squared distances between points and of plain numbers,
-/// weighted like tangent coordinates.
-fn squared_distance(a: &State, b: &State, layout: &Layout, weights: &Weights) -> f64 {
-    let of_block = |(block, range): (Block, std::ops::Range<usize>)| match (block.of(a), block.of(b)) {
-        (Element::Axis(a), Element::Axis(b)) => {
-            let turned = weights.of(range.end - 1) * a.direction().angle(&b.direction()).powi(2);
-            let moved = a.line().zip(b.line()).map_or(0.0, |(a, b)| (a.point - b.point).norm_squared());
-            turned + weights.of(range.start) * moved
-        }
-        (a, b) => {
-            let apart = a.local(&b).unwrap_or_default();
-            apart.iter().zip(range).map(|(x, coordinate)| weights.of(coordinate) * x * x).sum()
-        }
-    };
-    layout.blocks().map(of_block).sum()
-}
-
-/// Mean squared distance of predicted markers over the workspace, m².
-fn apart(a: &State, b: &State, workspace: &Workspace) -> f64 {
-    workspace.distance(&workspace.points(a), &workspace.points(b)).map_or(0.0, |(rms, _)| rms * rms)
-}
 
 #[cfg(test)]
 mod tests {
@@ -277,7 +245,7 @@ mod tests {
     use super::*;
     use crate::{
         estimation::Alternative,
-        model::laws::random_arm,
+        model::{Layout, laws::random_arm},
         selection::{CriterionUnits, plan::Plan},
     };
 
@@ -315,6 +283,38 @@ mod tests {
         }
     }
 
+    fn rivals(belief: &Belief) -> Vec<Alternative> {
+        let covariance = belief.covariance.as_ref().expect("kept") * 0.01;
+        let rival = |by: f64| {
+            let state = belief.state.retract(&belief.layout, &DVector::from_element(belief.layout.dimension(), by));
+            Alternative { weight: 0.3, state, covariance: covariance.clone() }
+        };
+        [0.02, -0.1].map(rival).to_vec()
+    }
+
+    /// What a plan expects of points is what predictions of any sensor say.
+    #[test]
+    fn points_are_expected_as_any_reading_is() {
+        for seed in 0..5 {
+            let (mut belief, weights, candidates) = case(seed);
+            belief.alternatives = rivals(&belief);
+            let outlook = Outlook::new(&belief, &weights, Optimality::A, &Workspace::default()).expect("a covariance");
+            for theta in &candidates[..8] {
+                let Expected { chances, told, rows } = outlook.expectations(theta);
+                assert_eq!((chances.as_slice(), told.len()), (&[1.0; 3][..], 3));
+                let predicted = outlook.predictions(&[theta]);
+                for (&(j, k, _), told) in outlook.pairs.iter().zip(told) {
+                    let confused = 1.0 - told_apart(outlook.rig, &predicted[j], &predicted[k], 0);
+                    assert!(((-told).exp() - confused).abs() < 1e-9, "{told} {confused}");
+                }
+                let states = [&belief.state, &belief.alternatives[0].state, &belief.alternatives[1].state];
+                for (state, rows) in states.into_iter().zip(rows.expect("of points")) {
+                    assert!((rows - belief.rig.jacobian(state, &belief.layout, theta)).amax() < 1e-9);
+                }
+            }
+        }
+    }
+
     /// The derivative by every joint is that of central differences, with and without rivals; criterion E has none.
     #[test]
     fn gradients_are_those_of_central_differences() {
@@ -324,15 +324,7 @@ mod tests {
             let (mut belief, weights, candidates) = case(seed);
             let workspace = Workspace::from(candidates.clone());
             if seed % 2 == 1 {
-                let covariance = belief.covariance.as_ref().expect("kept") * 0.01;
-                let moved = |by: f64| DVector::from_element(belief.layout.dimension(), by);
-                belief.alternatives = [0.02, -0.1]
-                    .map(|by| Alternative {
-                        weight: 0.3,
-                        state: belief.state.retract(&belief.layout, &moved(by)),
-                        covariance: covariance.clone(),
-                    })
-                    .to_vec();
+                belief.alternatives = rivals(&belief);
             }
             let outlook = Outlook::new(&belief, &weights, optimality, &workspace).expect("a covariance");
             for theta in &candidates[..5] {
@@ -366,7 +358,7 @@ mod tests {
             let now = Plan::new(&belief, 4);
             let mut plan = now.clone();
             for theta in &candidates[..5] {
-                plan.add(theta.clone(), vec![0.8], Vec::new());
+                plan.add(theta.clone(), Expected { chances: vec![0.8], ..Expected::default() });
             }
             let trace = |plan: &Plan| weights.trace(plan.after.covariance.as_ref().expect("kept"));
             assert!(trace(&plan) < trace(&now));

@@ -15,11 +15,13 @@
 
 use std::sync::Arc;
 
+use fearless_simd::Level;
 use nalgebra::{Cholesky, DMatrix};
 
-use super::{SelectionError, Weights};
+use super::{SelectionError, Weights, outlook::Expected};
 use crate::{
     estimation::{Alternative, Belief},
+    lanes::{add_few_squares, times_few},
     model::rank,
 };
 
@@ -72,9 +74,10 @@ impl Plan {
         Ok(eigenvalues.iter().filter(|value| **value > unknown * unknown).count())
     }
 
-    /// Adds a pose that each hypothesis expects to be seen with these chances, and that tells pairs apart by `told`.
-    pub fn add(&mut self, pose: Vec<f64>, chances: Vec<f64>, told: Vec<f64>) {
-        let rows: Arc<[DMatrix<f64>]> = jacobians(&self.after, &pose).into();
+    /// Adds a pose of which this is expected.
+    pub fn add(&mut self, pose: Vec<f64>, expected: Expected) {
+        let Expected { chances, told, rows } = expected;
+        let rows: Arc<[DMatrix<f64>]> = rows.unwrap_or_else(|| jacobians(&self.after, &pose)).into();
         self.each(&rows, &chances, 1.0);
         self.poses.push(pose);
         self.chances.push(chances);
@@ -127,9 +130,9 @@ fn jacobians(belief: &Belief, pose: &[f64]) -> Vec<DMatrix<f64>> {
 fn by_rows(belief: &mut Belief, rows: &[DMatrix<f64>], weight: impl Fn(usize) -> f64) -> bool {
     let Belief { covariance, alternatives, .. } = belief;
     let others = alternatives.iter_mut().map(|Alternative { covariance, .. }| Some(covariance));
-    let mut sound = true;
+    let (level, mut sound) = (Level::new(), true);
     for (index, (covariance, rows)) in std::iter::once(covariance.as_mut()).chain(others).zip(rows).enumerate() {
-        sound &= covariance.is_none_or(|covariance| update(covariance, rows, weight(index)));
+        sound &= covariance.is_none_or(|covariance| update(level, covariance, rows, weight(index)));
     }
     sound
 }
@@ -140,23 +143,28 @@ const SOUND: f64 = 1e-6;
 
 /// P ← (P⁻¹ + c HᵀH)⁻¹ = P − P Hᵀ (I/c + H P Hᵀ)⁻¹ H P, for c < 0 a downdate; as it was, where c is nothing. False where a
 /// downdate would cancel what is known.
-fn update(covariance: &mut DMatrix<f64>, rows: &DMatrix<f64>, c: f64) -> bool {
+fn update(level: Level, covariance: &mut DMatrix<f64>, rows: &DMatrix<f64>, c: f64) -> bool {
     if c.abs() < 1e-9 {
         return true;
     }
-    let numerator = &*covariance * rows;
+    let (m, d) = rows.shape();
+    let numerator = DMatrix::from_vec(m, d, times_few(level, rows.as_slice(), covariance.as_slice(), m));
     let spread = rows.tr_mul(&numerator);
-    let identity = DMatrix::identity(rows.ncols(), rows.ncols());
-    let middle = (identity / c + (&spread + spread.transpose()) * 0.5) * c.signum();
+    let middle = (DMatrix::identity(d, d) / c + (&spread + spread.transpose()) * 0.5) * c.signum();
     let Some(cholesky) = Cholesky::new(middle) else { return false };
-    if c < 0.0 && cholesky.l_dirty().diagonal().iter().any(|x| x * x < SOUND) {
+    let l = cholesky.l_dirty();
+    if c < 0.0 && l.diagonal().iter().any(|x| x * x < SOUND) {
         return false;
     }
-    // With L Lᵀ = ±(I/c + H P Hᵀ), what P loses or gains is a square: of P Hᵀ L⁻ᵀ.
-    let Some(root) = cholesky.l_dirty().solve_lower_triangular(&numerator.transpose()) else { return false };
-    for column in root.transpose().column_iter() {
-        covariance.syger(-c.signum(), &column, &column, 1.0);
+    // With L Lᵀ = ±(I/c + H P Hᵀ), what P loses or gains is a square: of X = P Hᵀ L⁻ᵀ, column by column.
+    let mut root = numerator;
+    for k in 0..d {
+        for before in 0..k {
+            let (found, mut column) = root.columns_range_pair_mut(before, k);
+            column.axpy(-l[(k, before)], &found, 1.0);
+        }
+        root.column_mut(k).scale_mut(1.0 / l[(k, k)]);
     }
-    covariance.fill_upper_triangle_with_lower_triangle();
+    add_few_squares(level, root.as_slice(), -c.signum(), covariance.as_mut_slice());
     true
 }

@@ -11,8 +11,8 @@ use super::{
     SelectionError, Sight, Situation, Watch, Weights,
     held::{evaluate, held_by},
     herding::herd,
-    outlook::Setting,
     plan::Plan,
+    setting::Setting,
     views::Views,
 };
 use crate::{
@@ -125,7 +125,7 @@ impl Planner {
         let scene = Scene::new(self, situation, limits);
         let outlook = scene.outlook(&scene.now)?;
         let drawn = (0..DRAWS).map(|_| scope.draw(searched, rng)).collect::<Result<Vec<_>, _>>()?;
-        let is_seen = |pose: &&Vec<f64>| outlook.expectations(pose).0.first().is_none_or(|chance| *chance >= 0.5);
+        let is_seen = |pose: &&Vec<f64>| outlook.expectations(pose).chances.first().is_none_or(|chance| *chance >= 0.5);
         let seen: Vec<&Vec<f64>> = drawn.iter().filter(is_seen).collect();
         match herd(&seen, &drawn, situation.history.made()) {
             Some(index) => {
@@ -220,8 +220,8 @@ impl<'a> Scene<'a> {
     }
 
     fn add(&self, plan: &mut Plan, pose: Vec<f64>) -> Result<(), SelectionError> {
-        let (chances, told) = self.outlook(plan)?.expectations(&pose);
-        plan.add(pose, chances, told);
+        let expected = self.outlook(plan)?.expectations(&pose);
+        plan.add(pose, expected);
         Ok(())
     }
 

@@ -5,9 +5,10 @@
 //! [`innovation`](super::innovation)).
 
 use fearless_simd::{Level, dispatch};
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Point3, Vector3};
+use nalgebra::{Cholesky, DMatrix, Matrix3, Point3};
 
 use super::{
+    apart::{bhattacharyya, share},
     innovation::{place, products, traces},
     views::Views,
 };
@@ -190,30 +191,10 @@ impl Predictions {
     }
 }
 
-/// From this distance on, what two hypotheses are confused by is lost in rounding.
-const FAR_APART: f64 = 40.0;
-
-/// 1 − e^{−B}.
-fn share(distance: f64) -> f64 {
-    if distance > FAR_APART { 1.0 } else { -(-distance).exp_m1() }
-}
-
 /// 1 − e^{−B} of two hypotheses that predict a candidate, with B the Bhattacharyya distance of their readings.
 pub(super) fn told_apart(rig: &Rig, a: &Predictions, b: &Predictions, index: usize) -> f64 {
-    let d = a.equations;
     let (in_a, in_b) = (a.spread(index), b.spread(index));
-    let mean = |row: usize, column: usize| {
-        0.5 * (in_a(row, column) + in_b(row, column)) + if row == column { 1.0 } else { 0.0 }
-    };
-    if d == 3 {
-        let mut difference = [0.0; 3];
-        rig.difference(a.reading(index), b.reading(index), &mut difference);
-        let difference = Vector3::from(difference);
-        let s = Matrix3::from_fn(mean).cholesky();
-        return s.map_or(0.0, |s| share(0.125 * difference.dot(&s.solve(&difference))));
-    }
-    let mut difference = DVector::zeros(d);
-    rig.difference(a.reading(index), b.reading(index), difference.as_mut_slice());
-    let s = Cholesky::new(DMatrix::from_fn(d, d, mean));
-    s.map_or(0.0, |s| share(0.125 * difference.dot(&s.solve(&difference))))
+    let mean = |row: usize, column: usize| 0.5 * (in_a(row, column) + in_b(row, column));
+    let distance = bhattacharyya(rig, [a.reading(index), b.reading(index)], mean, |distance, _| distance);
+    distance.map_or(0.0, share)
 }

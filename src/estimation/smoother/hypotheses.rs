@@ -47,13 +47,19 @@ const NEGLIGIBLE: f64 = 1e-5;
 const HOPELESS: f64 = 40.0;
 
 const WARM: Effort<'_> = Effort { steps: 30, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
+/// Of what is not the estimate its share of the evidence is what counts.
+const RIVAL: Effort<'_> = Effort { tolerance: 1e-3, ..WARM };
 /// What is found is followed after the next measurement: until then its share of the evidence is known to a hundredth.
 const COLD: Effort<'_> = Effort { steps: 40, tolerance: 1e-2, hopeless: f64::INFINITY, known: &[] };
 
 impl Hypotheses {
     /// Searches every mode again after the posterior has changed.
     pub fn follow(&mut self, posterior: &Posterior, layout: &Layout) {
-        let found = mapped(&self.modes, |mode| posterior.mode(&mode.state, layout, WARM));
+        let best = self.modes.iter().map(|mode| mode.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+        let found = mapped(&self.modes, |mode| {
+            let effort = if mode.log_evidence < best { RIVAL } else { WARM };
+            posterior.mode(&mode.state, layout, effort)
+        });
         self.modes = found.into_iter().flatten().collect();
     }
 

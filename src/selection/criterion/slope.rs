@@ -12,28 +12,56 @@
 //! ∂B/∂hⱼ = ¼ u,     ∂B/∂Hⱼ = −⅛ u uᵀ Gⱼ
 //! ```
 //!
-//! with hⱼ, and likewise with hₖ. [`Posture`] carries these back to the joints.
+//! with hⱼ, and likewise with hₖ. What multiplies G is summed first. [`Posture`] carries these back to the joints.
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::Criterion;
-use crate::{lanes::times_few, model::Posture, selection::Optimality, sensing::Rig};
+use crate::{
+    lanes::times_few,
+    model::Posture,
+    selection::{
+        Optimality,
+        apart::{bhattacharyya, share},
+    },
+    sensing::Rig,
+};
 
-/// One posture under one hypothesis: what is predicted, and how a value changes with that.
-pub(in crate::selection) struct Slope<'a> {
+/// What one posture shows under one hypothesis.
+pub(in crate::selection) struct Shown<'a> {
     posture: Posture<'a>,
-    /// What seeing the movement gains.
-    gain: f64,
     /// Gᵀ, m × d.
     gains: DMatrix<f64>,
     /// H P Hᵀ.
     spread: DMatrix<f64>,
+}
+
+/// The same, and how a value changes with that.
+pub(in crate::selection) struct Slope<'a> {
+    shown: Shown<'a>,
+    /// What seeing the movement gains.
+    gain: f64,
     by_readings: DVector<f64>,
-    /// m × d.
+    /// How the value changes with Hᵀ (m × d), but for Gᵀ times the next.
     by_rows: DMatrix<f64>,
+    /// d × d.
+    by_gains: DMatrix<f64>,
 }
 
 impl Criterion<'_> {
+    /// What a posture shows; `None` where something else than points is measured, or something may stay unseen.
+    pub(in crate::selection) fn shown(&self, posture: &[f64]) -> Option<Shown<'_>> {
+        let posture = self.points.as_ref().filter(|_| self.sees_all())?.at(posture);
+        let gains = self.times(posture.readings().len(), posture.rows(), self.covariance);
+        let spread = DMatrixView::from_slice(posture.rows(), gains.nrows(), gains.ncols()).tr_mul(&gains);
+        Some(Shown { posture, gains, spread })
+    }
+
+    /// A symmetric matrix times d columns.
+    fn times(&self, d: usize, columns: &[f64], by: &DMatrix<f64>) -> DMatrix<f64> {
+        DMatrix::from_vec(by.nrows(), d, times_few(self.level, columns, by.as_slice(), by.nrows()))
+    }
+
     /// Whether [`slope`](Self::slope) tells derivatives: everything is seen, points are measured, and they are known.
     pub(in crate::selection) fn has_slope(&self) -> bool {
         self.points.is_some() && self.sees_all() && self.optimality != Optimality::E
@@ -42,28 +70,46 @@ impl Criterion<'_> {
     /// Of −`weight` times what seeing the movement to a posture gains; `None` without [derivatives](Self::has_slope), or where the
     /// gain is no number.
     pub(in crate::selection) fn slope(&self, weight: f64, posture: &[f64]) -> Option<Slope<'_>> {
-        let posture = self.points.as_ref().filter(|_| self.has_slope())?.at(posture);
-        let (m, d) = (self.covariance.nrows(), posture.readings().len());
-        let times =
-            |rows: &[f64], by: &DMatrix<f64>| DMatrix::from_vec(m, d, times_few(self.level, rows, by.as_slice(), m));
-        let gains = times(posture.rows(), self.covariance);
-        let spread = DMatrixView::from_slice(posture.rows(), m, d).tr_mul(&gains);
-        let cholesky = (&spread + DMatrix::identity(d, d)).cholesky()?;
+        if !self.has_slope() {
+            return None;
+        }
+        let shown = self.shown(posture)?;
+        let Shown { gains, spread, .. } = &shown;
+        let (m, d) = gains.shape();
+        let cholesky = (spread + DMatrix::identity(d, d)).cholesky()?;
         let inverse = cholesky.inverse();
         let weighed = match (self.optimality, &self.metric) {
             (Optimality::D, _) => None,
-            (_, Some(metric)) => Some(times(gains.as_slice(), metric)),
-            (_, None) => Some(self.weights.scale(&gains)),
+            (_, Some(metric)) => Some(self.times(d, gains.as_slice(), metric)),
+            (_, None) => Some(self.weights.scale(gains)),
         };
-        let (gain, by_rows) = match weighed {
+        let (gain, by_rows, by_gains) = match weighed {
             Some(weighed) => {
-                let leverage = &inverse * weighed.tr_mul(&gains);
-                let by_rows = times(weighed.as_slice(), self.covariance) - &gains * &leverage;
-                (leverage.trace(), by_rows * inverse * (-2.0 * weight))
+                let leverage = &inverse * weighed.tr_mul(gains);
+                let by_rows = self.times(d, weighed.as_slice(), self.covariance) * &inverse * (-2.0 * weight);
+                (leverage.trace(), by_rows, leverage * inverse * (2.0 * weight))
             }
-            None => (cholesky.ln_determinant() * 0.5, &gains * inverse * -weight),
+            None => (cholesky.ln_determinant() * 0.5, DMatrix::zeros(m, d), inverse * -weight),
         };
-        gain.is_finite().then(|| Slope { posture, gain, gains, spread, by_readings: DVector::zeros(d), by_rows })
+        gain.is_finite().then(|| Slope { shown, gain, by_readings: DVector::zeros(d), by_rows, by_gains })
+    }
+}
+
+impl Shown<'_> {
+    /// Hᵀ, whitened, m × d.
+    pub fn rows(&self) -> DMatrix<f64> {
+        DMatrix::from_column_slice(self.gains.nrows(), self.gains.ncols(), self.posture.rows())
+    }
+
+    /// How far this and what another hypothesis predicts of the same posture are apart, B.
+    pub fn distance(&self, other: &Self, rig: &Rig) -> f64 {
+        self.apart(other, rig, |distance, _| distance).unwrap_or(0.0)
+    }
+
+    /// What is made of B, and of u.
+    fn apart<T>(&self, other: &Self, rig: &Rig, found: impl FnOnce(f64, &[f64]) -> T) -> Option<T> {
+        let mean = |row: usize, column: usize| 0.5 * (self.spread[(row, column)] + other.spread[(row, column)]);
+        bhattacharyya(rig, [self.posture.readings(), other.posture.readings()], mean, found)
     }
 }
 
@@ -75,24 +121,19 @@ impl Slope<'_> {
 
     /// How far these hypotheses are told apart, 1 − e^{−B}; adds −`weight` times that to what both stand for.
     pub fn tell_apart(&mut self, other: &mut Self, rig: &Rig, weight: f64) -> f64 {
-        let d = self.by_readings.len();
-        let mut apart = DVector::zeros(d);
-        rig.difference(self.posture.readings(), other.posture.readings(), apart.as_mut_slice());
-        let mean = (&self.spread + &other.spread) * 0.5 + DMatrix::identity(d, d);
-        let Some(cholesky) = mean.cholesky() else { return 0.0 };
-        let u = cholesky.solve(&apart);
-        let distance = 0.125 * apart.dot(&u);
+        let found = self.shown.apart(&other.shown, rig, |distance, u| (distance, DVector::from_column_slice(u)));
+        let Some((distance, u)) = found else { return 0.0 };
         let weight = weight * (-distance).exp();
         for (of, sign) in [(self, 1.0), (other, -1.0)] {
             of.by_readings.axpy(-0.25 * sign * weight, &u, 1.0);
-            let leaning = &of.gains * &u;
-            of.by_rows.ger(0.125 * weight, &leaning, &u, 1.0);
+            of.by_gains.ger(0.125 * weight, &u, &u, 1.0);
         }
-        -(-distance).exp_m1()
+        share(distance)
     }
 
     /// Adds the derivative by every joint's reading.
     pub fn add_to(&self, gradient: &mut [f64]) {
-        self.posture.add_slope((self.by_readings.as_slice(), self.by_rows.as_slice()), gradient);
+        let by_rows = &self.by_rows + &self.shown.gains * &self.by_gains;
+        self.shown.posture.add_slope((self.by_readings.as_slice(), by_rows.as_slice()), gradient);
     }
 }

@@ -1,0 +1,37 @@
+//! How far a movement tells two hypotheses apart: by the Bhattacharyya distance of the readings that they predict, of which the
+//! [outlook](super::Outlook) tells what it is for.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use crate::sensing::Rig;
+
+/// From this distance on, what two hypotheses are confused by is lost in rounding.
+const FAR_APART: f64 = 40.0;
+
+/// 1 − e^{−B}.
+pub(super) fn share(distance: f64) -> f64 {
+    if distance > FAR_APART { 1.0 } else { -(-distance).exp_m1() }
+}
+
+/// What is made of B = ⅛ δᵀ S̄⁻¹ δ and of u = S̄⁻¹ δ, by the readings that two hypotheses predict, δ apart, and the mean of their
+/// H P Hᵀ, entry by entry; `None` where S̄ is not positive.
+pub(super) fn bhattacharyya<T>(
+    rig: &Rig,
+    readings: [&[f64]; 2],
+    spread: impl Fn(usize, usize) -> f64,
+    found: impl FnOnce(f64, &[f64]) -> T,
+) -> Option<T> {
+    let mean = |row: usize, column: usize| spread(row, column) + if row == column { 1.0 } else { 0.0 };
+    let d = readings[0].len();
+    // Most often a point in space.
+    if d == 3 {
+        let mut apart = Vector3::zeros();
+        rig.difference(readings[0], readings[1], apart.as_mut_slice());
+        let u = Matrix3::from_fn(mean).cholesky()?.solve(&apart);
+        return Some(found(0.125 * apart.dot(&u), u.as_slice()));
+    }
+    let mut apart = DVector::zeros(d);
+    rig.difference(readings[0], readings[1], apart.as_mut_slice());
+    let u = DMatrix::from_fn(d, d, mean).cholesky()?.solve(&apart);
+    Some(found(0.125 * apart.dot(&u), u.as_slice()))
+}
