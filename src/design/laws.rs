@@ -75,15 +75,20 @@ proptest! {
             let wanted = problem.information(pose).dot(&s);
             prop_assert!((phi - wanted).abs() <= 1e-10 * wanted, "{phi} {wanted}");
             for (joint, slope) in slopes.iter().enumerate() {
-                let step = 1e-4;
-                let moved = [1.0, -1.0, 2.0, -2.0].map(|steps| {
-                    let mut moved = pose.clone();
-                    moved[joint] += steps * step;
-                    moved
-                });
-                let values = sensitivity.values(&s, &moved);
-                let wanted = (8.0 * (values[0] - values[1]) - (values[2] - values[3])) / (12.0 * step);
-                prop_assert!((slope - wanted).abs() <= 1e-6 * phi.max(slope.abs()), "{joint}: {slope} {wanted} {phi}");
+                let difference = |step: f64| {
+                    let moved = [1.0, -1.0, 2.0, -2.0].map(|steps| {
+                        let mut moved = pose.clone();
+                        moved[joint] += steps * step;
+                        moved
+                    });
+                    let values = sensitivity.values(&s, &moved);
+                    (8.0 * (values[0] - values[1]) - (values[2] - values[3])) / (12.0 * step)
+                };
+                let (coarse, fine) = (difference(1e-4), difference(5e-5));
+                // Beside a camera's plane of no image differences leave out more than elsewhere, of rows as of what is asked here.
+                let left_out = 4.0 * (coarse - fine).abs();
+                let apart = (slope - coarse).abs();
+                prop_assert!(apart <= 1e-6 * phi.max(slope.abs()) + left_out, "{joint}: {slope} {coarse} {fine} {phi}");
             }
         }
     }

@@ -198,6 +198,56 @@ fn an_absurd_reading_ends_nobody() {
     }
 }
 
+/// `arm-6dof` with one thing changed.
+fn changed_arm(from: &str, to: &str) -> Scenario {
+    let text = include_str!("../../scenarios/arm-6dof.toml");
+    let changed = text.replacen(from, to, 1);
+    assert_ne!(changed, text);
+    Scenario::parse("arm.toml", &changed, &|_| Err("no data".into())).expect("a scenario")
+}
+
+/// At a rate that is far too large the gradient leaves all bounds at once: it says so, and the others learn as without it.
+#[test]
+fn a_learner_that_diverges_says_so_and_the_others_go_on() {
+    let end = |scenario: &Scenario| {
+        let learners = ["random", "gradient", "active"].map(str::to_owned);
+        let mut experiment = scenario.experiment(1001, Some(&learners)).expect("an experiment");
+        for _ in 0..8 {
+            experiment.step().expect("a step");
+        }
+        experiment.latest().learners.clone()
+    };
+    let (well, badly) = (end(&builtin("arm-6dof").expect("built in")), end(&changed_arm("rate = 0.3", "rate = 1e9")));
+    for (well, badly) in well.iter().zip(&badly) {
+        assert!(badly.metrics.prediction_mean_m.is_some_and(f64::is_finite), "{badly:?}");
+        let diverged = badly.failure.as_deref().filter(|why| why.contains("diverged") && why.contains("rate"));
+        assert_eq!(diverged.is_some(), badly.name == "gradient", "{badly:?}");
+        if badly.failure.is_none() {
+            assert_eq!((badly.metrics.movements, &badly.metrics), (8, &well.metrics));
+        }
+    }
+}
+
+/// Two joints on one line, of which nobody can tell whose angle is whose, and a marker that the last joint does not move.
+#[test]
+fn degenerate_arms_end_nobody() {
+    for (from, to) in [
+        ("axis = [0.0, 1.0, 0.0]\npoint_m = [0.0, 0.0, 0.0]", "axis = [0.0, 0.0, 1.0]\npoint_m = [0.0, 0.0, 0.3]"),
+        ("marker_m = [0.66, 0.02, 0.05]", "marker_m = [0.56, 0.1, 0.0]"),
+    ] {
+        let learners = ["active", "unscented", "global"].map(str::to_owned);
+        let mut experiment = changed_arm(from, to).experiment(1001, Some(&learners)).expect("an experiment");
+        for _ in 0..15 {
+            for learner in &experiment.step().expect("a step").learners {
+                let (name, metrics) = (&learner.name, &learner.metrics);
+                assert!(learner.failure.is_none(), "{name}: {:?}", learner.failure);
+                let told = [metrics.prediction_mean_m, metrics.expected_prediction_m, metrics.trace];
+                assert!(told.iter().all(|number| number.is_some_and(f64::is_finite)), "{name}: {told:?}");
+            }
+        }
+    }
+}
+
 /// Two proposals at once are two movements.
 #[test]
 fn proposals_are_chosen_given_the_pending_ones() {
