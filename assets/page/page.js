@@ -338,6 +338,7 @@ function nameTextAgents() {
 
 // Keys pressed in the panel's canvas are its own; all others that mean something to it are passed on, and the viewer gets
 // none: each of them would take the scene apart.
+// As long as the viewer starts, it has the focus without the visitor's doing: there is nothing to leave by Escape yet.
 function onKey(event) {
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   const { target } = event;
@@ -346,7 +347,7 @@ function onKey(event) {
   const held = event.ctrlKey || event.metaKey || event.altKey;
   if (scene) event.stopImmediatePropagation();
   if (panel === null || event.type !== "keydown" || held) return;
-  if (key === "F6" || (scene && key === "Escape")) {
+  if (key === "F6" || (scene && viewer !== null && key === "Escape")) {
     if (scene) controls.focus();
     else element("viewer").focus();
     event.preventDefault();

@@ -4,6 +4,7 @@ use crate::{
     Server,
     axe::serious_findings,
     driver::Browser,
+    pointer::CONTROLS,
     visits::{ESCAPE, SHIFT, SPACE},
 };
 
@@ -103,5 +104,27 @@ pub async fn visit(page: &Browser, server: Server) {
         page.scheme(scheme).await;
         assert_eq!(serious_findings(page).await, Vec::<String>::new(), "{scheme}");
     }
+    closes_the_card_while_the_scene_starts(page, &server).await;
     server.stop().await;
+}
+
+/// The viewer has the focus as long as it starts, which nobody gave it: Escape closes the card all the same.
+async fn closes_the_card_while_the_scene_starts(page: &Browser, server: &Server) {
+    page.run("localStorage.clear()").await;
+    page.open(&server.at("")).await;
+    // Its WebAssembly never comes.
+    page.run(
+        "const fetched = fetch; const held = document.getElementById('viewer-wasm').dataset.address;
+        window.fetch = (what, how) => String(what).includes(held) ? new Promise(() => {}) : fetched(what, how)",
+    )
+    .await;
+    let has_card = format!("{CONTROLS}.includes('1 of 5')");
+    page.wait_for("the card", &has_card).await;
+    page.run("const viewer = document.getElementById('viewer'); viewer.tabIndex = 0; viewer.focus()").await;
+    assert_eq!(
+        (page.focus().await, page.evaluate("document.getElementById('cover').hidden").await),
+        ("viewer".to_owned(), false.into())
+    );
+    page.press(ESCAPE).await;
+    page.wait_for("no card", &format!("!{has_card}")).await;
 }
