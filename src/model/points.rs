@@ -312,15 +312,21 @@ impl Points {
 }
 
 impl Turn {
+    /// Whether the sine and the cosine of the reading count.
+    fn needs_sine(&self) -> bool {
+        let Correction { sine, cosine, .. } = self.correction;
+        let is_of_sine = |(_, term): &(usize, Term)| matches!(term, Term::Sine | Term::Cosine);
+        sine != 0.0 || cosine != 0.0 || self.terms.iter().any(is_of_sine)
+    }
+
     /// Turns or slides a joint's frame, which is before the joint, to a reading.
     #[inline(always)]
     fn turn<S: Simd>(&self, reading: Lanes<S>, frame: &mut Frame<S>, pivot: &mut Vector<S>) -> Turned<S> {
         let simd = reading.token();
         let Correction { offset, ratio, sine, cosine, .. } = self.correction;
         let mut theta = reading.mul_add(splat(simd, ratio), splat(simd, offset));
-        let needs_sine = |(_, term): &(usize, Term)| matches!(term, Term::Sine | Term::Cosine);
         let mut of_reading = [reading; 3];
-        if sine != 0.0 || cosine != 0.0 || self.terms.iter().any(needs_sine) {
+        if self.needs_sine() {
             let (sin, cos) = sin_cos::<S>(reading);
             of_reading = [reading, sin, cos];
             theta = sin.mul_add(splat(simd, sine), cos.mul_add(splat(simd, cosine), theta));

@@ -100,17 +100,45 @@ impl Plan {
         pose
     }
 
+    /// tr(W P) in the mean over the hypotheses if a pose were taken out of the plan; `None` where too much would cancel.
+    pub fn trace_without(&self, index: usize, weights: &Weights) -> Option<f64> {
+        let estimate = self.after.covariance.iter().map(|covariance| (self.after.weight(), covariance));
+        let others = self.after.alternatives.iter();
+        let hypotheses = estimate.chain(others.map(|alternative| (alternative.weight, &alternative.covariance)));
+        let (level, often) = (Level::new(), counted(&self.chances[index], -1.0));
+        let without = |(index, ((share, covariance), rows)): (usize, ((f64, &DMatrix<f64>), &DMatrix<f64>))| {
+            let c = often(index);
+            let gained = if c.abs() < NOTHING { 0.0 } else { weights.squares(&root(level, covariance, rows, c)?) };
+            Some(share * (weights.trace(covariance) + gained))
+        };
+        hypotheses.zip(self.rows[index].iter()).enumerate().map(without).sum()
+    }
+
     /// Σ B over the poses of the plan, by pair.
     pub fn told(&self) -> Vec<f64> {
+        self.told_but(None)
+    }
+
+    /// The same without one of the poses.
+    pub fn told_without(&self, index: usize) -> Vec<f64> {
+        self.told_but(Some(index))
+    }
+
+    fn told_but(&self, left_out: Option<usize>) -> Vec<f64> {
         let pairs = self.told.first().map_or(0, Vec::len);
-        (0..pairs).map(|pair| self.told.iter().map(|told| told[pair]).sum()).collect()
+        let counted = || self.told.iter().enumerate().filter(|(index, _)| Some(*index) != left_out);
+        (0..pairs).map(|pair| counted().map(|(_, told)| told[pair]).sum()).collect()
     }
 
     /// The update (sign 1) or downdate (sign −1) of every hypothesis' covariance by a pose; whether that was sound.
     fn each(&mut self, rows: &[DMatrix<f64>], chances: &[f64], sign: f64) -> bool {
-        let chance = |index: usize| sign * chances.get(index).copied().unwrap_or(1.0);
-        by_rows(&mut self.after, rows, chance)
+        by_rows(&mut self.after, rows, counted(chances, sign))
     }
+}
+
+/// How often a pose counts that each hypothesis expects to be seen with these chances.
+fn counted(chances: &[f64], sign: f64) -> impl Fn(usize) -> f64 {
+    move |index| sign * chances.get(index).copied().unwrap_or(1.0)
 }
 
 /// Changes the covariance of every hypothesis of `belief` as an observation after moving to `pose` would, counted `weight`
@@ -141,22 +169,32 @@ fn by_rows(belief: &mut Belief, rows: &[DMatrix<f64>], weight: impl Fn(usize) ->
 /// far above the rounding of H P Hᵀ, which the noise magnifies.
 const SOUND: f64 = 1e-6;
 
+/// What counts less often than this changes nothing.
+const NOTHING: f64 = 1e-9;
+
 /// P ← (P⁻¹ + c HᵀH)⁻¹ = P − P Hᵀ (I/c + H P Hᵀ)⁻¹ H P, for c < 0 a downdate; as it was, where c is nothing. False where a
 /// downdate would cancel what is known.
 fn update(level: Level, covariance: &mut DMatrix<f64>, rows: &DMatrix<f64>, c: f64) -> bool {
-    if c.abs() < 1e-9 {
+    if c.abs() < NOTHING {
         return true;
     }
+    let Some(root) = root(level, covariance, rows, c) else { return false };
+    add_few_squares(level, root.as_slice(), -c.signum(), covariance.as_mut_slice());
+    true
+}
+
+/// X (m × d), of whose square X Xᵀ P loses by an update, or gains by a downdate; `None` where that would cancel what is known.
+fn root(level: Level, covariance: &DMatrix<f64>, rows: &DMatrix<f64>, c: f64) -> Option<DMatrix<f64>> {
     let (m, d) = rows.shape();
     let numerator = DMatrix::from_vec(m, d, times_few(level, rows.as_slice(), covariance.as_slice(), m));
     let spread = rows.tr_mul(&numerator);
     let middle = (DMatrix::identity(d, d) / c + (&spread + spread.transpose()) * 0.5) * c.signum();
-    let Some(cholesky) = Cholesky::new(middle) else { return false };
+    let cholesky = Cholesky::new(middle)?;
     let l = cholesky.l_dirty();
     if c < 0.0 && l.diagonal().iter().any(|x| x * x < SOUND) {
-        return false;
+        return None;
     }
-    // With L Lᵀ = ±(I/c + H P Hᵀ), what P loses or gains is a square: of X = P Hᵀ L⁻ᵀ, column by column.
+    // With L Lᵀ = ±(I/c + H P Hᵀ), X = P Hᵀ L⁻ᵀ, column by column.
     let mut root = numerator;
     for k in 0..d {
         for before in 0..k {
@@ -165,6 +203,5 @@ fn update(level: Level, covariance: &mut DMatrix<f64>, rows: &DMatrix<f64>, c: f
         }
         root.column_mut(k).scale_mut(1.0 / l[(k, k)]);
     }
-    add_few_squares(level, root.as_slice(), -c.signum(), covariance.as_mut_slice());
-    true
+    Some(root)
 }

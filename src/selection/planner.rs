@@ -225,6 +225,19 @@ impl<'a> Scene<'a> {
         Ok(())
     }
 
+    /// The criterion once `plan` is carried out but for one of its poses.
+    fn left_without(&self, plan: &Plan, index: usize) -> Result<f64, SelectionError> {
+        let Planner { weights, planning, .. } = self.planner;
+        if planning.optimality == Optimality::A
+            && let Some(within) = plan.trace_without(index, weights)
+        {
+            return Ok(within + self.setting.between(&plan.told_without(index)));
+        }
+        let mut without = plan.clone();
+        without.remove(index);
+        Ok(self.outlook(&without)?.before())
+    }
+
     /// A plan of `horizon` movements, from where it stood. The search that is kept is DIRECT's first.
     fn plan(&self, horizon: usize, standing: Vec<Vec<f64>>, ground: &mut Ground<'_>) -> Result<Plan, SelectionError> {
         let searched = ground.searched;
@@ -236,9 +249,7 @@ impl<'a> Scene<'a> {
         if plan.poses.len() >= horizon {
             let mut weakest: Option<(f64, usize)> = None;
             for index in 0..plan.poses.len() {
-                let mut without = plan.clone();
-                without.remove(index);
-                let left = self.outlook(&without)?.before();
+                let left = self.left_without(&plan, index)?;
                 if weakest.is_none_or(|(least, _)| left < least) {
                     weakest = Some((left, index));
                 }

@@ -40,6 +40,12 @@ impl Setting {
         }
         Self { points: hypotheses.iter().map(|(_, state)| points(belief, state)).collect(), pairs }
     }
+
+    /// What is left between all pairs of hypotheses once they are told apart by these B.
+    pub fn between(&self, told: &[f64]) -> f64 {
+        let told = told.iter().copied().chain(std::iter::repeat(0.0));
+        self.pairs.iter().zip(told).map(|((.., between), told)| between * (-told).exp()).sum()
+    }
 }
 
 /// ‖x − x'‖²_W: squared angles between directions and rotations, squared distances between points and of plain numbers,

@@ -52,6 +52,11 @@ impl Weights {
         self.0.iter().zip(covariance.diagonal().iter()).map(|(w, p)| w * p).sum()
     }
 
+    /// tr(W X Xᵀ), for a matrix of m rows.
+    pub(super) fn squares(&self, matrix: &DMatrix<f64>) -> f64 {
+        matrix.column_iter().map(|column| self.0.iter().zip(column.iter()).map(|(w, x)| w * x * x).sum::<f64>()).sum()
+    }
+
     /// W M, for a matrix of m rows.
     pub(crate) fn scale(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let mut scaled = matrix.clone();

@@ -18,6 +18,7 @@ use crate::lanes::GROUP;
 const WIDTH: usize = 4;
 
 /// L, its columns one behind the other; rows and columns beyond the matrix are those of the identity.
+#[derive(Clone, Debug)]
 pub(super) struct Factor {
     level: Level,
     /// Rows of the matrix.
@@ -32,7 +33,13 @@ impl Factor {
     pub fn new(level: Level, matrix: &DMatrix<f64>, damping: f64) -> Option<Self> {
         let m = matrix.nrows();
         let n = m.next_multiple_of(WIDTH);
-        let mut l = vec![0.0; n * n];
+        Self { level, m, n, l: vec![0.0; n * n] }.anew(matrix, damping)
+    }
+
+    /// The same of another matrix of as many rows, in the same place.
+    pub fn anew(mut self, matrix: &DMatrix<f64>, damping: f64) -> Option<Self> {
+        let Self { level, m, n, ref mut l } = self;
+        // What is above the diagonal is zero.
         for (index, column) in l.chunks_exact_mut(n.max(1)).enumerate() {
             if index < m {
                 column[index..m].copy_from_slice(&matrix.as_slice()[index * m + index..(index + 1) * m]);
@@ -41,8 +48,7 @@ impl Factor {
                 column[index] = 1.0;
             }
         }
-        let is_positive = dispatch!(level, simd => factorise(simd, n, &mut l));
-        is_positive.then_some(Self { level, m, n, l })
+        dispatch!(level, simd => factorise(simd, n, l)).then_some(self)
     }
 
     /// ln det Λ.

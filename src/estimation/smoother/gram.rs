@@ -6,12 +6,12 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::lanes::{self, Lanes, load, splat};
 
-/// Columns of a tile: each number that is read serves several products.
-const ACROSS: usize = 4;
-const DOWN: usize = 2;
+/// A tile of HᵀH: each number that is read serves several products.
+const DOWN: usize = 4;
+const ACROSS: usize = 2;
 
-/// Adds HᵀH to `information` and Hᵀr to `descent`; H has as many rows as `residuals`, in blocks of `length`, a multiple of
-/// [`GROUP`](crate::lanes::GROUP).
+/// Adds HᵀH to the lower triangle of `information`, of which what is above the diagonal means nothing from then on, and Hᵀr to
+/// `descent`; H has as many rows as `residuals`, in blocks of `length`, a multiple of [`GROUP`](crate::lanes::GROUP).
 pub(super) fn add_squares(
     level: Level,
     (rows, residuals): (&[f64], &[f64]),
@@ -20,7 +20,7 @@ pub(super) fn add_squares(
     descent: &mut DVector<f64>,
 ) {
     dispatch!(level, simd => {
-        squares(simd, rows, length, information);
+        squares(simd, rows, length, information.nrows(), information.as_mut_slice());
         for (rows, residuals) in rows.chunks_exact(length * descent.len()).zip(residuals.chunks_exact(length)) {
             for (column, sum) in rows.chunks_exact(length).zip(descent.iter_mut()) {
                 *sum += dot(simd, column, residuals);
@@ -32,17 +32,17 @@ pub(super) fn add_squares(
 /// HᵀH of a single block of m columns, whose length is a multiple of [`GROUP`](crate::lanes::GROUP).
 pub(super) fn squared(level: Level, rows: &[f64], m: usize) -> DMatrix<f64> {
     let mut product = DMatrix::zeros(m, m);
-    dispatch!(level, simd => squares(simd, rows, rows.len() / m.max(1), &mut product));
+    dispatch!(level, simd => squares(simd, rows, rows.len() / m.max(1), m, product.as_mut_slice()));
+    product.fill_upper_triangle_with_lower_triangle();
     product
 }
 
-/// Adds HᵀH: by tiles above the diagonal, whose mirror image is what is below it.
+/// Adds HᵀH to the lower triangle of `sums` (m × m), by tiles; what is above the diagonal means nothing.
 #[inline(always)]
-fn squares<S: Simd>(simd: S, rows: &[f64], length: usize, sums: &mut DMatrix<f64>) {
-    let m = sums.nrows();
-    for right in (0..m).step_by(DOWN) {
-        for left in (0..(right + DOWN).min(m)).step_by(ACROSS) {
-            let mut tile = [[splat(simd, 0.0); DOWN]; ACROSS];
+fn squares<S: Simd>(simd: S, rows: &[f64], length: usize, m: usize, sums: &mut [f64]) {
+    for right in (0..m).step_by(ACROSS) {
+        for left in (right / DOWN * DOWN..m).step_by(DOWN) {
+            let mut tile = [[splat(simd, 0.0); ACROSS]; DOWN];
             for block in rows.chunks_exact((m * length).max(1)) {
                 // Beyond the last column it is taken again, and forgotten.
                 let column = |index: usize| &block[index.min(m - 1) * length..][..length];
@@ -59,14 +59,13 @@ fn squares<S: Simd>(simd: S, rows: &[f64], length: usize, sums: &mut DMatrix<f64
             }
             let [a, b, c, d] = tile;
             let found = lanes::sums::<S>([a[0], b[0], c[0], d[0], a[1], b[1], c[1], d[1]]);
-            for (column, found) in (right..m).zip(found.chunks_exact(ACROSS)) {
-                for (row, found) in (left..=column).zip(found) {
-                    sums[(row, column)] += found;
-                }
+            let few = DOWN.min(m - left);
+            for (column, found) in sums.chunks_exact_mut(m).skip(right).zip(found.chunks_exact(DOWN)) {
+                let sums = &mut column[left..left + few];
+                sums.iter_mut().zip(found).for_each(|(sum, found)| *sum += found);
             }
         }
     }
-    sums.fill_lower_triangle_with_upper_triangle();
 }
 
 /// Σ aᵢ bᵢ of as many numbers as fill lanes.
@@ -98,13 +97,17 @@ mod tests {
             for level in levels() {
                 let (mut information, mut descent) = (DMatrix::identity(m, m), DVector::zeros(m));
                 add_squares(level, (&h, r.as_slice()), length, &mut information, &mut descent);
+                information.fill_upper_triangle_with_lower_triangle();
                 let expected = whole.tr_mul(&whole) + DMatrix::identity(m, m);
                 assert!((&information - expected).amax() < 1e-13 * r.len() as f64, "{level:?} {blocks} {length} {m}");
                 assert!(
                     (descent - whole.tr_mul(&r)).amax() < 1e-13 * r.len() as f64,
                     "{level:?} {blocks} {length} {m}"
                 );
-                assert_eq!(information, information.transpose());
+                if blocks == 1 {
+                    let product = squared(level, &h, m);
+                    assert!((product - whole.tr_mul(&whole)).amax() < 1e-13 * r.len() as f64);
+                }
             }
         }
     }

@@ -144,11 +144,15 @@ fn mutated(state: &State, drawn: &State, layout: &Layout, rng: &mut impl Rng) ->
 mod tests {
     use std::{f64::consts::PI, sync::Arc};
 
+    use fearless_simd::Level;
     use nalgebra::{DMatrix, DVector, Point3, UnitVector3, Vector3};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::{super::posterior::Measurement, *};
+    use super::{
+        super::posterior::{Measurement, Normal},
+        *,
+    };
     use crate::{
         model::{Prior, laws::random_arm},
         sensing::{Observation, Rig},
@@ -167,10 +171,10 @@ mod tests {
         let m = layout.dimension();
         let mut delta = DVector::zeros(m);
         delta[0] = away * deviation;
-        let covariance = DMatrix::identity(m, m) * (deviation * deviation);
         let information = DMatrix::identity(m, m) / (deviation * deviation);
-        let state = state.retract(&layout, &delta);
-        Mode { state, cost: -log_evidence, information, covariance, log_evidence, weight: 0.0 }
+        let normal = Normal { cost: -log_evidence, information, descent: DVector::zeros(m) };
+        let mode = Mode::at(Level::new(), state.retract(&layout, &delta), normal).expect("positive");
+        Mode { log_evidence, ..mode }
     }
 
     fn condensed(modes: &[(f64, f64)], kept: usize) -> Vec<Mode> {
@@ -259,7 +263,7 @@ mod tests {
         for mode in &hypotheses.modes {
             let normal = posterior.normal(&mode.state, &layout).expect("in the chart");
             assert!((normal.cost - mode.cost).abs() < 1e-9 * mode.cost.max(1.0), "of all measurements");
-            let step = &mode.covariance * &normal.descent;
+            let step = mode.covariance() * &normal.descent;
             assert!(step.dot(&normal.descent) < 1e-3, "at rest");
         }
         hypotheses.condense(16, &layout);

@@ -78,11 +78,11 @@ proptest! {
         let mode = posterior.mode(&truth, &layout, THOROUGH).expect("a mode");
         let normal = posterior.normal(&mode.state, &layout).expect("in the chart");
         // In standard deviations.
-        let step = &mode.covariance * &normal.descent;
+        let step = mode.covariance() * &normal.descent;
         prop_assert!(step.dot(&(&mode.information * &step)) < 1e-6);
         prop_assert!(mode.cost <= posterior.cost(&truth, &layout) + 1e-9);
         let m = layout.dimension();
-        prop_assert!((&mode.covariance * &mode.information - DMatrix::identity(m, m)).amax() < 1e-6);
+        prop_assert!((mode.covariance() * &mode.information - DMatrix::identity(m, m)).amax() < 1e-6);
     }
 
     /// Compressing measurements at the mode changes neither the mode nor its covariance.

@@ -172,14 +172,10 @@ impl Smoother {
             self.belief.rig = Arc::new(self.nominal.scaled(&self.posterior.scales));
         }
         self.belief.state = best.state.clone();
-        self.belief.covariance = Some(best.covariance.clone());
+        self.belief.covariance = Some(best.covariance());
         self.belief.alternatives = rest
             .iter()
-            .map(|mode| Alternative {
-                weight: mode.weight,
-                state: mode.state.clone(),
-                covariance: mode.covariance.clone(),
-            })
+            .map(|mode| Alternative { weight: mode.weight, state: mode.state.clone(), covariance: mode.covariance() })
             .collect();
         self.belief.model_error_m = self.model_error_m();
     }

@@ -20,8 +20,7 @@ pub(super) struct Mode {
     pub state: State,
     pub cost: f64,
     pub information: DMatrix<f64>,
-    /// P, the inverse of the information.
-    pub covariance: DMatrix<f64>,
+    factor: Factor,
     /// −E − ½ ln det Λ: the logarithm of its share of the evidence, but for what all modes have in common.
     pub log_evidence: f64,
     /// Its share of the evidence, once that is told.
@@ -111,11 +110,15 @@ impl Posterior {
 
     fn descend(&self, loss: Graduated, start: &State, layout: &Layout, effort: Effort<'_>) -> Option<(State, Normal)> {
         let mut state = start.slid_towards(&self.pins);
-        let mut room = Room::default();
+        let (mut room, mut kept) = (Room::default(), None);
         let mut normal = self.normal_by(loss, &state, layout, &mut room)?;
         let (mut lambda, mut growth) = (1e-3, 2.0);
         for step in 0..effort.steps {
-            let mut delta = Factor::new(self.level, &normal.information, lambda)?.solve(&normal.descent);
+            let factor = match kept.take() {
+                None => Factor::new(self.level, &normal.information, lambda)?,
+                Some(before) => Factor::anew(before, &normal.information, lambda)?,
+            };
+            let mut delta = kept.insert(factor).solve(&normal.descent);
             // With D = diag Λ, Λ δ = descent − λ D δ; of a shortened step δ/l accordingly.
             let slope = delta.dot(&normal.descent);
             let damped = delta.iter().zip(normal.information.diagonal().iter()).map(|(x, d)| d * x * x).sum::<f64>();
@@ -141,13 +144,17 @@ impl Posterior {
             // none is taken.
             let found = self.normal_by(loss, &next, layout, &mut room);
             let ratio = found.as_ref().map_or(f64::NEG_INFINITY, |found| (normal.cost - found.cost) / predicted);
-            if let Some(found) = found.filter(|_| ratio > 0.0) {
-                (state, normal) = (next, found);
+            let is_better = ratio > 0.0;
+            if is_better {
+                state = next;
                 lambda = (lambda * (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0)).max(1e-9);
                 growth = 2.0;
             } else {
                 lambda *= growth;
                 growth *= 2.0;
+            }
+            if let Some(found) = found {
+                room.put_back(if is_better { std::mem::replace(&mut normal, found) } else { found });
             }
             if lambda > 1e12 {
                 break;
@@ -172,13 +179,17 @@ impl Mode {
         Some(delta.dot(&(&self.information * &delta)))
     }
 
-    fn at(level: Level, state: State, normal: Normal) -> Option<Self> {
-        let Normal { cost, information, .. } = normal;
+    /// The Gaussian where a search has ended with these equations; `None` where they are not positive.
+    pub fn at(level: Level, state: State, normal: Normal) -> Option<Self> {
+        let Normal { cost, mut information, .. } = normal;
+        information.fill_upper_triangle_with_lower_triangle();
         let factor = Factor::new(level, &information, 0.0)?;
         let log_evidence = -cost - 0.5 * factor.log_determinant();
-        if !log_evidence.is_finite() {
-            return None;
-        }
-        Some(Self { state, cost, information, covariance: factor.inverse(), log_evidence, weight: 0.0 })
+        log_evidence.is_finite().then_some(Self { state, cost, information, factor, log_evidence, weight: 0.0 })
+    }
+
+    /// P, the inverse of the information.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        self.factor.inverse()
     }
 }

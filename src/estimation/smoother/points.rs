@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{
     gram::add_squares,
-    posterior::{Measurement, Posterior},
+    posterior::{Measurement, Normal, Posterior},
 };
 use crate::{
     lanes::{GROUP, groups},
@@ -17,9 +17,10 @@ use crate::{
 /// Measurements whose rows are looked at together: few enough for the caches.
 const TOGETHER: usize = 32;
 
-/// Where rows and residuals are put, step after step of a search.
+/// Where rows and residuals are put, step after step of a search, of one layout.
 #[derive(Default)]
 pub(super) struct Room {
+    spare: Option<Normal>,
     rows: Vec<f64>,
     readings: Vec<f64>,
     factors: Vec<f64>,
@@ -30,6 +31,28 @@ fn emptied(numbers: &mut Vec<f64>, count: usize) -> &mut [f64] {
     numbers.clear();
     numbers.resize(count, 0.0);
     numbers
+}
+
+/// As many numbers: zero, or what was put here before and will be put here again.
+fn kept(numbers: &mut Vec<f64>, count: usize) -> &mut [f64] {
+    if numbers.len() == count { numbers } else { emptied(numbers, count) }
+}
+
+impl Room {
+    /// Sums of squares (m × m) and their kin, zero.
+    pub(super) fn derivatives(&mut self, m: usize) -> (DMatrix<f64>, DVector<f64>) {
+        let Some(Normal { mut information, mut descent, .. }) = self.spare.take() else {
+            return (DMatrix::zeros(m, m), DVector::zeros(m));
+        };
+        information.as_mut_slice().fill(0.0);
+        descent.as_mut_slice().fill(0.0);
+        (information, descent)
+    }
+
+    /// Equations that nobody needs any more.
+    pub(super) fn put_back(&mut self, normal: Normal) {
+        self.spare = Some(normal);
+    }
 }
 
 impl Posterior {
@@ -45,20 +68,23 @@ impl Posterior {
         let mut cost = 0.0;
         for measurements in self.measurements.chunks(TOGETHER) {
             let padded = d * GROUP * groups(measurements.len());
-            let rows = emptied(&mut room.rows, m * padded);
-            let readings = emptied(&mut room.readings, d * measurements.len());
+            let rows = kept(&mut room.rows, m * padded);
+            let readings = kept(&mut room.readings, d * measurements.len());
             dispatch!(self.level, simd => points.rows(simd, measurements, readings, rows));
             let weighed = (emptied(&mut room.factors, padded), emptied(&mut room.residuals, padded));
             cost += self.weigh_points(loss, measurements, readings, weighed);
-            if room.factors.iter().any(|factor| *factor != 1.0) {
-                let factors = room.factors.chunks_exact(d * GROUP);
-                for (rows, factors) in rows.chunks_exact_mut(m * d * GROUP).zip(factors) {
+            let factors = room.factors.chunks_exact(d * GROUP);
+            for (rows, factors) in rows.chunks_exact_mut(m * d * GROUP).zip(factors) {
+                if factors.iter().any(|factor| *factor != 1.0) {
                     for column in rows.chunks_exact_mut(d * GROUP) {
                         column.iter_mut().zip(factors).for_each(|(x, factor)| *x *= factor);
                     }
                 }
             }
             add_squares(self.level, (rows, &room.residuals), d * GROUP, information, descent);
+        }
+        if !cost.is_finite() {
+            room.rows.clear();
         }
         cost
     }

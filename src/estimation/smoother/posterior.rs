@@ -60,6 +60,7 @@ pub(super) struct Posterior {
 /// The normal equations of the posterior at a state: `information · step = descent`.
 pub(super) struct Normal {
     pub cost: f64,
+    /// Its lower triangle; what is above the diagonal means nothing.
     pub information: DMatrix<f64>,
     pub descent: DVector<f64>,
 }
@@ -236,13 +237,15 @@ impl Posterior {
     /// The normal equations at `state`, linearised there; `None` outside the chart of settled measurements.
     #[cfg(test)]
     pub fn normal(&self, state: &State, layout: &Layout) -> Option<Normal> {
-        self.normal_by(self.loss.into(), state, layout, &mut Room::default())
+        let mut normal = self.normal_by(self.loss.into(), state, layout, &mut Room::default())?;
+        normal.information.fill_upper_triangle_with_lower_triangle();
+        Some(normal)
     }
 
     /// The same by another loss.
     pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout, room: &mut Room) -> Option<Normal> {
-        let m = layout.dimension();
-        let (mut information, mut descent, mut cost) = (DMatrix::zeros(m, m), DVector::zeros(m), 0.0);
+        let (mut information, mut descent) = room.derivatives(layout.dimension());
+        let mut cost = 0.0;
         if let Some(points) = self.points(state, layout) {
             cost += self.add_points(loss, &points, (&mut information, &mut descent), room);
         } else {
@@ -384,7 +387,8 @@ impl Posterior {
             let (carried, _) = settled.carried(&mode.state, layout)?;
             noises.iter_mut().zip(carried).for_each(|(into, of)| into.information += of.information);
         }
-        let of = |(noise, scale): (&Quadratic, &f64)| noise.information.dot(&mode.covariance) / (scale * scale);
+        let covariance = mode.covariance();
+        let of = |(noise, scale): (&Quadratic, &f64)| noise.information.dot(&covariance) / (scale * scale);
         Some(noises.iter().zip(&self.scales).map(of).collect())
     }
 }

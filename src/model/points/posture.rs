@@ -105,7 +105,9 @@ impl Points {
         Posture { points: self, joints, places, readings, rows }
     }
 
-    /// What the parameters of every joint before a point at x do, with the joint.
+    /// What the parameters of every joint before a point at x do, with the joint. What is not asked for costs nothing where this is
+    /// written out.
+    #[inline(always)]
     fn columns_of_joints(&self, place: &Place, joints: &[Still], x: Vector3<f64>, mut each: impl FnMut(usize, Column)) {
         let nothing = Vector3::zeros();
         for (index, (joint, still)) in self.joints.iter().zip(joints).enumerate().take(place.link) {
@@ -177,7 +179,7 @@ impl Turn {
     /// Turns or slides a joint's frame, which is before the joint, to a reading.
     fn still(&self, reading: f64, frame: &mut Matrix3<f64>, pivot: &mut Vector3<f64>) -> Still {
         let Correction { offset, ratio, sine, cosine, .. } = self.correction;
-        let (sin, cos) = reading.sin_cos();
+        let (sin, cos) = if self.needs_sine() { reading.sin_cos() } else { (0.0, 0.0) };
         let theta = ratio * reading + offset + sine * sin + cosine * cos;
         let before = *frame;
         match self.kind {
@@ -243,6 +245,7 @@ impl Posture<'_> {
     }
 }
 
+#[inline]
 fn columns(a: &Matrix3<f64>) -> [Vector3<f64>; 3] {
     [a.column(0).into_owned(), a.column(1).into_owned(), a.column(2).into_owned()]
 }

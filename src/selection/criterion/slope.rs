@@ -84,10 +84,13 @@ impl Criterion<'_> {
             (_, None) => Some(self.weights.scale(gains)),
         };
         let (gain, by_rows, by_gains) = match weighed {
-            Some(weighed) => {
+            Some(mut weighed) => {
                 let leverage = &inverse * weighed.tr_mul(gains);
-                let by_rows = self.times(d, weighed.as_slice(), self.covariance) * &inverse * (-2.0 * weight);
-                (leverage.trace(), by_rows, leverage * inverse * (2.0 * weight))
+                let product = self.times(d, weighed.as_slice(), self.covariance);
+                // In the same place: larger ones cost more to find than to fill.
+                weighed.gemm(1.0, &product, &inverse, 0.0);
+                weighed *= -2.0 * weight;
+                (leverage.trace(), weighed, leverage * inverse * (2.0 * weight))
             }
             None => (cholesky.ln_determinant() * 0.5, DMatrix::zeros(m, d), inverse * -weight),
         };
@@ -132,8 +135,13 @@ impl Slope<'_> {
     }
 
     /// Adds the derivative by every joint's reading.
-    pub fn add_to(&self, gradient: &mut [f64]) {
-        let by_rows = &self.by_rows + &self.shown.gains * &self.by_gains;
-        self.shown.posture.add_slope((self.by_readings.as_slice(), by_rows.as_slice()), gradient);
+    pub fn add_to(&mut self, gradient: &mut [f64]) {
+        let Self { shown, by_readings, by_rows, by_gains, .. } = self;
+        let mut more = DVector::zeros(by_rows.nrows());
+        for (mut column, by) in by_rows.column_iter_mut().zip(by_gains.column_iter()) {
+            more.gemv(1.0, &shown.gains, &by, 0.0);
+            column += &more;
+        }
+        shown.posture.add_slope((by_readings.as_slice(), by_rows.as_slice()), gradient);
     }
 }
