@@ -103,15 +103,16 @@ impl Plan {
     /// tr(W P) in the mean over the hypotheses if a pose were taken out of the plan; `None` where too much would cancel.
     pub fn trace_without(&self, index: usize, weights: &Weights) -> Option<f64> {
         let estimate = self.after.covariance.iter().map(|covariance| (self.after.weight(), covariance));
-        let others = self.after.alternatives.iter();
-        let hypotheses = estimate.chain(others.map(|alternative| (alternative.weight, &alternative.covariance)));
+        let others = self.after.alternatives.iter().map(|alternative| (alternative.weight, &alternative.covariance));
         let (level, often) = (Level::new(), counted(&self.chances[index], -1.0));
-        let without = |(index, ((share, covariance), rows)): (usize, ((f64, &DMatrix<f64>), &DMatrix<f64>))| {
-            let c = often(index);
+        let mut sum = 0.0;
+        for (hypothesis, ((share, covariance), rows)) in estimate.chain(others).zip(self.rows[index].iter()).enumerate()
+        {
+            let c = often(hypothesis);
             let gained = if c.abs() < NOTHING { 0.0 } else { weights.squares(&root(level, covariance, rows, c)?) };
-            Some(share * (weights.trace(covariance) + gained))
-        };
-        hypotheses.zip(self.rows[index].iter()).enumerate().map(without).sum()
+            sum += share * (weights.trace(covariance) + gained);
+        }
+        Some(sum)
     }
 
     /// Σ B over the poses of the plan, by pair.

@@ -173,8 +173,9 @@ mod tests {
         delta[0] = away * deviation;
         let information = DMatrix::identity(m, m) / (deviation * deviation);
         let normal = Normal { cost: -log_evidence, information, descent: DVector::zeros(m) };
-        let mode = Mode::at(Level::new(), state.retract(&layout, &delta), normal).expect("positive");
-        Mode { log_evidence, ..mode }
+        let mut mode = Mode::at(Level::new(), state.retract(&layout, &delta), normal).expect("positive");
+        mode.log_evidence = log_evidence;
+        mode
     }
 
     fn condensed(modes: &[(f64, f64)], kept: usize) -> Vec<Mode> {
