@@ -111,11 +111,17 @@ impl Browser {
         self.client.execute_async(&script, Vec::new()).await.expect("a value")
     }
 
+    /// Waits until a condition holds. Between two pages of the browser's history it is an error for a moment: what it asks about is
+    /// not there yet.
     pub async fn wait_for(&self, what: &str, condition: &str) {
-        let deadline = Instant::now() + WAIT;
-        while self.evaluate(condition).await != true {
+        let (deadline, script) = (Instant::now() + WAIT, format!("return {condition};"));
+        loop {
+            let found = self.client.execute(&script, Vec::new()).await;
+            if matches!(found, Ok(Value::Bool(true))) {
+                return;
+            }
             if Instant::now() > deadline {
-                panic!("no {what}; the page says: {}", self.evaluate("document.body.innerText").await);
+                panic!("no {what}, but {found:?}; the page says: {}", self.evaluate("document.body.innerText").await);
             }
             tokio::time::sleep(Duration::from_millis(100)).await;
         }
