@@ -11,12 +11,13 @@ use rand_distr::StandardNormal;
 use super::{
     HypothesisSettings, Smoother,
     mode::Effort,
-    posterior::{Measurement, Posterior},
+    points::Room,
+    posterior::{Measurement, Normal, Posterior},
 };
 use crate::{
     estimation::Estimator,
     model::{Block, Layout, Prior, State, jacobian, laws::random_arm},
-    sensing::{Observation, Rig},
+    sensing::{Loss, Observation, Rig},
 };
 
 const THOROUGH: Effort<'_> = Effort { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY, known: &[] };
@@ -68,6 +69,34 @@ proptest! {
             let difference = -(moved(1e-6) - moved(-1e-6)) / 2e-6;
             let scale = 1.0 + normal.descent.amax();
             prop_assert!((difference - normal.descent[k]).abs() < 1e-5 * scale, "{k}: {difference} {}", normal.descent[k]);
+        }
+    }
+
+    /// What a search keeps from step to step changes no bit of its equations, whatever was put there before.
+    #[test]
+    fn a_place_that_is_used_again_changes_nothing(seed: u64, count in 1_usize..70, is_robust: bool) {
+        let (truth, layout, mut posterior, mut rng) = case(seed, 3, count, false);
+        if is_robust {
+            posterior.loss = Loss::Huber;
+        }
+        let mut room = Room::default();
+        // What is no number at one step is none of the next.
+        for scale in [1.0, 0.5, f64::NAN, 1.0, 2.0] {
+            posterior.scales.fill(scale);
+            let away = DVector::from_fn(layout.dimension(), |_, _| rng.random_range(-0.2..0.2));
+            let state = truth.retract(&layout, &away).slid_towards(&posterior.pins);
+            let loss = posterior.loss.into();
+            let again = posterior.normal_by(loss, &state, &layout, &mut room).expect("no chart ends");
+            let fresh = posterior.normal_by(loss, &state, &layout, &mut Room::default()).expect("no chart ends");
+            let bits = |x: &f64| x.to_bits();
+            let all = |normal: &Normal| -> Vec<u64> {
+                let (information, descent) = (normal.information.lower_triangle(), &normal.descent);
+                information.iter().chain(descent.iter()).map(bits).chain([normal.cost.to_bits()]).collect()
+            };
+            if scale.is_finite() {
+                prop_assert_eq!(all(&again), all(&fresh));
+            }
+            room.put_back(again);
         }
     }
 

@@ -84,6 +84,7 @@ impl Posterior {
             add_squares(self.level, (rows, &room.residuals), d * GROUP, information, descent);
         }
         if !cost.is_finite() {
+            // What is no number now would still be there where the next step writes nothing.
             room.rows.clear();
         }
         cost
