@@ -108,9 +108,15 @@ impl JointBox {
     /// The same, written to `configuration`.
     pub(crate) fn write_from_unit(&self, point: &[f64], configuration: &mut [f64]) {
         debug_assert_eq!(point.len(), self.dimension(), "one coordinate per joint");
-        for ((position, x), &(lower, upper)) in configuration.iter_mut().zip(point).zip(&self.joints) {
-            *position = (lower + x * (upper - lower)).clamp(lower, upper);
+        for (joint, (position, x)) in configuration.iter_mut().zip(point).enumerate() {
+            *position = self.from_unit_along(joint, *x);
         }
+    }
+
+    /// The position of one joint at a coordinate of the unit cube.
+    pub(crate) fn from_unit_along(&self, joint: usize, x: f64) -> f64 {
+        let (lower, upper) = self.joints[joint];
+        (lower + x * (upper - lower)).clamp(lower, upper)
     }
 
     /// Whether `configuration` has one position per joint, each within the limits (the limits themselves count). A

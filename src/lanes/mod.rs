@@ -9,6 +9,7 @@
 //! In memory candidates stand in groups of [`GROUP`], whatever the width of a register: of each number of a group one candidate
 //! beside the other.
 
+mod aligned;
 mod rotor;
 mod space;
 mod symmetric;
@@ -17,6 +18,7 @@ use std::ops::Range;
 
 use fearless_simd::{Level, Simd, SimdBase};
 
+pub use aligned::Aligned;
 pub use rotor::sin_cos;
 pub use space::{Frame, Vector};
 pub use symmetric::{add_few_squares, times, times_few, write_times};
@@ -85,7 +87,7 @@ pub fn runs(level: Level, candidates: usize) -> impl Iterator<Item = Run> {
 
 /// The same instructions, on no more lanes than so many candidates need. Those of SSE alone cannot multiply and add at once.
 #[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables))]
-fn narrowed(level: Level, candidates: usize) -> Level {
+pub fn narrowed(level: Level, candidates: usize) -> Level {
     #[cfg(target_arch = "x86_64")]
     if candidates <= GROUP / 2 && level.as_avx512().is_some() {
         return level.as_avx2().map_or(level, Level::Avx2);

@@ -5,7 +5,7 @@ use std::ops::{Add, Neg, Sub};
 use fearless_simd::{ExtractToken, Simd, SimdFloat};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Lanes, splat};
+use super::{Lanes, load, splat, store};
 
 /// A vector of each candidate: three components.
 #[derive(Clone, Copy)]
@@ -16,6 +16,21 @@ impl<S: Simd> Vector<S> {
     #[inline(always)]
     pub fn splat(simd: S, v: &Vector3<f64>) -> Self {
         Self([splat(simd, v.x), splat(simd, v.y), splat(simd, v.z)])
+    }
+
+    /// The vectors whose components begin at these places.
+    #[inline(always)]
+    pub fn load(simd: S, numbers: &[f64], [x, y, z]: [usize; 3]) -> Self {
+        Self([load(simd, numbers, x), load(simd, numbers, y), load(simd, numbers, z)])
+    }
+
+    /// Puts the components where these places are.
+    #[inline(always)]
+    pub fn store(self, numbers: &mut [f64], [at_x, at_y, at_z]: [usize; 3]) {
+        let [x, y, z] = self.0;
+        store::<S>(x, numbers, at_x);
+        store::<S>(y, numbers, at_y);
+        store::<S>(z, numbers, at_z);
     }
 
     /// k v.

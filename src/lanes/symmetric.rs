@@ -2,13 +2,13 @@
 
 use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
 
-use super::{GROUP, Lanes, Run, load, runs, splat, store};
+use super::{Aligned, GROUP, Lanes, Run, load, runs, splat, store};
 
 /// H P of all candidates, of d equations each: `rows` hold m × d rows of lanes for each [group](GROUP), P is symmetric (m × m).
 ///
 /// Unlike a general product it packs nothing, so that few candidates cost little.
-pub fn times(level: Level, [d, candidates]: [usize; 2], rows: &[f64], p: &[f64]) -> Vec<f64> {
-    let mut found = vec![0.0; rows.len()];
+pub fn times(level: Level, [d, candidates]: [usize; 2], rows: &[f64], p: &[f64]) -> Aligned {
+    let mut found = Aligned::of_any(rows.len());
     let of_group = p.len().isqrt() * d * GROUP;
     for Run { level, groups, candidates } in runs(level, candidates) {
         let place = groups.start * of_group..groups.end * of_group;

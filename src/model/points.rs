@@ -18,6 +18,7 @@
 
 mod posture;
 mod slopes;
+mod star;
 
 use fearless_simd::{ExtractToken, Simd, SimdBase, SimdFloat};
 use nalgebra::{Matrix3, Vector3};
@@ -25,10 +26,11 @@ use nalgebra::{Matrix3, Vector3};
 use super::{Block, Correction, Layout, State, pass::Term};
 use crate::{
     kinematics::{JointKind, chart},
-    lanes::{Frame, GROUP, Lanes, Vector, sin_cos, splat, store},
+    lanes::{Aligned, Frame, GROUP, Lanes, Vector, groups, sin_cos, splat},
 };
 
 pub use posture::Posture;
+pub use star::{Centre, Centres, Passage, Ray, Stage};
 
 /// Points of one state, to be looked up at many postures.
 #[derive(Clone, Debug)]
@@ -93,12 +95,66 @@ struct Turned<S: Simd> {
     reading: [Lanes<S>; 3],
 }
 
+/// Numbers of it for each posture.
+const OF_TURNED: usize = 21;
+
+/// The joints that a walk along the chain has passed, at a few postures.
+struct Passed<S: Simd> {
+    simd: S,
+    numbers: Aligned,
+    count: usize,
+}
+
+impl<S: Simd> Passed<S> {
+    /// None, with room for so many.
+    #[inline(always)]
+    fn with_room(simd: S, joints: usize) -> Self {
+        Self { simd, numbers: Aligned::of_any(joints * OF_TURNED * Lanes::<S>::LEN), count: 0 }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, turned: &Turned<S>) {
+        let width = Lanes::<S>::LEN;
+        let numbers = &mut self.numbers[self.count * OF_TURNED * width..][..OF_TURNED * width];
+        let Turned { swept: [d1, d2], axis, basis: [f1, f2], pivot, reading } = *turned;
+        d1.store(numbers, [0, width, 2 * width]);
+        d2.store(numbers, [3 * width, 4 * width, 5 * width]);
+        axis.store(numbers, [6 * width, 7 * width, 8 * width]);
+        f1.store(numbers, [9 * width, 10 * width, 11 * width]);
+        f2.store(numbers, [12 * width, 13 * width, 14 * width]);
+        pivot.store(numbers, [15 * width, 16 * width, 17 * width]);
+        Vector::<S>(reading).store(numbers, [18 * width, 19 * width, 20 * width]);
+        self.count += 1;
+    }
+
+    #[inline(always)]
+    fn at(&self, index: usize) -> Turned<S> {
+        let (simd, width) = (self.simd, Lanes::<S>::LEN);
+        let numbers = &self.numbers[index * OF_TURNED * width..][..OF_TURNED * width];
+        Turned {
+            swept: [
+                Vector::load(simd, numbers, [0, width, 2 * width]),
+                Vector::load(simd, numbers, [3 * width, 4 * width, 5 * width]),
+            ],
+            axis: Vector::load(simd, numbers, [6 * width, 7 * width, 8 * width]),
+            basis: [
+                Vector::load(simd, numbers, [9 * width, 10 * width, 11 * width]),
+                Vector::load(simd, numbers, [12 * width, 13 * width, 14 * width]),
+            ],
+            pivot: Vector::load(simd, numbers, [15 * width, 16 * width, 17 * width]),
+            reading: Vector::load(simd, numbers, [18 * width, 19 * width, 20 * width]).0,
+        }
+    }
+}
+
 /// What is wanted of postures beside the places of points.
 enum Wanted<'a> {
     /// The rows of each group.
     Rows(&'a mut [f64]),
     /// Of what multiplies the rows of each group, the derivatives of the product.
     Slopes(&'a [f64], &'a mut [f64]),
+    /// The rows of each group, and its joints.
+    Centres(&'a mut [f64], &'a mut [f64]),
 }
 
 /// Where the rows of one point at a few postures of a group are put: of each tangent coordinate all equations, of each of them
@@ -117,15 +173,13 @@ struct Columns<'a> {
 impl Columns<'_> {
     #[inline(always)]
     fn put<S: Simd>(&mut self, coordinate: usize, column: Vector<S>) {
-        let [x, y, z] = match self.shape {
-            None => column.0,
-            Some(shape) => column.through(shape).0,
+        let column = match self.shape {
+            None => column,
+            Some(shape) => column.through(shape),
         };
         let first = coordinate * self.stride + self.first;
         let numbers = &mut self.rows[first..first + 2 * GROUP + Lanes::<S>::LEN];
-        store::<S>(x, numbers, 0);
-        store::<S>(y, numbers, GROUP);
-        store::<S>(z, numbers, 2 * GROUP);
+        column.store(numbers, [0, GROUP, 2 * GROUP]);
     }
 }
 
@@ -207,12 +261,13 @@ impl Points {
 
     #[inline(always)]
     fn pass<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64], mut wanted: Wanted<'_>) {
-        let mut turned: Vec<Turned<S>> = Vec::with_capacity(self.joints.len());
+        let mut passed = Passed::with_room(simd, self.joints.len());
         let (d, width) = (self.equations(), Lanes::<S>::LEN);
+        let groups = groups(candidates.len()).max(1);
         let (of_group, of_slopes) = (self.dimension * d * GROUP, self.joints.len() * GROUP);
         for (index, few) in candidates.chunks(width).enumerate() {
             let first = index * width;
-            turned.clear();
+            passed.count = 0;
             let mut places = self.places.iter().peekable();
             let mut frame = Frame::splat(simd, &self.first.0);
             let mut pivot = Vector::splat(simd, &self.first.1);
@@ -225,12 +280,17 @@ impl Points {
                     match &mut wanted {
                         Wanted::Rows(rows) => {
                             let rows = &mut rows[group * of_group..][..of_group];
-                            self.put(place, (&x, &axes), &turned, first_row, rows);
+                            self.put(place, (&x, &axes), &passed, first_row, rows);
                         }
                         Wanted::Slopes(factors, slopes) => {
                             let factors = &factors[group * of_group..][..of_group];
                             let slopes = &mut slopes[group * of_slopes..][..of_slopes];
-                            self.slope(place, (&x, &axes), &turned, (first_row, factors), slopes);
+                            self.slope(place, (&x, &axes), &passed, (first_row, factors), slopes);
+                        }
+                        Wanted::Centres(rows, joints) => {
+                            self.put(place, (&x, &axes), &passed, first_row, &mut rows[group * of_group..][..of_group]);
+                            let of_joints = joints.len() / groups;
+                            star::keep(&passed, &mut joints[group * of_joints..][..of_joints], first % GROUP);
                         }
                     }
                     for (lane, reading) in readings[first * d..].chunks_mut(d).take(few.len()).enumerate() {
@@ -246,7 +306,7 @@ impl Points {
                     frame = frame.then(rotation);
                 }
                 let reading = Lanes::<S>::from_fn(simd, |lane| few[lane.min(few.len() - 1)].as_ref()[link]);
-                turned.push(joint.turn(reading, &mut frame, &mut pivot));
+                passed.push(&joint.turn(reading, &mut frame, &mut pivot));
             }
         }
     }
@@ -257,7 +317,7 @@ impl Points {
         &self,
         place: &Place,
         (x, axes): (&Vector<S>, &Frame<S>),
-        turned: &[Turned<S>],
+        passed: &Passed<S>,
         first: usize,
         rows: &mut [f64],
     ) {
@@ -276,7 +336,8 @@ impl Points {
                 columns.put(start + 3 + k, unit.cross(arm));
             }
         }
-        for (joint, turned) in self.joints.iter().zip(turned) {
+        for (index, joint) in self.joints.iter().enumerate().take(passed.count) {
+            let turned = passed.at(index);
             let arm = *x - turned.pivot;
             let [d1, d2] = [turned.swept[0].scaled(weight), turned.swept[1].scaled(weight)];
             if let Some(start) = joint.axis {

@@ -4,7 +4,7 @@
 
 use fearless_simd::{Level, Select, Simd, SimdBase, SimdFloat, dispatch};
 
-use crate::lanes::{GROUP, Lanes, Run, groups, load, runs, splat, store};
+use crate::lanes::{Aligned, GROUP, Lanes, Run, groups, load, runs, splat, store};
 
 /// Different entries of a symmetric matrix of d rows.
 pub(super) fn entries(d: usize) -> usize {
@@ -30,9 +30,9 @@ pub(super) fn products(
     a: &[f64],
     b: &[f64],
     weights: Option<&[f64]>,
-) -> Vec<f64> {
+) -> Aligned {
     let (of_group, of_found) = (m * d * GROUP, entries(d) * GROUP);
-    let mut found = vec![0.0; groups(candidates) * of_found];
+    let mut found = Aligned::of_any(groups(candidates) * of_found);
     for Run { level, groups, candidates } in runs(level, candidates) {
         let place = groups.start * of_group..groups.end * of_group;
         let found = &mut found[groups.start * of_found..groups.end * of_found];

@@ -13,7 +13,7 @@ use super::{
     views::Views,
 };
 use crate::{
-    lanes::{GROUP, Run, groups, runs, times},
+    lanes::{Aligned, GROUP, Run, groups, runs, times},
     model::{Layout, Pass, Points, State},
     sensing::Rig,
 };
@@ -28,11 +28,11 @@ pub(super) struct Predictions {
     /// Predicted readings, d per candidate; NaN where a channel has none.
     readings: Vec<f64>,
     /// H, whitened: m × d rows of lanes for each group.
-    rows: Vec<f64>,
+    rows: Aligned,
     /// G = H P, likewise.
-    gains: Vec<f64>,
+    gains: Aligned,
     /// H P Hᵀ of each candidate.
-    spreads: Vec<f64>,
+    spreads: Aligned,
     /// Chance of each candidate to be seen.
     chances: Vec<f64>,
 }
@@ -48,7 +48,7 @@ impl Predictions {
         views: Option<&Views>,
     ) -> Self {
         let (m, d) = (layout.dimension(), rig.equations());
-        let mut rows = vec![0.0; groups(candidates.len()) * m * d * GROUP];
+        let mut rows = Aligned::zeros(groups(candidates.len()) * m * d * GROUP);
         let mut readings = vec![0.0; d * candidates.len()];
         let mut chances = vec![1.0; candidates.len()];
         let mut pass = Pass::new(state, layout);
@@ -77,7 +77,7 @@ impl Predictions {
         candidates: &[C],
     ) -> Self {
         let [m, d] = [covariance.nrows(), points.equations()];
-        let mut rows = vec![0.0; groups(candidates.len()) * m * d * GROUP];
+        let mut rows = Aligned::zeros(groups(candidates.len()) * m * d * GROUP);
         let mut readings = vec![0.0; d * candidates.len()];
         for Run { level, groups, .. } in runs(level, candidates.len()) {
             let few = groups.start * GROUP..candidates.len().min(groups.end * GROUP);
@@ -92,7 +92,7 @@ impl Predictions {
         level: Level,
         [dimension, equations]: [usize; 2],
         covariance: &DMatrix<f64>,
-        (readings, rows): (Vec<f64>, Vec<f64>),
+        (readings, rows): (Vec<f64>, Aligned),
         chances: Vec<f64>,
     ) -> Self {
         let candidates = chances.len();

@@ -1,6 +1,9 @@
 //! A search of the joint box by DIRECT, and what it leaves for those who ask how it went.
 
-use super::{Partition, Scope, SelectionError};
+use super::{
+    Partition, Scope, SelectionError,
+    star::{AroundCentres, Room, Stars},
+};
 use crate::{
     kinematics::JointBox,
     optimize::{Direct, Settings},
@@ -19,22 +22,35 @@ pub struct Search {
 }
 
 /// Searches `limits`, the box of a scope; `evaluate` returns the criterion of a batch of postures in it (rad or m), which is not
-/// finite where they are not feasible.
+/// finite where they are not feasible, and `around` the same of stars, if there is something that does.
 pub(super) fn direct(
     scope: &Scope<'_>,
     limits: &JointBox,
     settings: Settings,
     evaluate: &(dyn Fn(&[Vec<f64>]) -> Vec<f64> + Sync),
+    around: Option<&AroundCentres<'_>>,
 ) -> Result<Search, SelectionError> {
     let mut direct = Direct::new(limits.dimension(), settings).map_err(SelectionError::Search)?;
     shared(evaluate, |batches| {
         // One batch after the other is written to the same place.
         let (mut postures, mut spare): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
+        let (mut stars, mut room) = (Stars::new(limits.dimension()), Room::default());
         while let Some(batch) = direct.ask() {
-            spare.extend(postures.drain(batch.len().min(postures.len())..));
-            postures.resize_with(batch.len(), || spare.pop().unwrap_or_else(|| vec![0.0; limits.dimension()]));
-            postures.iter_mut().zip(batch).for_each(|(posture, point)| limits.write_from_unit(point, posture));
-            direct.tell(&batches.evaluate(&mut postures))?;
+            let values = match around {
+                // The centre of the cube is a star's, but nobody's ray.
+                Some(around) if batch.stars().len() > 0 => {
+                    stars.clear();
+                    batch.stars().for_each(|star| stars.push(&star, limits));
+                    around.evaluate(&stars, &mut room)
+                }
+                _ => {
+                    spare.extend(postures.drain(batch.len().min(postures.len())..));
+                    postures.resize_with(batch.len(), || spare.pop().unwrap_or_else(|| vec![0.0; limits.dimension()]));
+                    postures.iter_mut().zip(batch).for_each(|(posture, point)| limits.write_from_unit(point, posture));
+                    batches.evaluate(&mut postures)
+                }
+            };
+            direct.tell(&values)?;
         }
         Ok(())
     })

@@ -13,7 +13,7 @@
 use fearless_simd::{ExtractToken, Simd, SimdFloat};
 use nalgebra::Vector3;
 
-use super::{Place, Points, Term, Turned, Wanted, Whitening};
+use super::{Passed, Place, Points, Term, Turned, Wanted, Whitening};
 use crate::{
     kinematics::JointKind,
     lanes::{Frame, GROUP, Lanes, Vector, load, splat, store},
@@ -60,7 +60,7 @@ impl Points {
         &self,
         place: &Place,
         (x, axes): (&Vector<S>, &Frame<S>),
-        turned: &[Turned<S>],
+        passed: &Passed<S>,
         (first, factors): (usize, &[f64]),
         slopes: &mut [f64],
     ) {
@@ -76,7 +76,8 @@ impl Points {
                 moved = moved + factors.of(simd, start + 3 + k).cross(Vector::splat(simd, &Vector3::ith(k, 1.0)));
             }
         }
-        for ((index, joint), turned) in self.joints.iter().enumerate().zip(turned) {
+        for (index, joint) in self.joints.iter().enumerate().take(passed.count) {
+            let turned = passed.at(index);
             let (arm, is_revolute) = (*x - turned.pivot, joint.kind == JointKind::Revolute);
             let velocity = if is_revolute { turned.axis.cross(arm) } else { turned.axis };
             let mut own = splat(simd, 0.0);
@@ -115,16 +116,17 @@ impl Points {
             if is_revolute {
                 by_position -= turned.axis.dot(turning);
             }
-            add::<S>(joint.rate(turned) * by_position + by_reading, slopes, index * GROUP + lane);
+            add::<S>(joint.rate(&turned) * by_position + by_reading, slopes, index * GROUP + lane);
         }
         if let Some(start) = place.own {
             for k in 0..3 {
                 turning = turning + axes.0[k].cross(factors.of(simd, start + k));
             }
         }
-        for ((index, joint), turned) in self.joints.iter().enumerate().zip(turned) {
+        for (index, joint) in self.joints.iter().enumerate().take(passed.count) {
+            let turned = passed.at(index);
             if joint.kind == JointKind::Revolute {
-                add::<S>(joint.rate(turned) * turned.axis.dot(turning), slopes, index * GROUP + lane);
+                add::<S>(joint.rate(&turned) * turned.axis.dot(turning), slopes, index * GROUP + lane);
             }
         }
     }

@@ -1,0 +1,600 @@
+//! The A-criterion of postures that differ from one in a single joint each, as DIRECT asks for them.
+//!
+//! G = P Hᵀ at the posture in the middle is a sum over the chain. Where joint j moves, what joints behind it add to that sum turns
+//! with the point, and what joints before it add changes by what moving the point changes (see
+//! [`model::points::star`](crate::model)): with U and V the sums over the columns before and behind, and T that of what drifts,
+//!
+//! ```text
+//! G' = U + T × Δ + R V + Σ P h'   over j's own columns
+//! ```
+//!
+//! so that a candidate takes some fifty multiplications for each tangent coordinate, however many there are, instead of three for
+//! each pair. Lanes run across tangent coordinates, and the values of one star do not depend on the others.
+
+use std::ops::Range;
+
+use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::innovation::{entries, place, traces};
+use crate::{
+    kinematics::JointBox,
+    lanes::{Aligned, GROUP, Lanes, groups, load, narrowed, sin_cos, splat, store, sums},
+    model::{Centre, Centres, Passage, Points, Ray, Stage},
+    optimize::Star,
+};
+
+/// Columns of a joint that are multiplied at once: those of its axis.
+const OWN: usize = 4;
+
+/// With fewer tangent coordinates it is faster to multiply those of every posture, postures side by side.
+pub(super) const FEWEST: usize = 36;
+
+/// Postures that differ from one in a single joint each: the same in the same order as a batch of DIRECT's.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Stars {
+    /// Joints of a posture.
+    dimension: usize,
+    centres: Vec<f64>,
+    /// The joint, and its reading there.
+    rays: Vec<(usize, f64)>,
+    /// Where the rays of each star end.
+    ends: Vec<usize>,
+}
+
+/// The criterion of stars under one hypothesis.
+pub(super) struct AroundCentres<'a> {
+    level: Level,
+    points: &'a Points,
+    passage: Passage,
+    /// Tangent coordinates, and as many with those that fill the last register.
+    sizes: [usize; 2],
+    /// P in the order of the passage, columns of full registers, and a few more that are zero.
+    p: Aligned,
+    weights: Aligned,
+    /// The criterion before the movement.
+    value: f64,
+}
+
+/// What a star is computed in. Of three numbers per coordinate, those of each dimension stand together.
+#[derive(Default)]
+pub(super) struct Room {
+    centres: Centres,
+    /// h and b, by coordinate, then by dimension.
+    columns: Vec<[f64; 3]>,
+    drifts: Vec<[f64; 3]>,
+    terms: Vec<[f64; 3]>,
+    /// h and b.
+    across: [Aligned; 2],
+    /// The sums behind every stage, and over all of them.
+    behind: Aligned,
+    /// T.
+    drifting: Aligned,
+    /// By how much the joint of each ray moves, its sine and cosine.
+    angles: [Vec<f64>; 3],
+    /// H P Hᵀ and G W Gᵀ of every ray.
+    found: [Vec<f64>; 2],
+}
+
+impl Stars {
+    /// None yet, of postures of so many joints.
+    pub fn new(dimension: usize) -> Self {
+        Self { dimension, ..Self::default() }
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.centres.clear();
+        self.rays.clear();
+        self.ends.clear();
+    }
+
+    /// Adds the points that divide a rectangle of the unit cube, which stands for these limits.
+    pub fn push(&mut self, star: &Star<'_>, limits: &JointBox) {
+        let along = |(joint, x): (usize, f64)| limits.from_unit_along(joint, x);
+        self.centres.extend(star.centre.iter().copied().enumerate().map(along));
+        self.rays.extend(star.rays().map(|ray| (ray.0, along(ray))));
+        self.ends.push(self.rays.len());
+    }
+
+    fn centres(&self) -> Vec<&[f64]> {
+        self.centres.chunks_exact(self.dimension).collect()
+    }
+}
+
+impl<'a> AroundCentres<'a> {
+    /// `None` where not just the place of one point is measured, alike in all directions.
+    pub fn new(
+        level: Level,
+        points: &'a Points,
+        covariance: &DMatrix<f64>,
+        weights: &[f64],
+        value: f64,
+    ) -> Option<Self> {
+        let m = covariance.nrows();
+        let passage = points.passage()?;
+        let wide = m.next_multiple_of(GROUP);
+        let mut p = Aligned::zeros(wide * (m + OWN));
+        for (column, &of) in p.chunks_exact_mut(wide.max(1)).zip(&passage.order) {
+            let given = covariance.column(of);
+            column.iter_mut().zip(&passage.order).for_each(|(p, &row)| *p = given[row]);
+        }
+        let mut ordered = Aligned::zeros(wide);
+        ordered.iter_mut().zip(&passage.order).for_each(|(weight, &of)| *weight = weights[of]);
+        Some(Self { level, points, passage, sizes: [m, wide], p, weights: ordered, value })
+    }
+
+    /// C(θ) of every ray, in order; not finite where it is no number.
+    pub fn evaluate(&self, stars: &Stars, room: &mut Room) -> Vec<f64> {
+        let [m, wide] = self.sizes;
+        let centres = stars.centres();
+        let level = narrowed(self.level, centres.len());
+        dispatch!(level, simd => self.points.look_up(simd, &centres, &mut room.centres));
+        let [h, b] = &mut room.across;
+        for numbers in [h, b, &mut room.drifting] {
+            numbers.ensure(3 * wide);
+        }
+        room.columns.resize(m, [0.0; 3]);
+        room.drifts.resize(m, [0.0; 3]);
+        room.behind.ensure((self.passage.stages.len() + 1) * 3 * wide);
+        let count = stars.rays.len();
+        for angles in &mut room.angles {
+            angles.resize(angles.len().max(count.next_multiple_of(GROUP)), 0.0);
+        }
+        let mut begin = 0;
+        for (centre, &end) in centres.iter().zip(&stars.ends) {
+            for ray in begin..end {
+                let (joint, reading) = stars.rays[ray];
+                room.angles[0][ray] = self.points.travel(joint, centre[joint], reading);
+            }
+            begin = end;
+        }
+        let of_group = entries(3) * GROUP;
+        for found in &mut room.found {
+            found.resize(groups(count) * of_group, 0.0);
+        }
+        dispatch!(self.level, simd => {
+            turn_all(simd, count, &mut room.angles);
+            let mut begin = 0;
+            for (index, (centre, &end)) in centres.iter().zip(&stars.ends).enumerate() {
+                self.star(simd, (index, centre), (begin, &stars.rays[begin..end]), room);
+                begin = end;
+            }
+        });
+        let mut values = traces(self.level, 3, &room.found[0], &room.found[1]);
+        values.truncate(count);
+        for value in &mut values {
+            *value = if value.is_finite() { self.value - *value } else { f64::INFINITY };
+        }
+        values
+    }
+
+    /// H P Hᵀ and G W Gᵀ of the rays of one star.
+    #[inline(always)]
+    fn star<S: Simd>(
+        &self,
+        simd: S,
+        (index, readings): (usize, &[f64]),
+        (first, rays): (usize, &[(usize, f64)]),
+        room: &mut Room,
+    ) {
+        let [_, wide] = self.sizes;
+        let stages = &self.passage.stages;
+        let Room { centres, columns, drifts, terms, across, behind, drifting, angles, found } = room;
+        let centre = centres.at(self.points, index);
+        self.gather(&centre, readings, (columns, drifts), across);
+        sum_behind(simd, wide, stages, (&self.p, columns), behind);
+        drifting.fill(0.0);
+        let (all, behind) = behind.split_at(3 * wide);
+        let (mut next, mut drifted) = (0, 0);
+        for (stage, at) in stages.iter().enumerate() {
+            let sums_behind = &behind[stage * 3 * wide..][..3 * wide];
+            // Of all from this stage on.
+            let from_here = if stage == 0 { all } else { &behind[(stage - 1) * 3 * wide..][..3 * wide] };
+            let is_last = stage + 1 == stages.len();
+            if next == rays.len() {
+                break;
+            }
+            let is_asked = is_last || rays[next].0 + 1 == stage;
+            if !is_asked {
+                continue;
+            }
+            drift(simd, wide, &stages[drifted..stage], (&self.p, drifts), drifting);
+            drifted = stage;
+            let pivot = (!is_last).then(|| centre.pivot(stage - 1, &columns[at.coordinates.clone()]));
+            while let Some(&(joint, reading)) = rays.get(next)
+                && (joint + 1 == stage || is_last)
+            {
+                let ray = first + next;
+                next += 1;
+                let turn = if let Some(pivot) = &pivot {
+                    pivot.ray(reading, [angles[0][ray], angles[1][ray], angles[2][ray]], terms)
+                } else {
+                    // Nothing moves before the point: its own columns stay what they are.
+                    terms.clear();
+                    terms.extend_from_slice(&columns[at.coordinates.clone()]);
+                    Ray { rotation: Matrix3::identity(), shift: Vector3::zeros(), axis: [[0.0; 3]; 4] }
+                };
+                let rotation: [[f64; 3]; 3] = turn.rotation.transpose().into();
+                let shift: [f64; 3] = turn.shift.into();
+                let ([r1, r2, r3], [h1, h2, h3, h4]) = (rotation, turn.axis);
+                let p = &self.p[at.coordinates.start * wide..];
+                let moved = Moved {
+                    simd,
+                    wide,
+                    rotation: [splat_all(simd, r1), splat_all(simd, r2), splat_all(simd, r3)],
+                    shift: splat_all(simd, shift),
+                    axis: [splat_all(simd, h1), splat_all(simd, h2), splat_all(simd, h3), splat_all(simd, h4)],
+                    p: [&p[..wide], &p[wide..2 * wide], &p[2 * wide..3 * wide], &p[3 * wide..4 * wide]],
+                    of_axis: at.of_axis,
+                    terms,
+                    p_of_terms: &p[at.of_axis * wide..],
+                    across,
+                    sums: [all, from_here, sums_behind, drifting],
+                    weights: &self.weights,
+                };
+                let spreads = moved.multiply(&at.coordinates);
+                let place = place(3, 0, 0, ray);
+                for (found, sums) in found.iter_mut().zip(spreads) {
+                    let found = &mut found[place..=place + 5 * GROUP];
+                    (0..6).for_each(|entry| found[entry * GROUP] = sums[entry]);
+                }
+            }
+        }
+    }
+
+    /// h and b of all coordinates, in both orders.
+    fn gather(
+        &self,
+        centre: &Centre<'_>,
+        readings: &[f64],
+        (columns, drifts): (&mut [[f64; 3]], &mut [[f64; 3]]),
+        across: &mut [Aligned; 2],
+    ) {
+        let wide = self.sizes[1];
+        columns.iter_mut().zip(centre.columns(&self.passage.order)).for_each(|(to, column)| *to = column);
+        for (stage, at) in self.passage.stages.iter().enumerate() {
+            let mut places = drifts[at.drifting.clone()].iter_mut();
+            centre.drifts(stage, readings, &columns[at.coordinates.clone()], |b| {
+                if let Some(place) = places.next() {
+                    *place = b;
+                }
+            });
+        }
+        for (across, columns) in across.iter_mut().zip([&*columns, &*drifts]) {
+            let (x, others) = across.split_at_mut(wide);
+            let (y, z) = others.split_at_mut(wide);
+            for (((x, y), z), column) in x.iter_mut().zip(y).zip(z).zip(columns) {
+                (*x, *y, *z) = (column[0], column[1], column[2]);
+            }
+        }
+    }
+}
+
+/// Sines and cosines of all angles.
+#[inline(always)]
+fn turn_all<S: Simd>(simd: S, count: usize, [angles, sines, cosines]: &mut [Vec<f64>; 3]) {
+    for first in (0..count).step_by(Lanes::<S>::LEN) {
+        let (sin, cos) = sin_cos::<S>(load(simd, angles, first));
+        store::<S>(sin, sines, first);
+        store::<S>(cos, cosines, first);
+    }
+}
+
+/// For every stage P h summed over its columns and those behind it; 0 behind the last.
+#[inline(always)]
+fn sum_behind<S: Simd>(simd: S, wide: usize, stages: &[Stage], given: (&[f64], &[[f64; 3]]), behind: &mut [f64]) {
+    let width = Lanes::<S>::LEN;
+    let threes = wide / (3 * width) * 3 * width;
+    for at in (0..threes).step_by(3 * width) {
+        sum_registers::<S, 3>(simd, [wide, at], stages, given, behind);
+    }
+    for at in (threes..wide).step_by(width) {
+        sum_registers::<S, 1>(simd, [wide, at], stages, given, behind);
+    }
+}
+
+/// K registers of it: as many sums at a time as do not wait for each other.
+#[inline(always)]
+fn sum_registers<S: Simd, const K: usize>(
+    simd: S,
+    [wide, at]: [usize; 2],
+    stages: &[Stage],
+    (p, h): (&[f64], &[[f64; 3]]),
+    behind: &mut [f64],
+) {
+    let width = Lanes::<S>::LEN;
+    let mut sums = [[splat(simd, 0.0); 3]; K];
+    for stage in (0..=stages.len()).rev() {
+        if let Some(of) = stages.get(stage) {
+            for column in of.coordinates.clone() {
+                let (p, [x, y, z]) = (&p[column * wide + at..][..K * width], h[column]);
+                let [x, y, z] = [splat(simd, x), splat(simd, y), splat(simd, z)];
+                for (k, [of_x, of_y, of_z]) in sums.iter_mut().enumerate() {
+                    let p = load(simd, p, k * width);
+                    *of_x = p.mul_add(x, *of_x);
+                    *of_y = p.mul_add(y, *of_y);
+                    *of_z = p.mul_add(z, *of_z);
+                }
+            }
+        }
+        for row in 0..3 {
+            let behind = &mut behind[(stage * 3 + row) * wide + at..][..K * width];
+            for (k, sums) in sums.iter().enumerate() {
+                store::<S>(sums[row], behind, k * width);
+            }
+        }
+    }
+}
+
+/// Adds P b of what drifts in a few stages.
+#[inline(always)]
+fn drift<S: Simd>(simd: S, wide: usize, stages: &[Stage], (p, b): (&[f64], &[[f64; 3]]), to: &mut [f64]) {
+    let (to_x, others) = to.split_at_mut(wide);
+    let (to_y, to_z) = others.split_at_mut(wide);
+    for at in (0..wide).step_by(Lanes::<S>::LEN) {
+        let [mut x, mut y, mut z] = [load(simd, to_x, at), load(simd, to_y, at), load(simd, to_z, at)];
+        for stage in stages {
+            for column in stage.drifting.clone() {
+                let (p, b) = (load(simd, p, column * wide + at), b[column]);
+                x = p.mul_add(splat(simd, b[0]), x);
+                y = p.mul_add(splat(simd, b[1]), y);
+                z = p.mul_add(splat(simd, b[2]), z);
+            }
+        }
+        store::<S>(x, to_x, at);
+        store::<S>(y, to_y, at);
+        store::<S>(z, to_z, at);
+    }
+}
+
+/// The same vector in all lanes.
+#[inline(always)]
+fn splat_all<S: Simd>(simd: S, [x, y, z]: [f64; 3]) -> [Lanes<S>; 3] {
+    [splat(simd, x), splat(simd, y), splat(simd, z)]
+}
+
+/// v + b × d.
+#[inline(always)]
+fn plus_cross<S: Simd>(v: [Lanes<S>; 3], b: [Lanes<S>; 3], d: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    let [[vx, vy, vz], [bx, by, bz], [x, y, z]] = [v, b, d];
+    [by.mul_add(z, (-bz).mul_add(y, vx)), bz.mul_add(x, (-bx).mul_add(z, vy)), bx.mul_add(y, (-by).mul_add(x, vz))]
+}
+
+/// What every register of a ray is made of.
+struct Moved<'a, S: Simd> {
+    simd: S,
+    wide: usize,
+    rotation: [[Lanes<S>; 3]; 3],
+    shift: [Lanes<S>; 3],
+    /// h' of the joint's axis, and P of its coordinates, of which so many are learned; those that are not count for nothing.
+    axis: [[Lanes<S>; 3]; OWN],
+    p: [&'a [f64]; OWN],
+    of_axis: usize,
+    /// The same of what corrects its reading.
+    terms: &'a [[f64; 3]],
+    p_of_terms: &'a [f64],
+    /// h and b.
+    across: &'a [Aligned; 2],
+    sums: [&'a [f64]; 4],
+    weights: &'a [f64],
+}
+
+/// The upper triangles of H P Hᵀ and G W Gᵀ.
+type Entries<S> = [[Lanes<S>; 6]; 2];
+
+impl<S: Simd> Moved<'_, S> {
+    #[inline(always)]
+    fn load(&self, numbers: &[f64], at: usize) -> [Lanes<S>; 3] {
+        let numbers = &numbers[at..at + 2 * self.wide + Lanes::<S>::LEN];
+        [load(self.simd, numbers, 0), load(self.simd, numbers, self.wide), load(self.simd, numbers, 2 * self.wide)]
+    }
+
+    /// h' of coordinates before the joint.
+    #[inline(always)]
+    fn before(&self, at: usize) -> [Lanes<S>; 3] {
+        let [h, b] = self.across;
+        plus_cross::<S>(self.load(h, at), self.load(b, at), self.shift)
+    }
+
+    /// h' of coordinates behind it.
+    #[inline(always)]
+    fn behind(&self, at: usize) -> [Lanes<S>; 3] {
+        let zero = splat(self.simd, 0.0);
+        self.turned(self.load(&self.across[0], at), [zero, zero, zero])
+    }
+
+    /// h' of a register in which there are coordinates of the joint itself.
+    #[inline(always)]
+    fn at_joint(&self, at: usize, own: Range<usize>) -> [Lanes<S>; 3] {
+        let (simd, width) = (self.simd, Lanes::<S>::LEN);
+        let ones = |until: usize| load(simd, &STEP, GROUP - until.saturating_sub(at).min(width));
+        let (is_before, is_not_behind) = (ones(own.start), ones(own.end));
+        let is_behind = splat(simd, 1.0) - is_not_behind;
+        let (before, behind) = (self.before(at), self.behind(at));
+        let mut moved = [splat(simd, 0.0); 3];
+        for row in 0..3 {
+            moved[row] = before[row].mul_add(is_before, behind[row] * is_behind);
+        }
+        for (coordinate, column) in own.clone().zip(&self.axis[..self.of_axis]) {
+            self.place(at, coordinate, *column, &mut moved);
+        }
+        for (coordinate, column) in own.skip(self.of_axis).zip(self.terms) {
+            self.place(at, coordinate, splat_all(simd, *column), &mut moved);
+        }
+        moved
+    }
+
+    /// Adds a column where its coordinate stands in the register, if it does.
+    #[inline(always)]
+    fn place(&self, at: usize, coordinate: usize, column: [Lanes<S>; 3], moved: &mut [Lanes<S>; 3]) {
+        if (at..at + Lanes::<S>::LEN).contains(&coordinate) {
+            let is_it = load(self.simd, &UNIT, GROUP - (coordinate - at));
+            for (moved, x) in moved.iter_mut().zip(column) {
+                *moved = is_it.mul_add(x, *moved);
+            }
+        }
+    }
+
+    /// R v + sum.
+    #[inline(always)]
+    fn turned(&self, v: [Lanes<S>; 3], mut sum: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        for (sum, r) in sum.iter_mut().zip(&self.rotation) {
+            *sum = v[0].mul_add(r[0], v[1].mul_add(r[1], v[2].mul_add(r[2], *sum)));
+        }
+        sum
+    }
+
+    /// Adds what a register of coordinates with these h' contributes.
+    #[inline(always)]
+    fn add(&self, at: usize, h: [Lanes<S>; 3], entries: &mut Entries<S>) {
+        let (simd, [all, from_here, behind, drifting]) = (self.simd, self.sums);
+        let (all, not_before) = (self.load(all, at), self.load(from_here, at));
+        let before = [all[0] - not_before[0], all[1] - not_before[1], all[2] - not_before[2]];
+        let mut g = plus_cross::<S>(before, self.load(drifting, at), self.shift);
+        g = self.turned(self.load(behind, at), g);
+        for (p, column) in self.p.iter().zip(&self.axis) {
+            let p = load(simd, p, at);
+            for (g, x) in g.iter_mut().zip(column) {
+                *g = p.mul_add(*x, *g);
+            }
+        }
+        for (index, column) in self.terms.iter().enumerate() {
+            let p = load(simd, self.p_of_terms, index * self.wide + at);
+            for (g, x) in g.iter_mut().zip(column) {
+                *g = p.mul_add(splat(simd, *x), *g);
+            }
+        }
+        let w = load(simd, self.weights, at);
+        let weighted = [g[0] * w, g[1] * w, g[2] * w];
+        let [spreads, leverages] = entries;
+        let mut entry = 0;
+        for column in 0..3 {
+            for row in 0..=column {
+                spreads[entry] = h[row].mul_add(g[column], spreads[entry]);
+                leverages[entry] = weighted[row].mul_add(g[column], leverages[entry]);
+                entry += 1;
+            }
+        }
+    }
+
+    /// H P Hᵀ and G W Gᵀ, of which the coordinates `own` are the joint's.
+    #[inline(always)]
+    fn multiply(&self, own: &Range<usize>) -> [[f64; 6]; 2] {
+        let width = Lanes::<S>::LEN;
+        let zero = splat(self.simd, 0.0);
+        let mut entries = [[zero; 6]; 2];
+        let (begin, end) = (own.start / width * width, own.end.next_multiple_of(width));
+        for at in (0..begin).step_by(width) {
+            self.add(at, self.before(at), &mut entries);
+        }
+        for at in (begin..end).step_by(width) {
+            self.add(at, self.at_joint(at, own.clone()), &mut entries);
+        }
+        for at in (end..self.wide).step_by(width) {
+            self.add(at, self.behind(at), &mut entries);
+        }
+        let [[a, b, c, d, e, f], [u, v, w, x, y, z]] = entries;
+        let [s11, s12, s22, s13, s23, s33, l11, l12] = sums::<S>([a, b, c, d, e, f, u, v]);
+        let [l22, l13, l23, l33, ..] = sums::<S>([w, x, y, z, zero, zero, zero, zero]);
+        [[s11, s12, s22, s13, s23, s33], [l11, l12, l22, l13, l23, l33]]
+    }
+}
+
+/// Ones, then zeros.
+const STEP: [f64; 2 * GROUP] = {
+    let mut step = [0.0; 2 * GROUP];
+    let mut index = 0;
+    while index < GROUP {
+        step[index] = 1.0;
+        index += 1;
+    }
+    step
+};
+
+/// A one among zeros.
+const UNIT: [f64; 2 * GROUP] = {
+    let mut unit = [0.0; 2 * GROUP];
+    unit[GROUP] = 1.0;
+    unit
+};
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::{
+        estimation::Belief,
+        lanes::levels,
+        model::{
+            Block, Layout,
+            laws::{all_blocks, random_state},
+        },
+        selection::{Criterion, CriterionUnits, Weights, criterion::points},
+        sensing::{Position, Rig},
+    };
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// For every kind of block and joint, at every level of instructions, whatever else is asked for beside a star.
+        #[test]
+        fn stars_say_what_single_postures_say(seed: u64, joints in 1_usize..=9, count in 1_usize..=5) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut state = random_state(&mut rng, joints);
+            state.corrections.iter_mut().for_each(|correction| correction.compliance = [0.0; 2]);
+            let blocks = all_blocks(&state).into_iter().filter(|block| !matches!(block, Block::Compliance(..)));
+            let mut blocks: Vec<Block> = blocks.collect();
+            for last in (1..blocks.len()).rev() {
+                blocks.swap(last, rng.random_range(0..=last));
+            }
+            blocks.truncate(rng.random_range(1..=blocks.len()));
+            let layout = Layout::new(&state, blocks);
+            let m = layout.dimension();
+            let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-0.5..0.5));
+            let covariance = &root * root.transpose() + DMatrix::identity(m, m) * 1e-3;
+            let prior_sd = nalgebra::DVector::from_fn(m, |_, _| rng.random_range(0.1..2.0));
+            let weights = Weights::new(CriterionUnits::Prior, &layout, &prior_sd);
+            let target = rng.random_range(0..state.targets.len());
+            let rig = Rig::new(vec![std::sync::Arc::new(Position::of(target, 0.1)) as _]);
+            let belief = Belief::new(state, layout.into(), rig.into()).with_covariance(covariance);
+            let criterion = Criterion::new(&belief, &weights).expect("a covariance");
+            let points = points(&belief, &belief.state).expect("a tracker");
+            let (mut stars, mut postures, mut alone) = (Stars::new(joints), Vec::new(), Vec::new());
+            for _ in 0..count {
+                let centre: Vec<f64> = (0..joints).map(|_| rng.random_range(-3.0..3.0)).collect();
+                let mut one = Stars::new(joints);
+                one.centres.extend(&centre);
+                for joint in 0..joints {
+                    for _ in 0..2 * rng.random_range(0..=1) {
+                        let mut posture = centre.clone();
+                        posture[joint] = rng.random_range(-3.0..3.0);
+                        one.rays.push((joint, posture[joint]));
+                        postures.push(posture);
+                    }
+                }
+                one.ends.push(one.rays.len());
+                stars.centres.extend(&one.centres);
+                stars.rays.extend(&one.rays);
+                stars.ends.push(stars.rays.len());
+                alone.push(one);
+            }
+            let expected = criterion.evaluate(&postures);
+            for level in levels() {
+                let (p, value) = (belief.covariance.as_ref().expect("a covariance"), criterion.before());
+                let around = AroundCentres::new(level, &points, p, weights.all(), value).expect("one point");
+                let found = around.evaluate(&stars, &mut Room::default());
+                prop_assert_eq!(found.len(), expected.len());
+                for (found, expected) in found.iter().zip(&expected) {
+                    prop_assert!((found - expected).abs() < 1e-12 * criterion.before(), "{level:?}: {found} {expected}");
+                }
+                let mut room = Room::default();
+                let apart: Vec<f64> = alone.iter().flat_map(|star| around.evaluate(star, &mut room)).collect();
+                prop_assert_eq!(apart, found);
+            }
+        }
+    }
+}
