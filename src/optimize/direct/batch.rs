@@ -1,6 +1,6 @@
 //! The points that a search asks for at a time.
 
-use super::{partition::Rectangles, settings::longest};
+use super::partition::Rectangles;
 
 /// Points to evaluate, all of which may be evaluated at once.
 #[derive(Debug, Clone, Copy)]
@@ -17,6 +17,7 @@ pub struct Star<'a> {
     /// c, the rectangle's centre, whose value has been told.
     pub centre: &'a [f64],
     levels: &'a [u8],
+    longest: u8,
     points: &'a [f64],
 }
 
@@ -43,7 +44,8 @@ impl<'a> Batch<'a> {
         dividing.iter().map(move |&rectangle| {
             let (points, others) = left.split_at(2 * rectangles.long_sides(rectangle) * rectangles.dimension);
             left = others;
-            Star { centre: rectangles.centre(rectangle), levels: rectangles.levels(rectangle), points }
+            let (centre, longest) = (rectangles.centre(rectangle), rectangles.longest(rectangle));
+            Star { centre, levels: rectangles.levels(rectangle), longest, points }
         })
     }
 }
@@ -62,8 +64,7 @@ impl<'a> Star<'a> {
 
     /// The same: in which coordinate each differs from the centre, and what it is there.
     pub fn rays(&self) -> impl Iterator<Item = (usize, f64)> {
-        let longest = longest(self.levels);
-        let sides = (0..self.levels.len()).filter(move |&side| self.levels[side] == longest).flat_map(|side| [side; 2]);
+        let sides = (0..self.levels.len()).filter(|&side| self.levels[side] == self.longest).flat_map(|side| [side; 2]);
         sides.zip(self.points()).map(|(side, point)| (side, point[side]))
     }
 }

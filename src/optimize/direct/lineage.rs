@@ -17,6 +17,9 @@ pub fn surrogate(value: f64) -> f64 {
 /// Rectangle 0 is the root and nobody's child, so a 0 ends every list of children.
 #[derive(Debug, Clone)]
 pub struct Lineage {
+    /// Who was divided for each rectangle.
+    parents: Vec<usize>,
+    /// Those of the tree: none as long as all centres are feasible, when nobody asks.
     nodes: Vec<Node>,
     /// Levels at birth, as many per rectangle as there are dimensions.
     birth_levels: Vec<u8>,
@@ -25,7 +28,6 @@ pub struct Lineage {
 /// A rectangle in the tree; 0, the root, where there is no child or sibling.
 #[derive(Debug, Clone)]
 struct Node {
-    parent: usize,
     last_child: usize,
     elder_sibling: usize,
     /// The least value of a feasible centre among a rectangle and its descendants.
@@ -37,7 +39,8 @@ struct Node {
 impl Lineage {
     /// With room for so many rectangles.
     pub fn with_room(dimension: usize, room: usize) -> Self {
-        Self { nodes: Vec::with_capacity(room), birth_levels: Vec::with_capacity(room * dimension) }
+        let (parents, birth_levels) = (Vec::with_capacity(room), Vec::with_capacity(room * dimension));
+        Self { parents, nodes: Vec::new(), birth_levels }
     }
 
     /// Whether any centre is infeasible.
@@ -47,12 +50,20 @@ impl Lineage {
 
     /// Adds the next rectangle in line, in the shape it has now. The root is its own parent.
     pub fn add(&mut self, parent: usize, rectangles: &Rectangles) {
-        let child = self.nodes.len();
+        let child = self.parents.len();
+        self.parents.push(parent);
+        self.birth_levels.extend_from_slice(rectangles.levels(child));
+        if self.any_infeasible() || rectangles.values[child].is_none() {
+            (self.nodes.len()..=child).for_each(|node| self.plant(node, rectangles.values[node]));
+        }
+    }
+
+    /// Puts the next rectangle into the tree.
+    fn plant(&mut self, child: usize, value: Option<f64>) {
+        let parent = self.parents[child];
         let elder_sibling =
             self.nodes.get_mut(parent).map_or(0, |parent| std::mem::replace(&mut parent.last_child, child));
-        self.nodes.push(Node { parent, last_child: 0, elder_sibling, least: f64::INFINITY, obscured: false });
-        self.birth_levels.extend_from_slice(rectangles.levels(child));
-        let value = rectangles.values[child];
+        self.nodes.push(Node { elder_sibling, last_child: 0, least: f64::INFINITY, obscured: false });
         let mut node = child;
         loop {
             // What is no news to a node is none to its ancestors.
@@ -68,7 +79,7 @@ impl Lineage {
                 Some(value) => known.least = value,
                 None => known.obscured = true,
             }
-            node = known.parent;
+            node = self.parents[node];
         }
     }
 

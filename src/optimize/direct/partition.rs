@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::settings::{Variant, longest};
+use super::settings::Variant;
 use super::ternary::{self, MAX_LEVEL};
 
 /// All rectangles, field by field. One whose value has not been told yet has a centre and levels but no more.
@@ -11,6 +11,8 @@ pub struct Rectangles {
     pub dimension: usize,
     pub centres: Vec<f64>,
     pub levels: Vec<u8>,
+    /// Of the longest sides: their level, and how many there are. The others are one level deeper.
+    longest: Vec<(u8, u32)>,
     /// `None` where the centre is infeasible.
     pub values: Vec<Option<f64>>,
     /// The value, or the surrogate of an infeasible centre, or infinity where it has none.
@@ -28,7 +30,9 @@ impl Rectangles {
         levels.resize(dimension, 0);
         let (values, scores) = (Vec::with_capacity(room), Vec::with_capacity(room));
         let (generations, chosen) = (Vec::with_capacity(room), Vec::with_capacity(room));
-        Self { dimension, centres, levels, values, scores, generations, chosen }
+        let mut longest = Vec::with_capacity(room);
+        longest.push((0, dimension as u32));
+        Self { dimension, centres, levels, longest, values, scores, generations, chosen }
     }
 
     /// How many values have been told.
@@ -49,23 +53,35 @@ impl Rectangles {
         &self.levels[rectangle * self.dimension..][..self.dimension]
     }
 
+    /// The trisection level of the longest sides.
+    pub fn longest(&self, rectangle: usize) -> u8 {
+        self.longest[rectangle].0
+    }
+
     /// How many sides of a rectangle are longest, and so would be trisected.
     pub fn long_sides(&self, rectangle: usize) -> usize {
-        let levels = self.levels(rectangle);
-        let longest = longest(levels);
-        levels.iter().filter(|&&level| level == longest).count()
+        self.longest[rectangle].1 as usize
+    }
+
+    /// The size class of a rectangle: as [`Variant::class`] says of its levels.
+    pub fn class(&self, rectangle: usize, variant: Variant) -> usize {
+        let (longest, count) = self.longest[rectangle];
+        match variant {
+            Variant::Original => self.dimension * (usize::from(longest) + 1) - count as usize,
+            Variant::LocallyBiased => usize::from(longest),
+        }
     }
 
     /// Whether the rectangle has a side left to divide.
     pub fn divisible(&self, rectangle: usize) -> bool {
-        longest(self.levels(rectangle)) < MAX_LEVEL
+        self.longest(rectangle) < MAX_LEVEL
     }
 
     /// Appends the centres that a division of `parent` samples: c ± 3⁻ˡ⁻¹ eᵢ for every longest side i in turn, plus
     /// before minus. Their levels are the parent's until their values decide who gets which.
     pub fn sample_around(&mut self, parent: usize) {
         let first = parent * self.dimension;
-        let level = longest(self.levels(parent));
+        let level = self.longest(parent);
         for side in 0..self.dimension {
             if self.levels[first + side] != level {
                 continue;
@@ -75,6 +91,7 @@ impl Rectangles {
                 self.centres.extend_from_within(first..first + self.dimension);
                 self.centres[child + side] = coordinate;
                 self.levels.extend_from_within(first..first + self.dimension);
+                self.longest.push(self.longest[parent]);
             }
         }
     }
@@ -93,7 +110,7 @@ impl Rectangles {
     /// Each side is ranked by the lower of its two children's scores; the parent is cut along the best side first,
     /// so that the best children keep the largest rectangles. Sides that tie are cut in the order of coordinates.
     pub fn divide(&mut self, parent: usize, first_child: usize, ranking: &mut Vec<(f64, usize, usize)>) -> usize {
-        let longest = longest(self.levels(parent));
+        let longest = self.longest(parent);
         ranking.clear();
         for side in 0..self.dimension {
             if self.levels(parent)[side] == longest {
@@ -109,6 +126,13 @@ impl Rectangles {
                 self.levels[(child + 1) * self.dimension + side] += 1;
             }
         }
+        // Who is cut along every longest side has all sides alike.
+        let alike = (longest + 1, self.dimension as u32);
+        for (rank, &(_, child, _)) in ranking.iter().enumerate() {
+            let left = (ranking.len() - rank - 1) as u32;
+            self.longest[child..child + 2].fill(if left > 0 { (longest, left) } else { alike });
+        }
+        self.longest[parent] = alike;
         2 * ranking.len()
     }
 }

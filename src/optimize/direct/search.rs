@@ -256,8 +256,7 @@ impl Direct {
     }
 
     fn enlist(&mut self, rectangle: usize) {
-        let levels = self.rectangles.levels(rectangle);
-        let class = self.settings.variant.class(levels);
+        let class = self.rectangles.class(rectangle, self.settings.variant);
         // Where the class is no smaller than the deepest level, the longest side may be there.
         if class < usize::from(MAX_LEVEL) || self.rectangles.divisible(rectangle) {
             self.classes.insert(class, rectangle, self.rectangles.scores[rectangle]);
@@ -265,7 +264,7 @@ impl Direct {
     }
 
     fn delist(&mut self, rectangle: usize) -> bool {
-        let class = self.settings.variant.class(self.rectangles.levels(rectangle));
+        let class = self.rectangles.class(rectangle, self.settings.variant);
         self.classes.remove(class, rectangle)
     }
 
@@ -288,7 +287,7 @@ impl Direct {
             self.chosen.extend(passed.map(|point| point.rectangle));
             if variant == Variant::Original {
                 for index in 0..self.chosen.len() {
-                    let class = variant.class(self.rectangles.levels(self.chosen[index]));
+                    let class = self.rectangles.class(self.chosen[index], variant);
                     self.chosen.extend(self.classes.ties(class));
                 }
             }
