@@ -95,7 +95,8 @@ fn d_one_active_selection(bencher: Bencher<'_, '_>, name: &str) {
 
 #[divan::bench(args = [6, 12])]
 fn e_direct_alone(bencher: Bencher<'_, '_>, dimension: usize) {
-    let settings = Settings { variant: Variant::LocallyBiased, epsilon: 1e-4, max_evaluations: CANDIDATES };
+    let settings =
+        Settings { variant: Variant::LocallyBiased, epsilon: 1e-4, max_evaluations: CANDIDATES, ..Settings::default() };
     bencher.bench(|| {
         let mut direct = Direct::new(dimension, settings).expect("valid settings");
         while let Some(batch) = direct.ask() {

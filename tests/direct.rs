@@ -295,7 +295,7 @@ fn extreme_values_do_no_harm() {
 fn rectangles_at_the_depth_limit_are_left_alone() {
     // With ε = 0 and a minimum of zero nothing else keeps the search from dividing the best rectangle for ever.
     for variant in VARIANTS {
-        let settings = Settings { variant, epsilon: 0.0, max_evaluations: 3_000 };
+        let settings = Settings { variant, epsilon: 0.0, max_evaluations: 3_000, ..Settings::default() };
         let mut direct = Direct::new(1, settings).unwrap();
         let mut seen = HashSet::new();
         while let Some(points) = step(&mut direct, |x| (x[0] - 0.3).abs()) {
@@ -340,4 +340,33 @@ fn asking_again_returns_the_same_points() {
     let twice: Vec<Vec<f64>> = direct.ask().into_iter().flatten().map(<[f64]>::to_vec).collect();
     assert_eq!(once.len(), 4);
     assert_eq!(once, twice);
+}
+
+/// Where nothing ties, the order changes what the last iteration leaves undivided, and nothing else.
+#[test]
+fn the_smallest_may_come_first() {
+    let objective = |x: &[f64]| {
+        let apart = x.iter().enumerate().map(|(i, x)| (x - 0.31 - 0.083 * i as f64).powi(2) * (1.0 + 0.37 * i as f64));
+        1.0 + apart.sum::<f64>() + 0.01 * (17.0 * x[0]).sin()
+    };
+    let settings = Settings { variant: Variant::LocallyBiased, max_evaluations: 400, ..Settings::default() };
+    let mut largest = Direct::new(5, settings).unwrap();
+    let mut smallest = Direct::new(5, Settings { smallest_first: true, ..settings }).unwrap();
+    let sorted = |points: Vec<Vec<f64>>| {
+        let mut points: Vec<Vec<u64>> = points.iter().map(|x| x.iter().map(|x| x.to_bits()).collect()).collect();
+        points.sort();
+        points
+    };
+    let mut iterations = 0;
+    loop {
+        assert_eq!(largest.potentially_optimal().len(), smallest.potentially_optimal().len());
+        let [a, b] = [&mut largest, &mut smallest].map(|direct| step(direct, objective));
+        let (Some(a), Some(b)) = (a, b) else { break };
+        let is_cut_short = largest.is_finished() || smallest.is_finished();
+        assert!(is_cut_short || sorted(a) == sorted(b));
+        iterations += 1;
+    }
+    assert!(iterations > 10);
+    let [a, b] = [&largest, &smallest].map(|direct| direct.best().expect("feasible").1);
+    assert!(b <= a, "{b} {a}");
 }

@@ -109,12 +109,12 @@ impl JointBox {
     pub(crate) fn write_from_unit(&self, point: &[f64], configuration: &mut [f64]) {
         debug_assert_eq!(point.len(), self.dimension(), "one coordinate per joint");
         for (joint, (position, x)) in configuration.iter_mut().zip(point).enumerate() {
-            *position = self.from_unit_along(joint, *x);
+            *position = self.along_from_unit(joint, *x);
         }
     }
 
     /// The position of one joint at a coordinate of the unit cube.
-    pub(crate) fn from_unit_along(&self, joint: usize, x: f64) -> f64 {
+    pub(crate) fn along_from_unit(&self, joint: usize, x: f64) -> f64 {
         let (lower, upper) = self.joints[joint];
         (lower + x * (upper - lower)).clamp(lower, upper)
     }

@@ -16,6 +16,7 @@
 //! θ e₁, θ e₂,  e₃                                                        prismatic
 //! ```
 
+mod passed;
 mod posture;
 mod slopes;
 mod star;
@@ -26,8 +27,10 @@ use nalgebra::{Matrix3, Vector3};
 use super::{Block, Correction, Layout, State, pass::Term};
 use crate::{
     kinematics::{JointKind, chart},
-    lanes::{Aligned, Frame, GROUP, Lanes, Vector, groups, sin_cos, splat},
+    lanes::{Frame, GROUP, Lanes, Vector, groups, sin_cos, splat},
 };
+
+use passed::{Passed, Turned};
 
 pub use posture::Posture;
 pub use star::{Centre, Centres, Passage, Ray, Stage};
@@ -82,69 +85,6 @@ pub enum Whitening {
     Even(f64),
     /// L⁻¹, 1/m.
     Full(Matrix3<f64>),
-}
-
-/// A joint at a few postures: d₁, d₂, f₃ and q; of a prismatic joint θ e₁ and θ e₂ in place of d₁ and d₂.
-struct Turned<S: Simd> {
-    swept: [Vector<S>; 2],
-    axis: Vector<S>,
-    /// f₁ and f₂.
-    basis: [Vector<S>; 2],
-    pivot: Vector<S>,
-    /// The joint's reading, its sine and cosine.
-    reading: [Lanes<S>; 3],
-}
-
-/// Numbers of it for each posture.
-const OF_TURNED: usize = 21;
-
-/// The joints that a walk along the chain has passed, at a few postures.
-struct Passed<S: Simd> {
-    simd: S,
-    numbers: Aligned,
-    count: usize,
-}
-
-impl<S: Simd> Passed<S> {
-    /// None, with room for so many.
-    #[inline(always)]
-    fn with_room(simd: S, joints: usize) -> Self {
-        Self { simd, numbers: Aligned::of_any(joints * OF_TURNED * Lanes::<S>::LEN), count: 0 }
-    }
-
-    #[inline(always)]
-    fn push(&mut self, turned: &Turned<S>) {
-        let width = Lanes::<S>::LEN;
-        let numbers = &mut self.numbers[self.count * OF_TURNED * width..][..OF_TURNED * width];
-        let Turned { swept: [d1, d2], axis, basis: [f1, f2], pivot, reading } = *turned;
-        d1.store(numbers, [0, width, 2 * width]);
-        d2.store(numbers, [3 * width, 4 * width, 5 * width]);
-        axis.store(numbers, [6 * width, 7 * width, 8 * width]);
-        f1.store(numbers, [9 * width, 10 * width, 11 * width]);
-        f2.store(numbers, [12 * width, 13 * width, 14 * width]);
-        pivot.store(numbers, [15 * width, 16 * width, 17 * width]);
-        Vector::<S>(reading).store(numbers, [18 * width, 19 * width, 20 * width]);
-        self.count += 1;
-    }
-
-    #[inline(always)]
-    fn at(&self, index: usize) -> Turned<S> {
-        let (simd, width) = (self.simd, Lanes::<S>::LEN);
-        let numbers = &self.numbers[index * OF_TURNED * width..][..OF_TURNED * width];
-        Turned {
-            swept: [
-                Vector::load(simd, numbers, [0, width, 2 * width]),
-                Vector::load(simd, numbers, [3 * width, 4 * width, 5 * width]),
-            ],
-            axis: Vector::load(simd, numbers, [6 * width, 7 * width, 8 * width]),
-            basis: [
-                Vector::load(simd, numbers, [9 * width, 10 * width, 11 * width]),
-                Vector::load(simd, numbers, [12 * width, 13 * width, 14 * width]),
-            ],
-            pivot: Vector::load(simd, numbers, [15 * width, 16 * width, 17 * width]),
-            reading: Vector::load(simd, numbers, [18 * width, 19 * width, 20 * width]).0,
-        }
-    }
 }
 
 /// What is wanted of postures beside the places of points.

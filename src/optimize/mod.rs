@@ -33,7 +33,9 @@
 //! Results depend on the order in which equals are served, so it is fixed, and follows Gablonsky's code:
 //!
 //! * The best rectangle of every chosen size comes first, from the largest size to the smallest; then, in the
-//!   original variant, those that tie with it, again from the largest size to the smallest.
+//!   original variant, those that tie with it, again from the largest size to the smallest. With
+//!   [`smallest_first`](Settings::smallest_first) it is the other way round, as in NLopt's code; with that and without ε
+//!   DIRECT-l finds what NLopt's `GN_DIRECT_L` finds by as many evaluations (`benches/choosing`, `-- --least`).
 //! * Rectangles equal in size and value are served first come, first served. Children come in the order of their
 //!   sides, plus before minus, and are followed by their parent.
 //! * In the original variant, values of one size tie with the best if they exceed it by 10⁻¹³ at most. This is an

@@ -63,11 +63,7 @@ pub fn shared<C: Send, R>(
             work(&mut Batches { evaluate, helpers })
         });
     }
-    work(&mut Batches {
-        evaluate,
-        #[cfg(feature = "parallel")]
-        helpers: Vec::new(),
-    })
+    work(&mut Batches::alone(evaluate))
 }
 
 /// Evaluates what is asked until nobody asks any more.
@@ -99,7 +95,16 @@ fn next<T>(from: &Receiver<T>) -> Option<T> {
     }
 }
 
-impl<C> Batches<'_, C> {
+impl<'a, C> Batches<'a, C> {
+    /// Evaluates them on this thread.
+    pub fn alone(evaluate: &'a (dyn Fn(&[C]) -> Vec<f64> + Sync)) -> Self {
+        Self {
+            evaluate,
+            #[cfg(feature = "parallel")]
+            helpers: Vec::new(),
+        }
+    }
+
     /// The values of all candidates, in order.
     #[cfg_attr(
         not(feature = "parallel"),

@@ -4,7 +4,7 @@ mod batches;
 
 use crate::lanes::GROUP;
 
-pub use batches::shared;
+pub use batches::{Batches, shared};
 
 /// `of` of every item, in order: on several cores with the feature `parallel`. The results do not depend on how many.
 pub fn mapped<T: Sync, R: Send>(items: &[T], of: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {

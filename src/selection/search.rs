@@ -7,7 +7,7 @@ use super::{
 use crate::{
     kinematics::JointBox,
     optimize::{Direct, Settings},
-    parallel::shared,
+    parallel::{Batches, shared},
 };
 
 /// How DIRECT searched the joint box, and what came of it.
@@ -31,7 +31,7 @@ pub(super) fn direct(
     around: Option<&AroundCentres<'_>>,
 ) -> Result<Search, SelectionError> {
     let mut direct = Direct::new(limits.dimension(), settings).map_err(SelectionError::Search)?;
-    shared(evaluate, |batches| {
+    let mut search = |batches: &mut Batches<'_, Vec<f64>>| {
         // One batch after the other is written to the same place.
         let (mut postures, mut spare): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
         let (mut stars, mut room) = (Stars::new(limits.dimension()), Room::default());
@@ -53,8 +53,10 @@ pub(super) fn direct(
             direct.tell(&values)?;
         }
         Ok(())
-    })
-    .map_err(SelectionError::Search)?;
+    };
+    // Of a few stars there is nothing to be shared.
+    let done = if around.is_some() { search(&mut Batches::alone(evaluate)) } else { shared(evaluate, search) };
+    done.map_err(SelectionError::Search)?;
     Ok(Search { direct: Box::new(direct), limits: scope.is_constrained().then(|| limits.clone()), chosen: None })
 }
 

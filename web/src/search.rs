@@ -170,7 +170,12 @@ mod tests {
         assert_eq!(search.variant(), Variant::LocallyBiased);
         assert_eq!(search.diagram(0).iter().map(|dot| dot.size).collect::<Vec<_>>(), [0.5]);
         let choice = search.choice();
-        let settings = Settings { variant: search.variant(), epsilon: choice.epsilon, max_evaluations: 10_000 };
+        let settings = Settings {
+            variant: search.variant(),
+            epsilon: choice.epsilon,
+            max_evaluations: 10_000,
+            ..Settings::default()
+        };
         let values: Vec<f64> = choice.boxes.iter().map(|one| one.value.unwrap_or(f64::NAN)).collect();
         let replayed = History::replay(choice.joints.len(), settings, &values).expect("settings").search;
         let sizes = replayed.partition().iter().filter(|one| one.value.is_some()).map(|one| one.size);

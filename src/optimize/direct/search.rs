@@ -274,7 +274,7 @@ impl Direct {
         self.chosen.clear();
         self.hull.clear();
         if let Some((_, best)) = self.best {
-            let Settings { variant, epsilon, .. } = self.settings;
+            let Settings { variant, epsilon, smallest_first, .. } = self.settings;
             let remote = self.remote();
             let points = self.classes.heads().map(|head| HullPoint {
                 rectangle: head.rectangle,
@@ -285,6 +285,9 @@ impl Direct {
             lower_right_hull(points, best, epsilon, &mut self.hull);
             let passed = self.hull.iter().filter(|point| point.potentially_optimal);
             self.chosen.extend(passed.map(|point| point.rectangle));
+            if smallest_first {
+                self.chosen.reverse();
+            }
             if variant == Variant::Original {
                 for index in 0..self.chosen.len() {
                     let class = self.rectangles.class(self.chosen[index], variant);

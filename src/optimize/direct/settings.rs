@@ -79,12 +79,17 @@ pub struct Settings {
     /// How many points may be evaluated, at least one. See [`Direct`](super::Direct) for what happens to the
     /// iteration that would exceed it.
     pub max_evaluations: usize,
+    /// Whether an iteration divides the smallest of the chosen rectangles first, as NLopt does, instead of the largest, as
+    /// Gablonsky's code does. It matters to the iteration that the budget cuts short, whose last samples then lie around
+    /// the best point, and to the order of ties.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub smallest_first: bool,
 }
 
 impl Default for Settings {
-    /// The original algorithm with ε = 10⁻⁴, as in the paper, and a thousand evaluations.
+    /// The original algorithm with ε = 10⁻⁴, as in the paper, and a thousand evaluations, the largest rectangles first.
     fn default() -> Self {
-        Self { variant: Variant::Original, epsilon: 1e-4, max_evaluations: 1_000 }
+        Self { variant: Variant::Original, epsilon: 1e-4, max_evaluations: 1_000, smallest_first: false }
     }
 }
 

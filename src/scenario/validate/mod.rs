@@ -423,6 +423,7 @@ impl Check<'_> {
             },
             epsilon: self.not_negative("selection.epsilon", &raw.epsilon),
             max_evaluations: *evaluations.get_ref(),
+            ..Settings::default()
         };
         let default = Planning::default();
         let mut count = |key: &str, value: &Option<Spanned<u64>>, default: usize| {
