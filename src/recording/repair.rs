@@ -6,9 +6,9 @@ use std::{
     path::Path,
 };
 
-use re_log_encoding::{Decodable, StreamFooter};
+use re_log_encoding::StreamFooter;
 
-use super::{RecordingError, decoded::messages, file::RrdFile, rerun::LogMsg};
+use super::{RecordingError, decoded::messages, file::RrdFile, rerun::LogMsg, stream::is_end};
 
 /// So many messages are held at a time.
 const BATCH: usize = 64;
@@ -101,5 +101,5 @@ fn has_footer(file: &mut File) -> std::io::Result<bool> {
         file.read_to_end(&mut end)?;
         file.rewind()?;
     }
-    Ok(is_long && StreamFooter::from_rrd_bytes(&end).is_ok())
+    Ok(is_long && is_end(&end))
 }

@@ -51,6 +51,9 @@ impl<R: BufRead> Frames<R> {
             Next::Message => self.message()?,
             Next::Footer => {
                 self.read_on(StreamFooter::ENCODED_SIZE_BYTES as u64)?;
+                if entries(&self.frame) > 1 {
+                    return Err(damaged(format!("its end says that it has {} footers", entries(&self.frame))));
+                }
                 Next::Header
             }
             Next::Nothing => Next::Nothing,
@@ -88,6 +91,16 @@ impl<R: BufRead> Frames<R> {
     fn read_on(&mut self, count: u64) -> io::Result<u64> {
         self.stream.by_ref().take(count).read_to_end(&mut self.frame).map(|found| found as u64)
     }
+}
+
+/// Whether these bytes are those of a stream's end.
+pub(super) fn is_end(bytes: &[u8]) -> bool {
+    entries(bytes) <= 1 && StreamFooter::from_rrd_bytes(bytes).is_ok()
+}
+
+/// How many footers the end of a stream names, in its last bytes: Rerun's decoder takes them for there, and writes one.
+fn entries(end: &[u8]) -> u32 {
+    end.last_chunk().map_or(0, |count| u32::from_le_bytes(*count))
 }
 
 fn damaged(why: String) -> io::Error {
@@ -192,6 +205,20 @@ mod tests {
     fn read(bytes: &[u8]) -> (usize, Option<String>) {
         let all: Vec<_> = messages(bytes).collect();
         (all.iter().filter(|message| message.is_ok()).count(), all.into_iter().find_map(Result::err))
+    }
+
+    /// Found by mutation: the decoder looked for the second of them behind the end.
+    #[test]
+    fn an_end_that_names_more_footers_than_there_are_is_an_error() {
+        let (mut bytes, _) = recorded();
+        let size = StreamFooter::ENCODED_SIZE_BYTES;
+        assert!(is_end(&bytes[bytes.len() - size..]) && read(&bytes).1.is_none());
+        let count = bytes.len() - 4;
+        for named in [2, 3, u32::MAX] {
+            bytes[count..].copy_from_slice(&named.to_le_bytes());
+            assert!(!is_end(&bytes[bytes.len() - size..]));
+            assert!(read(&bytes).1.is_some_and(|why| why.contains("footers")));
+        }
     }
 
     #[test]
