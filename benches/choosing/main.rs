@@ -11,7 +11,7 @@
 //! | choosing | [`Active`]'s choice of one posture: DIRECT-l with a budget of 600 evaluations, by NLopt's rules |
 //! | criterion | 600 evaluations of the criterion alone, in one batch |
 //! | DIRECT-l | the search alone, of an objective that costs next to nothing |
-//! | product | P (m × m) times m × 96 for every 32 candidates: the floor of any method that multiplies by P |
+//! | product | P (m × m) times m × 96 for every 32 candidates: the floor of any method that multiplies by P for each |
 //! | NLopt | `GN_DIRECT_L` with the same budget and the posterior's trace by the textbook's formula, with our Jacobian |
 //!
 //! Which of the two finds the lower value is a matter of the problem: `-- --least` compares them over 40 of each size. With

@@ -74,6 +74,15 @@ pub(crate) fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
     state
 }
 
+/// The same where no joint gives way to loads, and all blocks but those of loads.
+pub(crate) fn random_stiff_state(rng: &mut ChaCha8Rng, joints: usize) -> (State, Vec<Block>) {
+    let mut state = random_state(rng, joints);
+    state.corrections.iter_mut().for_each(|correction| correction.compliance = [0.0; 2]);
+    let mut blocks = all_blocks(&state);
+    blocks.retain(|block| !matches!(block, Block::Compliance(..)));
+    (state, blocks)
+}
+
 /// All blocks of a state.
 pub(crate) fn all_blocks(state: &State) -> Vec<Block> {
     let mut blocks = vec![Block::Base];

@@ -359,10 +359,7 @@ mod tests {
     use super::*;
     use crate::{
         lanes::{groups, levels},
-        model::{
-            Pass,
-            laws::{all_blocks, random_state},
-        },
+        model::{Pass, laws::random_stiff_state},
     };
 
     proptest! {
@@ -372,9 +369,7 @@ mod tests {
         #[test]
         fn points_are_those_of_the_pass(seed: u64, joints in 1_usize..=12, count in 1_usize..=9) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let mut state = random_state(&mut rng, joints);
-            state.corrections.iter_mut().for_each(|correction| correction.compliance = [0.0; 2]);
-            let blocks = all_blocks(&state).into_iter().filter(|block| !matches!(block, Block::Compliance(..)));
+            let (state, blocks) = random_stiff_state(&mut rng, joints);
             let layout = Layout::new(&state, blocks);
             let m = layout.dimension();
             let full = Matrix3::from_fn(|_, _| rng.random_range(-5.0..5.0));

@@ -155,8 +155,7 @@ impl Active {
         let criterion = self.criterion(situation.belief, situation, limits)?;
         let Some((scope, searched)) = Scope::around(situation, limits)? else { return Ok(None) };
         let at = |postures: &[Vec<f64>]| scope.evaluate(postures, |feasible| criterion.evaluate_here(feasible));
-        let around = criterion.around_centres().filter(|_| !scope.is_constrained());
-        Ok(Some(direct(&scope, &searched, settings, &at, around.as_ref())?))
+        Ok(Some(direct(&scope, &searched, settings, &at, Some(&criterion))?))
     }
 
     /// The criterion in one socket.
@@ -215,11 +214,8 @@ impl Active {
                 let here = |candidates: &[Vec<f64>]| {
                     scope.evaluate(candidates, |feasible| mean(feasible, |criterion, all| criterion.evaluate_here(all)))
                 };
-                let around = match criteria.as_slice() {
-                    [criterion] if !scope.is_constrained() => criterion.around_centres(),
-                    _ => None,
-                };
-                let search = direct(scope, searched, settings, &here, around.as_ref())?;
+                let alone = if let [criterion] = criteria.as_slice() { Some(criterion) } else { None };
+                let search = direct(scope, searched, settings, &here, alone)?;
                 let best = search.best().map(|(point, value)| (searched.from_unit(point), value));
                 (best, search.evaluations(), Some(search))
             }

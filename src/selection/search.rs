@@ -1,8 +1,8 @@
 //! A search of the joint box by DIRECT, and what it leaves for those who ask how it went.
 
 use super::{
-    Partition, Scope, SelectionError,
-    star::{AroundCentres, Room, Stars},
+    Criterion, Partition, Scope, SelectionError,
+    star::{Room, Stars},
 };
 use crate::{
     kinematics::JointBox,
@@ -22,21 +22,24 @@ pub struct Search {
 }
 
 /// Searches `limits`, the box of a scope; `evaluate` returns the criterion of a batch of postures in it (rad or m), which is not
-/// finite where they are not feasible, and `around` the same of stars, if there is something that does.
+/// finite where they are not feasible. Where it is a single `criterion` that is searched, that may evaluate whole stars.
 pub(super) fn direct(
     scope: &Scope<'_>,
     limits: &JointBox,
     settings: Settings,
     evaluate: &(dyn Fn(&[Vec<f64>]) -> Vec<f64> + Sync),
-    around: Option<&AroundCentres<'_>>,
+    criterion: Option<&Criterion<'_>>,
 ) -> Result<Search, SelectionError> {
     let mut direct = Direct::new(limits.dimension(), settings).map_err(SelectionError::Search)?;
+    // What is not feasible is left out posture by posture.
+    let criterion = criterion.filter(|_| !scope.is_constrained());
+    let around = criterion.and_then(Criterion::around_centres);
     let mut search = |batches: &mut Batches<'_, Vec<f64>>| {
         // One batch after the other is written to the same place.
         let (mut postures, mut spare): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
         let (mut stars, mut room) = (Stars::new(limits.dimension()), Room::default());
         while let Some(batch) = direct.ask() {
-            let values = match around {
+            let values = match &around {
                 // The centre of the cube is a star's, but nobody's ray.
                 Some(around) if batch.stars().len() > 0 => {
                     stars.clear();

@@ -16,12 +16,12 @@ mod registers;
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use registers::{Moved, drift, splat_all, sum_behind, turn_all};
+use registers::{Moved, drift, sum_behind, turn_all};
 
 use super::innovation::{entries, place, traces};
 use crate::{
     kinematics::JointBox,
-    lanes::{Aligned, GROUP, groups, narrowed},
+    lanes::{Aligned, Frame, GROUP, Vector, groups, narrowed},
     model::{Centre, Centres, Passage, Points, Ray},
     optimize::Star,
 };
@@ -63,9 +63,9 @@ pub(super) struct AroundCentres<'a> {
 pub(super) struct Room {
     centres: Centres,
     /// h and b, by coordinate, then by dimension.
-    columns: Vec<[f64; 3]>,
-    drifts: Vec<[f64; 3]>,
-    terms: Vec<[f64; 3]>,
+    columns: Vec<Vector3<f64>>,
+    drifts: Vec<Vector3<f64>>,
+    terms: Vec<Vector3<f64>>,
     /// h and b.
     across: [Aligned; 2],
     /// The sums behind every stage, and over all of them.
@@ -136,8 +136,8 @@ impl<'a> AroundCentres<'a> {
         for numbers in [h, b, &mut room.drifting] {
             numbers.ensure(3 * wide);
         }
-        room.columns.resize(m, [0.0; 3]);
-        room.drifts.resize(m, [0.0; 3]);
+        room.columns.resize(m, Vector3::zeros());
+        room.drifts.resize(m, Vector3::zeros());
         room.behind.ensure((self.passage.stages.len() + 1) * 3 * wide);
         let count = stars.rays.len();
         for angles in &mut room.angles {
@@ -215,18 +215,21 @@ impl<'a> AroundCentres<'a> {
                     // Nothing moves before the point: its own columns stay what they are.
                     terms.clear();
                     terms.extend_from_slice(&columns[at.coordinates.clone()]);
-                    Ray { rotation: Matrix3::identity(), shift: Vector3::zeros(), axis: [[0.0; 3]; 4] }
+                    Ray { rotation: Matrix3::identity(), shift: Vector3::zeros(), axis: [Vector3::zeros(); 4] }
                 };
-                let rotation: [[f64; 3]; 3] = turn.rotation.transpose().into();
-                let shift: [f64; 3] = turn.shift.into();
-                let ([r1, r2, r3], [h1, h2, h3, h4]) = (rotation, turn.axis);
+                let [h1, h2, h3, h4] = &turn.axis;
                 let p = &self.p[at.coordinates.start * wide..];
                 let moved = Moved {
                     simd,
                     wide,
-                    rotation: [splat_all(simd, r1), splat_all(simd, r2), splat_all(simd, r3)],
-                    shift: splat_all(simd, shift),
-                    axis: [splat_all(simd, h1), splat_all(simd, h2), splat_all(simd, h3), splat_all(simd, h4)],
+                    rotation: Frame::splat(simd, &turn.rotation),
+                    shift: Vector::splat(simd, &turn.shift),
+                    axis: [
+                        Vector::splat(simd, h1),
+                        Vector::splat(simd, h2),
+                        Vector::splat(simd, h3),
+                        Vector::splat(simd, h4),
+                    ],
                     p: [&p[..wide], &p[wide..2 * wide], &p[2 * wide..3 * wide], &p[3 * wide..4 * wide]],
                     of_axis: at.of_axis,
                     terms,
@@ -250,7 +253,7 @@ impl<'a> AroundCentres<'a> {
         &self,
         centre: &Centre<'_>,
         readings: &[f64],
-        (columns, drifts): (&mut [[f64; 3]], &mut [[f64; 3]]),
+        (columns, drifts): (&mut [Vector3<f64>], &mut [Vector3<f64>]),
         across: &mut [Aligned; 2],
     ) {
         let wide = self.sizes[1];
@@ -267,7 +270,7 @@ impl<'a> AroundCentres<'a> {
             let (x, others) = across.split_at_mut(wide);
             let (y, z) = others.split_at_mut(wide);
             for (((x, y), z), column) in x.iter_mut().zip(y).zip(z).zip(columns) {
-                (*x, *y, *z) = (column[0], column[1], column[2]);
+                (*x, *y, *z) = (column.x, column.y, column.z);
             }
         }
     }
@@ -283,10 +286,7 @@ mod tests {
     use crate::{
         estimation::Belief,
         lanes::levels,
-        model::{
-            Block, Layout,
-            laws::{all_blocks, random_state},
-        },
+        model::{Layout, laws::random_stiff_state},
         selection::{Criterion, CriterionUnits, Weights, criterion::points},
         sensing::{Position, Rig},
     };
@@ -298,10 +298,7 @@ mod tests {
         #[test]
         fn stars_say_what_single_postures_say(seed: u64, joints in 1_usize..=9, count in 1_usize..=5) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let mut state = random_state(&mut rng, joints);
-            state.corrections.iter_mut().for_each(|correction| correction.compliance = [0.0; 2]);
-            let blocks = all_blocks(&state).into_iter().filter(|block| !matches!(block, Block::Compliance(..)));
-            let mut blocks: Vec<Block> = blocks.collect();
+            let (state, mut blocks) = random_stiff_state(&mut rng, joints);
             for last in (1..blocks.len()).rev() {
                 blocks.swap(last, rng.random_range(0..=last));
             }

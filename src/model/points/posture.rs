@@ -260,10 +260,7 @@ mod tests {
     use super::*;
     use crate::{
         lanes::GROUP,
-        model::{
-            Block, Layout,
-            laws::{all_blocks, random_state},
-        },
+        model::{Layout, laws::random_stiff_state},
     };
 
     proptest! {
@@ -274,9 +271,7 @@ mod tests {
         #[test]
         fn slopes_are_those_of_central_differences(seed: u64, joints in 1_usize..=8) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let mut state = random_state(&mut rng, joints);
-            state.corrections.iter_mut().for_each(|correction| correction.compliance = [0.0; 2]);
-            let blocks = all_blocks(&state).into_iter().filter(|block| !matches!(block, Block::Compliance(..)));
+            let (state, blocks) = random_stiff_state(&mut rng, joints);
             let layout = Layout::new(&state, blocks);
             let full = Matrix3::from_fn(|_, _| rng.random_range(-2.0..2.0));
             let whitenings = [Whitening::Full(full), Whitening::Even(rng.random_range(1.0..3.0))];

@@ -162,10 +162,7 @@ mod tests {
 
     use crate::{
         lanes::{GROUP, groups, levels},
-        model::{
-            Block, Layout, Points, Whitening,
-            laws::{all_blocks, random_state},
-        },
+        model::{Layout, Points, Whitening, laws::random_stiff_state},
     };
 
     proptest! {
@@ -175,9 +172,7 @@ mod tests {
         #[test]
         fn slopes_are_those_of_the_rows(seed: u64, joints in 1_usize..=12, count in 1_usize..=9) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let mut state = random_state(&mut rng, joints);
-            state.corrections.iter_mut().for_each(|correction| correction.compliance = [0.0; 2]);
-            let blocks = all_blocks(&state).into_iter().filter(|block| !matches!(block, Block::Compliance(..)));
+            let (state, blocks) = random_stiff_state(&mut rng, joints);
             let layout = Layout::new(&state, blocks);
             let full = Matrix3::from_fn(|_, _| rng.random_range(-5.0..5.0));
             let whitenings = [Whitening::Full(full), Whitening::Even(rng.random_range(1.0..9.0))];

@@ -81,7 +81,7 @@ pub struct Ray {
     /// Δ, metres.
     pub shift: Vector3<f64>,
     /// h' of the joint's axis, as far as it is learned; else 0.
-    pub axis: [[f64; 3]; 4],
+    pub axis: [Vector3<f64>; 4],
 }
 
 impl Points {
@@ -164,11 +164,11 @@ impl Centre<'_> {
 
     /// h of tangent coordinates, in this order.
     #[inline(always)]
-    pub fn columns<'a>(&'a self, order: &'a [usize]) -> impl Iterator<Item = [f64; 3]> + 'a {
+    pub fn columns<'a>(&'a self, order: &'a [usize]) -> impl Iterator<Item = Vector3<f64>> + 'a {
         let rows = &self.of.rows[self.index / GROUP * self.points.dimension * 3 * GROUP + self.index % GROUP..];
         order.iter().map(|coordinate| {
             let numbers = &rows[coordinate * 3 * GROUP..][..=2 * GROUP];
-            [numbers[0], numbers[GROUP], numbers[2 * GROUP]]
+            Vector3::new(numbers[0], numbers[GROUP], numbers[2 * GROUP])
         })
     }
 
@@ -183,7 +183,7 @@ impl Centre<'_> {
 
     /// b of the drifting coordinates of a stage, in their order, where `h` are the columns of all of its coordinates.
     #[inline(always)]
-    pub fn drifts(&self, stage: usize, readings: &[f64], h: &[[f64; 3]], mut found: impl FnMut([f64; 3])) {
+    pub fn drifts(&self, stage: usize, readings: &[f64], h: &[Vector3<f64>], mut found: impl FnMut(Vector3<f64>)) {
         let Some(index) = stage.checked_sub(1) else {
             // Turning the base is as much for the point as moving it is for the base.
             (0..h.len().min(3)).for_each(|k| found(h[k]));
@@ -193,26 +193,26 @@ impl Centre<'_> {
         let Some(joint) = before.get(index).filter(|joint| joint.kind == JointKind::Revolute) else { return };
         if joint.axis.is_some() {
             found(h[1]);
-            found(h[0].map(|x| -x));
+            found(-h[0]);
         }
         if !joint.terms.is_empty() {
             let axis = self.vector(index, 2) * self.weight();
             for (_, term) in &joint.terms {
-                found((axis * factor(*term, readings[index])).into());
+                found(axis * factor(*term, readings[index]));
             }
         }
     }
 
     /// A joint that is before the point, of whose coordinates `h` are the columns.
     #[inline(always)]
-    pub fn pivot(&self, joint: usize, h: &[[f64; 3]]) -> Pivot<'_> {
+    pub fn pivot(&self, joint: usize, h: &[Vector3<f64>]) -> Pivot<'_> {
         let [axis, pivot] = [2, 3].map(|which| self.vector(joint, which));
         let arm = self.place() - pivot;
         let across = axis.cross(&arm);
         Pivot {
             turn: &self.points.joints[joint],
             weight: self.weight(),
-            columns: [0, 1].map(|k| h.get(k).map_or_else(Vector3::zeros, |&h| h.into())),
+            columns: [0, 1].map(|k| h.get(k).copied().unwrap_or_default()),
             basis: [0, 1].map(|which| self.vector(joint, which)),
             axis,
             arm,
@@ -225,9 +225,9 @@ impl Pivot<'_> {
     /// What becomes of all when the joint moves to another reading, by a way (rad or m) or an angle of this sine and cosine; h' of
     /// what corrects its reading is put to `terms`.
     #[inline(always)]
-    pub fn ray(&self, reading: f64, [travel, sin, cos]: [f64; 3], terms: &mut Vec<[f64; 3]>) -> Ray {
+    pub fn ray(&self, reading: f64, [travel, sin, cos]: [f64; 3], terms: &mut Vec<Vector3<f64>>) -> Ray {
         let (is_revolute, [f1, f2], [h1, h2]) = (self.turn.kind == JointKind::Revolute, self.basis, self.columns);
-        let mut axis = [[0.0; 3]; 4];
+        let mut axis = [Vector3::zeros(); 4];
         let (rotation, shift, arm) = if is_revolute {
             let [across, inward] = self.across;
             let shift = across * sin + inward * (1.0 - cos);
@@ -236,20 +236,20 @@ impl Pivot<'_> {
                 let (bent, swung) = (self.weight * (1.0 - cos), self.weight * sin);
                 let d1 = h1 + f1 * bent - f2 * swung;
                 let d2 = h2 + f2 * bent + f1 * swung;
-                axis = [d1.into(), d2.into(), d2.cross(&arm).into(), arm.cross(&d1).into()];
+                axis = [d1, d2, d2.cross(&arm), arm.cross(&d1)];
             }
             (rotation(&self.axis, sin, cos), shift, arm)
         } else {
             if self.turn.axis.is_some() {
                 let further = self.weight * travel;
-                (axis[0], axis[1]) = ((h1 + f1 * further).into(), (h2 + f2 * further).into());
+                (axis[0], axis[1]) = (h1 + f1 * further, h2 + f2 * further);
             }
             (Matrix3::identity(), self.axis * travel, self.arm)
         };
         terms.clear();
         if !self.turn.terms.is_empty() {
             let velocity = self.weight * if is_revolute { self.axis.cross(&arm) } else { self.axis };
-            terms.extend(self.turn.terms.iter().map(|(_, term)| <[f64; 3]>::from(velocity * factor(*term, reading))));
+            terms.extend(self.turn.terms.iter().map(|(_, term)| velocity * factor(*term, reading)));
         }
         Ray { rotation, shift, axis }
     }

@@ -21,6 +21,13 @@ pub struct Star<'a> {
     points: &'a [f64],
 }
 
+impl PartialEq for Batch<'_> {
+    /// Whether the points are the same.
+    fn eq(&self, other: &Self) -> bool {
+        self.rectangles.dimension == other.rectangles.dimension && self.centres == other.centres
+    }
+}
+
 impl<'a> Batch<'a> {
     pub(super) fn new(rectangles: &'a Rectangles, dividing: &'a [usize], centres: &'a [f64]) -> Self {
         Self { rectangles, dividing, centres }

@@ -4,10 +4,11 @@
 use std::ops::Range;
 
 use fearless_simd::{Simd, SimdBase, SimdFloat};
+use nalgebra::Vector3;
 
 use super::OWN;
 use crate::{
-    lanes::{Aligned, GROUP, Lanes, load, sin_cos, splat, store, sums},
+    lanes::{Aligned, Frame, GROUP, Lanes, Vector, load, sin_cos, splat, store, sums},
     model::Stage,
 };
 
@@ -23,7 +24,13 @@ pub fn turn_all<S: Simd>(simd: S, count: usize, [angles, sines, cosines]: &mut [
 
 /// For every stage P h summed over its columns and those behind it; 0 behind the last.
 #[inline(always)]
-pub fn sum_behind<S: Simd>(simd: S, wide: usize, stages: &[Stage], given: (&[f64], &[[f64; 3]]), behind: &mut [f64]) {
+pub fn sum_behind<S: Simd>(
+    simd: S,
+    wide: usize,
+    stages: &[Stage],
+    given: (&[f64], &[Vector3<f64>]),
+    behind: &mut [f64],
+) {
     let width = Lanes::<S>::LEN;
     let threes = wide / (3 * width) * 3 * width;
     for at in (0..threes).step_by(3 * width) {
@@ -40,79 +47,65 @@ fn sum_registers<S: Simd, const K: usize>(
     simd: S,
     [wide, at]: [usize; 2],
     stages: &[Stage],
-    (p, h): (&[f64], &[[f64; 3]]),
+    (p, h): (&[f64], &[Vector3<f64>]),
     behind: &mut [f64],
 ) {
     let width = Lanes::<S>::LEN;
-    let mut sums = [[splat(simd, 0.0); 3]; K];
+    let mut sums = [Vector::splat(simd, &Vector3::zeros()); K];
     for stage in (0..=stages.len()).rev() {
         if let Some(of) = stages.get(stage) {
             for column in of.coordinates.clone() {
-                let (p, [x, y, z]) = (&p[column * wide + at..][..K * width], h[column]);
-                let [x, y, z] = [splat(simd, x), splat(simd, y), splat(simd, z)];
-                for (k, [of_x, of_y, of_z]) in sums.iter_mut().enumerate() {
-                    let p = load(simd, p, k * width);
-                    *of_x = p.mul_add(x, *of_x);
-                    *of_y = p.mul_add(y, *of_y);
-                    *of_z = p.mul_add(z, *of_z);
+                let (p, h) = (&p[column * wide + at..][..K * width], Vector::splat(simd, &h[column]));
+                for (k, sum) in sums.iter_mut().enumerate() {
+                    *sum = h.scaled_onto(load(simd, p, k * width), *sum);
                 }
             }
         }
-        for row in 0..3 {
-            let behind = &mut behind[(stage * 3 + row) * wide + at..][..K * width];
-            for (k, sums) in sums.iter().enumerate() {
-                store::<S>(sums[row], behind, k * width);
-            }
+        let behind = &mut behind[stage * 3 * wide + at..][..2 * wide + K * width];
+        for (k, sum) in sums.iter().enumerate() {
+            sum.store(behind, [k * width, wide + k * width, 2 * wide + k * width]);
         }
     }
 }
 
 /// Adds P b of what drifts in a few stages.
 #[inline(always)]
-pub fn drift<S: Simd>(simd: S, wide: usize, stages: &[Stage], (p, b): (&[f64], &[[f64; 3]]), to: &mut [f64]) {
-    let (to_x, others) = to.split_at_mut(wide);
-    let (to_y, to_z) = others.split_at_mut(wide);
+pub fn drift<S: Simd>(simd: S, wide: usize, stages: &[Stage], (p, b): (&[f64], &[Vector3<f64>]), to: &mut [f64]) {
     for at in (0..wide).step_by(Lanes::<S>::LEN) {
-        let [mut x, mut y, mut z] = [load(simd, to_x, at), load(simd, to_y, at), load(simd, to_z, at)];
+        let places = [at, wide + at, 2 * wide + at];
+        let mut sum = Vector::load(simd, to, places);
         for stage in stages {
             for column in stage.drifting.clone() {
-                let (p, b) = (load(simd, p, column * wide + at), b[column]);
-                x = p.mul_add(splat(simd, b[0]), x);
-                y = p.mul_add(splat(simd, b[1]), y);
-                z = p.mul_add(splat(simd, b[2]), z);
+                sum = Vector::splat(simd, &b[column]).scaled_onto(load(simd, p, column * wide + at), sum);
             }
         }
-        store::<S>(x, to_x, at);
-        store::<S>(y, to_y, at);
-        store::<S>(z, to_z, at);
+        sum.store(to, places);
     }
-}
-
-/// The same vector in all lanes.
-#[inline(always)]
-pub fn splat_all<S: Simd>(simd: S, [x, y, z]: [f64; 3]) -> [Lanes<S>; 3] {
-    [splat(simd, x), splat(simd, y), splat(simd, z)]
 }
 
 /// v + b × d.
 #[inline(always)]
-fn plus_cross<S: Simd>(v: [Lanes<S>; 3], b: [Lanes<S>; 3], d: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
-    let [[vx, vy, vz], [bx, by, bz], [x, y, z]] = [v, b, d];
-    [by.mul_add(z, (-bz).mul_add(y, vx)), bz.mul_add(x, (-bx).mul_add(z, vy)), bx.mul_add(y, (-by).mul_add(x, vz))]
+fn plus_cross<S: Simd>(v: Vector<S>, b: Vector<S>, d: Vector<S>) -> Vector<S> {
+    let [[vx, vy, vz], [bx, by, bz], [x, y, z]] = [v.0, b.0, d.0];
+    Vector([
+        by.mul_add(z, (-bz).mul_add(y, vx)),
+        bz.mul_add(x, (-bx).mul_add(z, vy)),
+        bx.mul_add(y, (-by).mul_add(x, vz)),
+    ])
 }
 
 /// What every register of a ray is made of.
 pub struct Moved<'a, S: Simd> {
     pub simd: S,
     pub wide: usize,
-    pub rotation: [[Lanes<S>; 3]; 3],
-    pub shift: [Lanes<S>; 3],
+    pub rotation: Frame<S>,
+    pub shift: Vector<S>,
     /// h' of the joint's axis, and P of its coordinates, of which so many are learned; those that are not count for nothing.
-    pub axis: [[Lanes<S>; 3]; OWN],
+    pub axis: [Vector<S>; OWN],
     pub p: [&'a [f64]; OWN],
     pub of_axis: usize,
     /// The same of what corrects its reading.
-    pub terms: &'a [[f64; 3]],
+    pub terms: &'a [Vector3<f64>],
     pub p_of_terms: &'a [f64],
     /// h and b.
     pub across: &'a [Aligned; 2],
@@ -125,92 +118,74 @@ type Entries<S> = [[Lanes<S>; 6]; 2];
 
 impl<S: Simd> Moved<'_, S> {
     #[inline(always)]
-    fn load(&self, numbers: &[f64], at: usize) -> [Lanes<S>; 3] {
-        let numbers = &numbers[at..at + 2 * self.wide + Lanes::<S>::LEN];
-        [load(self.simd, numbers, 0), load(self.simd, numbers, self.wide), load(self.simd, numbers, 2 * self.wide)]
+    fn load(&self, numbers: &[f64], at: usize) -> Vector<S> {
+        Vector::load(self.simd, numbers, [at, self.wide + at, 2 * self.wide + at])
     }
 
     /// h' of coordinates before the joint.
     #[inline(always)]
-    fn before(&self, at: usize) -> [Lanes<S>; 3] {
+    fn before(&self, at: usize) -> Vector<S> {
         let [h, b] = self.across;
-        plus_cross::<S>(self.load(h, at), self.load(b, at), self.shift)
+        plus_cross(self.load(h, at), self.load(b, at), self.shift)
     }
 
     /// h' of coordinates behind it.
     #[inline(always)]
-    fn behind(&self, at: usize) -> [Lanes<S>; 3] {
-        let zero = splat(self.simd, 0.0);
-        self.turned(self.load(&self.across[0], at), [zero, zero, zero])
+    fn behind(&self, at: usize) -> Vector<S> {
+        self.turned(self.load(&self.across[0], at), Vector::splat(self.simd, &Vector3::zeros()))
     }
 
     /// h' of a register in which there are coordinates of the joint itself.
     #[inline(always)]
-    fn at_joint(&self, at: usize, own: Range<usize>) -> [Lanes<S>; 3] {
+    fn at_joint(&self, at: usize, own: Range<usize>) -> Vector<S> {
         let (simd, width) = (self.simd, Lanes::<S>::LEN);
         let ones = |until: usize| load(simd, &STEP, GROUP - until.saturating_sub(at).min(width));
         let (is_before, is_not_behind) = (ones(own.start), ones(own.end));
         let is_behind = splat(simd, 1.0) - is_not_behind;
-        let (before, behind) = (self.before(at), self.behind(at));
-        let mut moved = [splat(simd, 0.0); 3];
-        for row in 0..3 {
-            moved[row] = before[row].mul_add(is_before, behind[row] * is_behind);
-        }
+        let mut moved = self.before(at).scaled_onto(is_before, self.behind(at).scaled(is_behind));
         for (coordinate, column) in own.clone().zip(&self.axis[..self.of_axis]) {
-            self.place(at, coordinate, *column, &mut moved);
+            moved = self.placed(at, coordinate, *column, moved);
         }
         for (coordinate, column) in own.skip(self.of_axis).zip(self.terms) {
-            self.place(at, coordinate, splat_all(simd, *column), &mut moved);
+            moved = self.placed(at, coordinate, Vector::splat(simd, column), moved);
         }
         moved
     }
 
-    /// Adds a column where its coordinate stands in the register, if it does.
+    /// The same with a column where its coordinate stands in the register, if it does.
     #[inline(always)]
-    fn place(&self, at: usize, coordinate: usize, column: [Lanes<S>; 3], moved: &mut [Lanes<S>; 3]) {
-        if (at..at + Lanes::<S>::LEN).contains(&coordinate) {
-            let is_it = load(self.simd, &UNIT, GROUP - (coordinate - at));
-            for (moved, x) in moved.iter_mut().zip(column) {
-                *moved = is_it.mul_add(x, *moved);
-            }
+    fn placed(&self, at: usize, coordinate: usize, column: Vector<S>, moved: Vector<S>) -> Vector<S> {
+        if !(at..at + Lanes::<S>::LEN).contains(&coordinate) {
+            return moved;
         }
+        column.scaled_onto(load(self.simd, &UNIT, GROUP - (coordinate - at)), moved)
     }
 
     /// R v + sum.
     #[inline(always)]
-    fn turned(&self, v: [Lanes<S>; 3], mut sum: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
-        for (sum, r) in sum.iter_mut().zip(&self.rotation) {
-            *sum = v[0].mul_add(r[0], v[1].mul_add(r[1], v[2].mul_add(r[2], *sum)));
-        }
-        sum
+    fn turned(&self, v: Vector<S>, sum: Vector<S>) -> Vector<S> {
+        let (Frame([a, b, c]), Vector([x, y, z])) = (self.rotation, v);
+        a.scaled_onto(x, b.scaled_onto(y, c.scaled_onto(z, sum)))
     }
 
     /// Adds what a register of coordinates with these h' contributes.
     #[inline(always)]
-    fn add(&self, at: usize, h: [Lanes<S>; 3], entries: &mut Entries<S>) {
+    fn add(&self, at: usize, h: Vector<S>, entries: &mut Entries<S>) {
         let (simd, [all, from_here, behind, drifting]) = (self.simd, self.sums);
-        let (all, not_before) = (self.load(all, at), self.load(from_here, at));
-        let before = [all[0] - not_before[0], all[1] - not_before[1], all[2] - not_before[2]];
-        let mut g = plus_cross::<S>(before, self.load(drifting, at), self.shift);
+        let before = self.load(all, at) - self.load(from_here, at);
+        let mut g = plus_cross(before, self.load(drifting, at), self.shift);
         g = self.turned(self.load(behind, at), g);
         for (p, column) in self.p.iter().zip(&self.axis) {
-            let p = load(simd, p, at);
-            for (g, x) in g.iter_mut().zip(column) {
-                *g = p.mul_add(*x, *g);
-            }
+            g = column.scaled_onto(load(simd, p, at), g);
         }
         for (index, column) in self.terms.iter().enumerate() {
             let p = load(simd, self.p_of_terms, index * self.wide + at);
-            for (g, x) in g.iter_mut().zip(column) {
-                *g = p.mul_add(splat(simd, *x), *g);
-            }
+            g = Vector::splat(simd, column).scaled_onto(p, g);
         }
-        let w = load(simd, self.weights, at);
-        let weighted = [g[0] * w, g[1] * w, g[2] * w];
-        let [spreads, leverages] = entries;
+        let (weighted, [spreads, leverages]) = (g.scaled(load(simd, self.weights, at)), entries);
         let mut entry = 0;
-        for (column, g) in g.iter().enumerate() {
-            for (h, weighted) in h.iter().zip(&weighted).take(column + 1) {
+        for (column, g) in g.0.iter().enumerate() {
+            for (h, weighted) in h.0.iter().zip(&weighted.0).take(column + 1) {
                 spreads[entry] = h.mul_add(*g, spreads[entry]);
                 leverages[entry] = weighted.mul_add(*g, leverages[entry]);
                 entry += 1;
