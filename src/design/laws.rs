@@ -12,7 +12,7 @@ use crate::{
     kinematics::JointBox,
     model::{
         Layout,
-        laws::{all_blocks, random_state},
+        laws::{all_blocks, random_state, stiff},
     },
     scenario::builtin,
     selection::{CriterionUnits, Weights},
@@ -21,17 +21,16 @@ use crate::{
 
 /// A robot of which anything may be learned, by one channel.
 fn random_problem(rng: &mut ChaCha8Rng, joints: usize, channel: Option<usize>) -> Problem {
-    let mut truth = random_state(rng, joints);
-    let channels = examples(rng, &truth);
-    let rig = match channel {
-        Some(channel) => Rig::new(vec![channels[channel % channels.len()].clone()]),
+    let state = random_state(rng, joints);
+    let channels = examples(rng, &state);
+    let (channel, (truth, blocks)) = match channel {
+        Some(channel) => (channels[channel % channels.len()].clone(), (state.clone(), all_blocks(&state))),
         None => {
-            truth.corrections.iter_mut().for_each(|correction| correction.compliance = [0.0; 2]);
-            Rig::new(vec![Arc::new(Position::of_marker(rng.random_range(0.1..1.0))) as Arc<dyn Channel>])
+            let marker = Position::of_marker(rng.random_range(0.1..1.0));
+            (Arc::new(marker) as Arc<dyn Channel>, stiff(state))
         }
     };
-    let is_light = |block: &crate::model::Block| !matches!(block, crate::model::Block::Compliance(..));
-    let blocks = all_blocks(&truth).into_iter().filter(|block| channel.is_some() || is_light(block));
+    let rig = Rig::new(vec![channel]);
     let layout = Layout::new(&truth, blocks);
     let m = layout.dimension();
     let limits = (0..joints).map(|_| (rng.random_range(-3.0..-1.0), rng.random_range(1.0..3.0))).collect();

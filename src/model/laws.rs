@@ -74,9 +74,13 @@ pub(crate) fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
     state
 }
 
-/// The same where no joint gives way to loads, and all blocks but those of loads.
+/// The same where no joint gives way to loads, and all its blocks but those of loads.
 pub(crate) fn random_stiff_state(rng: &mut ChaCha8Rng, joints: usize) -> (State, Vec<Block>) {
-    let mut state = random_state(rng, joints);
+    stiff(random_state(rng, joints))
+}
+
+/// A state whose joints no longer give way to loads, and all its blocks but those of loads.
+pub(crate) fn stiff(mut state: State) -> (State, Vec<Block>) {
     state.corrections.iter_mut().for_each(|correction| correction.compliance = [0.0; 2]);
     let mut blocks = all_blocks(&state);
     blocks.retain(|block| !matches!(block, Block::Compliance(..)));

@@ -32,8 +32,7 @@ pub(super) fn direct(
 ) -> Result<Search, SelectionError> {
     let mut direct = Direct::new(limits.dimension(), settings).map_err(SelectionError::Search)?;
     // What is not feasible is left out posture by posture.
-    let criterion = criterion.filter(|_| !scope.is_constrained());
-    let around = criterion.and_then(Criterion::around_centres);
+    let around = criterion.filter(|_| !scope.is_constrained()).and_then(Criterion::around_centres);
     let mut search = |batches: &mut Batches<'_, Vec<f64>>| {
         // One batch after the other is written to the same place.
         let (mut postures, mut spare): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
@@ -57,7 +56,7 @@ pub(super) fn direct(
         }
         Ok(())
     };
-    // Of a few stars there is nothing to be shared.
+    // A batch of stars takes a few microseconds: to share it was no faster.
     let done = if around.is_some() { search(&mut Batches::alone(evaluate)) } else { shared(evaluate, search) };
     done.map_err(SelectionError::Search)?;
     Ok(Search { direct: Box::new(direct), limits: scope.is_constrained().then(|| limits.clone()), chosen: None })

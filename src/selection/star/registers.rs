@@ -83,17 +83,6 @@ pub fn drift<S: Simd>(simd: S, wide: usize, stages: &[Stage], (p, b): (&[f64], &
     }
 }
 
-/// v + b × d.
-#[inline(always)]
-fn plus_cross<S: Simd>(v: Vector<S>, b: Vector<S>, d: Vector<S>) -> Vector<S> {
-    let [[vx, vy, vz], [bx, by, bz], [x, y, z]] = [v.0, b.0, d.0];
-    Vector([
-        by.mul_add(z, (-bz).mul_add(y, vx)),
-        bz.mul_add(x, (-bx).mul_add(z, vy)),
-        bx.mul_add(y, (-by).mul_add(x, vz)),
-    ])
-}
-
 /// What every register of a ray is made of.
 pub struct Moved<'a, S: Simd> {
     pub simd: S,
@@ -126,13 +115,13 @@ impl<S: Simd> Moved<'_, S> {
     #[inline(always)]
     fn before(&self, at: usize) -> Vector<S> {
         let [h, b] = self.across;
-        plus_cross(self.load(h, at), self.load(b, at), self.shift)
+        self.load(b, at).cross_onto(self.shift, self.load(h, at))
     }
 
     /// h' of coordinates behind it.
     #[inline(always)]
     fn behind(&self, at: usize) -> Vector<S> {
-        self.turned(self.load(&self.across[0], at), Vector::splat(self.simd, &Vector3::zeros()))
+        self.rotation.times_onto(self.load(&self.across[0], at), Vector::splat(self.simd, &Vector3::zeros()))
     }
 
     /// h' of a register in which there are coordinates of the joint itself.
@@ -161,20 +150,13 @@ impl<S: Simd> Moved<'_, S> {
         column.scaled_onto(load(self.simd, &UNIT, GROUP - (coordinate - at)), moved)
     }
 
-    /// R v + sum.
-    #[inline(always)]
-    fn turned(&self, v: Vector<S>, sum: Vector<S>) -> Vector<S> {
-        let (Frame([a, b, c]), Vector([x, y, z])) = (self.rotation, v);
-        a.scaled_onto(x, b.scaled_onto(y, c.scaled_onto(z, sum)))
-    }
-
     /// Adds what a register of coordinates with these h' contributes.
     #[inline(always)]
     fn add(&self, at: usize, h: Vector<S>, entries: &mut Entries<S>) {
         let (simd, [all, from_here, behind, drifting]) = (self.simd, self.sums);
         let before = self.load(all, at) - self.load(from_here, at);
-        let mut g = plus_cross(before, self.load(drifting, at), self.shift);
-        g = self.turned(self.load(behind, at), g);
+        let mut g = self.load(drifting, at).cross_onto(self.shift, before);
+        g = self.rotation.times_onto(self.load(behind, at), g);
         for (p, column) in self.p.iter().zip(&self.axis) {
             g = column.scaled_onto(load(simd, p, at), g);
         }
