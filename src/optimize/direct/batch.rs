@@ -16,8 +16,7 @@ pub struct Batch<'a> {
 pub struct Star<'a> {
     /// c, the rectangle's centre, whose value has been told.
     pub centre: &'a [f64],
-    levels: &'a [u8],
-    longest: u8,
+    sides: &'a [usize],
     points: &'a [f64],
 }
 
@@ -47,12 +46,12 @@ impl<'a> Batch<'a> {
     /// The same by the rectangle that they divide; the cube's centre, which is asked for first, divides none.
     pub fn stars(&self) -> impl ExactSizeIterator<Item = Star<'a>> + use<'a> {
         let Self { rectangles, dividing, centres } = *self;
-        let mut left = centres;
+        let (mut left, mut sides_left) = (centres, &rectangles.sides[..]);
         dividing.iter().map(move |&rectangle| {
-            let (points, others) = left.split_at(2 * rectangles.long_sides(rectangle) * rectangles.dimension);
-            left = others;
-            let (centre, longest) = (rectangles.centre(rectangle), rectangles.longest(rectangle));
-            Star { centre, levels: rectangles.levels(rectangle), longest, points }
+            let (sides, other_sides) = sides_left.split_at(rectangles.long_sides(rectangle));
+            let (points, others) = left.split_at(2 * sides.len() * rectangles.dimension);
+            (left, sides_left) = (others, other_sides);
+            Star { centre: rectangles.centre(rectangle), sides, points }
         })
     }
 }
@@ -61,18 +60,17 @@ impl<'a> Star<'a> {
     /// How many points there are: two at least.
     #[expect(clippy::len_without_is_empty, reason = "every rectangle that is divided has a longest side")]
     pub fn len(&self) -> usize {
-        self.points.len() / self.levels.len()
+        2 * self.sides.len()
     }
 
     /// The points in the order of the batch.
     pub fn points(&self) -> std::slice::ChunksExact<'a, f64> {
-        self.points.chunks_exact(self.levels.len())
+        self.points.chunks_exact(self.centre.len())
     }
 
     /// The same: in which coordinate each differs from the centre, and what it is there.
     pub fn rays(&self) -> impl Iterator<Item = (usize, f64)> {
-        let sides = (0..self.levels.len()).filter(|&side| self.levels[side] == self.longest).flat_map(|side| [side; 2]);
-        sides.zip(self.points()).map(|(side, point)| (side, point[side]))
+        self.sides.iter().flat_map(|&side| [side; 2]).zip(self.points()).map(|(side, point)| (side, point[side]))
     }
 }
 

@@ -3,33 +3,12 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use super::ranked::{number, ranked, score};
+
 /// Scores this close are taken for equal when all best rectangles of a size are divided: the figure of
 /// Gablonsky's code. Rounding makes symmetric points differ in their last bits, and the published counts rest on
 /// dividing such points together.
 const TIE: f64 = 1e-13;
-
-/// A rectangle within its class. Equal scores are served first come, first served.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Entry {
-    rank: i64,
-    arrival: usize,
-    rectangle: usize,
-}
-
-impl Entry {
-    fn new(score: f64, arrival: usize, rectangle: usize) -> Self {
-        Self { rank: flipped(score.to_bits() as i64), arrival, rectangle }
-    }
-
-    fn score(self) -> f64 {
-        f64::from_bits(flipped(self.rank) as u64)
-    }
-}
-
-/// Makes integers that are in the order of `f64::total_cmp` of a number's bits, and bits of those.
-fn flipped(bits: i64) -> i64 {
-    bits ^ ((bits >> 63) as u64 >> 1) as i64
-}
 
 /// The best rectangle of a size class.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,81 +18,107 @@ pub struct Head {
     pub score: f64,
 }
 
-/// One heap per size class, so that an iteration looks at one rectangle per size rather than at all.
+/// One heap per size class, so that an iteration looks at one rectangle per size rather than at all. Equal scores are served
+/// first come, first served: what a heap holds is a score and an arrival.
 ///
-/// What is taken out stays in its heap until it gets to the top: a rectangle's entry counts only as long as it is the latest.
+/// What is taken out stays in its heap until it gets to the top: an arrival counts only as long as it is the rectangle's
+/// latest.
 #[derive(Debug, Clone, Default)]
 pub struct SizeClasses {
-    classes: Vec<BinaryHeap<Reverse<Entry>>>,
-    /// When each rectangle joined the class that it is in; 0 if it is in none.
+    classes: Vec<BinaryHeap<Reverse<u128>>>,
+    /// Who arrived, in the order of arrival.
+    arrived: Vec<usize>,
+    /// Of each rectangle the arrival in the class that it is in; [`NOWHERE`] if it is in none.
     arrivals: Vec<usize>,
-    clock: usize,
 }
+
+/// The arrival of a rectangle that is in no class.
+const NOWHERE: usize = usize::MAX;
+
+/// Rectangles of a class for which there is room from the beginning.
+const CLASS_ROOM: usize = 64;
 
 impl SizeClasses {
     /// With room for so many rectangles.
     pub fn with_room(room: usize) -> Self {
-        Self { arrivals: Vec::with_capacity(room), ..Self::default() }
+        // Who is divided arrives once more, and has two children at least.
+        let arrived = Vec::with_capacity(room + room / 2);
+        Self { arrived, arrivals: Vec::with_capacity(room), ..Self::default() }
     }
 
-    /// Adds a rectangle, which is in no class, behind those of its class that have the same score.
+    /// Knows the first so many rectangles: those that are new to it are in no class yet.
+    pub fn know(&mut self, rectangles: usize) {
+        self.arrivals.resize(rectangles.max(self.arrivals.len()), NOWHERE);
+    }
+
+    /// Adds a rectangle, which is known and in no class, behind those of its class that have the same score.
+    #[inline]
     pub fn insert(&mut self, class: usize, rectangle: usize, score: f64) {
         if self.classes.len() <= class {
-            self.classes.resize_with(class + 1, BinaryHeap::new);
+            self.classes.resize_with(class + 1, || BinaryHeap::with_capacity(CLASS_ROOM));
         }
-        if self.arrivals.len() <= rectangle {
-            self.arrivals.resize(rectangle + 1, 0);
-        }
-        self.clock += 1;
-        self.arrivals[rectangle] = self.clock;
-        self.classes[class].push(Reverse(Entry::new(score, self.clock, rectangle)));
+        let arrival = self.arrived.len();
+        self.arrived.push(rectangle);
+        self.arrivals[rectangle] = arrival;
+        self.classes[class].push(Reverse(ranked(score, arrival)));
     }
 
     /// Takes a rectangle out of its class, and says whether it was there.
     pub fn remove(&mut self, class: usize, rectangle: usize) -> bool {
-        let was_there = self.arrivals.get_mut(rectangle).is_some_and(|arrival| std::mem::take(arrival) > 0);
-        if let Some(heap) = self.classes.get_mut(class) {
-            while heap.peek().is_some_and(|Reverse(entry)| self.arrivals[entry.rectangle] != entry.arrival) {
+        let Self { classes, arrived, arrivals } = self;
+        let arrival = std::mem::replace(&mut arrivals[rectangle], NOWHERE);
+        if let Some(heap) = classes.get_mut(class) {
+            while heap.peek().is_some_and(|Reverse(entry)| !is_latest(*entry, arrived, arrivals)) {
                 heap.pop();
             }
         }
-        was_there
+        arrival != NOWHERE
     }
 
     /// The best rectangle of every class that has one, from the largest size to the smallest.
     pub fn heads(&self) -> impl Iterator<Item = Head> {
         self.classes.iter().enumerate().filter_map(|(class, heap)| {
             let &Reverse(entry) = heap.peek()?;
-            Some(Head { class, rectangle: entry.rectangle, score: entry.score() })
+            Some(Head { class, rectangle: self.arrived[number(entry)], score: score(entry) })
         })
     }
 
     /// The rectangles of a class, other than the best, whose score ties with that of the best, in their order.
     pub fn ties(&self, class: usize) -> impl Iterator<Item = usize> {
         let entries = self.classes.get(class).map_or(&[][..], BinaryHeap::as_slice);
-        let best = entries.first().map_or(f64::NAN, |Reverse(entry)| entry.score());
+        let best = entries.first().map_or(f64::NAN, |&Reverse(entry)| score(entry));
         let mut ties = Vec::new();
         let mut open = vec![0];
         while let Some(node) = open.pop() {
-            let Some(Reverse(entry)) = entries.get(node) else { continue };
+            let Some(&Reverse(entry)) = entries.get(node) else { continue };
             // Compared twice, since the difference of two infinite scores is not a number. What is below a node is no better.
-            if entry.score() == best || entry.score() - best <= TIE {
-                ties.extend((self.arrivals[entry.rectangle] == entry.arrival).then_some(*entry));
+            if score(entry) == best || score(entry) - best <= TIE {
+                ties.extend(is_latest(entry, &self.arrived, &self.arrivals).then_some(entry));
                 open.extend([2 * node + 1, 2 * node + 2]);
             }
         }
         ties.sort_unstable();
-        ties.into_iter().skip(1).map(|entry| entry.rectangle)
+        ties.into_iter().skip(1).map(|entry| self.arrived[number(entry)])
     }
+}
+
+fn is_latest(entry: u128, arrived: &[usize], arrivals: &[usize]) -> bool {
+    arrivals[arrived[number(entry)]] == number(entry)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn known(rectangles: usize) -> SizeClasses {
+        let mut classes = SizeClasses::with_room(rectangles);
+        classes.know(rectangles);
+        classes
+    }
+
     #[test]
     fn heads_run_from_large_to_small_and_skip_empty_classes() {
-        let mut classes = SizeClasses::default();
+        let mut classes = known(10);
         classes.insert(4, 0, 1.0);
         classes.insert(1, 1, 3.0);
         classes.insert(4, 2, 0.5);
@@ -125,17 +130,8 @@ mod tests {
     }
 
     #[test]
-    fn ranks_are_in_the_order_of_scores_and_lose_nothing() {
-        let scores = [f64::NEG_INFINITY, -1e300, -2.0, -1e-300, 0.0, 5e-324, 1.0, 1.0 + f64::EPSILON, f64::INFINITY];
-        for pair in scores.windows(2) {
-            assert!(Entry::new(pair[0], 1, 1) < Entry::new(pair[1], 0, 0));
-        }
-        assert!(scores.iter().all(|score| Entry::new(*score, 0, 0).score().to_bits() == score.to_bits()));
-    }
-
-    #[test]
     fn equal_scores_are_served_in_order_of_arrival() {
-        let mut classes = SizeClasses::default();
+        let mut classes = known(10);
         for rectangle in [7, 3, 5] {
             classes.insert(0, rectangle, 1.0);
         }
@@ -147,7 +143,7 @@ mod tests {
 
     #[test]
     fn ties_allow_for_rounding_and_for_infinite_scores() {
-        let mut classes = SizeClasses::default();
+        let mut classes = known(10);
         for (rectangle, score) in [(0, 1.0), (1, 1.0 + 1e-14), (2, 1.0 + 1e-12)] {
             classes.insert(0, rectangle, score);
         }
@@ -161,7 +157,7 @@ mod tests {
     /// Against a list that is sorted anew at every turn, with rectangles that leave from the middle and come back.
     #[test]
     fn order_survives_those_who_leave() {
-        let (mut classes, mut listed) = (SizeClasses::default(), Vec::<(f64, usize, usize)>::new());
+        let (mut classes, mut listed) = (known(61), Vec::<(f64, usize, usize)>::new());
         for turn in 0..2_000_usize {
             let rectangle = turn * 7_919 % 61;
             let was_there = listed.iter().any(|known| known.2 == rectangle);

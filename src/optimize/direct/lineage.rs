@@ -1,6 +1,8 @@
 //! Who descended from whom, and through it who lies near whom: what the surrogates of infeasible centres need.
 
-use super::partition::Rectangles;
+use std::ops::Range;
+
+use super::partition::{Record, Rectangles};
 use super::ternary::{half_side_ticks, ticks};
 
 /// The relative amount by which a surrogate exceeds the feasible value it is borrowed from.
@@ -15,14 +17,10 @@ pub fn surrogate(value: f64) -> f64 {
 /// descendants lie; that is what makes the tree a spatial index.
 ///
 /// Rectangle 0 is the root and nobody's child, so a 0 ends every list of children.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Lineage {
-    /// Who was divided for each rectangle.
-    parents: Vec<usize>,
-    /// Those of the tree: none as long as all centres are feasible, when nobody asks.
+    /// None as long as all centres are feasible, when nobody asks.
     nodes: Vec<Node>,
-    /// Levels at birth, as many per rectangle as there are dimensions.
-    birth_levels: Vec<u8>,
 }
 
 /// A rectangle in the tree; 0, the root, where there is no child or sibling.
@@ -37,30 +35,22 @@ struct Node {
 }
 
 impl Lineage {
-    /// With room for so many rectangles.
-    pub fn with_room(dimension: usize, room: usize) -> Self {
-        let (parents, birth_levels) = (Vec::with_capacity(room), Vec::with_capacity(room * dimension));
-        Self { parents, nodes: Vec::new(), birth_levels }
-    }
-
     /// Whether any centre is infeasible.
     pub fn any_infeasible(&self) -> bool {
         self.nodes.first().is_some_and(|root| root.obscured)
     }
 
-    /// Adds the next rectangle in line, in the shape it has now. The root is its own parent.
-    pub fn add(&mut self, parent: usize, rectangles: &Rectangles) {
-        let child = self.parents.len();
-        self.parents.push(parent);
-        self.birth_levels.extend_from_slice(rectangles.levels(child));
-        if self.any_infeasible() || rectangles.values[child].is_none() {
-            (self.nodes.len()..=child).for_each(|node| self.plant(node, rectangles.values[node]));
+    /// Adds the next rectangles in line, if there is reason to.
+    pub fn add(&mut self, children: Range<usize>, rectangles: &Rectangles) {
+        let infeasible = |record: &Record| record.value.is_none();
+        if self.any_infeasible() || rectangles.records[children.clone()].iter().any(infeasible) {
+            (self.nodes.len()..children.end).for_each(|node| self.plant(node, &rectangles.records));
         }
     }
 
     /// Puts the next rectangle into the tree.
-    fn plant(&mut self, child: usize, value: Option<f64>) {
-        let parent = self.parents[child];
+    fn plant(&mut self, child: usize, records: &[Record]) {
+        let Record { value, parent, .. } = records[child];
         let elder_sibling =
             self.nodes.get_mut(parent).map_or(0, |parent| std::mem::replace(&mut parent.last_child, child));
         self.nodes.push(Node { elder_sibling, last_child: 0, least: f64::INFINITY, obscured: false });
@@ -79,7 +69,7 @@ impl Lineage {
                 Some(value) => known.least = value,
                 None => known.obscured = true,
             }
-            node = self.parents[node];
+            node = records[node].parent;
         }
     }
 
@@ -91,12 +81,12 @@ impl Lineage {
                 return false;
             }
             let reach = |side| 2 * half_side_ticks(rectangles.levels(infeasible)[side]);
-            if let Some(value) = rectangles.values[node]
+            if let Some(value) = rectangles.records[node].value
                 && within(rectangles, node, infeasible, reach)
             {
                 least = least.min(value);
             }
-            let birth = self.birth_levels(node, rectangles);
+            let birth = rectangles.birth_levels(node);
             within(rectangles, node, infeasible, |side| reach(side) + half_side_ticks(birth[side]))
         });
         least
@@ -109,19 +99,15 @@ impl Lineage {
                 return false;
             }
             let reach = |levels: &[u8], side: usize| 2 * half_side_ticks(levels[side]);
-            if rectangles.values[node].is_none()
+            if rectangles.records[node].value.is_none()
                 && within(rectangles, node, point, |side| reach(rectangles.levels(node), side))
             {
                 visit(node);
             }
             // A descendant sticks out of its ancestor by half its own side when doubled, hence by no more than half
             // the ancestor's.
-            within(rectangles, node, point, |side| reach(self.birth_levels(node, rectangles), side))
+            within(rectangles, node, point, |side| reach(rectangles.birth_levels(node), side))
         });
-    }
-
-    fn birth_levels(&self, node: usize, rectangles: &Rectangles) -> &[u8] {
-        &self.birth_levels[node * rectangles.dimension..][..rectangles.dimension]
     }
 
     /// Walks the tree from the root, into the children of those nodes for which `enter` says so.

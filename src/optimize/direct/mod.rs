@@ -8,6 +8,7 @@ mod lineage;
 mod minimize;
 mod partition;
 mod plane;
+mod ranked;
 mod search;
 mod settings;
 mod ternary;

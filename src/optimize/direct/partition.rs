@@ -1,43 +1,69 @@
 //! The rectangles: how they are stored, and the view others have of them.
 
+use std::ops::Range;
+
 use serde::Serialize;
 
+use super::ranked::{number, ranked};
 use super::settings::Variant;
 use super::ternary::{self, MAX_LEVEL};
 
-/// All rectangles, field by field. One whose value has not been told yet has a centre and levels but no more.
+/// Levels for which there is room from the beginning.
+const LEVELS: usize = 8;
+
+/// All rectangles. One whose value has not been told yet has a centre but no more, one that has not been cut out of its
+/// parent no levels.
 #[derive(Debug, Clone)]
 pub struct Rectangles {
     pub dimension: usize,
     pub centres: Vec<f64>,
-    pub levels: Vec<u8>,
-    /// Of the longest sides: their level, and how many there are. The others are one level deeper.
-    longest: Vec<(u8, u32)>,
+    /// Levels at birth, which are those of now until a rectangle is divided and has all sides alike.
+    birth_levels: Vec<u8>,
+    /// 0, …, 0, 1, …, 1, …: the levels of rectangles that have all sides alike.
+    levels_alike: Vec<u8>,
+    pub records: Vec<Record>,
+    /// The sides along which the last rectangles to be sampled around are cut: each gives two children, the last ones.
+    pub sides: Vec<usize>,
+    /// Those of the rectangle that is being cut, numbered, by the lower of the two children's scores.
+    ranking: Vec<u128>,
+}
+
+/// What is known of a rectangle whose value has been told.
+#[derive(Debug, Clone, Copy)]
+pub struct Record {
     /// `None` where the centre is infeasible.
-    pub values: Vec<Option<f64>>,
+    pub value: Option<f64>,
     /// The value, or the surrogate of an infeasible centre, or infinity where it has none.
-    pub scores: Vec<f64>,
-    pub generations: Vec<usize>,
-    /// The round of selection in which the rectangle was last chosen.
-    pub chosen: Vec<usize>,
+    pub score: f64,
+    /// The iteration that gave it its present shape.
+    pub generation: usize,
+    /// The round of selection in which it was last chosen.
+    pub chosen: usize,
+    /// Who was divided for it; the cube is its own parent.
+    pub parent: usize,
+    /// The level of the longest sides; the others are one level deeper.
+    longest: u8,
+    /// How many sides are longest.
+    long_sides: u32,
 }
 
 impl Rectangles {
     /// The undivided cube, its centre not evaluated yet, with room for so many rectangles.
     pub fn cube(dimension: usize, room: usize) -> Self {
-        let (mut centres, mut levels) = (Vec::with_capacity(room * dimension), Vec::with_capacity(room * dimension));
+        let mut centres = Vec::with_capacity(room * dimension);
         centres.resize(dimension, 0.5);
-        levels.resize(dimension, 0);
-        let (values, scores) = (Vec::with_capacity(room), Vec::with_capacity(room));
-        let (generations, chosen) = (Vec::with_capacity(room), Vec::with_capacity(room));
-        let mut longest = Vec::with_capacity(room);
-        longest.push((0, dimension as u32));
-        Self { dimension, centres, levels, longest, values, scores, generations, chosen }
+        let (mut birth_levels, mut levels_alike) =
+            (Vec::with_capacity(room * dimension), Vec::with_capacity(LEVELS * dimension));
+        birth_levels.resize(dimension, 0);
+        levels_alike.resize(dimension, 0);
+        let (sides, ranking) = (Vec::with_capacity(4 * dimension), Vec::with_capacity(dimension));
+        let records = Vec::with_capacity(room);
+        Self { dimension, centres, birth_levels, levels_alike, records, sides, ranking }
     }
 
     /// How many values have been told.
     pub fn len(&self) -> usize {
-        self.values.len()
+        self.records.len()
     }
 
     /// How many centres wait for a value.
@@ -49,91 +75,117 @@ impl Rectangles {
         &self.centres[rectangle * self.dimension..][..self.dimension]
     }
 
+    /// How often each side has been trisected.
     pub fn levels(&self, rectangle: usize) -> &[u8] {
-        &self.levels[rectangle * self.dimension..][..self.dimension]
+        let Record { longest, long_sides, .. } = self.records[rectangle];
+        if long_sides as usize == self.dimension {
+            &self.levels_alike[usize::from(longest) * self.dimension..][..self.dimension]
+        } else {
+            self.birth_levels(rectangle)
+        }
     }
 
-    /// The trisection level of the longest sides.
-    pub fn longest(&self, rectangle: usize) -> u8 {
-        self.longest[rectangle].0
+    /// The same when the rectangle was cut out of its parent.
+    pub fn birth_levels(&self, rectangle: usize) -> &[u8] {
+        &self.birth_levels[rectangle * self.dimension..][..self.dimension]
     }
 
     /// How many sides of a rectangle are longest, and so would be trisected.
     pub fn long_sides(&self, rectangle: usize) -> usize {
-        self.longest[rectangle].1 as usize
+        self.records[rectangle].long_sides as usize
     }
 
     /// The size class of a rectangle: as [`Variant::class`] says of its levels.
     pub fn class(&self, rectangle: usize, variant: Variant) -> usize {
-        let (longest, count) = self.longest[rectangle];
+        let Record { longest, long_sides, .. } = self.records[rectangle];
         match variant {
-            Variant::Original => self.dimension * (usize::from(longest) + 1) - count as usize,
+            Variant::Original => self.dimension * (usize::from(longest) + 1) - long_sides as usize,
             Variant::LocallyBiased => usize::from(longest),
         }
     }
 
     /// Whether the rectangle has a side left to divide.
     pub fn divisible(&self, rectangle: usize) -> bool {
-        self.longest(rectangle) < MAX_LEVEL
+        self.records[rectangle].longest < MAX_LEVEL
     }
 
     /// Appends the centres that a division of `parent` samples: c ± 3⁻ˡ⁻¹ eᵢ for every longest side i in turn, plus
-    /// before minus. Their levels are the parent's until their values decide who gets which.
+    /// before minus.
     pub fn sample_around(&mut self, parent: usize) {
-        let first = parent * self.dimension;
-        let level = self.longest(parent);
-        for side in 0..self.dimension {
-            if self.levels[first + side] != level {
-                continue;
-            }
-            for coordinate in ternary::thirds(self.centres[first + side], level) {
-                let child = self.centres.len();
-                self.centres.extend_from_within(first..first + self.dimension);
-                self.centres[child + side] = coordinate;
-                self.levels.extend_from_within(first..first + self.dimension);
-                self.longest.push(self.longest[parent]);
-            }
+        let (dimension, Record { longest, long_sides, .. }) = (self.dimension, self.records[parent]);
+        let centre = parent * dimension;
+        let (first, first_side) = (self.centres.len(), self.sides.len());
+        repeat(&mut self.centres, centre..centre + dimension, 2 * long_sides as usize);
+        if long_sides as usize == dimension {
+            self.sides.extend(0..dimension);
+        } else {
+            let levels = &self.birth_levels[centre..centre + dimension];
+            self.sides.extend((0..dimension).filter(|&side| levels[side] == longest));
+        }
+        let (known, children) = self.centres.split_at_mut(first);
+        for (&side, pair) in self.sides[first_side..].iter().zip(children.chunks_exact_mut(2 * dimension)) {
+            [pair[side], pair[dimension + side]] = ternary::thirds(known[centre + side], longest);
         }
     }
 
-    /// Records the value of the next centre in line.
-    pub fn record(&mut self, value: Option<f64>, generation: usize) {
-        self.values.push(value);
-        self.scores.push(value.unwrap_or(f64::INFINITY));
-        self.generations.push(generation);
-        self.chosen.push(0);
+    /// Records the values of the next centres in line; one that is not finite marks an infeasible centre.
+    pub fn record(&mut self, values: &[f64], generation: usize) {
+        let long_sides = self.dimension as u32;
+        self.records.extend(values.iter().map(|value| {
+            // Adding zero turns −0 into +0, which would otherwise sort apart.
+            let value = value.is_finite().then_some(value + 0.0);
+            let score = value.unwrap_or(f64::INFINITY);
+            Record { value, score, generation, chosen: 0, parent: 0, longest: 0, long_sides }
+        }));
     }
 
-    /// Cuts `parent` along its longest sides into itself and the children from `first_child` on, whose values are
-    /// known by now, and returns how many they are.
+    /// Cuts `parent` along its longest sides into itself and the children from `first_child` on, who are next in line, whose
+    /// values are known by now, and returns who they are.
     ///
     /// Each side is ranked by the lower of its two children's scores; the parent is cut along the best side first,
     /// so that the best children keep the largest rectangles. Sides that tie are cut in the order of coordinates.
-    pub fn divide(&mut self, parent: usize, first_child: usize, ranking: &mut Vec<(f64, usize, usize)>) -> usize {
-        let longest = self.longest(parent);
+    pub fn divide(&mut self, parent: usize, first_child: usize) -> Range<usize> {
+        let Self { dimension, birth_levels, levels_alike, records, sides, ranking, .. } = self;
+        let (dimension, Record { longest, long_sides, .. }) = (*dimension, records[parent]);
+        let children = first_child..first_child + 2 * long_sides as usize;
+        let sides = &sides[sides.len() - (records.len() - first_child) / 2..];
         ranking.clear();
-        for side in 0..self.dimension {
-            if self.levels(parent)[side] == longest {
-                let child = first_child + 2 * ranking.len();
-                ranking.push((self.scores[child].min(self.scores[child + 1]), child, side));
+        let pairs = records[children.clone()].chunks_exact(2).enumerate();
+        ranking.extend(pairs.map(|(number, pair)| ranked(pair[0].score.min(pair[1].score), number)));
+        ranking.sort_unstable();
+        // Who is cut along every longest side has all sides alike; a child lacks the cuts that come after its own.
+        let divided = longest + 1;
+        if levels_alike.len() <= usize::from(divided) * dimension {
+            levels_alike.resize(levels_alike.len() + dimension, divided);
+        }
+        birth_levels.resize(children.end * dimension, divided);
+        (records[parent].longest, records[parent].long_sides) = (divided, dimension as u32);
+        for (rank, side) in ranking.iter().enumerate() {
+            let child = first_child + 2 * number(*side);
+            let later = &ranking[rank + 1..];
+            let (plus, minus) = birth_levels[child * dimension..][..2 * dimension].split_at_mut(dimension);
+            for side in later {
+                let side = sides[number(*side)];
+                (plus[side], minus[side]) = (longest, longest);
+            }
+            let of_longest = if later.is_empty() { (divided, dimension as u32) } else { (longest, later.len() as u32) };
+            for record in &mut records[child..child + 2] {
+                record.parent = parent;
+                (record.longest, record.long_sides) = of_longest;
             }
         }
-        ranking.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for (rank, &(_, _, side)) in ranking.iter().enumerate() {
-            self.levels[parent * self.dimension + side] += 1;
-            for &(_, child, _) in &ranking[rank..] {
-                self.levels[child * self.dimension + side] += 1;
-                self.levels[(child + 1) * self.dimension + side] += 1;
-            }
-        }
-        // Who is cut along every longest side has all sides alike.
-        let alike = (longest + 1, self.dimension as u32);
-        for (rank, &(_, child, _)) in ranking.iter().enumerate() {
-            let left = (ranking.len() - rank - 1) as u32;
-            self.longest[child..child + 2].fill(if left > 0 { (longest, left) } else { alike });
-        }
-        self.longest[parent] = alike;
-        2 * ranking.len()
+        children
+    }
+}
+
+/// Appends part of a buffer to it so many times.
+fn repeat<T: Copy>(buffer: &mut Vec<T>, part: Range<usize>, times: usize) {
+    let (begin, length) = (buffer.len(), part.len());
+    let end = begin + times * length;
+    buffer.reserve(end - begin);
+    buffer.extend_from_within(part);
+    while buffer.len() < end {
+        buffer.extend_from_within(begin..buffer.len().min(begin + end - buffer.len()));
     }
 }
 
@@ -194,15 +246,16 @@ impl<'a> Partition<'a> {
     fn rectangle(&self, index: usize) -> Rectangle<'a> {
         let all = self.rectangles;
         let levels = all.levels(index);
-        let score = all.scores[index].min(self.remote);
+        let record = all.records[index];
+        let score = record.score.min(self.remote);
         Rectangle {
             centre: all.centre(index),
             levels,
-            value: all.values[index],
+            value: record.value,
             score: score.is_finite().then_some(score),
             size: self.variant.size_of(levels),
-            generation: all.generations[index],
-            potentially_optimal: all.chosen[index] == self.round,
+            generation: record.generation,
+            potentially_optimal: record.chosen == self.round,
         }
     }
 }

@@ -1,12 +1,13 @@
 //! The search itself: ask, tell, divide, choose.
 
+use std::ops::Range;
+
 use super::batch::Batch;
 use super::classes::SizeClasses;
 use super::hull::{HullPoint, lower_right_hull};
 use super::lineage::{Lineage, surrogate};
 use super::partition::{Partition, Rectangles};
 use super::settings::{DirectError, Settings, Variant};
-use super::ternary::MAX_LEVEL;
 
 /// A search of the unit cube by DIRECT or DIRECT-l, as told by the [`Variant`](super::Variant).
 ///
@@ -64,6 +65,9 @@ pub struct Direct {
 /// Rectangles for which there is room from the beginning.
 const ROOM: usize = 4096;
 
+/// Size classes for whose best rectangles there is room from the beginning.
+const CLASSES: usize = 16;
+
 impl Direct {
     /// Prepares a search of the unit cube of that dimension.
     ///
@@ -80,9 +84,9 @@ impl Direct {
             settings,
             rectangles: Rectangles::cube(dimension, room),
             classes: SizeClasses::with_room(room),
-            lineage: Lineage::with_room(dimension, room),
-            hull: Vec::new(),
-            chosen: Vec::new(),
+            lineage: Lineage::default(),
+            hull: Vec::with_capacity(CLASSES),
+            chosen: Vec::with_capacity(CLASSES),
             dividing: 0,
             round: 0,
             iterations: 0,
@@ -119,12 +123,10 @@ impl Direct {
         self.asked = false;
         let first = self.rectangles.len();
         self.iterations += usize::from(first > 0);
-        for &value in values {
-            self.record(value);
-        }
+        self.record(values);
         if first == 0 {
-            self.lineage.add(0, &self.rectangles);
-            self.enlist(0);
+            self.lineage.add(0..1, &self.rectangles);
+            self.enlist(0..1);
         } else {
             self.divide(first);
         }
@@ -196,32 +198,32 @@ impl Direct {
         if self.best.is_some() { (self.worst + 1.0).min(f64::MAX) } else { f64::INFINITY }
     }
 
-    fn record(&mut self, value: f64) {
-        // Adding zero turns −0 into +0, which would otherwise sort apart.
-        let value = value.is_finite().then_some(value + 0.0);
-        if let Some(value) = value {
-            self.worst = self.worst.max(value);
-            if self.best.is_none_or(|(_, best)| value < best) {
-                self.best = Some((self.rectangles.len(), value));
+    fn record(&mut self, values: &[f64]) {
+        let first = self.rectangles.len();
+        self.rectangles.record(values, self.iterations);
+        self.classes.know(self.rectangles.len());
+        let (mut best, mut worst) = (self.best, self.worst);
+        for (rectangle, record) in (first..).zip(&self.rectangles.records[first..]) {
+            let Some(value) = record.value else { continue };
+            worst = worst.max(value);
+            if best.is_none_or(|(_, best)| value < best) {
+                best = Some((rectangle, value));
             }
         }
-        self.rectangles.record(value, self.iterations);
+        (self.best, self.worst) = (best, worst);
     }
 
     fn divide(&mut self, first: usize) {
-        let mut ranking = Vec::new();
         let mut child = first;
         for index in 0..self.dividing {
             let parent = self.chosen[index];
             self.delist(parent);
-            let children = child..child + self.rectangles.divide(parent, child, &mut ranking);
-            self.rectangles.generations[parent] = self.iterations;
-            for child in children.clone() {
-                self.lineage.add(parent, &self.rectangles);
-                self.enlist(child);
-            }
-            self.enlist(parent);
+            let children = self.rectangles.divide(parent, child);
+            self.rectangles.records[parent].generation = self.iterations;
+            self.lineage.add(children.clone(), &self.rectangles);
             child = children.end;
+            self.enlist(children);
+            self.enlist(parent..parent + 1);
         }
     }
 
@@ -230,18 +232,18 @@ impl Direct {
     fn set_surrogates(&mut self, first: usize) {
         let mut near = Vec::new();
         for point in first..self.rectangles.len() {
-            if let Some(value) = self.rectangles.values[point] {
+            if let Some(value) = self.rectangles.records[point].value {
                 self.lineage.infeasible_near(point, &self.rectangles, |infeasible| near.push((infeasible, value)));
             }
         }
         for (infeasible, value) in near {
-            if surrogate(value) < self.rectangles.scores[infeasible] {
+            if surrogate(value) < self.rectangles.records[infeasible].score {
                 self.rescore(infeasible, surrogate(value));
             }
         }
         let divided = self.chosen[..self.dividing].to_vec();
         for changed in divided.into_iter().chain(first..self.rectangles.len()) {
-            if self.rectangles.values[changed].is_none() {
+            if self.rectangles.records[changed].value.is_none() {
                 self.rescore(changed, surrogate(self.lineage.least_near(changed, &self.rectangles)));
             }
         }
@@ -249,17 +251,19 @@ impl Direct {
 
     fn rescore(&mut self, rectangle: usize, score: f64) {
         let listed = self.delist(rectangle);
-        self.rectangles.scores[rectangle] = score;
+        self.rectangles.records[rectangle].score = score;
         if listed {
-            self.enlist(rectangle);
+            self.enlist(rectangle..rectangle + 1);
         }
     }
 
-    fn enlist(&mut self, rectangle: usize) {
-        let class = self.rectangles.class(rectangle, self.settings.variant);
-        // Where the class is no smaller than the deepest level, the longest side may be there.
-        if class < usize::from(MAX_LEVEL) || self.rectangles.divisible(rectangle) {
-            self.classes.insert(class, rectangle, self.rectangles.scores[rectangle]);
+    /// Puts rectangles into their classes, those that can be divided.
+    fn enlist(&mut self, rectangles: Range<usize>) {
+        for rectangle in rectangles {
+            if self.rectangles.divisible(rectangle) {
+                let class = self.rectangles.class(rectangle, self.settings.variant);
+                self.classes.insert(class, rectangle, self.rectangles.records[rectangle].score);
+            }
         }
     }
 
@@ -298,13 +302,14 @@ impl Direct {
             self.chosen.extend(self.classes.heads().next().map(|head| head.rectangle));
         }
         for &rectangle in &self.chosen {
-            self.rectangles.chosen[rectangle] = self.round;
+            self.rectangles.records[rectangle].chosen = self.round;
         }
     }
 
     /// Samples around the chosen rectangles as far as the budget goes.
     fn sample(&mut self) {
         self.dividing = 0;
+        self.rectangles.sides.clear();
         for &parent in &self.chosen {
             let points = self.rectangles.len() + self.rectangles.pending() + 2 * self.rectangles.long_sides(parent);
             self.exhausted |= points > self.settings.max_evaluations;
