@@ -103,7 +103,10 @@ impl Case {
     /// The least value, and by how many evaluations it was found: DIRECT leaves a rectangle that it cannot divide along all its
     /// longest sides.
     fn choose_by(&self, settings: Settings) -> (f64, usize) {
-        let active = Active::new(self.weights.clone(), Minimiser::Direct(settings));
+        self.choose_as(&Active::new(self.weights.clone(), Minimiser::Direct(settings)))
+    }
+
+    fn choose_as(&self, active: &Active) -> (f64, usize) {
         let history = History::default();
         let situation =
             Situation { belief: &self.belief, actions: &self.actions, history: &history, constraints: None };
@@ -235,7 +238,7 @@ fn least() {
     }
 }
 
-/// One choice on a single thread and on two.
+/// One choice on a single thread and on two: of what is believed, and of samples of it, which cost as many times as much.
 #[cfg(feature = "parallel")]
 fn threads() {
     println!(
@@ -243,13 +246,19 @@ fn threads() {
     );
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     let (one, two) = (pool(1), pool(2));
-    for name in CASES {
-        let case = Case::new(&builtin(name).expect("built in"), SEED);
-        let choose = || case.choose(SETTINGS.max_evaluations);
-        let times = race(&mut [("one", Box::new(|| one.install(choose))), ("two", Box::new(|| two.install(choose)))]);
-        let medians = [&times[0], &times[1]].map(|times| spread(times.iter().copied())[0]);
-        let [ratio, least, most] = spread(times[0].iter().zip(&times[1]).map(|(one, two)| one / two));
-        println!("  {name:10} {:8.1} {:8.1}   {ratio:5.2} ({least:.2} to {most:.2})", medians[0], medians[1]);
+    for samples in [0, 8] {
+        for name in CASES {
+            let case = Case::new(&builtin(name).expect("built in"), SEED);
+            let active = Active::new(case.weights.clone(), Minimiser::Direct(SETTINGS)).sampled(samples);
+            let choose = || case.choose_as(&active).0;
+            let times =
+                race(&mut [("one", Box::new(|| one.install(choose))), ("two", Box::new(|| two.install(choose)))]);
+            let medians = [&times[0], &times[1]].map(|times| spread(times.iter().copied())[0]);
+            let [ratio, least, most] = spread(times[0].iter().zip(&times[1]).map(|(one, two)| one / two));
+            let of = if samples == 0 { String::new() } else { format!(", {samples} samples") };
+            let title = format!("{name}{of}");
+            println!("  {title:22} {:8.1} {:8.1}   {ratio:5.2} ({least:.2} to {most:.2})", medians[0], medians[1]);
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use std::{
     hint::spin_loop,
     sync::mpsc::{Receiver, Sender, TryRecvError, channel},
     thread::yield_now,
+    time::Instant,
 };
 
 #[cfg(feature = "parallel")]
@@ -25,11 +26,40 @@ const HELPERS: usize = 3;
 #[cfg(feature = "parallel")]
 const LOOKS: usize = 200;
 
+/// Seconds of work for which it pays to call others: it takes them a tenth of this to wake up.
+#[cfg(feature = "parallel")]
+const WORTH_A_CALL: f64 = 5e-4;
+
+/// Seconds of work in a batch for which it pays to hand over a part.
+#[cfg(feature = "parallel")]
+const WORTH_SHARING: f64 = 5e-6;
+
+/// Candidates by which it is judged what one costs.
+#[cfg(feature = "parallel")]
+const JUDGED: usize = 24;
+
 /// Evaluates batches, each in parts where others help.
 pub struct Batches<'a, C> {
     evaluate: &'a (dyn Fn(&[C]) -> Vec<f64> + Sync),
     #[cfg(feature = "parallel")]
     helpers: Vec<Helper<C>>,
+    /// Calls them, as soon as it is known that it pays.
+    #[cfg(feature = "parallel")]
+    call: Option<Call<'a, C>>,
+    /// How many candidates a batch must have to be shared.
+    #[cfg(feature = "parallel")]
+    fewest: usize,
+}
+
+/// What is known before others are called.
+#[cfg(feature = "parallel")]
+struct Call<'a, C> {
+    helpers: &'a dyn Fn() -> Vec<Helper<C>>,
+    /// How many candidates are still to come.
+    to_come: usize,
+    /// How many have been evaluated, and in how many seconds.
+    evaluated: usize,
+    seconds: f64,
 }
 
 /// One who helps, seen from here.
@@ -42,11 +72,13 @@ struct Helper<C> {
     told: Receiver<(Vec<C>, Vec<f64>)>,
 }
 
-/// Does `work` with what evaluates batches by `evaluate`: with the feature `parallel` on threads of the pool, too, that have nothing
-/// else to do, for as long as the work lasts. `evaluate` says of every candidate what it says of it in any other company, so that values
-/// do not depend on who helps.
+/// Does `work` with what evaluates batches by `evaluate`, `candidates` in all: with the feature `parallel` on threads of the pool, too,
+/// that have nothing else to do, for as long as the work lasts, where there is enough of it. `evaluate` says of every candidate what
+/// it says of it in any other company, so that values do not depend on who helps.
+#[cfg_attr(not(feature = "parallel"), expect(unused_variables, reason = "nobody asks how much there is to share"))]
 pub fn shared<C: Send, R>(
     evaluate: &(dyn Fn(&[C]) -> Vec<f64> + Sync),
+    candidates: usize,
     work: impl FnOnce(&mut Batches<'_, C>) -> R,
 ) -> R {
     #[cfg(feature = "parallel")]
@@ -59,8 +91,9 @@ pub fn shared<C: Send, R>(
                 scope.spawn(move |_| help(evaluate, &asks, &tells));
                 Helper { is_there: false, asked, told }
             };
-            let helpers = (1..rayon::current_num_threads()).take(HELPERS).map(|_| helper()).collect();
-            work(&mut Batches { evaluate, helpers })
+            let helpers = || (1..rayon::current_num_threads()).take(HELPERS).map(|_| helper()).collect();
+            let call = Call { helpers: &helpers, to_come: candidates, evaluated: 0, seconds: 0.0 };
+            work(&mut Batches { call: Some(call), ..Batches::alone(evaluate) })
         });
     }
     work(&mut Batches::alone(evaluate))
@@ -102,6 +135,10 @@ impl<'a, C> Batches<'a, C> {
             evaluate,
             #[cfg(feature = "parallel")]
             helpers: Vec::new(),
+            #[cfg(feature = "parallel")]
+            call: None,
+            #[cfg(feature = "parallel")]
+            fewest: 0,
         }
     }
 
@@ -112,10 +149,37 @@ impl<'a, C> Batches<'a, C> {
     )]
     pub fn evaluate(&mut self, candidates: &mut Vec<C>) -> Vec<f64> {
         #[cfg(feature = "parallel")]
-        if !self.helpers.is_empty() && candidates.len() > 2 * SHARE {
+        if self.call.is_some() {
+            return self.judge(candidates);
+        }
+        #[cfg(feature = "parallel")]
+        if !self.helpers.is_empty() && candidates.len() >= self.fewest {
             return self.evaluate_together(candidates);
         }
         (self.evaluate)(candidates)
+    }
+
+    /// Evaluates them here, and calls others if what is left takes long enough.
+    #[cfg(feature = "parallel")]
+    fn judge(&mut self, candidates: &[C]) -> Vec<f64> {
+        let start = Instant::now();
+        let values = (self.evaluate)(candidates);
+        if let Some(mut call) = self.call.take() {
+            call.to_come = call.to_come.saturating_sub(candidates.len());
+            // The first one finds nothing in the caches.
+            if candidates.len() > 1 {
+                call.evaluated += candidates.len();
+                call.seconds += start.elapsed().as_secs_f64();
+            }
+            let each = call.seconds / call.evaluated as f64;
+            if call.evaluated < JUDGED {
+                self.call = Some(call);
+            } else if each * call.to_come as f64 > WORTH_A_CALL {
+                self.helpers = (call.helpers)();
+                self.fewest = (2 * SHARE + 1).max((WORTH_SHARING / each) as usize);
+            }
+        }
+        values
     }
 
     #[cfg(feature = "parallel")]

@@ -89,25 +89,32 @@ mod tests {
 
     use super::*;
 
-    /// However many help, and whether they come in time or not.
+    /// However many help, whether they come in time or not, and whether or not it pays to call them.
     #[test]
     fn shared_batches_say_what_is_said_alone() {
-        let squares = |batch: &[f64]| batch.iter().map(|x| x * x).collect::<Vec<f64>>();
-        for threads in [1, 2, 3, 8] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            let check = || {
-                shared(&squares, |batches| {
-                    for size in (0..2000).map(|round| round % 61) {
-                        let all: Vec<f64> = (0..size).map(f64::from).collect();
-                        let mut batch = all.clone();
-                        assert_eq!(batches.evaluate(&mut batch), squares(&all), "{size} by {threads}");
-                        assert_eq!(batch, all, "{size} by {threads}");
-                    }
-                });
+        for work in [0, 2000] {
+            let roots = |batch: &[f64]| {
+                let root = |x: &f64| (0..work).fold(*x, |y, _| (y + x / (y + 1.0)) / 2.0);
+                batch.iter().map(root).collect::<Vec<f64>>()
             };
-            pool.install(check);
-            // Who is not of the pool, and others who have taken it.
-            thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(|| pool.install(check)))));
+            let sizes = || (0..120).map(|round| 7 * round % 61);
+            let candidates = sizes().sum::<usize>();
+            for threads in [1, 2, 3, 8] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+                let check = || {
+                    shared(&roots, candidates, |batches| {
+                        for size in sizes() {
+                            let all: Vec<f64> = (0..size).map(|x| x as f64).collect();
+                            let mut batch = all.clone();
+                            assert_eq!(batches.evaluate(&mut batch), roots(&all), "{size} by {threads}");
+                            assert_eq!(batch, all, "{size} by {threads}");
+                        }
+                    });
+                };
+                pool.install(check);
+                // Who is not of the pool, and others who have taken it.
+                thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(|| pool.install(check)))));
+            }
         }
     }
 
