@@ -106,3 +106,22 @@ fn e_direct_alone(bencher: Bencher<'_, '_>, dimension: usize) {
         direct.evaluations()
     });
 }
+
+/// What of [`e_direct_alone`] is its objective's.
+#[divan::bench(args = [6, 12])]
+fn f_objective_alone(bencher: Bencher<'_, '_>, dimension: usize) {
+    let settings =
+        Settings { variant: Variant::LocallyBiased, epsilon: 1e-4, max_evaluations: CANDIDATES, ..Settings::default() };
+    let bowl = |x: &[f64]| x.iter().map(|x| (x - 0.3).powi(2)).sum::<f64>();
+    let mut direct = Direct::new(dimension, settings).expect("valid settings");
+    let mut batches = Vec::new();
+    while let Some(batch) = direct.ask() {
+        let values: Vec<f64> = batch.iter().map(bowl).collect();
+        batches.push(batch.iter().flatten().copied().collect::<Vec<f64>>());
+        direct.tell(&values).expect("as many values as points");
+    }
+    bencher.bench(|| {
+        let values = |batch: &Vec<f64>| batch.chunks_exact(dimension).map(bowl).collect::<Vec<f64>>();
+        batches.iter().map(|batch| black_box(values(batch)).len()).sum::<usize>()
+    });
+}

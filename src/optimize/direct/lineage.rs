@@ -1,7 +1,5 @@
 //! Who descended from whom, and through it who lies near whom: what the surrogates of infeasible centres need.
 
-use std::ops::Range;
-
 use super::partition::{Record, Rectangles};
 use super::ternary::{half_side_ticks, ticks};
 
@@ -40,17 +38,14 @@ impl Lineage {
         self.nodes.first().is_some_and(|root| root.obscured)
     }
 
-    /// Adds the next rectangles in line, if there is reason to.
-    pub fn add(&mut self, children: Range<usize>, rectangles: &Rectangles) {
-        let infeasible = |record: &Record| record.value.is_none();
-        if self.any_infeasible() || rectangles.records[children.clone()].iter().any(infeasible) {
-            (self.nodes.len()..children.end).for_each(|node| self.plant(node, &rectangles.records));
-        }
+    /// Puts all rectangles into the tree that are not there yet, once there is an infeasible centre among them.
+    pub fn grow(&mut self, records: &[Record]) {
+        (self.nodes.len()..records.len()).for_each(|node| self.plant(node, records));
     }
 
     /// Puts the next rectangle into the tree.
     fn plant(&mut self, child: usize, records: &[Record]) {
-        let Record { value, parent, .. } = records[child];
+        let (value, parent) = (records[child].value(), records[child].parent);
         let elder_sibling =
             self.nodes.get_mut(parent).map_or(0, |parent| std::mem::replace(&mut parent.last_child, child));
         self.nodes.push(Node { elder_sibling, last_child: 0, least: f64::INFINITY, obscured: false });
@@ -81,7 +76,7 @@ impl Lineage {
                 return false;
             }
             let reach = |side| 2 * half_side_ticks(rectangles.levels(infeasible)[side]);
-            if let Some(value) = rectangles.records[node].value
+            if let Some(value) = rectangles.records[node].value()
                 && within(rectangles, node, infeasible, reach)
             {
                 least = least.min(value);
@@ -99,7 +94,7 @@ impl Lineage {
                 return false;
             }
             let reach = |levels: &[u8], side: usize| 2 * half_side_ticks(levels[side]);
-            if rectangles.records[node].value.is_none()
+            if rectangles.records[node].value().is_none()
                 && within(rectangles, node, point, |side| reach(rectangles.levels(node), side))
             {
                 visit(node);

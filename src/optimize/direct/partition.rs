@@ -31,10 +31,10 @@ pub struct Rectangles {
 /// What is known of a rectangle whose value has been told.
 #[derive(Debug, Clone, Copy)]
 pub struct Record {
-    /// `None` where the centre is infeasible.
-    pub value: Option<f64>,
     /// The value, or the surrogate of an infeasible centre, or infinity where it has none.
     pub score: f64,
+    /// Whether the centre is feasible.
+    is_feasible: bool,
     /// The iteration that gave it its present shape.
     pub generation: usize,
     /// The round of selection in which it was last chosen.
@@ -45,6 +45,26 @@ pub struct Record {
     longest: u8,
     /// How many sides are longest.
     long_sides: u32,
+}
+
+impl Record {
+    /// `None` where the centre is infeasible.
+    pub fn value(&self) -> Option<f64> {
+        self.is_feasible.then_some(self.score)
+    }
+
+    /// The size class: as [`Variant::class`] says of its levels.
+    pub fn class(&self, dimension: usize, variant: Variant) -> usize {
+        match variant {
+            Variant::Original => dimension * (usize::from(self.longest) + 1) - self.long_sides as usize,
+            Variant::LocallyBiased => usize::from(self.longest),
+        }
+    }
+
+    /// Whether there is a side left to divide.
+    pub fn is_divisible(&self) -> bool {
+        self.longest < MAX_LEVEL
+    }
 }
 
 impl Rectangles {
@@ -95,18 +115,9 @@ impl Rectangles {
         self.records[rectangle].long_sides as usize
     }
 
-    /// The size class of a rectangle: as [`Variant::class`] says of its levels.
+    /// The size class of a rectangle.
     pub fn class(&self, rectangle: usize, variant: Variant) -> usize {
-        let Record { longest, long_sides, .. } = self.records[rectangle];
-        match variant {
-            Variant::Original => self.dimension * (usize::from(longest) + 1) - long_sides as usize,
-            Variant::LocallyBiased => usize::from(longest),
-        }
-    }
-
-    /// Whether the rectangle has a side left to divide.
-    pub fn divisible(&self, rectangle: usize) -> bool {
-        self.records[rectangle].longest < MAX_LEVEL
+        self.records[rectangle].class(self.dimension, variant)
     }
 
     /// Appends the centres that a division of `parent` samples: c ± 3⁻ˡ⁻¹ eᵢ for every longest side i in turn, plus
@@ -132,10 +143,10 @@ impl Rectangles {
     pub fn record(&mut self, values: &[f64], generation: usize) {
         let long_sides = self.dimension as u32;
         self.records.extend(values.iter().map(|value| {
+            let is_feasible = value.is_finite();
             // Adding zero turns −0 into +0, which would otherwise sort apart.
-            let value = value.is_finite().then_some(value + 0.0);
-            let score = value.unwrap_or(f64::INFINITY);
-            Record { value, score, generation, chosen: 0, parent: 0, longest: 0, long_sides }
+            let score = if is_feasible { value + 0.0 } else { f64::INFINITY };
+            Record { score, is_feasible, generation, chosen: 0, parent: 0, longest: 0, long_sides }
         }));
     }
 
@@ -251,7 +262,7 @@ impl<'a> Partition<'a> {
         Rectangle {
             centre: all.centre(index),
             levels,
-            value: record.value,
+            value: record.value(),
             score: score.is_finite().then_some(score),
             size: self.variant.size_of(levels),
             generation: record.generation,

@@ -123,14 +123,14 @@ impl Direct {
         self.asked = false;
         let first = self.rectangles.len();
         self.iterations += usize::from(first > 0);
-        self.record(values);
+        let all_feasible = self.record(values);
         if first == 0 {
-            self.lineage.add(0..1, &self.rectangles);
             self.enlist(0..1);
         } else {
             self.divide(first);
         }
-        if self.lineage.any_infeasible() {
+        if !all_feasible || self.lineage.any_infeasible() {
+            self.lineage.grow(&self.rectangles.records);
             self.set_surrogates(first);
         }
         self.choose();
@@ -198,19 +198,27 @@ impl Direct {
         if self.best.is_some() { (self.worst + 1.0).min(f64::MAX) } else { f64::INFINITY }
     }
 
-    fn record(&mut self, values: &[f64]) {
-        let first = self.rectangles.len();
-        self.rectangles.record(values, self.iterations);
-        self.classes.know(self.rectangles.len());
-        let (mut best, mut worst) = (self.best, self.worst);
-        for (rectangle, record) in (first..).zip(&self.rectangles.records[first..]) {
-            let Some(value) = record.value else { continue };
-            worst = worst.max(value);
-            if best.is_none_or(|(_, best)| value < best) {
-                best = Some((rectangle, value));
+    /// Takes the values, and says whether all are feasible.
+    fn record(&mut self, values: &[f64]) -> bool {
+        let mut all_feasible = true;
+        let (mut best, mut least, mut worst) = (None, self.best.map_or(f64::INFINITY, |(_, best)| best), self.worst);
+        for (index, &value) in values.iter().enumerate() {
+            if !value.is_finite() {
+                all_feasible = false;
+                continue;
+            }
+            if value > worst {
+                worst = value;
+            }
+            if value < least {
+                (best, least) = (Some(self.rectangles.len() + index), value);
             }
         }
-        (self.best, self.worst) = (best, worst);
+        self.worst = worst;
+        self.rectangles.record(values, self.iterations);
+        self.best = best.map(|rectangle| (rectangle, self.rectangles.records[rectangle].score)).or(self.best);
+        self.classes.know(self.rectangles.len());
+        all_feasible
     }
 
     fn divide(&mut self, first: usize) {
@@ -220,7 +228,6 @@ impl Direct {
             self.delist(parent);
             let children = self.rectangles.divide(parent, child);
             self.rectangles.records[parent].generation = self.iterations;
-            self.lineage.add(children.clone(), &self.rectangles);
             child = children.end;
             self.enlist(children);
             self.enlist(parent..parent + 1);
@@ -232,7 +239,7 @@ impl Direct {
     fn set_surrogates(&mut self, first: usize) {
         let mut near = Vec::new();
         for point in first..self.rectangles.len() {
-            if let Some(value) = self.rectangles.records[point].value {
+            if let Some(value) = self.rectangles.records[point].value() {
                 self.lineage.infeasible_near(point, &self.rectangles, |infeasible| near.push((infeasible, value)));
             }
         }
@@ -243,7 +250,7 @@ impl Direct {
         }
         let divided = self.chosen[..self.dividing].to_vec();
         for changed in divided.into_iter().chain(first..self.rectangles.len()) {
-            if self.rectangles.records[changed].value.is_none() {
+            if self.rectangles.records[changed].value().is_none() {
                 self.rescore(changed, surrogate(self.lineage.least_near(changed, &self.rectangles)));
             }
         }
@@ -259,10 +266,10 @@ impl Direct {
 
     /// Puts rectangles into their classes, those that can be divided.
     fn enlist(&mut self, rectangles: Range<usize>) {
-        for rectangle in rectangles {
-            if self.rectangles.divisible(rectangle) {
-                let class = self.rectangles.class(rectangle, self.settings.variant);
-                self.classes.insert(class, rectangle, self.rectangles.records[rectangle].score);
+        let Rectangles { dimension, records, .. } = &self.rectangles;
+        for (rectangle, record) in rectangles.clone().zip(&records[rectangles]) {
+            if record.is_divisible() {
+                self.classes.insert(record.class(*dimension, self.settings.variant), rectangle, record.score);
             }
         }
     }
@@ -310,8 +317,9 @@ impl Direct {
     fn sample(&mut self) {
         self.dividing = 0;
         self.rectangles.sides.clear();
+        let mut points = self.rectangles.len();
         for &parent in &self.chosen {
-            let points = self.rectangles.len() + self.rectangles.pending() + 2 * self.rectangles.long_sides(parent);
+            points += 2 * self.rectangles.long_sides(parent);
             self.exhausted |= points > self.settings.max_evaluations;
             if self.exhausted {
                 break;
