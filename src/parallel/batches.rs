@@ -1,7 +1,6 @@
 //! One batch after the other, each shared with threads that stay at hand: to hand out a few microseconds' work to a thread that
 //! sleeps costs more than the work.
 
-#[cfg(feature = "parallel")]
 use std::{
     hint::spin_loop,
     sync::mpsc::{Receiver, Sender, TryRecvError, channel},
@@ -9,50 +8,38 @@ use std::{
     time::Instant,
 };
 
-#[cfg(feature = "parallel")]
 use super::pool;
-#[cfg(feature = "parallel")]
 use crate::lanes::GROUP;
 
 /// Candidates are handed out in so many: as many as the narrower registers of a group hold.
-#[cfg(feature = "parallel")]
 const SHARE: usize = GROUP / 2;
 
 /// Who helps at most: batches are small.
-#[cfg(feature = "parallel")]
 const HELPERS: usize = 3;
 
 /// How often one who waits looks again before it lets others go first.
-#[cfg(feature = "parallel")]
 const LOOKS: usize = 200;
 
 /// Seconds of work for which it pays to call others: it takes them a tenth of this to wake up.
-#[cfg(feature = "parallel")]
 const WORTH_A_CALL: f64 = 5e-4;
 
 /// Seconds of work in a batch for which it pays to hand over a part.
-#[cfg(feature = "parallel")]
 const WORTH_SHARING: f64 = 5e-6;
 
 /// Candidates by which it is judged what one costs.
-#[cfg(feature = "parallel")]
 const JUDGED: usize = 24;
 
 /// Evaluates batches, each in parts where others help.
 pub struct Batches<'a, C> {
     evaluate: &'a (dyn Fn(&[C]) -> Vec<f64> + Sync),
-    #[cfg(feature = "parallel")]
     helpers: Vec<Helper<C>>,
     /// Calls them, as soon as it is known that it pays.
-    #[cfg(feature = "parallel")]
     call: Option<Call<'a, C>>,
     /// How many candidates a batch must have to be shared.
-    #[cfg(feature = "parallel")]
     fewest: usize,
 }
 
 /// What is known before others are called.
-#[cfg(feature = "parallel")]
 struct Call<'a, C> {
     helpers: &'a dyn Fn() -> Vec<Helper<C>>,
     /// How many candidates are still to come.
@@ -63,7 +50,6 @@ struct Call<'a, C> {
 }
 
 /// One who helps, seen from here.
-#[cfg(feature = "parallel")]
 struct Helper<C> {
     /// It may begin late, or never while others have more to do.
     is_there: bool,
@@ -72,16 +58,14 @@ struct Helper<C> {
     told: Receiver<(Vec<C>, Vec<f64>)>,
 }
 
-/// Does `work` with what evaluates batches by `evaluate`, `candidates` in all: with the feature `parallel` on threads of the pool, too,
-/// that have nothing else to do, for as long as the work lasts, where there is enough of it. `evaluate` says of every candidate what
+/// Does `work` with what evaluates batches by `evaluate`, `candidates` in all: on threads of the pool, too, that
+/// have nothing else to do, for as long as the work lasts, where there is enough of it. `evaluate` says of every candidate what
 /// it says of it in any other company, so that values do not depend on who helps.
-#[cfg_attr(not(feature = "parallel"), expect(unused_variables, reason = "nobody asks how much there is to share"))]
 pub fn shared<C: Send, R>(
     evaluate: &(dyn Fn(&[C]) -> Vec<f64> + Sync),
     candidates: usize,
     work: impl FnOnce(&mut Batches<'_, C>) -> R,
 ) -> R {
-    #[cfg(feature = "parallel")]
     if rayon::current_num_threads() > 1
         && let Some(_place) = pool::taken()
     {
@@ -100,7 +84,6 @@ pub fn shared<C: Send, R>(
 }
 
 /// Evaluates what is asked until nobody asks any more.
-#[cfg(feature = "parallel")]
 fn help<C>(evaluate: &(dyn Fn(&[C]) -> Vec<f64> + Sync), asks: &Receiver<Vec<C>>, tells: &Sender<(Vec<C>, Vec<f64>)>) {
     let mut told = tells.send((Vec::new(), Vec::new()));
     while told.is_ok()
@@ -112,7 +95,6 @@ fn help<C>(evaluate: &(dyn Fn(&[C]) -> Vec<f64> + Sync), asks: &Receiver<Vec<C>>
 }
 
 /// What comes next, looked for without falling asleep; `None` once nothing will.
-#[cfg(feature = "parallel")]
 fn next<T>(from: &Receiver<T>) -> Option<T> {
     let mut looks = 0;
     loop {
@@ -131,28 +113,14 @@ fn next<T>(from: &Receiver<T>) -> Option<T> {
 impl<'a, C> Batches<'a, C> {
     /// Evaluates them on this thread.
     pub fn alone(evaluate: &'a (dyn Fn(&[C]) -> Vec<f64> + Sync)) -> Self {
-        Self {
-            evaluate,
-            #[cfg(feature = "parallel")]
-            helpers: Vec::new(),
-            #[cfg(feature = "parallel")]
-            call: None,
-            #[cfg(feature = "parallel")]
-            fewest: 0,
-        }
+        Self { evaluate, helpers: Vec::new(), call: None, fewest: 0 }
     }
 
     /// The values of all candidates, in order.
-    #[cfg_attr(
-        not(feature = "parallel"),
-        expect(clippy::ptr_arg, reason = "parts of a batch go to others and come back")
-    )]
     pub fn evaluate(&mut self, candidates: &mut Vec<C>) -> Vec<f64> {
-        #[cfg(feature = "parallel")]
         if self.call.is_some() {
             return self.judge(candidates);
         }
-        #[cfg(feature = "parallel")]
         if !self.helpers.is_empty() && candidates.len() >= self.fewest {
             return self.evaluate_together(candidates);
         }
@@ -160,7 +128,6 @@ impl<'a, C> Batches<'a, C> {
     }
 
     /// Evaluates them here, and calls others if what is left takes long enough.
-    #[cfg(feature = "parallel")]
     fn judge(&mut self, candidates: &[C]) -> Vec<f64> {
         let start = Instant::now();
         let values = (self.evaluate)(candidates);
@@ -182,7 +149,6 @@ impl<'a, C> Batches<'a, C> {
         values
     }
 
-    #[cfg(feature = "parallel")]
     fn evaluate_together(&mut self, candidates: &mut Vec<C>) -> Vec<f64> {
         for helper in &mut self.helpers {
             helper.is_there |= helper.told.try_recv().is_ok();

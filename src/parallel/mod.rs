@@ -1,5 +1,6 @@
 //! Independent work on several cores.
 
+#[cfg_attr(not(feature = "parallel"), path = "alone.rs")]
 mod batches;
 
 use crate::lanes::GROUP;
