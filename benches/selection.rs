@@ -93,14 +93,23 @@ fn d_one_active_selection(bencher: Bencher<'_, '_>, name: &str) {
     bencher.bench_local(|| active.select(&situation, &mut rng).expect("a selection"));
 }
 
-#[divan::bench(args = [6, 12])]
-fn e_direct_alone(bencher: Bencher<'_, '_>, dimension: usize) {
+/// A search of [`bowl`], by as many evaluations as there are candidates.
+fn search(dimension: usize) -> Direct {
     let settings =
         Settings { variant: Variant::LocallyBiased, epsilon: 1e-4, max_evaluations: CANDIDATES, ..Settings::default() };
+    Direct::new(dimension, settings).expect("valid settings")
+}
+
+fn bowl(x: &[f64]) -> f64 {
+    x.iter().map(|x| (x - 0.3).powi(2)).sum()
+}
+
+#[divan::bench(args = [6, 12])]
+fn e_direct_alone(bencher: Bencher<'_, '_>, dimension: usize) {
     bencher.bench(|| {
-        let mut direct = Direct::new(dimension, settings).expect("valid settings");
+        let mut direct = search(dimension);
         while let Some(batch) = direct.ask() {
-            let values: Vec<f64> = batch.iter().map(|x| x.iter().map(|x| (x - 0.3).powi(2)).sum()).collect();
+            let values: Vec<f64> = batch.iter().map(bowl).collect();
             direct.tell(&values).expect("as many values as points");
         }
         direct.evaluations()
@@ -110,11 +119,7 @@ fn e_direct_alone(bencher: Bencher<'_, '_>, dimension: usize) {
 /// What of [`e_direct_alone`] is its objective's.
 #[divan::bench(args = [6, 12])]
 fn f_objective_alone(bencher: Bencher<'_, '_>, dimension: usize) {
-    let settings =
-        Settings { variant: Variant::LocallyBiased, epsilon: 1e-4, max_evaluations: CANDIDATES, ..Settings::default() };
-    let bowl = |x: &[f64]| x.iter().map(|x| (x - 0.3).powi(2)).sum::<f64>();
-    let mut direct = Direct::new(dimension, settings).expect("valid settings");
-    let mut batches = Vec::new();
+    let (mut direct, mut batches) = (search(dimension), Vec::new());
     while let Some(batch) = direct.ask() {
         let values: Vec<f64> = batch.iter().map(bowl).collect();
         batches.push(batch.iter().flatten().copied().collect::<Vec<f64>>());

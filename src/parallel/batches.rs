@@ -118,8 +118,8 @@ impl<'a, C> Batches<'a, C> {
 
     /// The values of all candidates, in order.
     pub fn evaluate(&mut self, candidates: &mut Vec<C>) -> Vec<f64> {
-        if self.call.is_some() {
-            return self.judge(candidates);
+        if let Some(call) = self.call.take() {
+            return self.judge(call, candidates);
         }
         if !self.helpers.is_empty() && candidates.len() >= self.fewest {
             return self.evaluate_together(candidates);
@@ -128,23 +128,21 @@ impl<'a, C> Batches<'a, C> {
     }
 
     /// Evaluates them here, and calls others if what is left takes long enough.
-    fn judge(&mut self, candidates: &[C]) -> Vec<f64> {
+    fn judge(&mut self, mut call: Call<'a, C>, candidates: &[C]) -> Vec<f64> {
         let start = Instant::now();
         let values = (self.evaluate)(candidates);
-        if let Some(mut call) = self.call.take() {
-            call.to_come = call.to_come.saturating_sub(candidates.len());
-            // The first one finds nothing in the caches.
-            if candidates.len() > 1 {
-                call.evaluated += candidates.len();
-                call.seconds += start.elapsed().as_secs_f64();
-            }
-            let each = call.seconds / call.evaluated as f64;
-            if call.evaluated < JUDGED {
-                self.call = Some(call);
-            } else if each * call.to_come as f64 > WORTH_A_CALL {
-                self.helpers = (call.helpers)();
-                self.fewest = (2 * SHARE + 1).max((WORTH_SHARING / each) as usize);
-            }
+        call.to_come = call.to_come.saturating_sub(candidates.len());
+        // The first one finds nothing in the caches.
+        if candidates.len() > 1 {
+            call.evaluated += candidates.len();
+            call.seconds += start.elapsed().as_secs_f64();
+        }
+        let each = call.seconds / call.evaluated as f64;
+        if call.evaluated < JUDGED {
+            self.call = Some(call);
+        } else if each * call.to_come as f64 > WORTH_A_CALL {
+            self.helpers = (call.helpers)();
+            self.fewest = (2 * SHARE + 1).max((WORTH_SHARING / each) as usize);
         }
         values
     }

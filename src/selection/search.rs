@@ -33,7 +33,6 @@ pub(super) fn direct(
     let mut direct = Direct::new(limits.dimension(), settings).map_err(SelectionError::Search)?;
     // What is not feasible is left out posture by posture.
     let around = criterion.filter(|_| !scope.is_constrained()).and_then(Criterion::around_centres);
-    let budget = settings.max_evaluations;
     let mut search = |batches: &mut Batches<'_, Vec<f64>>| {
         // One batch after the other is written to the same place.
         let (mut postures, mut spare): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
@@ -58,7 +57,10 @@ pub(super) fn direct(
         Ok(())
     };
     // A batch of stars takes a few microseconds: to share it was no faster.
-    let done = if around.is_some() { search(&mut Batches::alone(evaluate)) } else { shared(evaluate, budget, search) };
+    let done = match around {
+        Some(_) => search(&mut Batches::alone(evaluate)),
+        None => shared(evaluate, settings.max_evaluations, search),
+    };
     done.map_err(SelectionError::Search)?;
     Ok(Search { direct: Box::new(direct), limits: scope.is_constrained().then(|| limits.clone()), chosen: None })
 }

@@ -46,9 +46,9 @@ impl SizeClasses {
         Self { arrived, arrivals: Vec::with_capacity(room), ..Self::default() }
     }
 
-    /// Knows the first so many rectangles: those that are new to it are in no class yet.
+    /// Knows the first so many rectangles, never fewer than before: those that are new to it are in no class yet.
     pub fn know(&mut self, rectangles: usize) {
-        self.arrivals.resize(rectangles.max(self.arrivals.len()), NOWHERE);
+        self.arrivals.resize(rectangles, NOWHERE);
     }
 
     /// Adds a rectangle, which is known and in no class, behind those of its class that have the same score.

@@ -61,6 +61,11 @@ impl Record {
         }
     }
 
+    /// Whether all sides are longest, as those of a rectangle that has been divided.
+    fn has_sides_alike(&self, dimension: usize) -> bool {
+        self.long_sides as usize == dimension
+    }
+
     /// Whether there is a side left to divide.
     pub fn is_divisible(&self) -> bool {
         self.longest < MAX_LEVEL
@@ -97,9 +102,9 @@ impl Rectangles {
 
     /// How often each side has been trisected.
     pub fn levels(&self, rectangle: usize) -> &[u8] {
-        let Record { longest, long_sides, .. } = self.records[rectangle];
-        if long_sides as usize == self.dimension {
-            &self.levels_alike[usize::from(longest) * self.dimension..][..self.dimension]
+        let record = &self.records[rectangle];
+        if record.has_sides_alike(self.dimension) {
+            &self.levels_alike[usize::from(record.longest) * self.dimension..][..self.dimension]
         } else {
             self.birth_levels(rectangle)
         }
@@ -123,19 +128,15 @@ impl Rectangles {
     /// Appends the centres that a division of `parent` samples: c ± 3⁻ˡ⁻¹ eᵢ for every longest side i in turn, plus
     /// before minus.
     pub fn sample_around(&mut self, parent: usize) {
-        let (dimension, Record { longest, long_sides, .. }) = (self.dimension, self.records[parent]);
+        let (dimension, record) = (self.dimension, self.records[parent]);
         let centre = parent * dimension;
         let (first, first_side) = (self.centres.len(), self.sides.len());
-        repeat(&mut self.centres, centre..centre + dimension, 2 * long_sides as usize);
-        if long_sides as usize == dimension {
-            self.sides.extend(0..dimension);
-        } else {
-            let levels = &self.birth_levels[centre..centre + dimension];
-            self.sides.extend((0..dimension).filter(|&side| levels[side] == longest));
-        }
+        repeat(&mut self.centres, centre..centre + dimension, 2 * record.long_sides as usize);
+        let (alike, levels) = (record.has_sides_alike(dimension), &self.birth_levels[centre..centre + dimension]);
+        self.sides.extend((0..dimension).filter(|&side| alike || levels[side] == record.longest));
         let (known, children) = self.centres.split_at_mut(first);
         for (&side, pair) in self.sides[first_side..].iter().zip(children.chunks_exact_mut(2 * dimension)) {
-            [pair[side], pair[dimension + side]] = ternary::thirds(known[centre + side], longest);
+            [pair[side], pair[dimension + side]] = ternary::thirds(known[centre + side], record.longest);
         }
     }
 
