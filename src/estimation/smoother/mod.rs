@@ -16,11 +16,14 @@
 //! compressed into a quadratic, so that a step costs the same whatever the number of movements.
 
 mod batch;
+mod change_point;
+mod changed_body;
 #[cfg(test)]
 mod changes;
 mod factor;
 mod gram;
 mod hypotheses;
+mod jump;
 #[cfg(test)]
 mod laws;
 mod mode;
@@ -32,19 +35,16 @@ mod settled;
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 
 pub use hypotheses::HypothesisSettings;
 
 use hypotheses::Hypotheses;
 use mode::Effort;
+use noise::Left;
 use posterior::{Measurement, Posterior};
 
-use super::{
-    Alternative, Belief, ChangeDetector, EstimationError, Estimator, NoiseFit, NoiseReport, ReadingReport, Update,
-    change::quantile,
-};
+use super::{Alternative, Belief, EstimationError, Estimator, NoiseFit, NoiseReport, ReadingReport, Update};
 use crate::{
     model::{Layout, Prior},
     sensing::{Loss, Observation, Rig},
@@ -58,7 +58,8 @@ pub struct Smoother {
     hypotheses: Hypotheses,
     settings: HypothesisSettings,
     rng: ChaCha8Rng,
-    changes: ChangeDetector,
+    /// What was known before the first movement, whatever has been dropped since.
+    original: Prior,
     /// Whether it drops what was measured before the body changed.
     forgets: bool,
     /// Movements absorbed so far, misses among them.
@@ -72,17 +73,16 @@ pub struct Smoother {
     unknown: Vec<bool>,
     /// By kind of noise: equations that no parameter accounts for.
     spare: Vec<f64>,
+    /// By kind of noise: what readings told of it that have been dropped since.
+    remembered: Vec<Left>,
+    /// The movement at which it was noticed last that the body has changed.
+    changed_at: Option<u64>,
 }
 
 /// Steps without a new hypothesis after which none are searched for any more.
 const CALM: usize = 6;
-/// Standard deviations of a normalised innovation squared (by Wilson and Hilferty) that the old body hardly explains: 99 %
-/// of what it does explain is below.
-const SURPRISING: f64 = 2.326;
 /// The search for another body that explains what is surprising.
 const THOROUGH: Effort<'_> = Effort { steps: 60, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
-/// Equations beyond the number of parameters that must agree on another body.
-const AGREEING: usize = 6;
 /// The number of what is known before the first movement.
 const BEFOREHAND: u64 = 0;
 /// Measurements that are kept as they are; beyond these the older half is compressed.
@@ -97,22 +97,25 @@ impl Smoother {
         settings: HypothesisSettings,
         rng: ChaCha8Rng,
     ) -> Self {
+        let posterior_prior = prior.clone();
         let posterior = Posterior::new(prior, rig.clone());
         let (nominal, unknown) = (rig.clone(), vec![false; rig.noises().len()]);
-        let spare = vec![0.0; unknown.len()];
+        let (spare, remembered) = (vec![0.0; unknown.len()], vec![Left::default(); unknown.len()]);
         let mut smoother = Self {
             belief: Belief::new(posterior.prior.guess().clone(), layout, rig),
             posterior,
             hypotheses: Hypotheses::default(),
             settings,
             rng,
-            changes: ChangeDetector::honest(),
+            original: posterior_prior,
             forgets: true,
             movements: 0,
             past: Arc::default(),
             nominal,
             unknown,
             spare,
+            remembered,
+            changed_at: None,
         };
         smoother.begin();
         smoother.publish();
@@ -123,7 +126,6 @@ impl Smoother {
     /// several in a row that agree with each other are a changed body.
     pub fn with_loss(mut self, loss: Loss) -> Self {
         self.posterior.loss = loss;
-        self.changes = ChangeDetector::for_loss(loss);
         self
     }
 
@@ -168,7 +170,7 @@ impl Smoother {
 
     fn publish(&mut self) {
         let Some((best, rest)) = self.hypotheses.modes.split_first() else { return };
-        if self.unknown.contains(&true) {
+        if self.posterior.scales.iter().any(|scale| *scale != 1.0) || self.unknown.contains(&true) {
             self.belief.rig = Arc::new(self.nominal.scaled(&self.posterior.scales));
         }
         self.belief.state = best.state.clone();
@@ -183,78 +185,6 @@ impl Smoother {
     /// Whether one hypothesis has explained everything alone for some time.
     fn is_settled(&self) -> bool {
         self.hypotheses.calm >= CALM
-    }
-
-    /// Whether the body has changed: its innovations say so, and where readings may be outliers, another body near this one
-    /// explains what is surprising, so that it agrees with itself.
-    fn notices_change(&mut self, nis: Option<(f64, usize)>) -> bool {
-        // Before the belief is settled its innovations say little about the body.
-        if !self.is_settled() || !nis.is_some_and(|(nis, degrees)| self.changes.observe(nis, degrees)) {
-            return false;
-        }
-        if !self.posterior.loss.is_robust() {
-            return true;
-        }
-        let layout = self.belief.layout.clone();
-        let Some(changed) = self.since_change() else { return false };
-        // As many equations as parameters, whatever they say, some body explains.
-        let equations: usize = changed.measurements.iter().map(|seen| seen.observation.equations()).sum();
-        if equations < layout.dimension() + AGREEING {
-            return false;
-        }
-        let mode = changed.mode_from_afar(&self.belief.state, &layout, THOROUGH);
-        let explains = mode.is_some_and(|mode| changed.readings(&mode.state).all(|reading| reading.weight > 0.5));
-        if explains && !self.forgets {
-            self.changes.reset();
-        }
-        explains
-    }
-
-    /// Drops what was measured before the body changed. The estimate stays as a guess, with half the deviations that
-    /// the prior had; of the measurements the latest stay, those that the old body does not explain.
-    fn forget(&mut self) {
-        let Some(changed) = self.since_change() else { return };
-        let latest = changed.measurements.iter().map(|seen| seen.movement);
-        let first = latest.filter(|movement| *movement != BEFOREHAND).min().unwrap_or(u64::MAX);
-        let dropped = self.posterior.readings(&self.belief.state).take_while(|reading| reading.movement < first);
-        let dropped: Vec<ReadingReport> = dropped.collect();
-        Arc::make_mut(&mut self.past).extend(dropped);
-        self.posterior = changed;
-        self.hypotheses.calm = 0;
-        self.changes.reset();
-    }
-
-    /// What is known if the body has changed: the estimate as a guess, and the latest measurements that it does not explain;
-    /// where readings may be outliers, all since the alarm began to rise.
-    fn since_change(&self) -> Option<Posterior> {
-        let explained = |(nis, degrees): (f64, usize)| nis <= quantile(degrees as f64, SURPRISING);
-        let measurements = &self.posterior.measurements;
-        let surprising = (measurements.iter().rev())
-            .take_while(|seen| {
-                self.belief.nis(&seen.positions, &seen.observation).is_some_and(|found| !explained(found))
-            })
-            .count();
-        let surprising = self.changes.since().unwrap_or(surprising).min(measurements.len());
-        let covariance = self.prior_here() * 0.25;
-        let prior = Prior::around(self.belief.state.clone(), &self.belief.layout, covariance).ok()?;
-        // What is known of the equipment has nothing to do with the body.
-        let (old, latest) = measurements.split_at(measurements.len() - surprising);
-        let known = old.iter().filter(|seen| seen.movement == BEFOREHAND);
-        Some(self.posterior.anew(prior, known.chain(latest).cloned().collect()))
-    }
-
-    /// The prior's covariance in the chart at the estimate; without what correlates its parameters where the estimate has
-    /// left the guess's chart.
-    fn prior_here(&self) -> DMatrix<f64> {
-        let (prior, layout) = (&self.posterior.prior, &self.belief.layout);
-        let change = prior.guess().change_of_chart(layout, &self.belief.state).and_then(|change| change.try_inverse());
-        match change.filter(|_| !prior.is_vague()) {
-            Some(change) => {
-                let carried = &change * prior.covariance() * change.transpose();
-                (&carried + carried.transpose()) * 0.5
-            }
-            None => DMatrix::from_diagonal(&prior.covariance().diagonal()),
-        }
     }
 
     /// Whether there are as many independent equations as parameters; where some can never be determined, twice as many
@@ -327,17 +257,16 @@ impl Smoother {
         let (positions, observation) = (positions.to_vec(), observation.clone());
         self.posterior.measurements.push(Measurement { positions, observation, movement: self.movements });
         self.begin_noise();
-        let change_noticed = self.notices_change(nis);
-        if change_noticed && self.forgets {
-            self.forget();
-        }
         self.hypotheses.follow(&self.posterior, &layout);
         if !self.is_settled() || self.hypotheses.modes.is_empty() {
             self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         }
         self.hypotheses.condense(self.settings.kept, &layout);
-        if self.unknown.contains(&true) {
-            self.learn_noise();
+        self.learn_noise();
+        let change = self.notices_change();
+        let change_noticed = change.is_some();
+        if let Some(change) = change {
+            self.changed(&change);
         }
         if self.hypotheses.modes.is_empty() {
             return Err(EstimationError::Diverged("no hypothesis explains the measurements"));

@@ -1,6 +1,21 @@
-//! How large noise is that nobody knows: one scale for each kind.
+//! How large noise is: one scale for each kind.
+//!
+//! A scale that nobody tells is learned by restricted maximum likelihood. One that is told is a guess: either it holds, or it
+//! is off by a factor of which next to nothing is known,
+//!
+//! ```text
+//! ln ev(holds)  = ln P(holds) − ½ χ²
+//! ln ev(is off) = ln P(is off) + ln Γ((a+ν)/2) − ln Γ(a/2) + (a/2) ln(a/2) − ((a+ν)/2) ln((a + χ²)/2),    a = 2
+//! ```
+//!
+//! with χ² the squared residuals in nominal σ and ν the equations that no parameter accounts for; the second is ½χ² with
+//! s² integrated out under an inverse χ² prior of a degrees of freedom (Gelman et al., *Bayesian Data Analysis*, 3.2).
 
-use super::Smoother;
+use super::{
+    Smoother,
+    mode::Mode,
+    posterior::{Fit, Posterior},
+};
 
 /// ν: how many equations the scale of the noise so far counts for.
 const NOISE_WEIGHT: f64 = 3.0;
@@ -8,12 +23,86 @@ const NOISE_WEIGHT: f64 = 3.0;
 const NOISE_ROUNDS: usize = 4;
 /// The least scale of a noise that is not known, in nominal σ.
 const LEAST_SCALE: f64 = 1e-3;
+/// P(holds): that noise is as large as is said.
+const HOLDS: f64 = 0.9;
+/// a.
+const VAGUENESS: f64 = 2.0;
+/// What was learned of noise before the body changed counts for as many equations at most.
+const REMEMBERED: f64 = 100.0;
+
+/// Squared residuals of one kind of noise, in nominal σ, and the equations that no parameter accounts for.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Left {
+    pub squared: f64,
+    pub free: f64,
+}
+
+impl Left {
+    fn and(self, other: Self) -> Self {
+        Self { squared: self.squared + other.squared, free: self.free + other.free }
+    }
+
+    /// The same for as many equations at most.
+    fn at_most(self, most: f64) -> Self {
+        let share = if self.free > most { most / self.free } else { 1.0 };
+        Self { squared: self.squared * share, free: self.free * share }
+    }
+
+    /// The logarithm of the evidence that noise is as said, and that it is off.
+    fn evidence(self) -> [f64; 2] {
+        [HOLDS.ln() - 0.5 * self.squared, (1.0 - HOLDS).ln() + log_off(self.squared, self.free)]
+    }
+
+    /// s of noise that is told: 1 as far as that holds, and what the residuals say as far as it is off.
+    fn scale(self) -> f64 {
+        let [holds, off] = self.evidence();
+        let chance = 1.0 / (1.0 + (off - holds).exp());
+        (chance + (1.0 - chance) * (VAGUENESS + self.squared) / (VAGUENESS + self.free)).sqrt()
+    }
+}
+
+/// The logarithm of the evidence of χ² with ν degrees of freedom and an unknown scale.
+fn log_off(squared: f64, free: f64) -> f64 {
+    let (a, sum) = (0.5 * VAGUENESS, 0.5 * (VAGUENESS + free));
+    libm::lgamma(sum) - libm::lgamma(a) + a * a.ln() - sum * (0.5 * (VAGUENESS + squared)).ln()
+}
+
+/// What tells larger noise from another cause of large residuals.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NoiseEvidence {
+    /// χ² in σ as they are taken to be, and ν.
+    left: Left,
+    /// χ² in nominal σ by χ², and Σ ν ln s; `None` where some scale is not told.
+    told: Option<(f64, f64)>,
+}
+
+impl NoiseEvidence {
+    /// What it gains of evidence when χ², in σ as they are taken to be, falls by so much.
+    pub fn gain(&self, lowered: f64) -> f64 {
+        let Self { left: Left { squared, free }, told } = *self;
+        // Of a reading nothing but its noise is left.
+        let rest = (squared - lowered).max(0.0);
+        let of = |squared: f64| {
+            let off = log_off(squared, free);
+            let Some((nominal, scales)) = told else { return off };
+            let (a, b) = (HOLDS.ln() - 0.5 * nominal * squared, (1.0 - HOLDS).ln() + off - scales);
+            a.max(b) + (-(a - b).abs()).exp().ln_1p()
+        };
+        of(rest) - of(squared)
+    }
+
+    /// The same without so many equations, which lowers χ² by so much.
+    pub fn without(&self, equations: usize, lowered: f64) -> Self {
+        let Left { squared, free } = self.left;
+        let left = Left { squared: (squared - lowered).max(0.0), free: (free - equations as f64).max(0.0) };
+        Self { left, told: self.told }
+    }
+}
 
 impl Smoother {
     /// The scale that the residuals of the first readings have at the guess: what it leaves unexplained.
     pub(super) fn begin_noise(&mut self) {
-        let first: Vec<usize> =
-            (0..self.unknown.len()).filter(|noise| self.unknown[*noise] && self.noise_seen(*noise) == 1).collect();
+        let first: Vec<usize> = (0..self.unknown.len()).filter(|noise| self.is_unheard(*noise)).collect();
         if first.is_empty() {
             return;
         }
@@ -25,6 +114,11 @@ impl Smoother {
         }
     }
 
+    /// Whether nobody tells a kind of noise and its first reading has just come.
+    fn is_unheard(&self, noise: usize) -> bool {
+        self.unknown[noise] && self.remembered[noise].free == 0.0 && self.noise_seen(noise) == 1
+    }
+
     /// Readings so far with a kind of noise.
     fn noise_seen(&self, noise: usize) -> usize {
         let channel = self.nominal.noises()[noise].channel;
@@ -33,29 +127,75 @@ impl Smoother {
         settled + seen.filter(|seen| seen.observation.readings.get(channel).is_some_and(Option::is_some)).count()
     }
 
-    /// Learns the scales of noise that is not known, by restricted maximum likelihood at the heaviest mode: what residuals are,
-    /// in their mean square over the equations that no parameter accounts for,
+    /// By kind of noise what the heaviest mode leaves of the readings, those before the body changed included.
+    fn left(&self) -> Option<Vec<Left>> {
+        self.left_by(&self.posterior, self.hypotheses.modes.first()?)
+    }
+
+    /// The same of a mode of another posterior.
+    fn left_by(&self, posterior: &Posterior, mode: &Mode) -> Option<Vec<Left>> {
+        let absorbed = posterior.absorbed(mode, &self.belief.layout)?;
+        let fits = posterior.fit(&mode.state, &self.belief.layout);
+        let of = |((fit, absorbed), before): ((Fit, f64), &Left)| {
+            Left { squared: fit.squared, free: (fit.equations - absorbed).max(0.0) }.and(*before)
+        };
+        Some(fits.into_iter().zip(absorbed).zip(&self.remembered).map(of).collect())
+    }
+
+    /// Keeps what is known of noise for when the readings are gone that tell it.
+    pub(super) fn remember_noise(&mut self, before: &Posterior, mode: &Mode) {
+        if let Some(left) = self.left_by(before, mode) {
+            self.remembered = left.into_iter().map(|left| left.at_most(REMEMBERED)).collect();
+        }
+    }
+
+    /// What tells larger noise from another cause of large residuals, at the heaviest mode.
+    pub(super) fn noise_evidence(&self) -> NoiseEvidence {
+        let lefts = self.left().unwrap_or_default();
+        let mut left = Left::default();
+        let (mut nominal, mut scales) = (0.0, 0.0);
+        for (of, scale) in lefts.iter().zip(&self.posterior.scales) {
+            left = left.and(Left { squared: of.squared / (scale * scale), free: of.free });
+            nominal += of.squared;
+            scales += of.free * scale.ln();
+        }
+        let is_told = !lefts.iter().zip(&self.unknown).any(|(of, unknown)| *unknown && of.free > 0.0);
+        let by = if left.squared > 0.0 { nominal / left.squared } else { 1.0 };
+        NoiseEvidence { left, told: is_told.then_some((by, scales)) }
+    }
+
+    /// Learns the scales of noise. Of noise that is not known by restricted maximum likelihood at the heaviest mode: what
+    /// residuals are, in their mean square over the equations that no parameter accounts for,
     ///
     /// ```text
     /// s² = (Σ w ‖r‖² + ν s₀²) / (Σ w d − tr(Λₙ P) + ν),    ν = 3
     /// ```
     ///
-    /// with s₀ the scale so far, so that it does not jump while there are hardly more equations than parameters.
+    /// with s₀ the scale so far, so that it does not jump while there are hardly more equations than parameters. Noise that is
+    /// told stays as told until that is unlikely, and one hypothesis explains the readings.
     pub(super) fn learn_noise(&mut self) {
         let layout = self.belief.layout.clone();
         let before = self.posterior.scales.clone();
         for _ in 0..NOISE_ROUNDS {
-            let Some(mode) = self.hypotheses.modes.first() else { return };
-            let Some(absorbed) = self.posterior.absorbed(mode, &layout) else { return };
-            let fits = self.posterior.fit(&mode.state, &layout);
+            let Some(left) = self.left() else { return };
+            let is_alone = self.hypotheses.modes.len() == 1;
             let mut change = 0.0_f64;
-            for noise in (0..fits.len()).filter(|noise| self.unknown[*noise] && fits[*noise].equations > 0.0) {
-                let free = (fits[noise].equations - absorbed[noise]).max(0.0);
-                self.spare[noise] = free;
-                // With equations to spare it may change as often as the modes follow.
-                let from = if free > NOISE_WEIGHT { self.posterior.scales[noise] } else { before[noise] };
-                let square = (fits[noise].squared + NOISE_WEIGHT * from * from) / (free + NOISE_WEIGHT);
-                let scale = square.sqrt().max(LEAST_SCALE);
+            for noise in 0..left.len() {
+                let free = left[noise].free;
+                let scale = if self.unknown[noise] {
+                    if self.noise_seen(noise) == 0 {
+                        continue;
+                    }
+                    self.spare[noise] = free;
+                    // With equations to spare it may change as often as the modes follow.
+                    let from = if free > NOISE_WEIGHT { self.posterior.scales[noise] } else { before[noise] };
+                    ((left[noise].squared + NOISE_WEIGHT * from * from) / (free + NOISE_WEIGHT)).sqrt()
+                } else if is_alone {
+                    left[noise].scale()
+                } else {
+                    continue;
+                };
+                let scale = scale.max(LEAST_SCALE);
                 if scale.is_finite() {
                     change = change.max((scale / self.posterior.scales[noise]).ln().abs());
                     self.posterior.scales[noise] = scale;

@@ -124,6 +124,13 @@ impl Posterior {
         self.measurements.iter().flat_map(of)
     }
 
+    /// Hands the weight of every reading of a measurement at `state` to `each`.
+    pub fn weights(&self, state: &State, seen: &Measurement, mut each: impl FnMut(f64)) {
+        self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+            each(self.loss.weight(self.squared(channel, whitened), whitened.len()));
+        });
+    }
+
     /// How many measurements there were.
     #[cfg(test)]
     pub fn count(&self) -> usize {
@@ -268,6 +275,12 @@ impl Posterior {
             }
         }
         Some(Normal { cost, information, descent })
+    }
+
+    /// √w Hᵀ/s (m × d) and √w (y − h)/s of one measurement.
+    pub fn weighed(&self, state: &State, layout: &Layout, seen: &Measurement) -> (DMatrix<f64>, DVector<f64>) {
+        let (rows, residuals, _) = self.stacked(self.loss.into(), state, layout, std::slice::from_ref(seen));
+        (rows, residuals)
     }
 
     /// √w Hᵀ/s and √w (y − h)/s of some measurements, one beside the other, and what they cost.

@@ -1,0 +1,186 @@
+//! Since when readings come from another body.
+//!
+//! Before a change the body is x, after it `x ⊕ B η`, `η ~ N(0, Q)` (see [`Jump`]). At the most probable state of all readings
+//! under one body, with whitened rows Hᵢ, residuals rᵢ and information Λ, those from the k-th on say of η
+//!
+//! ```text
+//! g = Σ_{i≥k} Bᵀ Hᵢᵀ rᵢ,    S = Bᵀ (M − M Λ⁻¹ M) B + Q⁻¹,    M = Σ_{i≥k} Hᵢᵀ Hᵢ
+//! ```
+//!
+//! so that a change lowers χ² by t = gᵀ S⁻¹ g, and its evidence is that of Laplace (a generalised likelihood ratio as of Willsky
+//! and Jones 1976, with Occam's factor in place of a threshold by degrees of freedom):
+//!
+//! ```text
+//! ln odds = ln ev(χ² − t) − ln ev(χ²) − ½ ln det(S Q) + ln P(change)
+//! ```
+//!
+//! ev is the evidence of the residuals with the scale of their noise integrated out (see [`NoiseEvidence`]): noise that is larger
+//! than was said explains large residuals as well, and is no change. Odds are summed over all k and jumps. One reading proves
+//! nothing: what may be an outlier must be supported by others.
+//!
+//! Where readings may be outliers, those of a changed body are taken for some at first, and say nothing in the sums above. There the
+//! two posteriors are searched instead (see [`changed_body`](super::changed_body)).
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::{Smoother, jump::Jump, noise::NoiseEvidence, points::Room, posterior::Normal};
+use crate::estimation::change::quantile;
+
+/// The chance that a body changes at a movement.
+pub(super) const RATE: f64 = 5e-3;
+/// The logarithm of the odds from which on a change is told of: to miss one costs more than to learn some parameters anew.
+const ALARM: f64 = -2.0;
+/// The same soon after a change, while it is being learned.
+const ALARM_AGAIN: f64 = 3.0;
+/// The same without a reading that may be an outlier.
+const SUPPORT: f64 = -4.0;
+/// Standard deviations (by Wilson and Hilferty) of a squared residual that may be an outlier's.
+const OUTLYING: f64 = 5.0;
+/// Latest movements at each of which a change is looked for; before these at fewer and fewer.
+const EACH: usize = 16;
+
+/// That the body has changed.
+#[derive(Clone, Debug)]
+pub(super) struct Change {
+    /// Since which of the measurements kept.
+    pub since: usize,
+    /// How.
+    pub jump: Jump,
+    /// The logarithm of its odds against one body for all.
+    pub log_odds: f64,
+}
+
+/// All readings at one state.
+pub(super) struct Evidence {
+    /// Hᵀ, whitened and weighed, of every measurement (m × d).
+    pub rows: Vec<DMatrix<f64>>,
+    /// Residuals, whitened and weighed.
+    pub residuals: Vec<DVector<f64>>,
+    /// Λ (m × m).
+    pub information: DMatrix<f64>,
+    /// What tells larger noise from a change.
+    pub noise: NoiseEvidence,
+}
+
+/// ln(eᵃ + eᵇ) of numbers of which one is finite.
+fn log_sum(a: f64, b: f64) -> f64 {
+    a.max(b) + (-(a - b).abs()).exp().ln_1p()
+}
+
+/// The places at which a change may have happened, the latest first: at least two movements are seen after it.
+fn places(count: usize, has_past: bool) -> Vec<usize> {
+    let first = usize::from(!has_past);
+    let mut places = Vec::new();
+    let mut at = count;
+    let mut step = 1;
+    while at >= first + step {
+        at -= step;
+        if count - at >= 2 {
+            places.push(at);
+        }
+        if count - at >= EACH {
+            step = 1 + (count - at) / EACH;
+        }
+    }
+    places
+}
+
+impl Evidence {
+    /// The likeliest change; `None` where there is none to be had.
+    pub fn likeliest(&self, jumps: &[Jump], has_past: bool) -> Option<Change> {
+        let m = self.information.nrows();
+        let covariance = Cholesky::new(self.information.clone())?.inverse();
+        let count = self.rows.len();
+        let places = places(count, has_past);
+        let mut best: Option<Change> = None;
+        let mut all = f64::NEG_INFINITY;
+        let (mut sum, mut pull) = (DMatrix::<f64>::zeros(m, m), DVector::<f64>::zeros(m));
+        let mut next = count;
+        for place in places {
+            while next > place {
+                next -= 1;
+                let (rows, residual) = (&self.rows[next], &self.residuals[next]);
+                sum.gemm(1.0, rows, &rows.transpose(), 1.0);
+                pull.gemv(1.0, rows, residual, 1.0);
+            }
+            let carried = &covariance * &sum;
+            for jump in jumps {
+                let Some(log_odds) = self.log_odds(jump, &sum, &carried, &pull) else { continue };
+                all = log_sum(all, log_odds);
+                if best.as_ref().is_none_or(|best| log_odds > best.log_odds) {
+                    best = Some(Change { since: place, jump: jump.clone(), log_odds });
+                }
+            }
+        }
+        best.map(|best| Change { log_odds: all, ..best })
+    }
+
+    fn log_odds(&self, jump: &Jump, sum: &DMatrix<f64>, carried: &DMatrix<f64>, pull: &DVector<f64>) -> Option<f64> {
+        let b = &jump.directions;
+        let seen = sum * b;
+        let known = Cholesky::new(jump.covariance.clone())?;
+        let mut s = b.tr_mul(&seen) - seen.tr_mul(&(carried * b));
+        s = (&s + s.transpose()) * 0.5 + known.inverse();
+        let factor = Cholesky::new(s)?;
+        let g = b.tr_mul(pull);
+        let lowered = g.dot(&factor.solve(&g));
+        let log_determinant = |l: &Cholesky<f64, Dyn>| 2.0 * l.l_dirty().diagonal().map(f64::ln).sum();
+        let occam = 0.5 * (log_determinant(&factor) + log_determinant(&known));
+        let log_odds = self.noise.gain(lowered) - occam + jump.log_share + RATE.ln();
+        log_odds.is_finite().then_some(log_odds)
+    }
+
+    /// The same without one measurement, at the state that is most probable then.
+    fn without(&self, index: usize) -> Option<Self> {
+        let (rows, residual) = (&self.rows[index], &self.residuals[index]);
+        let information = &self.information - rows * rows.transpose();
+        let shift = Cholesky::new(information.clone())?.solve(&(rows * residual * -1.0));
+        let kept = |all: usize| (0..all).filter(|other| *other != index);
+        let residuals: Vec<DVector<f64>> =
+            kept(self.rows.len()).map(|i| &self.residuals[i] - self.rows[i].tr_mul(&shift)).collect();
+        let rows = kept(self.rows.len()).map(|i| self.rows[i].clone()).collect();
+        // What it cost, and what the others cost less without it.
+        let lowered = residual.norm_squared() + shift.dot(&(&information * &shift));
+        let noise = self.noise.without(residual.len(), lowered);
+        Some(Self { rows, residuals, information, noise })
+    }
+
+    /// Of the measurements from `since` on the one that speaks most for a change: of the largest residual.
+    fn loudest(&self, since: usize) -> Option<usize> {
+        (since..self.rows.len())
+            .max_by(|a, b| self.residuals[*a].norm_squared().total_cmp(&self.residuals[*b].norm_squared()))
+    }
+
+    /// The likeliest change, if the odds are for it, and that not because of a single reading that may be an outlier. `soon`
+    /// after another change it takes more.
+    pub fn change(&self, jumps: &[Jump], has_past: bool, soon: bool) -> Option<Change> {
+        let alarm = if soon { ALARM_AGAIN } else { ALARM };
+        let found = self.likeliest(jumps, has_past).filter(|change| change.log_odds > alarm)?;
+        let loudest = self.loudest(found.since)?;
+        let residual = &self.residuals[loudest];
+        if residual.norm_squared() > quantile(residual.len() as f64, OUTLYING) {
+            self.without(loudest)?.likeliest(jumps, has_past).filter(|change| change.log_odds > SUPPORT)?;
+        }
+        Some(found)
+    }
+}
+
+impl Smoother {
+    /// What all readings that are kept say at the heaviest hypothesis.
+    pub(super) fn evidence(&self) -> Option<Evidence> {
+        let mode = self.hypotheses.modes.first()?;
+        let layout = &self.belief.layout;
+        // With the scales of noise as they are now, for which the mode need not have been searched again.
+        let Normal { mut information, descent, .. } =
+            self.posterior.normal_by(self.posterior.loss.into(), &mode.state, layout, &mut Room::default())?;
+        information.fill_upper_triangle_with_lower_triangle();
+        let shift = Cholesky::new(information.clone())?.solve(&descent);
+        let (mut rows, mut residuals) = (Vec::new(), Vec::new());
+        for seen in &self.posterior.measurements {
+            let (of, residual) = self.posterior.weighed(&mode.state, layout, seen);
+            residuals.push(residual - of.tr_mul(&shift));
+            rows.push(of);
+        }
+        Some(Evidence { rows, residuals, information, noise: self.noise_evidence() })
+    }
+}

@@ -1,0 +1,166 @@
+//! What becomes of a belief when the body has changed.
+//!
+//! What was measured before is kept as far as it says something of the changed body: what does not change stays known as well
+//! as it was,
+//!
+//! ```text
+//! x' ~ N(x, P + B Q Bᵀ)
+//! ```
+//!
+//! with x and P what the readings before the change say (see [`Jump`](super::jump::Jump) for B and Q). While these hardly determined
+//! the body, x' is what it was before the first movement. Either way knowledge from beforehand is the original one, however
+//! often the body has changed.
+
+use std::sync::Arc;
+
+use nalgebra::{Cholesky, DMatrix};
+
+use super::{
+    Smoother, THOROUGH,
+    change_point::{Change, RATE},
+    jump::{Jump, jumps},
+    mode::Mode,
+    posterior::{Measurement, Posterior},
+};
+use crate::{
+    estimation::ReadingReport,
+    model::{Prior, State},
+};
+
+/// Equations before a change, by the number of parameters, from which on they count for the changed body.
+const DETERMINED: f64 = 1.5;
+
+/// Movements after a change within which another one must be plainer.
+const SOON: u64 = 10;
+/// Where readings may be outliers: so many of the latest must have been rejected, the last among them, before a change is looked for.
+const REJECTED: usize = 3;
+const LATEST: usize = 10;
+
+/// What is believed after a change: the prior of the changed body, and the mode of what was measured since.
+struct After {
+    posterior: Posterior,
+    mode: Mode,
+    log_odds: f64,
+}
+
+impl Smoother {
+    /// Since when the body has changed and how, if the readings say so.
+    pub(super) fn notices_change(&self) -> Option<Change> {
+        if !self.forgets {
+            // What a body that never changes does not explain has other reasons.
+            return None;
+        }
+        let mode = self.hypotheses.modes.first()?;
+        let jumps = jumps(&mode.state, &self.belief.layout, &self.original_at(&mode.state));
+        if self.posterior.loss.is_robust() {
+            return self.rejected_change(mode, &jumps);
+        }
+        let soon = self.changed_at.is_some_and(|movement| self.movements < movement + SOON);
+        self.evidence()?.change(&jumps, self.posterior.settled.is_some(), soon)
+    }
+
+    /// The same where readings may be outliers: since one of the latest that were rejected.
+    fn rejected_change(&self, mode: &Mode, jumps: &[Jump]) -> Option<Change> {
+        let seen = &self.posterior.measurements;
+        let is_rejected = |seen: &Measurement| {
+            let mut rejected = false;
+            self.posterior.weights(&mode.state, seen, |weight| rejected |= weight < 0.5);
+            rejected
+        };
+        let first = seen.len().saturating_sub(LATEST);
+        let places: Vec<usize> = (first..seen.len()).filter(|place| is_rejected(&seen[*place])).collect();
+        if places.len() < REJECTED || places.last() != Some(&(seen.len() - 1)) {
+            return None;
+        }
+        let candidates = places[..places.len() + 1 - REJECTED].iter().filter(|place| **place > 0);
+        let mut best: Option<Change> = None;
+        for &since in candidates {
+            let Some(before) = self.before(since) else { continue };
+            for jump in jumps {
+                let change = Change { since, jump: jump.clone(), log_odds: f64::NEG_INFINITY };
+                let Some(After { mode: after, log_odds, .. }) = self.after(&before, &change, mode) else { continue };
+                let mut explained = 0;
+                for seen in &seen[since..] {
+                    self.posterior.weights(&after.state, seen, |weight| explained += usize::from(weight > 0.5));
+                }
+                let is_better = best.as_ref().is_none_or(|best| log_odds > best.log_odds);
+                if log_odds > 0.0 && explained >= REJECTED && is_better {
+                    best = Some(Change { log_odds, ..change });
+                }
+            }
+        }
+        best
+    }
+
+    /// What the readings say that came before one of those kept.
+    fn before(&self, since: usize) -> Option<(Posterior, Mode)> {
+        let mut before = self.posterior.clone();
+        before.measurements.truncate(since);
+        let mode = before.mode(&self.hypotheses.modes.first()?.state, &self.belief.layout, THOROUGH)?;
+        Some((before, mode))
+    }
+
+    /// What is believed if the body has changed so, against `mode`, one body for all.
+    fn after(&self, (before, known): &(Posterior, Mode), change: &Change, mode: &Mode) -> Option<After> {
+        let layout = &self.belief.layout;
+        let Jump { directions, covariance, log_share } = &change.jump;
+        let spread = known.covariance() + directions * covariance * directions.transpose();
+        let spread = (&spread + spread.transpose()) * 0.5;
+        let root = Cholesky::new(spread.clone())?;
+        let prior = Prior::around(known.state.clone(), layout, spread).ok()?;
+        let posterior = before.anew(prior, self.posterior.measurements[change.since..].to_vec());
+        let starts = [&known.state, &mode.state];
+        let found = starts.iter().filter_map(|start| posterior.mode_from_afar(start, layout, THOROUGH));
+        let found = found.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        let occam = root.l_dirty().diagonal().map(f64::ln).sum();
+        let log_odds = known.log_evidence + found.log_evidence - occam - mode.log_evidence + log_share + RATE.ln();
+        Some(After { posterior, mode: found, log_odds })
+    }
+
+    /// Takes note that the body has changed.
+    pub(super) fn changed(&mut self, change: &Change) {
+        let layout = self.belief.layout.clone();
+        let Some(mode) = self.hypotheses.modes.first().cloned() else { return };
+        let since = self.posterior.measurements.get(change.since).map_or(u64::MAX, |seen| seen.movement);
+        let dropped: Vec<ReadingReport> =
+            self.posterior.readings(&mode.state).take_while(|reading| reading.movement < since).collect();
+        Arc::make_mut(&mut self.past).extend(dropped);
+        let before = self.before(change.since);
+        if let Some((before, known)) = &before {
+            self.remember_noise(before, known);
+        }
+        let is_determined = |(before, known): &(Posterior, Mode)| {
+            before.equations(&known.state, &layout) >= DETERMINED * layout.dimension() as f64
+        };
+        let after = before.filter(is_determined).and_then(|before| self.after(&before, change, &mode));
+        if let Some(After { posterior, mode, .. }) = after {
+            self.posterior = posterior;
+            self.hypotheses.modes = vec![mode];
+        } else {
+            let latest = self.posterior.measurements.split_off(change.since.min(self.posterior.measurements.len()));
+            self.posterior = self.posterior.anew(self.original.clone(), latest);
+            self.begin();
+            let found = self.posterior.mode_from_afar(&mode.state, &layout, THOROUGH);
+            self.hypotheses.modes.extend(found);
+        }
+        self.hypotheses.calm = 0;
+        self.changed_at = Some(self.movements);
+        self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
+        self.hypotheses.condense(self.settings.kept, &layout);
+        self.learn_noise();
+    }
+
+    /// The original prior's covariance in the chart at a state; without what correlates its parameters where the state is outside the
+    /// guess's chart.
+    fn original_at(&self, state: &State) -> DMatrix<f64> {
+        let (prior, layout) = (&self.original, &self.belief.layout);
+        let change = prior.guess().change_of_chart(layout, state).and_then(|change| change.try_inverse());
+        match change.filter(|_| !prior.is_vague()) {
+            Some(change) => {
+                let carried = &change * prior.covariance() * change.transpose();
+                (&carried + carried.transpose()) * 0.5
+            }
+            None => DMatrix::from_diagonal(&prior.covariance().diagonal()),
+        }
+    }
+}

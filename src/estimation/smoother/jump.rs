@@ -1,0 +1,145 @@
+//! What of a body may change at once.
+//!
+//! A changed body is `x' = x ⊕ B η`, `η ~ N(0, Q)`: B (m × p) spans the tangent directions that change together.
+//!
+//! | jump | p | columns of B |
+//! |---|---|---|
+//! | one block | its dimension | its coordinates: one axis bent, a marker knocked, a camera moved |
+//! | a joint mounted anew | that of its axis, and 6 | its axis, and a rigid motion of all that is behind it |
+//! | the whole body | m | all |
+//!
+//! Q comes from the *original* prior, however often the body has changed: its covariance, with half its deviations, and several
+//! times as large ones where the prior is so narrow that a collision would exceed it.
+
+use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use crate::{
+    kinematics::{Joint, Line},
+    model::{Block, Layout, Place, Quantity, State},
+};
+
+/// One way for a body to change.
+#[derive(Clone, Debug)]
+pub(super) struct Jump {
+    /// B (m × p).
+    pub directions: DMatrix<f64>,
+    /// Q (p × p).
+    pub covariance: DMatrix<f64>,
+    /// The logarithm of its share among all ways to change.
+    pub log_share: f64,
+}
+
+/// The variance of what changes, in variances of the original prior.
+const VARIANCE: f64 = 0.25;
+/// How many times as far off a body may be after a change, where the prior is narrow.
+const WIDENED: [f64; 3] = [1.0, 8.0, 64.0];
+/// Deviations of an angle (rad) and of a length (m) beyond which no wider prior is tried.
+const WIDEST: f64 = 0.5;
+/// The share of changes that change the body as a whole.
+const WHOLE: f64 = 0.2;
+/// A step for differences, rad or m.
+const STEP: f64 = 1e-5;
+
+/// All jumps from `state`; `prior` is the original prior's covariance in the chart there.
+pub(super) fn jumps(state: &State, layout: &Layout, prior: &DMatrix<f64>) -> Vec<Jump> {
+    let m = layout.dimension();
+    let mut spaces: Vec<(DMatrix<f64>, DMatrix<f64>)> = Vec::new();
+    let identity = DMatrix::<f64>::identity(m, m);
+    let of_block = |range: &std::ops::Range<usize>| {
+        let (start, size) = (range.start, range.len());
+        (identity.columns(start, size).into_owned(), prior.view((start, start), (size, size)) * VARIANCE)
+    };
+    for (block, range) in layout.blocks() {
+        let (directions, covariance) = of_block(&range);
+        if let Block::Axis(joint) = block
+            && let Some(behind) = motions_behind(state, layout, joint)
+        {
+            let size = range.len();
+            let mut both = DMatrix::zeros(m, size + 6);
+            both.columns_mut(0, size).copy_from(&directions);
+            both.columns_mut(size, 6).copy_from(&behind);
+            let [length, angle] = typical(layout, prior);
+            let mut spread = DMatrix::zeros(size + 6, size + 6);
+            spread.view_mut((0, 0), (size, size)).copy_from(&covariance);
+            for k in 0..6 {
+                spread[(size + k, size + k)] = VARIANCE * if k < 3 { length } else { angle };
+            }
+            spaces.push((both, spread));
+        }
+        spaces.push((directions, covariance));
+    }
+    let share = ((1.0 - WHOLE) / spaces.len().max(1) as f64).ln();
+    let mut jumps: Vec<Jump> = Vec::new();
+    let mut offer = |directions: &DMatrix<f64>, covariance: &DMatrix<f64>, log_share: f64| {
+        for factor in WIDENED {
+            let widened = covariance * (factor * factor);
+            let widest = widened.diagonal().iter().fold(0.0_f64, |most, x| most.max(x.sqrt()));
+            if factor == 1.0 || widest < WIDEST {
+                jumps.push(Jump { directions: directions.clone(), covariance: widened, log_share });
+            }
+        }
+    };
+    for (directions, covariance) in &spaces {
+        offer(directions, covariance, share);
+    }
+    offer(&identity, &(prior * VARIANCE), WHOLE.ln());
+    jumps
+}
+
+/// The prior's mean variance of lengths (m²) and of angles (rad²) of axes.
+fn typical(layout: &Layout, prior: &DMatrix<f64>) -> [f64; 2] {
+    [Quantity::Length, Quantity::Angle].map(|wanted| {
+        let of_axes = layout.blocks().filter(|(block, _)| matches!(block, Block::Axis(_))).flat_map(|(_, range)| range);
+        let variances: Vec<f64> =
+            of_axes.filter(|k| layout.quantities()[*k] == wanted).map(|k| prior[(k, k)]).collect();
+        variances.iter().sum::<f64>() / variances.len().max(1) as f64
+    })
+}
+
+/// How learned coordinates change (m × 6) when all that is behind a joint shifts along and turns about the three coordinate axes
+/// at its place; `None` where nothing behind it is learned.
+fn motions_behind(state: &State, layout: &Layout, joint: usize) -> Option<DMatrix<f64>> {
+    let at = match state.joints[joint] {
+        Joint::Revolute(line) => line.point.coords,
+        Joint::Prismatic(_) => Vector3::zeros(),
+    };
+    let mut columns = DMatrix::zeros(layout.dimension(), 6);
+    for k in 0..6 {
+        let motion = |step: f64| {
+            let unit = Vector3::ith(k % 3, step);
+            if k < 3 {
+                Isometry3::from_parts(Translation3::from(unit), UnitQuaternion::identity())
+            } else {
+                let rotation = UnitQuaternion::from_scaled_axis(unit);
+                Isometry3::from_parts(Translation3::from(at - rotation * at), rotation)
+            }
+        };
+        let forward = state.local(layout, &moved_behind(state, joint, &motion(STEP)))?;
+        let back = state.local(layout, &moved_behind(state, joint, &motion(-STEP)))?;
+        columns.set_column(k, &((forward - back) / (2.0 * STEP)));
+    }
+    (columns.amax() > 0.0).then_some(columns)
+}
+
+/// The state with all that is behind a joint carried by a motion of the robot's frame.
+fn moved_behind(state: &State, joint: usize, motion: &Isometry3<f64>) -> State {
+    let mut moved = state.clone();
+    for axis in moved.joints.iter_mut().skip(joint + 1) {
+        *axis = match *axis {
+            Joint::Revolute(line) => {
+                Joint::Revolute(Line { point: motion * line.point, direction: motion.rotation * line.direction })
+            }
+            Joint::Prismatic(direction) => Joint::Prismatic(motion.rotation * direction),
+        };
+    }
+    for target in moved.targets.iter_mut().filter(|target| target.link > joint) {
+        target.place = match &target.place {
+            Place::Point(point) => Place::Point(motion * point),
+            Place::Pose(pose) => Place::Pose(motion * pose),
+        };
+    }
+    for device in moved.devices.iter_mut().filter(|device| device.link.is_some_and(|link| link > joint)) {
+        device.pose = motion * device.pose;
+    }
+    moved
+}
