@@ -25,6 +25,8 @@ mod gram;
 mod hypotheses;
 mod jump;
 #[cfg(test)]
+mod known;
+#[cfg(test)]
 mod laws;
 mod mode;
 mod model_error;
@@ -145,7 +147,7 @@ impl Smoother {
     /// The same with what is known before any movement, which no posture has to do with: of the robot's equipment.
     pub fn knowing(mut self, observation: Observation) -> Self {
         let positions = vec![0.0; self.belief.state.joints.len()];
-        self.posterior.measurements.push(Measurement { positions, observation, movement: BEFOREHAND });
+        self.posterior.known.push(Measurement { positions, observation, movement: BEFOREHAND });
         let layout = self.belief.layout.clone();
         self.hypotheses.follow(&self.posterior, &layout);
         self.hypotheses.condense(self.settings.kept, &layout);
@@ -203,7 +205,9 @@ impl Smoother {
     /// equation, and among many readings that would be taken for a misfit. Nor do readings that have settled, which were
     /// explained when they did.
     fn explains(&self) -> bool {
-        let normal = self.posterior.readings(&self.belief.state).filter(|reading| reading.weight > 0.5);
+        let (posterior, state) = (&self.posterior, &self.belief.state);
+        let all = posterior.known_readings(state).chain(posterior.readings(state));
+        let normal = all.filter(|reading| reading.weight > 0.5);
         let (cost, degrees) = normal.fold((0.0, 0.0), |(cost, degrees), reading| {
             let (squared, equations) = (reading.residual_sigmas.powi(2), reading.equations as f64);
             (cost + reading.weight * squared, degrees + reading.weight * equations)
@@ -245,7 +249,9 @@ impl Estimator for Smoother {
         if !self.posterior.loss.is_robust() {
             return Vec::new();
         }
-        self.past.iter().copied().chain(self.posterior.readings(&self.belief.state)).collect()
+        let (posterior, state) = (&self.posterior, &self.belief.state);
+        let known = posterior.known_readings(state);
+        known.chain(self.past.iter().copied()).chain(posterior.readings(state)).collect()
     }
 }
 

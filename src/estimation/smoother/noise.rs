@@ -16,6 +16,7 @@ use super::{
     mode::Mode,
     posterior::{Fit, Posterior},
 };
+use crate::sensing::{Noise, Occasion};
 
 /// ν: how many equations the scale of the noise so far counts for.
 const NOISE_WEIGHT: f64 = 3.0;
@@ -136,10 +137,15 @@ impl Smoother {
     fn left_by(&self, posterior: &Posterior, mode: &Mode) -> Option<Vec<Left>> {
         let absorbed = posterior.absorbed(mode, &self.belief.layout)?;
         let fits = posterior.fit(&mode.state, &self.belief.layout);
-        let of = |((fit, absorbed), before): ((Fit, f64), &Left)| {
+        let of = |(((fit, absorbed), before), noise): (((Fit, f64), &Left), &Noise)| {
+            if self.nominal.channels()[noise.channel].occasion() == Occasion::Beforehand {
+                // It is known as well as it is said to be: no movement tells more of it.
+                return Left::default();
+            }
             Left { squared: fit.squared, free: (fit.equations - absorbed).max(0.0) }.and(*before)
         };
-        Some(fits.into_iter().zip(absorbed).zip(&self.remembered).map(of).collect())
+        let lefts = fits.into_iter().zip(absorbed).zip(&self.remembered).zip(self.nominal.noises());
+        Some(lefts.map(of).collect())
     }
 
     /// Keeps what is known of noise for when the readings are gone that tell it.
