@@ -53,6 +53,12 @@ pub trait Estimator: Send + Sync {
         Vec::new()
     }
 
+    /// What the readings so far say that the model and its noise do not allow; `None` while all is well, and for an estimator that
+    /// does not look.
+    fn misfit(&self) -> Option<Misfit> {
+        None
+    }
+
     /// As [`correct`](Self::correct), for observations that nobody has looked at: what does not fit is refused, and
     /// nothing is changed by it.
     fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
@@ -83,6 +89,26 @@ pub struct ReadingReport {
     pub weight: f64,
     /// The probability that it is an outlier; null for a loss that knows of none.
     pub outlier_probability: Option<f64>,
+}
+
+/// That readings are not explained as they should be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Misfit {
+    /// The first movement that speaks of it, counted from 1.
+    pub since: u64,
+    /// What explains it best.
+    pub cause: MisfitCause,
+}
+
+/// What explains a misfit best.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MisfitCause {
+    /// The body may have changed: what was measured since does not fit what was measured before.
+    ChangedBody,
+    /// More readings are outliers than are to be expected.
+    Outliers,
+    /// Nothing that is known of: the model does not hold.
+    Unexplained,
 }
 
 /// The learned scale of one kind of noise.

@@ -17,7 +17,7 @@ use super::{
     streams::Stream,
 };
 use crate::{
-    estimation::{Belief, EstimationError, Estimator, NoiseReport, ReadingReport, Update},
+    estimation::{Belief, EstimationError, Estimator, Misfit, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
     selection::{
         Actions, Appraisal, Constraints, History, Movement, Planned, Policy, Search, Selection, SelectionError,
@@ -135,6 +135,11 @@ impl Agent {
     /// The scales of noise that it learns.
     pub fn noise(&self) -> Vec<NoiseReport> {
         self.estimator.noise()
+    }
+
+    /// What the readings say that its model does not allow.
+    pub fn misfit(&self) -> Option<Misfit> {
+        self.estimator.misfit()
     }
 
     /// What it may do.

@@ -24,7 +24,7 @@ use crate::{
 /// Steps in a row for which the expected error must stay below the target before a learner calls itself settled.
 pub const SETTLING_STEPS: u32 = 5;
 
-/// The estimate's weight among all hypotheses below which a learner is not settled.
+/// The estimate's weight among all hypotheses below which a learner is not settled. Nor is one whose readings do not fit.
 const UNAMBIGUOUS: f64 = 0.99;
 
 /// An agent in a comparison.
@@ -285,7 +285,7 @@ impl Learner {
     ) -> LearnerReport {
         let belief = self.agent.belief();
         let expected = belief.expected_error_m(&self.workspace);
-        let is_certain = belief.weight() > UNAMBIGUOUS;
+        let is_certain = belief.weight() > UNAMBIGUOUS && self.agent.misfit().is_none();
         if is_certain && expected.is_some_and(|error| error < self.settled_below_m) {
             self.record.steps_below_target += 1;
         } else {

@@ -2,7 +2,7 @@
 
 use super::{World, gauge::Gauge, learner::Learner};
 use crate::{
-    estimation::{NoiseReport, ReadingReport},
+    estimation::{Misfit, MisfitCause, NoiseReport, ReadingReport},
     experiment::{Description, Metrics},
 };
 
@@ -18,6 +18,7 @@ pub(super) fn remarks(learner: &Learner, metrics: &Metrics, description: &Descri
     said.extend(learner.noise().iter().filter_map(noise));
     said.extend(metrics.model_error_m.filter(|error| *error > 0.0).map(model_error));
     said.extend(outliers(&learner.readings()));
+    said.extend(learner.agent().misfit().map(misfit));
     let alarms = metrics.changes_noticed;
     if alarms > 0 && matches!(world, World::Measured { .. }) {
         said.push(format!(
@@ -33,6 +34,27 @@ fn undetermined(learner: &Learner, description: &Description) -> Option<String> 
     let belief = learner.belief();
     let gauge = Gauge::new(&belief.state, &belief.layout, &belief.rig, learner.limits());
     description.called().untold(&belief.layout, &gauge.free(&belief.state), "any movement")
+}
+
+fn misfit(misfit: Misfit) -> String {
+    let since = misfit.since;
+    match misfit.cause {
+        MisfitCause::ChangedBody => {
+            format!(
+                "the body may have changed: what was measured since movement {since} fits badly; more movements will tell"
+            )
+        }
+        MisfitCause::Outliers => {
+            format!(
+                "since movement {since} more readings are outliers than are to be expected: look at sensor and target"
+            )
+        }
+        MisfitCause::Unexplained => {
+            format!(
+                "what was measured since movement {since} is explained by nothing that is learned: the description does not hold"
+            )
+        }
+    }
 }
 
 fn noise(noise: &NoiseReport) -> Option<String> {

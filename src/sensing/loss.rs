@@ -6,10 +6,11 @@
 //! |---|---|---|
 //! | none | s/2 | 1 |
 //! | Huber | s/2 up to z = k, then k z − k²/2 | min(1, k/z) |
-//! | mixture | −ln((1 − ε) e^{−s/2} + ε κ^{−d} e^{−s/2κ²}) + constant | q + (1 − q)/κ² |
+//! | mixture | −ln((1 − ε) e^{−s/2} + ε κ^{−d}) + constant | q |
 //!
-//! The mixture takes a share ε of readings to be outliers, with κ times the deviations of the others; 1 − q is the probability
-//! that this one is, and the constant makes ρ(0) = 0. Huber's k is where 95 % of normal readings lie within. A loss enters a
+//! The mixture takes a share ε of readings to be outliers, which may be anywhere: their density is flat, as high as that of a
+//! reading with κ times the deviations of a normal one is at its middle. However far off an outlier is, it says nothing. 1 − q is
+//! the probability that a reading is one, and the constant makes ρ(0) = 0. Huber's k is where 95 % of normal readings lie within. A loss enters a
 //! least squares problem as the weight of the reading's equations (iteratively reweighted least squares), and the answer as ρ.
 
 /// What a reading costs that is far from its prediction, as a function of the whitened residual.
@@ -24,13 +25,13 @@ pub enum Loss {
     Mixture {
         /// ε, the share of outliers before anything is known of a reading; above 0, below 1.
         fraction: f64,
-        /// κ, the deviation of an outlier in those of a normal reading; above 1.
+        /// κ, by which the density of outliers is told: κ^{−d} of that of a normal reading at its middle; above 1.
         spread: f64,
     },
 }
 
 impl Loss {
-    /// The mixture unless told otherwise: one reading in twenty, fifty times as far off.
+    /// The mixture unless told otherwise: one reading in twenty, and κ = 50.
     pub const MIXTURE: Self = Self::Mixture { fraction: 0.05, spread: 50.0 };
 
     /// ρ(s) of a reading of d equations.
@@ -44,8 +45,7 @@ impl Loss {
             Self::Mixture { fraction, spread } => {
                 let share = log_odds(fraction, spread, d);
                 // Both terms relative to that of a normal reading at s = 0.
-                log_sum(-0.5 * s, share - 0.5 * s / (spread * spread))
-                    .map_or(f64::INFINITY, |log| log_one_plus(share) - log)
+                log_sum(-0.5 * s, share).map_or(f64::INFINITY, |log| log_one_plus(share) - log)
             }
         }
     }
@@ -55,17 +55,14 @@ impl Loss {
         match *self {
             Self::None => 1.0,
             Self::Huber => (huber(d) / s.sqrt()).min(1.0),
-            Self::Mixture { spread, .. } => {
-                let outlier = self.outlier(s, d).unwrap_or(0.0);
-                (1.0 - outlier) + outlier / (spread * spread)
-            }
+            Self::Mixture { .. } => 1.0 - self.outlier(s, d).unwrap_or(0.0),
         }
     }
 
     /// 1 − q, the probability that a reading is an outlier; `None` for a loss that knows of none.
     pub fn outlier(&self, s: f64, d: usize) -> Option<f64> {
         let Self::Mixture { fraction, spread } = *self else { return None };
-        let odds = log_odds(fraction, spread, d) + 0.5 * s * (1.0 - (spread * spread).recip());
+        let odds = log_odds(fraction, spread, d) + 0.5 * s;
         Some(1.0 / (1.0 + (-odds).exp()))
     }
 
@@ -159,7 +156,7 @@ mod tests {
         assert!(probability(1e6) == 1.0 && probability(1e200) == 1.0);
         assert_eq!(Loss::Huber.outlier(9.0, 3), None);
         // By Bayes' rule, worked out by hand for one equation, ε = 1/2, κ = 2, s = 4.
-        let (normal, outlier) = ((-2.0_f64).exp(), 0.5 * (-0.5_f64).exp());
+        let (normal, outlier) = ((-2.0_f64).exp(), 0.5);
         let found = Loss::Mixture { fraction: 0.5, spread: 2.0 }.outlier(4.0, 1).expect("a mixture");
         assert!((found - outlier / (normal + outlier)).abs() < 1e-12);
     }

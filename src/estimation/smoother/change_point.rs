@@ -23,8 +23,14 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::{Smoother, jump::Jump, noise::NoiseEvidence, points::Room, posterior::Normal};
-use crate::estimation::change::quantile;
+use super::{
+    Smoother,
+    jump::Jump,
+    mode::Mode,
+    noise::NoiseEvidence,
+    points::Room,
+    posterior::{Normal, Posterior},
+};
 
 /// The chance that a body changes at a movement.
 pub(super) const RATE: f64 = 5e-3;
@@ -34,8 +40,6 @@ const ALARM: f64 = -2.0;
 const ALARM_AGAIN: f64 = 3.0;
 /// The same without a reading that may be an outlier.
 const SUPPORT: f64 = -4.0;
-/// Standard deviations (by Wilson and Hilferty) of a squared residual that may be an outlier's.
-const OUTLYING: f64 = 5.0;
 /// Latest movements at each of which a change is looked for; before these at fewer and fewer.
 const EACH: usize = 16;
 
@@ -106,7 +110,11 @@ impl Evidence {
             let carried = &covariance * &sum;
             for jump in jumps {
                 let Some(log_odds) = self.log_odds(jump, &sum, &carried, &pull) else { continue };
-                all = log_sum(all, log_odds);
+                // What nothing was read of may have changed, for all that is known, and is no news.
+                let excess = log_odds - jump.log_share - RATE.ln();
+                if excess > 0.0 {
+                    all = log_sum(all, log_odds + (-(-excess).exp()).ln_1p());
+                }
                 if best.as_ref().is_none_or(|best| log_odds > best.log_odds) {
                     best = Some(Change { since: place, jump: jump.clone(), log_odds });
                 }
@@ -129,58 +137,35 @@ impl Evidence {
         let log_odds = self.noise.gain(lowered) - occam + jump.log_share + RATE.ln();
         log_odds.is_finite().then_some(log_odds)
     }
+}
 
-    /// The same without one measurement, at the state that is most probable then.
-    fn without(&self, index: usize) -> Option<Self> {
-        let (rows, residual) = (&self.rows[index], &self.residuals[index]);
-        let information = &self.information - rows * rows.transpose();
-        let shift = Cholesky::new(information.clone())?.solve(&(rows * residual * -1.0));
-        let kept = |all: usize| (0..all).filter(|other| *other != index);
-        let residuals: Vec<DVector<f64>> =
-            kept(self.rows.len()).map(|i| &self.residuals[i] - self.rows[i].tr_mul(&shift)).collect();
-        let rows = kept(self.rows.len()).map(|i| self.rows[i].clone()).collect();
-        // What it cost, and what the others cost less without it.
-        let lowered = residual.norm_squared() + shift.dot(&(&information * &shift));
-        let noise = self.noise.without(residual.len(), lowered);
-        Some(Self { rows, residuals, information, noise })
+impl Change {
+    /// Whether the odds are for it; `soon` after another change it takes more.
+    pub fn is_likely(&self, soon: bool) -> bool {
+        self.log_odds > if soon { ALARM_AGAIN } else { ALARM }
     }
 
-    /// Of the measurements from `since` on the one that speaks most for a change: of the largest residual.
-    fn loudest(&self, since: usize) -> Option<usize> {
-        (since..self.rows.len())
-            .max_by(|a, b| self.residuals[*a].norm_squared().total_cmp(&self.residuals[*b].norm_squared()))
-    }
-
-    /// The likeliest change, if the odds are for it, and that not because of a single reading that may be an outlier. `soon`
-    /// after another change it takes more.
-    pub fn change(&self, jumps: &[Jump], has_past: bool, soon: bool) -> Option<Change> {
-        let alarm = if soon { ALARM_AGAIN } else { ALARM };
-        let found = self.likeliest(jumps, has_past).filter(|change| change.log_odds > alarm)?;
-        let loudest = self.loudest(found.since)?;
-        let residual = &self.residuals[loudest];
-        if residual.norm_squared() > quantile(residual.len() as f64, OUTLYING) {
-            self.without(loudest)?.likeliest(jumps, has_past).filter(|change| change.log_odds > SUPPORT)?;
-        }
-        Some(found)
+    /// Whether there is something in it when the reading that speaks most for it does not count.
+    pub fn has_support(&self) -> bool {
+        self.log_odds > SUPPORT
     }
 }
 
 impl Smoother {
-    /// What all readings that are kept say at the heaviest hypothesis.
-    pub(super) fn evidence(&self) -> Option<Evidence> {
-        let mode = self.hypotheses.modes.first()?;
+    /// What all readings of a posterior that are kept say at a mode of it.
+    pub(super) fn evidence(&self, posterior: &Posterior, mode: &Mode) -> Option<Evidence> {
         let layout = &self.belief.layout;
         // With the scales of noise as they are now, for which the mode need not have been searched again.
         let Normal { mut information, descent, .. } =
-            self.posterior.normal_by(self.posterior.loss.into(), &mode.state, layout, &mut Room::default())?;
+            posterior.normal_by(posterior.loss.into(), &mode.state, layout, &mut Room::default())?;
         information.fill_upper_triangle_with_lower_triangle();
         let shift = Cholesky::new(information.clone())?.solve(&descent);
         let (mut rows, mut residuals) = (Vec::new(), Vec::new());
-        for seen in &self.posterior.measurements {
-            let (of, residual) = self.posterior.weighed(&mode.state, layout, seen);
+        for seen in &posterior.measurements {
+            let (of, residual) = posterior.weighed(&mode.state, layout, seen);
             residuals.push(residual - of.tr_mul(&shift));
             rows.push(of);
         }
-        Some(Evidence { rows, residuals, information, noise: self.noise_evidence() })
+        Some(Evidence { rows, residuals, information, noise: self.noise_evidence(posterior, mode) })
     }
 }

@@ -23,13 +23,17 @@ use super::{
     posterior::{Measurement, Posterior},
 };
 use crate::{
-    estimation::ReadingReport,
+    estimation::{Misfit, MisfitCause, ReadingReport, change::quantile},
     model::{Prior, State},
 };
 
 /// Equations before a change, by the number of parameters, from which on they count for the changed body.
 const DETERMINED: f64 = 1.5;
 
+/// The logarithm of the odds for a change from which on a belief does not call itself settled.
+const SUSPICIOUS: f64 = -4.0;
+/// Standard deviations (by Wilson and Hilferty) of a squared residual that may be an outlier's.
+const OUTLYING: f64 = 5.0;
 /// Movements after a change within which another one must be plainer.
 const SOON: u64 = 10;
 /// Where readings may be outliers: so many of the latest must have been rejected, the last among them, before a change is looked for.
@@ -44,31 +48,83 @@ struct After {
 }
 
 impl Smoother {
-    /// Since when the body has changed and how, if the readings say so.
-    pub(super) fn notices_change(&self) -> Option<Change> {
-        if !self.forgets {
-            // What a body that never changes does not explain has other reasons.
-            return None;
-        }
+    /// Since when the body has changed and how, if the readings say so; and whether they misfit.
+    pub(super) fn notices_change(&mut self) -> Option<Change> {
+        self.misfit = None;
         let mode = self.hypotheses.modes.first()?;
         let jumps = jumps(&mode.state, &self.belief.layout, &self.original_at(&mode.state));
         if self.posterior.loss.is_robust() {
+            self.misfit = self.outliers(mode);
             return self.rejected_change(mode, &jumps);
         }
         let soon = self.changed_at.is_some_and(|movement| self.movements < movement + SOON);
-        self.evidence()?.change(&jumps, self.posterior.settled.is_some(), soon)
+        let has_past = self.posterior.settled.is_some();
+        let evidence = self.evidence(&self.posterior, mode)?;
+        let found = evidence.likeliest(&jumps, has_past)?;
+        let since = self.posterior.measurements[found.since].movement;
+        // Who drops nothing has been told of what came before.
+        let is_new = self.forgets || self.changed_at.is_none_or(|movement| since > movement);
+        let mut cause = if self.forgets { MisfitCause::ChangedBody } else { MisfitCause::Unexplained };
+        if is_new && found.is_likely(soon) {
+            let suspect = self.suspect(found.since);
+            if suspect.is_none_or(|suspect| self.is_supported(suspect, mode, &jumps)) {
+                return Some(found);
+            }
+            cause = MisfitCause::Outliers;
+        }
+        self.misfit = (found.log_odds > SUSPICIOUS).then_some(Misfit { since, cause });
+        None
+    }
+
+    /// Of the measurements from one on that which the belief before the latest expected least, if it may be an outlier.
+    fn suspect(&self, since: usize) -> Option<usize> {
+        let Self { posterior, belief, .. } = self;
+        let squared = |index: usize| {
+            let seen = &posterior.measurements[index];
+            let mut sum = 0.0;
+            posterior.rig.residuals(&belief.state, &seen.positions, &seen.observation, |channel, whitened| {
+                sum += posterior.squared(channel, whitened);
+            });
+            (index, sum, seen.observation.equations())
+        };
+        let all = (since..posterior.measurements.len()).map(squared);
+        let (index, sum, equations) = all.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (sum > quantile(equations as f64, OUTLYING)).then_some(index)
+    }
+
+    /// Whether anything speaks for a change without one of the measurements.
+    fn is_supported(&self, without: usize, mode: &Mode, jumps: &[Jump]) -> bool {
+        let mut others = self.posterior.clone();
+        others.measurements.remove(without);
+        let layout = &self.belief.layout;
+        // It may have drawn the mode along.
+        let starts = [&self.belief.state, &mode.state];
+        let found = starts.iter().filter_map(|start| others.mode(start, layout, THOROUGH));
+        let Some(mode) = found.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else { return false };
+        let evidence = self.evidence(&others, &mode);
+        evidence.and_then(|it| it.likeliest(jumps, others.settled.is_some())).is_some_and(|it| it.has_support())
+    }
+
+    /// Whether more of the latest readings are outliers than are to be expected.
+    fn outliers(&self, mode: &Mode) -> Option<Misfit> {
+        let seen = &self.posterior.measurements;
+        let latest = &seen[seen.len().saturating_sub(LATEST)..];
+        let rejected: Vec<u64> =
+            latest.iter().filter(|seen| self.is_rejected(mode, seen)).map(|seen| seen.movement).collect();
+        (2 * rejected.len() >= LATEST).then(|| Misfit { since: rejected[0], cause: MisfitCause::Outliers })
+    }
+
+    fn is_rejected(&self, mode: &Mode, seen: &Measurement) -> bool {
+        let mut rejected = false;
+        self.posterior.weights(&mode.state, seen, |weight| rejected |= weight < 0.5);
+        rejected
     }
 
     /// The same where readings may be outliers: since one of the latest that were rejected.
     fn rejected_change(&self, mode: &Mode, jumps: &[Jump]) -> Option<Change> {
         let seen = &self.posterior.measurements;
-        let is_rejected = |seen: &Measurement| {
-            let mut rejected = false;
-            self.posterior.weights(&mode.state, seen, |weight| rejected |= weight < 0.5);
-            rejected
-        };
         let first = seen.len().saturating_sub(LATEST);
-        let places: Vec<usize> = (first..seen.len()).filter(|place| is_rejected(&seen[*place])).collect();
+        let places: Vec<usize> = (first..seen.len()).filter(|place| self.is_rejected(mode, &seen[*place])).collect();
         if places.len() < REJECTED || places.last() != Some(&(seen.len() - 1)) {
             return None;
         }
@@ -96,6 +152,8 @@ impl Smoother {
     fn before(&self, since: usize) -> Option<(Posterior, Mode)> {
         let mut before = self.posterior.clone();
         before.measurements.truncate(since);
+        // What is known beforehand goes on to be known of the changed body, and is not told twice.
+        before.known.clear();
         let mode = before.mode(&self.hypotheses.modes.first()?.state, &self.belief.layout, THOROUGH)?;
         Some((before, mode))
     }
@@ -108,7 +166,7 @@ impl Smoother {
         let spread = (&spread + spread.transpose()) * 0.5;
         let root = Cholesky::new(spread.clone())?;
         let prior = Prior::around(known.state.clone(), layout, spread).ok()?;
-        let posterior = before.anew(prior, self.posterior.measurements[change.since..].to_vec());
+        let posterior = self.posterior.anew(prior, self.posterior.measurements[change.since..].to_vec());
         let starts = [&known.state, &mode.state];
         let found = starts.iter().filter_map(|start| posterior.mode_from_afar(start, layout, THOROUGH));
         let found = found.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
@@ -120,7 +178,8 @@ impl Smoother {
     /// Takes note that the body has changed.
     pub(super) fn changed(&mut self, change: &Change) {
         let layout = self.belief.layout.clone();
-        let Some(mode) = self.hypotheses.modes.first().cloned() else { return };
+        self.changed_at = Some(self.movements);
+        let Some(mode) = self.hypotheses.modes.first().cloned().filter(|_| self.forgets) else { return };
         let since = self.posterior.measurements.get(change.since).map_or(u64::MAX, |seen| seen.movement);
         let dropped: Vec<ReadingReport> =
             self.posterior.readings(&mode.state).take_while(|reading| reading.movement < since).collect();
@@ -144,10 +203,8 @@ impl Smoother {
             self.hypotheses.modes.extend(found);
         }
         self.hypotheses.calm = 0;
-        self.changed_at = Some(self.movements);
         self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         self.hypotheses.condense(self.settings.kept, &layout);
-        self.learn_noise();
     }
 
     /// The original prior's covariance in the chart at a state; without what correlates its parameters where the state is outside the

@@ -32,7 +32,7 @@ pub(super) struct Jump {
 /// The variance of what changes, in variances of the original prior.
 const VARIANCE: f64 = 0.25;
 /// How many times as far off a body may be after a change, where the prior is narrow.
-const WIDENED: [f64; 3] = [1.0, 8.0, 64.0];
+const WIDENED: [f64; 4] = [1.0, 4.0, 16.0, 64.0];
 /// Deviations of an angle (rad) and of a length (m) beyond which no wider prior is tried.
 const WIDEST: f64 = 0.5;
 /// The share of changes that change the body as a whole.

@@ -46,7 +46,7 @@ use mode::Effort;
 use noise::Left;
 use posterior::{Measurement, Posterior};
 
-use super::{Alternative, Belief, EstimationError, Estimator, NoiseFit, NoiseReport, ReadingReport, Update};
+use super::{Alternative, Belief, EstimationError, Estimator, Misfit, NoiseFit, NoiseReport, ReadingReport, Update};
 use crate::{
     model::{Layout, Prior},
     sensing::{Loss, Observation, Rig},
@@ -79,6 +79,7 @@ pub struct Smoother {
     remembered: Vec<Left>,
     /// The movement at which it was noticed last that the body has changed.
     changed_at: Option<u64>,
+    misfit: Option<Misfit>,
 }
 
 /// Steps without a new hypothesis after which none are searched for any more.
@@ -118,6 +119,7 @@ impl Smoother {
             spare,
             remembered,
             changed_at: None,
+            misfit: None,
         };
         smoother.begin();
         smoother.publish();
@@ -237,6 +239,10 @@ impl Estimator for Smoother {
         Ok(update)
     }
 
+    fn misfit(&self) -> Option<Misfit> {
+        self.misfit
+    }
+
     fn noise(&self) -> Vec<NoiseReport> {
         let noises = self.nominal.noises().iter().zip(&self.unknown).zip(&self.posterior.scales);
         let unknown = noises.filter(|((_, unknown), _)| **unknown);
@@ -268,12 +274,13 @@ impl Smoother {
             self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         }
         self.hypotheses.condense(self.settings.kept, &layout);
-        self.learn_noise();
+        // Before the noise is learned: it would take a change for larger noise.
         let change = self.notices_change();
         let change_noticed = change.is_some();
         if let Some(change) = change {
             self.changed(&change);
         }
+        self.learn_noise();
         if self.hypotheses.modes.is_empty() {
             return Err(EstimationError::Diverged("no hypothesis explains the measurements"));
         }

@@ -91,13 +91,6 @@ impl NoiseEvidence {
         };
         of(rest) - of(squared)
     }
-
-    /// The same without so many equations, which lowers χ² by so much.
-    pub fn without(&self, equations: usize, lowered: f64) -> Self {
-        let Left { squared, free } = self.left;
-        let left = Left { squared: (squared - lowered).max(0.0), free: (free - equations as f64).max(0.0) };
-        Self { left, told: self.told }
-    }
 }
 
 impl Smoother {
@@ -155,9 +148,9 @@ impl Smoother {
         }
     }
 
-    /// What tells larger noise from another cause of large residuals, at the heaviest mode.
-    pub(super) fn noise_evidence(&self) -> NoiseEvidence {
-        let lefts = self.left().unwrap_or_default();
+    /// What tells larger noise from another cause of large residuals, at a mode of a posterior.
+    pub(super) fn noise_evidence(&self, posterior: &Posterior, mode: &Mode) -> NoiseEvidence {
+        let lefts = self.left_by(posterior, mode).unwrap_or_default();
         let mut left = Left::default();
         let (mut nominal, mut scales) = (0.0, 0.0);
         for (of, scale) in lefts.iter().zip(&self.posterior.scales) {
