@@ -108,6 +108,7 @@ impl Case<'_> {
         let smoother = Smoother::new(prior, Arc::new(layout.clone()), self.rig.clone(), settings, rng)
             .with_loss(self.loss)
             .with_unknown_noise(unknown)
+            .with_unknown_joint_noise(self.scenario.smoother.joints_unknown)
             .never_forgetting();
         Ok(match self.known {
             Some(known) => smoother.knowing(known.clone()),

@@ -21,6 +21,7 @@ mod changes;
 mod factor;
 mod gram;
 mod hypotheses;
+mod joints;
 #[cfg(test)]
 mod laws;
 mod mode;
@@ -168,8 +169,10 @@ impl Smoother {
 
     fn publish(&mut self) {
         let Some((best, rest)) = self.hypotheses.modes.split_first() else { return };
-        if self.unknown.contains(&true) {
-            self.belief.rig = Arc::new(self.nominal.scaled(&self.posterior.scales));
+        if self.learns_noise() {
+            let joints = self.posterior.joints.as_ref().map(|joints| Arc::new(joints.noise.clone()));
+            let rig = self.nominal.scaled(&self.posterior.scales);
+            self.belief.rig = Arc::new(rig.with_joint_noise(joints));
         }
         self.belief.state = best.state.clone();
         self.belief.covariance = Some(best.covariance());
@@ -336,7 +339,7 @@ impl Smoother {
             self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         }
         self.hypotheses.condense(self.settings.kept, &layout);
-        if self.unknown.contains(&true) {
+        if self.learns_noise() {
             self.learn_noise();
         }
         if self.hypotheses.modes.is_empty() {
@@ -350,6 +353,7 @@ impl Smoother {
                 let first = self.posterior.measurements[KEPT / 2].movement;
                 let settling = self.posterior.readings(&self.belief.state).take_while(|it| it.movement < first);
                 Arc::make_mut(&mut self.past).extend(settling);
+                self.posterior.settle_joints(KEPT / 2, &self.hypotheses.modes[0], &layout);
                 self.posterior.settle(KEPT / 2, &self.belief.state, &layout);
             }
         } else {

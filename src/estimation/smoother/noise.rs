@@ -61,6 +61,7 @@ impl Smoother {
                     self.posterior.scales[noise] = scale;
                 }
             }
+            change = change.max(self.learn_joint_noise());
             if change < 1e-3 {
                 return;
             }

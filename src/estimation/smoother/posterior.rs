@@ -15,6 +15,7 @@ use fearless_simd::Level;
 use nalgebra::{DMatrix, DVector};
 
 use super::{
+    joints::Joints,
     mode::Mode,
     points::Room,
     settled::{Quadratic, Settled},
@@ -53,6 +54,8 @@ pub(super) struct Posterior {
     pub loss: Loss,
     /// s, by kind of noise: 1 where it is known.
     pub scales: Vec<f64>,
+    /// What the joints' readings are off by, where they are not exact.
+    pub joints: Option<Joints>,
     pub measurements: Vec<Measurement>,
     pub settled: Option<Settled>,
 }
@@ -85,7 +88,9 @@ impl Posterior {
     pub fn new(prior: Prior, rig: Arc<Rig>) -> Self {
         let scales = vec![1.0; rig.noises().len()];
         let targets = rig.points();
+        let joints = rig.joint_noise().map(|noise| Joints::new(noise.as_ref().clone()));
         Self {
+            joints,
             pins: prior.pins(),
             prior,
             rig,
@@ -100,15 +105,15 @@ impl Posterior {
 
     /// The same rig and likelihood with another prior, and of the measurements only these.
     pub fn anew(&self, prior: Prior, measurements: Vec<Measurement>) -> Self {
-        let (loss, scales) = (self.loss, self.scales.clone());
-        Self { loss, scales, measurements, ..Self::new(prior, self.rig.clone()) }
+        let (loss, scales, joints) = (self.loss, self.scales.clone(), self.joints.clone());
+        Self { loss, scales, joints, measurements, ..Self::new(prior, self.rig.clone()) }
     }
 
     /// What is made of every reading at `state`, but for those that have settled.
     pub fn readings(&self, state: &State) -> impl Iterator<Item = ReadingReport> {
         let of = move |seen: &Measurement| {
             let mut reports = Vec::new();
-            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+            self.residuals(state, seen, |channel, whitened| {
                 let (squared, d) = (self.squared(channel, whitened), whitened.len());
                 reports.push(ReadingReport {
                     movement: seen.movement,
@@ -164,7 +169,7 @@ impl Posterior {
     /// A measurement without the readings that are likelier outliers than not; `None` if that leaves none.
     fn without_outliers(&self, state: &State, seen: &Measurement) -> Option<Measurement> {
         let mut normal = seen.clone();
-        self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+        self.residuals(state, seen, |channel, whitened| {
             if self.loss.weight(self.squared(channel, whitened), whitened.len()) < 0.5 {
                 normal.observation.readings[channel] = None;
             }
@@ -193,8 +198,14 @@ impl Posterior {
     #[cfg(test)]
     pub fn cost(&self, state: &State, layout: &Layout) -> f64 {
         let (loss, mut cost) = (Graduated::from(self.loss), self.prior.cost(state, None));
+        if let Some(joints) = &self.joints {
+            cost += self.stacked_jointly((&joints.noise, loss), state, layout, &self.measurements, None).2;
+        }
         for seen in &self.measurements {
-            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+            self.residuals(state, seen, |channel, whitened| {
+                if self.joints.is_some() {
+                    return;
+                }
                 cost += loss.cost(self.squared(channel, whitened), whitened.len());
             });
         }
@@ -208,9 +219,12 @@ impl Posterior {
     /// By kind of noise, how well the data are fitted at `state`: for one that is as assumed `squared` is χ² distributed with
     /// `equations` degrees of freedom.
     pub fn fit(&self, state: &State, layout: &Layout) -> Vec<Fit> {
-        let mut fits = vec![Fit::default(); self.scales.len()];
-        for seen in &self.measurements {
-            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+        let mut fits = match &self.joints {
+            None => vec![Fit::default(); self.scales.len()],
+            Some(joints) => self.joint_fit(&joints.noise, state),
+        };
+        for seen in self.measurements.iter().filter(|_| self.joints.is_none()) {
+            self.residuals(state, seen, |channel, whitened| {
                 let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
                 for (noise, part) in self.noises(channel) {
                     fits[noise].squared += weight * norm_squared(&whitened[part.clone()]);
@@ -248,6 +262,16 @@ impl Posterior {
         let mut cost = 0.0;
         if let Some(points) = self.points(state, layout) {
             cost += self.add_points(loss, &points, (&mut information, &mut descent), room);
+        } else if let Some(joints) = &self.joints {
+            let by_joints = room.joints.take().unwrap_or_else(|| self.joint_rows(state));
+            for (measurements, by_joints) in self.measurements.chunks(STACKED).zip(by_joints.chunks(STACKED)) {
+                let (stacked, residuals, errors) =
+                    self.stacked_jointly((&joints.noise, loss), state, layout, measurements, Some(by_joints));
+                information += &stacked * stacked.transpose();
+                descent += stacked * residuals;
+                cost += errors;
+            }
+            room.joints = Some(by_joints);
         } else {
             for measurements in self.measurements.chunks(STACKED) {
                 let (stacked, residuals, errors) = self.stacked(loss, state, layout, measurements);
@@ -278,6 +302,9 @@ impl Posterior {
         layout: &Layout,
         measurements: &[Measurement],
     ) -> (DMatrix<f64>, DVector<f64>, f64) {
+        if let Some(joints) = &self.joints {
+            return self.stacked_jointly((&joints.noise, loss), state, layout, measurements, None);
+        }
         let m = layout.dimension();
         let equations = measurements.iter().map(|seen| seen.observation.equations()).sum();
         let mut stacked = DMatrix::zeros(m, equations);
@@ -348,7 +375,7 @@ impl Posterior {
         };
         let mut quadratics: Vec<Quadratic> = of_noise.iter().zip(&self.scales).map(of).collect();
         for seen in measurements {
-            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+            self.residuals(state, seen, |channel, whitened| {
                 let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
                 self.noises(channel)
                     .for_each(|(noise, part)| quadratics[noise].equations += weight * part.len() as f64);
@@ -378,6 +405,10 @@ impl Posterior {
 
     /// By kind of noise, how many of its equations the parameters account for: tr(Λₙ P), with Λₙ its share of the information.
     pub fn absorbed(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
+        if let Some(joints) = &self.joints {
+            let (kept, _) = self.joint_shares(joints, mode, layout);
+            return Some(kept.iter().zip(self.settled_shares(mode, layout)?).map(|(kept, settled)| kept + settled).collect());
+        }
         let mut noises = vec![Quadratic::nothing(layout.dimension()); self.scales.len()];
         for measurements in self.measurements.chunks(STACKED) {
             let (of, _) = self.quadratics(&mode.state, layout, measurements);
