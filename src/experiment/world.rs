@@ -235,7 +235,7 @@ mod tests {
     use super::*;
     use crate::{
         model::laws::random_arm,
-        sensing::{Channel, Socket},
+        sensing::{Channel, JointNoise, Socket},
     };
 
     #[test]
@@ -283,6 +283,34 @@ mod tests {
         assert_eq!(world.execute(&elsewhere, &Draw::default()), Err(WorldError::OutOfReach { socket: 2 }));
         let free = Movement { socket: None, ..proposed };
         assert_eq!(world.execute(&free, &Draw::default()), Ok(free.clone()), "nothing is held");
+    }
+
+    /// Joints that are off are shown where they stand and told where they read, and no other draw of chance changes.
+    #[test]
+    fn joints_stand_beside_what_they_read() {
+        let truth = random_arm(&mut ChaCha8Rng::seed_from_u64(4), 3);
+        let limits = JointBox::new(vec![(-1.0, 1.0); 3]).expect("limits");
+        let world = |noise: Option<Vec<f64>>| {
+            let noise = noise.and_then(|sigmas| JointNoise::new(&truth, sigmas)).map(Arc::new);
+            let rig = Arc::new(Rig::tracker(1e-9).with_joint_noise(noise));
+            let (truth, limits) = (Box::new(truth.clone()), limits.clone());
+            World::Simulated { truth, rig, limits, head: None, change: None, outliers: None }
+        };
+        let (exact, off) = (world(None), world(Some(vec![0.02, 0.0, 0.1])));
+        let (mut of_exact, mut of_off) = (NoiseSequence::new(7), NoiseSequence::new(7));
+        let mut squares = [0.0; 3];
+        for _ in 0..400 {
+            let (draw, with) = (of_exact.draw(&exact), of_off.draw(&off));
+            assert_eq!((&draw.noise, &draw.outliers, draw.joints.len()), (&with.noise, &with.outliers, 0));
+            let movement = Movement::to(vec![0.3, -0.2, 0.5]);
+            let stands = [0.3 + 0.02 * with.joints[0], -0.2, 0.5 + 0.1 * with.joints[2]];
+            assert_eq!(off.execute(&movement, &with), Ok(movement.clone()), "it reads what was wanted");
+            let seen = off.observe(&movement, &with).expect("seen").readings[0].clone().expect("seen");
+            let place = truth.marker_at(&stands);
+            assert!(place.coords.iter().zip(&seen).all(|(a, b)| (a - b).abs() < 1e-7));
+            squares.iter_mut().zip(&with.joints).for_each(|(sum, v)| *sum += v * v / 400.0);
+        }
+        assert!(squares.iter().all(|square| (0.75..1.3).contains(square)), "{squares:?}");
     }
 
     #[test]

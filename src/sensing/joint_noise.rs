@@ -177,7 +177,8 @@ impl JointErrors {
     fn spread(&mut self, j: &[f64]) -> f64 {
         let columns = self.covariance.chunks_exact(j.len().max(1));
         self.gain.iter_mut().zip(columns).for_each(|(gain, column)| *gain = dot(column, j));
-        dot(&self.gain, j)
+        // Below 0 by rounding alone.
+        dot(&self.gain, j).max(0.0)
     }
 
     /// h − Bᵀ j.
@@ -221,4 +222,91 @@ impl JointErrors {
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+    use proptest::prelude::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::*;
+    use crate::{
+        model::laws::random_stiff_state,
+        sensing::{Observation, Rig, examples},
+    };
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
+        /// Of every channel at once: J is that of central differences, and what is whitened by it is what the matrix
+        /// I + J Σ Jᵀ says, whichever readings are missing.
+        #[test]
+        fn readings_are_whitened_by_the_whole_matrix(seed: u64, joints in 1_usize..=7) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let (state, blocks) = random_stiff_state(&mut rng, joints);
+            let layout = Layout::new(&state, blocks);
+            let sigmas: Vec<f64> =
+                (0..joints).map(|joint| if joint == 1 { 0.0 } else { rng.random_range(1e-4..0.05) }).collect();
+            let noise = JointNoise::new(&state, sigmas.clone()).expect("off");
+            let apart = Rig::new(examples(&mut rng, &state));
+            let rig = apart.clone().with_joint_noise(Some(Arc::new(noise.clone())));
+            let theta: Vec<f64> = (0..joints).map(|_| rng.random_range(-2.0..2.0)).collect();
+            let readings = apart.channels().iter().map(|channel| {
+                let mut reading = vec![0.0; channel.equations()];
+                let is_read = channel.predict(&state, &theta, &mut reading) && rng.random_range(0..4) > 0;
+                let v: Vec<f64> = (0..reading.len()).map(|_| rng.sample(StandardNormal)).collect();
+                channel.disturb(&mut reading, &v);
+                is_read.then_some(reading)
+            });
+            let observation = Observation { readings: readings.collect() };
+            // Derivatives where nothing is left.
+            let exact = observation.readings.iter().zip(apart.channels()).map(|(reading, channel)| {
+                let mut reading = reading.clone()?;
+                channel.predict(&state, &theta, &mut reading);
+                Some(reading)
+            });
+            let exact = Observation { readings: exact.collect() };
+            let (found, wanted) = (
+                rig.equations_of(&state, &layout, &theta, &observation),
+                apart.equations_of(&state, &layout, &theta, &observation),
+            );
+            let d = wanted.residual.len();
+            let rows = apart.joint_rows_of(&noise, &state, &theta, &observation);
+            let j = DMatrix::from_column_slice(joints, d, &rows);
+            for joint in 0..joints {
+                let moved = |step: f64| {
+                    let mut theta = theta.clone();
+                    theta[joint] += step;
+                    apart.residual(&state, &theta, &exact)
+                };
+                let slope = (moved(-1e-6) - moved(1e-6)) / 2e-6;
+                let scale = 1.0 + j.amax();
+                prop_assert!((slope - j.row(joint).transpose()).amax() < 1e-5 * scale, "joint {joint}");
+            }
+            let sigma = DMatrix::from_diagonal(&DVector::from_vec(sigmas).map(|sigma| sigma * sigma));
+            let c = j.tr_mul(&(sigma * &j)) + DMatrix::identity(d, d);
+            let inverse = c.clone().cholesky().expect("positive").inverse();
+            // What rounding leaves grows with what is divided by.
+            let slack = 1e-12 * c.amax().max(1e4);
+            let information = &wanted.rows * &inverse * wanted.rows.transpose();
+            let scale = 1.0 + (&wanted.rows * wanted.rows.transpose()).amax();
+            prop_assert!((&found.rows * found.rows.transpose() - information).amax() < slack * scale);
+            let pull = &wanted.rows * &inverse * &wanted.residual;
+            prop_assert!((&found.rows * &found.residual - pull).amax() < slack * scale);
+            let squared = wanted.residual.dot(&(&inverse * &wanted.residual));
+            prop_assert!((found.residual.norm_squared() - squared).abs() < slack * (1.0 + wanted.residual.norm_squared()));
+            prop_assert!((rig.residual(&state, &theta, &observation) - &found.residual).amax() < 1e-6);
+            let mut sum = 0.0;
+            rig.residuals(&state, &theta, &observation, |_, it| sum += it.iter().map(|x| x * x).sum::<f64>());
+            prop_assert!((sum - found.residual.norm_squared()).abs() < 1e-6 * (1.0 + sum));
+            let factor = noise.factor(&rows);
+            prop_assert!((&factor * factor.transpose() - &c).amax() < 1e-9 * c.amax());
+            let mut errors = JointErrors::new(noise.sigmas(), 0);
+            let log = errors.whiten(&rows, &mut [], &mut []);
+            prop_assert!(d == 0 || (log - 2.0 * factor.diagonal().map(f64::ln).sum()).abs() < 1e-6 * (1.0 + log.abs()));
+        }
+    }
 }

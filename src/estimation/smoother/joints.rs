@@ -11,12 +11,13 @@
 //! Σ is learned by restricted maximum likelihood, as one factor t² of what it is said to be (MacKay's fixed point):
 //!
 //! ```text
-//! t² = (Σ ê_j²/σ_j² + ν) / (Σ (1 − V_jj/t²σ_j²) + ν),     ν = 2
+//! t² = (Σ ê_j²/σ_j² + ν t₀² + ½ t₁²) / (Σ (1 − V_jj/t²σ_j²) + ν + ½),     ν = 2,   t₁ = 0.3
 //! ```
 //!
-//! over all postures and joints, with ê and V what all measurements say of an error, V with what is not known of the state. It
-//! is how many errors were determined that counts: where readings tell hardly any, t stays 1. The scale of a sensor's own noise
-//! is told by what ê leaves of the residuals.
+//! over all postures and joints, with ê and V what all measurements say of an error, V with what is not known of the state, and
+//! t₀ what it was before the latest movement. It is how many errors were determined that counts: where readings tell hardly any,
+//! t changes slowly, and neither collapses nor swells. The scale of a sensor's own noise is told by what ê leaves of the
+//! residuals.
 
 use std::ops::Range;
 
@@ -33,8 +34,10 @@ use crate::{
     sensing::{Graduated, JointErrors, JointNoise},
 };
 
-/// ν: how many errors the stated Σ counts for.
-const STATED: f64 = 2.0;
+/// ν: how many errors t so far counts for.
+const SO_FAR: f64 = 2.0;
+/// t₁, and how many errors it counts for.
+const LIKELY: [f64; 2] = [0.3, 0.5];
 /// The least and the greatest factor of a stated σ.
 const FACTORS: [f64; 2] = [1e-3, 1e2];
 
@@ -188,7 +191,9 @@ impl Posterior {
             reading.weight = loss.weight(squared, count);
             if let Some(before) = before.filter(|_| reading.weight < 1.0) {
                 errors = before;
-                errors.weigh(reading.weight, j, &apart.0.as_slice()[of_rows], &apart.1.as_slice()[place]);
+                // What is left of an outlier's weight would still pull: it says nothing of e.
+                let weight = loss.normal(squared, count);
+                errors.weigh(weight, j, &apart.0.as_slice()[of_rows], &apart.1.as_slice()[place]);
                 let root = reading.weight.sqrt();
                 own.iter_mut().chain(left).for_each(|x| *x *= root);
             }
@@ -343,14 +348,24 @@ impl Smoother {
         self.unknown.contains(&true) || self.posterior.joints.as_ref().is_some_and(|joints| joints.unknown)
     }
 
-    /// Learns Σ at the heaviest mode, and tells by how much it has changed.
-    pub(super) fn learn_joint_noise(&mut self) -> f64 {
+    /// t; 1 where joints are exact.
+    pub(super) fn joint_factor(&self) -> f64 {
+        self.posterior.joints.as_ref().map_or(1.0, |joints| joints.factor)
+    }
+
+    /// Learns Σ at the heaviest mode, with t₀ = `before`, and tells by how much it has changed.
+    pub(super) fn learn_joint_noise(&mut self, before: f64) -> f64 {
         let layout = self.belief.layout.clone();
         let Some(mode) = self.hypotheses.modes.first() else { return 0.0 };
         let Some(joints) = self.posterior.joints.as_ref().filter(|joints| joints.unknown) else { return 0.0 };
         let (_, mut said) = self.posterior.joint_shares(joints, mode, &layout);
         said.add(joints.settled);
-        let factor = ((said.squares + STATED) / (said.determined + STATED)).sqrt().clamp(FACTORS[0], FACTORS[1]);
+        // With enough of them it may change as often as the modes follow.
+        let before = if said.determined > SO_FAR { joints.factor } else { before };
+        let [likely, weight] = LIKELY;
+        let square =
+            (said.squares + SO_FAR * before * before + weight * likely * likely) / (said.determined + SO_FAR + weight);
+        let factor = square.sqrt().clamp(FACTORS[0], FACTORS[1]);
         let change = (factor / joints.factor).ln().abs();
         if !change.is_finite() {
             return 0.0;

@@ -21,6 +21,8 @@ mod changes;
 mod factor;
 mod gram;
 mod hypotheses;
+#[cfg(test)]
+mod joint_laws;
 mod joints;
 #[cfg(test)]
 mod laws;
@@ -312,6 +314,11 @@ impl Estimator for Smoother {
         unknown
             .map(|((noise, _), scale)| NoiseReport { channel: noise.channel, first: noise.part.start, scale: *scale })
             .collect()
+    }
+
+    fn reading_sigmas(&self) -> Vec<f64> {
+        let joints = self.posterior.joints.as_ref().filter(|joints| joints.unknown);
+        joints.map_or_else(Vec::new, |joints| joints.noise.sigmas().to_vec())
     }
 
     fn readings(&self) -> Vec<ReadingReport> {

@@ -44,6 +44,7 @@ impl Smoother {
     pub(super) fn learn_noise(&mut self) {
         let layout = self.belief.layout.clone();
         let before = self.posterior.scales.clone();
+        let joints_before = self.joint_factor();
         for _ in 0..NOISE_ROUNDS {
             let Some(mode) = self.hypotheses.modes.first() else { return };
             let Some(absorbed) = self.posterior.absorbed(mode, &layout) else { return };
@@ -61,7 +62,7 @@ impl Smoother {
                     self.posterior.scales[noise] = scale;
                 }
             }
-            change = change.max(self.learn_joint_noise());
+            change = change.max(self.learn_joint_noise(joints_before));
             if change < 1e-3 {
                 return;
             }

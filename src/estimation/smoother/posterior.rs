@@ -407,7 +407,9 @@ impl Posterior {
     pub fn absorbed(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
         if let Some(joints) = &self.joints {
             let (kept, _) = self.joint_shares(joints, mode, layout);
-            return Some(kept.iter().zip(self.settled_shares(mode, layout)?).map(|(kept, settled)| kept + settled).collect());
+            return Some(
+                kept.iter().zip(self.settled_shares(mode, layout)?).map(|(kept, settled)| kept + settled).collect(),
+            );
         }
         let mut noises = vec![Quadratic::nothing(layout.dimension()); self.scales.len()];
         for measurements in self.measurements.chunks(STACKED) {

@@ -88,3 +88,66 @@ impl Check<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::{Scenario, builtin};
+
+    fn parsed(from: &str, to: &str) -> Result<Scenario, String> {
+        let known = builtin("hobby-arm-webcam").expect("built in");
+        assert!(known.source.contains(from));
+        let text = known.source.replacen(from, to, 1);
+        Scenario::parse("play.toml", &text, &|_| Err("no data".to_owned())).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn readings_are_stated_for_all_joints_or_for_each() {
+        let given = "reading_sigma_deg = 1.0";
+        let sigmas = |to: &str| {
+            let noise = parsed(given, to)?.rig.joint_noise().cloned();
+            Ok::<_, String>(
+                noise.map(|noise| noise.sigmas().iter().map(|sigma| sigma.to_degrees()).collect::<Vec<_>>()),
+            )
+        };
+        let near = |found: Option<Vec<f64>>, wanted: [f64; 5]| {
+            found.is_some_and(|found| found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12))
+        };
+        assert!(near(sigmas(given).expect("valid"), [1.0; 5]));
+        let each = [0.5, 1.0, 0.0, 2.0, 3.0];
+        assert!(near(sigmas(&format!("reading_sigma_deg = {each:?}")).expect("valid"), each));
+        assert_eq!(sigmas("reading_sigma_deg = 0.0"), Ok(None), "as if they were exact");
+        assert_eq!(sigmas("elbow = \"elbow\""), Ok(None), "they are unless it is said");
+        for (to, message) in [
+            ("reading_sigma_deg = -1.0", "0 or more"),
+            ("reading_sigma_deg = nan", "0 or more"),
+            ("reading_sigma_deg = [1.0, 2.0]", "2 numbers for 5 joints"),
+            ("reading_sigma_deg = \"unknown\"", "[smoother]"),
+            ("reading_sigma_deg = \"much\"", "is none of these"),
+            ("reading_sigma_deg = true", "expected a number"),
+            ("reading_sigma_m = [0.001]", "1 numbers for 0 joints"),
+        ] {
+            let found = sigmas(to).expect_err(to);
+            assert!(found.contains(message) && found.contains("reading_sigma"), "{to}: {found}");
+        }
+    }
+
+    #[test]
+    fn the_smoother_is_told_or_learns() {
+        let given = "reading_sigma = \"unknown\"";
+        assert!(parsed(given, given).expect("valid").smoother.joints_unknown);
+        assert!(!parsed(given, "reading_sigma = \"known\"").expect("valid").smoother.joints_unknown);
+        assert!(!parsed(given, "").expect("valid").smoother.joints_unknown);
+        // Of a table it learns it where a sensor reads more than a point, unless told.
+        for (name, learns) in [("tiago-mocap", false), ("ur10-camera", true), ("panda-sockets", false)] {
+            let recorded = builtin(name).expect("built in");
+            assert_eq!(recorded.smoother.joints_unknown, learns, "{name}");
+            assert!(recorded.rig.joint_noise().is_none(), "{name}");
+            for (key, learns) in [("\"unknown\"", true), ("0.0", false), ("0.3", false)] {
+                let text = recorded.source.replacen("[robot]", &format!("[robot]\nreading_sigma_deg = {key}"), 1);
+                let given = Scenario::parse("given.toml", &text, &|file| recorded.data_file(file)).expect("valid");
+                assert_eq!(given.smoother.joints_unknown, learns, "{name} {key}");
+                assert_eq!(given.rig.joint_noise().is_some(), key == "0.3", "{name} {key}");
+            }
+        }
+    }
+}
