@@ -4,6 +4,8 @@
 //! candidates side by side, and multiplied by P together. What is left per candidate are d × d matrices (see
 //! [`innovation`](super::innovation)).
 
+use std::sync::Arc;
+
 use fearless_simd::{Level, dispatch};
 use nalgebra::{Cholesky, DMatrix, Matrix3, Point3};
 
@@ -15,7 +17,7 @@ use super::{
 use crate::{
     lanes::{Aligned, GROUP, Run, groups, runs, times},
     model::{Layout, Pass, Points, State},
-    sensing::Rig,
+    sensing::{JointNoise, Rig},
 };
 
 /// Predictions of a chunk of candidates under one hypothesis.
@@ -33,8 +35,8 @@ pub(super) struct Predictions {
     gains: Aligned,
     /// H P Hᵀ of each candidate.
     spreads: Aligned,
-    /// L of each candidate, by which its rows are whitened beside the sensors' noise, where joints' readings are off.
-    factors: Vec<DMatrix<f64>>,
+    /// J of each candidate, by which its rows are whitened beside the sensors' noise, where joints' readings are off.
+    joints: Option<(Arc<JointNoise>, Vec<Vec<f64>>)>,
     /// Chance of each candidate to be seen.
     chances: Vec<f64>,
 }
@@ -55,19 +57,19 @@ impl Predictions {
         let mut chances = vec![1.0; candidates.len()];
         let mut pass = Pass::new(state, layout);
         let mut columns = vec![0.0; d * m];
-        let mut factors = Vec::new();
+        let mut joints = rig.joint_noise().map(|noise| (noise.clone(), Vec::with_capacity(candidates.len())));
         for (index, candidate) in candidates.iter().enumerate() {
             let candidate = candidate.as_ref();
             columns.fill(0.0);
             rig.rows_apart(pass.at(candidate), &mut readings[index * d..(index + 1) * d], &mut columns);
-            if let Some(joints) = rig.joint_noise() {
+            if let Some((noise, all)) = &mut joints {
                 // What may stay unseen counts less before the rest is whitened by it.
-                let mut by_joints = rig.joint_rows(joints, state, candidate);
-                factors.push(joints.factor(&by_joints));
+                let mut by_joints = rig.joint_rows(noise, state, candidate);
+                all.push(by_joints.clone());
                 if let Some(views) = views {
                     chances[index] = views.weigh(rig, candidate, &mut [&mut columns, &mut by_joints]);
                 }
-                joints.whiten(&by_joints, &mut columns, &mut []);
+                noise.whiten(&by_joints, &mut columns, &mut []);
             } else if let Some(views) = views {
                 chances[index] = views.weigh(rig, candidate, &mut [&mut columns]);
             }
@@ -77,7 +79,7 @@ impl Predictions {
                 row.zip(columns).for_each(|(row, x)| *row = *x);
             }
         }
-        Self { factors, ..Self::from_rows(level, [m, d], covariance, (readings, rows), chances) }
+        Self { joints, ..Self::from_rows(level, [m, d], covariance, (readings, rows), chances) }
     }
 
     /// The same where nothing but `points` is measured, which are seen for certain.
@@ -109,7 +111,7 @@ impl Predictions {
         let candidates = chances.len();
         let gains = times(level, [equations, candidates], &rows, covariance.as_slice());
         let spreads = products(level, [dimension, equations, candidates], &rows, &gains, None);
-        Self { level, equations, dimension, readings, rows, gains, spreads, factors: Vec::new(), chances }
+        Self { level, equations, dimension, readings, rows, gains, spreads, joints: None, chances }
     }
 
     /// The same with a chance of being seen for each candidate, from the predicted marker and its covariance (m, m²),
@@ -167,10 +169,11 @@ impl Predictions {
     /// L (H P Hᵀ + I) Lᵀ − I = H P Hᵀ + J Σ Jᵀ of a candidate whitened by the sensors' noise alone, from that of its rows; `None`
     /// where joints' readings are exact, and it is the same.
     fn unwhitened(&self, index: usize, spread: impl Fn(usize, usize) -> f64) -> Option<DMatrix<f64>> {
-        let factor = self.factors.get(index)?;
+        let (noise, by_joints) = self.joints.as_ref()?;
+        let factor = noise.factor(&by_joints[index]);
         let one = DMatrix::identity(self.equations, self.equations);
         let whitened = DMatrix::from_fn(self.equations, self.equations, spread) + &one;
-        Some(factor * whitened * factor.transpose() - one)
+        Some(&factor * whitened * factor.transpose() - one)
     }
 
     /// Gᵀ of a candidate (m × d), and S = H P Hᵀ + I.

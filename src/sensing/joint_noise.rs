@@ -75,7 +75,7 @@ impl JointNoise {
     }
 
     /// By what J is found: the offset of every joint.
-    pub(super) fn layout(&self) -> &Layout {
+    pub(crate) fn layout(&self) -> &Layout {
         &self.layout
     }
 

@@ -316,20 +316,12 @@ impl Rig {
         rows
     }
 
-    /// Writes J of a reading of one channel (columns of n numbers, all zero at first), as [`joint_rows`](Self::joint_rows); they
-    /// stay zero where it has no prediction.
-    pub fn joint_rows_in(
-        &self,
-        joints: &JointNoise,
-        state: &State,
-        positions: &[f64],
-        channel: usize,
-        rows: &mut [f64],
-    ) {
-        let mut pass = Pass::new(state, joints.layout());
-        let channel = &self.channels[channel];
-        channel.rows(pass.at(positions), &mut vec![0.0; channel.equations()], rows);
-        joints.by_readings(state, positions, rows);
+    /// Writes J of a reading of one channel (columns of n numbers, all zero at first), as [`joint_rows`](Self::joint_rows), where
+    /// a `pass` of the layout of `joints` stands; they stay zero where it has no prediction.
+    pub fn joint_rows_in(&self, joints: &JointNoise, pass: &Pass<'_>, channel: usize, rows: &mut [f64]) {
+        let (channel, mut scratch) = (&self.channels[channel], Scratch::default());
+        channel.rows(pass, scratch.take(channel.equations()), rows);
+        joints.by_readings(pass.state(), pass.positions(), rows);
     }
 
     /// As [`linearise_apart`](Self::linearise_apart) of one channel's reading; false where it has no prediction.

@@ -11,7 +11,7 @@
 //! Σ is learned by restricted maximum likelihood, as one factor t² of what it is said to be (MacKay's fixed point):
 //!
 //! ```text
-//! t² = (Σ ê_j²/σ_j² + ν t₀² + ½ t₁²) / (Σ (1 − V_jj/t²σ_j²) + ν + ½),     ν = 2,   t₁ = 0.3
+//! t² = (Σ ê_j²/σ_j² + ν t₀² + t₁²/5) / (Σ (1 − V_jj/t²σ_j²) + ν + 1/5),     ν = 2,   t₁ = 0.3
 //! ```
 //!
 //! over all postures and joints, with ê and V what all measurements say of an error, V with what is not known of the state, and
@@ -37,7 +37,10 @@ use crate::{
 /// ν: how many errors t so far counts for.
 const SO_FAR: f64 = 2.0;
 /// t₁, and how many errors it counts for.
-const LIKELY: [f64; 2] = [0.3, 0.5];
+const LIKELY: [f64; 2] = [0.3, 0.2];
+/// How many times as far off a reading may be and still tell of Σ: what is an outlier by a Σ that is too small would else never
+/// show that it is.
+const WIDE: f64 = 3.0;
 /// The least and the greatest factor of a stated σ.
 const FACTORS: [f64; 2] = [1e-3, 1e2];
 
@@ -115,18 +118,19 @@ impl Posterior {
     /// J of every measurement at `state`, whitened by the sensors' nominal noise: zero where a reading has no prediction.
     pub fn joint_rows(&self, state: &State) -> Vec<DMatrix<f64>> {
         let Some(joints) = &self.joints else { return Vec::new() };
-        let of = |seen: &Measurement| self.joint_rows_of(&joints.noise, state, seen);
+        let mut pass = Pass::new(state, joints.noise.layout());
+        let of = |seen: &Measurement| self.joint_rows_of(&joints.noise, pass.at(&seen.positions), seen);
         self.measurements.iter().map(of).collect()
     }
 
-    fn joint_rows_of(&self, noise: &JointNoise, state: &State, seen: &Measurement) -> DMatrix<f64> {
+    fn joint_rows_of(&self, noise: &JointNoise, pass: &Pass<'_>, seen: &Measurement) -> DMatrix<f64> {
         let (n, d) = (seen.positions.len(), seen.observation.equations());
         let mut rows = DMatrix::zeros(n, d);
         let mut at = 0;
         for (channel, reading) in seen.observation.readings.iter().enumerate() {
             let Some(reading) = reading else { continue };
             let end = at + reading.len();
-            self.rig.joint_rows_in(noise, state, &seen.positions, channel, &mut rows.as_mut_slice()[at * n..end * n]);
+            self.rig.joint_rows_in(noise, pass, channel, &mut rows.as_mut_slice()[at * n..end * n]);
             at = end;
         }
         rows
@@ -145,7 +149,10 @@ impl Posterior {
         let (mut rows, mut residual) = (DMatrix::zeros(m, d), DVector::zeros(d));
         let mut by_joints = match by_joints {
             Some(rows) => rows.clone(),
-            None => self.joint_rows_of(noise, pass.state(), seen),
+            None => {
+                let mut there = Pass::new(pass.state(), noise.layout());
+                self.joint_rows_of(noise, there.at(&seen.positions), seen)
+            }
         };
         let (mut readings, mut at, mut start) = (Vec::new(), 0, 0);
         for (channel, reading) in seen.observation.readings.iter().enumerate() {
@@ -241,12 +248,12 @@ impl Posterior {
 
     /// By kind of noise, how many equations of the measurements that have not settled parameters and joints' errors account for,
     /// and what these say of Σ.
-    pub fn joint_shares(&self, joints: &Joints, mode: &Mode, layout: &Layout) -> (Vec<f64>, Said) {
+    pub fn joint_shares(&self, loss: Graduated, joints: &Joints, mode: &Mode, layout: &Layout) -> (Vec<f64>, Said) {
         let (mut absorbed, mut said) = (vec![0.0; self.scales.len()], Said::default());
         let covariance = mode.covariance();
         let mut pass = Pass::new(&mode.state, layout);
         for seen in &self.measurements {
-            let posture = self.posture(&joints.noise, self.loss.into(), pass.at(&seen.positions), seen, None);
+            let posture = self.posture(&joints.noise, loss, pass.at(&seen.positions), seen, None);
             let (rows, _, spread) = posture.left();
             let gains = &covariance * &rows;
             for reading in &posture.readings {
@@ -358,7 +365,8 @@ impl Smoother {
         let layout = self.belief.layout.clone();
         let Some(mode) = self.hypotheses.modes.first() else { return 0.0 };
         let Some(joints) = self.posterior.joints.as_ref().filter(|joints| joints.unknown) else { return 0.0 };
-        let (_, mut said) = self.posterior.joint_shares(joints, mode, &layout);
+        let wide = Graduated { loss: self.posterior.loss, width: WIDE };
+        let (_, mut said) = self.posterior.joint_shares(wide, joints, mode, &layout);
         said.add(joints.settled);
         // With enough of them it may change as often as the modes follow.
         let before = if said.determined > SO_FAR { joints.factor } else { before };

@@ -406,7 +406,7 @@ impl Posterior {
     /// By kind of noise, how many of its equations the parameters account for: tr(Λₙ P), with Λₙ its share of the information.
     pub fn absorbed(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
         if let Some(joints) = &self.joints {
-            let (kept, _) = self.joint_shares(joints, mode, layout);
+            let (kept, _) = self.joint_shares(self.loss.into(), joints, mode, layout);
             return Some(
                 kept.iter().zip(self.settled_shares(mode, layout)?).map(|(kept, settled)| kept + settled).collect(),
             );

@@ -26,8 +26,9 @@ pub(super) struct Readings {
 
 impl Check<'_> {
     /// What `[robot]` and `[smoother]` say of the joints' readings. Where they say nothing, joints of a simulated robot are exact;
-    /// those of any other are learned by the smoother where a sensor reads more than a point, and are taken to be exact where
-    /// none does: from points alone play is hardly told from noise.
+    /// how far those of any other are off the smoother learns where a camera sees two points or more in one picture, or where a
+    /// robot elsewhere is told of poses. They are taken to be exact where nothing but points is read, from which play is hardly told
+    /// from noise, and in tables of poses.
     pub(super) fn readings(&mut self, raw: &raw::Scenario, robot: &Robot, rig: Option<&Rig>) -> Readings {
         let given = [
             ("robot.reading_sigma_deg", &raw.robot.reading_sigma_deg, JointKind::Revolute),
@@ -75,7 +76,10 @@ impl Check<'_> {
         let told = raw.smoother.as_ref().and_then(|given| given.reading_sigma);
         let is_telling = rig.is_some_and(|rig| {
             let mut channels = rig.channels().iter();
-            channels.any(|it| it.occasion() == Occasion::Always && it.equations() >= TELLING)
+            channels.any(|it| {
+                let is_usual = self.is_outside || it.sight().is_some();
+                it.occasion() == Occasion::Always && it.equations() >= TELLING && is_usual
+            })
         });
         let usual = is_unknown || (is_told && !is_stated && is_telling);
         let unknown = told.map_or(usual, |told| told == raw::NoiseKnowledge::Unknown);
@@ -137,8 +141,8 @@ mod tests {
         assert!(parsed(given, given).expect("valid").smoother.joints_unknown);
         assert!(!parsed(given, "reading_sigma = \"known\"").expect("valid").smoother.joints_unknown);
         assert!(!parsed(given, "").expect("valid").smoother.joints_unknown);
-        // Of a table it learns it where a sensor reads more than a point, unless told.
-        for (name, learns) in [("tiago-mocap", false), ("ur10-camera", true), ("panda-sockets", false)] {
+        // Of tables of points and poses it learns it where it is asked to.
+        for (name, learns) in [("tiago-mocap", false), ("ur10-camera", false), ("panda-sockets", false)] {
             let recorded = builtin(name).expect("built in");
             assert_eq!(recorded.smoother.joints_unknown, learns, "{name}");
             assert!(recorded.rig.joint_noise().is_none(), "{name}");
