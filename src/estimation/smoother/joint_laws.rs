@@ -70,8 +70,11 @@ impl Case {
     }
 
     fn smoother(&self, rig: Arc<Rig>) -> Smoother {
+        self.searching(rig, HypothesisSettings { kept: 1, spawned: 0 })
+    }
+
+    fn searching(&self, rig: Arc<Rig>, settings: HypothesisSettings) -> Smoother {
         let prior = Prior::around(self.guess.clone(), &self.layout, self.prior.clone()).expect("a prior");
-        let settings = HypothesisSettings { kept: 1, spawned: 0 };
         let rng = ChaCha8Rng::seed_from_u64(1);
         Smoother::new(prior, self.layout.clone(), rig, settings, rng).never_forgetting()
     }
@@ -203,7 +206,8 @@ fn what_is_learned_neither_collapses_nor_swells_at_first() {
         let case = Case::new(seed, 8, 1e-3, 0.01, 0.05);
         let noise = JointNoise::new(&case.truth, vec![0.0175; JOINTS]).map(Arc::new);
         let rig = Arc::new(case.rig.as_ref().clone().with_joint_noise(noise));
-        let mut smoother = case.smoother(rig).with_loss(Loss::MIXTURE).with_unknown_joint_noise(true);
+        let smoother = case.searching(rig, HypothesisSettings { kept: 8, spawned: 8 });
+        let mut smoother = smoother.with_loss(Loss::MIXTURE).with_unknown_joint_noise(true);
         for (theta, observation) in &case.seen {
             smoother.update(theta, observation).expect("absorbed");
             let sigma = smoother.reading_sigmas()[0];

@@ -11,7 +11,7 @@
 //! Σ is learned by restricted maximum likelihood, as one factor t² of what it is said to be (MacKay's fixed point):
 //!
 //! ```text
-//! t² = (Σ ê_j²/σ_j² + ν t₀² + t₁²/5) / (Σ (1 − V_jj/t²σ_j²) + ν + 1/5),     ν = 2,   t₁ = 0.3
+//! t² = (Σ ê_j²/σ_j² + ν t₀² + t₁²/5) / (Σ (1 − V_jj/t²σ_j²) + ν + 1/5),     ν = 4,   t₁ = 0.3
 //! ```
 //!
 //! over all postures and joints, with ê and V what all measurements say of an error, V with what is not known of the state, and
@@ -35,7 +35,7 @@ use crate::{
 };
 
 /// ν: how many errors t so far counts for.
-const SO_FAR: f64 = 2.0;
+const SO_FAR: f64 = 4.0;
 /// t₁, and how many errors it counts for.
 const LIKELY: [f64; 2] = [0.3, 0.2];
 /// How many times as far off a reading may be and still tell of Σ: what is an outlier by a Σ that is too small would else never
