@@ -13,7 +13,7 @@ use crate::{
         SmootherSpec, WorldSpec,
     },
     selection::{Active, Human, Minimiser, Planner, Policy, Random},
-    sensing::{Loss, Noise, Occasion},
+    sensing::{JointNoise, Loss, Noise, Occasion, Rig},
 };
 
 /// States drawn from the posterior for one Monte Carlo evaluation of (7).
@@ -132,14 +132,15 @@ impl Scenario {
         };
         let prior = Prior::new(briefing.initial.clone(), layout, covariance, within)
             .map_err(|source| ScenarioError::Prior { scenario: self.name.clone(), source })?;
-        let (rig, rng) = (Arc::new(self.rig.assuming(sigma)), Stream::Hypotheses.rng(seed));
+        let (rig, rng) = (Arc::new(self.smoother_rig(sigma)), Stream::Hypotheses.rng(seed));
         // What is known beforehand is one equation: its own σ says how well.
         let channels = self.rig.channels();
         let is_measured = |noise: &Noise| channels[noise.channel].occasion() != Occasion::Beforehand;
         let unknown = self.rig.noises().iter().map(|noise| noise_unknown && is_measured(noise)).collect();
         let smoother = Smoother::new(prior, layout.clone(), rig, hypotheses, rng)
             .with_loss(if spec.robust { loss } else { Loss::None })
-            .with_unknown_noise(unknown);
+            .with_unknown_noise(unknown)
+            .with_unknown_joint_noise(self.smoother.joints_unknown);
         let smoother = match &briefing.beforehand {
             Some(known) => smoother.knowing(known.clone()),
             None => smoother,
@@ -147,6 +148,16 @@ impl Scenario {
         // Recorded bodies do not change: what looks like it is an outlier or a model that does not hold.
         let is_recorded = matches!(self.world, WorldSpec::Measured { .. });
         Ok(if is_recorded { smoother.never_forgetting() } else { smoother })
+    }
+
+    /// The sensors as the smoother takes them to be, with σ of the first as `sigma`: where it learns how far joints' readings are
+    /// off, it begins with what is usual.
+    pub(crate) fn smoother_rig(&self, sigma: f64) -> Rig {
+        let rig = self.rig.assuming(sigma);
+        if !self.smoother.joints_unknown {
+            return rig;
+        }
+        rig.with_joint_noise(JointNoise::usual(&self.robot.state).map(Arc::new))
     }
 
     fn policy(&self, spec: &LearnerSpec, briefing: &Briefing) -> Box<dyn Policy> {

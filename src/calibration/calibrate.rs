@@ -135,6 +135,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         compliance: case.compliance(&fuller),
         outliers: case.outliers(&fit),
         noise: case.noise(&fit),
+        reading_sigmas: fit.reading_sigmas.clone(),
         base: case.base(&fit),
         targets: case.targets(&fit)?,
         joints: case.joints(&fit),

@@ -69,7 +69,7 @@ impl<'a> Case<'a> {
             names: scenario.robot.called(),
             described: scenario.robot.described.as_deref(),
             known: measurements.beforehand.as_ref(),
-            rig: Arc::new(scenario.rig.assuming(scenario.smoother.sigma)),
+            rig: Arc::new(scenario.smoother_rig(scenario.smoother.sigma)),
             loss: if scenario.smoother.loss == Loss::None { Loss::MIXTURE } else { scenario.smoother.loss },
         })
     }

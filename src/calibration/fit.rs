@@ -22,6 +22,8 @@ pub struct Fit {
     pub readings: Vec<ReadingReport>,
     /// How well they are fitted, by kind of noise.
     pub noise: Vec<NoiseFit>,
+    /// How far joints stand beside what they read, where that was learned: one standard deviation each, rad or m.
+    pub reading_sigmas: Vec<f64>,
     /// The rows that it was learned from.
     pub rows: Vec<usize>,
 }
@@ -72,6 +74,7 @@ impl Case<'_> {
             belief: smoother.belief().clone(),
             readings: smoother.readings(),
             noise: smoother.fits(),
+            reading_sigmas: smoother.reading_sigmas(),
             rows: rows.to_vec(),
         })
     }
@@ -108,6 +111,7 @@ impl Case<'_> {
         let smoother = Smoother::new(prior, Arc::new(layout.clone()), self.rig.clone(), settings, rng)
             .with_loss(self.loss)
             .with_unknown_noise(unknown)
+            .with_unknown_joint_noise(self.scenario.smoother.joints_unknown)
             .never_forgetting();
         Ok(match self.known {
             Some(known) => smoother.knowing(known.clone()),

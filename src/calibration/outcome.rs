@@ -42,6 +42,9 @@ pub struct Report {
     pub outliers: Vec<Outlier>,
     /// What the residuals say of the sensors' noise.
     pub noise: Vec<Noise>,
+    /// How far joints stand beside what they read, where that was learned: one standard deviation for each, rad or m.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reading_sigmas: Vec<f64>,
     /// Where the base link is in the frame of the measurements.
     pub base: Placement,
     /// Where the targets are.

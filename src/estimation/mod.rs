@@ -59,6 +59,11 @@ pub trait Estimator: Send + Sync {
         None
     }
 
+    /// How far joints' readings are off, where it learns that: one standard deviation each, rad or m.
+    fn reading_sigmas(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// As [`correct`](Self::correct), for observations that nobody has looked at: what does not fit is refused, and
     /// nothing is changed by it.
     fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {

@@ -85,7 +85,8 @@ impl SixNumbers {
         let p = &self.covariance;
         let weight = self.belief.rig.marker_sigma().recip();
         let (rows, predicted) = self.rows(positions);
-        let (rows, innovation) = (rows * weight, (measured - predicted) * weight);
+        let (mut rows, mut innovation) = (rows * weight, (measured - predicted) * weight);
+        self.belief.rig.whiten_marker(&self.belief.state, positions, rows.as_mut_slice(), innovation.as_mut_slice());
         let diverged = || EstimationError::Diverged("an update was not a finite number");
         let (s, numerator) = innovation_covariance(p, &rows);
         let s = s.cholesky().ok_or_else(diverged)?;

@@ -54,7 +54,7 @@ impl UnscentedRls {
         let m = layout.dimension();
         let diverged = || EstimationError::Diverged("an update was not a finite number");
         // All whitened residuals are taken from the observation: y₀ − y = −residual at the centre, and so on.
-        let residual_of = |state: &State| rig.residual(state, positions, observation);
+        let residual_of = |at: &State| rig.residual_near(state, at, positions, observation);
         let centre = residual_of(state);
         let d = centre.len();
         if d == 0 {

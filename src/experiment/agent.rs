@@ -142,6 +142,11 @@ impl Agent {
         self.estimator.misfit()
     }
 
+    /// How far joints' readings are off, where it learns that: one standard deviation each, rad or m.
+    pub fn reading_sigmas(&self) -> Vec<f64> {
+        self.estimator.reading_sigmas()
+    }
+
     /// What it may do.
     pub fn actions(&self) -> &Actions {
         &self.actions

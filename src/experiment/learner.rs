@@ -101,6 +101,11 @@ impl Learner {
         self.agent.noise()
     }
 
+    /// How far joints' readings are off, where it learns that: one standard deviation each, rad or m.
+    pub(super) fn reading_sigmas(&self) -> Vec<f64> {
+        self.agent.reading_sigmas()
+    }
+
     /// The joint limits.
     pub(super) fn limits(&self) -> &JointBox {
         self.agent.limits()

@@ -4,6 +4,7 @@ use super::{World, gauge::Gauge, learner::Learner};
 use crate::{
     estimation::{Misfit, MisfitCause, NoiseReport, ReadingReport},
     experiment::{Description, Metrics},
+    kinematics::JointKind,
 };
 
 /// Movements listed at most.
@@ -16,6 +17,7 @@ pub(super) fn remarks(learner: &Learner, metrics: &Metrics, description: &Descri
     let mut said = Vec::new();
     said.extend(undetermined(learner, description));
     said.extend(learner.noise().iter().filter_map(noise));
+    said.extend(joint_noise(learner));
     said.extend(metrics.model_error_m.filter(|error| *error > 0.0).map(model_error));
     said.extend(outliers(&learner.readings()));
     said.extend(learner.agent().misfit().map(misfit));
@@ -61,6 +63,21 @@ fn noise(noise: &NoiseReport) -> Option<String> {
     let NoiseReport { channel, scale, .. } = noise;
     ((scale - 1.0).abs() > AS_PROMISED)
         .then(|| format!("what channel {channel} measures scatters {scale:.2} times as much as its σ says"))
+}
+
+/// How far joints stand beside what they read, where that is learned: the largest of each kind.
+fn joint_noise(learner: &Learner) -> Option<String> {
+    let sigmas = learner.reading_sigmas();
+    let joints = &learner.belief().state.joints;
+    let largest = |kind: JointKind| {
+        let of_kind = joints.iter().zip(&sigmas).filter(|(joint, _)| joint.kind() == kind);
+        of_kind.map(|(_, sigma)| *sigma).reduce(f64::max)
+    };
+    let turning = largest(JointKind::Revolute).map(|sigma| format!("{:.2} deg", sigma.to_degrees()));
+    let sliding = largest(JointKind::Prismatic).map(|sigma| format!("{:.2} mm", sigma * 1e3));
+    let said: Vec<String> = turning.into_iter().chain(sliding).collect();
+    (!said.is_empty())
+        .then(|| format!("joints stand beside what they read by {} (standard deviation, learned)", said.join(" and ")))
 }
 
 fn model_error(error_m: f64) -> String {

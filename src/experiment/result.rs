@@ -85,6 +85,9 @@ pub struct LearnerResult {
     /// The scales of noise that it learned.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub noise: Vec<NoiseReport>,
+    /// How far the joints' readings are off as it learned it: one standard deviation for each joint, rad or m.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reading_sigmas: Vec<f64>,
     /// What is to be said of it in words: what no movement can tell, noise other than promised, outliers, alarms.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
@@ -248,6 +251,7 @@ impl Experiment {
                 metrics: report.metrics.clone(),
                 readings: learner.readings(),
                 noise: learner.noise(),
+                reading_sigmas: learner.reading_sigmas(),
                 remarks: remarks(learner, &report.metrics, description, &self.world),
                 model: Model::new(learner.belief(), &names),
             })

@@ -26,6 +26,8 @@ pub enum Stream {
     HeldOutSockets = 9,
     /// The error of what is known before any movement.
     Beforehand = 10,
+    /// What the joints' readings are off by, one draw per movement.
+    JointNoise = 11,
 }
 
 impl Stream {

@@ -59,6 +59,8 @@ pub struct Draw {
     pub noise: Vec<f64>,
     /// By channel four numbers uniform in 0..1: whether the reading is an outlier, and where it lies.
     pub outliers: Vec<[f64; 4]>,
+    /// Standard normal numbers, one per joint: by what its reading is off.
+    pub joints: Vec<f64>,
 }
 
 /// A change of the body.
@@ -103,12 +105,15 @@ pub enum WorldError {
 pub struct NoiseSequence {
     noise: ChaCha8Rng,
     outliers: ChaCha8Rng,
+    joints: ChaCha8Rng,
 }
 
 impl NoiseSequence {
     /// The sequence of a seed.
     pub fn new(seed: u64) -> Self {
-        Self { noise: Stream::Noise.rng(seed), outliers: Stream::Outliers.rng(seed) }
+        let [noise, outliers, joints] =
+            [Stream::Noise, Stream::Outliers, Stream::JointNoise].map(|stream| stream.rng(seed));
+        Self { noise, outliers, joints }
     }
 
     /// The draw of the next movement in a world.
@@ -116,7 +121,9 @@ impl NoiseSequence {
         let World::Simulated { rig, outliers, .. } = world else { return Draw::default() };
         let noise = (0..rig.equations()).map(|_| self.noise.sample(StandardNormal)).collect();
         let channels = outliers.map_or(0, |_| rig.channels().len());
-        Draw { noise, outliers: (0..channels).map(|_| self.outliers.random()).collect() }
+        let outliers = (0..channels).map(|_| self.outliers.random()).collect();
+        let joints = rig.joint_noise().map_or(0, |noise| noise.sigmas().len());
+        Draw { noise, outliers, joints: (0..joints).map(|_| self.joints.sample(StandardNormal)).collect() }
     }
 }
 
@@ -164,6 +171,14 @@ impl World {
         draw.outliers.get(channel).is_some_and(|[chance, ..]| *chance < outliers.fraction)
     }
 
+    /// What the joints' readings are off by, rad or m: where they read θ, the robot stands at θ and this. Empty where they are
+    /// exact.
+    fn errors(&self, draw: &Draw) -> Vec<f64> {
+        let Self::Simulated { rig, .. } = self else { return Vec::new() };
+        let noise = rig.joint_noise().into_iter().flat_map(|noise| noise.sigmas());
+        noise.zip(&draw.joints).map(|(sigma, v)| sigma * v).collect()
+    }
+
     /// A movement as it is carried out, under a draw of chance: what is to be held in a socket is pushed into it. The joints then
     /// read the nearest posture in which the target is there, but for what play and their noise, which are σ at the target,
     /// make of it.
@@ -177,7 +192,10 @@ impl World {
         let mut place = truth.sockets[socket];
         rig.channels()[channel].disturb(place.coords.as_mut_slice(), rig.part(channel, &draw.noise));
         let nearest = Manifold::new(truth, target, place, limits).nearest(&movement.configuration);
-        Ok(Movement { configuration: nearest.ok_or_else(out_of_reach)?, ..movement.clone() })
+        let mut configuration = nearest.ok_or_else(out_of_reach)?;
+        // The robot stands there; what it reads is off.
+        configuration.iter_mut().zip(self.errors(draw)).for_each(|(reading, error)| *reading -= error);
+        Ok(Movement { configuration, ..movement.clone() })
     }
 
     /// What is seen after `movement`, under a draw of chance.
@@ -186,9 +204,11 @@ impl World {
             Self::Simulated { truth, rig, head, outliers, .. } => {
                 let theta = &movement.configuration;
                 Observation::missed(rig.channels().len()).check(rig, truth.joints.len(), theta)?;
+                let mut stands = theta.clone();
+                stands.iter_mut().zip(self.errors(draw)).for_each(|(position, error)| *position += error);
                 let mut observation = match head {
-                    Some(head) if !head.sees(&truth.marker_at(theta)) => Observation::missed(rig.channels().len()),
-                    _ => rig.observe_in(movement.socket, truth, theta, &draw.noise),
+                    Some(head) if !head.sees(&truth.marker_at(&stands)) => Observation::missed(rig.channels().len()),
+                    _ => rig.observe_in(movement.socket, truth, &stands, &draw.noise),
                 };
                 for (channel, reading) in observation.readings.iter_mut().enumerate() {
                     if let (Some(reading), Some(outliers), true) = (reading, outliers, self.is_outlier(draw, channel)) {
@@ -215,7 +235,7 @@ mod tests {
     use super::*;
     use crate::{
         model::laws::random_arm,
-        sensing::{Channel, Socket},
+        sensing::{Channel, JointNoise, Socket},
     };
 
     #[test]
@@ -248,7 +268,7 @@ mod tests {
         };
         let proposed = Movement { socket: Some(1), ..Movement::to(vec![0.21, 0.19, 0.2, 0.22, 0.18, 0.2]) };
         for noise in [0.0, 1.0] {
-            let draw = Draw { noise: vec![noise; 6], outliers: Vec::new() };
+            let draw = Draw { noise: vec![noise; 6], ..Draw::default() };
             let made = world.execute(&proposed, &draw).expect("in reach");
             let away = robot.marker_at(&made.configuration) - wanted;
             assert!((away - nalgebra::Vector3::repeat(2e-4 * noise)).norm() < 1e-9, "{away}");
@@ -265,6 +285,34 @@ mod tests {
         assert_eq!(world.execute(&free, &Draw::default()), Ok(free.clone()), "nothing is held");
     }
 
+    /// Joints that are off are shown where they stand and told where they read, and no other draw of chance changes.
+    #[test]
+    fn joints_stand_beside_what_they_read() {
+        let truth = random_arm(&mut ChaCha8Rng::seed_from_u64(4), 3);
+        let limits = JointBox::new(vec![(-1.0, 1.0); 3]).expect("limits");
+        let world = |noise: Option<Vec<f64>>| {
+            let noise = noise.and_then(|sigmas| JointNoise::new(&truth, sigmas)).map(Arc::new);
+            let rig = Arc::new(Rig::tracker(1e-9).with_joint_noise(noise));
+            let (truth, limits) = (Box::new(truth.clone()), limits.clone());
+            World::Simulated { truth, rig, limits, head: None, change: None, outliers: None }
+        };
+        let (exact, off) = (world(None), world(Some(vec![0.02, 0.0, 0.1])));
+        let (mut of_exact, mut of_off) = (NoiseSequence::new(7), NoiseSequence::new(7));
+        let mut squares = [0.0; 3];
+        for _ in 0..400 {
+            let (draw, with) = (of_exact.draw(&exact), of_off.draw(&off));
+            assert_eq!((&draw.noise, &draw.outliers, draw.joints.len()), (&with.noise, &with.outliers, 0));
+            let movement = Movement::to(vec![0.3, -0.2, 0.5]);
+            let stands = [0.3 + 0.02 * with.joints[0], -0.2, 0.5 + 0.1 * with.joints[2]];
+            assert_eq!(off.execute(&movement, &with), Ok(movement.clone()), "it reads what was wanted");
+            let seen = off.observe(&movement, &with).expect("seen").readings[0].clone().expect("seen");
+            let place = truth.marker_at(&stands);
+            assert!(place.coords.iter().zip(&seen).all(|(a, b)| (a - b).abs() < 1e-7));
+            squares.iter_mut().zip(&with.joints).for_each(|(sum, v)| *sum += v * v / 400.0);
+        }
+        assert!(squares.iter().all(|square| (0.75..1.3).contains(square)), "{squares:?}");
+    }
+
     #[test]
     fn a_body_beyond_all_numbers_shows_nothing() {
         let mut truth = random_arm(&mut ChaCha8Rng::seed_from_u64(1), 2);
@@ -272,7 +320,7 @@ mod tests {
         let (truth, rig) = (Box::new(truth), Arc::new(Rig::tracker(0.1)));
         let limits = JointBox::new(vec![(-1.0, 1.0); 2]).expect("limits");
         let world = World::Simulated { truth, rig, limits, head: None, change: None, outliers: None };
-        let draw = Draw { noise: vec![0.0; 3], outliers: Vec::new() };
+        let draw = Draw { noise: vec![0.0; 3], ..Draw::default() };
         let shown = world.observe(&Movement::to(vec![0.1; 2]), &draw);
         assert!(matches!(shown, Err(WorldError::NoMeasurement(_))), "{shown:?}");
     }

@@ -89,6 +89,8 @@ pub struct Pass<'a> {
     loads: Option<&'a Loads>,
     /// By joint: what it bears, N·m per kg; empty without loads.
     torques: Vec<[f64; 2]>,
+    /// Where it stands.
+    positions: Vec<f64>,
     links: Vec<Motion>,
     /// Of base, axes and corrections, those that move the links nearest to the base first.
     twists: Vec<Twist>,
@@ -131,7 +133,8 @@ impl<'a> Pass<'a> {
         });
         let axes = axes.collect();
         let (links, twists) = (Vec::with_capacity(state.joints.len() + 1), Vec::with_capacity(layout.dimension()));
-        Self { state, layout, corrections, axes, loads, torques: Vec::new(), links, twists }
+        let positions = Vec::with_capacity(state.joints.len());
+        Self { state, layout, corrections, axes, loads, torques: Vec::new(), positions, links, twists }
     }
 
     /// The state.
@@ -144,11 +147,18 @@ impl<'a> Pass<'a> {
         self.layout
     }
 
+    /// The readings where it stands, rad or m, one per joint.
+    pub fn positions(&self) -> &[f64] {
+        &self.positions
+    }
+
     /// Moves to readings `positions`, rad or m, one per joint.
     pub fn at(&mut self, positions: &[f64]) -> &mut Self {
         debug_assert_eq!(positions.len(), self.state.joints.len());
         self.links.clear();
         self.twists.clear();
+        self.positions.clear();
+        self.positions.extend_from_slice(positions);
         let mut link = Motion::of(&self.state.base);
         if let Some(range) = self.layout.block(Block::Base) {
             for (k, coordinate) in range.enumerate() {

@@ -27,6 +27,7 @@ pub const BUILTIN: &[Builtin] = builtins![
     "arm-6dof-outliers",
     "arm-6dof-camera",
     "hand-eye-6dof",
+    "hobby-arm-webcam",
     "arm-6dof-pose-gears",
     "arm-7dof-eccentric",
     "arm-7dof-socket",

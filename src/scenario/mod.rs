@@ -366,6 +366,8 @@ pub struct SmootherSpec {
     pub loss: Loss,
     /// Whether it is not told how much noise there is, so that the sensors' σ are units alone.
     pub noise_unknown: bool,
+    /// Whether it is not told how far the joints' readings are off, and learns it.
+    pub joints_unknown: bool,
 }
 
 /// How movements are chosen actively.

@@ -302,7 +302,7 @@ mod tests {
         lanes::levels,
         model::laws::random_arm,
         selection::CriterionUnits,
-        sensing::{Position, Rig},
+        sensing::{JointNoise, Position, Rig},
     };
 
     /// A random belief about an arm whose marker is seen by one tracker, or by two at once.
@@ -329,6 +329,60 @@ mod tests {
         let information: f64 = belief.rig.channels().iter().map(|channel| channel.sigma().powi(-2)).sum();
         let information = p.clone().try_inverse().expect("positive") + h.transpose() * &h * information;
         information.try_inverse().expect("positive")
+    }
+
+    /// Where joints' readings are off: every optimality against the posterior by the whole covariance of the readings, and how far
+    /// two hypotheses are apart by it.
+    #[test]
+    fn readings_that_err_together_teach_less() {
+        for seed in 0..20 {
+            let (mut belief, weights, mut rng) = random_belief(seed, 1 + seed as usize % 2);
+            let sigmas: Vec<f64> = (0..6).map(|_| rng.random_range(0.01..0.3)).collect();
+            let noise = JointNoise::new(&belief.state, sigmas.clone()).map(Arc::new);
+            let apart = belief.rig.clone();
+            belief.rig = Arc::new(apart.as_ref().clone().with_joint_noise(noise.clone()));
+            let offsets = Layout::new(&belief.state, (0..6).map(crate::model::Block::Offset));
+            let workspace = Workspace::from(candidates(&mut rng, 10));
+            let p = belief.covariance.clone().expect("a covariance");
+            let whole = |state: &State, theta: &[f64]| {
+                let h = apart.jacobian(state, &belief.layout, theta);
+                let j = apart.jacobian(state, &offsets, theta);
+                let sigma = DMatrix::from_diagonal(&DVector::from_fn(6, |joint, _| sigmas[joint] * sigmas[joint]));
+                (h, j.tr_mul(&(sigma * &j)) + DMatrix::identity(j.ncols(), j.ncols()))
+            };
+            for optimality in [Optimality::A, Optimality::D, Optimality::I] {
+                let criterion = Criterion::new(&belief, &weights).expect("a covariance").by(optimality, &workspace);
+                for theta in candidates(&mut rng, 3) {
+                    let (h, c) = whole(&belief.state, &theta);
+                    let s = h.tr_mul(&(&p * &h)) + &c;
+                    let posterior = &p - &p * &h * s.cholesky().expect("positive").solve(&(h.transpose() * &p));
+                    let expected = match optimality {
+                        Optimality::A => weights.trace(&posterior),
+                        Optimality::D => 0.5 * posterior.determinant().ln(),
+                        _ => {
+                            let after = belief.clone().with_covariance(posterior);
+                            let spread = |theta: &Vec<f64>| after.marker_covariance(theta).expect("kept").trace();
+                            workspace.configurations.iter().map(spread).sum::<f64>() / 10.0
+                        }
+                    };
+                    let value = criterion.evaluate(std::slice::from_ref(&theta))[0];
+                    let scale = expected.abs().max(1e-3);
+                    assert!((value - expected).abs() < 1e-6 * scale, "{seed} {optimality:?}: {value} {expected}");
+                }
+            }
+            let other = random_arm(&mut rng, 6);
+            let criteria = [&belief.state, &other].map(|state| Criterion::over(&belief, state, &p, &weights));
+            for theta in candidates(&mut rng, 3) {
+                let predicted = [&criteria[0], &criteria[1]].map(|of| of.predictions(std::slice::from_ref(&theta)));
+                let told = crate::selection::prediction::told_apart(&belief.rig, &predicted[0], &predicted[1], 0);
+                let [(h, c), (g, e)] = [&belief.state, &other].map(|state| whole(state, &theta));
+                let mean = (h.tr_mul(&(&p * &h)) + c + g.tr_mul(&(&p * &g)) + e) * 0.5;
+                let mut apart_by = DVector::zeros(mean.nrows());
+                apart.difference(predicted[0].reading(0), predicted[1].reading(0), apart_by.as_mut_slice());
+                let distance = 0.125 * apart_by.dot(&mean.cholesky().expect("positive").solve(&apart_by));
+                assert!((told + (-distance).exp_m1()).abs() < 1e-8, "{told} {distance}");
+            }
+        }
     }
 
     fn candidates(rng: &mut ChaCha8Rng, count: usize) -> Vec<Vec<f64>> {

@@ -4,6 +4,8 @@
 //! candidates side by side, and multiplied by P together. What is left per candidate are d × d matrices (see
 //! [`innovation`](super::innovation)).
 
+use std::sync::Arc;
+
 use fearless_simd::{Level, dispatch};
 use nalgebra::{Cholesky, DMatrix, Matrix3, Point3};
 
@@ -15,7 +17,7 @@ use super::{
 use crate::{
     lanes::{Aligned, GROUP, Run, groups, runs, times},
     model::{Layout, Pass, Points, State},
-    sensing::Rig,
+    sensing::{JointNoise, Rig},
 };
 
 /// Predictions of a chunk of candidates under one hypothesis.
@@ -33,6 +35,8 @@ pub(super) struct Predictions {
     gains: Aligned,
     /// H P Hᵀ of each candidate.
     spreads: Aligned,
+    /// J of each candidate, by which its rows are whitened beside the sensors' noise, where joints' readings are off.
+    joints: Option<(Arc<JointNoise>, Vec<Vec<f64>>)>,
     /// Chance of each candidate to be seen.
     chances: Vec<f64>,
 }
@@ -53,12 +57,21 @@ impl Predictions {
         let mut chances = vec![1.0; candidates.len()];
         let mut pass = Pass::new(state, layout);
         let mut columns = vec![0.0; d * m];
+        let mut joints = rig.joint_noise().map(|noise| (noise.clone(), Vec::with_capacity(candidates.len())));
         for (index, candidate) in candidates.iter().enumerate() {
             let candidate = candidate.as_ref();
             columns.fill(0.0);
-            rig.rows(pass.at(candidate), &mut readings[index * d..(index + 1) * d], &mut columns);
-            if let Some(views) = views {
-                chances[index] = views.weigh(rig, candidate, &mut columns);
+            rig.rows_apart(pass.at(candidate), &mut readings[index * d..(index + 1) * d], &mut columns);
+            if let Some((noise, all)) = &mut joints {
+                // What may stay unseen counts less before the rest is whitened by it.
+                let mut by_joints = rig.joint_rows(noise, state, candidate);
+                all.push(by_joints.clone());
+                if let Some(views) = views {
+                    chances[index] = views.weigh(rig, candidate, &mut [&mut columns, &mut by_joints]);
+                }
+                noise.whiten(&by_joints, &mut columns, &mut []);
+            } else if let Some(views) = views {
+                chances[index] = views.weigh(rig, candidate, &mut [&mut columns]);
             }
             let rows = &mut rows[index / GROUP * m * d * GROUP..];
             for (equation, columns) in columns.chunks_exact(m.max(1)).enumerate() {
@@ -66,7 +79,7 @@ impl Predictions {
                 row.zip(columns).for_each(|(row, x)| *row = *x);
             }
         }
-        Self::from_rows(level, [m, d], covariance, (readings, rows), chances)
+        Self { joints, ..Self::from_rows(level, [m, d], covariance, (readings, rows), chances) }
     }
 
     /// The same where nothing but `points` is measured, which are seen for certain.
@@ -98,7 +111,7 @@ impl Predictions {
         let candidates = chances.len();
         let gains = times(level, [equations, candidates], &rows, covariance.as_slice());
         let spreads = products(level, [dimension, equations, candidates], &rows, &gains, None);
-        Self { level, equations, dimension, readings, rows, gains, spreads, chances }
+        Self { level, equations, dimension, readings, rows, gains, spreads, joints: None, chances }
     }
 
     /// The same with a chance of being seen for each candidate, from the predicted marker and its covariance (m, m²),
@@ -116,9 +129,12 @@ impl Predictions {
         });
         let spreads = other.as_ref().unwrap_or(&self.spreads);
         for index in 0..self.chances.len() {
-            let Some(spread) = rig.marker_spread(|row, column| spreads[place(d, row, column, index)]) else {
-                return;
+            let of_rows = |row: usize, column: usize| spreads[place(d, row, column, index)];
+            let spread = match self.unwhitened(index, of_rows) {
+                Some(whole) => rig.marker_spread(|row, column| whole[(row, column)]),
+                None => rig.marker_spread(of_rows),
             };
+            let Some(spread) = spread else { return };
             let at = index * d + marker.start;
             let marker = Point3::from_slice(&self.readings[at..at + 3]);
             self.chances[index] = chance(index, &marker, &spread);
@@ -148,6 +164,16 @@ impl Predictions {
     /// H P Hᵀ of a candidate, by row and column.
     pub fn spread(&self, index: usize) -> impl Fn(usize, usize) -> f64 {
         move |row, column| self.spreads[place(self.equations, row, column, index)]
+    }
+
+    /// L (H P Hᵀ + I) Lᵀ − I = H P Hᵀ + J Σ Jᵀ of a candidate whitened by the sensors' noise alone, from that of its rows; `None`
+    /// where joints' readings are exact, and it is the same.
+    fn unwhitened(&self, index: usize, spread: impl Fn(usize, usize) -> f64) -> Option<DMatrix<f64>> {
+        let (noise, by_joints) = self.joints.as_ref()?;
+        let factor = noise.factor(&by_joints[index]);
+        let one = DMatrix::identity(self.equations, self.equations);
+        let whitened = DMatrix::from_fn(self.equations, self.equations, spread) + &one;
+        Some(&factor * whitened * factor.transpose() - one)
     }
 
     /// Gᵀ of a candidate (m × d), and S = H P Hᵀ + I.
@@ -194,6 +220,13 @@ impl Predictions {
 /// 1 − e^{−B} of two hypotheses that predict a candidate, with B the Bhattacharyya distance of their readings.
 pub(super) fn told_apart(rig: &Rig, a: &Predictions, b: &Predictions, index: usize) -> f64 {
     let (in_a, in_b) = (a.spread(index), b.spread(index));
+    if let (Some(in_a), Some(in_b)) = (a.unwhitened(index, &in_a), b.unwhitened(index, &in_b)) {
+        // Each was whitened by its own L: they are compared as the sensors see them.
+        let mean = (in_a + in_b) * 0.5;
+        let distance =
+            bhattacharyya(rig, [a.reading(index), b.reading(index)], |row, column| mean[(row, column)], |it, _| it);
+        return distance.map_or(0.0, share);
+    }
     let mean = |row: usize, column: usize| 0.5 * (in_a(row, column) + in_b(row, column));
     let distance = bhattacharyya(rig, [a.reading(index), b.reading(index)], mean, |distance, _| distance);
     distance.map_or(0.0, share)

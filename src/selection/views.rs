@@ -86,19 +86,21 @@ impl Views {
         Self { states }
     }
 
-    /// Weighs the rows (d columns of m numbers) of a movement to `positions` by what channels will see, and tells the chance
+    /// Weighs rows (each d columns of some numbers) of a movement to `positions` by what channels will see, and tells the chance
     /// that anything is seen.
-    pub fn weigh(&self, rig: &Rig, positions: &[f64], rows: &mut [f64]) -> f64 {
+    pub fn weigh(&self, rig: &Rig, positions: &[f64], all: &mut [&mut [f64]]) -> f64 {
         let mut chances = vec![0.0; rig.channels().len()];
         self.chances(rig, positions, &mut chances);
         let best = chances.iter().copied().fold(0.0, f64::max);
-        let m = rows.len() / rig.equations().max(1);
         let mut start = 0;
         for (channel, chance) in rig.channels().iter().zip(&chances) {
-            let end = start + channel.equations() * m;
+            let end = start + channel.equations();
             if *chance < best {
                 let factor = (chance / best).sqrt();
-                rows[start..end].iter_mut().for_each(|x| *x *= factor);
+                for rows in &mut *all {
+                    let m = rows.len() / rig.equations().max(1);
+                    rows[start * m..end * m].iter_mut().for_each(|x| *x *= factor);
+                }
             }
             start = end;
         }

@@ -3,6 +3,7 @@
 //! * [`Channel`]: one kind of reading, whitened at the source; the list below names all there are.
 //! * [`Occasion`]: when a channel reads: always, while a target is held in a socket, or before any movement.
 //! * [`Rig`]: the channels of a robot together, and what they say at one posture.
+//! * [`JointNoise`]: how far the joints' own readings are off, by which all readings of one posture err together.
 //! * [`Observation`]: the readings of one movement; a channel may have none.
 //! * [`Keys`]: what a scenario may say of a sensor; [`Equipment`]: what it can name.
 //! * [`Loss`]: what a reading costs that is far from its prediction.
@@ -12,6 +13,7 @@
 
 mod channel;
 mod head;
+mod joint_noise;
 mod keys;
 #[cfg(test)]
 mod laws;
@@ -21,6 +23,8 @@ mod rig;
 
 pub use channel::{Apart, Channel, Occasion};
 pub use head::{Gaze, Head};
+pub(crate) use joint_noise::JointErrors;
+pub use joint_noise::JointNoise;
 pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
 pub use loss::{Graduated, Loss};
 pub use observation::{Observation, Refused};

@@ -4,7 +4,7 @@ use std::{ops::Range, sync::Arc};
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use super::{Channel, Observation, Occasion, Position};
+use super::{Channel, JointErrors, JointNoise, Observation, Occasion, Position};
 use crate::model::{Layout, Pass, State, Whitening};
 
 /// All channels through which a robot is observed. What it hands out is whitened: R = I.
@@ -16,6 +16,8 @@ pub struct Rig {
     /// All kinds of noise, channel by channel.
     noises: Vec<Noise>,
     marker: Option<usize>,
+    /// What the joints' readings are off by; `None` where they are exact.
+    joints: Option<Arc<JointNoise>>,
 }
 
 /// One kind of noise of a channel: the equations that share a σ.
@@ -52,7 +54,18 @@ impl Rig {
             (0..count).map(move |noise| Noise { channel: index, part: noise * size..(noise + 1) * size })
         });
         let noises = noises.collect();
-        Self { channels, places, noises, marker }
+        Self { channels, places, noises, marker, joints: None }
+    }
+
+    /// The same where the joints' readings are off by `joints`: all readings after one movement err together, and what is
+    /// handed out is whitened by `I + J Σ Jᵀ`. See [`JointNoise`].
+    pub fn with_joint_noise(self, joints: Option<Arc<JointNoise>>) -> Self {
+        Self { joints, ..self }
+    }
+
+    /// What the joints' readings are off by; `None` where they are exact.
+    pub fn joint_noise(&self) -> Option<&Arc<JointNoise>> {
+        self.joints.as_ref()
     }
 
     /// A tracker of the marker alone, with so much noise per coordinate (metres).
@@ -72,7 +85,7 @@ impl Rig {
             Occasion::Held { socket: other, .. } => socket == Some(other),
             Occasion::Beforehand => false,
         };
-        Self::new(self.channels.iter().filter(reads).cloned().collect())
+        Self::new(self.channels.iter().filter(reads).cloned().collect()).with_joint_noise(self.joints.clone())
     }
 
     /// The channel that reads while a target is held in `socket`, and that target.
@@ -120,7 +133,8 @@ impl Rig {
             let of_channel = self.noises.iter().zip(factors).filter(|(noise, _)| noise.channel == index);
             of_channel.map(|(_, factor)| *factor).collect::<Vec<f64>>()
         };
-        Self::new(self.channels.iter().enumerate().map(|(index, channel)| channel.scaled(&of(index))).collect())
+        let scaled = self.channels.iter().enumerate().map(|(index, channel)| channel.scaled(&of(index)));
+        Self::new(scaled.collect()).with_joint_noise(self.joints.clone())
     }
 
     /// Whether any channel sees some postures only.
@@ -140,8 +154,11 @@ impl Rig {
         self.places.last().map_or(0, |place| place.end)
     }
 
-    /// The points that are measured, where nothing else is: see [`Channel::point`].
+    /// The points that are measured, where nothing else is (see [`Channel::point`]) and each errs by itself.
     pub fn points(&self) -> Option<Vec<(usize, Whitening)>> {
+        if self.joints.is_some() {
+            return None;
+        }
         self.channels.iter().map(|channel| channel.point()).collect()
     }
 
@@ -168,7 +185,7 @@ impl Rig {
             // Not by the factor: σ is to be `sigma` to the last bit, also where it was 0.
             channel.with_sigma(if index == 0 || factor.is_infinite() { sigma } else { channel.sigma() * factor })
         });
-        Self::new(scaled.collect())
+        Self::new(scaled.collect()).with_joint_noise(self.joints.clone())
     }
 
     /// H P Hᵀ of the marker's position (m²), of the whitened spread of all equations; `None` if no channel measures it.
@@ -176,6 +193,16 @@ impl Rig {
         let channel = self.marker?;
         let (start, variance) = (self.places[channel].start, self.channels[channel].sigma().powi(2));
         Some(Matrix3::from_fn(|row, column| spread(start + row, start + column) * variance))
+    }
+
+    /// Whitens the marker's three equations by what joints' readings are off, which are whitened by the sensor's noise already;
+    /// what is exact changes nothing.
+    pub fn whiten_marker(&self, state: &State, positions: &[f64], rows: &mut [f64], residual: &mut [f64]) {
+        if let (Some(joints), Some(place)) = (&self.joints, self.marker_place()) {
+            let by_joints = self.joint_rows(joints, state, positions);
+            let n = positions.len();
+            joints.whiten(&by_joints[place.start * n..place.end * n], rows, residual);
+        }
     }
 
     /// Where the marker's predicted position stands among all predicted readings.
@@ -187,6 +214,25 @@ impl Rig {
     /// d columns of m numbers in `rows`, which are all zero at first.
     #[inline]
     pub fn rows(&self, pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
+        self.rows_apart(pass, readings, rows);
+        if let Some(joints) = &self.joints {
+            joints.whiten(&self.joint_rows(joints, pass.state(), pass.positions()), rows, &mut []);
+        }
+    }
+
+    /// J = ∂h/∂q by the joints' readings at one posture, whitened by the sensors' noise, transposed: d columns of n numbers.
+    pub fn joint_rows(&self, joints: &JointNoise, state: &State, positions: &[f64]) -> Vec<f64> {
+        let (d, n) = (self.equations(), positions.len());
+        let mut pass = Pass::new(state, joints.layout());
+        let mut rows = vec![0.0; d * n];
+        self.rows_apart(pass.at(positions), &mut vec![0.0; d], &mut rows);
+        joints.by_readings(state, positions, &mut rows);
+        rows
+    }
+
+    /// As [`rows`](Self::rows), but whitened by the sensors' noise alone.
+    #[inline]
+    pub fn rows_apart(&self, pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
         let m = rows.len() / readings.len().max(1);
         for (channel, place) in self.channels.iter().zip(&self.places) {
             let reading = &mut readings[place.clone()];
@@ -244,6 +290,66 @@ impl Rig {
         rows: &mut [f64],
         residual: &mut [f64],
     ) -> usize {
+        let found = self.linearise_apart(pass, observation, rows, residual);
+        if let Some(joints) = &self.joints {
+            let m = pass.layout().dimension();
+            let by_joints = self.joint_rows_of(joints, pass.state(), pass.positions(), observation);
+            joints.whiten(&by_joints, &mut rows[..found * m], &mut residual[..found]);
+        }
+        found
+    }
+
+    /// J of the readings of an observation that have a prediction, as [`joint_rows`](Self::joint_rows).
+    pub fn joint_rows_of(
+        &self,
+        joints: &JointNoise,
+        state: &State,
+        positions: &[f64],
+        observation: &Observation,
+    ) -> Vec<f64> {
+        let (d, n) = (observation.equations(), positions.len());
+        let mut pass = Pass::new(state, joints.layout());
+        let mut rows = vec![0.0; d * n];
+        let found = self.linearise_apart(pass.at(positions), observation, &mut rows, &mut vec![0.0; d]);
+        rows.truncate(found * n);
+        joints.by_readings(state, positions, &mut rows);
+        rows
+    }
+
+    /// Writes J of a reading of one channel (columns of n numbers, all zero at first), as [`joint_rows`](Self::joint_rows), where
+    /// a `pass` of the layout of `joints` stands; they stay zero where it has no prediction.
+    pub fn joint_rows_in(&self, joints: &JointNoise, pass: &Pass<'_>, channel: usize, rows: &mut [f64]) {
+        let (channel, mut scratch) = (&self.channels[channel], Scratch::default());
+        channel.rows(pass, scratch.take(channel.equations()), rows);
+        joints.by_readings(pass.state(), pass.positions(), rows);
+    }
+
+    /// As [`linearise_apart`](Self::linearise_apart) of one channel's reading; false where it has no prediction.
+    pub fn linearise_reading(
+        &self,
+        pass: &Pass<'_>,
+        channel: usize,
+        reading: &[f64],
+        rows: &mut [f64],
+        residual: &mut [f64],
+    ) -> bool {
+        let mut scratch = Scratch::default();
+        let (channel, predicted) = (&self.channels[channel], scratch.take(reading.len()));
+        let is_predicted = channel.rows(pass, predicted, rows);
+        if is_predicted {
+            channel.difference(reading, predicted, residual);
+        }
+        is_predicted
+    }
+
+    /// As [`linearise`](Self::linearise), but whitened by the sensors' noise alone.
+    pub fn linearise_apart(
+        &self,
+        pass: &Pass<'_>,
+        observation: &Observation,
+        rows: &mut [f64],
+        residual: &mut [f64],
+    ) -> usize {
         let m = pass.layout().dimension();
         let mut scratch = Scratch::default();
         let mut at = 0;
@@ -261,6 +367,30 @@ impl Rig {
 
     /// L⁻¹ (y ⊖ h) of an observation, of those readings that have a prediction.
     pub fn residual(&self, state: &State, positions: &[f64], observation: &Observation) -> DVector<f64> {
+        self.residual_near(state, state, positions, observation)
+    }
+
+    /// The same with L that of another state near this one, as of the centre of several.
+    pub fn residual_near(
+        &self,
+        centre: &State,
+        state: &State,
+        positions: &[f64],
+        observation: &Observation,
+    ) -> DVector<f64> {
+        let mut residual = self.residual_apart(state, positions, observation);
+        if let Some(joints) = &self.joints {
+            let by_joints = self.joint_rows_of(joints, centre, positions, observation);
+            // Where the two see different readings, none of them is whitened by the other's.
+            if by_joints.len() == residual.len() * positions.len() {
+                joints.whiten(&by_joints, &mut [], residual.as_mut_slice());
+            }
+        }
+        residual
+    }
+
+    /// The same whitened by the sensors' noise alone.
+    pub fn residual_apart(&self, state: &State, positions: &[f64], observation: &Observation) -> DVector<f64> {
         let mut residual = Vec::with_capacity(observation.equations());
         for (channel, reading) in self.channels.iter().zip(&observation.readings) {
             let Some(reading) = reading else { continue };
@@ -283,8 +413,36 @@ impl Rig {
         sum
     }
 
-    /// Hands L⁻¹ (y ⊖ h) of every reading that there is to `each`, with its channel.
+    /// Hands L⁻¹ (y ⊖ h) of every reading that there is to `each`, with its channel: given the readings before it, where they
+    /// err together.
     pub fn residuals(
+        &self,
+        state: &State,
+        positions: &[f64],
+        observation: &Observation,
+        mut each: impl FnMut(usize, &[f64]),
+    ) {
+        let Some(joints) = &self.joints else {
+            self.residuals_apart(state, positions, observation, each);
+            return;
+        };
+        let n = positions.len();
+        let by_joints = self.joint_rows_of(joints, state, positions, observation);
+        let (mut errors, mut at) = (JointErrors::new(joints.sigmas(), 0), 0);
+        self.residuals_apart(state, positions, observation, |channel, whitened| {
+            let mut whitened = whitened.to_vec();
+            let place = at * n..(at + whitened.len()) * n;
+            // A reading that is predicted has its rows.
+            if let Some(by_joints) = by_joints.get(place) {
+                errors.whiten(by_joints, &mut [], &mut whitened);
+            }
+            at += whitened.len();
+            each(channel, &whitened);
+        });
+    }
+
+    /// The same whitened by the sensors' noise alone.
+    pub fn residuals_apart(
         &self,
         state: &State,
         positions: &[f64],

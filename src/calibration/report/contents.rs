@@ -182,6 +182,22 @@ fn noise(document: &mut Document, report: &Report) {
         [only] => document.text(only.clone()),
         _ => document.parts.push(Part::List(said)),
     }
+    let joints = report.joints.iter().zip(&report.reading_sigmas);
+    let said: Vec<String> = joints.filter_map(|(joint, sigma)| reading(joint, *sigma)).collect();
+    if !said.is_empty() {
+        document.text(format!(
+            "Joints stand beside what they read, anew at every posture; standard deviations that explain the residuals: {}.",
+            said.join(", ")
+        ));
+    }
+}
+
+fn reading(joint: &crate::calibration::Joint, sigma: f64) -> Option<String> {
+    let said = match joint.kind.as_str() {
+        "prismatic" => format!("{} {:.3} mm", joint.name, sigma * 1e3),
+        _ => format!("{} {:.3} deg", joint.name, sigma.to_degrees()),
+    };
+    (sigma > 0.0).then_some(said)
 }
 
 fn placements(document: &mut Document, report: &Report, case: &Case<'_>) {

@@ -82,7 +82,7 @@ impl Smoother {
     /// Where least squares with the nominal noise leads, and the scales of the noise as its residuals have them: no reading
     /// counts as an outlier before it is known how far normal ones scatter, and what parameters explain is no noise.
     fn begin_noise_from(&mut self, starts: &[&State]) -> Vec<State> {
-        if !self.unknown.contains(&true) {
+        if !self.learns_noise() {
             return starts.iter().map(|start| (*start).clone()).collect();
         }
         let layout = self.belief.layout.clone();
@@ -96,7 +96,7 @@ impl Smoother {
     }
 
     fn settle_noise(&mut self) {
-        if !self.unknown.contains(&true) {
+        if !self.learns_noise() {
             return;
         }
         for _ in 0..ROUNDS {

@@ -82,7 +82,7 @@ impl Smoother {
         let squared = |index: usize| {
             let seen = &posterior.measurements[index];
             let mut sum = 0.0;
-            posterior.rig.residuals(&belief.state, &seen.positions, &seen.observation, |channel, whitened| {
+            posterior.residuals(&belief.state, seen, |channel, whitened| {
                 sum += posterior.squared(channel, whitened);
             });
             (index, sum, seen.observation.equations())
@@ -134,7 +134,7 @@ impl Smoother {
             let Some(before) = self.before(since) else { continue };
             for jump in jumps {
                 let change = Change { since, jump: jump.clone(), log_odds: f64::NEG_INFINITY };
-                let Some(After { mode: after, log_odds, .. }) = self.after(&before, &change, mode) else { continue };
+                let Some(After { mode: after, log_odds, .. }) = self.after(&before.1, &change, mode) else { continue };
                 let mut explained = 0;
                 for seen in &seen[since..] {
                     self.posterior.weights(&after.state, seen, |weight| explained += usize::from(weight > 0.5));
@@ -159,7 +159,7 @@ impl Smoother {
     }
 
     /// What is believed if the body has changed so, against `mode`, one body for all.
-    fn after(&self, (before, known): &(Posterior, Mode), change: &Change, mode: &Mode) -> Option<After> {
+    fn after(&self, known: &Mode, change: &Change, mode: &Mode) -> Option<After> {
         let layout = &self.belief.layout;
         let Jump { directions, covariance, log_share } = &change.jump;
         let spread = known.covariance() + directions * covariance * directions.transpose();
@@ -191,7 +191,7 @@ impl Smoother {
         let is_determined = |(before, known): &(Posterior, Mode)| {
             before.equations(&known.state, &layout) >= DETERMINED * layout.dimension() as f64
         };
-        let after = before.filter(is_determined).and_then(|before| self.after(&before, change, &mode));
+        let after = before.filter(is_determined).and_then(|before| self.after(&before.1, change, &mode));
         if let Some(After { posterior, mode, .. }) = after {
             self.posterior = posterior;
             self.hypotheses.modes = vec![mode];

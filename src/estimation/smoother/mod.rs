@@ -23,6 +23,9 @@ mod changes;
 mod factor;
 mod gram;
 mod hypotheses;
+#[cfg(test)]
+mod joint_laws;
+mod joints;
 mod jump;
 #[cfg(test)]
 mod known;
@@ -174,8 +177,10 @@ impl Smoother {
 
     fn publish(&mut self) {
         let Some((best, rest)) = self.hypotheses.modes.split_first() else { return };
-        if self.posterior.scales.iter().any(|scale| *scale != 1.0) || self.unknown.contains(&true) {
-            self.belief.rig = Arc::new(self.nominal.scaled(&self.posterior.scales));
+        if self.learns_noise() || self.posterior.scales.iter().any(|scale| *scale != 1.0) {
+            let joints = self.posterior.joints.as_ref().map(|joints| Arc::new(joints.noise.clone()));
+            let rig = self.nominal.scaled(&self.posterior.scales);
+            self.belief.rig = Arc::new(rig.with_joint_noise(joints));
         }
         self.belief.state = best.state.clone();
         self.belief.covariance = Some(best.covariance());
@@ -251,6 +256,11 @@ impl Estimator for Smoother {
             .collect()
     }
 
+    fn reading_sigmas(&self) -> Vec<f64> {
+        let joints = self.posterior.joints.as_ref().filter(|joints| joints.unknown);
+        joints.map_or_else(Vec::new, |joints| joints.noise.sigmas().to_vec())
+    }
+
     fn readings(&self) -> Vec<ReadingReport> {
         if !self.posterior.loss.is_robust() {
             return Vec::new();
@@ -292,6 +302,7 @@ impl Smoother {
                 let first = self.posterior.measurements[KEPT / 2].movement;
                 let settling = self.posterior.readings(&self.belief.state).take_while(|it| it.movement < first);
                 Arc::make_mut(&mut self.past).extend(settling);
+                self.posterior.settle_joints(KEPT / 2, &self.hypotheses.modes[0], &layout);
                 self.posterior.settle(KEPT / 2, &self.belief.state, &layout);
             }
         } else {

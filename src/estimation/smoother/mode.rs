@@ -156,6 +156,12 @@ impl Posterior {
             if let Some(found) = found {
                 room.put_back(if is_better { std::mem::replace(&mut normal, found) } else { found });
             }
+            if is_better && self.joints.is_some() {
+                // Readings are whitened by where it stands now.
+                room.joints = None;
+                let found = self.normal_by(loss, &state, layout, &mut room)?;
+                room.put_back(std::mem::replace(&mut normal, found));
+            }
             if lambda > 1e12 {
                 break;
             }

@@ -175,6 +175,7 @@ impl Smoother {
     pub(super) fn learn_noise(&mut self) {
         let layout = self.belief.layout.clone();
         let before = self.posterior.scales.clone();
+        let joints_before = self.joint_factor();
         for _ in 0..NOISE_ROUNDS {
             let Some(left) = self.left() else { return };
             let is_alone = self.hypotheses.modes.len() == 1;
@@ -200,6 +201,7 @@ impl Smoother {
                     self.posterior.scales[noise] = scale;
                 }
             }
+            change = change.max(self.learn_joint_noise(joints_before));
             if change < 1e-3 {
                 return;
             }

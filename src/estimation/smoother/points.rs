@@ -25,6 +25,8 @@ pub(super) struct Room {
     readings: Vec<f64>,
     factors: Vec<f64>,
     residuals: Vec<f64>,
+    /// J of every measurement, where joints' readings are off: of the state that a search stood in last.
+    pub(super) joints: Option<Vec<DMatrix<f64>>>,
 }
 
 fn emptied(numbers: &mut Vec<f64>, count: usize) -> &mut [f64] {

@@ -15,6 +15,7 @@ use fearless_simd::Level;
 use nalgebra::{DMatrix, DVector};
 
 use super::{
+    joints::Joints,
     mode::Mode,
     points::Room,
     settled::{Quadratic, Settled},
@@ -56,6 +57,8 @@ pub(super) struct Posterior {
     /// What is known of the equipment before any movement: it belongs to the prior, so that it never settles and no change of the
     /// body drops it.
     pub known: Vec<Measurement>,
+    /// What the joints' readings are off by, where they are not exact.
+    pub joints: Option<Joints>,
     pub measurements: Vec<Measurement>,
     pub settled: Option<Settled>,
 }
@@ -88,7 +91,9 @@ impl Posterior {
     pub fn new(prior: Prior, rig: Arc<Rig>) -> Self {
         let scales = vec![1.0; rig.noises().len()];
         let targets = rig.points();
+        let joints = rig.joint_noise().map(|noise| Joints::new(noise.as_ref().clone()));
         Self {
+            joints,
             pins: prior.pins(),
             prior,
             rig,
@@ -104,8 +109,8 @@ impl Posterior {
 
     /// The same rig, likelihood and known equipment with another prior, and of the measurements only these.
     pub fn anew(&self, prior: Prior, measurements: Vec<Measurement>) -> Self {
-        let (loss, scales, known) = (self.loss, self.scales.clone(), self.known.clone());
-        Self { loss, scales, known, measurements, ..Self::new(prior, self.rig.clone()) }
+        let (loss, scales, known, joints) = (self.loss, self.scales.clone(), self.known.clone(), self.joints.clone());
+        Self { loss, scales, known, joints, measurements, ..Self::new(prior, self.rig.clone()) }
     }
 
     /// What is made of every reading at `state`, but for those that have settled and what is known beforehand.
@@ -121,7 +126,7 @@ impl Posterior {
     fn readings_of(&self, measurements: &[Measurement], state: &State) -> impl Iterator<Item = ReadingReport> {
         let of = move |seen: &Measurement| {
             let mut reports = Vec::new();
-            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+            self.residuals(state, seen, |channel, whitened| {
                 let (squared, d) = (self.squared(channel, whitened), whitened.len());
                 reports.push(ReadingReport {
                     movement: seen.movement,
@@ -144,9 +149,14 @@ impl Posterior {
 
     /// Hands the weight of every reading of a measurement at `state` to `each`.
     pub fn weights(&self, state: &State, seen: &Measurement, mut each: impl FnMut(f64)) {
-        self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+        self.residuals(state, seen, |channel, whitened| {
             each(self.loss.weight(self.squared(channel, whitened), whitened.len()));
         });
+    }
+
+    /// The measurements of which no two readings err together: what is known beforehand, and where joints are exact, all.
+    fn apart(&self) -> impl Iterator<Item = &Measurement> {
+        self.known.iter().chain(self.measurements.iter().filter(|_| self.joints.is_none()))
     }
 
     /// How many measurements there were.
@@ -189,7 +199,7 @@ impl Posterior {
     /// A measurement without the readings that are likelier outliers than not; `None` if that leaves none.
     fn without_outliers(&self, state: &State, seen: &Measurement) -> Option<Measurement> {
         let mut normal = seen.clone();
-        self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+        self.residuals(state, seen, |channel, whitened| {
             if self.loss.weight(self.squared(channel, whitened), whitened.len()) < 0.5 {
                 normal.observation.readings[channel] = None;
             }
@@ -218,8 +228,11 @@ impl Posterior {
     #[cfg(test)]
     pub fn cost(&self, state: &State, layout: &Layout) -> f64 {
         let (loss, mut cost) = (Graduated::from(self.loss), self.prior.cost(state, None));
-        for seen in self.all() {
-            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+        if let Some(joints) = &self.joints {
+            cost += self.stacked_jointly((&joints.noise, loss), state, layout, &self.measurements, None).2;
+        }
+        for seen in self.apart() {
+            self.residuals(state, seen, |channel, whitened| {
                 cost += loss.cost(self.squared(channel, whitened), whitened.len());
             });
         }
@@ -233,9 +246,12 @@ impl Posterior {
     /// By kind of noise, how well the data are fitted at `state`: for one that is as assumed `squared` is χ² distributed with
     /// `equations` degrees of freedom.
     pub fn fit(&self, state: &State, layout: &Layout) -> Vec<Fit> {
-        let mut fits = vec![Fit::default(); self.scales.len()];
-        for seen in self.all() {
-            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+        let mut fits = match &self.joints {
+            None => vec![Fit::default(); self.scales.len()],
+            Some(joints) => self.joint_fit(&joints.noise, state),
+        };
+        for seen in self.apart() {
+            self.residuals(state, seen, |channel, whitened| {
                 let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
                 for (noise, part) in self.noises(channel) {
                     fits[noise].squared += weight * norm_squared(&whitened[part.clone()]);
@@ -279,6 +295,16 @@ impl Posterior {
         }
         if let Some(points) = self.points(state, layout) {
             cost += self.add_points(loss, &points, (&mut information, &mut descent), room);
+        } else if let Some(joints) = &self.joints {
+            let by_joints = room.joints.take().unwrap_or_else(|| self.joint_rows(state));
+            for (measurements, by_joints) in self.measurements.chunks(STACKED).zip(by_joints.chunks(STACKED)) {
+                let (stacked, residuals, errors) =
+                    self.stacked_jointly((&joints.noise, loss), state, layout, measurements, Some(by_joints));
+                information += &stacked * stacked.transpose();
+                descent += stacked * residuals;
+                cost += errors;
+            }
+            room.joints = Some(by_joints);
         } else {
             for measurements in self.measurements.chunks(STACKED) {
                 let (stacked, residuals, errors) = self.stacked(loss, state, layout, measurements);
@@ -315,6 +341,9 @@ impl Posterior {
         layout: &Layout,
         measurements: &[Measurement],
     ) -> (DMatrix<f64>, DVector<f64>, f64) {
+        if let Some(joints) = &self.joints {
+            return self.stacked_jointly((&joints.noise, loss), state, layout, measurements, None);
+        }
         let m = layout.dimension();
         let equations = measurements.iter().map(|seen| seen.observation.equations()).sum();
         let mut stacked = DMatrix::zeros(m, equations);
@@ -385,7 +414,7 @@ impl Posterior {
         };
         let mut quadratics: Vec<Quadratic> = of_noise.iter().zip(&self.scales).map(of).collect();
         for seen in measurements {
-            self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
+            self.residuals(state, seen, |channel, whitened| {
                 let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
                 self.noises(channel)
                     .for_each(|(noise, part)| quadratics[noise].equations += weight * part.len() as f64);
@@ -415,6 +444,12 @@ impl Posterior {
 
     /// By kind of noise, how many of its equations the parameters account for: tr(Λₙ P), with Λₙ its share of the information.
     pub fn absorbed(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
+        if let Some(joints) = &self.joints {
+            let (kept, _) = self.joint_shares(self.loss.into(), joints, mode, layout);
+            return Some(
+                kept.iter().zip(self.settled_shares(mode, layout)?).map(|(kept, settled)| kept + settled).collect(),
+            );
+        }
         let mut noises = vec![Quadratic::nothing(layout.dimension()); self.scales.len()];
         let known = self.known.chunks(STACKED);
         for measurements in known.chain(self.measurements.chunks(STACKED)) {

@@ -77,8 +77,19 @@ pub struct Robot {
     pub elbow: Option<Spanned<String>>,
     #[serde(default)]
     pub offsets: Vec<Spanned<String>>,
+    pub reading_sigma_deg: Option<Spanned<Deviations>>,
+    pub reading_sigma_m: Option<Spanned<Deviations>>,
     #[serde(rename = "joint")]
     pub joints: Spanned<Vec<Spanned<Joint>>>,
+}
+
+/// Standard deviations: one for all, one for each, or a word.
+#[derive(Debug, PartialEq, Deserialize)]
+#[serde(untagged, expecting = "expected a number, a list of numbers or \"unknown\"")]
+pub enum Deviations {
+    One(f64),
+    Each(Vec<f64>),
+    Word(String),
 }
 
 #[derive(Debug, Deserialize)]
@@ -278,6 +289,8 @@ pub struct Smoother {
     /// Also written `sigma = "unknown"`.
     #[serde(alias = "sigma")]
     pub noise: Option<NoiseKnowledge>,
+    /// Whether it is told how far the joints' readings are off.
+    pub reading_sigma: Option<NoiseKnowledge>,
 }
 
 /// Whether the smoother is told how much noise there is.

@@ -12,11 +12,12 @@ mod held_out;
 mod learners;
 mod measured;
 mod outside;
+mod readings;
 mod recorded_sockets;
 mod sockets;
 mod world;
 
-use std::{collections::BTreeMap, ops::Range};
+use std::{collections::BTreeMap, ops::Range, sync::Arc};
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use toml::Spanned;
@@ -192,6 +193,8 @@ impl Check<'_> {
         }
         let recorded = if is_recorded { self.recorded(raw, &mut robot) } else { None };
         let rig = self.rig(raw, &robot);
+        let readings = self.readings(raw, &robot, rig.as_deref());
+        let rig = rig.map(|rig| Arc::new(rig.as_ref().clone().with_joint_noise(readings.noise.clone())));
         let rows = recorded.as_ref().map(|(_, held_out)| held_out.split(0).0.len() as u64);
         let world = self.world(raw, &robot, rig.as_deref(), recorded);
         let kind = match (self.is_outside, &raw.measurements) {
@@ -218,7 +221,7 @@ impl Check<'_> {
             prior: self.prior(raw, &robot),
             filter,
             unscented: raw.unscented.as_ref().map_or(filter, |given| self.filter("unscented", given, usual)),
-            smoother: self.smoother(raw, rig.as_deref()),
+            smoother: self.smoother(raw, rig.as_deref(), readings.unknown),
             gradient_rate: self.gradient_rate(raw),
             selection: self.selection(&raw.selection),
             constraints,
@@ -318,7 +321,7 @@ impl Check<'_> {
         Filter { variance, stabilising }
     }
 
-    fn smoother(&mut self, raw: &raw::Scenario, rig: Option<&Rig>) -> SmootherSpec {
+    fn smoother(&mut self, raw: &raw::Scenario, rig: Option<&Rig>, joints_unknown: bool) -> SmootherSpec {
         let default = HypothesisSettings::default();
         let given = raw.smoother.as_ref();
         let variance = given.and_then(|given| given.measurement_variance_m2.as_ref());
@@ -338,7 +341,7 @@ impl Check<'_> {
         let is_told = raw.measurements.is_some() || self.is_outside;
         let usual = if is_told { raw::NoiseKnowledge::Unknown } else { raw::NoiseKnowledge::Known };
         let noise_unknown = given.and_then(|given| given.noise).unwrap_or(usual) == raw::NoiseKnowledge::Unknown;
-        SmootherSpec { sigma, hypotheses, loss: self.loss(given), noise_unknown }
+        SmootherSpec { sigma, hypotheses, loss: self.loss(given), noise_unknown, joints_unknown }
     }
 
     fn loss(&mut self, given: Option<&raw::Smoother>) -> Loss {
