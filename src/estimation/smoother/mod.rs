@@ -22,6 +22,8 @@ mod factor;
 mod gram;
 mod hypotheses;
 #[cfg(test)]
+mod known;
+#[cfg(test)]
 mod laws;
 mod mode;
 mod model_error;
@@ -143,7 +145,7 @@ impl Smoother {
     /// The same with what is known before any movement, which no posture has to do with: of the robot's equipment.
     pub fn knowing(mut self, observation: Observation) -> Self {
         let positions = vec![0.0; self.belief.state.joints.len()];
-        self.posterior.measurements.push(Measurement { positions, observation, movement: BEFOREHAND });
+        self.posterior.known.push(Measurement { positions, observation, movement: BEFOREHAND });
         let layout = self.belief.layout.clone();
         self.hypotheses.follow(&self.posterior, &layout);
         self.hypotheses.condense(self.settings.kept, &layout);
@@ -215,7 +217,7 @@ impl Smoother {
     fn forget(&mut self) {
         let Some(changed) = self.since_change() else { return };
         let latest = changed.measurements.iter().map(|seen| seen.movement);
-        let first = latest.filter(|movement| *movement != BEFOREHAND).min().unwrap_or(u64::MAX);
+        let first = latest.min().unwrap_or(u64::MAX);
         let dropped = self.posterior.readings(&self.belief.state).take_while(|reading| reading.movement < first);
         let dropped: Vec<ReadingReport> = dropped.collect();
         Arc::make_mut(&mut self.past).extend(dropped);
@@ -237,10 +239,8 @@ impl Smoother {
         let surprising = self.changes.since().unwrap_or(surprising).min(measurements.len());
         let covariance = self.prior_here() * 0.25;
         let prior = Prior::around(self.belief.state.clone(), &self.belief.layout, covariance).ok()?;
-        // What is known of the equipment has nothing to do with the body.
-        let (old, latest) = measurements.split_at(measurements.len() - surprising);
-        let known = old.iter().filter(|seen| seen.movement == BEFOREHAND);
-        Some(self.posterior.anew(prior, known.chain(latest).cloned().collect()))
+        let latest = &measurements[measurements.len() - surprising..];
+        Some(self.posterior.anew(prior, latest.to_vec()))
     }
 
     /// The prior's covariance in the chart at the estimate; without what correlates its parameters where the estimate has
@@ -273,7 +273,9 @@ impl Smoother {
     /// equation, and among many readings that would be taken for a misfit. Nor do readings that have settled, which were
     /// explained when they did.
     fn explains(&self) -> bool {
-        let normal = self.posterior.readings(&self.belief.state).filter(|reading| reading.weight > 0.5);
+        let (posterior, state) = (&self.posterior, &self.belief.state);
+        let all = posterior.known_readings(state).chain(posterior.readings(state));
+        let normal = all.filter(|reading| reading.weight > 0.5);
         let (cost, degrees) = normal.fold((0.0, 0.0), |(cost, degrees), reading| {
             let (squared, equations) = (reading.residual_sigmas.powi(2), reading.equations as f64);
             (cost + reading.weight * squared, degrees + reading.weight * equations)
@@ -315,7 +317,9 @@ impl Estimator for Smoother {
         if !self.posterior.loss.is_robust() {
             return Vec::new();
         }
-        self.past.iter().copied().chain(self.posterior.readings(&self.belief.state)).collect()
+        let (posterior, state) = (&self.posterior, &self.belief.state);
+        let known = posterior.known_readings(state);
+        known.chain(self.past.iter().copied()).chain(posterior.readings(state)).collect()
     }
 }
 

@@ -53,6 +53,9 @@ pub(super) struct Posterior {
     pub loss: Loss,
     /// s, by kind of noise: 1 where it is known.
     pub scales: Vec<f64>,
+    /// What is known of the equipment before any movement: it belongs to the prior, so that it never settles and no change of the
+    /// body drops it.
+    pub known: Vec<Measurement>,
     pub measurements: Vec<Measurement>,
     pub settled: Option<Settled>,
 }
@@ -93,19 +96,29 @@ impl Posterior {
             level: Level::new(),
             loss: Loss::None,
             scales,
+            known: Vec::new(),
             measurements: Vec::new(),
             settled: None,
         }
     }
 
-    /// The same rig and likelihood with another prior, and of the measurements only these.
+    /// The same rig, likelihood and known equipment with another prior, and of the measurements only these.
     pub fn anew(&self, prior: Prior, measurements: Vec<Measurement>) -> Self {
-        let (loss, scales) = (self.loss, self.scales.clone());
-        Self { loss, scales, measurements, ..Self::new(prior, self.rig.clone()) }
+        let (loss, scales, known) = (self.loss, self.scales.clone(), self.known.clone());
+        Self { loss, scales, known, measurements, ..Self::new(prior, self.rig.clone()) }
     }
 
-    /// What is made of every reading at `state`, but for those that have settled.
+    /// What is made of every reading at `state`, but for those that have settled and what is known beforehand.
     pub fn readings(&self, state: &State) -> impl Iterator<Item = ReadingReport> {
+        self.readings_of(&self.measurements, state)
+    }
+
+    /// What is made at `state` of what is known beforehand.
+    pub fn known_readings(&self, state: &State) -> impl Iterator<Item = ReadingReport> {
+        self.readings_of(&self.known, state)
+    }
+
+    fn readings_of(&self, measurements: &[Measurement], state: &State) -> impl Iterator<Item = ReadingReport> {
         let of = move |seen: &Measurement| {
             let mut reports = Vec::new();
             self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
@@ -121,7 +134,12 @@ impl Posterior {
             });
             reports
         };
-        self.measurements.iter().flat_map(of)
+        measurements.iter().flat_map(of)
+    }
+
+    /// What is known beforehand, and the measurements that have not settled.
+    fn all(&self) -> impl Iterator<Item = &Measurement> {
+        self.known.iter().chain(&self.measurements)
     }
 
     /// How many measurements there were.
@@ -133,7 +151,7 @@ impl Posterior {
     /// How many equations they brought, those of outliers at `state` not counted.
     pub fn equations(&self, state: &State, layout: &Layout) -> f64 {
         if !self.loss.is_robust() {
-            let kept: usize = self.measurements.iter().map(|seen| seen.observation.equations()).sum();
+            let kept: usize = self.all().map(|seen| seen.observation.equations()).sum();
             return kept as f64 + self.settled.as_ref().map_or(0.0, Settled::equations);
         }
         self.fit(state, layout).iter().map(|fit| fit.equations).sum()
@@ -144,9 +162,9 @@ impl Posterior {
     pub fn rank(&self, state: &State, layout: &Layout) -> usize {
         let m = layout.dimension();
         let normal: Vec<Measurement> = if self.loss.is_robust() {
-            self.measurements.iter().filter_map(|seen| self.without_outliers(state, seen)).collect()
+            self.all().filter_map(|seen| self.without_outliers(state, seen)).collect()
         } else {
-            self.measurements.clone()
+            self.all().cloned().collect()
         };
         let mut rows = DMatrix::zeros(m, normal.iter().map(|seen| seen.observation.equations()).sum());
         let mut pass = Pass::new(state, layout);
@@ -193,7 +211,7 @@ impl Posterior {
     #[cfg(test)]
     pub fn cost(&self, state: &State, layout: &Layout) -> f64 {
         let (loss, mut cost) = (Graduated::from(self.loss), self.prior.cost(state, None));
-        for seen in &self.measurements {
+        for seen in self.all() {
             self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
                 cost += loss.cost(self.squared(channel, whitened), whitened.len());
             });
@@ -209,7 +227,7 @@ impl Posterior {
     /// `equations` degrees of freedom.
     pub fn fit(&self, state: &State, layout: &Layout) -> Vec<Fit> {
         let mut fits = vec![Fit::default(); self.scales.len()];
-        for seen in &self.measurements {
+        for seen in self.all() {
             self.rig.residuals(state, &seen.positions, &seen.observation, |channel, whitened| {
                 let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
                 for (noise, part) in self.noises(channel) {
@@ -246,6 +264,12 @@ impl Posterior {
     pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout, room: &mut Room) -> Option<Normal> {
         let (mut information, mut descent) = room.derivatives(layout.dimension());
         let mut cost = 0.0;
+        if !self.known.is_empty() {
+            let (stacked, residuals, errors) = self.stacked(loss, state, layout, &self.known);
+            information += &stacked * stacked.transpose();
+            descent += stacked * residuals;
+            cost += errors;
+        }
         if let Some(points) = self.points(state, layout) {
             cost += self.add_points(loss, &points, (&mut information, &mut descent), room);
         } else {
@@ -379,7 +403,8 @@ impl Posterior {
     /// By kind of noise, how many of its equations the parameters account for: tr(Λₙ P), with Λₙ its share of the information.
     pub fn absorbed(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
         let mut noises = vec![Quadratic::nothing(layout.dimension()); self.scales.len()];
-        for measurements in self.measurements.chunks(STACKED) {
+        let known = self.known.chunks(STACKED);
+        for measurements in known.chain(self.measurements.chunks(STACKED)) {
             let (of, _) = self.quadratics(&mode.state, layout, measurements);
             noises.iter_mut().zip(of).for_each(|(into, of)| into.add(of));
         }
