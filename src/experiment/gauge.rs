@@ -15,7 +15,7 @@ use crate::{
     design::{General, general_movements},
     kinematics::JointBox,
     model::{Layout, State, null_space},
-    sensing::Rig,
+    sensing::{Head, Rig},
 };
 
 /// What can be told of a problem by its measurements, and what cannot.
@@ -23,6 +23,7 @@ use crate::{
 pub struct Gauge {
     layout: Layout,
     rig: Rig,
+    head: Option<Head>,
     limits: JointBox,
     /// The movements that stand for all, and through which channels each is seen.
     movements: Vec<General>,
@@ -32,20 +33,25 @@ pub struct Gauge {
 const STEPS: usize = 30;
 
 impl Gauge {
-    /// The gauge at `truth`, judged by movements in general position.
-    pub fn new(truth: &State, layout: &Layout, rig: &Rig, limits: &JointBox) -> Self {
+    /// The gauge at `truth`, judged by movements in general position that are in view, of `head` too if one watches.
+    pub fn new(truth: &State, layout: &Layout, rig: &Rig, head: Option<&Head>, limits: &JointBox) -> Self {
         // Noise may be none: what can be told does not depend on it.
         let rig = if rig.sigma() > 0.0 { rig.clone() } else { rig.assuming(1.0) };
         let (layout, limits) = (layout.clone(), limits.clone());
-        let mut gauge = Self { layout, rig, limits, movements: Vec::new(), undetermined: 0 };
+        let mut gauge = Self { layout, rig, head: head.copied(), limits, movements: Vec::new(), undetermined: 0 };
         gauge.study(truth);
         gauge
     }
 
     /// Judges another truth.
     pub fn study(&mut self, truth: &State) {
-        self.movements = general_movements(truth, &self.layout, &self.rig, &self.limits);
+        self.movements = general_movements(truth, &self.layout, &self.rig, self.head.as_ref(), &self.limits);
         self.undetermined = self.free(truth).ncols();
+    }
+
+    /// Which parameters it is of.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
     }
 
     /// How many directions of parameter space no measurement determines.
@@ -164,7 +170,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let truth = random_arm(&mut rng, 4);
         let layout = Layout::new(&truth, (0..4).map(Block::Axis).chain([Block::Base, Block::Target(0)]));
-        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.01), &limits());
+        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.01), None, &limits());
         (truth, layout, gauge, rng)
     }
 
@@ -173,7 +179,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let truth = random_arm(&mut rng, 4);
         let layout = Layout::of_arm(&truth, &[], false);
-        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.0), &limits());
+        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.0), None, &limits());
         assert_eq!((gauge.undetermined(), gauge.rank()), (0, layout.dimension()));
         let estimate = truth.retract(&layout, &DVector::from_element(layout.dimension(), 0.1));
         assert_eq!(gauge.aligned(&truth, &estimate), truth);

@@ -14,7 +14,7 @@ const AS_PROMISED: f64 = 0.2;
 /// All remarks on a learner.
 pub(super) fn remarks(learner: &Learner, metrics: &Metrics, description: &Description, world: &World) -> Vec<String> {
     let mut said = Vec::new();
-    said.extend(undetermined(learner, description));
+    said.extend(undetermined(learner, description, world));
     said.extend(learner.noise().iter().filter_map(noise));
     said.extend(metrics.model_error_m.filter(|error| *error > 0.0).map(model_error));
     said.extend(outliers(&learner.readings()));
@@ -29,9 +29,9 @@ pub(super) fn remarks(learner: &Learner, metrics: &Metrics, description: &Descri
     said
 }
 
-fn undetermined(learner: &Learner, description: &Description) -> Option<String> {
+fn undetermined(learner: &Learner, description: &Description, world: &World) -> Option<String> {
     let belief = learner.belief();
-    let gauge = Gauge::new(&belief.state, &belief.layout, &belief.rig, learner.limits());
+    let gauge = Gauge::new(&belief.state, &belief.layout, &belief.rig, world.head(), learner.limits());
     description.called().untold(&belief.layout, &gauge.free(&belief.state), "any movement")
 }
 

@@ -30,6 +30,9 @@ const NO_INFORMATION: f64 = 1e-12;
 /// without columns where the information is no number.
 pub fn null_space(information: &DMatrix<f64>) -> DMatrix<f64> {
     let m = information.nrows();
+    if m == 0 {
+        return DMatrix::zeros(0, 0);
+    }
     let scale = information.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 1.0 });
     let scaled = information.component_mul(&(&scale * scale.transpose()));
     if !scaled.iter().all(|x| x.is_finite()) {

@@ -72,7 +72,7 @@ impl Views {
                 let drawn = state.retract(layout, &delta);
                 let mut weight = 1.0;
                 for miss in &misses {
-                    rig.clearances(&drawn, miss, &mut clearances);
+                    rig.clearances(None, &drawn, miss, &mut clearances);
                     weight *= clearances.iter().map(|clearance| (1.0 - seen(*clearance)).max(DOUBT)).product::<f64>();
                 }
                 states.push((weight, drawn));
@@ -110,7 +110,7 @@ impl Views {
         let mut clearances = vec![0.0; chances.len()];
         chances.fill(0.0);
         for (weight, state) in &self.states {
-            rig.clearances(state, positions, &mut clearances);
+            rig.clearances(None, state, positions, &mut clearances);
             for (chance, clearance) in chances.iter_mut().zip(&clearances) {
                 *chance += weight * seen(*clearance);
             }

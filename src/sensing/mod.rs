@@ -18,6 +18,7 @@ mod laws;
 mod loss;
 mod observation;
 mod rig;
+mod visible;
 
 pub use channel::{Apart, Channel, Occasion};
 pub use head::{Gaze, Head};
