@@ -140,10 +140,8 @@ mod tests {
     fn sockets_that_nothing_reads_count_for_nothing() {
         let scenario = builtin("arm-7dof-socket").expect("built in");
         let (robot, rig) = (&scenario.robot, &scenario.rig);
-        let channels = rig
-            .channels()
-            .iter()
-            .filter(|channel| !matches!(channel.occasion(), Occasion::Held { socket: 0, .. }));
+        let channels =
+            rig.channels().iter().filter(|channel| !matches!(channel.occasion(), Occasion::Held { socket: 0, .. }));
         let rig = Rig::new(channels.cloned().collect());
         for General { rig, posture } in general_movements(&robot.state, &robot.layout, &rig, None, &robot.limits) {
             for channel in rig.channels() {
@@ -160,7 +158,11 @@ mod tests {
         for (name, expected) in [("arm-6dof", 8), ("arm-12dof", 16), ("head-fov", 6)] {
             let scenario = builtin(name).expect("built in");
             let (robot, rig) = (&scenario.robot, Rig::tracker(0.01));
-            assert_eq!(movements_by_counting(&robot.state, &robot.layout, &rig, None, &robot.limits), expected, "{name}");
+            assert_eq!(
+                movements_by_counting(&robot.state, &robot.layout, &rig, None, &robot.limits),
+                expected,
+                "{name}"
+            );
         }
         let arm = random_arm(&mut ChaCha8Rng::seed_from_u64(2), 4);
         let limits = JointBox::new(vec![(-1.0, 1.0); 4]).expect("limits");

@@ -178,7 +178,10 @@ fn certificates_hold() {
         let climbed = search.favoured(&standing, 300);
         let greatest = climbed.iter().take(50).map(|(point, _)| phi(&problem.limits.from_unit(point)));
         let excess = (greatest.fold(by_chance, f64::max) - mean) / trace;
-        assert!((climbed[0].1 / phi(&problem.limits.from_unit(&climbed[0].0)) - 1.0).abs() < 1e-9, "{name}: as is believed");
+        assert!(
+            (climbed[0].1 / phi(&problem.limits.from_unit(&climbed[0].0)) - 1.0).abs() < 1e-9,
+            "{name}: as is believed"
+        );
         // What the documentation of `Design::gap` admits: some maxima draw from nearby alone, and nobody follows the border of what
         // is in view.
         let missed = if problem.is_watched() { 0.1 } else { 0.01 };

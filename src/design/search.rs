@@ -1,7 +1,10 @@
 //! The search for the best data: an approximate A-optimal design, by exchange.
 
+use std::sync::Arc;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 
 use super::{
     Problem,
@@ -29,7 +32,7 @@ pub struct Design {
 /// Candidates inside the joint box, on its faces and on its corners, each.
 const CANDIDATES: usize = 1500;
 /// Candidates in view that are wanted at least where sensors see some postures only, and rounds of draws in search of them.
-const IN_VIEW: usize = 600;
+const IN_VIEW: usize = 3000;
 const ROUNDS: usize = 40;
 /// Candidates polished in every exchange, the best of them: the best few often climb to the same pose.
 const POLISHED: usize = 100;
@@ -56,6 +59,10 @@ impl Problem {
 
     /// The same, from a design of another number of movements: where data outweigh the prior the two are nearly alike.
     pub fn best_design_from(&self, movements: usize, gap: f64, start: Option<&Design>) -> Option<Design> {
+        // What never sees anything is left out: it would change the last digits of all sums, and so the way that a search takes.
+        if let Some(sighted) = self.sighted() {
+            return sighted.best_design_from(movements, gap, start);
+        }
         let mut search = Search::new(self, movements, start);
         if search.candidates.is_empty() {
             return None;
@@ -144,7 +151,38 @@ impl<'a> Search<'a> {
         let found = climbed.into_iter().map(|(point, value)| (point, -value));
         let mut found: Vec<_> = found.filter(|(_, phi)| phi.is_finite()).collect();
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        if self.problem.rig.has_view() {
+            self.follow_border(standing, &mut found);
+        }
         found
+    }
+
+    /// Climbs on from the best of `found` where slopes end at the border of what is in view: by steps in random directions, longer
+    /// after one that leads up and shorter after one that does not (an evolution strategy of one parent and one child; Rechenberg 1973).
+    fn follow_border(&self, standing: &Standing, found: &mut [(Vec<f64>, f64)]) {
+        // A fixed stream of its own.
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let limits = &self.problem.limits;
+        let count = found.len().min(FOLLOWED);
+        let mut steps = vec![LONGEST; count];
+        for _ in 0..FOLLOWING {
+            let tried: Vec<usize> = (0..count).filter(|index| steps[*index] > SHORTEST).collect();
+            let beside = tried.iter().map(|index| {
+                let from = &found[*index].0;
+                within(from.iter().map(|x| x + steps[*index] * rng.sample::<f64, _>(StandardNormal)).collect())
+            });
+            let beside: Vec<Vec<f64>> = beside.collect();
+            let poses: Vec<Vec<f64>> = beside.iter().map(|point| limits.from_unit(point)).collect();
+            let values = self.sensitivity.values(&standing.sensitivity, &poses);
+            for ((index, point), phi) in tried.into_iter().zip(beside).zip(values) {
+                let is_better = phi > found[index].1;
+                steps[index] *= if is_better { 1.5 } else { 0.9 };
+                if is_better {
+                    found[index] = (point, phi);
+                }
+            }
+        }
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
     }
 
     /// Adds those that are favoured more than the design's own, each once.
@@ -167,11 +205,30 @@ impl<'a> Search<'a> {
     }
 }
 
+/// Of the best poses that slopes lead to so many follow the border of what is in view, by so many steps at most; the first step and
+/// the last, in sides of the cube.
+const FOLLOWED: usize = 40;
+const FOLLOWING: usize = 250;
+const LONGEST: f64 = 0.03;
+const SHORTEST: f64 = 1e-4;
 /// How far, in sides of the cube, poses are drawn beside others that are in view; and draws for each that is wanted.
 const BESIDE: [f64; 4] = [0.01, 0.03, 0.1, 0.3];
 const DRAWS: usize = 20;
 
 impl Problem {
+    /// The same without the channels that see nothing at any candidate; `None` if there are none of those.
+    fn sighted(&self) -> Option<Self> {
+        if !self.rig.has_view() || self.rig.channels().len() < 2 {
+            return None;
+        }
+        let mut sighted = vec![false; self.rig.channels().len()];
+        for pose in candidates(self) {
+            sighted.iter_mut().zip(self.visible(&pose)).for_each(|(any, visible)| *any |= visible);
+        }
+        let is_some = sighted.contains(&true) && sighted.contains(&false);
+        is_some.then(|| Self { rig: Arc::new(self.rig.limited_to(&sighted)), ..self.clone() })
+    }
+
     /// At most `count` poses in view beside those known to be, and the one that is said to be.
     fn near_view(&self, count: usize, known: &[Vec<f64>], rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
         let said = self.visible_pose.iter().filter(|pose| pose.len() == self.limits.dimension());

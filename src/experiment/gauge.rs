@@ -9,12 +9,12 @@
 //! truth by N Nᵀ δ, δ being the coordinates of the estimate in the chart at the truth, and then by Gauss and Newton back to
 //! where it predicts what it predicted before.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
 use crate::{
     design::{General, general_movements},
     kinematics::JointBox,
-    model::{Layout, State, null_space},
+    model::{Layout, State, eigen, null_space},
     sensing::{Head, Rig},
 };
 
@@ -129,7 +129,7 @@ impl Gauge {
         let free = self.free(estimate);
         let m = self.layout.dimension();
         let across = DMatrix::identity(m, m) - &free * free.transpose();
-        let eigen = SymmetricEigen::new(across);
+        let eigen = eigen(across)?;
         let determined: Vec<DVector<f64>> =
             (0..m).filter(|k| eigen.eigenvalues[*k] > 0.5).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
         if determined.is_empty() {

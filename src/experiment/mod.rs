@@ -16,12 +16,16 @@ mod convergence;
 mod failures;
 mod gauge;
 mod head;
+#[cfg(test)]
+mod holders;
 mod judge;
 #[cfg(test)]
 mod laws;
 mod learner;
 mod loads;
 mod metrics;
+#[cfg(test)]
+mod noises;
 mod remarks;
 mod report;
 mod result;

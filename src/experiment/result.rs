@@ -214,11 +214,21 @@ impl Model {
     }
 }
 
+impl Model {
+    /// How many parameters were learned.
+    fn parameters(&self) -> usize {
+        let joints = self.joints.iter().map(|joint| joint.coordinates.len());
+        let others = self.others.iter().map(|other| other.coordinates.len());
+        joints.chain(others).sum::<usize>() + self.marker.coordinates.len()
+    }
+}
+
 impl RunResult {
     /// The same beside the best designs of the scenario.
     pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
         for learner in &mut self.learners {
-            learner.efficiency = BestDesign::efficiency(&best_designs, learner.metrics.bound_trace);
+            learner.efficiency =
+                BestDesign::efficiency(&best_designs, learner.metrics.bound_trace, learner.model.parameters());
         }
         Self { best_designs, ..self }
     }

@@ -186,8 +186,7 @@ impl World {
             Self::Simulated { truth, rig, head, outliers, .. } => {
                 let theta = &movement.configuration;
                 Observation::missed(rig.channels().len()).check(rig, truth.joints.len(), theta)?;
-                let mut observation =
-                    rig.observe_watched(head.as_ref(), movement.socket, truth, theta, &draw.noise);
+                let mut observation = rig.observe_watched(head.as_ref(), movement.socket, truth, theta, &draw.noise);
                 for (channel, reading) in observation.readings.iter_mut().enumerate() {
                     if let (Some(reading), Some(outliers), true) = (reading, outliers, self.is_outlier(draw, channel)) {
                         let place = &draw.outliers[channel][1..];

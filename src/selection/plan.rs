@@ -22,7 +22,7 @@ use super::{SelectionError, Weights, outlook::Expected};
 use crate::{
     estimation::{Alternative, Belief},
     lanes::{add_few_squares, times_few},
-    model::rank,
+    model::{eigen, rank},
 };
 
 /// Movements that are planned and not yet made, with what the belief would be after all of them.
@@ -70,8 +70,8 @@ impl Plan {
         if !weighted.iter().all(|x| x.is_finite()) {
             return Err(SelectionError::NoFiniteCriterion);
         }
-        let eigenvalues = weighted.symmetric_eigenvalues();
-        Ok(eigenvalues.iter().filter(|value| **value > unknown * unknown).count())
+        let eigen = eigen(weighted).ok_or(SelectionError::NoFiniteCriterion)?;
+        Ok(eigen.eigenvalues.iter().filter(|value| **value > unknown * unknown).count())
     }
 
     /// Adds a pose of which this is expected.

@@ -16,6 +16,7 @@ mod keys;
 #[cfg(test)]
 mod laws;
 mod loss;
+mod noise;
 mod observation;
 mod rig;
 mod visible;
@@ -24,6 +25,7 @@ pub use channel::{Apart, Channel, Occasion};
 pub use head::{Gaze, Head};
 pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
 pub use loss::{Graduated, Loss};
+pub use noise::UnusableNoise;
 pub use observation::{Observation, Refused};
 pub use pixels::{Facing, NEAR};
 pub use rig::{Equations, Noise, Rig};

@@ -163,7 +163,7 @@ impl Smoother {
         } else {
             vec![prior.guess().clone()]
         };
-        let modes = starts.iter().filter_map(|start| self.posterior.mode(start, &layout, once));
+        let modes = starts.iter().filter_map(|start| self.posterior.mode(start, &layout, once).ok());
         self.hypotheses.modes = modes.collect();
         self.hypotheses.condense(self.settings.kept, &layout);
     }
@@ -205,7 +205,7 @@ impl Smoother {
             return false;
         }
         let mode = changed.mode_from_afar(&self.belief.state, &layout, THOROUGH);
-        let explains = mode.is_some_and(|mode| changed.readings(&mode.state).all(|reading| reading.weight > 0.5));
+        let explains = mode.is_ok_and(|mode| changed.readings(&mode.state).all(|reading| reading.weight > 0.5));
         if explains && !self.forgets {
             self.changes.reset();
         }
@@ -321,6 +321,18 @@ impl Estimator for Smoother {
         let known = posterior.known_readings(state);
         known.chain(self.past.iter().copied()).chain(posterior.readings(state)).collect()
     }
+
+    fn latest_readings(&self, movement: u64) -> Vec<ReadingReport> {
+        if !self.posterior.loss.is_robust() {
+            return Vec::new();
+        }
+        // What was dropped in the same step is the end of what is past.
+        let past = self.past.iter().rev().take_while(|reading| reading.movement >= movement).copied();
+        let mut latest: Vec<ReadingReport> = past.filter(|reading| reading.movement == movement).collect();
+        latest.reverse();
+        latest.extend(self.posterior.readings_after(movement, &self.belief.state));
+        latest
+    }
 }
 
 impl Smoother {
@@ -344,7 +356,7 @@ impl Smoother {
             self.learn_noise();
         }
         if self.hypotheses.modes.is_empty() {
-            return Err(EstimationError::Diverged("no hypothesis explains the measurements"));
+            return Err(EstimationError::Diverged(self.hypotheses.why()));
         }
         self.publish();
         // What costs most is asked last.

@@ -113,6 +113,12 @@ impl Posterior {
         self.readings_of(&self.measurements, state)
     }
 
+    /// What is made at `state` of the measurements from this movement on.
+    pub fn readings_after(&self, movement: u64, state: &State) -> impl Iterator<Item = ReadingReport> {
+        let latest = self.measurements.iter().rev().take_while(|seen| seen.movement >= movement).count();
+        self.readings_of(&self.measurements[self.measurements.len() - latest..], state)
+    }
+
     /// What is made at `state` of what is known beforehand.
     pub fn known_readings(&self, state: &State) -> impl Iterator<Item = ReadingReport> {
         self.readings_of(&self.known, state)
