@@ -51,6 +51,13 @@ impl Rig {
         })
     }
 
+    /// Hᵀ, whitened, of a movement as it would be seen of a robot that is as `state` says (m × d): zero where a channel would not read;
+    /// of all where none would, for who believes in such a state with a chance alone.
+    pub fn believed_jacobian(&self, state: &State, layout: &Layout, positions: &[f64]) -> DMatrix<f64> {
+        let seen = self.visible_jacobian(None, state, layout, positions);
+        seen.unwrap_or_else(|| self.jacobian(state, layout, positions))
+    }
+
     /// Makes the rows (d columns of m numbers) of all channels zero that are not `visible`.
     pub fn hide(&self, visible: &[bool], rows: &mut [f64]) {
         let m = rows.len() / self.equations().max(1);

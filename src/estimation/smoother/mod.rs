@@ -298,11 +298,18 @@ impl Estimator for Smoother {
             self.movements += 1;
             return Ok(Update::default());
         }
-        // All or nothing: an observation that ends it leaves no trace.
-        let mut revised = self.clone();
-        let update = revised.absorb(positions, observation)?;
-        *self = revised;
-        Ok(update)
+        // All or nothing: an observation that ends it leaves no trace. What is past goes along, so that adding to it copies nothing.
+        let (known, past) = (self.past.len(), std::mem::take(&mut self.past));
+        let mut revised = Self { past, ..self.clone() };
+        let update = revised.absorb(positions, observation);
+        match update {
+            Ok(_) => *self = revised,
+            Err(_) => {
+                self.past = revised.past;
+                Arc::make_mut(&mut self.past).truncate(known);
+            }
+        }
+        update
     }
 
     fn noise(&self) -> Vec<NoiseReport> {
