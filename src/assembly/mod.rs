@@ -19,7 +19,7 @@ use crate::{
     model::{Block, Layout, State, Workspace},
     scenario::{HeldOut, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
     selection::{Actions, Movement, Watch, Weights},
-    sensing::Observation,
+    sensing::{InView, Observation},
 };
 
 /// Configurations over which the prediction error is judged in a simulated world.
@@ -254,7 +254,7 @@ impl Scenario {
                 &robot.state,
                 layout,
                 &self.rig.assuming(1.0),
-                world.head(),
+                world.truth().map_or(InView::Unknown, |_| InView::By(world.head())),
                 &robot.limits,
             ),
             learners: specs.iter().map(|spec| self.learner_description(spec)).collect(),

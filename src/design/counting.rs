@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::{
     kinematics::JointBox,
     model::{Layout, Manifold, State, rank},
-    sensing::{Head, Occasion, Rig},
+    sensing::{InView, Occasion, Rig},
 };
 
 /// A movement in general position.
@@ -22,13 +22,13 @@ pub struct General {
 }
 
 /// Movements that stand for all, twice as many as there can be need of: to postures anywhere in the joint box; where targets are
-/// held in sockets, anywhere on their manifolds in turn. Where not everything is in view (of `head`, if one watches), to postures at
+/// held in sockets, anywhere on their manifolds in turn. Where not everything is in `view`, to postures at
 /// which something is, and of every camera to as many that it sees. What is known before any movement comes first, as if it were one.
 pub fn general_movements(
     state: &State,
     layout: &Layout,
     rig: &Rig,
-    head: Option<&Head>,
+    view: InView<'_>,
     limits: &JointBox,
 ) -> Vec<General> {
     // A fixed stream of its own: what is general needs no seed.
@@ -58,17 +58,17 @@ pub fn general_movements(
             Some(manifold) => manifold.draw(&mut rng),
         };
         let posture = posture?;
-        if !rig.is_watched(head) {
+        if !view.is_limited(rig) {
             return Some(General { rig: rig.clone(), posture });
         }
-        let visible = rig.visible(head, state, &posture);
+        let visible = view.visible(rig, state, &posture);
         is_wanted(&visible).then(|| General { rig: rig.limited_to(&visible), posture })
     };
     let mut movements: Vec<General> = known.into_iter().collect();
     let mut patience = PATIENCE;
     for index in 0..count {
         let mut found = draw(index, &|visible| visible.contains(&true));
-        while found.is_none() && patience > 0 && rig.is_watched(head) {
+        while found.is_none() && patience > 0 && view.is_limited(rig) {
             found = draw(index, &|visible| visible.contains(&true));
             patience -= 1;
         }
@@ -76,7 +76,9 @@ pub fn general_movements(
     }
     // Those so far may be in view of one camera alone, though others see something elsewhere.
     for (socket, (rig, _)) in held.iter().enumerate() {
-        for (channel, sensor) in rig.channels().iter().enumerate().filter(|(_, sensor)| sensor.has_view()) {
+        let with_view =
+            rig.channels().iter().enumerate().filter(|(_, sensor)| sensor.has_view() && view.is_limited(rig));
+        for (channel, sensor) in with_view {
             let wanted = 2 * layout.dimension().div_ceil(sensor.equations().max(1)) + 8;
             let sees = |general: &&General| general.rig.channels().iter().any(|other| Arc::ptr_eq(other, sensor));
             let missing = wanted.saturating_sub(movements.iter().filter(sees).count());
@@ -96,14 +98,8 @@ const FURTHER: usize = 2_000;
 /// parameters: what cannot be determined needs no equation.
 ///
 /// A yardstick to draw beside curves, not a bound: a prior or loose thresholds can beat it.
-pub fn movements_by_counting(
-    state: &State,
-    layout: &Layout,
-    rig: &Rig,
-    head: Option<&Head>,
-    limits: &JointBox,
-) -> usize {
-    let movements = general_movements(state, layout, rig, head, limits);
+pub fn movements_by_counting(state: &State, layout: &Layout, rig: &Rig, view: InView<'_>, limits: &JointBox) -> usize {
+    let movements = general_movements(state, layout, rig, view, limits);
     let is_made = |movement: &&General| movement.rig.channels().iter().all(|it| it.occasion() != Occasion::Beforehand);
     let Some(most) = movements.iter().filter(is_made).map(|movement| movement.rig.equations()).max() else { return 0 };
     let equations: usize = movements.iter().map(|movement| movement.rig.equations()).sum();
@@ -143,7 +139,9 @@ mod tests {
         let channels =
             rig.channels().iter().filter(|channel| !matches!(channel.occasion(), Occasion::Held { socket: 0, .. }));
         let rig = Rig::new(channels.cloned().collect());
-        for General { rig, posture } in general_movements(&robot.state, &robot.layout, &rig, None, &robot.limits) {
+        for General { rig, posture } in
+            general_movements(&robot.state, &robot.layout, &rig, InView::Unknown, &robot.limits)
+        {
             for channel in rig.channels() {
                 let Occasion::Held { socket, target } = channel.occasion() else { continue };
                 let away = robot.state.target_at(target, &posture) - robot.state.sockets[socket];
@@ -159,7 +157,7 @@ mod tests {
             let scenario = builtin(name).expect("built in");
             let (robot, rig) = (&scenario.robot, Rig::tracker(0.01));
             assert_eq!(
-                movements_by_counting(&robot.state, &robot.layout, &rig, None, &robot.limits),
+                movements_by_counting(&robot.state, &robot.layout, &rig, InView::Unknown, &robot.limits),
                 expected,
                 "{name}"
             );
@@ -170,7 +168,11 @@ mod tests {
         let axes = Layout::of_arm(&arm, &[], true);
         let with_base = Layout::new(&arm, (0..4).map(Block::Axis).chain([Block::Base, Block::Target(0)]));
         assert_eq!(with_base.dimension(), axes.dimension() + 6);
-        let alone = movements_by_counting(&arm, &axes, &rig, None, &limits);
-        assert_eq!(movements_by_counting(&arm, &with_base, &rig, None, &limits), alone, "the base adds nothing");
+        let alone = movements_by_counting(&arm, &axes, &rig, InView::Unknown, &limits);
+        assert_eq!(
+            movements_by_counting(&arm, &with_base, &rig, InView::Unknown, &limits),
+            alone,
+            "the base adds nothing"
+        );
     }
 }

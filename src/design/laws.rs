@@ -17,7 +17,7 @@ use crate::{
     },
     scenario::builtin,
     selection::{CriterionUnits, Movement, Weights},
-    sensing::{Channel, Equipment, Facing, Pixels, Position, Rig, examples},
+    sensing::{Channel, Equipment, Facing, InView, Pixels, Position, Rig, examples},
 };
 
 /// A robot of which anything may be learned, by one channel.
@@ -253,8 +253,8 @@ fn a_camera_that_looks_away_changes_nothing() {
     assert!((both.trace / one.trace - 1.0).abs() < 1e-9, "{} and {}", one.trace, both.trace);
     let [one, both] = [&problem, &two].map(|problem| {
         let Problem { truth, layout, rig, limits, .. } = problem;
-        let gauge = Gauge::new(truth, layout, rig, None, limits);
-        (movements_by_counting(truth, layout, rig, None, limits), gauge.undetermined())
+        let gauge = Gauge::new(truth, layout, rig, InView::By(None), limits);
+        (movements_by_counting(truth, layout, rig, InView::By(None), limits), gauge.undetermined())
     });
     assert_eq!(one, both);
 }
@@ -267,6 +267,6 @@ fn where_nothing_is_in_view_there_is_no_design() {
     problem.truth.devices[0].pose.translation.vector.z += 100.0;
     assert!(problem.best_design(10, 0.05).is_none());
     let Problem { truth, layout, rig, limits, .. } = &problem;
-    assert_eq!(movements_by_counting(truth, layout, rig, None, limits), 0);
-    assert_eq!(Gauge::new(truth, layout, rig, None, limits).undetermined(), layout.dimension());
+    assert_eq!(movements_by_counting(truth, layout, rig, InView::By(None), limits), 0);
+    assert_eq!(Gauge::new(truth, layout, rig, InView::By(None), limits).undetermined(), layout.dimension());
 }

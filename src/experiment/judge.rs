@@ -10,7 +10,13 @@ use super::{
     metrics::{self, Evaluation, Metrics},
     report::StepReport,
 };
-use crate::{design::Problem, estimation::Belief, kinematics::JointBox, model::State, sensing::Head};
+use crate::{
+    design::Problem,
+    estimation::Belief,
+    kinematics::JointBox,
+    model::State,
+    sensing::{Head, InView},
+};
 
 /// What beliefs and runs are judged by.
 #[derive(Clone)]
@@ -66,7 +72,7 @@ impl Judge {
     pub(super) fn study(&mut self, belief: &Belief, truth: &State, head: Option<&Head>, limits: &JointBox) {
         let Belief { layout, rig, .. } = belief;
         if self.gauge(belief).is_none() {
-            self.gauges.push(Gauge::new(truth, layout, rig, head, limits));
+            self.gauges.push(Gauge::new(truth, layout, rig, InView::By(head), limits));
         }
     }
 

@@ -4,6 +4,7 @@ use super::{World, gauge::Gauge, learner::Learner};
 use crate::{
     estimation::{NoiseReport, ReadingReport},
     experiment::{Description, Metrics},
+    sensing::InView,
 };
 
 /// Movements listed at most.
@@ -31,7 +32,12 @@ pub(super) fn remarks(learner: &Learner, metrics: &Metrics, description: &Descri
 
 fn undetermined(learner: &Learner, description: &Description, world: &World) -> Option<String> {
     let belief = learner.belief();
-    let gauge = Gauge::new(&belief.state, &belief.layout, &belief.rig, world.head(), learner.limits());
+    // Where the truth is known, it says what is in view.
+    let (state, view) = match world.truth() {
+        Some(truth) => (truth, InView::By(world.head())),
+        None => (&belief.state, InView::Unknown),
+    };
+    let gauge = Gauge::new(state, &belief.layout, &belief.rig, view, learner.limits());
     description.called().untold(&belief.layout, &gauge.free(&belief.state), "any movement")
 }
 

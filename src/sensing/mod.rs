@@ -29,6 +29,7 @@ pub use noise::UnusableNoise;
 pub use observation::{Observation, Refused};
 pub use pixels::{Facing, NEAR};
 pub use rig::{Equations, Noise, Rig};
+pub use visible::InView;
 
 channel::channels! {
     /// Where a target is, three coordinates.

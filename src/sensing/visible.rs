@@ -12,6 +12,30 @@ use nalgebra::DMatrix;
 use super::{Head, Observation, Rig};
 use crate::model::{Layout, State};
 
+/// Whether it can be told of a state what is in view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InView<'a> {
+    /// It cannot: the state is a guess, and cameras stand elsewhere. Everything may be seen.
+    Unknown,
+    /// The state is the truth, of which a head, if one watches, and the sensors see a part.
+    By(Option<&'a Head>),
+}
+
+impl InView<'_> {
+    /// By channel of `rig`, whether it reads at `positions`.
+    pub fn visible(self, rig: &Rig, state: &State, positions: &[f64]) -> Vec<bool> {
+        match self {
+            Self::Unknown => vec![true; rig.channels().len()],
+            Self::By(head) => rig.visible(head, state, positions),
+        }
+    }
+
+    /// Whether some postures may be out of view.
+    pub fn is_limited(self, rig: &Rig) -> bool {
+        matches!(self, Self::By(head) if rig.is_watched(head))
+    }
+}
+
 impl Rig {
     /// Writes for every channel how far what it measures is inside what it can see, and the marker inside what `head` can see,
     /// radians; infinite where everything is seen.

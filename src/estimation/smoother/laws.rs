@@ -10,7 +10,7 @@ use rand_distr::StandardNormal;
 
 use super::{
     HypothesisSettings, Smoother,
-    mode::Effort,
+    mode::{Effort, Mode},
     points::Room,
     posterior::{Measurement, Normal, Posterior},
 };
@@ -189,7 +189,8 @@ fn a_reading_without_a_prediction_shifts_no_other() {
     let (truth, layout, plain, mut rng) = case(7, 3, 0, false);
     let theta = [0.4, -0.3, 0.7];
     // The target is where the distance is measured from: every direction leads away.
-    let to = Pass::new(&truth, &layout).at(&theta).target(0).into();
+    let state = truth.slid_towards(&plain.pins);
+    let to = Pass::new(&state, &layout).at(&theta).target(0).into();
     let channels: Vec<Arc<dyn Channel>> = vec![
         Arc::new(Position::of_marker(SIGMA)),
         Arc::new(Distance { target: 0, to, sigma_m: 1e-4 }),
@@ -212,7 +213,6 @@ fn a_reading_without_a_prediction_shifts_no_other() {
         }
         let mut others = all.clone();
         others.measurements[1].observation.readings[1] = None;
-        let state = truth.slid_towards(&all.pins);
         let near = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() <= 1e-12 * b.amax();
         let [one, other] = [&all, &others].map(|posterior| posterior.normal(&state, &layout).expect("in the chart"));
         assert!((one.cost - other.cost).abs() <= 1e-12 * other.cost, "{loss:?}: {} {}", one.cost, other.cost);
@@ -220,12 +220,12 @@ fn a_reading_without_a_prediction_shifts_no_other() {
         assert!((&one.descent - &other.descent).amax() <= 1e-12 * other.descent.amax(), "{loss:?}");
         let equations = [&all, &others].map(|posterior| {
             let Measurement { positions, observation, .. } = &posterior.measurements[1];
-            posterior.rig.equations_of(&truth, &layout, positions, observation)
+            posterior.rig.equations_of(&state, &layout, positions, observation)
         });
         assert!(equations[0].rows.ncols() == 4 && equations[0].rows == equations[1].rows);
         assert_eq!(equations[0].residual, equations[1].residual);
-        let effort = Effort { steps: 0, ..THOROUGH };
-        let modes = [&all, &others].map(|posterior| posterior.mode(&state, &layout, effort).expect("a prior"));
+        let modes = [(&all, one), (&others, other)];
+        let modes = modes.map(|(posterior, normal)| Mode::at(posterior.level, state.clone(), normal).expect("a prior"));
         let absorbed = [(&all, &modes[0]), (&others, &modes[1])];
         let absorbed = absorbed.map(|(posterior, mode)| posterior.absorbed(mode, &layout).expect("in the chart"));
         assert!(absorbed[0].iter().zip(&absorbed[1]).all(|(a, b)| (a - b).abs() < 1e-9), "{absorbed:?}");
