@@ -184,7 +184,7 @@ fn certificates_hold() {
         );
         // What the documentation of `Design::gap` admits: some maxima draw from nearby alone, and nobody follows the border of what
         // is in view.
-        let missed = if problem.is_watched() { 0.1 } else { 0.01 };
+        let missed = if problem.rig.is_watched(problem.head.as_ref()) { 0.1 } else { 0.01 };
         assert!(excess <= design.gap + missed, "{name}: {excess} and {}", design.gap);
     }
 }

@@ -26,6 +26,7 @@
 
 mod balance;
 mod best;
+mod candidates;
 mod counting;
 #[cfg(test)]
 mod laws;
@@ -92,11 +93,6 @@ impl Problem {
     /// Whether anything is seen.
     fn sees(&self, configuration: &[f64]) -> bool {
         self.visible(configuration).contains(&true)
-    }
-
-    /// Whether some postures may be out of view.
-    fn is_watched(&self) -> bool {
-        self.rig.is_watched(self.head.as_ref())
     }
 
     /// The covariance F⁻¹ that the information F allows, in the chart at the truth; `None` if F is singular.

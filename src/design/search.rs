@@ -1,7 +1,5 @@
 //! The search for the best data: an approximate A-optimal design, by exchange.
 
-use std::sync::Arc;
-
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -9,6 +7,7 @@ use rand_distr::StandardNormal;
 use super::{
     Problem,
     balance::{Shares, Standing},
+    candidates::{candidates, within},
     sensitivity::Sensitivity,
 };
 use crate::optimize::{Polish, Slopes, descend};
@@ -29,11 +28,6 @@ pub struct Design {
     pub gap: f64,
 }
 
-/// Candidates inside the joint box, on its faces and on its corners, each.
-const CANDIDATES: usize = 1500;
-/// Candidates in view that are wanted at least where sensors see some postures only, and rounds of draws in search of them.
-const IN_VIEW: usize = 3000;
-const ROUNDS: usize = 40;
 /// Candidates polished in every exchange, the best of them: the best few often climb to the same pose.
 const POLISHED: usize = 100;
 /// Candidates polished before a design is called optimal: some maxima draw from nearby alone.
@@ -49,6 +43,12 @@ const UNBALANCED: f64 = 0.1;
 const EXCHANGES: usize = 60;
 /// To a hundredth of the gap that is usually asked for.
 const CLIMB: Polish = Polish { steps: 40, tolerance: 1e-4 };
+/// Of the best poses that slopes lead to so many follow the border of what is in view, by so many steps at most; the first step and
+/// the last, in sides of the cube.
+const FOLLOWED: usize = 40;
+const FOLLOWING: usize = 250;
+const LONGEST: f64 = 0.03;
+const SHORTEST: f64 = 1e-4;
 
 impl Problem {
     /// The best design of `movements` movements, to within `gap` of the optimum or as near as it came. `None` where the
@@ -203,93 +203,6 @@ impl<'a> Search<'a> {
         let (shares, trace) = (self.shares.shares().to_vec(), standing.trace);
         Design { poses: self.poses, shares, trace, gap: (excess / trace).max(0.0) }
     }
-}
-
-/// Of the best poses that slopes lead to so many follow the border of what is in view, by so many steps at most; the first step and
-/// the last, in sides of the cube.
-const FOLLOWED: usize = 40;
-const FOLLOWING: usize = 250;
-const LONGEST: f64 = 0.03;
-const SHORTEST: f64 = 1e-4;
-/// How far, in sides of the cube, poses are drawn beside others that are in view; and draws for each that is wanted.
-const BESIDE: [f64; 4] = [0.01, 0.03, 0.1, 0.3];
-const DRAWS: usize = 20;
-
-impl Problem {
-    /// The same without the channels that see nothing at any candidate; `None` if there are none of those.
-    fn sighted(&self) -> Option<Self> {
-        if !self.rig.has_view() || self.rig.channels().len() < 2 {
-            return None;
-        }
-        let mut sighted = vec![false; self.rig.channels().len()];
-        for pose in candidates(self) {
-            sighted.iter_mut().zip(self.visible(&pose)).for_each(|(any, visible)| *any |= visible);
-        }
-        let is_some = sighted.contains(&true) && sighted.contains(&false);
-        is_some.then(|| Self { rig: Arc::new(self.rig.limited_to(&sighted)), ..self.clone() })
-    }
-
-    /// At most `count` poses in view beside those known to be, and the one that is said to be.
-    fn near_view(&self, count: usize, known: &[Vec<f64>], rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
-        let said = self.visible_pose.iter().filter(|pose| pose.len() == self.limits.dimension());
-        let said = said.map(|pose| self.limits.from_unit(&within(self.limits.to_unit(pose))));
-        let mut found: Vec<Vec<f64>> = said.filter(|pose| self.sees(pose)).collect();
-        if known.is_empty() && found.is_empty() {
-            return found;
-        }
-        for draw in 0..DRAWS * count {
-            if found.len() >= count {
-                break;
-            }
-            let place = rng.random_range(0..known.len() + found.len());
-            let from = self.limits.to_unit(known.get(place).unwrap_or_else(|| &found[place - known.len()]));
-            let step = BESIDE[draw % BESIDE.len()];
-            let beside = within(from.iter().map(|x| x + step * rng.random_range(-1.0..1.0)).collect());
-            let pose = self.limits.from_unit(&beside);
-            if self.sees(&pose) {
-                found.push(pose);
-            }
-        }
-        found
-    }
-}
-
-/// A point brought within the unit cube.
-fn within(mut point: Vec<f64>) -> Vec<f64> {
-    point.iter_mut().for_each(|x| *x = x.clamp(0.0, 1.0));
-    point
-}
-
-/// Poses inside the joint box, on its faces and on its corners, after which something is seen.
-fn candidates(problem: &Problem) -> Vec<Vec<f64>> {
-    // A fixed stream of its own: limits depend on no seed.
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let mut candidates = Vec::with_capacity(3 * CANDIDATES);
-    // Where cameras see little of the box, few draws are in view.
-    let rounds = if problem.rig.has_view() { ROUNDS } else { 1 };
-    for _ in 0..rounds {
-        for at_bounds in [0.0, 0.5, 1.0] {
-            for _ in 0..CANDIDATES {
-                let coordinate = |_| {
-                    let x: f64 = rng.random();
-                    if rng.random::<f64>() < at_bounds { x.round() } else { x }
-                };
-                let point: Vec<f64> = (0..problem.limits.dimension()).map(coordinate).collect();
-                let pose = problem.limits.from_unit(&point);
-                if problem.sees(&pose) {
-                    candidates.push(pose);
-                }
-            }
-        }
-        if candidates.len() >= IN_VIEW {
-            return candidates;
-        }
-    }
-    let wanted = if problem.rig.has_view() { IN_VIEW } else { usize::from(problem.is_watched()) };
-    if candidates.len() < wanted {
-        candidates.extend(problem.near_view(wanted - candidates.len(), &candidates, &mut rng));
-    }
-    candidates
 }
 
 #[cfg(test)]
