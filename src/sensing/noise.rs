@@ -57,7 +57,11 @@ fn check(channel: usize, sensor: &dyn Channel, holds: impl Fn(f64) -> bool) -> R
 /// deviations are numbers by which readings can be divided.
 pub(super) fn root(covariance: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let deviations = covariance.diagonal().map(f64::sqrt);
-    if !deviations.iter().all(|sigma| is_positive(*sigma)) || deviations.min() < THINNEST * deviations.max() {
+    // Of what is no number the largest says nothing.
+    if !covariance.iter().all(|x| x.is_finite())
+        || !deviations.iter().all(|sigma| is_positive(*sigma))
+        || deviations.min() < THINNEST * deviations.max()
+    {
         return None;
     }
     let scaled = covariance.component_div(&(deviations * deviations.transpose()));
