@@ -19,7 +19,7 @@ use crate::{
     model::{Block, Layout, State, Workspace},
     scenario::{HeldOut, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec},
     selection::{Actions, Movement, Watch, Weights},
-    sensing::Observation,
+    sensing::{InView, Observation},
 };
 
 /// Configurations over which the prediction error is judged in a simulated world.
@@ -52,7 +52,7 @@ impl Briefing {
         let deviations = scenario.prior.standard_deviations(&layout);
         Self {
             initial: self.initial.clone(),
-            weights: Weights::new(scenario.selection.units, &layout, &deviations),
+            weights: scenario.weights_of(&layout),
             covariance: DMatrix::from_diagonal(&deviations.map(|sd| sd * sd)),
             layout: Arc::new(layout),
             actions: self.actions.clone(),
@@ -80,22 +80,37 @@ impl Scenario {
     /// What designs are sought for here; `None` where no truth is known, a sensor has no noise or targets are held in
     /// sockets.
     pub fn design_problem(&self) -> Option<Problem> {
+        self.design_problem_of(self.robot.layout.clone())
+    }
+
+    /// The same for one who learns these parameters and knows all others.
+    fn design_problem_of(&self, layout: Layout) -> Option<Problem> {
         let WorldSpec::Simulated { watch, .. } = &self.world else { return None };
         // Designs are sought for in the joint box, of which sockets leave a part without a volume.
         if !self.robot.sockets.is_empty() || self.rig.channels().iter().any(|channel| channel.sigma() <= 0.0) {
             return None;
         }
-        let layout = self.robot.layout.clone();
-        let deviations = self.prior.standard_deviations(&layout);
+        let watch = watch.as_ref();
         Some(Problem {
             truth: self.robot.state.clone(),
             rig: self.rig.clone(),
             limits: self.robot.limits.clone(),
-            head: watch.as_ref().and_then(|watch| watch.head),
-            prior: DMatrix::from_diagonal(&deviations.map(|sd| sd.powi(-2))),
-            weights: self.weights(),
+            head: watch.and_then(|watch| watch.head),
+            visible_pose: watch.map(|watch| watch.visible_pose.clone()),
+            prior: self.information(&layout),
+            weights: self.weights_of(&layout),
             layout,
         })
+    }
+
+    /// Λ₀ of these parameters.
+    fn information(&self, layout: &Layout) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&self.prior.standard_deviations(layout).map(|sd| sd.powi(-2)))
+    }
+
+    /// W of these parameters.
+    fn weights_of(&self, layout: &Layout) -> Weights {
+        Weights::new(self.selection.units, layout, &self.prior.standard_deviations(layout))
     }
 
     /// The same along a run of so many steps, one stretch before a change of the body and one after it; empty where no
@@ -235,7 +250,13 @@ impl Scenario {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             joints: robot.joint_descriptions(),
             parameters: layout.dimension(),
-            movements_by_counting: movements_by_counting(&robot.state, layout, &self.rig.assuming(1.0), &robot.limits),
+            movements_by_counting: movements_by_counting(
+                &robot.state,
+                layout,
+                &self.rig.assuming(1.0),
+                world.truth().map_or(InView::Unknown, |_| InView::By(world.head())),
+                &robot.limits,
+            ),
             learners: specs.iter().map(|spec| self.learner_description(spec)).collect(),
             thresholds: self.thresholds,
             movements_available: briefing.actions.remaining(),
@@ -249,7 +270,10 @@ impl Scenario {
             sockets: robot.socket_descriptions(world.truth().is_some()),
             body: robot.body,
         };
-        Ok(Experiment::new(description, world, learners, evaluation, self.design_problem()))
+        // Of what each learns itself; all or none.
+        let problems = learners.iter().map(|learner| self.design_problem_of((*learner.belief().layout).clone()));
+        let problems = problems.collect::<Option<_>>().unwrap_or_default();
+        Ok(Experiment::new(description, world, learners, evaluation, problems))
     }
 }
 

@@ -66,7 +66,7 @@ mod tests {
         model::State,
         scenario::{Robot, Scenario, builtin},
         selection::Movement,
-        sensing::{Occasion, Rig},
+        sensing::{InView, Occasion, Rig},
     };
 
     fn scenario() -> Scenario {
@@ -164,7 +164,7 @@ mod tests {
     fn where_the_whole_stands_is_a_gauge_and_its_size_is_none() {
         let scenario = scenario();
         let Robot { state, layout, limits, .. } = &scenario.robot;
-        let gauge = Gauge::new(state, layout, &scenario.rig, limits);
+        let gauge = Gauge::new(state, layout, &scenario.rig, InView::Unknown, limits);
         let motion = Isometry3::new(Vector3::new(0.02, -0.01, 0.03), Vector3::new(0.05, 0.02, -0.04));
         let mut moved = State { base: motion, ..state.clone() }.measured().into_owned();
         moved.sockets.iter_mut().for_each(|socket| *socket = motion * *socket);
@@ -174,9 +174,9 @@ mod tests {
         assert!(gauge.undetermined() >= 6);
         let channels = scenario.rig.channels().iter();
         let without: Vec<_> = channels.filter(|it| it.occasion() != Occasion::Beforehand).cloned().collect();
-        let blind = Gauge::new(state, layout, &Rig::new(without), limits);
+        let blind = Gauge::new(state, layout, &Rig::new(without), InView::Unknown, limits);
         assert_eq!(blind.undetermined(), gauge.undetermined() + 1, "its size");
-        let counted = movements_by_counting(state, layout, &scenario.rig, limits);
+        let counted = movements_by_counting(state, layout, &scenario.rig, InView::Unknown, limits);
         assert_eq!(counted, (gauge.rank() - 1).div_ceil(3), "three equations each, and the distance");
     }
 

@@ -170,7 +170,7 @@ impl Case<'_> {
             for (channel, (sensor, reading)) in self.rig.channels().iter().zip(&row.observation.readings).enumerate() {
                 let (Some(measured), Occasion::Always) = (reading, sensor.occasion()) else { continue };
                 let mut predicted = vec![0.0; measured.len()];
-                if sensor.predict(state, &row.positions, &mut predicted) {
+                if sensor.extended(state, &row.positions, &mut predicted) {
                     let (sensor, apart) = (Sensed::Channel(channel), sensor.apart(measured, &predicted));
                     residuals.push(Residual { row: index, sensor, predicted, measured: measured.clone(), apart });
                 }

@@ -17,12 +17,17 @@ pub struct BestDesign {
     pub best_design_trace: f64,
     /// By how much that may exceed the optimum, as a fraction of it: the gap of the equivalence theorem.
     pub gap: f64,
+    /// How many parameters it is for: who learns fewer cannot be compared with it.
+    #[serde(default)]
+    pub parameters: usize,
 }
 
 impl BestDesign {
-    /// The A-efficiency of data whose bound is tr(W F⁻¹): the trace of the last of the best designs as a fraction of it.
-    pub fn efficiency(designs: &[Self], bound_trace: Option<f64>) -> Option<f64> {
-        Some(designs.last()?.best_design_trace / bound_trace?)
+    /// The A-efficiency of data whose bound is tr(W F⁻¹): the trace of the last of the best designs as a fraction of it; `None` for data
+    /// that teach another number of parameters.
+    pub fn efficiency(designs: &[Self], bound_trace: Option<f64>, parameters: usize) -> Option<f64> {
+        let best = designs.last().filter(|best| best.parameters == parameters)?;
+        Some(best.best_design_trace / bound_trace?)
     }
 }
 
@@ -56,7 +61,8 @@ pub fn best_designs(stretches: &[Stretch]) -> Vec<BestDesign> {
                 break;
             };
             let (best_design_trace, gap) = (best.trace, best.gap);
-            found.push(BestDesign { step: from + movements, movements, best_design_trace, gap });
+            let parameters = problem.layout.dimension();
+            found.push(BestDesign { step: from + movements, movements, best_design_trace, gap, parameters });
             design = Some(best);
         }
     }

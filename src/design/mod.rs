@@ -18,13 +18,15 @@
 //!   favours most joins the design, and the shares are balanced by Newton's method over the simplex. By the equivalence
 //!   theorem (Kiefer and Wolfowitz 1960) the design is optimal where φ nowhere exceeds Σ pᵢ φᵢ, and its trace is above the
 //!   optimum by at most the difference.
-//!   Where a head watches, only movements after which it sees the marker are candidates.
+//!   Only movements after which something is seen are candidates, and what a channel does not see tells nothing (`visible` of
+//!   the [rig](crate::sensing::Rig)).
 //! * *Before any measurement* ([`observability`]): what can be determined at all, and how well by how many movements, at the robot as
 //!   it is described.
 //! * *Counting.* As many independent equations as there are directions that can be determined. A yardstick, not a bound.
 
 mod balance;
 mod best;
+mod candidates;
 mod counting;
 #[cfg(test)]
 mod laws;
@@ -59,8 +61,10 @@ pub struct Problem {
     pub rig: Arc<Rig>,
     /// Joint limits.
     pub limits: JointBox,
-    /// The head that watches; `None` if the marker is always seen.
+    /// The head that watches; `None` if the sensors see what they see by themselves.
     pub head: Option<Head>,
+    /// A posture (rad or m) at which something is said to be seen, where not everything is.
+    pub visible_pose: Option<Vec<f64>>,
     /// Λ₀, the information of the prior.
     pub prior: DMatrix<f64>,
     /// W.
@@ -68,7 +72,7 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// HᵀH, the information of one movement at the truth; nothing of a marker that the head does not see.
+    /// HᵀH, the information of one movement at the truth: of the channels that see something there, and nothing of the others.
     pub fn information(&self, configuration: &[f64]) -> DMatrix<f64> {
         match self.seen(configuration) {
             Some(rows) => &rows * rows.transpose(),
@@ -76,14 +80,19 @@ impl Problem {
         }
     }
 
-    /// Hᵀ at the truth (m × d); `None` where the marker is not seen.
+    /// Hᵀ at the truth (m × d), zero where a channel sees nothing; `None` where none sees anything.
     fn seen(&self, configuration: &[f64]) -> Option<DMatrix<f64>> {
-        self.sees(configuration).then(|| self.rig.jacobian(&self.truth, &self.layout, configuration))
+        self.rig.visible_jacobian(self.head.as_ref(), &self.truth, &self.layout, configuration)
     }
 
-    /// Whether the marker is seen.
+    /// By channel, whether it reads.
+    fn visible(&self, configuration: &[f64]) -> Vec<bool> {
+        self.rig.visible(self.head.as_ref(), &self.truth, configuration)
+    }
+
+    /// Whether anything is seen.
     fn sees(&self, configuration: &[f64]) -> bool {
-        self.head.is_none_or(|head| head.sees(&self.truth.marker_at(configuration)))
+        self.visible(configuration).contains(&true)
     }
 
     /// The covariance F⁻¹ that the information F allows, in the chart at the truth; `None` if F is singular.

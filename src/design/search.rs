@@ -2,10 +2,12 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 
 use super::{
     Problem,
     balance::{Shares, Standing},
+    candidates::{candidates, within},
     sensitivity::Sensitivity,
 };
 use crate::optimize::{Polish, Slopes, descend};
@@ -21,13 +23,11 @@ pub struct Design {
     pub trace: f64,
     /// By how much the trace may exceed the optimum, as a fraction of it: the gap of the equivalence theorem over 4500
     /// candidates, the best third of them and the poses of the design polished. Some maxima draw from nearby alone: climbing from
-    /// 100 000 other poses finds up to 0.01 more. Where a head watches, the polish cannot follow the border of what it sees: there
-    /// all candidates that it sees are polished, and 0.07 more was found.
+    /// 100 000 other poses finds up to 0.01 more. Where not everything is in view, the polish cannot follow the border of what is:
+    /// there more candidates are polished, and 0.07 more was found where a head watches.
     pub gap: f64,
 }
 
-/// Candidates inside the joint box, on its faces and on its corners, each.
-const CANDIDATES: usize = 1500;
 /// Candidates polished in every exchange, the best of them: the best few often climb to the same pose.
 const POLISHED: usize = 100;
 /// Candidates polished before a design is called optimal: some maxima draw from nearby alone.
@@ -43,18 +43,31 @@ const UNBALANCED: f64 = 0.1;
 const EXCHANGES: usize = 60;
 /// To a hundredth of the gap that is usually asked for.
 const CLIMB: Polish = Polish { steps: 40, tolerance: 1e-4 };
+/// Of the best poses that slopes lead to so many follow the border of what is in view, by so many steps at most; the first step and
+/// the last, in sides of the cube.
+const FOLLOWED: usize = 40;
+const FOLLOWING: usize = 250;
+const LONGEST: f64 = 0.03;
+const SHORTEST: f64 = 1e-4;
 
 impl Problem {
     /// The best design of `movements` movements, to within `gap` of the optimum or as near as it came. `None` where the
-    /// prior and the movements leave something open.
+    /// prior and the movements leave something open, and where no movement shows anything.
     pub fn best_design(&self, movements: usize, gap: f64) -> Option<Design> {
         self.best_design_from(movements, gap, None)
     }
 
     /// The same, from a design of another number of movements: where data outweigh the prior the two are nearly alike.
     pub fn best_design_from(&self, movements: usize, gap: f64, start: Option<&Design>) -> Option<Design> {
+        // What never sees anything is left out: it would change the last digits of all sums, and so the way that a search takes.
+        if let Some(sighted) = self.sighted() {
+            return sighted.best_design_from(movements, gap, start);
+        }
         let mut search = Search::new(self, movements, start);
-        // Polishes that end at the border of what a head sees end at many places.
+        if search.candidates.is_empty() {
+            return None;
+        }
+        // Polishes that end at the border of what a head sees end at many places. Rows of cameras take longer than those of points.
         let polished = if self.head.is_some() { search.candidates.len() } else { POLISHED };
         let certifying = polished.max(CERTIFYING);
         let mut exchanges = 0;
@@ -138,7 +151,38 @@ impl<'a> Search<'a> {
         let found = climbed.into_iter().map(|(point, value)| (point, -value));
         let mut found: Vec<_> = found.filter(|(_, phi)| phi.is_finite()).collect();
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        if self.problem.rig.has_view() {
+            self.follow_border(standing, &mut found);
+        }
         found
+    }
+
+    /// Climbs on from the best of `found` where slopes end at the border of what is in view: by steps in random directions, longer
+    /// after one that leads up and shorter after one that does not (an evolution strategy of one parent and one child; Rechenberg 1973).
+    fn follow_border(&self, standing: &Standing, found: &mut [(Vec<f64>, f64)]) {
+        // A fixed stream of its own.
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let limits = &self.problem.limits;
+        let count = found.len().min(FOLLOWED);
+        let mut steps = vec![LONGEST; count];
+        for _ in 0..FOLLOWING {
+            let tried: Vec<usize> = (0..count).filter(|index| steps[*index] > SHORTEST).collect();
+            let beside = tried.iter().map(|index| {
+                let from = &found[*index].0;
+                within(from.iter().map(|x| x + steps[*index] * rng.sample::<f64, _>(StandardNormal)).collect())
+            });
+            let beside: Vec<Vec<f64>> = beside.collect();
+            let poses: Vec<Vec<f64>> = beside.iter().map(|point| limits.from_unit(point)).collect();
+            let values = self.sensitivity.values(&standing.sensitivity, &poses);
+            for ((index, point), phi) in tried.into_iter().zip(beside).zip(values) {
+                let is_better = phi > found[index].1;
+                steps[index] *= if is_better { 1.5 } else { 0.9 };
+                if is_better {
+                    found[index] = (point, phi);
+                }
+            }
+        }
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
     }
 
     /// Adds those that are favoured more than the design's own, each once.
@@ -159,25 +203,6 @@ impl<'a> Search<'a> {
         let (shares, trace) = (self.shares.shares().to_vec(), standing.trace);
         Design { poses: self.poses, shares, trace, gap: (excess / trace).max(0.0) }
     }
-}
-
-/// Poses inside the joint box, on its faces and on its corners, after which the marker is seen.
-fn candidates(problem: &Problem) -> Vec<Vec<f64>> {
-    // A fixed stream of its own: limits depend on no seed.
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let mut candidates = Vec::with_capacity(3 * CANDIDATES);
-    for at_bounds in [0.0, 0.5, 1.0] {
-        for _ in 0..CANDIDATES {
-            let coordinate = |_| {
-                let x: f64 = rng.random();
-                if rng.random::<f64>() < at_bounds { x.round() } else { x }
-            };
-            let point: Vec<f64> = (0..problem.limits.dimension()).map(coordinate).collect();
-            candidates.push(problem.limits.from_unit(&point));
-        }
-    }
-    candidates.retain(|pose| problem.sees(pose));
-    candidates
 }
 
 #[cfg(test)]

@@ -35,7 +35,7 @@ impl<'a> Sensitivity<'a> {
         Self { problem, points, level: Level::new() }
     }
 
-    /// φ of every pose (rad or m) for the matrix S; −∞ where the marker is not seen.
+    /// φ of every pose (rad or m) for the matrix S; −∞ where nothing is seen.
     pub fn values(&self, s: &DMatrix<f64>, poses: &[Vec<f64>]) -> Vec<f64> {
         self.evaluate(s, poses, None)
     }
@@ -52,13 +52,13 @@ impl<'a> Sensitivity<'a> {
         match &self.points {
             Some(points) => {
                 dispatch!(self.level, simd => in_lanes(simd, (points, s), poses, &mut values, gradients));
+                for (value, pose) in values.iter_mut().zip(poses) {
+                    if !self.problem.sees(pose) {
+                        *value = f64::NEG_INFINITY;
+                    }
+                }
             }
             None => self.one_by_one(s, poses, &mut values, gradients),
-        }
-        for (value, pose) in values.iter_mut().zip(poses) {
-            if !self.problem.sees(pose) {
-                *value = f64::NEG_INFINITY;
-            }
         }
         values
     }
@@ -69,9 +69,16 @@ impl<'a> Sensitivity<'a> {
         let mut readings = vec![0.0; rig.equations()];
         let mut rows = DMatrix::zeros(layout.dimension(), rig.equations());
         for (index, (pose, value)) in poses.iter().zip(values).enumerate() {
+            // What is seen here is taken for seen beside it too: where it is lost, no difference says anything.
+            let visible = self.problem.visible(pose);
+            if !visible.contains(&true) {
+                *value = f64::NEG_INFINITY;
+                continue;
+            }
             let mut rows_at = |pose: &[f64], rows: &mut DMatrix<f64>| {
                 rows.fill(0.0);
                 rig.rows(pass.at(pose), &mut readings, rows.as_mut_slice());
+                rig.hide(&visible, rows.as_mut_slice());
             };
             rows_at(pose, &mut rows);
             let products = s * &rows;

@@ -76,10 +76,11 @@ impl Belief {
         }
     }
 
-    /// Whether an observation after a movement to `positions` (rad or m) can be taken in: it fits the rig, and how far it is
-    /// from what is believed can be computed.
+    /// Whether an observation after a movement to `positions` (rad or m) can be taken in: it fits the rig, whose noise can be
+    /// divided by, and how far it is from what is believed can be computed.
     pub fn accepts(&self, positions: &[f64], observation: &Observation) -> Result<(), Refused> {
         observation.check(&self.rig, self.state.joints.len(), positions)?;
+        self.rig.check_noise()?;
         let squared = self.rig.squared_error(&self.state, positions, observation);
         if squared.is_finite() { Ok(()) } else { Err(Refused::Absurd) }
     }

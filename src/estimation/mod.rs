@@ -48,6 +48,11 @@ pub trait Estimator: Send + Sync {
         Vec::new()
     }
 
+    /// What it makes of the readings of the latest movement, the `movement`-th; without a look at those before.
+    fn latest_readings(&self, movement: u64) -> Vec<ReadingReport> {
+        self.readings().into_iter().filter(|reading| reading.movement == movement).collect()
+    }
+
     /// The scales of noise that it learns, by kind of noise; empty for an estimator that is told them all.
     fn noise(&self) -> Vec<NoiseReport> {
         Vec::new()

@@ -132,6 +132,11 @@ impl Agent {
         self.estimator.readings()
     }
 
+    /// What it makes of the readings of the latest movement, the `movement`-th; whatever the number of those before.
+    pub fn latest_readings(&self, movement: u64) -> Vec<ReadingReport> {
+        self.estimator.latest_readings(movement)
+    }
+
     /// The scales of noise that it learns.
     pub fn noise(&self) -> Vec<NoiseReport> {
         self.estimator.noise()

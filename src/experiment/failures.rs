@@ -115,7 +115,7 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
         body: None,
     };
     let evaluation = Evaluation::of_truth(vec![vec![0.2; JOINTS], vec![-0.4; JOINTS]], &truth(), 0.01);
-    (Experiment::new(description, world, learners, evaluation, None), falters)
+    (Experiment::new(description, world, learners, evaluation, Vec::new()), falters)
 }
 
 /// The report of the next step, but for how long the choices took.

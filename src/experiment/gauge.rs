@@ -9,13 +9,13 @@
 //! truth by N Nᵀ δ, δ being the coordinates of the estimate in the chart at the truth, and then by Gauss and Newton back to
 //! where it predicts what it predicted before.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
 use crate::{
     design::{General, general_movements},
     kinematics::JointBox,
-    model::{Layout, State, null_space},
-    sensing::Rig,
+    model::{Layout, State, eigen, null_space},
+    sensing::{Head, InView, Rig},
 };
 
 /// What can be told of a problem by its measurements, and what cannot.
@@ -23,6 +23,8 @@ use crate::{
 pub struct Gauge {
     layout: Layout,
     rig: Rig,
+    /// Whether what is in view is told by the truth, and the head that watches it.
+    watched: Option<Option<Head>>,
     limits: JointBox,
     /// The movements that stand for all, and through which channels each is seen.
     movements: Vec<General>,
@@ -32,20 +34,30 @@ pub struct Gauge {
 const STEPS: usize = 30;
 
 impl Gauge {
-    /// The gauge at `truth`, judged by movements in general position.
-    pub fn new(truth: &State, layout: &Layout, rig: &Rig, limits: &JointBox) -> Self {
+    /// The gauge at `truth`, judged by movements in general position that are in `view`.
+    pub fn new(truth: &State, layout: &Layout, rig: &Rig, view: InView<'_>, limits: &JointBox) -> Self {
         // Noise may be none: what can be told does not depend on it.
         let rig = if rig.sigma() > 0.0 { rig.clone() } else { rig.assuming(1.0) };
         let (layout, limits) = (layout.clone(), limits.clone());
-        let mut gauge = Self { layout, rig, limits, movements: Vec::new(), undetermined: 0 };
+        let watched = match view {
+            InView::Unknown => None,
+            InView::By(head) => Some(head.copied()),
+        };
+        let mut gauge = Self { layout, rig, watched, limits, movements: Vec::new(), undetermined: 0 };
         gauge.study(truth);
         gauge
     }
 
     /// Judges another truth.
     pub fn study(&mut self, truth: &State) {
-        self.movements = general_movements(truth, &self.layout, &self.rig, &self.limits);
+        let view = self.watched.as_ref().map_or(InView::Unknown, |head| InView::By(head.as_ref()));
+        self.movements = general_movements(truth, &self.layout, &self.rig, view, &self.limits);
         self.undetermined = self.free(truth).ncols();
+    }
+
+    /// Which parameters it is of.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
     }
 
     /// How many directions of parameter space no measurement determines.
@@ -123,7 +135,7 @@ impl Gauge {
         let free = self.free(estimate);
         let m = self.layout.dimension();
         let across = DMatrix::identity(m, m) - &free * free.transpose();
-        let eigen = SymmetricEigen::new(across);
+        let eigen = eigen(across)?;
         let determined: Vec<DVector<f64>> =
             (0..m).filter(|k| eigen.eigenvalues[*k] > 0.5).map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
         if determined.is_empty() {
@@ -164,7 +176,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let truth = random_arm(&mut rng, 4);
         let layout = Layout::new(&truth, (0..4).map(Block::Axis).chain([Block::Base, Block::Target(0)]));
-        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.01), &limits());
+        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.01), InView::Unknown, &limits());
         (truth, layout, gauge, rng)
     }
 
@@ -173,7 +185,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let truth = random_arm(&mut rng, 4);
         let layout = Layout::of_arm(&truth, &[], false);
-        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.0), &limits());
+        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.0), InView::Unknown, &limits());
         assert_eq!((gauge.undetermined(), gauge.rank()), (0, layout.dimension()));
         let estimate = truth.retract(&layout, &DVector::from_element(layout.dimension(), 0.1));
         assert_eq!(gauge.aligned(&truth, &estimate), truth);

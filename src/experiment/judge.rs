@@ -10,24 +10,33 @@ use super::{
     metrics::{self, Evaluation, Metrics},
     report::StepReport,
 };
-use crate::{design::Problem, estimation::Belief, kinematics::JointBox, model::State};
+use crate::{
+    design::Problem,
+    estimation::Belief,
+    kinematics::JointBox,
+    model::State,
+    sensing::{Head, InView},
+};
 
 /// What beliefs and runs are judged by.
 #[derive(Clone)]
 pub struct Judge {
     evaluation: Evaluation,
-    gauge: Option<Gauge>,
-    bounds: Option<Bounds>,
+    /// One for every layout that learners have: what one learns of another may be known to the next.
+    gauges: Vec<Gauge>,
+    /// One for each learner, or none at all.
+    bounds: Vec<Bound>,
     verdicts: Vec<Verdict>,
     change_at: Option<u64>,
 }
 
-/// What the data of every learner allow.
+/// What the data of a learner allow.
 #[derive(Clone)]
-struct Bounds {
+struct Bound {
+    /// Of what this learner learns.
     problem: Problem,
-    /// Λ₀ + Σ HᵀH at the truth, one per learner.
-    information: Vec<DMatrix<f64>>,
+    /// Λ₀ + Σ HᵀH at the truth.
+    information: DMatrix<f64>,
 }
 
 /// What is known of one learner's run so far.
@@ -56,42 +65,50 @@ impl Judge {
     /// Of so many learners, over `evaluation`; the body changes after `change_at` movements, if it does.
     pub fn new(evaluation: Evaluation, learners: usize, thresholds: Thresholds, change_at: Option<u64>) -> Self {
         let verdicts = vec![Verdict::new(thresholds); learners];
-        Self { evaluation, gauge: None, bounds: None, verdicts, change_at }
+        Self { evaluation, gauges: Vec::new(), bounds: Vec::new(), verdicts, change_at }
     }
 
-    /// Learns from a belief what measurements leave undetermined of a truth.
-    pub(super) fn study(&mut self, belief: &Belief, truth: &State, limits: &JointBox) {
+    /// Learns from a belief what measurements that `head` may watch leave undetermined of a truth.
+    pub(super) fn study(&mut self, belief: &Belief, truth: &State, head: Option<&Head>, limits: &JointBox) {
         let Belief { layout, rig, .. } = belief;
-        self.gauge = Some(Gauge::new(truth, layout, rig, limits));
+        if self.gauge(belief).is_none() {
+            self.gauges.push(Gauge::new(truth, layout, rig, InView::By(head), limits));
+        }
     }
 
-    /// Also tells what the data of every learner allow.
-    pub(super) fn bound(&mut self, problem: Problem) {
-        let information = vec![problem.prior.clone(); self.verdicts.len()];
-        self.bounds = Some(Bounds { problem, information });
+    /// The gauge of what a belief is about.
+    fn gauge(&self, belief: &Belief) -> Option<&Gauge> {
+        self.gauges.iter().find(|gauge| *gauge.layout() == *belief.layout)
+    }
+
+    /// Also tells what the data of every learner allow; one problem for each, of what it learns.
+    pub(super) fn bound(&mut self, problems: Vec<Problem>) {
+        let bound = |problem: Problem| Bound { information: problem.prior.clone(), problem };
+        self.bounds = problems.into_iter().map(bound).collect();
     }
 
     /// The body is another from now on.
     pub(super) fn follow(&mut self, truth: &State) {
         self.evaluation.follow(truth);
-        self.gauge.iter_mut().for_each(|gauge| gauge.study(truth));
-        if let Some(bounds) = &mut self.bounds {
+        self.gauges.iter_mut().for_each(|gauge| gauge.study(truth));
+        for Bound { problem, information } in &mut self.bounds {
             // What was measured before says nothing certain of the new body.
-            bounds.problem.truth = truth.clone();
-            bounds.information.fill(bounds.problem.prior.clone());
+            problem.truth = truth.clone();
+            *information = problem.prior.clone();
         }
     }
 
     /// The metrics of a belief that need a truth or held-out measurements; the others are left to the learner.
     pub(super) fn metrics(&self, belief: &Belief, truth: Option<&State>) -> Metrics {
         let layout = &*belief.layout;
-        let aligned = truth.map(|truth| match &self.gauge {
+        let gauge = self.gauge(belief);
+        let aligned = truth.map(|truth| match gauge {
             Some(gauge) => gauge.aligned(truth, &belief.state),
             None => truth.clone(),
         });
         let held_out = self.evaluation.error(&belief.state, &belief.rig);
         let nees = aligned.as_ref().and_then(|truth| {
-            let (gauge, covariance) = (self.gauge.as_ref()?, belief.covariance.as_ref()?);
+            let (gauge, covariance) = (gauge?, belief.covariance.as_ref()?);
             gauge.nees(&belief.state, covariance, truth)
         });
         let estimate = belief.state.measured();
@@ -120,15 +137,13 @@ impl Judge {
 
     /// Completes a report with what the data allow, and draws the conclusions.
     pub(super) fn conclude(&mut self, report: &mut StepReport) {
-        if let Some(Bounds { problem, information }) = &mut self.bounds {
-            for (learner, information) in report.learners.iter_mut().zip(information) {
-                if let Some(movement) = learner.movement.as_ref().filter(|it| it.seen) {
-                    *information += problem.information(&movement.configuration);
-                }
-                if let Some(allowed) = problem.allowed(information) {
-                    learner.metrics.bound_trace = allowed.covariance.as_ref().map(|p| problem.weights.trace(p));
-                    learner.estimate.allow(&allowed);
-                }
+        for (learner, Bound { problem, information }) in report.learners.iter_mut().zip(&mut self.bounds) {
+            if let Some(movement) = learner.movement.as_ref().filter(|it| it.seen) {
+                *information += problem.information(&movement.configuration);
+            }
+            if let Some(allowed) = problem.allowed(information) {
+                learner.metrics.bound_trace = allowed.covariance.as_ref().map(|p| problem.weights.trace(p));
+                learner.estimate.allow(&allowed);
             }
         }
         for (verdict, learner) in self.verdicts.iter_mut().zip(&report.learners) {

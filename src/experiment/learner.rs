@@ -227,8 +227,7 @@ impl Learner {
         self.record.misses += u64::from(!seen);
         self.record.changes_noticed += u64::from(update.change_noticed);
         let movements = self.record.movements;
-        let weighed: Vec<ReadingReport> =
-            self.readings().into_iter().filter(|reading| reading.movement == movements).collect();
+        let weighed = self.agent.latest_readings(movements);
         let readings = readings(world, self.belief(), &configuration, &observed, channels, &weighed);
         let selection = proposal.as_ref().map(|proposal| &proposal.selection);
         let report = MovementReport {

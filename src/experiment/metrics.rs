@@ -211,7 +211,8 @@ impl Evaluation {
             for (channel, reading) in rig.channels().iter().zip(&observation.readings) {
                 let Some(reading) = reading else { continue };
                 let mut predicted = vec![0.0; reading.len()];
-                if channel.predict(estimate, theta, &mut predicted) {
+                // Where an estimate has what was seen behind the camera it is wrong, and is told by how much.
+                if channel.extended(estimate, theta, &mut predicted) {
                     let apart = channel.apart(reading, &predicted);
                     lengths.extend(apart.length_m);
                     angles.extend(apart.angle_rad.map(f64::to_degrees));

@@ -16,12 +16,16 @@ mod convergence;
 mod failures;
 mod gauge;
 mod head;
+#[cfg(test)]
+mod holders;
 mod judge;
 #[cfg(test)]
 mod laws;
 mod learner;
 mod loads;
 mod metrics;
+#[cfg(test)]
+mod noises;
 mod remarks;
 mod report;
 mod result;
@@ -106,20 +110,20 @@ pub enum ExperimentError {
 }
 
 impl Experiment {
-    /// A comparison of `learners` in `world`, judged over `evaluation`; step 0 is reported at once. With a `problem`
-    /// reports tell also what the data of every learner allow (see [`design`](crate::design)).
+    /// A comparison of `learners` in `world`, judged over `evaluation`; step 0 is reported at once. With
+    /// `problems`, one for each learner, reports tell also what the data of every learner allow (see [`design`](crate::design)).
     pub fn new(
         description: Description,
         world: World,
         mut learners: Vec<Learner>,
         evaluation: Evaluation,
-        problem: Option<Problem>,
+        problems: Vec<Problem>,
     ) -> Self {
         let mut judge = Judge::new(evaluation, learners.len(), description.thresholds, description.change_at);
-        if let (Some(truth), Some(learner)) = (world.truth(), learners.first()) {
-            judge.study(learner.belief(), truth, learner.limits());
+        for (truth, learner) in world.truth().into_iter().flat_map(|truth| learners.iter().map(move |it| (truth, it))) {
+            judge.study(learner.belief(), truth, world.head(), learner.limits());
         }
-        problem.into_iter().for_each(|problem| judge.bound(problem));
+        judge.bound(problems);
         let truth = world.truth();
         let reports =
             learners.iter_mut().map(|learner| learner.report(None, Update::default(), &judge, truth)).collect();

@@ -5,6 +5,7 @@ use crate::{
     estimation::{Misfit, MisfitCause, NoiseReport, ReadingReport},
     experiment::{Description, Metrics},
     kinematics::JointKind,
+    sensing::InView,
 };
 
 /// Movements listed at most.
@@ -15,7 +16,7 @@ const AS_PROMISED: f64 = 0.2;
 /// All remarks on a learner.
 pub(super) fn remarks(learner: &Learner, metrics: &Metrics, description: &Description, world: &World) -> Vec<String> {
     let mut said = Vec::new();
-    said.extend(undetermined(learner, description));
+    said.extend(undetermined(learner, description, world));
     said.extend(learner.noise().iter().filter_map(noise));
     said.extend(joint_noise(learner));
     said.extend(metrics.model_error_m.filter(|error| *error > 0.0).map(model_error));
@@ -32,9 +33,14 @@ pub(super) fn remarks(learner: &Learner, metrics: &Metrics, description: &Descri
     said
 }
 
-fn undetermined(learner: &Learner, description: &Description) -> Option<String> {
+fn undetermined(learner: &Learner, description: &Description, world: &World) -> Option<String> {
     let belief = learner.belief();
-    let gauge = Gauge::new(&belief.state, &belief.layout, &belief.rig, learner.limits());
+    // Where the truth is known, it says what is in view.
+    let (state, view) = match world.truth() {
+        Some(truth) => (truth, InView::By(world.head())),
+        None => (&belief.state, InView::Unknown),
+    };
+    let gauge = Gauge::new(state, &belief.layout, &belief.rig, view, learner.limits());
     description.called().untold(&belief.layout, &gauge.free(&belief.state), "any movement")
 }
 

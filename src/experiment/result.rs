@@ -77,6 +77,9 @@ pub struct LearnerResult {
     /// the end; null without one of them.
     #[serde(default)]
     pub efficiency: Option<f64>,
+    /// How many parameters it learns.
+    #[serde(default)]
+    pub parameters: usize,
     /// The metrics at the end.
     pub metrics: Metrics,
     /// What it makes of every reading, for a learner with a robust loss.
@@ -221,7 +224,7 @@ impl RunResult {
     /// The same beside the best designs of the scenario.
     pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
         for learner in &mut self.learners {
-            learner.efficiency = BestDesign::efficiency(&best_designs, learner.metrics.bound_trace);
+            learner.efficiency = BestDesign::efficiency(&best_designs, learner.metrics.bound_trace, learner.parameters);
         }
         Self { best_designs, ..self }
     }
@@ -248,6 +251,7 @@ impl Experiment {
                 settled_at: verdict.settled_at,
                 failure: report.failure.clone(),
                 efficiency: None,
+                parameters: learner.belief().layout.dimension(),
                 metrics: report.metrics.clone(),
                 readings: learner.readings(),
                 noise: learner.noise(),

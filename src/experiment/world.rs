@@ -206,10 +206,7 @@ impl World {
                 Observation::missed(rig.channels().len()).check(rig, truth.joints.len(), theta)?;
                 let mut stands = theta.clone();
                 stands.iter_mut().zip(self.errors(draw)).for_each(|(position, error)| *position += error);
-                let mut observation = match head {
-                    Some(head) if !head.sees(&truth.marker_at(&stands)) => Observation::missed(rig.channels().len()),
-                    _ => rig.observe_in(movement.socket, truth, &stands, &draw.noise),
-                };
+                let mut observation = rig.observe_watched(head.as_ref(), movement.socket, truth, &stands, &draw.noise);
                 for (channel, reading) in observation.readings.iter_mut().enumerate() {
                     if let (Some(reading), Some(outliers), true) = (reading, outliers, self.is_outlier(draw, channel)) {
                         let place = &draw.outliers[channel][1..];

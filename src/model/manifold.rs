@@ -8,10 +8,10 @@
 //! its self-motion manifold (Burdick 1989), with the null space of J as tangent. Distances between postures are Euclidean,
 //! in radians and metres.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Vector3};
 use rand::Rng;
 
-use super::{Load, State};
+use super::{Load, State, eigen};
 use crate::kinematics::{Joint, JointBox};
 
 /// The postures within joint limits in which a target of a robot is at a place.
@@ -118,7 +118,7 @@ impl<'a> Manifold<'a> {
     /// An orthonormal basis of the tangent at a posture (n × (n − 3); more columns where the arm is singular).
     pub fn tangent(&self, positions: &[f64]) -> DMatrix<f64> {
         let jacobian = self.state.target_jacobian(self.target, positions);
-        let eigen = SymmetricEigen::new(jacobian.tr_mul(&jacobian));
+        let Some(eigen) = eigen(jacobian.tr_mul(&jacobian)) else { return DMatrix::zeros(positions.len(), 0) };
         let greatest = eigen.eigenvalues.amax();
         let free = |k: &usize| eigen.eigenvalues[*k] <= 1e-10 * greatest;
         let columns: Vec<_> = (0..positions.len()).filter(free).map(|k| eigen.eigenvectors.column(k)).collect();

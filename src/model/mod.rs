@@ -36,7 +36,7 @@ pub use pass::{Frame, Motion, Pass, jacobian};
 pub use points::Whitening;
 pub(crate) use points::{Centre, Centres, Passage, Points, Posture, Ray, Stage};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
-pub use rank::{null_space, rank};
+pub use rank::{eigen, null_space, rank, singular};
 pub use state::{Correction, Device, Hand, Place, State, Target, Thetas};
 pub use workspace::{Workspace, best_motion};
 

@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Rotation3, SVD, Translation3, UnitQuaternion, Vector3};
 
-use super::{Layout, State, jacobian};
+use super::{Layout, State, jacobian, singular};
 
 /// Configurations, and what an error there is.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,7 +47,7 @@ impl Workspace {
         }
         if self.up_to_motion && count > 0 {
             // An orthonormal basis also where the points lie on a line.
-            let svd = SVD::new(motions, true, false);
+            let Some(svd) = singular(motions, true) else { return stacked };
             let greatest = svd.singular_values.amax();
             if let Some(basis) = svd.u {
                 for k in (0..basis.ncols()).filter(|k| svd.singular_values[*k] > 1e-9 * greatest) {
@@ -84,8 +84,10 @@ pub fn best_motion(from: &[Point3<f64>], to: &[Point3<f64>]) -> Isometry3<f64> {
     };
     let (a, b) = (centre(from), centre(to));
     let product: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| (q.coords - b) * (p.coords - a).transpose()).sum();
-    let svd = SVD::new(product, true, true);
-    let rotation = svd.u.zip(svd.v_t).map_or(Matrix3::identity(), |(u, v_t)| {
+    let svd =
+        product.iter().all(|x| x.is_finite()).then(|| SVD::try_new(product, true, true, 5.0 * f64::EPSILON, 10_000));
+    let parts = svd.flatten().and_then(|svd| svd.u.zip(svd.v_t));
+    let rotation = parts.map_or(Matrix3::identity(), |(u, v_t)| {
         let handed = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v_t).determinant().signum()));
         u * handed * v_t
     });

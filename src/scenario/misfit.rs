@@ -1,13 +1,15 @@
 //! Which learners fit a scenario, and why others do not.
 
 use super::{EstimatorKind, PolicyKind, Robot, WorldKind};
-use crate::sensing::Rig;
+use crate::{model::Block, sensing::Rig};
 
 /// What of a scenario decides which learners fit it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setting {
     /// Whether the marker is learned.
     pub learns_marker: bool,
+    /// Whether axes are all that is learned.
+    pub learns_axes_alone: bool,
     /// Whether recorded rows are replayed.
     pub is_measured: bool,
     /// Whether the robot is elsewhere and asks where to move.
@@ -24,6 +26,7 @@ impl Setting {
         let mut channels = rig.into_iter().flat_map(Rig::channels);
         Self {
             learns_marker: robot.layout.marker().is_some(),
+            learns_axes_alone: robot.layout.blocks().all(|(block, _)| matches!(block, Block::Axis(_))),
             is_measured: world == WorldKind::Measured,
             is_outside: world == WorldKind::Outside,
             has_sockets: !robot.sockets.is_empty(),

@@ -1,9 +1,9 @@
 //! What makes a movement good: the alphabet of optimal design.
 
-use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::Weights;
-use crate::model::{Layout, State, Workspace};
+use crate::model::{Layout, State, Workspace, eigen};
 
 /// What is to become small (Atkinson, Donev, Tobias: *Optimum Experimental Designs*, 2007).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
@@ -72,5 +72,5 @@ pub(super) fn greatest_eigenvalue(
         v = next / length;
     }
     let found = projected.view((0, 0), (basis.len(), basis.len())).into_owned();
-    if found.iter().all(|x| x.is_finite()) { SymmetricEigen::new(found).eigenvalues.max() } else { f64::NAN }
+    eigen(found).map_or(f64::NAN, |eigen| eigen.eigenvalues.max())
 }

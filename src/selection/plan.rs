@@ -22,7 +22,7 @@ use super::{SelectionError, Weights, outlook::Expected};
 use crate::{
     estimation::{Alternative, Belief},
     lanes::{add_few_squares, times_few},
-    model::rank,
+    model::{eigen, rank},
 };
 
 /// Movements that are planned and not yet made, with what the belief would be after all of them.
@@ -56,10 +56,11 @@ impl Plan {
         }
     }
 
-    /// How many independent equations a movement brings, by the rank of its Jacobian at `posture` (rad or m); at least one.
+    /// How many independent equations a movement brings, by the rank of the Jacobian of what is believed to read at `posture` (rad or
+    /// m); at least one.
     pub fn equations(&self, posture: &[f64]) -> usize {
         let Belief { state, layout, rig, .. } = &self.after;
-        rank(&rig.jacobian(state, layout, posture).transpose()).max(1)
+        rank(&rig.believed_jacobian(state, layout, posture).transpose()).max(1)
     }
 
     /// How many directions in parameter space, weighted as the criterion does, have a standard deviation above `unknown`.
@@ -70,8 +71,8 @@ impl Plan {
         if !weighted.iter().all(|x| x.is_finite()) {
             return Err(SelectionError::NoFiniteCriterion);
         }
-        let eigenvalues = weighted.symmetric_eigenvalues();
-        Ok(eigenvalues.iter().filter(|value| **value > unknown * unknown).count())
+        let eigen = eigen(weighted).ok_or(SelectionError::NoFiniteCriterion)?;
+        Ok(eigen.eigenvalues.iter().filter(|value| **value > unknown * unknown).count())
     }
 
     /// Adds a pose of which this is expected.
@@ -149,11 +150,11 @@ pub(super) fn condition(belief: &mut Belief, pose: &[f64], weight: impl Fn(usize
     by_rows(belief, &rows, weight)
 }
 
-/// Hᵀ, whitened, of a pose under every hypothesis.
+/// Hᵀ, whitened, of a pose under every hypothesis, of the channels that would read there: how likely any does is told apart.
 fn jacobians(belief: &Belief, pose: &[f64]) -> Vec<DMatrix<f64>> {
     let Belief { state, layout, rig, alternatives, .. } = belief;
     let states = std::iter::once(state).chain(alternatives.iter().map(|alternative| &alternative.state));
-    states.map(|state| rig.jacobian(state, layout, pose)).collect()
+    states.map(|state| rig.believed_jacobian(state, layout, pose)).collect()
 }
 
 fn by_rows(belief: &mut Belief, rows: &[DMatrix<f64>], weight: impl Fn(usize) -> f64) -> bool {

@@ -17,7 +17,7 @@ pub enum Sight<'a> {
     /// The gain times the chance of being seen, by a head that watches or by the sensors themselves; not finite where that is
     /// certainly 0.
     Chance(Visibility<'a>, &'a JointBox),
-    /// The naive form, for comparison: the plain criterion, not finite unless the *predicted* marker is in view.
+    /// The naive form, for comparison: the plain criterion of what is *predicted* to be in view, not finite where nothing is.
     Predicted(Visibility<'a>),
 }
 
@@ -30,9 +30,14 @@ impl Sight<'_> {
         covariance: &DMatrix<f64>,
         rig: &Rig,
     ) -> Option<Arc<Views>> {
-        let Self::Chance(visibility, limits) = self else { return None };
-        let misses = visibility.misses().map(|miss| limits.from_unit(miss));
-        rig.has_view().then(|| Arc::new(Views::new(state, layout, covariance, rig, misses)))
+        let views = || match self {
+            Self::Predicted(_) => Views::of_estimate(state),
+            Self::Chance(visibility, limits) => {
+                let misses = visibility.misses().map(|miss| limits.from_unit(miss));
+                Views::new(state, layout, covariance, rig, misses)
+            }
+        };
+        rig.has_view().then(|| Arc::new(views()))
     }
 
     /// p(θ), given the distribution of the predicted marker.

@@ -35,6 +35,8 @@ use crate::{
 pub(super) struct Views {
     /// wₖ and xₖ.
     states: Vec<(f64, State)>,
+    /// Whether what is outside by a hair is taken for lost, and what is inside for seen.
+    is_naive: bool,
 }
 
 /// Pairs of states, before misses and after.
@@ -72,7 +74,7 @@ impl Views {
                 let drawn = state.retract(layout, &delta);
                 let mut weight = 1.0;
                 for miss in &misses {
-                    rig.clearances(&drawn, miss, &mut clearances);
+                    rig.clearances(None, &drawn, miss, &mut clearances);
                     weight *= clearances.iter().map(|clearance| (1.0 - seen(*clearance)).max(DOUBT)).product::<f64>();
                 }
                 states.push((weight, drawn));
@@ -83,7 +85,12 @@ impl Views {
         let total: f64 = states.iter().map(|(weight, _)| weight).sum();
         let share = |weight: f64| if total > 0.0 { weight / total } else { 1.0 / KEPT as f64 };
         states.iter_mut().for_each(|(weight, _)| *weight = share(*weight));
-        Self { states }
+        Self { states, is_naive: false }
+    }
+
+    /// Of an estimate that is believed blindly.
+    pub fn of_estimate(state: &State) -> Self {
+        Self { states: vec![(1.0, state.clone())], is_naive: true }
     }
 
     /// Weighs rows (each d columns of some numbers) of a movement to `positions` by what channels will see, and tells the chance
@@ -112,9 +119,10 @@ impl Views {
         let mut clearances = vec![0.0; chances.len()];
         chances.fill(0.0);
         for (weight, state) in &self.states {
-            rig.clearances(state, positions, &mut clearances);
+            rig.clearances(None, state, positions, &mut clearances);
             for (chance, clearance) in chances.iter_mut().zip(&clearances) {
-                *chance += weight * seen(*clearance);
+                let seen = if self.is_naive { f64::from(*clearance >= 0.0) } else { seen(*clearance) };
+                *chance += weight * seen;
             }
         }
     }

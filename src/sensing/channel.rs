@@ -30,14 +30,20 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// where there is none, as for a point behind a camera.
     fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool;
 
+    /// Writes the prediction that searches and filters go by: [`predict`](Self::predict)'s, and where there is none, as behind a
+    /// camera, a continuation of it that leads back to where there is one. False where there is not even that.
+    fn extended(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
+        self.predict(state, positions, reading)
+    }
+
     /// Writes L⁻¹ (y ⊖ h), the difference of two readings, whitened (d numbers); (y − h)/σ unless a channel says otherwise.
     fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
         let sigma = self.sigma();
         whitened.iter_mut().zip(y.iter().zip(h)).for_each(|(whitened, (y, h))| *whitened = (y - h) / sigma);
     }
 
-    /// Writes the predicted reading and L⁻¹ ∂h/∂δ, transposed: `rows` holds d columns of m numbers each, all zero at
-    /// first. False where there is no prediction; the rows then stay zero.
+    /// Writes the [extended](Self::extended) prediction and L⁻¹ ∂h/∂δ, transposed: `rows` holds d columns of m numbers each, all
+    /// zero at first. False where there is none; the rows then stay zero.
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool;
 
     /// What is read where `reading` would be without noise: y = h ⊕ L v, with v standard normal (d numbers); h + σ v unless a

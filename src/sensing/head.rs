@@ -162,7 +162,10 @@ fn square_root(covariance: &Matrix3<f64>) -> Matrix3<f64> {
     if let Some(cholesky) = covariance.cholesky() {
         return cholesky.l();
     }
-    let eigen = SymmetricEigen::new(*covariance);
+    let is_sound = covariance.iter().all(|x| x.is_finite());
+    let Some(eigen) = is_sound.then(|| SymmetricEigen::try_new(*covariance, f64::EPSILON, 1000)).flatten() else {
+        return Matrix3::from_element(f64::NAN);
+    };
     eigen.eigenvectors * Matrix3::from_diagonal(&eigen.eigenvalues.map(|value| value.max(0.0).sqrt()))
 }
 

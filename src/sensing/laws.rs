@@ -32,7 +32,11 @@ proptest! {
             let mut pass = Pass::new(&state, &layout);
             let seen = channel.rows(pass.at(&positions), &mut reading, &mut rows);
             let mut predicted = vec![0.0; d];
-            prop_assert_eq!(channel.predict(&state, &positions, &mut predicted), seen);
+            prop_assert_eq!(channel.extended(&state, &positions, &mut predicted), seen);
+            let mut strict = vec![0.0; d];
+            if channel.predict(&state, &positions, &mut strict) {
+                prop_assert_eq!(&strict, &predicted, "a prediction is no other than its continuation");
+            }
             if !seen {
                 prop_assert!(rows.iter().all(|row| *row == 0.0));
                 continue;
@@ -47,7 +51,7 @@ proptest! {
                     let mut delta = DVector::zeros(m);
                     delta[k] = sign * step;
                     let mut reading = vec![0.0; d];
-                    channel.predict(&state.retract(&layout, &delta), &positions, &mut reading);
+                    channel.extended(&state.retract(&layout, &delta), &positions, &mut reading);
                     reading
                 };
                 let mut slope = vec![0.0; d];
@@ -69,7 +73,7 @@ proptest! {
         for channel in examples(&mut rng, &state) {
             let d = channel.equations();
             let mut reading = vec![0.0; d];
-            if !channel.predict(&state, &positions, &mut reading) {
+            if !channel.extended(&state, &positions, &mut reading) {
                 continue;
             }
             let v: Vec<f64> = (0..d).map(|_| rng.sample(StandardNormal)).collect();
@@ -101,14 +105,14 @@ fn a_rig_stacks_its_channels() {
     let mut start = 0;
     let readings = rig.channels().iter().map(|channel| {
         let mut reading = vec![0.0; channel.equations()];
-        assert!(channel.predict(&state, &positions, &mut reading));
+        assert!(channel.extended(&state, &positions, &mut reading));
         channel.disturb(&mut reading, &v[start..start + channel.equations()]);
         start += channel.equations();
         Some(reading)
     });
     let mut observation = Observation { readings: readings.collect() };
     let mut clearances = vec![0.0; rig.channels().len()];
-    rig.clearances(&state, &positions, &mut clearances);
+    rig.clearances(None, &state, &positions, &mut clearances);
     for (reading, clearance) in rig.observe(&state, &positions, &v).readings.iter().zip(&clearances) {
         assert_eq!(reading.is_some(), *clearance >= 0.0, "what is in view is seen");
     }

@@ -18,8 +18,10 @@ mod keys;
 #[cfg(test)]
 mod laws;
 mod loss;
+mod noise;
 mod observation;
 mod rig;
+mod visible;
 
 pub use channel::{Apart, Channel, Occasion};
 pub use head::{Gaze, Head};
@@ -27,9 +29,11 @@ pub(crate) use joint_noise::JointErrors;
 pub use joint_noise::JointNoise;
 pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
 pub use loss::{Graduated, Loss};
+pub use noise::UnusableNoise;
 pub use observation::{Observation, Refused};
 pub use pixels::{Facing, NEAR};
 pub use rig::{Equations, Noise, Rig};
+pub use visible::InView;
 
 channel::channels! {
     /// Where a target is, three coordinates.

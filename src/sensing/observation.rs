@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::Rig;
+use super::{Rig, UnusableNoise};
 use crate::magnitude::is_usable;
 
 /// The readings of one movement, one entry per channel of its [`Rig`]; `None` where the channel had none.
@@ -49,6 +49,9 @@ pub enum Refused {
         /// Numbers of its readings.
         wanted: usize,
     },
+    /// Readings whose noise is none.
+    #[error("nothing can be learned from these sensors: {0}")]
+    Noise(#[from] UnusableNoise),
     /// A reading so far from what is believed that the distance is no number.
     #[error("the readings are farther from what is expected than numbers reach")]
     Absurd,

@@ -10,8 +10,9 @@
 //! are known, so that hand–eye and a fixed camera are one channel. Poses and lenses are blocks of the model.
 //!
 //! *Out of view.* A target is seen whole or not at all: in front of the camera, inside its picture, and facing it. An estimate
-//! that has a point behind the camera which was seen must find its way to the front, so below [`NEAR`] the depth goes on
-//! as `z̄ = z₀²/(2 z₀ − z)`: positive everywhere, with a continuous slope.
+//! that has a point behind the camera which was seen must find its way to the front, so for searches and filters the depth goes on
+//! below [`NEAR`] as `z̄ = z₀²/(2 z₀ − z)`: positive everywhere, with a continuous slope. It is no prediction: there is none of a point
+//! behind the camera.
 
 use std::sync::Arc;
 
@@ -84,6 +85,19 @@ impl Pixels {
         Seen { at: Vector3::new(at.x, at.y, depth), slope, picture }
     }
 
+    /// Writes the picture, continued behind the camera, and tells how far the nearest point is in front of it, metres.
+    fn project(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> f64 {
+        let (camera, target) = self.frames(state, positions);
+        let (lens, place) = (self.lens(state), camera.inverse() * target);
+        let mut nearest = f64::INFINITY;
+        for (point, picture) in self.points.iter().zip(reading.chunks_exact_mut(2)) {
+            let at = (place * point).coords;
+            nearest = nearest.min(at.z);
+            picture.copy_from_slice(&Self::see(&lens, &at).picture);
+        }
+        nearest
+    }
+
     fn frames(&self, state: &State, positions: &[f64]) -> (Isometry3<f64>, Isometry3<f64>) {
         (state.frame_at(Frame::Device(self.camera), positions), state.frame_at(Frame::Target(self.target), positions))
     }
@@ -116,11 +130,11 @@ impl Channel for Pixels {
     }
 
     fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        let (camera, target) = self.frames(state, positions);
-        let (lens, place) = (self.lens(state), camera.inverse() * target);
-        for (point, picture) in self.points.iter().zip(reading.chunks_exact_mut(2)) {
-            picture.copy_from_slice(&Self::see(&lens, &(place * point).coords).picture);
-        }
+        self.project(state, positions, reading) > 0.0
+    }
+
+    fn extended(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
+        self.project(state, positions, reading);
         true
     }
 
@@ -258,6 +272,21 @@ mod tests {
             clearance(Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.5), turn))
         };
         assert!(turned(79.0) > 0.0 && turned(81.0) < 0.0 && turned(180.0) < 0.0);
+    }
+
+    /// There is no picture of what is behind a camera, wholly or in part, though a search is led to the front.
+    #[test]
+    fn behind_the_camera_there_is_no_prediction() {
+        for (turn, z, is_predicted) in [(0.0, 0.5, true), (0.0, -0.5, false), (90_f64, 0.04, false), (90.0, 0.06, true)] {
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn.to_radians());
+            let (state, view) = tag(Isometry3::from_parts(Translation3::new(0.0, 0.0, z), turn));
+            let mut picture = [0.0; 4];
+            assert_eq!(view.predict(&state, &[0.0], &mut picture), is_predicted, "{z}");
+            assert!(view.extended(&state, &[0.0], &mut picture) && picture.iter().all(|x| x.is_finite()));
+            let rig = crate::sensing::Rig::new(vec![Arc::new(view)]);
+            let observation = crate::sensing::Observation::of([300.0, 200.0, 310.0, 220.0]);
+            assert_eq!(rig.residual(&state, &[0.0], &observation).len(), 4, "an estimate that is wrong is told so");
+        }
     }
 
     /// Behind the camera the projection goes on without a break, and its slope leads to the front.

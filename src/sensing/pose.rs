@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::{Apart, Channel, Equipment, KeyError, Keys};
+use super::{Apart, Channel, Equipment, KeyError, Keys, noise::is_all_or_nothing};
 use crate::{
     kinematics::rotation,
     model::{Frame, Pass, State},
@@ -34,7 +34,14 @@ impl Pose {
     pub(super) fn from_keys(keys: &Keys, equipment: &Equipment) -> Result<Self, KeyError> {
         keys.only(&["target", "sigma_m", "sigma_deg"])?;
         let (target, _) = keys.target(equipment)?;
-        Ok(Self { target, sigma_m: keys.sigma_m()?, sigma_rad: keys.sigma_rad()? })
+        let pose = Self { target, sigma_m: keys.sigma_m()?, sigma_rad: keys.sigma_rad()? };
+        if !is_all_or_nothing(&pose) {
+            let (key, other) =
+                if pose.sigma_m > 0.0 { ("sigma_deg", "sigma_m") } else { ("sigma_m", "sigma_deg") };
+            let what = format!("it is 0 beside a `{other}` that is not: half of every reading would be known for certain");
+            return Err(KeyError::new(key, what, "write a number above 0, or 0 for both: a world without noise"));
+        }
+        Ok(pose)
     }
 
     fn write(pose: &Isometry3<f64>, reading: &mut [f64]) {
@@ -80,8 +87,13 @@ impl Channel for Pose {
     }
 
     fn with_sigma(&self, sigma_m: f64) -> Arc<dyn Channel> {
-        let factor = if self.sigma_m > 0.0 { sigma_m / self.sigma_m } else { 1.0 };
-        Arc::new(Self { target: self.target, sigma_m, sigma_rad: self.sigma_rad * factor })
+        // Where there is no noise, what is taken for some is as many radians as metres.
+        let sigma_rad = match (self.sigma_m > 0.0, self.sigma_rad == 0.0) {
+            (true, _) => self.sigma_rad * (sigma_m / self.sigma_m),
+            (false, true) => sigma_m,
+            (false, false) => self.sigma_rad,
+        };
+        Arc::new(Self { target: self.target, sigma_m, sigma_rad })
     }
 
     fn scaled(&self, factors: &[f64]) -> Arc<dyn Channel> {

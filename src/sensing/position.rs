@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Apart, Channel, Equipment, KeyError, Keys};
+use super::{Apart, Channel, Equipment, KeyError, Keys, noise::root};
 use crate::model::{Pass, State, Whitening};
 
 /// A tracker of a target's position in space, metres, in the frame of the measurements.
@@ -29,10 +29,10 @@ impl Position {
         Self { target, sigma_m, shape: None }
     }
 
-    /// The tracker of a target with noise of this covariance (m²); `None` if it is not positive.
+    /// The tracker of a target with noise of this covariance (m²); `None` if it is not symmetric and positive.
     pub fn with_covariance(target: usize, covariance: &Matrix3<f64>) -> Option<Self> {
         let sigma_m = (covariance.trace() / 3.0).sqrt();
-        let root = covariance.cholesky()?.l() / sigma_m;
+        let root = root(covariance)? / sigma_m;
         Some(Self { target, sigma_m, shape: Some((root, root.try_inverse()?)) })
     }
 

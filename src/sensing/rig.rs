@@ -142,13 +142,6 @@ impl Rig {
         self.channels.iter().any(|channel| channel.has_view())
     }
 
-    /// Writes for every channel how far what it measures is inside what it can see, radians; infinite where it sees everything.
-    pub fn clearances(&self, state: &State, positions: &[f64], clearances: &mut [f64]) {
-        for (channel, clearance) in self.channels.iter().zip(clearances) {
-            *clearance = channel.clearance(state, positions).unwrap_or(f64::INFINITY);
-        }
-    }
-
     /// Equations of a movement of which nothing is missed, d.
     pub fn equations(&self) -> usize {
         self.places.last().map_or(0, |place| place.end)
@@ -278,11 +271,13 @@ impl Rig {
         if found == residual.len() {
             return Equations { rows, residual };
         }
-        Equations { rows: rows.columns(0, found).into_owned(), residual: residual.rows(0, found).into_owned() }
+        let told: Vec<usize> = (0..residual.len()).filter(|row| !residual[*row].is_nan()).collect();
+        Equations { rows: rows.select_columns(&told), residual: residual.select_rows(&told) }
     }
 
     /// Writes Hᵀ (columns of m numbers, all zero at first) and the residual of an observation where `pass` stands, and
-    /// returns how many equations those are: a reading without a prediction says nothing.
+    /// returns how many equations those are. A reading without a prediction says nothing: its rows stay zero in their place, and its
+    /// residual is no number.
     pub fn linearise(
         &self,
         pass: &Pass<'_>,
@@ -352,17 +347,20 @@ impl Rig {
     ) -> usize {
         let m = pass.layout().dimension();
         let mut scratch = Scratch::default();
-        let mut at = 0;
+        let (mut at, mut found) = (0, 0);
         for (channel, reading) in self.channels.iter().zip(&observation.readings) {
             let Some(reading) = reading else { continue };
             let end = at + reading.len();
             let predicted = scratch.take(reading.len());
             if channel.rows(pass, predicted, &mut rows[at * m..end * m]) {
                 channel.difference(reading, predicted, &mut residual[at..end]);
-                at = end;
+                found += reading.len();
+            } else {
+                residual[at..end].fill(f64::NAN);
             }
+            at = end;
         }
-        at
+        found
     }
 
     /// L⁻¹ (y ⊖ h) of an observation, of those readings that have a prediction.
@@ -395,7 +393,7 @@ impl Rig {
         for (channel, reading) in self.channels.iter().zip(&observation.readings) {
             let Some(reading) = reading else { continue };
             let mut predicted = vec![0.0; reading.len()];
-            if channel.predict(state, positions, &mut predicted) {
+            if channel.extended(state, positions, &mut predicted) {
                 let start = residual.len();
                 residual.resize(start + reading.len(), 0.0);
                 channel.difference(reading, &predicted, &mut residual[start..]);
@@ -453,7 +451,7 @@ impl Rig {
         for (index, (channel, reading)) in self.channels.iter().zip(&observation.readings).enumerate() {
             let Some(reading) = reading else { continue };
             let (predicted, whitened) = (predicted.take(reading.len()), whitened.take(reading.len()));
-            if channel.predict(state, positions, predicted) {
+            if channel.extended(state, positions, predicted) {
                 channel.difference(reading, predicted, whitened);
                 each(index, whitened);
             }
@@ -475,15 +473,15 @@ impl Rig {
     /// What is observed of a robot that is as `state` says: its readings at `positions` of what is in view, with `v` (d standard normal
     /// numbers) as noise.
     pub fn observe(&self, state: &State, positions: &[f64], v: &[f64]) -> Observation {
-        let reading = |(channel, place): (&Arc<dyn Channel>, &Range<usize>)| {
+        let visible = self.visible(None, state, positions);
+        let reading = |((channel, place), visible): ((&Arc<dyn Channel>, &Range<usize>), bool)| {
             let mut reading = vec![0.0; channel.equations()];
-            let in_view = channel.clearance(state, positions).is_none_or(|clearance| clearance >= 0.0);
-            (in_view && channel.predict(state, positions, &mut reading)).then(|| {
+            (visible && channel.predict(state, positions, &mut reading)).then(|| {
                 channel.disturb(&mut reading, &v[place.clone()]);
                 reading
             })
         };
-        Observation { readings: self.channels.iter().zip(&self.places).map(reading).collect() }
+        Observation { readings: self.channels.iter().zip(&self.places).zip(visible).map(reading).collect() }
     }
 
     /// As [`observe`](Self::observe), after a movement that holds a target in `socket`, or in none: that it is there is read of

@@ -71,12 +71,8 @@ impl Prospect {
     /// What is seen after a movement of the robot as it is described; nothing that the head does not see.
     fn seen(&self, movement: &Movement) -> Observation {
         let noise = vec![0.0; self.rig.equations()];
-        let mut seen = self.rig.observe_in(movement.socket, &self.state, &movement.configuration, &noise);
-        let head = self.watch.as_ref().and_then(|watch| watch.head);
-        if head.is_some_and(|head| !head.sees(&self.state.marker_at(&movement.configuration))) {
-            seen.readings.fill(None);
-        }
-        seen
+        let head = self.watch.as_ref().and_then(|watch| watch.head.as_ref());
+        self.rig.observe_watched(head, movement.socket, &self.state, &movement.configuration, &noise)
     }
 
     fn known_beforehand(&self) -> DMatrix<f64> {

@@ -3,6 +3,8 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
+use crate::model::eigen;
+
 /// How well a set of postures conditions an identification, by the singular values σ₁ ≥ … ≥ σₘ of its Jacobian, n postures stacked,
 /// whitened by the noise and with parameters in units of their prior standard deviations. Without a unit; all are better the
 /// greater they are. Collected and compared by Y. Sun and J. M. Hollerbach, "Observability Index Selection for Robot Calibration",
@@ -29,7 +31,8 @@ impl Indices {
         if rank == 0 {
             return Self::default();
         }
-        let mut squares: Vec<f64> = information.clone().symmetric_eigenvalues().iter().copied().collect();
+        let Some(eigen) = eigen(information.clone()) else { return Self::default() };
+        let mut squares: Vec<f64> = eigen.eigenvalues.iter().copied().collect();
         squares.sort_by(|a, b| b.total_cmp(a));
         let singular: Vec<f64> = squares.iter().take(rank).map(|square| square.max(0.0).sqrt()).collect();
         let (Some(greatest), Some(least)) = (singular.first().copied(), singular.last().copied()) else {

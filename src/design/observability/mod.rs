@@ -23,11 +23,11 @@ mod report;
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
 use crate::{
     kinematics::JointBox,
-    model::{Layout, Names, State, Workspace, null_space},
+    model::{Layout, Names, State, Workspace, eigen, null_space},
     optimize::Settings,
     selection::{Actions, Constraints, CriterionUnits, Planner, Planning, Random, SelectionError, Watch, Weights},
     sensing::Rig,
@@ -145,7 +145,7 @@ impl Prospect {
     /// The directions of parameter space, in units of the prior, that some movements tell little of though others could, and what
     /// is left of their deviation; the weakest first. The first `undetermined` eigenvectors are those that nothing tells.
     fn weakest(&self, information: &DMatrix<f64>, undetermined: usize) -> Vec<(f64, DVector<f64>)> {
-        let eigen = SymmetricEigen::new(self.scaled(information));
+        let Some(eigen) = eigen(self.scaled(information)) else { return Vec::new() };
         let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
         order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
         let left = |k: usize| (1.0 + eigen.eigenvalues[k].max(0.0)).sqrt().recip();

@@ -61,7 +61,7 @@ impl Smoother {
             self.settle_noise();
         }
         if self.hypotheses.modes.is_empty() {
-            return Err(EstimationError::Diverged("no hypothesis explains the measurements"));
+            return Err(EstimationError::Diverged(self.hypotheses.why()));
         }
         self.publish();
         Ok(())
@@ -72,8 +72,10 @@ impl Smoother {
         let guess = [self.posterior.prior.guess().clone()];
         let starts: Vec<&State> = if starts.is_empty() { guess.iter().collect() } else { starts.iter().collect() };
         let starts = self.begin_noise_from(&starts);
-        let modes = starts.iter().filter_map(|start| self.posterior.mode_from_afar(start, &layout, THOROUGH));
-        self.hypotheses.modes = modes.collect();
+        let found = starts.iter().map(|start| self.posterior.mode_from_afar(start, &layout, THOROUGH));
+        let found: Vec<_> = found.collect();
+        self.hypotheses.lost = found.iter().find_map(|mode| mode.as_ref().err().copied());
+        self.hypotheses.modes = found.into_iter().flatten().collect();
         self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         self.hypotheses.condense(self.settings.kept, &layout);
         self.settle_noise();
@@ -87,7 +89,7 @@ impl Smoother {
         }
         let layout = self.belief.layout.clone();
         let loss = std::mem::replace(&mut self.posterior.loss, Loss::None);
-        let modes = starts.iter().filter_map(|start| self.posterior.mode(start, &layout, THOROUGH));
+        let modes = starts.iter().filter_map(|start| self.posterior.mode(start, &layout, THOROUGH).ok());
         self.hypotheses.modes = modes.collect();
         self.hypotheses.condense(self.settings.kept, &layout);
         self.learn_noise();

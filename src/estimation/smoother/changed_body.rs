@@ -99,7 +99,7 @@ impl Smoother {
         let layout = &self.belief.layout;
         // It may have drawn the mode along.
         let starts = [&self.belief.state, &mode.state];
-        let found = starts.iter().filter_map(|start| others.mode(start, layout, THOROUGH));
+        let found = starts.iter().filter_map(|start| others.mode(start, layout, THOROUGH).ok());
         let Some(mode) = found.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else { return false };
         let evidence = self.evidence(&others, &mode);
         evidence.and_then(|it| it.likeliest(jumps, others.settled.is_some())).is_some_and(|it| it.has_support())
@@ -154,7 +154,7 @@ impl Smoother {
         before.measurements.truncate(since);
         // What is known beforehand goes on to be known of the changed body, and is not told twice.
         before.known.clear();
-        let mode = before.mode(&self.hypotheses.modes.first()?.state, &self.belief.layout, THOROUGH)?;
+        let mode = before.mode(&self.hypotheses.modes.first()?.state, &self.belief.layout, THOROUGH).ok()?;
         Some((before, mode))
     }
 
@@ -168,7 +168,7 @@ impl Smoother {
         let prior = Prior::around(known.state.clone(), layout, spread).ok()?;
         let posterior = self.posterior.anew(prior, self.posterior.measurements[change.since..].to_vec());
         let starts = [&known.state, &mode.state];
-        let found = starts.iter().filter_map(|start| posterior.mode_from_afar(start, layout, THOROUGH));
+        let found = starts.iter().filter_map(|start| posterior.mode_from_afar(start, layout, THOROUGH).ok());
         let found = found.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
         let occam = root.l_dirty().diagonal().map(f64::ln).sum();
         let log_odds = known.log_evidence + found.log_evidence - occam - mode.log_evidence + log_share + RATE.ln();

@@ -7,7 +7,7 @@
 use rand::{Rng, RngExt};
 
 use super::{
-    mode::{Effort, Mode},
+    mode::{Effort, Mode, NoMode},
     posterior::Posterior,
 };
 use crate::{
@@ -37,6 +37,8 @@ pub(super) struct Hypotheses {
     pub modes: Vec<Mode>,
     /// Steps in a row in which no new mode counted for anything.
     pub calm: usize,
+    /// Why the last mode was lost, where none is left.
+    pub lost: Option<NoMode>,
 }
 
 /// Modes nearer than this (squared, in standard deviations) are one.
@@ -60,6 +62,7 @@ impl Hypotheses {
             let effort = if mode.log_evidence < best { RIVAL } else { WARM };
             posterior.mode(&mode.state, layout, effort)
         });
+        self.lost = found.iter().find_map(|mode| mode.as_ref().err().copied());
         self.modes = found.into_iter().flatten().collect();
     }
 
@@ -88,6 +91,11 @@ impl Hypotheses {
             None => posterior.mode_from_afar(start, layout, effort),
         });
         self.modes.extend(found.into_iter().flatten());
+    }
+
+    /// What is to be said where there is no mode.
+    pub fn why(&self) -> &'static str {
+        self.lost.map_or("no hypothesis explains the measurements", NoMode::why)
     }
 
     /// Merges, weighs, sorts and prunes.
@@ -180,7 +188,7 @@ mod tests {
 
     fn condensed(modes: &[(f64, f64)], kept: usize) -> Vec<Mode> {
         let modes = modes.iter().map(|(away, log_evidence)| mode(*away, *log_evidence)).collect();
-        let mut hypotheses = Hypotheses { modes, calm: 0 };
+        let mut hypotheses = Hypotheses { modes, ..Hypotheses::default() };
         hypotheses.condense(kept, &chain().1);
         hypotheses.modes
     }

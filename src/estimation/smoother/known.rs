@@ -23,6 +23,7 @@ struct Run {
     truth: State,
     smoother: Smoother,
     rng: ChaCha8Rng,
+    movements: u64,
 }
 
 impl Run {
@@ -50,7 +51,7 @@ impl Run {
         let settings = HypothesisSettings { kept: 2, spawned: 2 };
         let smoother = Smoother::new(prior, Arc::new(layout), rig, settings, rng.clone());
         let smoother = smoother.with_loss(loss).with_unknown_noise(vec![true, false]).knowing(known);
-        Self { truth, smoother, rng }
+        Self { truth, smoother, rng, movements: 0 }
     }
 
     /// Whether it has noticed a change.
@@ -59,7 +60,12 @@ impl Run {
         let noise = Vector3::from_fn(|_, _| SIGMA * self.rng.sample::<f64, _>(StandardNormal));
         let marker = self.truth.marker_at(&theta) + noise;
         let seen = Observation { readings: vec![Some(marker.coords.as_slice().to_vec()), None] };
-        self.smoother.update(&theta, &seen).expect("an update").change_noticed
+        let noticed = self.smoother.update(&theta, &seen).expect("an update").change_noticed;
+        self.movements += 1;
+        let latest = self.smoother.latest_readings(self.movements);
+        let all = self.smoother.readings().into_iter();
+        assert_eq!(latest, all.filter(|reading| reading.movement == self.movements).collect::<Vec<_>>());
+        noticed
     }
 
     /// The standard deviation of the distance between the two sockets, metres.

@@ -10,14 +10,14 @@ use rand_distr::StandardNormal;
 
 use super::{
     HypothesisSettings, Smoother,
-    mode::Effort,
+    mode::{Effort, Mode},
     points::Room,
     posterior::{Measurement, Normal, Posterior},
 };
 use crate::{
     estimation::Estimator,
-    model::{Block, Layout, Prior, State, jacobian, laws::random_arm},
-    sensing::{Loss, Observation, Rig},
+    model::{Block, Layout, Pass, Prior, State, jacobian, laws::random_arm},
+    sensing::{Channel, Distance, Loss, Observation, Position, Rig},
 };
 
 const THOROUGH: Effort<'_> = Effort { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY, known: &[] };
@@ -184,6 +184,63 @@ fn near_the_truth_it_agrees_with_the_filter() {
     let covariance = information.try_inverse().expect("positive");
     let found = smoother.belief().covariance.as_ref().expect("kept");
     assert!((found - &covariance).amax() < 1e-3 * covariance.amax());
+}
+
+/// A reading without a prediction says nothing, and what others say stays theirs: in the equations, in what is compressed, and in how
+/// many equations parameters account for.
+#[test]
+fn a_reading_without_a_prediction_shifts_no_other() {
+    let (truth, layout, plain, mut rng) = case(7, 3, 0, false);
+    let theta = [0.4, -0.3, 0.7];
+    // The target is where the distance is measured from: every direction leads away.
+    let state = truth.slid_towards(&plain.pins);
+    let to = Pass::new(&state, &layout).at(&theta).target(0).into();
+    let channels: Vec<Arc<dyn Channel>> = vec![
+        Arc::new(Position::of_marker(SIGMA)),
+        Arc::new(Distance { target: 0, to, sigma_m: 1e-4 }),
+        Arc::new(Distance { target: 0, to: Point3::new(0.3, 0.2, 1.0), sigma_m: 0.02 }),
+    ];
+    let rig = Arc::new(Rig::new(channels));
+    let seen = |theta: &[f64], rng: &mut ChaCha8Rng| {
+        let v: Vec<f64> = (0..rig.equations()).map(|_| rng.sample(StandardNormal)).collect();
+        let mut observation = rig.observe(&truth, theta, &v);
+        observation.readings[1] = Some(vec![0.7]);
+        observation
+    };
+    for loss in [Loss::None, Loss::Huber, Loss::MIXTURE] {
+        let mut all = Posterior::new(plain.prior.clone(), rig.clone());
+        all.loss = loss;
+        for index in 0..4 {
+            let positions = if index == 1 { theta.to_vec() } else { vec![0.1 * index as f64; 3] };
+            let observation = seen(&positions, &mut rng);
+            all.measurements.push(Measurement { positions, observation, movement: index + 1 });
+        }
+        let mut others = all.clone();
+        others.measurements[1].observation.readings[1] = None;
+        let near = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() <= 1e-12 * b.amax();
+        let [one, other] = [&all, &others].map(|posterior| posterior.normal(&state, &layout).expect("in the chart"));
+        assert!((one.cost - other.cost).abs() <= 1e-12 * other.cost, "{loss:?}: {} {}", one.cost, other.cost);
+        assert!(near(&one.information, &other.information), "{loss:?}");
+        assert!((&one.descent - &other.descent).amax() <= 1e-12 * other.descent.amax(), "{loss:?}");
+        let equations = [&all, &others].map(|posterior| {
+            let Measurement { positions, observation, .. } = &posterior.measurements[1];
+            posterior.rig.equations_of(&state, &layout, positions, observation)
+        });
+        assert!(equations[0].rows.ncols() == 4 && equations[0].rows == equations[1].rows);
+        assert_eq!(equations[0].residual, equations[1].residual);
+        let modes = [(&all, one), (&others, other)];
+        let modes = modes.map(|(posterior, normal)| Mode::at(posterior.level, state.clone(), normal).expect("a prior"));
+        let absorbed = [(&all, &modes[0]), (&others, &modes[1])];
+        let absorbed = absorbed.map(|(posterior, mode)| posterior.absorbed(mode, &layout).expect("in the chart"));
+        assert!(absorbed[0].iter().zip(&absorbed[1]).all(|(a, b)| (a - b).abs() < 1e-9), "{absorbed:?}");
+        for posterior in [&mut all, &mut others] {
+            posterior.settle(3, &state, &layout);
+        }
+        let settled = [&all, &others].map(|posterior| posterior.settled.as_ref().expect("compressed"));
+        for (one, other) in settled[0].noises.iter().zip(&settled[1].noises) {
+            assert!(near(&one.information, &other.information) && (one.misfit - other.misfit).abs() < 1e-9, "{loss:?}");
+        }
+    }
 }
 
 #[test]

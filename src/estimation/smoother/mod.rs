@@ -170,7 +170,7 @@ impl Smoother {
         } else {
             vec![prior.guess().clone()]
         };
-        let modes = starts.iter().filter_map(|start| self.posterior.mode(start, &layout, once));
+        let modes = starts.iter().filter_map(|start| self.posterior.mode(start, &layout, once).ok());
         self.hypotheses.modes = modes.collect();
         self.hypotheses.condense(self.settings.kept, &layout);
     }
@@ -237,11 +237,18 @@ impl Estimator for Smoother {
             self.movements += 1;
             return Ok(Update::default());
         }
-        // All or nothing: an observation that ends it leaves no trace.
-        let mut revised = self.clone();
-        let update = revised.absorb(positions, observation)?;
-        *self = revised;
-        Ok(update)
+        // All or nothing: an observation that ends it leaves no trace. What is past goes along, so that adding to it copies nothing.
+        let (known, past) = (self.past.len(), std::mem::take(&mut self.past));
+        let mut revised = Self { past, ..self.clone() };
+        let update = revised.absorb(positions, observation);
+        match update {
+            Ok(_) => *self = revised,
+            Err(_) => {
+                self.past = revised.past;
+                Arc::make_mut(&mut self.past).truncate(known);
+            }
+        }
+        update
     }
 
     fn misfit(&self) -> Option<Misfit> {
@@ -269,6 +276,18 @@ impl Estimator for Smoother {
         let known = posterior.known_readings(state);
         known.chain(self.past.iter().copied()).chain(posterior.readings(state)).collect()
     }
+
+    fn latest_readings(&self, movement: u64) -> Vec<ReadingReport> {
+        if !self.posterior.loss.is_robust() {
+            return Vec::new();
+        }
+        // What was dropped in the same step is the end of what is past.
+        let past = self.past.iter().rev().take_while(|reading| reading.movement >= movement).copied();
+        let mut latest: Vec<ReadingReport> = past.filter(|reading| reading.movement == movement).collect();
+        latest.reverse();
+        latest.extend(self.posterior.readings_after(movement, &self.belief.state));
+        latest
+    }
 }
 
 impl Smoother {
@@ -292,7 +311,7 @@ impl Smoother {
         }
         self.learn_noise();
         if self.hypotheses.modes.is_empty() {
-            return Err(EstimationError::Diverged("no hypothesis explains the measurements"));
+            return Err(EstimationError::Diverged(self.hypotheses.why()));
         }
         self.publish();
         // What costs most is asked last.

@@ -27,6 +27,36 @@ pub(super) struct Mode {
     pub weight: f64,
 }
 
+/// Why a search found no mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NoMode {
+    /// The equations are singular, or no equations at all: some direction is left open, or a number is none.
+    Singular,
+    /// The search left the range of numbers.
+    Diverged,
+    /// It would have cost too much even where it was bound for.
+    Hopeless,
+    /// It led to a mode that is known.
+    Known,
+    /// It began where measurements that have settled say nothing.
+    OutsideChart,
+}
+
+impl NoMode {
+    /// What is to be said where there is no other mode either.
+    pub fn why(self) -> &'static str {
+        match self {
+            Self::Singular => "no hypothesis explains the measurements: their equations are singular",
+            Self::Diverged => "no hypothesis explains the measurements: the search for one left the range of numbers",
+            Self::Hopeless => "no hypothesis explains the measurements: every one costs too much",
+            Self::Known => "no hypothesis explains the measurements but those that were given up",
+            Self::OutsideChart => {
+                "no hypothesis explains the measurements: the latest are too far from those that were compressed"
+            }
+        }
+    }
+}
+
 /// When a search ends.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effort<'a> {
@@ -70,13 +100,13 @@ impl Posterior {
     /// The local minimum that Levenberg–Marquardt reaches from `start`, and the Gaussian there.
     ///
     /// Steps solve `(Λ + λ diag Λ) δ = descent`; λ follows the ratio of found to predicted descent (Nielsen's rule).
-    pub fn mode(&self, start: &State, layout: &Layout, effort: Effort<'_>) -> Option<Mode> {
+    pub fn mode(&self, start: &State, layout: &Layout, effort: Effort<'_>) -> Result<Mode, NoMode> {
         let (state, normal) = self.descend(self.loss.into(), start, layout, effort)?;
         Mode::at(self.level, state, normal)
     }
 
     /// The same from a start that may be far from where the search ends: a robust loss narrows on the way.
-    pub fn mode_from_afar(&self, start: &State, layout: &Layout, effort: Effort<'_>) -> Option<Mode> {
+    pub fn mode_from_afar(&self, start: &State, layout: &Layout, effort: Effort<'_>) -> Result<Mode, NoMode> {
         if !self.loss.is_robust() {
             return self.mode(start, layout, effort);
         }
@@ -100,7 +130,13 @@ impl Posterior {
     }
 
     /// The local minimum reached from where `others`, some of the measurements, are explained by least squares.
-    pub fn mode_through(&self, others: &Self, start: &State, layout: &Layout, effort: Effort<'_>) -> Option<Mode> {
+    pub fn mode_through(
+        &self,
+        others: &Self,
+        start: &State,
+        layout: &Layout,
+        effort: Effort<'_>,
+    ) -> Result<Mode, NoMode> {
         let least_squares = Graduated { loss: self.loss, width: f64::INFINITY };
         // By least squares what is still no outlier may cost much.
         let patient = Effort { hopeless: effort.hopeless * 10.0 + 1e3, known: &[], ..effort };
@@ -108,16 +144,24 @@ impl Posterior {
         self.mode(&state, layout, effort)
     }
 
-    fn descend(&self, loss: Graduated, start: &State, layout: &Layout, effort: Effort<'_>) -> Option<(State, Normal)> {
+    /// Where steps end that lead down from `start`, and the equations there: bounded by the steps of the effort, whatever the numbers.
+    fn descend(
+        &self,
+        loss: Graduated,
+        start: &State,
+        layout: &Layout,
+        effort: Effort<'_>,
+    ) -> Result<(State, Normal), NoMode> {
         let mut state = start.slid_towards(&self.pins);
         let (mut room, mut kept) = (Room::default(), None);
-        let mut normal = self.normal_by(loss, &state, layout, &mut room)?;
+        let mut normal = self.normal_by(loss, &state, layout, &mut room).ok_or(NoMode::OutsideChart)?;
         let (mut lambda, mut growth) = (1e-3, 2.0);
         for step in 0..effort.steps {
             let factor = match kept.take() {
-                None => Factor::new(self.level, &normal.information, lambda)?,
-                Some(before) => Factor::anew(before, &normal.information, lambda)?,
+                None => Factor::new(self.level, &normal.information, lambda),
+                Some(before) => Factor::anew(before, &normal.information, lambda),
             };
+            let factor = factor.ok_or(NoMode::Singular)?;
             let mut delta = kept.insert(factor).solve(&normal.descent);
             // With D = diag Λ, Λ δ = descent − λ D δ; of a shortened step δ/l accordingly.
             let slope = delta.dot(&normal.descent);
@@ -129,8 +173,11 @@ impl Posterior {
             }
             let left = (effort.steps - step).min(FEW) as f64;
             let is_hopeless = normal.cost.is_finite() && normal.cost - left * predicted > effort.hopeless;
-            if is_hopeless || !predicted.is_finite() {
-                return None;
+            if is_hopeless {
+                return Err(NoMode::Hopeless);
+            }
+            if !predicted.is_finite() {
+                return Err(NoMode::Diverged);
             }
             if predicted < effort.tolerance {
                 break;
@@ -138,7 +185,7 @@ impl Posterior {
             let mut next = state.retract(layout, &delta);
             next.slide_towards(&self.pins);
             if effort.known.iter().any(|mode| mode.is_reached(layout, &next, normal.cost - predicted)) {
-                return None;
+                return Err(NoMode::Known);
             }
             // Hardly any step is refused, so that what it costs is not asked beforehand. Outside the chart of settled measurements
             // none is taken.
@@ -159,14 +206,14 @@ impl Posterior {
             if is_better && self.joints.is_some() {
                 // Readings are whitened by where it stands now.
                 room.joints = None;
-                let found = self.normal_by(loss, &state, layout, &mut room)?;
+                let found = self.normal_by(loss, &state, layout, &mut room).ok_or(NoMode::OutsideChart)?;
                 room.put_back(std::mem::replace(&mut normal, found));
             }
             if lambda > 1e12 {
                 break;
             }
         }
-        Some((state, normal))
+        Ok((state, normal))
     }
 }
 
@@ -185,13 +232,16 @@ impl Mode {
         Some(delta.dot(&(&self.information * &delta)))
     }
 
-    /// The Gaussian where a search has ended with these equations; `None` where they are not positive.
-    pub fn at(level: Level, state: State, normal: Normal) -> Option<Self> {
+    /// The Gaussian where a search has ended with these equations, unless they are not positive.
+    pub fn at(level: Level, state: State, normal: Normal) -> Result<Self, NoMode> {
         let Normal { cost, mut information, .. } = normal;
         information.fill_upper_triangle_with_lower_triangle();
-        let factor = Factor::new(level, &information, 0.0)?;
+        let factor = Factor::new(level, &information, 0.0).ok_or(NoMode::Singular)?;
         let log_evidence = -cost - 0.5 * factor.log_determinant();
-        log_evidence.is_finite().then_some(Self { state, cost, information, factor, log_evidence, weight: 0.0 })
+        if !log_evidence.is_finite() {
+            return Err(NoMode::Diverged);
+        }
+        Ok(Self { state, cost, information, factor, log_evidence, weight: 0.0 })
     }
 
     /// P, the inverse of the information.

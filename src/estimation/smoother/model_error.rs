@@ -62,6 +62,11 @@ impl Smoother {
             let mut at = 0;
             for (channel, reading) in seen.observation.readings.iter().enumerate() {
                 let Some(reading) = reading else { continue };
+                if residual[at..at + reading.len()].iter().any(|x| x.is_nan()) {
+                    // There is no prediction of it.
+                    at += reading.len();
+                    continue;
+                }
                 for (index, noise) in noises.iter().enumerate().filter(|(_, noise)| noise.channel == channel) {
                     let place = at + noise.part.start..at + noise.part.end;
                     // The first three coordinates of a base are its shift.

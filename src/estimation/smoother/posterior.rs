@@ -118,6 +118,12 @@ impl Posterior {
         self.readings_of(&self.measurements, state)
     }
 
+    /// What is made at `state` of the measurements from this movement on.
+    pub fn readings_after(&self, movement: u64, state: &State) -> impl Iterator<Item = ReadingReport> {
+        let latest = self.measurements.iter().rev().take_while(|seen| seen.movement >= movement).count();
+        self.readings_of(&self.measurements[self.measurements.len() - latest..], state)
+    }
+
     /// What is made at `state` of what is known beforehand.
     pub fn known_readings(&self, state: &State) -> impl Iterator<Item = ReadingReport> {
         self.readings_of(&self.known, state)
@@ -355,14 +361,15 @@ impl Posterior {
             let d = seen.observation.equations();
             let rows = &mut stacked.as_mut_slice()[at * m..(at + d) * m];
             let residual = &mut residuals.as_mut_slice()[at..at + d];
-            self.rig.linearise(&pass, &seen.observation, rows, residual);
-            cost += self.weigh(loss, &seen.observation, m, rows, residual);
+            let is_whole = self.rig.linearise(&pass, &seen.observation, rows, residual) == d;
+            cost += self.weigh(loss, &seen.observation, m, rows, residual, is_whole);
             at += d;
         }
         (stacked, residuals, cost)
     }
 
-    /// Weighs the rows and residuals of an observation, reading by reading, and returns what they cost.
+    /// Weighs the rows and residuals of an observation, reading by reading, and returns what they cost: nothing where there is no
+    /// prediction, as can be where not all of it `is_whole`.
     fn weigh(
         &self,
         loss: Graduated,
@@ -370,10 +377,18 @@ impl Posterior {
         m: usize,
         rows: &mut [f64],
         residual: &mut [f64],
+        is_whole: bool,
     ) -> f64 {
         let (mut at, mut cost) = (0, 0.0);
         for (channel, reading) in observation.readings.iter().enumerate() {
             let Some(reading) = reading else { continue };
+            let place = at..at + reading.len();
+            if !is_whole && residual[place.clone()].iter().any(|x| x.is_nan()) {
+                rows[place.start * m..place.end * m].fill(0.0);
+                residual[place.clone()].fill(0.0);
+                at = place.end;
+                continue;
+            }
             let squared = self.squared(channel, &residual[at..at + reading.len()]);
             cost += loss.cost(squared, reading.len());
             let root = loss.weight(squared, reading.len()).sqrt();

@@ -48,6 +48,9 @@ pub struct LearnerComparison {
     /// `bound_trace` at the end; null without one of them.
     #[serde(default)]
     pub efficiency: Option<f64>,
+    /// How many parameters it learns.
+    #[serde(default)]
+    pub parameters: usize,
 }
 
 /// One run of one learner.
@@ -192,7 +195,7 @@ impl Comparison {
     pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
         for learner in &mut self.learners {
             let bound = learner.curve.last().and_then(|end| end.bound_trace).map(|bound| bound.median);
-            learner.efficiency = BestDesign::efficiency(&best_designs, bound);
+            learner.efficiency = BestDesign::efficiency(&best_designs, bound, learner.parameters);
         }
         Self { best_designs, ..self }
     }
@@ -247,6 +250,7 @@ impl LearnerComparison {
             runs,
             curve,
             efficiency: None,
+            parameters: of_learner().next().map(|(_, trace)| trace.parameters).unwrap_or_default(),
             selection_ms: SelectionTime { median: median(&times), p95: nearest_rank(&times, 0.95) },
         }
     }

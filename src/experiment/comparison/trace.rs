@@ -16,6 +16,8 @@ pub struct Trace {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct LearnerTrace {
     pub(super) name: String,
+    #[serde(default)]
+    pub(super) parameters: usize,
     pub(super) converged_at: Option<u64>,
     pub(super) recovered_at: Option<u64>,
     pub(super) movements: u64,
@@ -44,8 +46,10 @@ impl Trace {
             .description()
             .learners
             .iter()
-            .map(|learner| LearnerTrace {
+            .zip(&experiment.learners)
+            .map(|(learner, agent)| LearnerTrace {
                 name: learner.name.clone(),
+                parameters: agent.belief().layout.dimension(),
                 converged_at: None,
                 recovered_at: None,
                 movements: 0,

@@ -64,7 +64,7 @@ impl Check<'_> {
         let key = "view.visible_pose_deg";
         let visible_pose = self.pose(key, raw, robot)?;
         let mut clearances = vec![0.0; rig.channels().len()];
-        rig.clearances(&robot.state, &visible_pose, &mut clearances);
+        rig.clearances(None, &robot.state, &visible_pose, &mut clearances);
         let best = clearances.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if best < 0.0 {
             let what = format!("nothing is in view there: it is {:.1} degrees outside", -best.to_degrees());

@@ -55,6 +55,11 @@ impl Check<'_> {
                 self.problem(given.span(), format!("{key}.holds_axes"), "this estimator learns all there is", mend);
             }
             let holds_axes = learner.holds_axes.as_ref().is_some_and(|given| *given.get_ref());
+            if let (Some(given), true, true) = (&learner.holds_axes, holds_axes, setting.learns_axes_alone) {
+                let mend = "remove it, or learn something else too, as with `learn_marker = true`";
+                let what = "nothing is left to learn: this robot's axes are all that is learned";
+                self.problem(given.span(), format!("{key}.holds_axes"), what, mend);
+            }
             let stabilising = learner.stabilising_noise.as_ref().is_none_or(|given| *given.get_ref());
             let robust = learner.robust.as_ref().is_none_or(|given| *given.get_ref());
             let (name, by_default) = (name.clone(), learner.by_default);

@@ -208,6 +208,11 @@ impl Check<'_> {
         let usual = rig.as_deref().filter(|_| robot.described.is_some() && is_told);
         let usual = usual.map(|rig| (FILTER_SIGMAS * rig.sigma()).powi(2));
         let filter = self.filter("filter", &raw.filter, usual);
+        let unscented = raw.unscented.as_ref().map_or(filter, |given| self.filter("unscented", given, usual));
+        let smoother = self.smoother(raw, rig.as_deref(), readings.unknown);
+        if let (Some(rig), true) = (&rig, self.problems.is_empty()) {
+            self.assumed_noise(raw, rig, [filter.sigma(), unscented.sigma(), smoother.sigma]);
+        }
         let constraints = raw.constraints.as_ref();
         if let (Some(given), true) = (constraints, raw.held.is_some() && !self.is_outside) {
             let mend = "leave [constraints] out, or the sockets";
@@ -220,8 +225,8 @@ impl Check<'_> {
             steps: self.at_least_one("steps", &raw.steps).min(rows.unwrap_or(u64::MAX)),
             prior: self.prior(raw, &robot),
             filter,
-            unscented: raw.unscented.as_ref().map_or(filter, |given| self.filter("unscented", given, usual)),
-            smoother: self.smoother(raw, rig.as_deref(), readings.unknown),
+            unscented,
+            smoother,
             gradient_rate: self.gradient_rate(raw),
             selection: self.selection(&raw.selection),
             constraints,
@@ -319,6 +324,17 @@ impl Check<'_> {
             }
         };
         Filter { variance, stabilising }
+    }
+
+    /// Every σ that an estimator takes for granted, the first sensor's as told and the others' in proportion.
+    fn assumed_noise(&mut self, raw: &raw::Scenario, rig: &Rig, sigmas: [f64; 3]) {
+        let told = sigmas.into_iter().find_map(|sigma| rig.assuming(sigma).check_noise().err());
+        if let Some(error) = told {
+            let sensor = raw.sensor.as_ref().map(Spanned::span);
+            let span = sensor.or(raw.sockets.first().map(Spanned::span)).unwrap_or(raw.filter.span());
+            let mend = "bring the σ of all sensors, and what filters assume of the first, nearer to each other";
+            self.problem(span, "sensor", error.to_string(), mend);
+        }
     }
 
     fn smoother(&mut self, raw: &raw::Scenario, rig: Option<&Rig>, joints_unknown: bool) -> SmootherSpec {
