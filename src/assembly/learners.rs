@@ -140,6 +140,10 @@ impl Scenario {
         let smoother = Smoother::new(prior, layout.clone(), rig, hypotheses, rng)
             .with_loss(if spec.robust { loss } else { Loss::None })
             .with_unknown_noise(unknown);
+        let smoother = match self.chain_prior(&briefing.initial, layout) {
+            Some(chain) => smoother.with_chain(Arc::new(chain)),
+            None => smoother,
+        };
         let smoother = match &briefing.beforehand {
             Some(known) => smoother.knowing(known.clone()),
             None => smoother,

@@ -49,11 +49,11 @@ impl Briefing {
     fn holding_axes(&self, scenario: &Scenario) -> Self {
         let others = self.layout.blocks().map(|(block, _)| block).filter(|block| !matches!(block, Block::Axis(_)));
         let layout = Layout::new(&self.initial, others);
-        let deviations = scenario.prior.standard_deviations(&layout);
+        let deviations = scenario.deviations(&layout);
         Self {
             initial: self.initial.clone(),
             weights: Weights::new(scenario.selection.units, &layout, &deviations),
-            covariance: DMatrix::from_diagonal(&deviations.map(|sd| sd * sd)),
+            covariance: scenario.prior_covariance(&self.initial, &layout),
             layout: Arc::new(layout),
             actions: self.actions.clone(),
             workspace: self.workspace.clone(),
@@ -119,7 +119,7 @@ impl Scenario {
                     layout: Arc::new(self.robot.layout.clone()),
                     weights: self.weights(),
                     initial: self.perturbed(initial_error, &mut Stream::InitialEstimate.rng(seed)),
-                    covariance: self.prior_covariance(),
+                    covariance: self.prior_covariance(&self.robot.state, &self.robot.layout),
                     actions: self.actions(),
                     // Uniform in the joint box, seen or not: what a head can see depends on the truth.
                     workspace: self.workspace(drawn(limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true)),
@@ -146,7 +146,7 @@ impl Scenario {
                     layout: Arc::new(self.robot.layout.clone()),
                     weights: self.weights(),
                     initial: self.robot.state.clone(),
-                    covariance: self.prior_covariance(),
+                    covariance: self.prior_covariance(&self.robot.state, &self.robot.layout),
                     actions: self.actions(),
                     workspace: self.workspace(drawn(
                         &self.robot.limits,
@@ -171,11 +171,6 @@ impl Scenario {
     /// What one measurement of the marker is worth, metres: of the tracker, or where none sees it of the first sensor.
     fn marker_sigma(&self) -> f64 {
         self.rig.marker_channel().map_or(self.rig.sigma(), |_| self.rig.marker_sigma())
-    }
-
-    fn prior_covariance(&self) -> DMatrix<f64> {
-        let deviations = self.prior.standard_deviations(&self.robot.layout);
-        DMatrix::from_diagonal(&deviations.map(|sd| sd * sd))
     }
 
     /// Holds rows out; learners begin with the robot's description, and find where it stands from the rows that they choose.
@@ -203,7 +198,7 @@ impl Scenario {
             initial: self.robot.state.clone(),
             weights: self.weights(),
             layout: Arc::new(self.robot.layout.clone()),
-            covariance: self.prior_covariance(),
+            covariance: self.prior_covariance(&self.robot.state, &self.robot.layout),
             actions: Actions::Pool(pool),
             workspace: self.workspace(configurations(&training)),
             watch: None,

@@ -1,6 +1,6 @@
 //! One fit: a layout and the rows that it is learned from.
 
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +8,7 @@ use super::{CalibrationError, Case, figures::mean};
 use crate::{
     estimation::{Belief, Estimator, HypothesisSettings, NoiseFit, ReadingReport, Smoother},
     experiment::Stream,
-    model::{Block, Layout, Prior, State, best_motion},
+    model::{Block, ChainPrior, Layout, Prior, State, best_motion},
     scenario::Known,
     sensing::{Noise, Occasion},
 };
@@ -24,6 +24,8 @@ pub struct Fit {
     pub noise: Vec<NoiseFit>,
     /// The rows that it was learned from.
     pub rows: Vec<usize>,
+    /// By how much the prior's deviations of origins and of zeros were found to be off, where the robot is described.
+    pub scales: Option<[f64; 2]>,
 }
 
 impl Fit {
@@ -73,6 +75,7 @@ impl Case<'_> {
             readings: smoother.readings(),
             noise: smoother.fits(),
             rows: rows.to_vec(),
+            scales: smoother.scales(),
         })
     }
 
@@ -85,8 +88,11 @@ impl Case<'_> {
     }
 
     fn smoother(&self, layout: &Layout, near: Option<&State>) -> Result<Smoother, CalibrationError> {
-        let deviations = self.deviations(layout);
-        let covariance = DMatrix::from_diagonal(&deviations.map(|sd| sd * sd));
+        let chain = self.chain(layout);
+        let covariance = match &chain {
+            Some(chain) => chain.covariance([1.0; 2]),
+            None => DMatrix::from_diagonal(&self.deviations(layout).map(|sd| sd * sd)),
+        };
         let within = |block: Block| match self.scenario.prior.of(block) {
             Some(Known::Anywhere { within_m }) => Some(within_m),
             _ => None,
@@ -109,15 +115,30 @@ impl Case<'_> {
             .with_loss(self.loss)
             .with_unknown_noise(unknown)
             .never_forgetting();
+        let smoother = match chain {
+            Some(chain) => smoother.with_chain(chain),
+            None => smoother,
+        };
         Ok(match self.known {
             Some(known) => smoother.knowing(known.clone()),
             None => smoother,
         })
     }
 
-    /// The prior's standard deviations.
+    /// The prior's standard deviations, as stated.
     pub(super) fn deviations(&self, layout: &Layout) -> DVector<f64> {
-        self.scenario.prior.standard_deviations(layout)
+        self.chain(layout).map_or_else(|| self.scenario.prior.standard_deviations(layout), |chain| chain.deviations())
+    }
+
+    /// The prior along the chain of a described robot, the same for all fits of a layout.
+    pub(super) fn chain(&self, layout: &Layout) -> Option<Arc<ChainPrior>> {
+        let mut known = self.chains.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, chain)) = known.iter().find(|(of, _)| of == layout) {
+            return chain.clone();
+        }
+        let chain = self.scenario.chain_prior(self.guess(), layout).map(Arc::new);
+        known.push((layout.clone(), chain.clone()));
+        chain
     }
 
     /// The guess with its base where the rigid motion that fits best puts it, by the targets that were seen in `rows`, and

@@ -147,6 +147,18 @@ impl Prior {
         Ok(Self { guess, blocks, covariance, information, root: cholesky.l(), coupled, lines })
     }
 
+    /// The same with another covariance of its blocks around the guess.
+    pub(crate) fn with_covariance(&self, layout: &Layout, covariance: DMatrix<f64>) -> Result<Self, PriorError> {
+        let bound = |block: Block| {
+            let of = self.blocks.iter().find(|(known, ..)| *known == block);
+            of.and_then(|(.., knowledge)| match knowledge {
+                Knowledge::Around => None,
+                Knowledge::Anywhere(bound) => Some(*bound),
+            })
+        };
+        Self::new(self.guess.clone(), layout, covariance, bound)
+    }
+
     /// The state to start from. Blocks that may be anywhere mean nothing in it.
     pub fn guess(&self) -> &State {
         &self.guess

@@ -28,6 +28,7 @@ mod model_error;
 mod noise;
 mod points;
 mod posterior;
+mod prior_scale;
 mod settled;
 
 use std::sync::Arc;
@@ -40,6 +41,7 @@ pub use hypotheses::HypothesisSettings;
 use hypotheses::Hypotheses;
 use mode::Effort;
 use posterior::{Measurement, Posterior};
+use prior_scale::Scaled;
 
 use super::{
     Alternative, Belief, ChangeDetector, EstimationError, Estimator, NoiseFit, NoiseReport, ReadingReport, Update,
@@ -72,6 +74,8 @@ pub struct Smoother {
     unknown: Vec<bool>,
     /// By kind of noise: equations that no parameter accounts for.
     spare: Vec<f64>,
+    /// The prior along a chain whose scales are learned, if it is one.
+    scaled: Option<Scaled>,
 }
 
 /// Steps without a new hypothesis after which none are searched for any more.
@@ -113,6 +117,7 @@ impl Smoother {
             nominal,
             unknown,
             spare,
+            scaled: None,
         };
         smoother.begin();
         smoother.publish();
@@ -220,6 +225,8 @@ impl Smoother {
         let dropped: Vec<ReadingReport> = dropped.collect();
         Arc::make_mut(&mut self.past).extend(dropped);
         self.posterior = changed;
+        // What is made of an estimate has no scales to learn.
+        self.scaled = None;
         self.hypotheses.calm = 0;
         self.changes.reset();
     }
@@ -339,6 +346,7 @@ impl Smoother {
         if self.unknown.contains(&true) {
             self.learn_noise();
         }
+        self.learn_scales();
         if self.hypotheses.modes.is_empty() {
             return Err(EstimationError::Diverged("no hypothesis explains the measurements"));
         }

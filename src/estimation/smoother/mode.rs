@@ -20,6 +20,8 @@ pub(super) struct Mode {
     pub state: State,
     pub cost: f64,
     pub information: DMatrix<f64>,
+    /// −∂E/∂δ there, which is next to nothing.
+    pub descent: DVector<f64>,
     factor: Factor,
     /// −E − ½ ln det Λ: the logarithm of its share of the evidence, but for what all modes have in common.
     pub log_evidence: f64,
@@ -181,11 +183,11 @@ impl Mode {
 
     /// The Gaussian where a search has ended with these equations; `None` where they are not positive.
     pub fn at(level: Level, state: State, normal: Normal) -> Option<Self> {
-        let Normal { cost, mut information, .. } = normal;
+        let Normal { cost, mut information, descent } = normal;
         information.fill_upper_triangle_with_lower_triangle();
         let factor = Factor::new(level, &information, 0.0)?;
         let log_evidence = -cost - 0.5 * factor.log_determinant();
-        log_evidence.is_finite().then_some(Self { state, cost, information, factor, log_evidence, weight: 0.0 })
+        log_evidence.is_finite().then_some(Self { state, cost, information, descent, factor, log_evidence, weight: 0.0 })
     }
 
     /// P, the inverse of the information.

@@ -1,0 +1,259 @@
+//! The prior of a robot as a description has it: errors are local, and carry everything behind them.
+//!
+//! A description places every joint's frame relative to the one before. What is wrong there, an origin that was measured badly
+//! or a zero that was set badly, moves all that the joint carries. With ε_i the twist (v, ω) by which the origin o_i of joint i
+//! is off, and z_i the error of the zero of its reading, to first order
+//!
+//! ```text
+//! δ = Σᵢ Jᵢ εᵢ + Kᵢ zᵢ,       ε ~ N(0, diag(σₚ², σ_d²)),   z ~ N(0, σ_z²)
+//! P₀ = Σᵢ Jᵢ Σ_ε Jᵢᵀ + σ_z² Kᵢ Kᵢᵀ + D
+//! ```
+//!
+//! where a twist at o moves a point x by v + ω × (x − o) and a direction w by ω × w:
+//!
+//! | block of δ | moved by ε_i | moved by z_i, the twist (0, w_i), or (w_i, 0) of a joint that slides |
+//! |---|---|---|
+//! | axis of joint j, in its own chart | j ≥ i | j > i |
+//! | target or device on link l | l > i | l > i |
+//!
+//! with joints counted from 0, and link l behind joint l − 1. D holds the variances of what is no error of the chain: where the
+//! base stands, where on its link a target is. A target that is known to a millimetre *on its link* so moves with the chain; of one
+//! of which little is known D is all that counts. Where the zeros are blocks of their own ([`Block::Offset`]) they are not counted
+//! among the axes a second time.
+//!
+//! Origins and zeros are two kinds of error, each with a scale: Σ_ε stands for s_o² Σ_ε, σ_z² for s_z² σ_z². What is stated is
+//! s = 1. How large errors of one description are tells the evidence of measurements, with a weak prior of the scales themselves
+//! (a spike and a slab): with probability w there is next to no error of the kind, else ln s ~ N(0, d²). It is tabulated on a
+//! [grid](ChainPrior::GRID).
+//!
+//! *Held axes.* An axis that is not learned is right where it is, in the frame of the base. So P₀ is conditioned on it: of all errors
+//! along the chain those count that leave it there, to [`HELD`](ChainPrior::HELD).
+
+use std::sync::OnceLock;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Point3, Vector3};
+
+use super::{Block, Element, Layout, State};
+use crate::kinematics::{Joint, chart};
+
+/// What is known of errors along a chain, as standard deviations per coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChainErrors {
+    /// σₚ: of a joint's origin in the frame before it, metres.
+    pub point_m: f64,
+    /// σ_d: of how that frame is turned, radians.
+    pub direction_rad: f64,
+    /// σ_z: of the zero of a joint that turns, radians.
+    pub zero_rad: f64,
+    /// The same of a joint that slides, metres.
+    pub zero_m: f64,
+}
+
+/// A covariance of tangent coordinates as a function of the scales of two kinds of error; see the [module](self).
+#[derive(Clone, Debug)]
+pub struct ChainPrior {
+    /// By kind: a root of its part of P₀, m × k, at a scale of 1; the rows of what is held stand last.
+    roots: [DMatrix<f64>; 2],
+    /// D, with (1e-6)² of what is held.
+    own: DVector<f64>,
+    /// How many of the rows are held: the last ones.
+    held: usize,
+    /// Learned coordinates of which the deviation is so small that they are held, too.
+    fixed: Vec<usize>,
+    /// By place on the grid: found when it is asked for first.
+    inverted: Vec<OnceLock<Option<Inverted>>>,
+}
+
+/// P₀⁻¹ at some scales, and ln det P₀.
+#[derive(Clone, Debug)]
+pub(crate) struct Inverted {
+    pub information: DMatrix<f64>,
+    pub log_determinant: f64,
+}
+
+/// A scale at which there is next to no error.
+const NONE: f64 = 1e-3;
+
+impl ChainPrior {
+    /// How well what is held is known, m or rad.
+    pub const HELD: f64 = 1e-6;
+    /// The scales of origins and those of zeros that are looked at. The first of each stands for none at all.
+    pub const GRID: [&'static [f64]; 2] = [
+        &[NONE, 0.1, 0.16, 0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0],
+        &[NONE, 0.05, 0.1, 0.2, 0.4, 0.7, 1.2, 2.0, 4.0],
+    ];
+    /// w: how probable it is that there are no errors of a kind, beyond what the other kind makes.
+    const RIGHT: [f64; 2] = [0.6, 0.85];
+    /// d: the deviation of the logarithm of a scale.
+    const SPREAD: [f64; 2] = [1.0, 1.5];
+
+    /// The prior of `layout` around `guess`, the joints' origins being where `origins` has them (frame of the guess at θ = 0,
+    /// metres). Joints whose zeros go together, one following the other, are one of `readings`: (joint, multiplier) each.
+    ///
+    /// `own` are the deviations of what is no error of the chain, one per coordinate; of axes they count only where they are
+    /// [`HELD`](Self::HELD) or less.
+    pub fn new(
+        guess: &State,
+        layout: &Layout,
+        origins: &[Point3<f64>],
+        readings: &[Vec<(usize, f64)>],
+        errors: ChainErrors,
+        own: &DVector<f64>,
+    ) -> Self {
+        let is_axis = |block: &Block| matches!(block, Block::Axis(_));
+        let missing = (0..guess.joints.len()).map(Block::Axis).filter(|block| layout.block(*block).is_none());
+        let held_layout = Layout::new(guess, missing);
+        let (learned, held) = (layout.dimension(), held_layout.dimension());
+        let blocks: Vec<(Block, usize)> = (layout.blocks().map(|(block, range)| (block, range.start)))
+            .chain(held_layout.blocks().map(|(block, range)| (block, learned + range.start)))
+            .collect();
+        let carried = |twist: &Twist, first: usize, column: &mut [f64]| {
+            for (block, start) in &blocks {
+                let moves = match *block {
+                    Block::Axis(joint) => joint >= first,
+                    Block::Target(target) => guess.targets[target].link > twist.joint,
+                    Block::Device(device) => guess.devices[device].link.is_some_and(|link| link > twist.joint),
+                    _ => false,
+                };
+                if moves {
+                    twist.moves(&block.of(guess), &mut column[*start..]);
+                }
+            }
+        };
+        let rows = learned + held;
+        let mut of_origins = DMatrix::zeros(rows, 6 * guess.joints.len());
+        for (joint, origin) in origins.iter().enumerate() {
+            for k in 0..6 {
+                let unit = Vector3::ith(k % 3, if k < 3 { errors.point_m } else { errors.direction_rad });
+                let (linear, angular) = if k < 3 { (unit, Vector3::zeros()) } else { (Vector3::zeros(), unit) };
+                let twist = Twist { joint, at: *origin, linear, angular };
+                carried(&twist, joint, &mut of_origins.as_mut_slice()[(6 * joint + k) * rows..][..rows]);
+            }
+        }
+        let mut of_zeros = DMatrix::zeros(rows, readings.len());
+        for (index, reading) in readings.iter().enumerate() {
+            let mut sum = DVector::zeros(rows);
+            for &(joint, multiplier) in reading.iter().filter(|(joint, _)| layout.block(Block::Offset(*joint)).is_none()) {
+                let w = guess.joints[joint].direction().into_inner() * multiplier;
+                let (linear, angular) = match guess.joints[joint] {
+                    Joint::Revolute(_) => (Vector3::zeros(), w * errors.zero_rad),
+                    Joint::Prismatic(_) => (w * errors.zero_m, Vector3::zeros()),
+                };
+                let at = guess.joints[joint].line().map_or(Point3::origin(), |line| line.point);
+                let mut column = DVector::zeros(rows);
+                carried(&Twist { joint, at, linear, angular }, joint + 1, column.as_mut_slice());
+                sum += column;
+            }
+            of_zeros.set_column(index, &sum);
+        }
+        let mut variances = DVector::from_element(rows, Self::HELD * Self::HELD);
+        let mut fixed = Vec::new();
+        for (block, range) in layout.blocks() {
+            for k in range {
+                let sd = own[k];
+                variances[k] = if is_axis(&block) { 0.0 } else { sd * sd };
+                if sd <= Self::HELD {
+                    fixed.push(k);
+                }
+            }
+        }
+        let cells = Self::GRID.iter().map(|scales| scales.len()).product();
+        Self { roots: [of_origins, of_zeros], own: variances, held, fixed, inverted: vec![OnceLock::new(); cells] }
+    }
+
+    /// P₀ (m × m) with the scales of origins and zeros.
+    pub fn covariance(&self, scales: [f64; 2]) -> DMatrix<f64> {
+        let mut all = DMatrix::from_diagonal(&self.own);
+        for (root, scale) in self.roots.iter().zip(scales) {
+            all.gemm(scale * scale, root, &root.transpose(), 1.0);
+        }
+        let learned = all.nrows() - self.held;
+        let conditions: Vec<usize> = self.fixed.iter().copied().chain(learned..all.nrows()).collect();
+        let mut covariance = all.view((0, 0), (learned, learned)).into_owned();
+        if !conditions.is_empty() {
+            let across = all.select_columns(&conditions).rows(0, learned).into_owned();
+            let mut among = DMatrix::from_fn(conditions.len(), conditions.len(), |i, j| all[(conditions[i], conditions[j])]);
+            for (k, place) in conditions.iter().enumerate() {
+                // Of what is held the rows hold its variance already.
+                if *place < learned {
+                    among[(k, k)] += Self::HELD * Self::HELD;
+                }
+            }
+            if let Some(among) = Cholesky::new(among) {
+                covariance -= &across * among.solve(&across.transpose());
+            }
+            // What rounding leaves of a coordinate that is known exactly.
+            for k in &self.fixed {
+                covariance[(*k, *k)] = covariance[(*k, *k)].max(Self::HELD * Self::HELD);
+            }
+        }
+        (&covariance + covariance.transpose()) * 0.5
+    }
+
+    /// P₀⁻¹ at a place of the [grid](Self::GRID); `None` where rounding leaves P₀ no covariance.
+    pub(crate) fn inverted(&self, [origins, zeros]: [usize; 2]) -> Option<&Inverted> {
+        let invert = || {
+            let factor = Cholesky::new(self.covariance([Self::GRID[0][origins], Self::GRID[1][zeros]]))?;
+            let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+            Some(Inverted { information: factor.inverse(), log_determinant })
+        };
+        self.inverted[origins * Self::GRID[1].len() + zeros].get_or_init(invert).as_ref()
+    }
+
+    /// By kind of error and by place on the [grid](Self::GRID): ln of the probability of a scale before any measurement. Where there are
+    /// no errors of a kind to learn of, all that counts is the first.
+    pub(crate) fn log_probabilities(&self) -> [Vec<f64>; 2] {
+        [0, 1].map(|kind| {
+            let slab = |scale: &f64| (-0.5 * (scale.ln() / Self::SPREAD[kind]).powi(2)).exp();
+            let rest = &Self::GRID[kind][1..];
+            let total: f64 = rest.iter().map(slab).sum();
+            let right = Self::RIGHT[kind];
+            let nothing = self.roots[kind].amax() == 0.0;
+            let of = |scale: &f64| if nothing { f64::NEG_INFINITY } else { ((1.0 - right) * slab(scale) / total).ln() };
+            std::iter::once(if nothing { 0.0 } else { right.ln() }).chain(rest.iter().map(of)).collect()
+        })
+    }
+
+    /// Of every coordinate its standard deviation, at scales of 1.
+    pub fn deviations(&self) -> DVector<f64> {
+        self.covariance([1.0; 2]).diagonal().map(|variance| variance.max(0.0).sqrt())
+    }
+}
+
+/// A twist of all that a joint carries.
+struct Twist {
+    joint: usize,
+    at: Point3<f64>,
+    linear: Vector3<f64>,
+    angular: Vector3<f64>,
+}
+
+impl Twist {
+    /// Adds how it moves an element, in the chart there.
+    fn moves(&self, element: &Element, coordinates: &mut [f64]) {
+        let shift = |x: &Point3<f64>| self.linear + self.angular.cross(&(x - self.at));
+        let mut add = |from: usize, values: &[f64]| {
+            coordinates[from..].iter_mut().zip(values).for_each(|(x, value)| *x += value);
+        };
+        match element {
+            Element::Axis(joint) => {
+                let w = joint.direction();
+                let basis = chart::basis(&w).transpose();
+                let turn = basis * self.angular.cross(&w);
+                match joint.line() {
+                    Some(line) => {
+                        add(0, (basis * shift(&line.point)).as_slice());
+                        add(2, turn.as_slice());
+                    }
+                    None => add(0, turn.as_slice()),
+                }
+            }
+            Element::Point(point) => add(0, shift(point).as_slice()),
+            Element::Pose(pose) => {
+                add(0, shift(&Point3::from(pose.translation.vector)).as_slice());
+                add(3, self.angular.as_slice());
+            }
+            Element::Numbers(_) => {}
+        }
+    }
+}
