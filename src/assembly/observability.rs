@@ -29,7 +29,7 @@ impl Scenario {
         let m = layout.dimension();
         let known = self.chain_prior(&self.robot.state, &layout).and_then(|chain| {
             let inverse = deviations.map(f64::recip);
-            let correlations = chain.covariance([1.0; 2]).component_mul(&(&inverse * inverse.transpose()));
+            let correlations = chain.covariance(&chain.stated()).component_mul(&(&inverse * inverse.transpose()));
             Some(correlations.cholesky()?.inverse())
         });
         Prospect {

@@ -8,7 +8,7 @@ use super::{CalibrationError, Case, figures::mean};
 use crate::{
     estimation::{Belief, Estimator, HypothesisSettings, NoiseFit, ReadingReport, Smoother},
     experiment::Stream,
-    model::{Block, ChainPrior, Layout, Prior, State, best_motion},
+    model::{Block, ChainPrior, Layout, Prior, Scales, State, best_motion},
     scenario::Known,
     sensing::{Noise, Occasion},
 };
@@ -24,8 +24,8 @@ pub struct Fit {
     pub noise: Vec<NoiseFit>,
     /// The rows that it was learned from.
     pub rows: Vec<usize>,
-    /// By how much the prior's deviations of origins and of zeros were found to be off, where the robot is described.
-    pub scales: Option<[f64; 2]>,
+    /// By how much errors along the chain were found to be larger than the prior states, where the robot is described.
+    pub scales: Option<Scales>,
 }
 
 impl Fit {
@@ -75,7 +75,7 @@ impl Case<'_> {
             readings: smoother.readings(),
             noise: smoother.fits(),
             rows: rows.to_vec(),
-            scales: smoother.scales(),
+            scales: smoother.scales().cloned(),
         })
     }
 
@@ -90,7 +90,7 @@ impl Case<'_> {
     fn smoother(&self, layout: &Layout, near: Option<&State>) -> Result<Smoother, CalibrationError> {
         let chain = self.chain(layout);
         let covariance = match &chain {
-            Some(chain) => chain.covariance([1.0; 2]),
+            Some(chain) => chain.covariance(&chain.stated()),
             None => DMatrix::from_diagonal(&self.deviations(layout).map(|sd| sd * sd)),
         };
         let within = |block: Block| match self.scenario.prior.of(block) {

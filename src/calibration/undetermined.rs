@@ -41,7 +41,7 @@ impl Case<'_> {
         let layout = &*fit.belief.layout;
         let covariance = fit.belief.covariance.as_ref()?;
         // As the rows have them: what shrinks with the scale of the prior alone is not told by rows.
-        let prior = match (self.chain(layout), fit.scales) {
+        let prior = match (self.chain(layout), &fit.scales) {
             (Some(chain), Some(scales)) => chain.covariance(scales).diagonal().map(|x| x.max(0.0).sqrt()),
             _ => self.deviations(layout),
         };

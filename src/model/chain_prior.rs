@@ -21,10 +21,10 @@
 //! of which little is known D is all that counts. Where the zeros are blocks of their own ([`Block::Offset`]) they are not counted
 //! among the axes a second time.
 //!
-//! Origins and zeros are two kinds of error, each with a scale: Σ_ε stands for s_o² Σ_ε, σ_z² for s_z² σ_z². What is stated is
-//! s = 1. How large errors of one description are tells the evidence of measurements, with a weak prior of the scales themselves
-//! (a spike and a slab): with probability w there is next to no error of the kind, else ln s ~ N(0, d²). It is tabulated on a
-//! [grid](ChainPrior::GRID).
+//! Origins have a scale, and so has every single zero: σₚ stands for s σₚ, σ_d for s σ_d, σ_z for s_i σ_z, see [`Scales`]. What is stated is s = 1. How large the errors of one description are tells the evidence of measurements,
+//! with a weak prior of the scales themselves (a spike and a slab, on a [grid](ChainPrior::GRID)): with probability w there is next to
+//! no error of the kind, else ln s ~ N(0, d²). Origins come off one machine and share their scale; a zero is set by hand, and
+//! one that is off says nothing of the others.
 //!
 //! *Held axes.* An axis that is not learned is right where it is, in the frame of the base. So P₀ is conditioned on it: of all errors
 //! along the chain those count that leave it there, to [`HELD`](ChainPrior::HELD).
@@ -49,10 +49,19 @@ pub struct ChainErrors {
     pub zero_m: f64,
 }
 
+/// By how much errors along a chain are larger than stated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scales {
+    /// s: of how origins are shifted and turned.
+    pub origins: f64,
+    /// s_i: of the zero of every reading.
+    pub zeros: Vec<f64>,
+}
+
 /// A covariance of tangent coordinates as a function of the scales of two kinds of error; see the [module](self).
 #[derive(Clone, Debug)]
 pub struct ChainPrior {
-    /// By kind: a root of its part of P₀, m × k, at a scale of 1; the rows of what is held stand last.
+    /// Of origins and of zeros: a root of its part of P₀, m × k, at a scale of 1; the rows of what is held stand last.
     roots: [DMatrix<f64>; 2],
     /// D, with (1e-6)² of what is held.
     own: DVector<f64>,
@@ -71,19 +80,41 @@ pub(crate) struct Inverted {
     pub log_determinant: f64,
 }
 
+impl Inverted {
+    fn of(covariance: DMatrix<f64>) -> Option<Self> {
+        let factor = Cholesky::new(covariance)?;
+        let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+        Some(Self { information: factor.inverse(), log_determinant })
+    }
+
+    /// The same with a covariance that is larger by K diag(v) Kᵀ, K of m rows (Woodbury).
+    pub fn with(&self, columns: &DMatrix<f64>, variances: &[f64]) -> Option<Self> {
+        let off: Vec<usize> = (0..variances.len()).filter(|k| variances[*k] > NONE * NONE).collect();
+        if off.is_empty() {
+            return Some(self.clone());
+        }
+        let columns =
+            DMatrix::from_fn(columns.nrows(), off.len(), |i, k| columns[(i, off[k])] * variances[off[k]].sqrt());
+        let carried = &self.information * &columns;
+        let mut within = columns.tr_mul(&carried);
+        (0..off.len()).for_each(|k| within[(k, k)] += 1.0);
+        let factor = Cholesky::new(within)?;
+        let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+        let information = &self.information - &carried * factor.solve(&carried.transpose());
+        Some(Self { information, log_determinant: self.log_determinant + log_determinant })
+    }
+}
+
 /// A scale at which there is next to no error.
 const NONE: f64 = 1e-3;
 
 impl ChainPrior {
     /// How well what is held is known, m or rad.
     pub const HELD: f64 = 1e-6;
-    /// The scales of origins and those of zeros that are looked at. The first of each stands for none at all.
-    pub const GRID: [&'static [f64]; 2] = [
-        &[NONE, 0.1, 0.16, 0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0],
-        &[NONE, 0.05, 0.1, 0.2, 0.4, 0.7, 1.2, 2.0, 4.0],
-    ];
-    /// w: how probable it is that there are no errors of a kind, beyond what the other kind makes.
-    const RIGHT: [f64; 2] = [0.6, 0.85];
+    /// The scales that are looked at. The first stands for no error at all.
+    pub const GRID: &'static [f64] = &[NONE, 0.1, 0.16, 0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0];
+    /// w: how probable it is that origins are not off, and that a zero is not.
+    const RIGHT: [f64; 2] = [0.6, 0.8];
     /// d: the deviation of the logarithm of a scale.
     const SPREAD: [f64; 2] = [1.0, 1.5];
 
@@ -127,13 +158,16 @@ impl ChainPrior {
                 let unit = Vector3::ith(k % 3, if k < 3 { errors.point_m } else { errors.direction_rad });
                 let (linear, angular) = if k < 3 { (unit, Vector3::zeros()) } else { (Vector3::zeros(), unit) };
                 let twist = Twist { joint, at: *origin, linear, angular };
-                carried(&twist, joint, &mut of_origins.as_mut_slice()[(6 * joint + k) * rows..][..rows]);
+                let place = (6 * joint + k) * rows;
+                carried(&twist, joint, &mut of_origins.as_mut_slice()[place..place + rows]);
             }
         }
         let mut of_zeros = DMatrix::zeros(rows, readings.len());
         for (index, reading) in readings.iter().enumerate() {
             let mut sum = DVector::zeros(rows);
-            for &(joint, multiplier) in reading.iter().filter(|(joint, _)| layout.block(Block::Offset(*joint)).is_none()) {
+            for &(joint, multiplier) in
+                reading.iter().filter(|(joint, _)| layout.block(Block::Offset(*joint)).is_none())
+            {
                 let w = guess.joints[joint].direction().into_inner() * multiplier;
                 let (linear, angular) = match guess.joints[joint] {
                     Joint::Revolute(_) => (Vector3::zeros(), w * errors.zero_rad),
@@ -157,22 +191,30 @@ impl ChainPrior {
                 }
             }
         }
-        let cells = Self::GRID.iter().map(|scales| scales.len()).product();
-        Self { roots: [of_origins, of_zeros], own: variances, held, fixed, inverted: vec![OnceLock::new(); cells] }
+        let inverted = vec![OnceLock::new(); Self::GRID.len()];
+        Self { roots: [of_origins, of_zeros], own: variances, held, fixed, inverted }
     }
 
-    /// P₀ (m × m) with the scales of origins and zeros.
-    pub fn covariance(&self, scales: [f64; 2]) -> DMatrix<f64> {
+    /// The scales of what is stated.
+    pub fn stated(&self) -> Scales {
+        Scales { origins: 1.0, zeros: vec![1.0; self.roots[1].ncols()] }
+    }
+
+    /// P₀ (m × m) with these scales.
+    pub fn covariance(&self, scales: &Scales) -> DMatrix<f64> {
         let mut all = DMatrix::from_diagonal(&self.own);
-        for (root, scale) in self.roots.iter().zip(scales) {
-            all.gemm(scale * scale, root, &root.transpose(), 1.0);
-        }
+        let [origins, zeros] = &self.roots;
+        all.gemm(scales.origins * scales.origins, origins, &origins.transpose(), 1.0);
+        let mut zeros = zeros.clone();
+        zeros.column_iter_mut().zip(&scales.zeros).for_each(|(mut column, scale)| column *= *scale);
+        all.gemm(1.0, &zeros, &zeros.transpose(), 1.0);
         let learned = all.nrows() - self.held;
         let conditions: Vec<usize> = self.fixed.iter().copied().chain(learned..all.nrows()).collect();
         let mut covariance = all.view((0, 0), (learned, learned)).into_owned();
         if !conditions.is_empty() {
             let across = all.select_columns(&conditions).rows(0, learned).into_owned();
-            let mut among = DMatrix::from_fn(conditions.len(), conditions.len(), |i, j| all[(conditions[i], conditions[j])]);
+            let mut among =
+                DMatrix::from_fn(conditions.len(), conditions.len(), |i, j| all[(conditions[i], conditions[j])]);
             for (k, place) in conditions.iter().enumerate() {
                 // Of what is held the rows hold its variance already.
                 if *place < learned {
@@ -190,33 +232,56 @@ impl ChainPrior {
         (&covariance + covariance.transpose()) * 0.5
     }
 
-    /// P₀⁻¹ at a place of the [grid](Self::GRID); `None` where rounding leaves P₀ no covariance.
-    pub(crate) fn inverted(&self, [origins, zeros]: [usize; 2]) -> Option<&Inverted> {
-        let invert = || {
-            let factor = Cholesky::new(self.covariance([Self::GRID[0][origins], Self::GRID[1][zeros]]))?;
-            let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
-            Some(Inverted { information: factor.inverse(), log_determinant })
-        };
-        self.inverted[origins * Self::GRID[1].len() + zeros].get_or_init(invert).as_ref()
+    /// P₀⁻¹ with the scale of origins at a place of the [grid](Self::GRID), where no zero is off; `None` where rounding leaves P₀ no
+    /// covariance.
+    pub(crate) fn inverted(&self, origins: usize) -> Option<&Inverted> {
+        let zeros = || vec![NONE; self.roots[1].ncols()];
+        let invert = || Inverted::of(self.covariance(&Scales { origins: Self::GRID[origins], zeros: zeros() }));
+        self.inverted[origins].get_or_init(invert).as_ref()
     }
 
-    /// By kind of error and by place on the [grid](Self::GRID): ln of the probability of a scale before any measurement. Where there are
-    /// no errors of a kind to learn of, all that counts is the first.
-    pub(crate) fn log_probabilities(&self) -> [Vec<f64>; 2] {
+    /// How every zero that is off by one deviation moves what is learned, one column each, at some scale of origins. The columns are
+    /// those of the roots, but where axes are held.
+    pub(crate) fn zeros(&self, origins: f64) -> DMatrix<f64> {
+        let columns = self.roots[1].ncols();
+        let learned = self.own.len() - self.held;
+        if self.held == 0 && self.fixed.is_empty() {
+            return self.roots[1].clone();
+        }
+        let with = |zero: Option<usize>| {
+            let zeros = (0..columns).map(|column| if Some(column) == zero { 1.0 } else { NONE }).collect();
+            self.covariance(&Scales { origins, zeros })
+        };
+        let without = with(None);
+        let mut found = DMatrix::zeros(learned, columns);
+        for column in 0..columns {
+            // One zero makes a difference of rank one.
+            let difference = with(Some(column)) - &without;
+            let largest = difference.diagonal().imax();
+            let variance = difference[(largest, largest)];
+            if variance > 0.0 {
+                found.set_column(column, &(difference.column(largest) / variance.sqrt()));
+            }
+        }
+        found
+    }
+
+    /// Of origins and of a zero, by place on the [grid](Self::GRID): ln of the probability of a scale before any measurement.
+    pub(crate) fn log_probabilities() -> [Vec<f64>; 2] {
         [0, 1].map(|kind| {
             let slab = |scale: &f64| (-0.5 * (scale.ln() / Self::SPREAD[kind]).powi(2)).exp();
-            let rest = &Self::GRID[kind][1..];
+            let rest = &Self::GRID[1..];
             let total: f64 = rest.iter().map(slab).sum();
             let right = Self::RIGHT[kind];
-            let nothing = self.roots[kind].amax() == 0.0;
-            let of = |scale: &f64| if nothing { f64::NEG_INFINITY } else { ((1.0 - right) * slab(scale) / total).ln() };
-            std::iter::once(if nothing { 0.0 } else { right.ln() }).chain(rest.iter().map(of)).collect()
+            std::iter::once(right.ln())
+                .chain(rest.iter().map(|scale| ((1.0 - right) * slab(scale) / total).ln()))
+                .collect()
         })
     }
 
     /// Of every coordinate its standard deviation, at scales of 1.
     pub fn deviations(&self) -> DVector<f64> {
-        self.covariance([1.0; 2]).diagonal().map(|variance| variance.max(0.0).sqrt())
+        self.covariance(&self.stated()).diagonal().map(|variance| variance.max(0.0).sqrt())
     }
 }
 

@@ -29,7 +29,8 @@ pub mod urdf;
 mod workspace;
 
 pub use block::Block;
-pub use chain_prior::{ChainErrors, ChainPrior};
+pub(crate) use chain_prior::Inverted;
+pub use chain_prior::{ChainErrors, ChainPrior, Scales};
 pub use element::{Displacement, Element};
 pub use layout::{Layout, Quantity};
 pub use loads::{GRAVITY, Load, Loads, Mass};

@@ -13,7 +13,10 @@ impl Scenario {
     pub fn chain_prior(&self, guess: &State, layout: &Layout) -> Option<ChainPrior> {
         let chain = &self.robot.described.as_ref()?.chain;
         let has_axis = layout.blocks().any(|(block, _)| matches!(block, Block::Axis(_)));
-        if !has_axis || matches!(self.world, WorldSpec::Simulated { .. }) || chain.moving().count() != guess.joints.len() {
+        if !has_axis
+            || matches!(self.world, WorldSpec::Simulated { .. })
+            || chain.moving().count() != guess.joints.len()
+        {
             return None;
         }
         let frames = chain.frames();
@@ -35,7 +38,7 @@ impl Scenario {
     /// P₀ of the tangent coordinates of a layout, as stated.
     pub fn prior_covariance(&self, guess: &State, layout: &Layout) -> DMatrix<f64> {
         match self.chain_prior(guess, layout) {
-            Some(chain) => chain.covariance([1.0; 2]),
+            Some(chain) => chain.covariance(&chain.stated()),
             None => DMatrix::from_diagonal(&self.prior.standard_deviations(layout).map(|sd| sd * sd)),
         }
     }

@@ -187,7 +187,15 @@ impl Mode {
         information.fill_upper_triangle_with_lower_triangle();
         let factor = Factor::new(level, &information, 0.0)?;
         let log_evidence = -cost - 0.5 * factor.log_determinant();
-        log_evidence.is_finite().then_some(Self { state, cost, information, descent, factor, log_evidence, weight: 0.0 })
+        log_evidence.is_finite().then_some(Self {
+            state,
+            cost,
+            information,
+            descent,
+            factor,
+            log_evidence,
+            weight: 0.0,
+        })
     }
 
     /// P, the inverse of the information.
