@@ -322,3 +322,199 @@ impl Twist {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3};
+    use proptest::prelude::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::*;
+    use crate::{
+        kinematics::Line,
+        model::{Place, Target, laws::random_direction},
+    };
+
+    /// A chain as a description has it: by joint its frame in the one before, and its axis there.
+    struct Described {
+        origins: Vec<Isometry3<f64>>,
+        axes: Vec<UnitVector3<f64>>,
+        slides: Vec<bool>,
+        target: Isometry3<f64>,
+    }
+
+    impl Described {
+        fn random(rng: &mut ChaCha8Rng, joints: usize) -> Self {
+            let mut pose = || {
+                let mut vector = |size: f64| Vector3::from_fn(|_, _| size * rng.random_range(-1.0..1.0));
+                Isometry3::new(vector(0.3), vector(1.5))
+            };
+            let origins = (0..joints).map(|_| pose()).collect();
+            let target = pose();
+            let axes = (0..joints).map(|_| random_direction(rng)).collect();
+            Self { origins, axes, slides: (0..joints).map(|_| rng.random_range(0..4) == 0).collect(), target }
+        }
+
+        /// The robot with its joints at zeros that are off by so much, and the frames of its joints.
+        fn state(&self, zeros: &[f64]) -> (State, Vec<Point3<f64>>) {
+            let (mut frame, mut joints, mut origins) = (Isometry3::identity(), Vec::new(), Vec::new());
+            for (joint, origin) in self.origins.iter().enumerate() {
+                frame *= origin;
+                let at: Point3<f64> = frame.translation.vector.into();
+                let direction = UnitVector3::new_normalize(frame * self.axes[joint].into_inner());
+                let slides = self.slides[joint];
+                joints.push(if slides {
+                    Joint::Prismatic(direction)
+                } else {
+                    Joint::Revolute(Line { point: at, direction })
+                });
+                origins.push(at);
+                frame *= if slides {
+                    Translation3::from(self.axes[joint].into_inner() * zeros[joint]).into()
+                } else {
+                    let turn = UnitQuaternion::from_axis_angle(&self.axes[joint], zeros[joint]);
+                    Isometry3::from_parts(Translation3::identity(), turn)
+                };
+            }
+            let place = frame * self.target;
+            let mut state = State::arm(joints, place.translation.vector.into());
+            state.targets.push(Target { link: self.origins.len(), place: Place::Pose(place) });
+            (state, origins)
+        }
+
+        /// With origins and zeros off as is said of them.
+        fn perturbed(&self, errors: ChainErrors, rng: &mut ChaCha8Rng) -> State {
+            let mut normal = |sd: f64| sd * rng.sample::<f64, _>(StandardNormal);
+            let origins = self.origins.iter().map(|origin| {
+                let shift = Vector3::from_fn(|_, _| normal(errors.point_m));
+                let turn = Vector3::from_fn(|_, _| normal(errors.direction_rad));
+                origin * Isometry3::new(shift, turn)
+            });
+            let origins = origins.collect();
+            let zeros = self.slides.iter().map(|slides| normal(if *slides { errors.zero_m } else { errors.zero_rad }));
+            let zeros: Vec<f64> = zeros.collect();
+            Self { origins, axes: self.axes.clone(), slides: self.slides.clone(), target: self.target }.state(&zeros).0
+        }
+    }
+
+    /// Small, so that what is of second order is lost in the noise of the draws.
+    const ERRORS: ChainErrors = ChainErrors { point_m: 5e-4, direction_rad: 1e-3, zero_rad: 2e-3, zero_m: 8e-4 };
+    const NOTHING: f64 = 1e-9;
+
+    fn singly(joints: usize) -> Vec<Vec<(usize, f64)>> {
+        (0..joints).map(|joint| vec![(joint, 1.0)]).collect()
+    }
+
+    fn prior(state: &State, layout: &Layout, origins: &[Point3<f64>]) -> ChainPrior {
+        // Of axes what is stated one by one does not count.
+        let own = DVector::from_iterator(
+            layout.dimension(),
+            layout.blocks().flat_map(|(block, range)| {
+                range.map(move |_| if matches!(block, Block::Axis(_)) { 0.01 } else { NOTHING })
+            }),
+        );
+        ChainPrior::new(state, layout, origins, &singly(origins.len()), ERRORS, &own)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        /// P₀ is the covariance of tangent coordinates of robots whose every frame is off in the one before, targets with them.
+        #[test]
+        fn the_covariance_is_that_of_chains_that_are_off_link_by_link(seed: u64, joints in 2_usize..7) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let described = Described::random(&mut rng, joints);
+            let (state, origins) = described.state(&vec![0.0; joints]);
+            let layout = Layout::new(&state, (0..joints).map(Block::Axis).chain([Block::Target(0), Block::Target(1)]));
+            let mut own = DVector::from_element(layout.dimension(), 0.01);
+            for target in [Block::Target(0), Block::Target(1)] {
+                own.rows_range_mut(layout.block(target).expect("learned")).fill(2e-6);
+            }
+            let chain = ChainPrior::new(&state, &layout, &origins, &singly(joints), ERRORS, &own);
+            let expected = chain.covariance(&chain.stated());
+            let draws = 4000;
+            let mut found = DMatrix::zeros(layout.dimension(), layout.dimension());
+            for _ in 0..draws {
+                let delta = state.local(&layout, &described.perturbed(ERRORS, &mut rng)).expect("near");
+                found += &delta * delta.transpose() / f64::from(draws);
+            }
+            for i in 0..layout.dimension() {
+                for j in 0..layout.dimension() {
+                    // Six deviations of a sample covariance, √((1 + ρ²)/n) in units of both.
+                    let unit = (expected[(i, i)] * expected[(j, j)]).sqrt();
+                    let away = (found[(i, j)] - expected[(i, j)]) / unit;
+                    prop_assert!(away.abs() < 6.0 * (2.0 / f64::from(draws)).sqrt() + 0.01, "{i} {j}: {away}");
+                }
+            }
+        }
+
+        /// What is held stays, and of all chains those are left that leave it where it is: what is expected of the rest given that.
+        #[test]
+        fn what_is_held_conditions_the_rest(seed: u64, joints in 3_usize..7) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let (state, origins) = Described::random(&mut rng, joints).state(&vec![0.0; joints]);
+            let held = rng.random_range(0..joints);
+            let all = Layout::new(&state, (0..joints).map(Block::Axis));
+            let some = Layout::new(&state, (0..joints).filter(|joint| *joint != held).map(Block::Axis));
+            let full = prior(&state, &all, &origins);
+            let full = full.covariance(&full.stated());
+            let chain = prior(&state, &some, &origins);
+            let found = chain.covariance(&chain.stated());
+            let of = all.block(Block::Axis(held)).expect("learned");
+            let rest: Vec<usize> = (0..all.dimension()).filter(|k| !of.contains(k)).collect();
+            let of: Vec<usize> = of.collect();
+            let pick = |rows: &[usize], columns: &[usize]| full.select_rows(rows).select_columns(columns);
+            let inverse = pick(&of, &of).try_inverse().expect("positive");
+            let across = pick(&rest, &of);
+            let expected = pick(&rest, &rest) - &across * inverse * across.transpose();
+            prop_assert!((&found - &expected).amax() < 1e-6 * full.amax(), "{}", (&found - &expected).amax());
+            prop_assert!(found.cholesky().is_some());
+            // A direction that is held is a condition as well.
+            let mut own = DVector::from_element(all.dimension(), 0.01);
+            let direction = all.direction(held).expect("learned");
+            own.rows_range_mut(direction.clone()).fill(1e-6);
+            let chain = ChainPrior::new(&state, &all, &origins, &singly(joints), ERRORS, &own);
+            let found = chain.covariance(&chain.stated());
+            prop_assert!(direction.clone().all(|k| found[(k, k)].sqrt() < 2e-6));
+            prop_assert!(found.clone().cholesky().is_some());
+            prop_assert!((0..all.dimension()).all(|k| found[(k, k)] <= full[(k, k)] * (1.0 + 1e-9) + 1e-11));
+        }
+
+        /// Zeros that are off make the inverse that they make by Woodbury's formula.
+        #[test]
+        fn zeros_are_added_to_what_is_inverted(seed: u64, joints in 2_usize..7) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let (state, origins) = Described::random(&mut rng, joints).state(&vec![0.0; joints]);
+            let layout = Layout::new(&state, (0..joints).map(Block::Axis));
+            let chain = prior(&state, &layout, &origins);
+            let place = rng.random_range(1..ChainPrior::GRID.len());
+            let mut scales = Scales { origins: ChainPrior::GRID[place], zeros: vec![NONE; joints] };
+            scales.zeros[rng.random_range(0..joints)] = 1.5;
+            let variances: Vec<f64> = scales.zeros.iter().map(|scale| scale * scale).collect();
+            let with = chain.inverted(place).expect("positive").with(&chain.zeros(scales.origins), &variances);
+            let with = with.expect("positive");
+            let covariance = chain.covariance(&scales);
+            let unit = &with.information * &covariance - DMatrix::identity(layout.dimension(), layout.dimension());
+            prop_assert!(unit.amax() < 1e-3, "{}", unit.amax());
+            let log = Inverted::of(covariance).expect("positive").log_determinant;
+            prop_assert!((with.log_determinant - log).abs() < 1e-3);
+        }
+    }
+
+    /// A joint whose offset is learned has no zero beside it.
+    #[test]
+    fn zeros_are_not_counted_twice() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let (state, origins) = Described::random(&mut rng, 4).state(&[0.0; 4]);
+        let axes = (0..4).map(Block::Axis);
+        let with = Layout::new(&state, axes.clone().chain((0..4).map(Block::Offset)));
+        let chain = prior(&state, &with, &origins);
+        let without = prior(&state, &Layout::new(&state, axes), &origins);
+        let nothing = Scales { origins: 1.0, zeros: vec![0.0; 4] };
+        let m = without.covariance(&nothing).nrows();
+        let found = chain.covariance(&chain.stated()).view((0, 0), (m, m)).into_owned();
+        assert!((found - without.covariance(&nothing)).amax() < 1e-15);
+    }
+}
