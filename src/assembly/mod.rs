@@ -49,11 +49,10 @@ impl Briefing {
     fn holding_axes(&self, scenario: &Scenario) -> Self {
         let others = self.layout.blocks().map(|(block, _)| block).filter(|block| !matches!(block, Block::Axis(_)));
         let layout = Layout::new(&self.initial, others);
-        let deviations = scenario.prior.standard_deviations(&layout);
         Self {
             initial: self.initial.clone(),
             weights: scenario.weights_of(&layout),
-            covariance: DMatrix::from_diagonal(&deviations.map(|sd| sd * sd)),
+            covariance: scenario.prior_covariance(&self.initial, &layout),
             layout: Arc::new(layout),
             actions: self.actions.clone(),
             workspace: self.workspace.clone(),
@@ -110,7 +109,7 @@ impl Scenario {
 
     /// W of these parameters.
     fn weights_of(&self, layout: &Layout) -> Weights {
-        Weights::new(self.selection.units, layout, &self.prior.standard_deviations(layout))
+        Weights::new(self.selection.units, layout, &self.deviations(layout))
     }
 
     /// The same along a run of so many steps, one stretch before a change of the body and one after it; empty where no
@@ -134,7 +133,7 @@ impl Scenario {
                     layout: Arc::new(self.robot.layout.clone()),
                     weights: self.weights(),
                     initial: self.perturbed(initial_error, &mut Stream::InitialEstimate.rng(seed)),
-                    covariance: self.prior_covariance(),
+                    covariance: self.prior_covariance(&self.robot.state, &self.robot.layout),
                     actions: self.actions(),
                     // Uniform in the joint box, seen or not: what a head can see depends on the truth.
                     workspace: self.workspace(drawn(limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true)),
@@ -161,7 +160,7 @@ impl Scenario {
                     layout: Arc::new(self.robot.layout.clone()),
                     weights: self.weights(),
                     initial: self.robot.state.clone(),
-                    covariance: self.prior_covariance(),
+                    covariance: self.prior_covariance(&self.robot.state, &self.robot.layout),
                     actions: self.actions(),
                     workspace: self.workspace(drawn(
                         &self.robot.limits,
@@ -186,11 +185,6 @@ impl Scenario {
     /// What one measurement of the marker is worth, metres: of the tracker, or where none sees it of the first sensor.
     fn marker_sigma(&self) -> f64 {
         self.rig.marker_channel().map_or(self.rig.sigma(), |_| self.rig.marker_sigma())
-    }
-
-    fn prior_covariance(&self) -> DMatrix<f64> {
-        let deviations = self.prior.standard_deviations(&self.robot.layout);
-        DMatrix::from_diagonal(&deviations.map(|sd| sd * sd))
     }
 
     /// Holds rows out; learners begin with the robot's description, and find where it stands from the rows that they choose.
@@ -218,7 +212,7 @@ impl Scenario {
             initial: self.robot.state.clone(),
             weights: self.weights(),
             layout: Arc::new(self.robot.layout.clone()),
-            covariance: self.prior_covariance(),
+            covariance: self.prior_covariance(&self.robot.state, &self.robot.layout),
             actions: Actions::Pool(pool),
             workspace: self.workspace(configurations(&training)),
             watch: None,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -25,6 +25,13 @@ impl Scenario {
             self.unline(&mut state);
         }
         let watch = self.watch(&state);
+        let deviations = self.deviations(&layout);
+        let m = layout.dimension();
+        let known = self.chain_prior(&self.robot.state, &layout).and_then(|chain| {
+            let inverse = deviations.map(f64::recip);
+            let correlations = chain.covariance(&chain.stated()).component_mul(&(&inverse * inverse.transpose()));
+            Some(correlations.cholesky()?.inverse())
+        });
         Prospect {
             scenario: self.name.clone(),
             title: self.title.clone(),
@@ -35,7 +42,8 @@ impl Scenario {
             actions: self.actions(),
             constraints: self.constraints.clone(),
             watch,
-            deviations: self.prior.standard_deviations(&layout),
+            known: known.unwrap_or_else(|| DMatrix::identity(m, m)),
+            deviations,
             units: self.selection.units,
             search: self.selection.search,
             planning: self.selection.planning,

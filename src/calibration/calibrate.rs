@@ -125,7 +125,9 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         rows: case.rows.len(),
         training_rows: training.len(),
         held_out_by: case.held_out_by(&splits),
-        doubts: scenario.examine().map_or_else(Vec::new, |it| it.doubts.iter().map(ToString::to_string).collect()),
+        doubts: (scenario.examine().into_iter().flat_map(|it| it.doubts).map(|doubt| doubt.to_string()))
+            .chain(case.beyond_prior(&fit))
+            .collect(),
         parameters: case.determined(&fit),
         training: comparison,
         held_out,

@@ -1,9 +1,9 @@
 //! What is to be calibrated, and by what.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use crate::{
-    model::{Block, Layout, Names, State},
+    model::{Block, ChainPrior, Layout, Names, State},
     scenario::{Described, HeldOutRule, Scenario, WorldSpec},
     sensing::{Loss, Observation, Occasion, Rig},
 };
@@ -39,7 +39,12 @@ pub struct Case<'a> {
     pub(super) known: Option<&'a Observation>,
     pub(super) rig: Arc<Rig>,
     pub(super) loss: Loss,
+    /// By layout: what is known of the chain, shared by all fits.
+    pub(super) chains: Chains,
 }
+
+/// What is known of a chain, by layout.
+type Chains = Arc<Mutex<Vec<(Layout, Option<Arc<ChainPrior>>)>>>;
 
 /// Rows held out under this seed, where the scenario draws them by one.
 const SEED: u64 = 1;
@@ -70,6 +75,7 @@ impl<'a> Case<'a> {
             described: scenario.robot.described.as_deref(),
             known: measurements.beforehand.as_ref(),
             rig: Arc::new(scenario.smoother_rig(scenario.smoother.sigma)),
+            chains: Chains::default(),
             loss: if scenario.smoother.loss == Loss::None { Loss::MIXTURE } else { scenario.smoother.loss },
         })
     }

@@ -1,6 +1,6 @@
 //! One fit: a layout and the rows that it is learned from.
 
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +8,7 @@ use super::{CalibrationError, Case, figures::mean};
 use crate::{
     estimation::{Belief, Estimator, HypothesisSettings, NoiseFit, ReadingReport, Smoother},
     experiment::Stream,
-    model::{Block, Layout, Prior, State, best_motion},
+    model::{Block, ChainPrior, Layout, Prior, Scales, State, best_motion},
     scenario::Known,
     sensing::{Noise, Occasion},
 };
@@ -26,6 +26,8 @@ pub struct Fit {
     pub reading_sigmas: Vec<f64>,
     /// The rows that it was learned from.
     pub rows: Vec<usize>,
+    /// By how much errors along the chain were found to be larger than the prior states, where the robot is described.
+    pub scales: Option<Scales>,
 }
 
 impl Fit {
@@ -76,6 +78,7 @@ impl Case<'_> {
             noise: smoother.fits(),
             reading_sigmas: smoother.reading_sigmas(),
             rows: rows.to_vec(),
+            scales: smoother.scales().cloned(),
         })
     }
 
@@ -88,8 +91,11 @@ impl Case<'_> {
     }
 
     fn smoother(&self, layout: &Layout, near: Option<&State>) -> Result<Smoother, CalibrationError> {
-        let deviations = self.deviations(layout);
-        let covariance = DMatrix::from_diagonal(&deviations.map(|sd| sd * sd));
+        let chain = self.chain(layout);
+        let covariance = match &chain {
+            Some(chain) => chain.covariance(&chain.stated()),
+            None => DMatrix::from_diagonal(&self.deviations(layout).map(|sd| sd * sd)),
+        };
         let within = |block: Block| match self.scenario.prior.of(block) {
             Some(Known::Anywhere { within_m }) => Some(within_m),
             _ => None,
@@ -113,15 +119,30 @@ impl Case<'_> {
             .with_unknown_noise(unknown)
             .with_unknown_joint_noise(self.scenario.smoother.joints_unknown)
             .never_forgetting();
+        let smoother = match chain {
+            Some(chain) => smoother.with_chain(chain),
+            None => smoother,
+        };
         Ok(match self.known {
             Some(known) => smoother.knowing(known.clone()),
             None => smoother,
         })
     }
 
-    /// The prior's standard deviations.
+    /// The prior's standard deviations, as stated.
     pub(super) fn deviations(&self, layout: &Layout) -> DVector<f64> {
-        self.scenario.prior.standard_deviations(layout)
+        self.chain(layout).map_or_else(|| self.scenario.prior.standard_deviations(layout), |chain| chain.deviations())
+    }
+
+    /// The prior along the chain of a described robot, the same for all fits of a layout.
+    pub(super) fn chain(&self, layout: &Layout) -> Option<Arc<ChainPrior>> {
+        let mut known = self.chains.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, chain)) = known.iter().find(|(of, _)| of == layout) {
+            return chain.clone();
+        }
+        let chain = self.scenario.chain_prior(self.guess(), layout).map(Arc::new);
+        known.push((layout.clone(), chain.clone()));
+        chain
     }
 
     /// The guess with its base where the rigid motion that fits best puts it, by the targets that were seen in `rows`, and

@@ -28,6 +28,7 @@
 //! This module does no input or output.
 
 mod active;
+mod beyond;
 mod calibrate;
 mod case;
 mod error;

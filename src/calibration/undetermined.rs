@@ -40,7 +40,11 @@ impl Case<'_> {
     fn hardly(&self, fit: &Fit, free: &DMatrix<f64>) -> Option<String> {
         let layout = &*fit.belief.layout;
         let covariance = fit.belief.covariance.as_ref()?;
-        let prior = self.deviations(layout);
+        // As the rows have them: what shrinks with the scale of the prior alone is not told by rows.
+        let prior = match (self.chain(layout), &fit.scales) {
+            (Some(chain), Some(scales)) => chain.covariance(scales).diagonal().map(|x| x.max(0.0).sqrt()),
+            _ => self.deviations(layout),
+        };
         let share = |coordinate: usize| covariance[(coordinate, coordinate)].sqrt() / prior[coordinate];
         let is_told = |coordinate: usize| free.ncols() > 0 && free.row(coordinate).norm_squared() > NAMED;
         let hardly = |(block, range): (Block, std::ops::Range<usize>)| {

@@ -3,6 +3,7 @@
 //! * [`State`]: base, joints, corrections of readings, targets, devices, sockets; forward kinematics.
 //! * [`Block`]: parameters that belong together; [`Element`]: their values, with chart and transport.
 //! * [`Layout`]: which blocks are learned, and where each stands in the tangent vector.
+//! * [`ChainPrior`]: what is known of a described robot, whose errors are local: a covariance for the prior.
 //! * [`Prior`]: what is known before any measurement, with a full covariance, or anywhere within bounds.
 //! * [`Loads`]: what gravity does to joints that give way.
 //! * [`Pass`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
@@ -13,6 +14,7 @@
 //! * [`Manifold`]: the postures in which a target is at a given place.
 
 mod block;
+mod chain_prior;
 mod element;
 mod layout;
 mod loads;
@@ -27,6 +29,8 @@ pub mod urdf;
 mod workspace;
 
 pub use block::Block;
+pub(crate) use chain_prior::Inverted;
+pub use chain_prior::{ChainErrors, ChainPrior, Scales};
 pub use element::{Displacement, Element};
 pub use layout::{Layout, Quantity};
 pub use loads::{GRAVITY, Load, Loads, Mass};

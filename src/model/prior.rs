@@ -72,6 +72,9 @@ const UNIFORM_DIRECTION: f64 = PI * PI / 4.0 - 1.0;
 /// The variance of each coordinate of a uniform rotation, E φ²/3 with φ its angle.
 const UNIFORM_ROTATION: f64 = (PI * PI / 3.0 + 2.0) / 3.0;
 
+/// The derivative and the slope of a block's displacement.
+type Slopes = (DMatrix<f64>, DMatrix<f64>);
+
 /// A cost's second and first derivatives: information (m × m) and descent direction −∂cost/∂δ.
 pub type Derivatives<'a> = (&'a mut DMatrix<f64>, &'a mut DVector<f64>);
 
@@ -147,6 +150,18 @@ impl Prior {
         Ok(Self { guess, blocks, covariance, information, root: cholesky.l(), coupled, lines })
     }
 
+    /// The same with another covariance of its blocks around the guess.
+    pub(crate) fn with_covariance(&self, layout: &Layout, covariance: DMatrix<f64>) -> Result<Self, PriorError> {
+        let bound = |block: Block| {
+            let of = self.blocks.iter().find(|(known, ..)| *known == block);
+            of.and_then(|(.., knowledge)| match knowledge {
+                Knowledge::Around => None,
+                Knowledge::Anywhere(bound) => Some(*bound),
+            })
+        };
+        Self::new(self.guess.clone(), layout, covariance, bound)
+    }
+
     /// The state to start from. Blocks that may be anywhere mean nothing in it.
     pub fn guess(&self) -> &State {
         &self.guess
@@ -211,6 +226,9 @@ impl Prior {
                 }
             }
         }
+        if self.coupled.iter().any(|(i, j)| i != j) {
+            return cost + self.coupled_cost(&displaced, &slopes, normal);
+        }
         for &(i, j) in &self.coupled {
             let (Some(a), Some(b)) = (&displaced[i], &displaced[j]) else { return f64::INFINITY };
             let (rows, columns) = (&self.blocks[i].1, &self.blocks[j].1);
@@ -225,6 +243,49 @@ impl Prior {
                 let mut place = descent.rows_mut(rows.start, rows.len());
                 place.gemv_tr(-1.0, derivative, &pull, 1.0);
             }
+        }
+        cost
+    }
+
+    /// What blocks cost whose errors have to do with each other, by their displacements and the derivatives of these; all at once.
+    /// Of lines alone and of what may be anywhere nothing is put here.
+    fn coupled_cost(
+        &self,
+        displaced: &[Option<DVector<f64>>],
+        slopes: &[Option<Slopes>],
+        normal: Option<Derivatives<'_>>,
+    ) -> f64 {
+        let m = self.information.nrows();
+        let mut value = DVector::zeros(m);
+        for ((index, (_, range, knowledge)), of) in self.blocks.iter().enumerate().zip(displaced) {
+            let Some(of) = of else {
+                if self.lines[index].is_some() || *knowledge != Knowledge::Around {
+                    continue;
+                }
+                return f64::INFINITY;
+            };
+            value.rows_mut(range.start, range.len()).copy_from(of);
+        }
+        let pull = &self.information * &value;
+        let cost = 0.5 * value.dot(&pull);
+        let Some((information, descent)) = normal else { return cost };
+        // Λ S, column by column of a block.
+        let mut carried = DMatrix::zeros(m, m);
+        for ((_, range, _), of) in self.blocks.iter().zip(slopes) {
+            let Some((derivative, slope)) = of else { continue };
+            let columns = self.information.columns(range.start, range.len());
+            carried.columns_mut(range.start, range.len()).gemm(1.0, &columns, slope, 0.0);
+            descent.rows_mut(range.start, range.len()).gemv_tr(
+                -1.0,
+                derivative,
+                &pull.rows(range.start, range.len()),
+                1.0,
+            );
+        }
+        for ((_, range, _), of) in self.blocks.iter().zip(slopes) {
+            let Some((_, slope)) = of else { continue };
+            let rows = carried.rows(range.start, range.len());
+            information.rows_mut(range.start, range.len()).gemm_tr(1.0, slope, &rows, 1.0);
         }
         cost
     }

@@ -8,6 +8,7 @@
 //! files, whatever a scenario leaves out is taken from `measured.toml`, and from the table's titles.
 
 mod builtin;
+mod chain;
 mod data;
 mod edit;
 mod error;
@@ -99,7 +100,7 @@ impl Scenario {
     /// The weights of the criterion.
     pub fn weights(&self) -> Weights {
         let layout = &self.robot.layout;
-        Weights::new(self.selection.units, layout, &self.prior.standard_deviations(layout))
+        Weights::new(self.selection.units, layout, &self.deviations(layout))
     }
 
     /// The text of a data file that this scenario has already read.
@@ -303,6 +304,10 @@ pub struct Prior {
     pub point_m: f64,
     /// Of the marker, metres.
     pub marker_m: f64,
+    /// Of the zeros of the readings of a described robot's joints: of those that turn, radians.
+    pub zero_rad: f64,
+    /// Of those that slide, metres.
+    pub zero_m: f64,
     /// Of how much a joint gives way, rad per N·m with which gravity pulls at 1 kg.
     pub compliance_rad_per_nm: f64,
     /// Of other blocks, where they are learned.

@@ -63,7 +63,7 @@ pub fn written(
         }
         _ => text.push_str("folds = 5\n"),
     }
-    text.push_str("\n# How well the description is known: about half a degree and a few millimetres.\n[prior]\ndirection_rad = 0.01\npoint_m = 0.005\n");
+    text.push_str("\n# How well each joint is known in the frame before it: about half a degree and a few millimetres. Its scale is learned.\n[prior]\ndirection_rad = 0.01\npoint_m = 0.005\n");
     text
 }
 

@@ -86,8 +86,7 @@ impl Prospect {
 
     /// P = D (I + D Λ D)⁻¹ D.
     fn covariance(&self, information: &DMatrix<f64>) -> Result<DMatrix<f64>, SelectionError> {
-        let m = self.layout.dimension();
-        let scaled = DMatrix::identity(m, m) + self.scaled(information);
+        let scaled = &self.known + self.scaled(information);
         let inverse = Cholesky::new(scaled).ok_or(SelectionError::NoFiniteCriterion)?.inverse();
         Ok(self.scaled(&inverse))
     }

@@ -22,6 +22,7 @@ fn prospect(seed: u64, blocks: &[Block]) -> Prospect {
         title: String::new(),
         names: Names { joints: ["a", "b", "c", "d"].map(str::to_owned).to_vec(), ..Names::default() },
         deviations: DVector::from_element(layout.dimension(), 0.05),
+        known: DMatrix::identity(layout.dimension(), layout.dimension()),
         rig: Arc::new(Rig::tracker(0.001)),
         actions: Actions::Box(limits.clone()),
         constraints: None,

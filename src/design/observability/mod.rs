@@ -63,6 +63,8 @@ pub struct Prospect {
     pub watch: Option<Watch>,
     /// σ₀: by tangent coordinate the standard deviation before any measurement.
     pub deviations: DVector<f64>,
+    /// D P₀⁻¹ D, with D of these: the identity where errors of coordinates have nothing to do with each other.
+    pub known: DMatrix<f64>,
     /// The units of the criterion.
     pub units: CriterionUnits,
     /// How the joint box is searched.
@@ -129,10 +131,11 @@ impl Prospect {
         Workspace { configurations, up_to_motion: self.up_to_motion }
     }
 
-    /// P once everything else is known: N (Nᵀ D⁻² N)⁻¹ Nᵀ.
+    /// P once everything else is known: N (Nᵀ P₀⁻¹ N)⁻¹ Nᵀ.
     fn left_of_prior(&self, free: &DMatrix<f64>) -> DMatrix<f64> {
         let m = self.layout.dimension();
-        let known = DMatrix::from_diagonal(&self.deviations.map(|sd| sd.powi(-2)));
+        let inverse = self.deviations.map(f64::recip);
+        let known = self.known.component_mul(&(&inverse * inverse.transpose()));
         let within = (free.transpose() * known * free).cholesky();
         within.map_or_else(|| DMatrix::zeros(m, m), |within| free * within.inverse() * free.transpose())
     }

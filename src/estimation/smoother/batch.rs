@@ -60,6 +60,7 @@ impl Smoother {
             self.hypotheses.condense(self.settings.kept, &layout);
             self.settle_noise();
         }
+        self.learn_scales();
         if self.hypotheses.modes.is_empty() {
             return Err(EstimationError::Diverged(self.hypotheses.why()));
         }

@@ -194,6 +194,8 @@ impl Smoother {
         let after = before.filter(is_determined).and_then(|before| self.after(&before.1, change, &mode));
         if let Some(After { posterior, mode, .. }) = after {
             self.posterior = posterior;
+            // What is made of an estimate has no scales to learn.
+            self.scaled = None;
             self.hypotheses.modes = vec![mode];
         } else {
             let latest = self.posterior.measurements.split_off(change.since.min(self.posterior.measurements.len()));

@@ -36,6 +36,7 @@ mod model_error;
 mod noise;
 mod points;
 mod posterior;
+mod prior_scale;
 mod settled;
 
 use std::sync::Arc;
@@ -48,6 +49,7 @@ use hypotheses::Hypotheses;
 use mode::Effort;
 use noise::Left;
 use posterior::{Measurement, Posterior};
+use prior_scale::Scaled;
 
 use super::{Alternative, Belief, EstimationError, Estimator, Misfit, NoiseFit, NoiseReport, ReadingReport, Update};
 use crate::{
@@ -83,6 +85,8 @@ pub struct Smoother {
     /// The movement at which it was noticed last that the body has changed.
     changed_at: Option<u64>,
     misfit: Option<Misfit>,
+    /// The prior along a chain whose scales are learned, if it is one.
+    scaled: Option<Scaled>,
 }
 
 /// Steps without a new hypothesis after which none are searched for any more.
@@ -123,6 +127,7 @@ impl Smoother {
             remembered,
             changed_at: None,
             misfit: None,
+            scaled: None,
         };
         smoother.begin();
         smoother.publish();
@@ -310,6 +315,7 @@ impl Smoother {
             self.changed(&change);
         }
         self.learn_noise();
+        self.learn_scales();
         if self.hypotheses.modes.is_empty() {
             return Err(EstimationError::Diverged(self.hypotheses.why()));
         }

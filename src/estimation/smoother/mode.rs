@@ -20,6 +20,8 @@ pub(super) struct Mode {
     pub state: State,
     pub cost: f64,
     pub information: DMatrix<f64>,
+    /// −∂E/∂δ there, which is next to nothing.
+    pub descent: DVector<f64>,
     factor: Factor,
     /// −E − ½ ln det Λ: the logarithm of its share of the evidence, but for what all modes have in common.
     pub log_evidence: f64,
@@ -234,14 +236,14 @@ impl Mode {
 
     /// The Gaussian where a search has ended with these equations, unless they are not positive.
     pub fn at(level: Level, state: State, normal: Normal) -> Result<Self, NoMode> {
-        let Normal { cost, mut information, .. } = normal;
+        let Normal { cost, mut information, descent } = normal;
         information.fill_upper_triangle_with_lower_triangle();
         let factor = Factor::new(level, &information, 0.0).ok_or(NoMode::Singular)?;
         let log_evidence = -cost - 0.5 * factor.log_determinant();
         if !log_evidence.is_finite() {
             return Err(NoMode::Diverged);
         }
-        Ok(Self { state, cost, information, factor, log_evidence, weight: 0.0 })
+        Ok(Self { state, cost, information, descent, factor, log_evidence, weight: 0.0 })
     }
 
     /// P, the inverse of the information.

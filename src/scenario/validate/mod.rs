@@ -42,6 +42,9 @@ use crate::{
 
 /// Unless a file says otherwise, a joint gives way to this torque by as much as an axis may be tilted: 1 kg half a metre out, N·m.
 const USUAL_TORQUE: f64 = 5.0;
+/// Unless a file says otherwise, the zeros of a described robot's joints are as good as 3 degrees, and 5 mm.
+const USUAL_ZERO_RAD: f64 = 0.05;
+const USUAL_ZERO_M: f64 = 0.005;
 
 /// How far from 1 the length of an axis may be: what is lost by writing six digits.
 const UNIT_TOLERANCE: f64 = 1e-5;
@@ -254,6 +257,8 @@ impl Check<'_> {
             direction_rad,
             point_m: self.positive("prior.point_m", &prior.point_m),
             marker_m: prior.marker_m.as_ref().map_or(1.0, |sd| self.positive("prior.marker_m", sd)),
+            zero_rad: prior.offset_rad.as_ref().map_or(USUAL_ZERO_RAD, |sd| self.positive("prior.offset_rad", sd)),
+            zero_m: prior.offset_m.as_ref().map_or(USUAL_ZERO_M, |sd| self.positive("prior.offset_m", sd)),
             compliance_rad_per_nm: compliance
                 .map_or(direction_rad / USUAL_TORQUE, |sd| self.positive("prior.compliance_rad_per_nm", sd)),
             known: self.known_blocks(raw, robot),
