@@ -34,12 +34,6 @@ use super::{
 
 /// The chance that a body changes at a movement.
 pub(super) const RATE: f64 = 5e-3;
-/// The logarithm of the odds from which on a change is told of: to miss one costs more than to learn some parameters anew.
-const ALARM: f64 = -2.0;
-/// The same soon after a change, while it is being learned.
-const ALARM_AGAIN: f64 = 3.0;
-/// The same without a reading that may be an outlier.
-const SUPPORT: f64 = -4.0;
 /// Latest movements at each of which a change is looked for; before these at fewer and fewer.
 const EACH: usize = 16;
 
@@ -136,18 +130,6 @@ impl Evidence {
         let occam = 0.5 * (log_determinant(&factor) + log_determinant(&known));
         let log_odds = self.noise.gain(lowered) - occam + jump.log_share + RATE.ln();
         log_odds.is_finite().then_some(log_odds)
-    }
-}
-
-impl Change {
-    /// Whether the odds are for it; `soon` after another change it takes more.
-    pub fn is_likely(&self, soon: bool) -> bool {
-        self.log_odds > if soon { ALARM_AGAIN } else { ALARM }
-    }
-
-    /// Whether there is something in it when the reading that speaks most for it does not count.
-    pub fn has_support(&self) -> bool {
-        self.log_odds > SUPPORT
     }
 }
 

@@ -32,6 +32,16 @@ const DETERMINED: f64 = 1.5;
 
 /// The logarithm of the odds for a change from which on a belief does not call itself settled.
 const SUSPICIOUS: f64 = -4.0;
+/// The logarithm of the odds from which on a change is told of: to miss one costs more than to learn some parameters anew.
+const ALARM: f64 = -2.0;
+/// The same soon after a change, while it is being learned.
+const ALARM_AGAIN: f64 = 3.0;
+/// The same where the model has errors.
+const ALARM_OF_MODEL: f64 = 6.0;
+/// What speaks for a change without a reading that may be an outlier.
+const SUPPORT: f64 = -4.0;
+/// The scale of noise that nobody tells beyond which it is taken for an error of the model.
+const UNUSUAL: f64 = 1.5;
 /// Standard deviations (by Wilson and Hilferty) of a squared residual that may be an outlier's.
 const OUTLYING: f64 = 5.0;
 /// Movements after a change within which another one must be plainer.
@@ -58,6 +68,11 @@ impl Smoother {
             return self.rejected_change(mode, &jumps);
         }
         let soon = self.changed_at.is_some_and(|movement| self.movements < movement + SOON);
+        let alarm = match (self.has_model_error(), soon) {
+            (true, _) => ALARM_OF_MODEL,
+            (false, true) => ALARM_AGAIN,
+            (false, false) => ALARM,
+        };
         let has_past = self.posterior.settled.is_some();
         let evidence = self.evidence(&self.posterior, mode)?;
         let found = evidence.likeliest(&jumps, has_past)?;
@@ -65,7 +80,7 @@ impl Smoother {
         // Who drops nothing has been told of what came before.
         let is_new = self.forgets || self.changed_at.is_none_or(|movement| since > movement);
         let mut cause = if self.forgets { MisfitCause::ChangedBody } else { MisfitCause::Unexplained };
-        if is_new && found.is_likely(soon) {
+        if is_new && found.log_odds > alarm {
             let suspect = self.suspect(found.since);
             if suspect.is_none_or(|suspect| self.is_supported(suspect, mode, &jumps)) {
                 return Some(found);
@@ -92,6 +107,12 @@ impl Smoother {
         (sum > quantile(equations as f64, OUTLYING)).then_some(index)
     }
 
+    /// Whether noise that nobody tells is larger than is usual of its sensor: the model does not hold then, and what it cannot
+    /// explain differs from posture to posture as a change does from movement to movement.
+    fn has_model_error(&self) -> bool {
+        self.unknown.iter().zip(&self.posterior.scales).any(|(unknown, scale)| *unknown && *scale > UNUSUAL)
+    }
+
     /// Whether anything speaks for a change without one of the measurements.
     fn is_supported(&self, without: usize, mode: &Mode, jumps: &[Jump]) -> bool {
         let mut others = self.posterior.clone();
@@ -102,7 +123,7 @@ impl Smoother {
         let found = starts.iter().filter_map(|start| others.mode(start, layout, THOROUGH).ok());
         let Some(mode) = found.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else { return false };
         let evidence = self.evidence(&others, &mode);
-        evidence.and_then(|it| it.likeliest(jumps, others.settled.is_some())).is_some_and(|it| it.has_support())
+        evidence.and_then(|it| it.likeliest(jumps, others.settled.is_some())).is_some_and(|it| it.log_odds > SUPPORT)
     }
 
     /// Whether more of the latest readings are outliers than are to be expected.
