@@ -141,10 +141,6 @@ impl Scenario {
             .with_loss(if spec.robust { loss } else { Loss::None })
             .with_unknown_noise(unknown)
             .with_unknown_joint_noise(self.smoother.joints_unknown);
-        let smoother = match self.chain_prior(&briefing.initial, layout) {
-            Some(chain) => smoother.with_chain(Arc::new(chain)),
-            None => smoother,
-        };
         let smoother = match &briefing.beforehand {
             Some(known) => smoother.knowing(known.clone()),
             None => smoother,

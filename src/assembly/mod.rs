@@ -52,7 +52,7 @@ impl Briefing {
         Self {
             initial: self.initial.clone(),
             weights: scenario.weights_of(&layout),
-            covariance: scenario.prior_covariance(&self.initial, &layout),
+            covariance: scenario.prior_covariance(&layout),
             layout: Arc::new(layout),
             actions: self.actions.clone(),
             workspace: self.workspace.clone(),
@@ -109,7 +109,7 @@ impl Scenario {
 
     /// W of these parameters.
     fn weights_of(&self, layout: &Layout) -> Weights {
-        Weights::new(self.selection.units, layout, &self.deviations(layout))
+        Weights::new(self.selection.units, layout, &self.prior.standard_deviations(layout))
     }
 
     /// The same along a run of so many steps, one stretch before a change of the body and one after it; empty where no
@@ -133,7 +133,7 @@ impl Scenario {
                     layout: Arc::new(self.robot.layout.clone()),
                     weights: self.weights(),
                     initial: self.perturbed(initial_error, &mut Stream::InitialEstimate.rng(seed)),
-                    covariance: self.prior_covariance(&self.robot.state, &self.robot.layout),
+                    covariance: self.prior_covariance(&self.robot.layout),
                     actions: self.actions(),
                     // Uniform in the joint box, seen or not: what a head can see depends on the truth.
                     workspace: self.workspace(drawn(limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true)),
@@ -160,7 +160,7 @@ impl Scenario {
                     layout: Arc::new(self.robot.layout.clone()),
                     weights: self.weights(),
                     initial: self.robot.state.clone(),
-                    covariance: self.prior_covariance(&self.robot.state, &self.robot.layout),
+                    covariance: self.prior_covariance(&self.robot.layout),
                     actions: self.actions(),
                     workspace: self.workspace(drawn(
                         &self.robot.limits,
@@ -176,6 +176,10 @@ impl Scenario {
                 (World::Outside, nothing, briefing)
             }
         }
+    }
+
+    fn prior_covariance(&self, layout: &Layout) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&self.prior.standard_deviations(layout).map(|sd| sd * sd))
     }
 
     fn workspace(&self, configurations: Vec<Vec<f64>>) -> Workspace {
@@ -212,7 +216,7 @@ impl Scenario {
             initial: self.robot.state.clone(),
             weights: self.weights(),
             layout: Arc::new(self.robot.layout.clone()),
-            covariance: self.prior_covariance(&self.robot.state, &self.robot.layout),
+            covariance: self.prior_covariance(&self.robot.layout),
             actions: Actions::Pool(pool),
             workspace: self.workspace(configurations(&training)),
             watch: None,

@@ -25,9 +25,11 @@ impl Scenario {
             self.unline(&mut state);
         }
         let watch = self.watch(&state);
-        let deviations = self.deviations(&layout);
+        let chain = self.chain_prior(&self.robot.state, &layout);
+        let deviations =
+            chain.as_ref().map_or_else(|| self.prior.standard_deviations(&layout), |chain| chain.deviations());
         let m = layout.dimension();
-        let known = self.chain_prior(&self.robot.state, &layout).and_then(|chain| {
+        let known = chain.and_then(|chain| {
             let inverse = deviations.map(f64::recip);
             let correlations = chain.covariance(&chain.stated()).component_mul(&(&inverse * inverse.transpose()));
             Some(correlations.cholesky()?.inverse())

@@ -384,14 +384,22 @@ impl Agent {
         self.history.moved(movement, &self.actions, observation);
         self.actions.use_up(movement);
         // All of the list were accepted before the first of it was absorbed.
-        self.estimator.correct(&movement.configuration, observation).map_err(|error| match error {
+        let update = self.estimator.correct(&movement.configuration, observation).map_err(|error| match error {
             EstimationError::Refused(refused) => refused.into(),
             EstimationError::Diverged(_) => {
                 self.failure = Some(error.to_string());
                 self.pending.clear();
                 AbsorbError::Ended(error.to_string())
             }
-        })
+        })?;
+        let made = self.history.made().len() as u64;
+        let readings = self.estimator.latest_readings(made);
+        let is_alone = self.belief().alternatives.is_empty();
+        if is_alone && !readings.is_empty() && readings.iter().all(|reading| reading.weight < 0.5) {
+            // It counted for nothing, as if nothing had been seen.
+            self.history.rejected(movement, &self.actions);
+        }
+        Ok(update)
     }
 
     /// Restores an event of a stored list, in its turn, without choosing anything again.

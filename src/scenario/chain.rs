@@ -1,6 +1,6 @@
 //! What is known of the joints of a robot that a URDF describes.
 
-use nalgebra::{DMatrix, DVector, Point3};
+use nalgebra::Point3;
 
 use super::{Scenario, WorldSpec};
 use crate::model::{Block, ChainErrors, ChainPrior, Layout, State};
@@ -33,19 +33,5 @@ impl Scenario {
         let (point_m, direction_rad) = (prior.point_m, prior.direction_rad);
         let errors = ChainErrors { point_m, direction_rad, zero_rad: prior.zero_rad, zero_m: prior.zero_m };
         Some(ChainPrior::new(guess, layout, &origins, &readings, errors, &prior.standard_deviations(layout)))
-    }
-
-    /// P₀ of the tangent coordinates of a layout, as stated.
-    pub fn prior_covariance(&self, guess: &State, layout: &Layout) -> DMatrix<f64> {
-        match self.chain_prior(guess, layout) {
-            Some(chain) => chain.covariance(&chain.stated()),
-            None => DMatrix::from_diagonal(&self.prior.standard_deviations(layout).map(|sd| sd * sd)),
-        }
-    }
-
-    /// The standard deviation of every tangent coordinate, as stated.
-    pub fn deviations(&self, layout: &Layout) -> DVector<f64> {
-        let chain = self.chain_prior(&self.robot.state, layout);
-        chain.map_or_else(|| self.prior.standard_deviations(layout), |chain| chain.deviations())
     }
 }

@@ -100,7 +100,7 @@ impl Scenario {
     /// The weights of the criterion.
     pub fn weights(&self) -> Weights {
         let layout = &self.robot.layout;
-        Weights::new(self.selection.units, layout, &self.deviations(layout))
+        Weights::new(self.selection.units, layout, &self.prior.standard_deviations(layout))
     }
 
     /// The text of a data file that this scenario has already read.

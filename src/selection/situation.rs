@@ -68,6 +68,17 @@ impl History {
         }
     }
 
+    /// The reading of the movement made last was rejected: there is as little to be hoped of its neighbourhood as where nothing was
+    /// seen.
+    pub fn rejected(&mut self, movement: &Movement, actions: &Actions) {
+        if let Actions::Box(limits) = actions {
+            self.misses.push_back(limits.to_unit(&movement.configuration));
+            if self.misses.len() > MEMORY {
+                self.misses.pop_front();
+            }
+        }
+    }
+
     /// As if a movement to `configuration` had been made already: it is pending.
     pub fn expect(&mut self, configuration: &[f64]) {
         self.has_moved = true;
@@ -89,7 +100,7 @@ impl History {
         self.has_moved
     }
 
-    /// The latest movements after which nothing was seen, scaled to the unit cube of the joint box.
+    /// The latest movements after which nothing was seen, or nothing that counted, scaled to the unit cube of the joint box.
     pub fn misses(&self) -> &VecDeque<Vec<f64>> {
         &self.misses
     }

@@ -6,12 +6,17 @@
 //! |---|---|---|
 //! | none | s/2 | 1 |
 //! | Huber | s/2 up to z = k, then k z − k²/2 | min(1, k/z) |
-//! | mixture | −ln((1 − ε) e^{−s/2} + ε κ^{−d}) + constant | q |
+//! | mixture | −ln((1 − ε) e^{−s/2} + ε ((1 − φ) κ^{−d} e^{−s/2κ²} + φ (100 κ)^{−d})) + constant | q + p/κ² |
 //!
-//! The mixture takes a share ε of readings to be outliers, which may be anywhere: their density is flat, as high as that of a
-//! reading with κ times the deviations of a normal one is at its middle. However far off an outlier is, it says nothing. 1 − q is
-//! the probability that a reading is one, and the constant makes ρ(0) = 0. Huber's k is where 95 % of normal readings lie within. A loss enters a
+//! The mixture takes a share ε of readings to be outliers. Most of them have κ times the deviations of the others, with
+//! probability p; a share φ = 10 % may be anywhere: their density is flat, so that a reading says nothing however far off it is.
+//! 1 − q is the probability that a reading is an outlier of either kind, and the constant makes ρ(0) = 0. Huber's k is where 95 % of normal readings lie within. A loss enters a
 //! least squares problem as the weight of the reading's equations (iteratively reweighted least squares), and the answer as ρ.
+
+/// φ, the share of outliers that may be anywhere.
+const ANYWHERE: f64 = 0.1;
+/// Where these are, in deviations of the others.
+const FAR: f64 = 100.0;
 
 /// What a reading costs that is far from its prediction, as a function of the whitened residual.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,13 +30,13 @@ pub enum Loss {
     Mixture {
         /// ε, the share of outliers before anything is known of a reading; above 0, below 1.
         fraction: f64,
-        /// κ, by which the density of outliers is told: κ^{−d} of that of a normal reading at its middle; above 1.
+        /// κ, the deviation of most outliers in those of a normal reading; above 1.
         spread: f64,
     },
 }
 
 impl Loss {
-    /// The mixture unless told otherwise: one reading in twenty, and κ = 50.
+    /// The mixture unless told otherwise: one reading in twenty, most of them fifty times as far off.
     pub const MIXTURE: Self = Self::Mixture { fraction: 0.05, spread: 50.0 };
 
     /// ρ(s) of a reading of d equations.
@@ -42,10 +47,11 @@ impl Loss {
                 let k = huber(d);
                 if s <= k * k { 0.5 * s } else { k * s.sqrt() - 0.5 * k * k }
             }
-            Self::Mixture { fraction, spread } => {
-                let share = log_odds(fraction, spread, d);
-                // Both terms relative to that of a normal reading at s = 0.
-                log_sum(-0.5 * s, share).map_or(f64::INFINITY, |log| log_one_plus(share) - log)
+            Self::Mixture { .. } => {
+                let [near, far] = self.outlying(s, d).unwrap_or([f64::NEG_INFINITY; 2]);
+                let [near_best, far_best] = self.outlying(0.0, d).unwrap_or([f64::NEG_INFINITY; 2]);
+                // All terms relative to that of a normal reading at s = 0.
+                log_sum(-0.5 * s, log_sum(near, far)) * -1.0 + log_sum(0.0, log_sum(near_best, far_best))
             }
         }
     }
@@ -55,15 +61,26 @@ impl Loss {
         match *self {
             Self::None => 1.0,
             Self::Huber => (huber(d) / s.sqrt()).min(1.0),
-            Self::Mixture { .. } => 1.0 - self.outlier(s, d).unwrap_or(0.0),
+            Self::Mixture { spread, .. } => {
+                let [near, far] = self.outlying(s, d).unwrap_or([f64::NEG_INFINITY; 2]);
+                let all = log_sum(-0.5 * s, log_sum(near, far));
+                (-0.5 * s - all).exp() + (near - all).exp() / (spread * spread)
+            }
         }
     }
 
     /// 1 − q, the probability that a reading is an outlier; `None` for a loss that knows of none.
     pub fn outlier(&self, s: f64, d: usize) -> Option<f64> {
-        let Self::Mixture { fraction, spread } = *self else { return None };
-        let odds = log_odds(fraction, spread, d) + 0.5 * s;
+        let [near, far] = self.outlying(s, d)?;
+        let odds = log_sum(near, far) + 0.5 * s;
         Some(1.0 / (1.0 + (-odds).exp()))
+    }
+
+    /// The logarithms of ε (1 − φ) κ^{−d} e^{−s/2κ²} and of ε φ (100 κ)^{−d}, by 1 − ε.
+    fn outlying(&self, s: f64, d: usize) -> Option<[f64; 2]> {
+        let Self::Mixture { fraction, spread } = *self else { return None };
+        let near = log_odds(fraction, spread, d) + (-ANYWHERE).ln_1p() - 0.5 * s / (spread * spread);
+        Some([near, log_odds(fraction, FAR * spread, d) + ANYWHERE.ln()])
     }
 
     /// Whether one reading that fits nothing is taken to be the reading's fault.
@@ -121,15 +138,9 @@ fn log_odds(fraction: f64, spread: f64, d: usize) -> f64 {
     fraction.ln() - (-fraction).ln_1p() - d as f64 * spread.ln()
 }
 
-fn log_one_plus(log: f64) -> f64 {
-    log.exp().ln_1p()
-}
-
-/// ln(eᵃ + eᵇ); `None` where it is no number.
-fn log_sum(a: f64, b: f64) -> Option<f64> {
-    let (high, low) = (a.max(b), a.min(b));
-    let sum = high + log_one_plus(low - high);
-    sum.is_finite().then_some(sum)
+/// ln(eᵃ + eᵇ), of which one is finite.
+fn log_sum(a: f64, b: f64) -> f64 {
+    a.max(b) + (-(a - b).abs()).exp().ln_1p()
 }
 
 #[cfg(test)]
@@ -163,9 +174,21 @@ mod tests {
         assert!(probability(1e6) == 1.0 && probability(1e200) == 1.0);
         assert_eq!(Loss::Huber.outlier(9.0, 3), None);
         // By Bayes' rule, worked out by hand for one equation, ε = 1/2, κ = 2, s = 4.
-        let (normal, outlier) = ((-2.0_f64).exp(), 0.5);
+        let (normal, outlier) = ((-2.0_f64).exp(), 0.9 * 0.5 * (-0.5_f64).exp() + 0.1 / 200.0);
         let found = Loss::Mixture { fraction: 0.5, spread: 2.0 }.outlier(4.0, 1).expect("a mixture");
         assert!((found - outlier / (normal + outlier)).abs() < 1e-12);
+    }
+
+    /// However far off a reading is, it costs no more and pulls at nothing.
+    #[test]
+    fn what_is_anywhere_says_nothing() {
+        for d in [1, 3, 6] {
+            let most = Loss::MIXTURE.cost(1e300, d);
+            assert!((Loss::MIXTURE.cost(1e12, d) - most).abs() < 1e-9 && most < 12.0 * (d + 1) as f64, "{most}");
+            for s in [1e8, 1e12, 1e300, f64::MAX] {
+                assert!(Loss::MIXTURE.weight(s, d) * s < 1e-3, "{d}: {s}");
+            }
+        }
     }
 
     /// 95 % of readings: tables of χ².

@@ -30,17 +30,18 @@ use crate::{
 /// Equations before a change, by the number of parameters, from which on they count for the changed body.
 const DETERMINED: f64 = 1.5;
 
-/// The logarithm of the odds for a change from which on a belief does not call itself settled.
-const SUSPICIOUS: f64 = -4.0;
+/// How far below an alarm, in the logarithm of the odds, a belief does not call itself settled any more.
+const SUSPICION: f64 = 2.0;
 /// The logarithm of the odds from which on a change is told of: to miss one costs more than to learn some parameters anew.
-const ALARM: f64 = -2.0;
-/// The same soon after a change, while it is being learned.
+const ALARM: f64 = -1.0;
+/// The same soon after a change, while it is being learned, and where noise is larger than was told.
 const ALARM_AGAIN: f64 = 3.0;
-/// The same where the model has errors.
+/// The same where noise that nobody told is larger than is usual of its sensor: the model has errors then, and what it cannot
+/// explain differs from posture to posture as a change does from movement to movement.
 const ALARM_OF_MODEL: f64 = 6.0;
 /// What speaks for a change without a reading that may be an outlier.
 const SUPPORT: f64 = -4.0;
-/// The scale of noise that nobody tells beyond which it is taken for an error of the model.
+/// The scale beyond which noise is larger than was told, or than is usual.
 const UNUSUAL: f64 = 1.5;
 /// Standard deviations (by Wilson and Hilferty) of a squared residual that may be an outlier's.
 const OUTLYING: f64 = 5.0;
@@ -65,10 +66,15 @@ impl Smoother {
         let jumps = jumps(&mode.state, &self.belief.layout, &self.original_at(&mode.state));
         if self.posterior.loss.is_robust() {
             self.misfit = self.outliers(mode);
-            return self.rejected_change(mode, &jumps);
+            // Before the belief is settled it may be wrong itself, and rejects what would tell.
+            return if self.is_settled() { self.rejected_change(mode, &jumps) } else { None };
         }
         let soon = self.changed_at.is_some_and(|movement| self.movements < movement + SOON);
-        let alarm = match (self.has_model_error(), soon) {
+        let is_unusual = |untold: bool| {
+            let mut scales = self.unknown.iter().zip(&self.posterior.scales);
+            scales.any(|(unknown, scale)| *unknown == untold && *scale > UNUSUAL)
+        };
+        let alarm = match (is_unusual(true), soon || is_unusual(false)) {
             (true, _) => ALARM_OF_MODEL,
             (false, true) => ALARM_AGAIN,
             (false, false) => ALARM,
@@ -87,7 +93,7 @@ impl Smoother {
             }
             cause = MisfitCause::Outliers;
         }
-        self.misfit = (found.log_odds > SUSPICIOUS).then_some(Misfit { since, cause });
+        self.misfit = (found.log_odds > alarm - SUSPICION).then_some(Misfit { since, cause });
         None
     }
 
@@ -105,12 +111,6 @@ impl Smoother {
         let all = (since..posterior.measurements.len()).map(squared);
         let (index, sum, equations) = all.max_by(|a, b| a.1.total_cmp(&b.1))?;
         (sum > quantile(equations as f64, OUTLYING)).then_some(index)
-    }
-
-    /// Whether noise that nobody tells is larger than is usual of its sensor: the model does not hold then, and what it cannot
-    /// explain differs from posture to posture as a change does from movement to movement.
-    fn has_model_error(&self) -> bool {
-        self.unknown.iter().zip(&self.posterior.scales).any(|(unknown, scale)| *unknown && *scale > UNUSUAL)
     }
 
     /// Whether anything speaks for a change without one of the measurements.
