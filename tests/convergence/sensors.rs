@@ -246,7 +246,7 @@ fn what_no_parameter_explains_is_expected_and_not_chased() {
 fn chosen_movements_calibrate_a_panda_better_than_random_ones_at_every_number() {
     let scenario = builtin("panda-calibration").expect("built in");
     assert_eq!(scenario.selection.planning.optimality, Optimality::I, "what a URDF's owner asks for");
-    let seeds: Vec<u64> = (1..=20).collect();
+    let seeds: Vec<u64> = (1..=40).collect();
     let medians = |learner: &str| -> Vec<f64> {
         let curve = compare(&scenario, learner, &seeds, 60).curve;
         curve.iter().map(|point| point.prediction_mean_m.expect("a truth").median * 1e3).collect()

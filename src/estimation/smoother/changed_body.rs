@@ -33,7 +33,7 @@ const DETERMINED: f64 = 1.5;
 /// How far below an alarm, in the logarithm of the odds, a belief does not call itself settled any more.
 const SUSPICION: f64 = 2.0;
 /// The logarithm of the odds from which on a change is told of: to miss one costs more than to learn some parameters anew.
-const ALARM: f64 = -1.0;
+const ALARM: f64 = 1.0;
 /// The same soon after a change, while it is being learned, and where noise is larger than was told.
 const ALARM_AGAIN: f64 = 3.0;
 /// The same where noise that nobody told is larger than is usual of its sensor: the model has errors then, and what it cannot
@@ -69,7 +69,7 @@ impl Smoother {
             // Before the belief is settled it may be wrong itself, and rejects what would tell.
             return if self.is_settled() { self.rejected_change(mode, &jumps) } else { None };
         }
-        let soon = self.changed_at.is_some_and(|movement| self.movements < movement + SOON);
+        let soon = self.is_revising();
         let is_unusual = |untold: bool| {
             let mut scales = self.unknown.iter().zip(&self.posterior.scales);
             scales.any(|(unknown, scale)| *unknown == untold && *scale > UNUSUAL)
@@ -194,6 +194,12 @@ impl Smoother {
         let occam = root.l_dirty().diagonal().map(f64::ln).sum();
         let log_odds = known.log_evidence + found.log_evidence - occam - mode.log_evidence + log_share + RATE.ln();
         Some(After { posterior, mode: found, log_odds })
+    }
+
+    /// Whether it is still learning how the body has changed: what is found now is no other change, but a better account of the
+    /// last.
+    pub(super) fn is_revising(&self) -> bool {
+        self.changed_at.is_some_and(|movement| self.movements < movement + SOON)
     }
 
     /// Takes note that the body has changed.

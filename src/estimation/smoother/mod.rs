@@ -310,7 +310,7 @@ impl Smoother {
         self.hypotheses.condense(self.settings.kept, &layout);
         // Before the noise is learned: it would take a change for larger noise.
         let change = self.notices_change();
-        let change_noticed = change.is_some();
+        let change_noticed = change.is_some() && !self.is_revising();
         if let Some(change) = change {
             self.changed(&change);
         }

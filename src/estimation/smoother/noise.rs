@@ -205,8 +205,14 @@ impl Smoother {
             if change < 1e-3 {
                 return;
             }
+            let modes = self.hypotheses.clone();
             self.hypotheses.follow(&self.posterior, &layout);
             self.hypotheses.condense(self.settings.kept, &layout);
+            if self.hypotheses.modes.is_empty() {
+                // With scales so small that the equations are singular there is no mode: those before stay.
+                (self.hypotheses, self.posterior.scales) = (modes, before);
+                return;
+            }
         }
     }
 }

@@ -79,6 +79,7 @@ impl Smoother {
             let prior = self.posterior.prior.with_covariance(&layout, chain.covariance(&found.scales));
             let Ok(prior) = prior else { return };
             let change = changed(&scaled.scales, &found.scales).max(found.log_noise.abs());
+            let before = (self.posterior.clone(), self.hypotheses.clone(), self.scaled.clone());
             self.posterior.prior = prior;
             self.scaled = Some(Scaled { chain, scales: found.scales });
             for (scale, _) in self.posterior.scales.iter_mut().zip(&self.unknown).filter(|(_, unknown)| **unknown) {
@@ -86,6 +87,11 @@ impl Smoother {
             }
             self.hypotheses.follow(&self.posterior, &layout);
             self.hypotheses.condense(self.settings.kept, &layout);
+            if self.hypotheses.modes.is_empty() {
+                // With scales so small that the equations are singular there is no mode: those before stay.
+                (self.posterior, self.hypotheses, self.scaled) = before;
+                return;
+            }
             if change < FOUND {
                 return;
             }
