@@ -51,7 +51,7 @@ impl Loss {
                 let [near, far] = self.outlying(s, d).unwrap_or([f64::NEG_INFINITY; 2]);
                 let [near_best, far_best] = self.outlying(0.0, d).unwrap_or([f64::NEG_INFINITY; 2]);
                 // All terms relative to that of a normal reading at s = 0.
-                log_sum(-0.5 * s, log_sum(near, far)) * -1.0 + log_sum(0.0, log_sum(near_best, far_best))
+                log_sum(0.0, log_sum(near_best, far_best)) - log_sum(-0.5 * s, log_sum(near, far))
             }
         }
     }
