@@ -1013,7 +1013,7 @@ function __wbg_get_imports() {
                     const a = state0.a;
                     state0.a = 0;
                     try {
-                        return wasm_bindgen__convert__closures_____invoke__h2aa0535ab8af7741(a, state0.b, arg0, arg1);
+                        return wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined_______true_(a, state0.b, arg0, arg1);
                     } finally {
                         state0.a = a;
                     }
@@ -1383,23 +1383,23 @@ function __wbg_get_imports() {
             return ret;
         },
         __wbindgen_generic_0000000000000001: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 877, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h98a1432622e44601);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 875, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___wasm_bindgen_a6f65211bf6a5470___JsValue__core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsError___true_);
             return ret;
         },
         __wbindgen_generic_0000000000000002: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 396, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h6d2b30a95af4aaaa);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 395, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true_);
             return ret;
         },
         __wbindgen_generic_0000000000000003: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 396, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h6d2b30a95af4aaaa_12);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 395, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true__12);
             return ret;
         },
         __wbindgen_generic_0000000000000004: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 394, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen__convert__closures_____invoke__h009498df3e12d1e3);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 398, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsValue___true_);
             return ret;
         },
         __wbindgen_generic_0000000000000005: function(arg0, arg1) {
@@ -1457,30 +1457,30 @@ function __wbg_get_imports() {
     };
 }
 
-function wasm_bindgen__convert__closures_____invoke__h009498df3e12d1e3(arg0, arg1) {
-    const ret = wasm.wasm_bindgen__convert__closures_____invoke__h009498df3e12d1e3(arg0, arg1);
+function wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsValue___true_(arg0, arg1) {
+    const ret = wasm.wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsValue___true_(arg0, arg1);
     if (ret[1]) {
         throw takeFromExternrefTable0(ret[0]);
     }
 }
 
-function wasm_bindgen__convert__closures_____invoke__h6d2b30a95af4aaaa(arg0, arg1, arg2) {
-    wasm.wasm_bindgen__convert__closures_____invoke__h6d2b30a95af4aaaa(arg0, arg1, arg2);
+function wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true_(arg0, arg1, arg2) {
+    wasm.wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true_(arg0, arg1, arg2);
 }
 
-function wasm_bindgen__convert__closures_____invoke__h6d2b30a95af4aaaa_12(arg0, arg1, arg2) {
-    wasm.wasm_bindgen__convert__closures_____invoke__h6d2b30a95af4aaaa_12(arg0, arg1, arg2);
+function wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true__12(arg0, arg1, arg2) {
+    wasm.wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true__12(arg0, arg1, arg2);
 }
 
-function wasm_bindgen__convert__closures_____invoke__h98a1432622e44601(arg0, arg1, arg2) {
-    const ret = wasm.wasm_bindgen__convert__closures_____invoke__h98a1432622e44601(arg0, arg1, arg2);
+function wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___wasm_bindgen_a6f65211bf6a5470___JsValue__core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsError___true_(arg0, arg1, arg2) {
+    const ret = wasm.wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___wasm_bindgen_a6f65211bf6a5470___JsValue__core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsError___true_(arg0, arg1, arg2);
     if (ret[1]) {
         throw takeFromExternrefTable0(ret[0]);
     }
 }
 
-function wasm_bindgen__convert__closures_____invoke__h2aa0535ab8af7741(arg0, arg1, arg2, arg3) {
-    wasm.wasm_bindgen__convert__closures_____invoke__h2aa0535ab8af7741(arg0, arg1, arg2, arg3);
+function wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined_______true_(arg0, arg1, arg2, arg3) {
+    wasm.wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined_______true_(arg0, arg1, arg2, arg3);
 }
 
 
