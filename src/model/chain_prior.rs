@@ -58,7 +58,7 @@ pub struct Scales {
     pub zeros: Vec<f64>,
 }
 
-/// A covariance of tangent coordinates as a function of the scales of two kinds of error; see the [module](self).
+/// A covariance of tangent coordinates as a function of the scales of two kinds of error.
 #[derive(Clone, Debug)]
 pub struct ChainPrior {
     /// Of origins and of zeros: a root of its part of P₀, m × k, at a scale of 1; the rows of what is held stand last.
