@@ -264,3 +264,36 @@ fn proposals_are_chosen_given_the_pending_ones() {
         }
     }
 }
+
+/// Where a reading was rejected there is little to be learned: nothing near it is asked for in the next movements.
+#[test]
+fn what_was_rejected_is_not_asked_for_again() {
+    let scenario = builtin("arm-6dof-outliers").expect("built in");
+    for seed in 1001..1004 {
+        let mut agent = agent(&scenario, "global", seed);
+        let truth = &scenario.robot.state;
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut rejected: Option<Vec<f64>> = None;
+        for index in 0..31 {
+            let proposal = agent.propose(1).expect("chosen")[0].clone();
+            let theta = &proposal.selection.movement.configuration;
+            let unit = agent.limits().to_unit(theta);
+            if let Some(rejected) = &rejected {
+                let squared: f64 = unit.iter().zip(rejected).map(|(a, b)| (a - b) * (a - b)).sum();
+                assert!(squared.sqrt() > 0.05, "seed {seed}: asked again after {index} movements");
+            }
+            let mut seen = truth.marker_at(theta);
+            seen.coords.iter_mut().for_each(|x| *x += 0.01 * rng.sample::<f64, _>(rand_distr::StandardNormal));
+            if index == 25 {
+                seen.x += 3.0;
+                rejected = Some(unit);
+            }
+            let movement = proposal.selection.movement.clone();
+            let observation = Observation::seen(seen);
+            let executed = Executed { proposal: Some(proposal.id), movement, observation };
+            agent.absorb(&[executed]).expect("absorbed");
+        }
+        let weights: Vec<f64> = agent.latest_readings(26).iter().map(|reading| reading.weight).collect();
+        assert!(weights.first().is_some_and(|weight| *weight < 1e-3), "seed {seed}: {weights:?}");
+    }
+}
