@@ -16,14 +16,8 @@
 //! with heavier tails. For it the mean per degree of freedom of the last eight is compared with that of forty before:
 //! four times as much is a change. (On `body-change`, seeds 1001 to 1012, that ratio reaches 3.7 for `active` and 2.8 for `random` before the
 //! change, 4.3 to 10 and 2.8 to 5.1 after it.)
-//!
-//! Where outliers are expected, one surprise says nothing of the body. There a cumulative sum (Page 1954) of the log
-//! likelihood ratio of being surprised weighs a changed body, which surprises in seven of ten movements, against outliers,
-//! a share ε of readings, and 0.1 % of normal ones: with ε = 5 % five surprises in a row are a change.
 
 use std::collections::VecDeque;
-
-use crate::sensing::Loss;
 
 /// Innovations summed at most, where they are honest.
 const WINDOW: usize = 5;
@@ -36,29 +30,10 @@ const RATIO: f64 = 4.0;
 /// A filter's first innovations fall steeply and say nothing.
 const SILENT: usize = 100;
 
-/// The share of normal readings that surprise where outliers are expected, and the standard deviations beyond which they do.
-const SURPRISE: f64 = 1e-3;
-const SURPRISED: f64 = 3.09;
-/// The share of movements in which a changed body surprises.
-const CHANGED: f64 = 0.7;
-/// The log likelihood ratio beyond which the body has changed.
-const EVIDENCE: f64 = 12.0;
-
-/// A cumulative sum, where outliers are expected.
-#[derive(Clone, Copy, Debug)]
-struct Rise {
-    /// The share of readings that surprise in an unchanged body.
-    share: f64,
-    sum: f64,
-    /// Since how many observations it is above 0.
-    since: usize,
-}
-
 /// Watches normalised innovations squared for a change.
 #[derive(Clone, Debug)]
 pub struct ChangeDetector {
     relative: bool,
-    outliers: Option<Rise>,
     /// z.
     deviations: f64,
     /// Normalised innovations squared with their degrees of freedom, the latest first.
@@ -66,36 +41,11 @@ pub struct ChangeDetector {
     observed: usize,
 }
 
-impl Rise {
-    /// Whether the sum has come up to an alarm at a surprise.
-    fn observe(&mut self, is_surprising: bool) -> bool {
-        let [changed, same] = if is_surprising { [CHANGED, self.share] } else { [1.0 - CHANGED, 1.0 - self.share] };
-        self.sum = (self.sum + (changed / same).ln()).clamp(0.0, 2.0 * EVIDENCE);
-        self.since = if self.sum > 0.0 { self.since + 1 } else { 0 };
-        is_surprising && self.sum > EVIDENCE
-    }
-}
-
 impl ChangeDetector {
     /// For an estimator whose innovations are χ² distributed: at most one false alarm in two
     /// million movements; with three equations a movement one in 4.4 million.
     pub fn honest() -> Self {
-        Self { relative: false, outliers: None, deviations: DEVIATIONS, recent: VecDeque::new(), observed: 0 }
-    }
-
-    /// For an estimator with honest innovations but for outliers, as far as its loss expects some.
-    pub fn for_loss(loss: Loss) -> Self {
-        let share = match loss {
-            Loss::None => return Self::honest(),
-            Loss::Huber => 0.05,
-            Loss::Mixture { fraction, .. } => fraction,
-        };
-        Self { outliers: Some(Rise { share: share + SURPRISE, sum: 0.0, since: 0 }), ..Self::honest() }
-    }
-
-    /// Of how many observations up to the latest the alarm speaks; `None` for a detector that an outlier alarms.
-    pub fn since(&self) -> Option<usize> {
-        self.outliers.as_ref().map(|rise| rise.since)
+        Self { relative: false, deviations: DEVIATIONS, recent: VecDeque::new(), observed: 0 }
     }
 
     /// For a filter that assumes another noise than the sensor's.
@@ -108,12 +58,7 @@ impl ChangeDetector {
         self.recent.push_front((nis, degrees as f64));
         self.recent.truncate(RECENT + BASELINE);
         self.observed += 1;
-        let alarm = match (&mut self.outliers, self.relative) {
-            // Whoever hears it says whether it was one: a reading later there may be more to tell.
-            (Some(rise), _) => return rise.observe(nis > quantile(degrees as f64, SURPRISED)),
-            (None, true) => self.stands_out(),
-            (None, false) => self.is_improbable(),
-        };
+        let alarm = if self.relative { self.stands_out() } else { self.is_improbable() };
         if alarm {
             self.reset();
         }
@@ -124,7 +69,6 @@ impl ChangeDetector {
     pub fn reset(&mut self) {
         self.recent.clear();
         self.observed = 0;
-        self.outliers.iter_mut().for_each(|rise| (rise.sum, rise.since) = (0.0, 0));
     }
 
     fn is_improbable(&self) -> bool {

@@ -139,7 +139,7 @@ fn log_odds(fraction: f64, spread: f64, d: usize) -> f64 {
 }
 
 /// ln(eᵃ + eᵇ), of which one is finite.
-fn log_sum(a: f64, b: f64) -> f64 {
+pub(crate) fn log_sum(a: f64, b: f64) -> f64 {
     a.max(b) + (-(a - b).abs()).exp().ln_1p()
 }
 

@@ -28,6 +28,7 @@ pub use head::{Gaze, Head};
 pub(crate) use joint_noise::JointErrors;
 pub use joint_noise::JointNoise;
 pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
+pub(crate) use loss::log_sum;
 pub use loss::{Graduated, Loss};
 pub use noise::UnusableNoise;
 pub use observation::{Observation, Refused};

@@ -21,16 +21,17 @@
 //! Where readings may be outliers, those of a changed body are taken for some at first, and say nothing in the sums above. There the
 //! two posteriors are searched instead (see [`changed_body`](super::changed_body)).
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::{
     Smoother,
-    jump::Jump,
+    jump::{Jump, log_determinant},
     mode::Mode,
     noise::NoiseEvidence,
     points::Room,
     posterior::{Normal, Posterior},
 };
+use crate::sensing::log_sum;
 
 /// The chance that a body changes at a movement.
 pub(super) const RATE: f64 = 5e-3;
@@ -58,11 +59,6 @@ pub(super) struct Evidence {
     pub information: DMatrix<f64>,
     /// What tells larger noise from a change.
     pub noise: NoiseEvidence,
-}
-
-/// ln(eᵃ + eᵇ) of numbers of which one is finite.
-fn log_sum(a: f64, b: f64) -> f64 {
-    a.max(b) + (-(a - b).abs()).exp().ln_1p()
 }
 
 /// The places at which a change may have happened, the latest first: at least two movements are seen after it.
@@ -120,14 +116,12 @@ impl Evidence {
     fn log_odds(&self, jump: &Jump, sum: &DMatrix<f64>, carried: &DMatrix<f64>, pull: &DVector<f64>) -> Option<f64> {
         let b = &jump.directions;
         let seen = sum * b;
-        let known = Cholesky::new(jump.covariance.clone())?;
         let mut s = b.tr_mul(&seen) - seen.tr_mul(&(carried * b));
-        s = (&s + s.transpose()) * 0.5 + known.inverse();
+        s = (&s + s.transpose()) * 0.5 + &jump.information;
         let factor = Cholesky::new(s)?;
         let g = b.tr_mul(pull);
         let lowered = g.dot(&factor.solve(&g));
-        let log_determinant = |l: &Cholesky<f64, Dyn>| 2.0 * l.l_dirty().diagonal().map(f64::ln).sum();
-        let occam = 0.5 * (log_determinant(&factor) + log_determinant(&known));
+        let occam = 0.5 * (log_determinant(&factor) + jump.log_determinant);
         let log_odds = self.noise.gain(lowered) - occam + jump.log_share + RATE.ln();
         log_odds.is_finite().then_some(log_odds)
     }

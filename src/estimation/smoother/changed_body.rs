@@ -63,12 +63,12 @@ impl Smoother {
     pub(super) fn notices_change(&mut self) -> Option<Change> {
         self.misfit = None;
         let mode = self.hypotheses.modes.first()?;
-        let jumps = jumps(&mode.state, &self.belief.layout, &self.original_at(&mode.state));
         if self.posterior.loss.is_robust() {
             self.misfit = self.outliers(mode);
             // Before the belief is settled it may be wrong itself, and rejects what would tell.
-            return if self.is_settled() { self.rejected_change(mode, &jumps) } else { None };
+            return if self.is_settled() { self.rejected_change(mode) } else { None };
         }
+        let jumps = self.jumps(mode);
         let soon = self.is_revising();
         let is_unusual = |untold: bool| {
             let mut scales = self.unknown.iter().zip(&self.posterior.scales);
@@ -95,6 +95,11 @@ impl Smoother {
         }
         self.misfit = (found.log_odds > alarm - SUSPICION).then_some(Misfit { since, cause });
         None
+    }
+
+    /// All ways in which the body may have changed from where a mode has it.
+    fn jumps(&self, mode: &Mode) -> Vec<Jump> {
+        jumps(&mode.state, &self.belief.layout, &self.original_at(&mode.state))
     }
 
     /// Of the measurements from one on that which the belief before the latest expected least, if it may be an outlier.
@@ -142,7 +147,7 @@ impl Smoother {
     }
 
     /// The same where readings may be outliers: since one of the latest that were rejected.
-    fn rejected_change(&self, mode: &Mode, jumps: &[Jump]) -> Option<Change> {
+    fn rejected_change(&self, mode: &Mode) -> Option<Change> {
         let seen = &self.posterior.measurements;
         let first = seen.len().saturating_sub(LATEST);
         let places: Vec<usize> = (first..seen.len()).filter(|place| self.is_rejected(mode, &seen[*place])).collect();
@@ -150,10 +155,11 @@ impl Smoother {
             return None;
         }
         let candidates = places[..places.len() + 1 - REJECTED].iter().filter(|place| **place > 0);
+        let jumps = self.jumps(mode);
         let mut best: Option<Change> = None;
         for &since in candidates {
             let Some(before) = self.before(since) else { continue };
-            for jump in jumps {
+            for jump in &jumps {
                 let change = Change { since, jump: jump.clone(), log_odds: f64::NEG_INFINITY };
                 let Some(After { mode: after, log_odds, .. }) = self.after(&before.1, &change, mode) else { continue };
                 let mut explained = 0;
@@ -182,7 +188,7 @@ impl Smoother {
     /// What is believed if the body has changed so, against `mode`, one body for all.
     fn after(&self, known: &Mode, change: &Change, mode: &Mode) -> Option<After> {
         let layout = &self.belief.layout;
-        let Jump { directions, covariance, log_share } = &change.jump;
+        let Jump { directions, covariance, log_share, .. } = &change.jump;
         let spread = known.covariance() + directions * covariance * directions.transpose();
         let spread = (&spread + spread.transpose()) * 0.5;
         let root = Cholesky::new(spread.clone())?;

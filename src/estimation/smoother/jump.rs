@@ -11,7 +11,7 @@
 //! Q comes from the *original* prior, however often the body has changed: its covariance, with half its deviations, and several
 //! times as large ones where the prior is so narrow that a collision would exceed it.
 
-use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Cholesky, DMatrix, Dyn, Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::{
     kinematics::{Joint, Line},
@@ -25,6 +25,10 @@ pub(super) struct Jump {
     pub directions: DMatrix<f64>,
     /// Q (p × p).
     pub covariance: DMatrix<f64>,
+    /// Q⁻¹.
+    pub information: DMatrix<f64>,
+    /// ln det Q.
+    pub log_determinant: f64,
     /// The logarithm of its share among all ways to change.
     pub log_share: f64,
 }
@@ -39,6 +43,11 @@ const WIDEST: f64 = 0.5;
 const WHOLE: f64 = 0.2;
 /// A step for differences, rad or m.
 const STEP: f64 = 1e-5;
+
+/// ln det A of the root of A.
+pub(super) fn log_determinant(root: &Cholesky<f64, Dyn>) -> f64 {
+    2.0 * root.l_dirty().diagonal().map(f64::ln).sum()
+}
 
 /// All jumps from `state`; `prior` is the original prior's covariance in the chart there.
 pub(super) fn jumps(state: &State, layout: &Layout, prior: &DMatrix<f64>) -> Vec<Jump> {
@@ -74,9 +83,18 @@ pub(super) fn jumps(state: &State, layout: &Layout, prior: &DMatrix<f64>) -> Vec
         for factor in WIDENED {
             let widened = covariance * (factor * factor);
             let widest = widened.diagonal().iter().fold(0.0_f64, |most, x| most.max(x.sqrt()));
-            if factor == 1.0 || widest < WIDEST {
-                jumps.push(Jump { directions: directions.clone(), covariance: widened, log_share });
+            if factor != 1.0 && widest >= WIDEST {
+                continue;
             }
+            // What cannot change is no jump.
+            let Some(root) = Cholesky::new(widened.clone()) else { continue };
+            jumps.push(Jump {
+                directions: directions.clone(),
+                covariance: widened,
+                information: root.inverse(),
+                log_determinant: log_determinant(&root),
+                log_share,
+            });
         }
     };
     for (directions, covariance) in &spaces {

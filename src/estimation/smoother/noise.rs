@@ -16,7 +16,7 @@ use super::{
     mode::Mode,
     posterior::{Fit, Posterior},
 };
-use crate::sensing::{Noise, Occasion};
+use crate::sensing::{Noise, Occasion, log_sum};
 
 /// ν: how many equations the scale of the noise so far counts for.
 const NOISE_WEIGHT: f64 = 3.0;
@@ -87,7 +87,7 @@ impl NoiseEvidence {
             let off = log_off(squared, free);
             let Some((nominal, scales)) = told else { return off };
             let (a, b) = (HOLDS.ln() - 0.5 * nominal * squared, (1.0 - HOLDS).ln() + off - scales);
-            a.max(b) + (-(a - b).abs()).exp().ln_1p()
+            log_sum(a, b)
         };
         of(rest) - of(squared)
     }
