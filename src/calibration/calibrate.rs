@@ -1,8 +1,12 @@
 //! From a case to everything that its report says.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::{
     CalibrationError, Case, Chain, Choice, Comparison, Extra, Figures, Fit, Fold, HeldOut, Outlier, Progress, Reading,
-    Report, Residual, Split, extras::TRIED,
+    Report, Residual, Split,
+    extras::TRIED,
+    figures::{Sensed, Unit},
 };
 use crate::selection::Optimality;
 
@@ -63,7 +67,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     progress.tick();
     let fit = case.fit(&case.writable(), &training, Some(nominal.state()))?;
     progress.tick();
-    let mut trials = case.trials(&training, fit.state())?;
+    let mut trials = case.trials(&normal(&fit), fit.state())?;
     let fuller = case.fuller(&trials, &fit)?;
     progress.tick();
 
@@ -73,7 +77,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         let (fold, verdict) = if has_folds {
             let nominal = case.nominal(&split.training)?;
             let fit = case.fit(&case.writable(), &split.training, Some(nominal.state()))?;
-            let trials = case.trials(&split.training, fit.state())?;
+            let trials = case.trials(&normal(&fit), fit.state())?;
             let fuller = case.fuller(&trials, &fit)?;
             let verdict = case.judge(split, &nominal, &fit, &fuller)?;
             (fit, verdict)
@@ -84,24 +88,31 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         judged.push(verdict);
         progress.tick();
     }
+    let outliers = case.outliers(&fit, judged.iter().flat_map(|judged| &judged.after));
+    // What is an outlier counts for nothing in any figure, nor for what is judged by figures.
+    let strays: BTreeSet<usize> = outliers.iter().map(|outlier| outlier.row - 1).collect();
+    let figures =
+        |residuals: &mut dyn Iterator<Item = &Residual>| Figures::of(residuals.filter(|it| !strays.contains(&it.row)));
     for (index, trial) in trials.iter_mut().enumerate().filter(|_| !judged.is_empty()) {
-        trial.held_out = Some(Figures::of(judged.iter().flat_map(|judged| &judged.tried[index])));
+        trial.held_out = Some(figures(&mut judged.iter().flat_map(|judged| &judged.tried[index])));
     }
+    let mut without_strays = splits.clone();
+    without_strays.iter_mut().for_each(|split| split.held_out.retain(|row| !strays.contains(row)));
 
     let (mut active, mut selection, mut learning) = (Vec::new(), None, Vec::new());
     if let Some(count) = options.active {
-        active = case.active(&splits, count, progress)?;
+        active = case.active(&without_strays, count, progress)?;
         selection = Some(case.choice(&training, count, progress)?);
     } else {
-        learning = case.learning(&splits, progress)?;
+        learning = case.learning(&without_strays, progress)?;
     }
 
     let training_residuals = |fit: &Fit| case.residuals(fit, &training);
     let comparison = Comparison {
-        before: Figures::of(&training_residuals(&nominal)),
-        after: Figures::of(&training_residuals(&fit)),
+        before: figures(&mut training_residuals(&nominal).iter()),
+        after: figures(&mut training_residuals(&fit).iter()),
     };
-    let all = |of: fn(&Judged) -> &Vec<Residual>| Figures::of(judged.iter().flat_map(of));
+    let all = |of: fn(&Judged) -> &Vec<Residual>| figures(&mut judged.iter().flat_map(of));
     let held_out = if judged.is_empty() {
         None
     } else {
@@ -109,7 +120,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
             before: all(|it| &it.before),
             after: all(|it| &it.after),
             full_model: all(|it| &it.fuller),
-            folds: if has_folds { case.folds(&splits, &folds, &judged)? } else { Vec::new() },
+            folds: if has_folds { case.folds(&splits, &folds, &judged, &figures)? } else { Vec::new() },
         })
     };
     let scenario = case.scenario;
@@ -135,7 +146,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         span_1m_sd_mm: if case.meets_itself() { case.span_sd_mm(&fit) } else { None },
         extras: trials.clone(),
         compliance: case.compliance(&fuller),
-        outliers: case.outliers(&fit),
+        outliers,
         noise: case.noise(&fit),
         reading_sigmas: fit.reading_sigmas.clone(),
         base: case.base(&fit),
@@ -163,14 +174,20 @@ impl Case<'_> {
         Ok(Judged { before: judged(nominal), after: judged(fit), fuller: judged(fuller), tried })
     }
 
-    fn folds(&self, splits: &[Split], fits: &[Fit], judged: &[Judged]) -> Result<Vec<Fold>, CalibrationError> {
+    fn folds(
+        &self,
+        splits: &[Split],
+        fits: &[Fit],
+        judged: &[Judged],
+        figures: &dyn Fn(&mut dyn Iterator<Item = &Residual>) -> Figures,
+    ) -> Result<Vec<Fold>, CalibrationError> {
         let of = |(fold, ((split, fit), judged)): (usize, ((&Split, &Fit), &Judged))| {
             Ok(Fold {
                 fold,
                 rows: split.held_out.iter().map(|row| row + 1).collect(),
-                before: Figures::of(&judged.before),
-                after: Figures::of(&judged.after),
-                full_model: Figures::of(&judged.fuller),
+                before: figures(&mut judged.before.iter()),
+                after: figures(&mut judged.after.iter()),
+                full_model: figures(&mut judged.fuller.iter()),
                 base: self.base(fit),
                 targets: self.targets(fit)?,
             })
@@ -205,10 +222,17 @@ impl Case<'_> {
         }
     }
 
-    fn outliers(&self, fit: &Fit) -> Vec<Outlier> {
-        let suspected = fit.outliers().into_iter().filter(|(_, probability)| *probability > 0.5);
+    /// The rows that are likelier outliers than not by the fit that learned from them; of those that nothing learned from, the ones
+    /// that are gross beside the others.
+    fn outliers<'r>(&self, fit: &Fit, held_out: impl Iterator<Item = &'r Residual>) -> Vec<Outlier> {
         let told = |(row, probability): (usize, f64)| Outlier { row: row + 1, line: self.rows[row].line, probability };
-        suspected.map(told).collect()
+        let learned: BTreeSet<usize> = fit.rows.iter().copied().collect();
+        let held_out: Vec<&Residual> = held_out.filter(|it| !learned.contains(&it.row)).collect();
+        let suspected = fit.outliers().into_iter().filter(|(_, probability)| *probability > 0.5);
+        let mut outliers: Vec<Outlier> =
+            suspected.chain(gross(&held_out).into_iter().map(|row| (row, 1.0))).map(told).collect();
+        outliers.sort_by_key(|outlier| outlier.row);
+        outliers
     }
 
     /// Every reading by the model that had not learned from its row, if there is one, else by the calibrated one.
@@ -237,6 +261,34 @@ impl Case<'_> {
         };
         all.into_iter().map(reading).collect()
     }
+}
+
+/// The rows that a fit was learned from and that are likelier normal than outliers.
+fn normal(fit: &Fit) -> Vec<usize> {
+    let outliers: BTreeSet<usize> = fit.outliers().into_iter().filter(|it| it.1 > 0.5).map(|it| it.0).collect();
+    fit.rows.iter().copied().filter(|row| !outliers.contains(row)).collect()
+}
+
+/// So many times the median residual of a sensor is no error of the model any more.
+const GROSS: f64 = 50.0;
+
+/// The rows with a residual that is so much larger than most of its sensor: as if it were in other units, or said that nothing was
+/// seen. How good a model is they do not tell, while a bad model, off by the same everywhere, has none of them.
+fn gross(residuals: &[&Residual]) -> BTreeSet<usize> {
+    let mut by_sensor: BTreeMap<Sensed, Vec<&Residual>> = BTreeMap::new();
+    residuals.iter().for_each(|it| by_sensor.entry(it.sensor).or_default().push(it));
+    let mut rows = BTreeSet::new();
+    for (of, unit) in
+        by_sensor.values().flat_map(|of| [Unit::Millimetres, Unit::Degrees, Unit::Pixels].map(|unit| (of, unit)))
+    {
+        let mut errors: Vec<(f64, usize)> = of.iter().filter_map(|it| Some((unit.of(&it.apart)?, it.row))).collect();
+        errors.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((median, _)) = errors.get(errors.len() / 2).copied() else { continue };
+        rows.extend(
+            errors.into_iter().filter(|(error, _)| *error > GROSS * median && median > 0.0).map(|(_, row)| row),
+        );
+    }
+    rows
 }
 
 #[cfg(test)]

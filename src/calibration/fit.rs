@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, PoisonError};
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3};
 
 use super::{CalibrationError, Case, figures::mean};
 use crate::{
@@ -159,7 +159,7 @@ impl Case<'_> {
             }
         }
         if self.placing().block(Block::Base).is_some() && predicted.len() > 2 {
-            state.base = best_motion(&predicted, &seen) * state.base;
+            state.base = motion_of_most(predicted, seen) * state.base;
         }
         for (channel, sensor) in self.rig.channels().iter().enumerate() {
             let Occasion::Held { socket, target } = sensor.occasion() else { continue };
@@ -171,4 +171,27 @@ impl Case<'_> {
         }
         state
     }
+}
+
+/// So many times the median distance is no place that a motion is fitted to.
+const FAR: f64 = 5.0;
+/// How often places are left out, at most.
+const ROUNDS: usize = 10;
+
+/// The rigid motion that fits best to most of the places, whatever the others say.
+fn motion_of_most(mut from: Vec<Point3<f64>>, mut to: Vec<Point3<f64>>) -> Isometry3<f64> {
+    for _ in 0..ROUNDS {
+        let motion = best_motion(&from, &to);
+        let distances: Vec<f64> = from.iter().zip(&to).map(|(a, b)| (motion * a - b).norm()).collect();
+        let mut sorted = distances.clone();
+        sorted.sort_by(f64::total_cmp);
+        let far = FAR * sorted[sorted.len() / 2];
+        let near: Vec<usize> = (0..from.len()).filter(|index| distances[*index] <= far).collect();
+        if near.len() == from.len() || near.len() < 3 {
+            return motion;
+        }
+        from = near.iter().map(|index| from[*index]).collect();
+        to = near.iter().map(|index| to[*index]).collect();
+    }
+    best_motion(&from, &to)
 }

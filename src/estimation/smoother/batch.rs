@@ -71,8 +71,8 @@ impl Smoother {
     fn search(&mut self, starts: &[State]) {
         let layout = self.belief.layout.clone();
         let guess = [self.posterior.prior.guess().clone()];
-        let starts: Vec<&State> = if starts.is_empty() { guess.iter().collect() } else { starts.iter().collect() };
-        let starts = self.begin_noise_from(&starts);
+        let given: Vec<&State> = if starts.is_empty() { guess.iter().collect() } else { starts.iter().collect() };
+        let starts = self.begin_noise_from(&given);
         let found = starts.iter().map(|start| self.posterior.mode_from_afar(start, &layout, THOROUGH));
         let found: Vec<_> = found.collect();
         self.hypotheses.lost = found.iter().find_map(|mode| mode.as_ref().err().copied());
@@ -80,6 +80,11 @@ impl Smoother {
         self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         self.hypotheses.condense(self.settings.kept, &layout);
         self.settle_noise();
+        if self.doubt_noise(&given) {
+            self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
+            self.hypotheses.condense(self.settings.kept, &layout);
+            self.settle_noise();
+        }
     }
 
     /// Where least squares with the nominal noise leads, and the scales of the noise as its residuals have them: no reading

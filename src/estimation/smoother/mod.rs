@@ -37,6 +37,7 @@ mod noise;
 mod points;
 mod posterior;
 mod prior_scale;
+mod robust;
 mod settled;
 
 use std::sync::Arc;
@@ -315,6 +316,7 @@ impl Smoother {
             self.changed(&change);
         }
         self.learn_noise();
+        self.doubt_noise(&[]);
         self.learn_scales();
         if self.hypotheses.modes.is_empty() {
             return Err(EstimationError::Diverged(self.hypotheses.why()));

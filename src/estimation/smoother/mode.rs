@@ -116,8 +116,12 @@ impl Posterior {
         let coarse = Effort { steps: STEPS_AT_WIDTH, tolerance, hopeless: f64::INFINITY, known: &[] };
         let mut state = start.clone();
         for width in WIDTHS.into_iter().filter(|width| *width > 1.0) {
-            let steps = if width.is_infinite() { Effort { steps: effort.steps, ..coarse } } else { coarse };
-            state = self.descend(Graduated { loss: self.loss, width }, &state, layout, steps)?.0;
+            let (loss, steps) = if width.is_infinite() {
+                (self.least_squares(&state), Effort { steps: effort.steps, ..coarse })
+            } else {
+                (Graduated { loss: self.loss, width }, coarse)
+            };
+            state = self.descend(loss, &state, layout, steps)?.0;
         }
         self.mode(&state, layout, effort)
     }
@@ -139,10 +143,9 @@ impl Posterior {
         layout: &Layout,
         effort: Effort<'_>,
     ) -> Result<Mode, NoMode> {
-        let least_squares = Graduated { loss: self.loss, width: f64::INFINITY };
         // By least squares what is still no outlier may cost much.
         let patient = Effort { hopeless: effort.hopeless * 10.0 + 1e3, known: &[], ..effort };
-        let (state, _) = others.descend(least_squares, start, layout, patient)?;
+        let (state, _) = others.descend(others.least_squares(start), start, layout, patient)?;
         self.mode(&state, layout, effort)
     }
 

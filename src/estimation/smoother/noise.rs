@@ -23,7 +23,9 @@ const NOISE_WEIGHT: f64 = 3.0;
 /// How often scales and modes are found in turn, at most.
 const NOISE_ROUNDS: usize = 4;
 /// The least scale of a noise that is not known, in nominal σ.
-const LEAST_SCALE: f64 = 1e-3;
+pub(super) const LEAST_SCALE: f64 = 1e-3;
+/// A first reading is as far off at the guess as so many times what the prior expects, at most, as far as that is due to noise.
+const EXPECTED: f64 = 3.0;
 /// P(holds): that noise is as large as is said.
 const HOLDS: f64 = 0.9;
 /// a.
@@ -94,18 +96,36 @@ impl NoiseEvidence {
 }
 
 impl Smoother {
-    /// The scale that the residuals of the first readings have at the guess: what it leaves unexplained.
+    /// The scale that the residuals of the first readings have at the guess: what it leaves unexplained, but not beyond what the
+    /// prior allows for.
     pub(super) fn begin_noise(&mut self) {
         let first: Vec<usize> = (0..self.unknown.len()).filter(|noise| self.is_unheard(*noise)).collect();
         if first.is_empty() {
             return;
         }
-        let guess = self.posterior.prior.guess().clone();
-        let fits = self.posterior.fit(&guess, &self.belief.layout);
-        for noise in first.into_iter().filter(|noise| fits[*noise].equations > 0.0) {
-            let scale = (fits[noise].squared / fits[noise].equations).sqrt();
-            self.posterior.scales[noise] = scale.max(LEAST_SCALE);
+        for noise in first {
+            if let Some(scale) = self.first_scale(noise) {
+                self.posterior.scales[noise] = scale.max(LEAST_SCALE);
+            }
         }
+    }
+
+    /// What the guess leaves of the latest reading with a kind of noise, per equation; `None` where it predicts none.
+    fn first_scale(&self, noise: usize) -> Option<f64> {
+        let (channel, part) =
+            self.posterior.rig.noises().get(noise).map(|noise| (noise.channel, noise.part.clone()))?;
+        let mut seen = self.posterior.measurements.last()?.clone();
+        let readings = seen.observation.readings.iter_mut().enumerate();
+        readings.filter(|(other, _)| *other != channel).for_each(|(_, reading)| *reading = None);
+        let (guess, layout) = (self.posterior.prior.guess(), &self.belief.layout);
+        let equations = self.nominal.equations_of(guess, layout, &seen.positions, &seen.observation);
+        if equations.residual.len() < part.end {
+            return None;
+        }
+        let (rows, residual) = (equations.rows.columns_range(part.clone()), equations.residual.rows_range(part));
+        let d = residual.len() as f64;
+        let expected = (self.posterior.prior.covariance() * rows).dot(&rows) / d;
+        Some((residual.norm_squared() / d).sqrt().min(EXPECTED * (1.0 + expected).sqrt()))
     }
 
     /// Whether nobody tells a kind of noise and its first reading has just come.

@@ -180,6 +180,20 @@ impl Posterior {
         self.fit(state, layout).iter().map(|fit| fit.equations).sum()
     }
 
+    /// By kind of noise: the equations of all readings, outliers among them; those of readings that have settled but for outliers.
+    pub fn equations_by_noise(&self) -> Vec<f64> {
+        let mut equations = vec![0.0; self.scales.len()];
+        for seen in self.all() {
+            for (channel, _) in seen.observation.readings.iter().enumerate().filter(|(_, reading)| reading.is_some()) {
+                self.noises(channel).for_each(|(noise, part)| equations[noise] += part.len() as f64);
+            }
+        }
+        if let Some(settled) = &self.settled {
+            equations.iter_mut().zip(&settled.noises).for_each(|(all, of)| *all += of.equations);
+        }
+        equations
+    }
+
     /// How many independent equations the measurements are that have not settled, outliers at `state` not counted; all settled ones
     /// count as independent.
     pub fn rank(&self, state: &State, layout: &Layout) -> usize {

@@ -1,0 +1,283 @@
+//! Noise as most readings have it.
+//!
+//! Least squares let one reading of −9999 decide how large noise is, and with noise that large nothing is an outlier. So scales that
+//! are learned are doubted wherever most readings scatter much less than the scale says: the median of their squares, over the
+//! median of χ², is a scale that no minority of readings changes, whatever its size. From there modes are searched with
+//! Huber's loss, the scale in turn with them (an M-estimator with a scale of its own; Huber and Ronchetti, *Robust Statistics*, 7.8),
+//! and then as ever. Of the two, what has more evidence is kept,
+//!
+//! ```text
+//! ln p = −E − ½ ln det Λ − Σ q d ln s − Σ (1 − q) d ln s₊
+//! ```
+//!
+//! with q the chance that a reading of d equations is normal, and s₊ the larger of the two scales: where outliers are, they are as
+//! far apart by both.
+
+use super::{
+    Smoother, THOROUGH,
+    mode::Mode,
+    posterior::{Fit, Posterior},
+};
+use crate::{
+    model::{Layout, State},
+    sensing::{Graduated, Loss},
+};
+
+/// Most readings scatter much less than a scale says when theirs is so much of it.
+const DOUBTFUL: f64 = 0.7;
+/// Equations that no parameter accounts for, from which on most readings tell a scale.
+const SPARE: f64 = 6.0;
+/// How often modes and scales are found in turn, at most.
+const ROUNDS: usize = 12;
+/// Scales that change by less than this have been found.
+const FOUND: f64 = 0.02;
+/// Least squares hold for readings of so many times the median residual; beyond, they pull as much as one at this distance.
+const FAR: f64 = 10.0;
+
+/// The median of χ² of d degrees of freedom (Wilson and Hilferty).
+fn median_square(d: usize) -> f64 {
+    let d = d as f64;
+    d * (1.0 - 2.0 / (9.0 * d)).powi(3)
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+impl Posterior {
+    /// Least squares for all readings but those that are far from where most are.
+    pub fn least_squares(&self, state: &State) -> Graduated {
+        let mut squares = Vec::new();
+        for seen in &self.measurements {
+            self.residuals(state, seen, |channel, whitened| {
+                squares.push(self.squared(channel, whitened) / whitened.len() as f64);
+            });
+        }
+        let width = FAR * median(squares).map_or(f64::INFINITY, f64::sqrt).max(1.0);
+        Graduated { loss: if width.is_finite() { Loss::Huber } else { Loss::None }, width }
+    }
+
+    /// By kind of noise: the scale of most readings at `state`; `None` where there are none.
+    fn common_scales(&self, state: &State) -> Vec<Option<f64>> {
+        let mut squares = vec![Vec::new(); self.scales.len()];
+        for seen in &self.measurements {
+            self.residuals(state, seen, |channel, whitened| {
+                for (noise, part) in self.noises(channel) {
+                    let square: f64 = whitened[part.clone()].iter().map(|x| x * x).sum();
+                    squares[noise].push(square / median_square(part.len()));
+                }
+            });
+        }
+        squares.into_iter().map(|squares| median(squares).map(f64::sqrt)).collect()
+    }
+}
+
+impl Smoother {
+    /// Learns the scales anew from those of most readings, where these are much smaller, from where the heaviest mode is and from
+    /// `starts`; whether that is what has more evidence, and was kept.
+    pub(super) fn doubt_noise(&mut self, starts: &[&State]) -> bool {
+        if !self.posterior.loss.is_robust() || !self.unknown.contains(&true) {
+            return false;
+        }
+        let layout = self.belief.layout.clone();
+        let best = self.hypotheses.modes.first().map(|mode| mode.state.clone());
+        if best.as_ref().is_some_and(|state| !self.is_doubtful(state, &layout)) && !self.is_worse_than(starts) {
+            return false;
+        }
+        let starts = best.iter().chain(starts.iter().copied());
+        let tried: Vec<Self> = starts.filter_map(|start| self.by_most_readings(start, &layout)).collect();
+        let mut revised = false;
+        for trial in tried {
+            if self.hypotheses.modes.is_empty() || trial.evidence_beside(self) > self.evidence_beside(&trial) {
+                (self.posterior, self.hypotheses, self.spare) = (trial.posterior, trial.hypotheses, trial.spare);
+                revised = true;
+            }
+        }
+        revised
+    }
+
+    /// Whether most readings scatter much less at the heaviest mode than a scale says that is learned.
+    fn is_doubtful(&self, state: &State, layout: &Layout) -> bool {
+        let Some(mode) = self.hypotheses.modes.first() else { return true };
+        let common = self.common(mode, state, layout);
+        let scales = common.iter().zip(&self.posterior.scales).zip(&self.unknown);
+        scales.into_iter().any(|((common, scale), unknown)| *unknown && common.is_some_and(|it| it < DOUBTFUL * scale))
+    }
+
+    /// Whether most readings scatter much less at one of these, where nothing was learned yet, than a scale says that is learned.
+    fn is_worse_than(&self, starts: &[&State]) -> bool {
+        starts.iter().any(|start| {
+            let common = self.posterior.common_scales(start).into_iter();
+            let mut scales = common.zip(&self.posterior.scales).zip(&self.unknown);
+            scales.any(|((common, scale), unknown)| *unknown && common.is_some_and(|it| it < DOUBTFUL * scale))
+        })
+    }
+
+    /// The scales of most readings, as they would be without what parameters account for; `None` where hardly anything else is left.
+    fn common(&self, mode: &Mode, state: &State, layout: &Layout) -> Vec<Option<f64>> {
+        let Some(absorbed) = self.posterior.absorbed(mode, layout) else { return Vec::new() };
+        let equations = self.posterior.fit(state, layout).into_iter().map(|fit| fit.equations);
+        let common = self.posterior.common_scales(state).into_iter();
+        let of = |((common, absorbed), equations): ((Option<f64>, f64), f64)| {
+            let spare = equations - absorbed;
+            common.filter(|_| spare >= SPARE).map(|common| common * (equations / spare).sqrt())
+        };
+        common.zip(absorbed).zip(equations).map(of).collect()
+    }
+
+    /// What is learned from where most readings are explained.
+    fn by_most_readings(&self, start: &State, layout: &Layout) -> Option<Self> {
+        let mut trial = self.clone();
+        let loss = std::mem::replace(&mut trial.posterior.loss, Loss::Huber);
+        let mut state = start.clone();
+        // As far as parameters have not explained anything yet, what is left of the readings is no noise.
+        for (noise, common) in self.posterior.common_scales(start).into_iter().enumerate() {
+            if let (Some(common), true) = (common, self.unknown[noise]) {
+                trial.posterior.scales[noise] = common.max(super::noise::LEAST_SCALE);
+            }
+        }
+        for _ in 0..ROUNDS {
+            let mode = trial.posterior.mode(&state, layout, THOROUGH).ok()?;
+            let before = trial.posterior.scales.clone();
+            for (noise, common) in trial.common(&mode, &mode.state, layout).into_iter().enumerate() {
+                if let (Some(common), true) = (common, self.unknown[noise]) {
+                    trial.posterior.scales[noise] = common.max(super::noise::LEAST_SCALE);
+                }
+            }
+            state = mode.state;
+            let change =
+                before.iter().zip(&trial.posterior.scales).map(|(a, b)| (a / b).ln().abs()).fold(0.0, f64::max);
+            if change < FOUND {
+                break;
+            }
+        }
+        trial.posterior.loss = loss;
+        let mode = trial.posterior.mode(&state, layout, THOROUGH).ok()?;
+        trial.hypotheses.modes.insert(0, mode);
+        trial.hypotheses.follow(&trial.posterior, layout);
+        trial.hypotheses.condense(self.settings.kept, layout);
+        trial.learn_noise();
+        (!trial.hypotheses.modes.is_empty()).then_some(trial)
+    }
+
+    /// The logarithm of the evidence of the heaviest mode and its scales, beside those of another.
+    fn evidence_beside(&self, other: &Self) -> f64 {
+        let Some(mode) = self.hypotheses.modes.first() else { return f64::NEG_INFINITY };
+        let fits = self.posterior.fit(&mode.state, &self.belief.layout);
+        let all = self.posterior.equations_by_noise();
+        let of = |((fit, all), (scale, other)): ((&Fit, f64), (&f64, &f64))| {
+            let normal = fit.equations;
+            -normal * scale.ln() - (all - normal).max(0.0) * scale.max(*other).ln()
+        };
+        let scales = self.posterior.scales.iter().zip(&other.posterior.scales);
+        mode.log_evidence + fits.iter().zip(all).zip(scales).map(of).sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{DMatrix, Vector3};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::{
+        estimation::{Estimator, HypothesisSettings},
+        model::{Block, Prior, laws::random_arm},
+        sensing::{Observation, Rig},
+    };
+
+    const SIGMA: f64 = 3e-4;
+
+    /// Arms whose axes are off by their prior, their base by a metre, and exact readings but for noise.
+    fn case(seed: u64, rows: usize) -> (State, Vec<(Vec<f64>, Observation)>, impl Fn() -> Smoother) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let guess = random_arm(&mut rng, 4);
+        let layout = Layout::new(&guess, (0..4).map(Block::Axis).chain([Block::Base, Block::Target(0)]));
+        let m = layout.dimension();
+        let mut covariance = DMatrix::from_diagonal_element(m, m, 1e-4);
+        covariance.view_mut((0, 0), (6, 6)).fill_diagonal(0.3);
+        let prior = Prior::around(guess, &layout, covariance).expect("a prior");
+        let truth = prior.draw(&layout, &mut rng);
+        let rig = Rig::tracker(SIGMA);
+        let observe = |_| {
+            let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
+            let v: Vec<f64> = (0..3).map(|_| rng.sample::<f64, _>(rand_distr::StandardNormal)).collect();
+            let observation = rig.observe(&truth, &theta, &v);
+            (theta, observation)
+        };
+        let seen = (0..rows).map(observe).collect();
+        let (layout, assumed) = (Arc::new(layout), Arc::new(rig.assuming(SIGMA * 2.0)));
+        let smoother = move || {
+            let settings = HypothesisSettings { kept: 8, spawned: 8 };
+            let rng = ChaCha8Rng::seed_from_u64(seed + 1);
+            Smoother::new(prior.clone(), layout.clone(), assumed.clone(), settings, rng)
+                .with_loss(Loss::MIXTURE)
+                .with_unknown_noise(vec![true])
+        };
+        (truth, seen, smoother)
+    }
+
+    fn of(seen: &[(Vec<f64>, Observation)]) -> Vec<(&[f64], &Observation)> {
+        seen.iter().map(|(theta, observation)| (theta.as_slice(), observation)).collect()
+    }
+
+    fn worst(smoother: &Smoother, truth: &State, seen: &[(Vec<f64>, Observation)]) -> f64 {
+        let state = &smoother.belief().state;
+        seen.iter().map(|(theta, _)| (state.marker_at(theta) - truth.marker_at(theta)).norm()).fold(0.0, f64::max)
+    }
+
+    /// What stands in tables for what was not seen, and readings in other units.
+    fn gross() -> [(&'static str, fn(Vector3<f64>) -> Vector3<f64>); 6] {
+        [
+            ("-9999", |_| Vector3::repeat(-9999.0)),
+            ("zeros", |_| Vector3::zeros()),
+            ("millimetres", |it| it * 1e3),
+            ("inches", |it| it / 0.0254),
+            ("1e12", |it| Vector3::new(it.x, 1e12, it.z)),
+            ("3 cm", |it| it + Vector3::new(0.0, 0.0, 0.03)),
+        ]
+    }
+
+    /// One row of any size among thirty changes neither what is learned nor how large noise is, at once and one by one.
+    #[test]
+    fn a_row_of_any_size_changes_nothing() {
+        for seed in 1..=8 {
+            let (truth, seen, smoother) = case(seed, 30);
+            let (mut without, mut without_singly) = (smoother(), smoother());
+            without.absorb_all(&of(&seen), &[]).expect("absorbed");
+            of(&seen).into_iter().for_each(|(theta, it)| drop(without_singly.correct(theta, it).expect("absorbed")));
+            let right = worst(&without, &truth, &seen);
+            assert!(right < 5.0 * SIGMA && without.noise()[0].scale < 0.8, "seed {seed}: {right} m");
+            for (index, (name, ruin)) in gross().into_iter().enumerate() {
+                for at in [0, 2 + 3 * index, 29] {
+                    let mut seen = seen.clone();
+                    let reading = seen[at].1.readings[0].as_mut().expect("seen");
+                    let ruined = ruin(Vector3::from_column_slice(reading));
+                    reading.copy_from_slice(ruined.as_slice());
+                    let rest: Vec<_> =
+                        seen.iter().enumerate().filter(|(it, _)| *it != at).map(|(_, it)| it.clone()).collect();
+                    let (mut with, mut singly, mut less) = (smoother(), smoother(), smoother());
+                    less.absorb_all(&of(&rest), &[]).expect("absorbed");
+                    with.absorb_all(&of(&seen), &[]).expect("absorbed");
+                    of(&seen).into_iter().for_each(|(theta, it)| drop(singly.correct(theta, it).expect("absorbed")));
+                    for (how, found) in [("at once", &with), ("one by one", &singly)] {
+                        let (scale, wanted) = (found.noise()[0].scale, less.noise()[0].scale);
+                        let apart = worst(found, &less.belief().state, &rest);
+                        let outliers: Vec<u64> =
+                            found.readings().iter().filter(|it| it.weight < 0.5).map(|it| it.movement).collect();
+                        let said = format!(
+                            "seed {seed}, {name} at {at}, {how}: {apart} m, {scale} for {wanted}, {outliers:?}"
+                        );
+                        assert!(apart < 0.05 * SIGMA + 0.05 * worst(&less, &truth, &rest), "{said}");
+                        assert!((scale / wanted - 1.0).abs() < 0.05, "{said}");
+                        assert_eq!(outliers, [at as u64 + 1], "{said}");
+                    }
+                }
+            }
+        }
+    }
+}
