@@ -80,6 +80,28 @@ fn nothing_is_doubted_in_a_table_that_is_right() {
     assert_eq!(panda(|_| {}), []);
 }
 
+/// A row that went wrong is an outlier and no reason to doubt all others; and they are doubted as if it were not there.
+#[test]
+fn one_row_that_went_wrong_is_no_doubt() {
+    let ruined: [fn(f64) -> f64; 5] = [|_| -9999.0, |_| 0.0, |x| x * 1e3, |x| x * 1e-3, |x| x / 0.0254];
+    for ruin in ruined {
+        for row in [0, 7, 33] {
+            let spoil = |sheet: &mut Sheet| {
+                for title in ["x1", "y1", "z1"] {
+                    let column = sheet.column(title);
+                    sheet.rows[row][column] = ruin(sheet.rows[row][column]);
+                }
+            };
+            told(&spoilt(spoil), &[]);
+            let sign = spoilt(|sheet| {
+                spoil(sheet);
+                sheet.change("arm_4_joint", |x| -x);
+            });
+            told(&sign, &[(DoubtKind::Sign, &["column `arm_4_joint`: its sign is reversed", "fits to 4."])]);
+        }
+    }
+}
+
 #[test]
 fn units_are_doubted() {
     let millimetres = spoilt(|sheet| ["x1", "y1", "z1"].iter().for_each(|title| sheet.change(title, |x| x * 1e3)));

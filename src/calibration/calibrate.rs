@@ -339,6 +339,23 @@ mod tests {
         assert_ne!(found.report.held_out, spoilt.report.held_out);
     }
 
+    /// Of rows that nothing learned from what is gross is no error of the model, but a model that is off everywhere is.
+    #[test]
+    fn what_is_gross_is_told_from_what_is_bad() {
+        let residual = |row: usize, mm: f64| Residual {
+            row,
+            sensor: Sensed::Channel(0),
+            predicted: vec![],
+            measured: vec![],
+            apart: crate::sensing::Apart { length_m: Some(mm / 1e3), ..Default::default() },
+        };
+        let all: Vec<Residual> =
+            [3.0, 1.0, 40.0, 9e6, 2.0].into_iter().enumerate().map(|(row, mm)| residual(row, mm)).collect();
+        assert_eq!(gross(&all.iter().collect::<Vec<_>>()), BTreeSet::from([3]));
+        let bad: Vec<Residual> = (0..9).map(|row| residual(row, 400.0 + 50.0 * row as f64)).collect();
+        assert_eq!(gross(&bad.iter().collect::<Vec<_>>()), BTreeSet::new());
+    }
+
     #[test]
     fn what_cannot_be_asked_is_refused() {
         let scenario = tiago();

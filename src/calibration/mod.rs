@@ -37,6 +37,8 @@ mod figures;
 mod files;
 mod fit;
 mod init;
+#[cfg(test)]
+mod laws;
 mod learned;
 mod loads;
 mod outcome;

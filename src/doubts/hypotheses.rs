@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::{
     Doubt, DoubtKind, Evidence, Subject,
@@ -213,9 +213,14 @@ fn shift(left: &dyn Fn(f64) -> Fit, fine: bool) -> (f64, Fit) {
     best
 }
 
+/// How far most points are from where most are.
 fn spread(points: &[Point3<f64>]) -> f64 {
-    let centre = points.iter().map(|point| point.coords).sum::<nalgebra::Vector3<f64>>() / points.len() as f64;
-    (points.iter().map(|point| (point.coords - centre).norm_squared()).sum::<f64>() / points.len() as f64).sqrt()
+    let middle = |mut values: Vec<f64>| {
+        let at = values.len() / 2;
+        *values.select_nth_unstable_by(at, f64::total_cmp).1
+    };
+    let centre = Point3::from(Vector3::from_fn(|k, _| middle(points.iter().map(|point| point[k]).collect())));
+    middle(points.iter().map(|point| (point - centre).norm()).collect())
 }
 
 impl Hypothesis {
