@@ -67,7 +67,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     progress.tick();
     let fit = case.fit(&case.writable(), &training, Some(nominal.state()))?;
     progress.tick();
-    let mut trials = case.trials(&normal(&fit), fit.state())?;
+    let mut trials = case.trials(&case.normal(&fit), fit.state())?;
     let fuller = case.fuller(&trials, &fit)?;
     progress.tick();
 
@@ -77,7 +77,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         let (fold, verdict) = if has_folds {
             let nominal = case.nominal(&split.training)?;
             let fit = case.fit(&case.writable(), &split.training, Some(nominal.state()))?;
-            let trials = case.trials(&normal(&fit), fit.state())?;
+            let trials = case.trials(&case.normal(&fit), fit.state())?;
             let fuller = case.fuller(&trials, &fit)?;
             let verdict = case.judge(split, &nominal, &fit, &fuller)?;
             (fit, verdict)
@@ -88,16 +88,21 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         judged.push(verdict);
         progress.tick();
     }
-    let outliers = case.outliers(&fit, judged.iter().flat_map(|judged| &judged.after));
-    // What is an outlier counts for nothing in any figure, nor for what is judged by figures.
-    let strays: BTreeSet<usize> = outliers.iter().map(|outlier| outlier.row - 1).collect();
-    let figures =
-        |residuals: &mut dyn Iterator<Item = &Residual>| Figures::of(residuals.filter(|it| !strays.contains(&it.row)));
+    // What went wrong altogether counts for nothing in any figure, nor for what is judged by figures.
+    let mut strays = case.strays(&fit);
+    let learned: BTreeSet<usize> = fit.rows.iter().copied().collect();
+    let unlearned = judged.iter().flat_map(|judged| &judged.after).filter(|it| !learned.contains(&it.row));
+    let unlearned = gross(GROSS, &unlearned.collect::<Vec<_>>());
+    strays.extend(&unlearned);
+    let figures = |residuals: &mut dyn Iterator<Item = &Residual>| {
+        Figures::of(residuals.filter(|it| !strays.contains(&(it.row, it.sensor))))
+    };
     for (index, trial) in trials.iter_mut().enumerate().filter(|_| !judged.is_empty()) {
         trial.held_out = Some(figures(&mut judged.iter().flat_map(|judged| &judged.tried[index])));
     }
+    let gone: BTreeSet<usize> = strays.iter().map(|(row, _)| *row).collect();
     let mut without_strays = splits.clone();
-    without_strays.iter_mut().for_each(|split| split.held_out.retain(|row| !strays.contains(row)));
+    without_strays.iter_mut().for_each(|split| split.held_out.retain(|row| !gone.contains(row)));
 
     let (mut active, mut selection, mut learning) = (Vec::new(), None, Vec::new());
     if let Some(count) = options.active {
@@ -146,7 +151,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         span_1m_sd_mm: if case.meets_itself() { case.span_sd_mm(&fit) } else { None },
         extras: trials.clone(),
         compliance: case.compliance(&fuller),
-        outliers,
+        outliers: case.outliers(&fit, unlearned.iter().map(|(row, _)| *row).collect()),
         noise: case.noise(&fit),
         reading_sigmas: fit.reading_sigmas.clone(),
         base: case.base(&fit),
@@ -222,17 +227,31 @@ impl Case<'_> {
         }
     }
 
-    /// The rows that are likelier outliers than not by the fit that learned from them; of those that nothing learned from, the ones
-    /// that are gross beside the others.
-    fn outliers<'r>(&self, fit: &Fit, held_out: impl Iterator<Item = &'r Residual>) -> Vec<Outlier> {
+    /// The rows that are likelier outliers than not by the fit that learned from them, and `others`.
+    fn outliers(&self, fit: &Fit, others: BTreeSet<usize>) -> Vec<Outlier> {
         let told = |(row, probability): (usize, f64)| Outlier { row: row + 1, line: self.rows[row].line, probability };
-        let learned: BTreeSet<usize> = fit.rows.iter().copied().collect();
-        let held_out: Vec<&Residual> = held_out.filter(|it| !learned.contains(&it.row)).collect();
         let suspected = fit.outliers().into_iter().filter(|(_, probability)| *probability > 0.5);
-        let mut outliers: Vec<Outlier> =
-            suspected.chain(gross(&held_out).into_iter().map(|row| (row, 1.0))).map(told).collect();
+        let mut outliers: Vec<Outlier> = suspected.chain(others.into_iter().map(|row| (row, 1.0))).map(told).collect();
         outliers.sort_by_key(|outlier| outlier.row);
         outliers
+    }
+
+    /// The readings that are likelier outliers than not by the fit that learned from them, and far beyond most of their sensor.
+    fn strays(&self, fit: &Fit) -> BTreeSet<(usize, Sensed)> {
+        let outliers: BTreeSet<usize> = fit.outliers().into_iter().filter(|it| it.1 > 0.5).map(|it| it.0).collect();
+        if outliers.is_empty() {
+            return BTreeSet::new();
+        }
+        let residuals = self.residuals(fit, &fit.rows);
+        let mut strays = gross(STRAY, &residuals.iter().collect::<Vec<_>>());
+        strays.retain(|(row, _)| outliers.contains(row));
+        strays
+    }
+
+    /// The rows that a fit was learned from and of which no reading went wrong altogether.
+    fn normal(&self, fit: &Fit) -> Vec<usize> {
+        let strays: BTreeSet<usize> = self.strays(fit).into_iter().map(|(row, _)| row).collect();
+        fit.rows.iter().copied().filter(|row| !strays.contains(row)).collect()
     }
 
     /// Every reading by the model that had not learned from its row, if there is one, else by the calibrated one.
@@ -263,32 +282,30 @@ impl Case<'_> {
     }
 }
 
-/// The rows that a fit was learned from and that are likelier normal than outliers.
-fn normal(fit: &Fit) -> Vec<usize> {
-    let outliers: BTreeSet<usize> = fit.outliers().into_iter().filter(|it| it.1 > 0.5).map(|it| it.0).collect();
-    fit.rows.iter().copied().filter(|row| !outliers.contains(row)).collect()
-}
-
-/// So many times the median residual of a sensor is no error of the model any more.
+/// An outlier that is more than so many times the median residual of its sensor says nothing of how good a model is. What is nearer
+/// may be an error of the model, and counts.
+const STRAY: f64 = 10.0;
+/// Without a fit that knows the reading, so many times the median is no error of a model.
 const GROSS: f64 = 50.0;
 
-/// The rows with a residual that is so much larger than most of its sensor: as if it were in other units, or said that nothing was
-/// seen. How good a model is they do not tell, while a bad model, off by the same everywhere, has none of them.
-fn gross(residuals: &[&Residual]) -> BTreeSet<usize> {
+/// The readings whose residual is more than so many times the median of their sensor: as if they were in other units, or said that nothing
+/// was seen. A bad model, off by the same everywhere, has none of them.
+fn gross(times: f64, residuals: &[&Residual]) -> BTreeSet<(usize, Sensed)> {
     let mut by_sensor: BTreeMap<Sensed, Vec<&Residual>> = BTreeMap::new();
     residuals.iter().for_each(|it| by_sensor.entry(it.sensor).or_default().push(it));
-    let mut rows = BTreeSet::new();
-    for (of, unit) in
-        by_sensor.values().flat_map(|of| [Unit::Millimetres, Unit::Degrees, Unit::Pixels].map(|unit| (of, unit)))
-    {
-        let mut errors: Vec<(f64, usize)> = of.iter().filter_map(|it| Some((unit.of(&it.apart)?, it.row))).collect();
-        errors.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((median, _)) = errors.get(errors.len() / 2).copied() else { continue };
-        rows.extend(
-            errors.into_iter().filter(|(error, _)| *error > GROSS * median && median > 0.0).map(|(_, row)| row),
-        );
+    let mut found = BTreeSet::new();
+    for (sensor, of) in by_sensor {
+        for unit in [Unit::Millimetres, Unit::Degrees, Unit::Pixels] {
+            let mut errors: Vec<(f64, usize)> =
+                of.iter().filter_map(|it| Some((unit.of(&it.apart)?, it.row))).collect();
+            errors.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((median, _)) = errors.get(errors.len() / 2).copied().filter(|(median, _)| *median > 0.0) else {
+                continue;
+            };
+            found.extend(errors.into_iter().filter(|(error, _)| *error > times * median).map(|(_, row)| (row, sensor)));
+        }
     }
-    rows
+    found
 }
 
 #[cfg(test)]
@@ -351,9 +368,9 @@ mod tests {
         };
         let all: Vec<Residual> =
             [3.0, 1.0, 40.0, 9e6, 2.0].into_iter().enumerate().map(|(row, mm)| residual(row, mm)).collect();
-        assert_eq!(gross(&all.iter().collect::<Vec<_>>()), BTreeSet::from([3]));
+        assert_eq!(gross(GROSS, &all.iter().collect::<Vec<_>>()), BTreeSet::from([(3, Sensed::Channel(0))]));
         let bad: Vec<Residual> = (0..9).map(|row| residual(row, 400.0 + 50.0 * row as f64)).collect();
-        assert_eq!(gross(&bad.iter().collect::<Vec<_>>()), BTreeSet::new());
+        assert_eq!(gross(STRAY, &bad.iter().collect::<Vec<_>>()), BTreeSet::new());
     }
 
     #[test]

@@ -149,7 +149,7 @@ fn summarise(report: &Report) -> Result<()> {
         let lines: Vec<String> = report.outliers.iter().take(8).map(|outlier| outlier.line.to_string()).collect();
         let more = if report.outliers.len() > lines.len() { ", …" } else { "" };
         output::say(format!(
-            "{} rows are likelier outliers than not, and no figure counts them: lines {}{more}",
+            "{} rows are likelier outliers than not: lines {}{more}",
             report.outliers.len(),
             lines.join(", ")
         ))?;

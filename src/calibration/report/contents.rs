@@ -149,7 +149,7 @@ fn outliers(document: &mut Document, report: &Report) {
         return;
     }
     document.text(
-        "Rows that are likelier outliers than not, by the residuals of their readings. They hardly count in the fit, and in no figure of errors:",
+        "Rows that are likelier outliers than not, by the residuals of their readings. They hardly count in the fit; what is off by more than ten times the median counts in no figure of errors either:",
     );
     let row = |outlier: &crate::calibration::Outlier| {
         [outlier.row.to_string(), outlier.line.to_string(), format!("{:.3}", outlier.probability)]

@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Most readings scatter much less than a scale says when theirs is so much of it.
-const DOUBTFUL: f64 = 0.7;
+const DOUBTFUL: f64 = 0.4;
 /// Equations that no parameter accounts for, from which on most readings tell a scale.
 const SPARE: f64 = 6.0;
 /// How often modes and scales are found in turn, at most.
