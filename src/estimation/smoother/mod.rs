@@ -305,6 +305,7 @@ impl Smoother {
         self.posterior.measurements.push(Measurement { positions, observation, movement: self.movements });
         self.begin_noise();
         self.hypotheses.follow(&self.posterior, &layout);
+        self.doubt_estimate();
         if !self.is_settled() || self.hypotheses.modes.is_empty() {
             self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         }

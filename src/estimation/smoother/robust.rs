@@ -74,6 +74,20 @@ impl Posterior {
 }
 
 impl Smoother {
+    /// Where the latest readings look like outliers although nothing is settled, it may be the estimate that is wrong: a guess that is
+    /// off by thousands of σ would reject everything. So a mode is searched from there as from afar, beside those that there are.
+    pub(super) fn doubt_estimate(&mut self) {
+        let Some(best) = self.hypotheses.modes.iter().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else {
+            return;
+        };
+        if !self.posterior.loss.is_robust() || self.is_settled() {
+            return;
+        }
+        let is_rejected = self.posterior.readings_after(self.movements, &best.state).any(|it| it.weight < 0.5);
+        let found = is_rejected.then(|| self.posterior.mode_from_afar(&best.state, &self.belief.layout, THOROUGH));
+        self.hypotheses.modes.extend(found.and_then(Result::ok));
+    }
+
     /// Learns the scales anew from those of most readings, where these are much smaller, from where the heaviest mode is and from
     /// `starts`; whether that is what has more evidence, and was kept.
     pub(super) fn doubt_noise(&mut self, starts: &[&State]) -> bool {
@@ -281,6 +295,36 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// A guess that is off by thousands of σ rejects nothing for ever, though hardly any other hypothesis is searched: targets that are
+    /// known to decimetres and readings to tenths of a millimetre, with σ told and learned.
+    #[test]
+    fn a_guess_that_is_far_off_rejects_nothing() {
+        for (seed, unknown) in (1..=6).flat_map(|seed| [(seed, false), (seed, true)]) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let guess = random_arm(&mut rng, 4);
+            let layout = Layout::new(&guess, (0..4).map(Block::Axis).chain([Block::Target(0)]));
+            let mut deviations = nalgebra::DVector::from_element(layout.dimension(), 1e-4);
+            let target = layout.block(Block::Target(0)).expect("learned");
+            deviations.rows_mut(target.start, 3).fill(0.5);
+            let prior = Prior::with_deviations(guess, &layout, &deviations).expect("a prior");
+            let truth = prior.draw(&layout, &mut rng);
+            let rig = Arc::new(Rig::tracker(1e-4));
+            let settings = HypothesisSettings { kept: 2, spawned: 1 };
+            let mut smoother = Smoother::new(prior, Arc::new(layout), rig.clone(), settings, rng.clone())
+                .with_loss(Loss::MIXTURE)
+                .with_unknown_noise(vec![unknown]);
+            for _ in 0..12 {
+                let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
+                let v: Vec<f64> = (0..3).map(|_| rng.sample::<f64, _>(rand_distr::StandardNormal)).collect();
+                smoother.correct(&theta, &rig.observe(&truth, &theta, &v)).expect("absorbed");
+            }
+            let outliers = smoother.readings().iter().filter(|it| it.weight < 0.5).count();
+            let theta = [0.3, -0.7, 1.1, 0.2];
+            let apart = (smoother.belief().state.marker_at(&theta) - truth.marker_at(&theta)).norm();
+            assert!(outliers == 0 && apart < 1e-3, "seed {seed}, σ unknown {unknown}: {outliers} outliers, {apart} m");
         }
     }
 }
