@@ -110,7 +110,7 @@ impl Smoother {
         }
     }
 
-    /// What the guess leaves of the latest reading with a kind of noise, per equation; `None` where it predicts none.
+    /// What the guess leaves of the latest reading with a kind of noise, per equation, but not less than what is nominal; `None` where it predicts none.
     fn first_scale(&self, noise: usize) -> Option<f64> {
         let (channel, part) =
             self.posterior.rig.noises().get(noise).map(|noise| (noise.channel, noise.part.clone()))?;
@@ -125,7 +125,8 @@ impl Smoother {
         let (rows, residual) = (equations.rows.columns_range(part.clone()), equations.residual.rows_range(part));
         let d = residual.len() as f64;
         let expected = (self.posterior.prior.covariance() * rows).dot(&rows) / d;
-        Some((residual.norm_squared() / d).sqrt().min(EXPECTED * (1.0 + expected).sqrt()))
+        // A reading that the guess explains, as where a socket is placed by it, does not tell that there is no noise.
+        Some((residual.norm_squared() / d).sqrt().clamp(1.0, EXPECTED * (1.0 + expected).sqrt()))
     }
 
     /// Whether nobody tells a kind of noise and its first reading has just come.
