@@ -28,6 +28,8 @@ def test_a_person_calibrates_with_a_ball() -> None:
     ran = subprocess.run([sys.executable, EXAMPLES / "socket_by_hand.py"], capture_output=True, text=True)
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert "scatter at the seven other places" in ran.stdout
+    expected = [float(mm) for mm in re.findall(r"([\d.]+) mm are expected", ran.stdout)]
+    assert len(expected) == 20 and expected[-1] < 10.0 < expected[0], expected
 
 
 def test_a_panda_in_pybullet() -> None:

@@ -327,4 +327,31 @@ mod tests {
             assert!(outliers == 0 && apart < 1e-3, "seed {seed}, σ unknown {unknown}: {outliers} outliers, {apart} m");
         }
     }
+
+    /// A first reading that the guess explains to the last digit does not tell that there is no noise, so that all others were outliers.
+    #[test]
+    fn a_first_reading_without_an_error_rejects_no_other() {
+        for seed in 1..=6 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let truth = random_arm(&mut rng, 4);
+            let layout = Layout::new(&truth, (0..4).map(Block::Axis));
+            let deviations = nalgebra::DVector::from_element(layout.dimension(), 1e-2);
+            let prior = Prior::with_deviations(truth.clone(), &layout, &deviations).expect("a prior");
+            let rig = Arc::new(Rig::tracker(SIGMA));
+            let settings = HypothesisSettings { kept: 2, spawned: 1 };
+            let mut smoother = Smoother::new(prior, Arc::new(layout), rig.clone(), settings, rng.clone())
+                .with_loss(Loss::MIXTURE)
+                .with_unknown_noise(vec![true]);
+            for movement in 0..30 {
+                let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
+                let size = if movement == 0 { 0.0 } else { 1.0 };
+                let v: Vec<f64> = (0..3).map(|_| size * rng.sample::<f64, _>(rand_distr::StandardNormal)).collect();
+                smoother.correct(&theta, &rig.observe(&truth, &theta, &v)).expect("absorbed");
+                let outliers = smoother.readings().iter().filter(|it| it.weight < 0.5).count();
+                assert_eq!(outliers, 0, "seed {seed}, movement {movement}");
+            }
+            let scale = smoother.noise()[0].scale;
+            assert!((0.7..1.4).contains(&scale), "seed {seed}: {scale}");
+        }
+    }
 }
