@@ -94,6 +94,7 @@ pub mod kinematics;
 mod lanes;
 pub mod magnitude;
 pub mod model;
+mod most;
 pub mod optimize;
 #[cfg(feature = "app")]
 pub mod paper;

@@ -8,7 +8,7 @@ use super::{
     extras::TRIED,
     figures::{Sensed, Unit},
 };
-use crate::selection::Optimality;
+use crate::{most::middle, selection::Optimality};
 
 /// What is asked beside the fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,7 +67,8 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     progress.tick();
     let fit = case.fit(&case.writable(), &training, Some(nominal.state()))?;
     progress.tick();
-    let mut trials = case.trials(&case.normal(&fit), fit.state())?;
+    let mut strays = case.strays(&fit);
+    let mut trials = case.trials(&without(&training, &strays), fit.state())?;
     let fuller = case.fuller(&trials, &fit)?;
     progress.tick();
 
@@ -77,7 +78,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         let (fold, verdict) = if has_folds {
             let nominal = case.nominal(&split.training)?;
             let fit = case.fit(&case.writable(), &split.training, Some(nominal.state()))?;
-            let trials = case.trials(&case.normal(&fit), fit.state())?;
+            let trials = case.trials(&without(&split.training, &case.strays(&fit)), fit.state())?;
             let fuller = case.fuller(&trials, &fit)?;
             let verdict = case.judge(split, &nominal, &fit, &fuller)?;
             (fit, verdict)
@@ -89,7 +90,6 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         progress.tick();
     }
     // What went wrong altogether counts for nothing in any figure, nor for what is judged by figures.
-    let mut strays = case.strays(&fit);
     let learned: BTreeSet<usize> = fit.rows.iter().copied().collect();
     let unlearned = judged.iter().flat_map(|judged| &judged.after).filter(|it| !learned.contains(&it.row));
     let unlearned = gross(GROSS, &unlearned.collect::<Vec<_>>());
@@ -100,9 +100,8 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     for (index, trial) in trials.iter_mut().enumerate().filter(|_| !judged.is_empty()) {
         trial.held_out = Some(figures(&mut judged.iter().flat_map(|judged| &judged.tried[index])));
     }
-    let gone: BTreeSet<usize> = strays.iter().map(|(row, _)| *row).collect();
     let mut without_strays = splits.clone();
-    without_strays.iter_mut().for_each(|split| split.held_out.retain(|row| !gone.contains(row)));
+    without_strays.iter_mut().for_each(|split| split.held_out = without(&split.held_out, &strays));
 
     let (mut active, mut selection, mut learning) = (Vec::new(), None, Vec::new());
     if let Some(count) = options.active {
@@ -230,15 +229,15 @@ impl Case<'_> {
     /// The rows that are likelier outliers than not by the fit that learned from them, and `others`.
     fn outliers(&self, fit: &Fit, others: BTreeSet<usize>) -> Vec<Outlier> {
         let told = |(row, probability): (usize, f64)| Outlier { row: row + 1, line: self.rows[row].line, probability };
-        let suspected = fit.outliers().into_iter().filter(|(_, probability)| *probability > 0.5);
-        let mut outliers: Vec<Outlier> = suspected.chain(others.into_iter().map(|row| (row, 1.0))).map(told).collect();
+        let others = others.into_iter().map(|row| (row, 1.0));
+        let mut outliers: Vec<Outlier> = fit.suspected().into_iter().chain(others).map(told).collect();
         outliers.sort_by_key(|outlier| outlier.row);
         outliers
     }
 
     /// The readings that are likelier outliers than not by the fit that learned from them, and far beyond most of their sensor.
     fn strays(&self, fit: &Fit) -> BTreeSet<(usize, Sensed)> {
-        let outliers: BTreeSet<usize> = fit.outliers().into_iter().filter(|it| it.1 > 0.5).map(|it| it.0).collect();
+        let outliers: BTreeSet<usize> = fit.suspected().into_iter().map(|(row, _)| row).collect();
         if outliers.is_empty() {
             return BTreeSet::new();
         }
@@ -246,12 +245,6 @@ impl Case<'_> {
         let mut strays = gross(STRAY, &residuals.iter().collect::<Vec<_>>());
         strays.retain(|(row, _)| outliers.contains(row));
         strays
-    }
-
-    /// The rows that a fit was learned from and of which no reading went wrong altogether.
-    fn normal(&self, fit: &Fit) -> Vec<usize> {
-        let strays: BTreeSet<usize> = self.strays(fit).into_iter().map(|(row, _)| row).collect();
-        fit.rows.iter().copied().filter(|row| !strays.contains(row)).collect()
     }
 
     /// Every reading by the model that had not learned from its row, if there is one, else by the calibrated one.
@@ -282,6 +275,12 @@ impl Case<'_> {
     }
 }
 
+/// The rows of which no reading went wrong altogether.
+fn without(rows: &[usize], strays: &BTreeSet<(usize, Sensed)>) -> Vec<usize> {
+    let strays: BTreeSet<usize> = strays.iter().map(|(row, _)| *row).collect();
+    rows.iter().copied().filter(|row| !strays.contains(row)).collect()
+}
+
 /// An outlier that is more than so many times the median residual of its sensor says nothing of how good a model is. What is nearer
 /// may be an error of the model, and counts.
 const STRAY: f64 = 10.0;
@@ -296,12 +295,9 @@ fn gross(times: f64, residuals: &[&Residual]) -> BTreeSet<(usize, Sensed)> {
     let mut found = BTreeSet::new();
     for (sensor, of) in by_sensor {
         for unit in [Unit::Millimetres, Unit::Degrees, Unit::Pixels] {
-            let mut errors: Vec<(f64, usize)> =
-                of.iter().filter_map(|it| Some((unit.of(&it.apart)?, it.row))).collect();
-            errors.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let Some((median, _)) = errors.get(errors.len() / 2).copied().filter(|(median, _)| *median > 0.0) else {
-                continue;
-            };
+            let errors: Vec<(f64, usize)> = of.iter().filter_map(|it| Some((unit.of(&it.apart)?, it.row))).collect();
+            let median = middle(errors.iter().map(|it| it.0).collect());
+            let Some(median) = median.filter(|median| *median > 0.0) else { continue };
             found.extend(errors.into_iter().filter(|(error, _)| *error > times * median).map(|(_, row)| (row, sensor)));
         }
     }

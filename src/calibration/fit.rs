@@ -9,6 +9,7 @@ use crate::{
     estimation::{Belief, Estimator, HypothesisSettings, NoiseFit, ReadingReport, Smoother},
     experiment::Stream,
     model::{Block, ChainPrior, Layout, Prior, Scales, State, best_motion},
+    most,
     scenario::Known,
     sensing::{Noise, Occasion},
 };
@@ -52,6 +53,11 @@ impl Fit {
             }
         }
         by_row
+    }
+
+    /// Those of them that are likelier outliers than not.
+    pub fn suspected(&self) -> Vec<(usize, f64)> {
+        self.outliers().into_iter().filter(|(_, probability)| *probability > 0.5).collect()
     }
 }
 
@@ -159,7 +165,7 @@ impl Case<'_> {
             }
         }
         if self.placing().block(Block::Base).is_some() && predicted.len() > 2 {
-            state.base = motion_of_most(predicted, seen) * state.base;
+            state.base = motion_of_most(&predicted, &seen) * state.base;
         }
         for (channel, sensor) in self.rig.channels().iter().enumerate() {
             let Occasion::Held { socket, target } = sensor.occasion() else { continue };
@@ -173,25 +179,15 @@ impl Case<'_> {
     }
 }
 
-/// So many times the median distance is no place that a motion is fitted to.
-const FAR: f64 = 5.0;
 /// How often places are left out, at most.
 const ROUNDS: usize = 10;
 
 /// The rigid motion that fits best to most of the places, whatever the others say.
-fn motion_of_most(mut from: Vec<Point3<f64>>, mut to: Vec<Point3<f64>>) -> Isometry3<f64> {
-    for _ in 0..ROUNDS {
-        let motion = best_motion(&from, &to);
-        let distances: Vec<f64> = from.iter().zip(&to).map(|(a, b)| (motion * a - b).norm()).collect();
-        let mut sorted = distances.clone();
-        sorted.sort_by(f64::total_cmp);
-        let far = FAR * sorted[sorted.len() / 2];
-        let near: Vec<usize> = (0..from.len()).filter(|index| distances[*index] <= far).collect();
-        if near.len() == from.len() || near.len() < 3 {
-            return motion;
-        }
-        from = near.iter().map(|index| from[*index]).collect();
-        to = near.iter().map(|index| to[*index]).collect();
-    }
-    best_motion(&from, &to)
+fn motion_of_most(from: &[Point3<f64>], to: &[Point3<f64>]) -> Isometry3<f64> {
+    let fit = |rows: &[usize]| {
+        let (from, to): (Vec<_>, Vec<_>) = rows.iter().map(|row| (from[*row], to[*row])).unzip();
+        best_motion(&from, &to)
+    };
+    let away = |motion: &Isometry3<f64>, row: usize| (motion * from[row] - to[row]).norm();
+    most::fitted(from.len(), from.len().saturating_sub(3), ROUNDS, fit, away)
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
 
-use crate::model::best_motion;
+use crate::{model::best_motion, most};
 
 /// What was seen, row by row.
 #[derive(Clone, Debug)]
@@ -39,37 +39,21 @@ impl Sight {
     }
 }
 
-/// A row is left out that is so many times as far off as the median row, and of all rows one in so many at most: a few that went wrong
-/// shall not decide what all others say.
-const FAR: f64 = 5.0;
+/// Of all rows one in so many at most is left out that is far off: a few that went wrong shall not decide what all others say.
 const FEW: usize = 10;
 /// How often rows are left out, at most.
 const ROUNDS: usize = 4;
 
 /// The same as [`of_points`] but for a few rows that are far off.
 fn of_most_points(guess: Point3<f64>, points: &[Point3<f64>], motions: &[Isometry3<f64>]) -> f64 {
-    let (mut points, mut motions) = (points.to_vec(), motions.to_vec());
-    let mut spare = points.len().div_ceil(FEW);
-    let mut found = of_points(guess, &points, &motions);
-    for _ in 0..ROUNDS {
-        let (_, base, target) = found;
-        let away: Vec<f64> = points.iter().zip(&motions).map(|(y, t)| (base * (t * target) - y).norm()).collect();
-        let mut order: Vec<usize> = (0..points.len()).collect();
-        order.sort_by(|a, b| away[*b].total_cmp(&away[*a]));
-        let far = FAR * away[order[order.len() / 2]];
-        let mut left_out: Vec<usize> = order.into_iter().take(spare).take_while(|row| away[*row] > far).collect();
-        if left_out.is_empty() {
-            break;
-        }
-        spare -= left_out.len();
-        left_out.sort_unstable_by(|a, b| b.cmp(a));
-        for row in left_out {
-            points.swap_remove(row);
-            motions.swap_remove(row);
-        }
-        found = of_points(guess, &points, &motions);
-    }
-    found.0
+    let fit = |rows: &[usize]| {
+        let (points, motions): (Vec<_>, Vec<_>) = rows.iter().map(|row| (points[*row], motions[*row])).unzip();
+        of_points(guess, &points, &motions)
+    };
+    let away = |(_, base, target): &(f64, Isometry3<f64>, Point3<f64>), row: usize| {
+        (base * (motions[row] * target) - points[row]).norm()
+    };
+    most::fitted(points.len(), points.len().div_ceil(FEW), ROUNDS, fit, away).0
 }
 
 /// `y = B Tⱼ p`, B and p free: the root mean square, B and p.

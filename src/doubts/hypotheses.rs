@@ -9,7 +9,10 @@ use super::{
     doubt::length,
     fit::{Fit, Sight},
 };
-use crate::kinematics::{Joint, JointKind};
+use crate::{
+    kinematics::{Joint, JointKind},
+    most::middle,
+};
 
 /// A way to read a column must bring the residual below this share of what it was.
 const CONVINCING: f64 = 0.5;
@@ -215,10 +218,7 @@ fn shift(left: &dyn Fn(f64) -> Fit, fine: bool) -> (f64, Fit) {
 
 /// How far most points are from where most are.
 fn spread(points: &[Point3<f64>]) -> f64 {
-    let middle = |mut values: Vec<f64>| {
-        let at = values.len() / 2;
-        *values.select_nth_unstable_by(at, f64::total_cmp).1
-    };
+    let middle = |values: Vec<f64>| middle(values).unwrap_or(f64::NAN);
     let centre = Point3::from(Vector3::from_fn(|k, _| middle(points.iter().map(|point| point[k]).collect())));
     middle(points.iter().map(|point| (point - centre).norm()).collect())
 }

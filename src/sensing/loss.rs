@@ -110,20 +110,18 @@ impl Graduated {
     /// τ² ρ(s/τ²).
     pub fn cost(&self, s: f64, d: usize) -> f64 {
         let square = self.width * self.width;
-        if square.is_finite() { square * self.loss.cost(s / square, d) } else { 0.5 * s }
+        square * self.loss.cost(s / square, d)
     }
 
     /// The probability that a reading is a normal one; its weight, by a loss that knows of no outliers.
     pub fn normal(&self, s: f64, d: usize) -> f64 {
         let square = self.width * self.width;
-        let outlier = if square.is_finite() { self.loss.outlier(s / square, d) } else { None };
-        outlier.map_or_else(|| self.weight(s, d), |outlier| 1.0 - outlier)
+        self.loss.outlier(s / square, d).map_or_else(|| self.weight(s, d), |outlier| 1.0 - outlier)
     }
 
     /// The weight of a reading's equations.
     pub fn weight(&self, s: f64, d: usize) -> f64 {
-        let square = self.width * self.width;
-        if square.is_finite() { self.loss.weight(s / square, d) } else { 1.0 }
+        self.loss.weight(s / (self.width * self.width), d)
     }
 }
 

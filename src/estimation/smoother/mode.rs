@@ -77,9 +77,9 @@ pub(super) struct Effort<'a> {
 /// valley that does not explain them hardly anything.
 const FEW: usize = 3;
 
-/// The widths of a loss through which a search goes that begins far from its end, the last being the loss itself.
-const WIDTHS: [f64; 4] = [f64::INFINITY, 10.0, 3.0, 1.0];
-/// Steps at every width but the last.
+/// The widths of a loss through which a search goes that begins far from its end, from least squares to the loss itself.
+const WIDTHS: [f64; 2] = [10.0, 3.0];
+/// Steps at each of these.
 const STEPS_AT_WIDTH: usize = 8;
 
 /// The largest step: a turn of so many radians, a shift of as many metres; of numbers without a unit a third of that, and
@@ -114,14 +114,10 @@ impl Posterior {
         }
         let tolerance = effort.tolerance * 1e2;
         let coarse = Effort { steps: STEPS_AT_WIDTH, tolerance, hopeless: f64::INFINITY, known: &[] };
-        let mut state = start.clone();
-        for width in WIDTHS.into_iter().filter(|width| *width > 1.0) {
-            let (loss, steps) = if width.is_infinite() {
-                (self.least_squares(&state), Effort { steps: effort.steps, ..coarse })
-            } else {
-                (Graduated { loss: self.loss, width }, coarse)
-            };
-            state = self.descend(loss, &state, layout, steps)?.0;
+        let first = Effort { steps: effort.steps, ..coarse };
+        let (mut state, _) = self.descend(self.least_squares(start), start, layout, first)?;
+        for width in WIDTHS {
+            state = self.descend(Graduated { loss: self.loss, width }, &state, layout, coarse)?.0;
         }
         self.mode(&state, layout, effort)
     }

@@ -174,8 +174,7 @@ impl Posterior {
     /// How many equations they brought, those of outliers at `state` not counted.
     pub fn equations(&self, state: &State, layout: &Layout) -> f64 {
         if !self.loss.is_robust() {
-            let kept: usize = self.all().map(|seen| seen.observation.equations()).sum();
-            return kept as f64 + self.settled.as_ref().map_or(0.0, Settled::equations);
+            return self.equations_by_noise().iter().sum();
         }
         self.fit(state, layout).iter().map(|fit| fit.equations).sum()
     }

@@ -16,10 +16,12 @@
 use super::{
     Smoother, THOROUGH,
     mode::Mode,
+    noise::LEAST_SCALE,
     posterior::{Fit, Posterior},
 };
 use crate::{
     model::{Layout, State},
+    most::middle,
     sensing::{Graduated, Loss},
 };
 
@@ -40,11 +42,6 @@ fn median_square(d: usize) -> f64 {
     d * (1.0 - 2.0 / (9.0 * d)).powi(3)
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
 impl Posterior {
     /// Least squares for all readings but those that are far from where most are.
     pub fn least_squares(&self, state: &State) -> Graduated {
@@ -54,8 +51,9 @@ impl Posterior {
                 squares.push(self.squared(channel, whitened) / whitened.len() as f64);
             });
         }
-        let width = FAR * median(squares).map_or(f64::INFINITY, f64::sqrt).max(1.0);
-        Graduated { loss: if width.is_finite() { Loss::Huber } else { Loss::None }, width }
+        let width = FAR * middle(squares).unwrap_or_default().sqrt().max(1.0);
+        // Where numbers end there is nothing to be robust against.
+        if width.is_finite() { Graduated { loss: Loss::Huber, width } } else { Loss::None.into() }
     }
 
     /// By kind of noise: the scale of most readings at `state`; `None` where there are none.
@@ -69,7 +67,7 @@ impl Posterior {
                 }
             });
         }
-        squares.into_iter().map(|squares| median(squares).map(f64::sqrt)).collect()
+        squares.into_iter().map(|squares| middle(squares).map(f64::sqrt)).collect()
     }
 }
 
@@ -95,11 +93,13 @@ impl Smoother {
             return false;
         }
         let layout = self.belief.layout.clone();
-        let best = self.hypotheses.modes.first().map(|mode| mode.state.clone());
-        if best.as_ref().is_some_and(|state| !self.is_doubtful(state, &layout)) && !self.is_worse_than(starts) {
+        let best = self.hypotheses.modes.first();
+        let is_doubtful = best.is_none_or(|mode| self.is_exceeded(&self.common(mode, &layout)))
+            || starts.iter().any(|start| self.is_exceeded(&self.posterior.common_scales(start)));
+        if !is_doubtful {
             return false;
         }
-        let starts = best.iter().chain(starts.iter().copied());
+        let starts = best.map(|mode| &mode.state).into_iter().chain(starts.iter().copied());
         let tried: Vec<Self> = starts.filter_map(|start| self.by_most_readings(start, &layout)).collect();
         let mut revised = false;
         for trial in tried {
@@ -111,28 +111,27 @@ impl Smoother {
         revised
     }
 
-    /// Whether most readings scatter much less at the heaviest mode than a scale says that is learned.
-    fn is_doubtful(&self, state: &State, layout: &Layout) -> bool {
-        let Some(mode) = self.hypotheses.modes.first() else { return true };
-        let common = self.common(mode, state, layout);
-        let scales = common.iter().zip(&self.posterior.scales).zip(&self.unknown);
-        scales.into_iter().any(|((common, scale), unknown)| *unknown && common.is_some_and(|it| it < DOUBTFUL * scale))
+    /// Whether a scale that is learned is much larger than that of most readings.
+    fn is_exceeded(&self, common: &[Option<f64>]) -> bool {
+        let mut scales = common.iter().zip(&self.posterior.scales).zip(&self.unknown);
+        scales.any(|((common, scale), unknown)| *unknown && common.is_some_and(|common| common < DOUBTFUL * scale))
     }
 
-    /// Whether most readings scatter much less at one of these, where nothing was learned yet, than a scale says that is learned.
-    fn is_worse_than(&self, starts: &[&State]) -> bool {
-        starts.iter().any(|start| {
-            let common = self.posterior.common_scales(start).into_iter();
-            let mut scales = common.zip(&self.posterior.scales).zip(&self.unknown);
-            scales.any(|((common, scale), unknown)| *unknown && common.is_some_and(|it| it < DOUBTFUL * scale))
-        })
+    /// Takes the scales of most readings for those that are learned, as far as these tell them.
+    fn take_scales(&mut self, common: Vec<Option<f64>>) {
+        for ((scale, common), unknown) in self.posterior.scales.iter_mut().zip(common).zip(&self.unknown) {
+            if let (Some(common), true) = (common, *unknown) {
+                *scale = common.max(LEAST_SCALE);
+            }
+        }
     }
 
-    /// The scales of most readings, as they would be without what parameters account for; `None` where hardly anything else is left.
-    fn common(&self, mode: &Mode, state: &State, layout: &Layout) -> Vec<Option<f64>> {
+    /// The scales of most readings at a mode, as they would be without what parameters account for; `None` where hardly anything else
+    /// is left.
+    fn common(&self, mode: &Mode, layout: &Layout) -> Vec<Option<f64>> {
         let Some(absorbed) = self.posterior.absorbed(mode, layout) else { return Vec::new() };
-        let equations = self.posterior.fit(state, layout).into_iter().map(|fit| fit.equations);
-        let common = self.posterior.common_scales(state).into_iter();
+        let equations = self.posterior.fit(&mode.state, layout).into_iter().map(|fit| fit.equations);
+        let common = self.posterior.common_scales(&mode.state).into_iter();
         let of = |((common, absorbed), equations): ((Option<f64>, f64), f64)| {
             let spare = equations - absorbed;
             common.filter(|_| spare >= SPARE).map(|common| common * (equations / spare).sqrt())
@@ -146,19 +145,11 @@ impl Smoother {
         let loss = std::mem::replace(&mut trial.posterior.loss, Loss::Huber);
         let mut state = start.clone();
         // As far as parameters have not explained anything yet, what is left of the readings is no noise.
-        for (noise, common) in self.posterior.common_scales(start).into_iter().enumerate() {
-            if let (Some(common), true) = (common, self.unknown[noise]) {
-                trial.posterior.scales[noise] = common.max(super::noise::LEAST_SCALE);
-            }
-        }
+        trial.take_scales(self.posterior.common_scales(start));
         for _ in 0..ROUNDS {
             let mode = trial.posterior.mode(&state, layout, THOROUGH).ok()?;
             let before = trial.posterior.scales.clone();
-            for (noise, common) in trial.common(&mode, &mode.state, layout).into_iter().enumerate() {
-                if let (Some(common), true) = (common, self.unknown[noise]) {
-                    trial.posterior.scales[noise] = common.max(super::noise::LEAST_SCALE);
-                }
-            }
+            trial.take_scales(trial.common(&mode, layout));
             state = mode.state;
             let change =
                 before.iter().zip(&trial.posterior.scales).map(|(a, b)| (a / b).ln().abs()).fold(0.0, f64::max);
@@ -217,13 +208,7 @@ mod tests {
         let prior = Prior::around(guess, &layout, covariance).expect("a prior");
         let truth = prior.draw(&layout, &mut rng);
         let rig = Rig::tracker(SIGMA);
-        let observe = |_| {
-            let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
-            let v: Vec<f64> = (0..3).map(|_| rng.sample::<f64, _>(rand_distr::StandardNormal)).collect();
-            let observation = rig.observe(&truth, &theta, &v);
-            (theta, observation)
-        };
-        let seen = (0..rows).map(observe).collect();
+        let seen = (0..rows).map(|_| seen_by(&rig, &truth, 1.0, &mut rng)).collect();
         let (layout, assumed) = (Arc::new(layout), Arc::new(rig.assuming(SIGMA * 2.0)));
         let smoother = move || {
             let settings = HypothesisSettings { kept: 8, spawned: 8 };
@@ -233,6 +218,22 @@ mod tests {
                 .with_unknown_noise(vec![true])
         };
         (truth, seen, smoother)
+    }
+
+    /// One that searches hardly any other hypothesis, with noise as it is told or learned from that.
+    fn plain(prior: Prior, layout: Layout, rig: &Arc<Rig>, spawned: usize, unknown: bool) -> Smoother {
+        let settings = HypothesisSettings { kept: 2, spawned };
+        Smoother::new(prior, Arc::new(layout), rig.clone(), settings, ChaCha8Rng::seed_from_u64(1))
+            .with_loss(Loss::MIXTURE)
+            .with_unknown_noise(vec![unknown])
+    }
+
+    /// A movement, and what is seen of it with so many σ of noise.
+    fn seen_by(rig: &Rig, truth: &State, size: f64, rng: &mut ChaCha8Rng) -> (Vec<f64>, Observation) {
+        let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
+        let v: Vec<f64> = (0..3).map(|_| size * rng.sample::<f64, _>(rand_distr::StandardNormal)).collect();
+        let observation = rig.observe(truth, &theta, &v);
+        (theta, observation)
     }
 
     fn of(seen: &[(Vec<f64>, Observation)]) -> Vec<(&[f64], &Observation)> {
@@ -312,14 +313,10 @@ mod tests {
             let prior = Prior::with_deviations(guess, &layout, &deviations).expect("a prior");
             let truth = prior.draw(&layout, &mut rng);
             let rig = Arc::new(Rig::tracker(1e-4));
-            let settings = HypothesisSettings { kept: 2, spawned: 0 };
-            let mut smoother = Smoother::new(prior, Arc::new(layout), rig.clone(), settings, rng.clone())
-                .with_loss(Loss::MIXTURE)
-                .with_unknown_noise(vec![unknown]);
+            let mut smoother = plain(prior, layout, &rig, 0, unknown);
             for _ in 0..12 {
-                let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
-                let v: Vec<f64> = (0..3).map(|_| rng.sample::<f64, _>(rand_distr::StandardNormal)).collect();
-                smoother.correct(&theta, &rig.observe(&truth, &theta, &v)).expect("absorbed");
+                let (theta, observation) = seen_by(&rig, &truth, 1.0, &mut rng);
+                smoother.correct(&theta, &observation).expect("absorbed");
             }
             let outliers = smoother.readings().iter().filter(|it| it.weight < 0.5).count();
             let theta = [0.3, -0.7, 1.1, 0.2];
@@ -338,15 +335,11 @@ mod tests {
             let deviations = nalgebra::DVector::from_element(layout.dimension(), 1e-2);
             let prior = Prior::with_deviations(truth.clone(), &layout, &deviations).expect("a prior");
             let rig = Arc::new(Rig::tracker(SIGMA));
-            let settings = HypothesisSettings { kept: 2, spawned: 1 };
-            let mut smoother = Smoother::new(prior, Arc::new(layout), rig.clone(), settings, rng.clone())
-                .with_loss(Loss::MIXTURE)
-                .with_unknown_noise(vec![true]);
+            let mut smoother = plain(prior, layout, &rig, 1, true);
             for movement in 0..30 {
-                let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
                 let size = if movement == 0 { 0.0 } else { 1.0 };
-                let v: Vec<f64> = (0..3).map(|_| size * rng.sample::<f64, _>(rand_distr::StandardNormal)).collect();
-                smoother.correct(&theta, &rig.observe(&truth, &theta, &v)).expect("absorbed");
+                let (theta, observation) = seen_by(&rig, &truth, size, &mut rng);
+                smoother.correct(&theta, &observation).expect("absorbed");
                 let outliers = smoother.readings().iter().filter(|it| it.weight < 0.5).count();
                 assert_eq!(outliers, 0, "seed {seed}, movement {movement}");
             }
