@@ -3,6 +3,7 @@
 //! ```sh
 //! cargo run --release --no-default-features --example changes -- 20 80 1001 1100    # change after 20 of 80 movements, seeds
 //! cargo run --release --no-default-features --example changes -- 0 200 1001 1100    # no change: false alarms
+//! cargo run --release --no-default-features --example changes -- 0 200 1001 1100 2  # the same, with noise twice as large as stated
 //! ```
 
 use body_schema::{
@@ -29,7 +30,7 @@ fn tilt(state: &mut State, joint: usize) {
 }
 
 /// The movements at which it noticed a change, and the mean prediction error at the end, millimetres.
-fn run(scenario: &Scenario, seed: u64, change: u64, movements: u64) -> (Vec<u64>, f64) {
+fn run(scenario: &Scenario, noise_factor: f64, seed: u64, change: u64, movements: u64) -> (Vec<u64>, f64) {
     let learner = scenario.chosen(Some(&["global".to_owned()])).expect("a learner").remove(0);
     let mut agent = scenario.agent(&learner, seed).expect("an agent");
     let mut truth = scenario.robot.state.clone();
@@ -41,7 +42,8 @@ fn run(scenario: &Scenario, seed: u64, change: u64, movements: u64) -> (Vec<u64>
             tilt(&mut truth, elbow);
         }
         let proposal = agent.propose(1).expect("chosen")[0].clone();
-        let noise: Vec<f64> = (0..scenario.rig.equations()).map(|_| rng.sample(StandardNormal)).collect();
+        let draw = |_| noise_factor * rng.sample::<f64, _>(StandardNormal);
+        let noise: Vec<f64> = (0..scenario.rig.equations()).map(draw).collect();
         let moved = proposal.selection.movement;
         let observation = scenario.rig.observe(&truth, &moved.configuration, &noise);
         let executed = Executed { proposal: Some(proposal.id), movement: moved, observation };
@@ -59,13 +61,21 @@ fn run(scenario: &Scenario, seed: u64, change: u64, movements: u64) -> (Vec<u64>
 }
 
 fn main() {
-    let given: Vec<u64> = std::env::args().skip(1).filter_map(|number| number.parse().ok()).collect();
-    let &[change, movements, first, last] = given.as_slice() else {
-        eprintln!("changes CHANGE MOVEMENTS FIRST_SEED LAST_SEED: four whole numbers; CHANGE 0 is none");
+    let given: Vec<f64> = std::env::args().skip(1).filter_map(|number| number.parse().ok()).collect();
+    let (whole, noise_factor) = match given.as_slice() {
+        [whole @ .., factor] if whole.len() == 4 => (whole, *factor),
+        whole => (whole, 1.0),
+    };
+    let &[change, movements, first, last] = whole else {
+        eprintln!(
+            "changes CHANGE MOVEMENTS FIRST_SEED LAST_SEED [NOISE]: four whole numbers, CHANGE 0 is none; and by how much"
+        );
+        eprintln!("the noise is larger than is stated, 1 if not given");
         std::process::exit(2);
     };
+    let [change, movements, first, last] = [change, movements, first, last].map(|number| number as u64);
     let scenario = builtin("arm-6dof").expect("built in");
-    let runs: Vec<_> = (first..=last).map(|seed| run(&scenario, seed, change, movements)).collect();
+    let runs: Vec<_> = (first..=last).map(|seed| run(&scenario, noise_factor, seed, change, movements)).collect();
     let within = |most: u64| {
         let is_soon = |at: &u64| change > 0 && *at > change && *at <= change + most;
         runs.iter().filter(|(noticed, _)| noticed.iter().any(is_soon)).count()

@@ -105,7 +105,7 @@ impl Evidence {
                 if excess > 0.0 {
                     all = log_sum(all, log_odds + (-(-excess).exp()).ln_1p());
                 }
-                if best.as_ref().is_none_or(|best| log_odds > best.log_odds) {
+                if jump.has_room && best.as_ref().is_none_or(|best| log_odds > best.log_odds) {
                     best = Some(Change { since: place, jump: jump.clone(), log_odds });
                 }
             }

@@ -39,6 +39,9 @@ const ALARM_AGAIN: f64 = 3.0;
 /// The same where noise that nobody told is larger than is usual of its sensor: the model has errors then, and what it cannot
 /// explain differs from posture to posture as a change does from movement to movement.
 const ALARM_OF_MODEL: f64 = 6.0;
+/// The logarithm of the odds from which on it is plain how the body has changed, and the movements after which that is taken to be so.
+const PLAIN: f64 = 8.0;
+const PATIENCE: u64 = 6;
 /// What speaks for a change without a reading that may be an outlier.
 const SUPPORT: f64 = -4.0;
 /// The scale beyond which noise is larger than was told, or than is usual.
@@ -62,6 +65,7 @@ impl Smoother {
     /// Since when the body has changed and how, if the readings say so; and whether they misfit.
     pub(super) fn notices_change(&mut self) -> Option<Change> {
         self.misfit = None;
+        self.told_at = self.told_at.filter(|movement| self.movements < movement + SOON);
         let mode = self.hypotheses.modes.first()?;
         if self.posterior.loss.is_robust() {
             self.misfit = self.outliers(mode);
@@ -69,7 +73,7 @@ impl Smoother {
             return if self.is_settled() { self.rejected_change(mode) } else { None };
         }
         let jumps = self.jumps(mode);
-        let soon = self.is_revising();
+        let soon = self.is_revising() && self.told_at.is_none();
         let is_unusual = |untold: bool| {
             let mut scales = self.unknown.iter().zip(&self.posterior.scales);
             scales.any(|(unknown, scale)| *unknown == untold && *scale > UNUSUAL)
@@ -89,6 +93,7 @@ impl Smoother {
         if is_new && found.log_odds > alarm {
             let suspect = self.suspect(found.since);
             if suspect.is_none_or(|suspect| self.is_supported(suspect, mode, &jumps)) {
+                self.misfit = Some(Misfit { since, cause });
                 return Some(found);
             }
             cause = MisfitCause::Outliers;
@@ -159,7 +164,7 @@ impl Smoother {
         let mut best: Option<Change> = None;
         for &since in candidates {
             let Some(before) = self.before(since) else { continue };
-            for jump in &jumps {
+            for jump in jumps.iter().filter(|jump| jump.has_room) {
                 let change = Change { since, jump: jump.clone(), log_odds: f64::NEG_INFINITY };
                 let Some(After { mode: after, log_odds, .. }) = self.after(&before.1, &change, mode) else { continue };
                 let mut explained = 0;
@@ -202,6 +207,16 @@ impl Smoother {
         Some(After { posterior, mode: found, log_odds })
     }
 
+    /// Takes note of a change that has been told: what was learned before is given up once it is plain how the body has changed. The
+    /// first readings after a change often tell that there was one, but not yet of which joint.
+    pub(super) fn noticed(&mut self, change: &Change) {
+        let told = *self.told_at.get_or_insert(self.movements);
+        let is_plain = self.posterior.loss.is_robust() || change.log_odds > PLAIN;
+        if is_plain || self.movements >= told + PATIENCE {
+            self.changed(change);
+        }
+    }
+
     /// Whether it is still learning how the body has changed: what is found now is no other change, but a better account of the
     /// last.
     pub(super) fn is_revising(&self) -> bool {
@@ -209,9 +224,11 @@ impl Smoother {
     }
 
     /// Takes note that the body has changed.
-    pub(super) fn changed(&mut self, change: &Change) {
+    fn changed(&mut self, change: &Change) {
         let layout = self.belief.layout.clone();
         self.changed_at = Some(self.movements);
+        self.told_at = None;
+        self.misfit = None;
         let Some(mode) = self.hypotheses.modes.first().cloned().filter(|_| self.forgets) else { return };
         let since = self.posterior.measurements.get(change.since).map_or(u64::MAX, |seen| seen.movement);
         let dropped: Vec<ReadingReport> =

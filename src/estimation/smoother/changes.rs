@@ -196,13 +196,6 @@ fn a_change_needs_readings_that_agree() {
     assert!(run.smoother.posterior.settled.is_none());
     let belief = run.smoother.belief();
     let spread = |belief: &Belief, joint: usize| belief.direction_covariance(joint).expect("kept").trace();
-    eprintln!(
-        "{} {} {} {}",
-        spread(belief, 0),
-        spread(&before, 0),
-        spread(belief, JOINTS - 1),
-        spread(&before, JOINTS - 1)
-    );
     assert!(spread(belief, 0) < 2.0 * spread(&before, 0), "the first joint is known as before");
     assert!(spread(belief, JOINTS - 1) > 4.0 * spread(&before, JOINTS - 1), "the last one is to be learned anew");
 }

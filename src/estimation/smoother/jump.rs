@@ -5,11 +5,13 @@
 //! | jump | p | columns of B |
 //! |---|---|---|
 //! | one block | its dimension | its coordinates: one axis bent, a marker knocked, a camera moved |
+//! | an axis in place | that of its direction, or of its point | these: one axis turned, or one shifted |
 //! | a joint mounted anew | that of its axis, and 6 | its axis, and a rigid motion of all that is behind it |
 //! | the whole body | m | all |
 //!
-//! Q comes from the *original* prior, however often the body has changed: its covariance, with half its deviations, and several
-//! times as large ones where the prior is so narrow that a collision would exceed it.
+//! Q comes from the *original* prior, however often the body has changed: its covariance, with half its deviations; besides with
+//! several times as large ones where the prior is so narrow that a collision would exceed it, and with a quarter of these where it
+//! is wide. A change that is as large as Q says is noticed sooner than one for which Q is far too wide (Occam's factor).
 
 use nalgebra::{Cholesky, DMatrix, Dyn, Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -31,14 +33,18 @@ pub(super) struct Jump {
     pub log_determinant: f64,
     /// The logarithm of its share among all ways to change.
     pub log_share: f64,
+    /// Whether what is learned after a change may take it to have been this one. To notice it, a small change or one of some
+    /// coordinates may be what tells most; the others may have changed as well, and need room.
+    pub has_room: bool,
 }
 
 /// The variance of what changes, in variances of the original prior.
 const VARIANCE: f64 = 0.25;
-/// How many times as far off a body may be after a change, where the prior is narrow.
-const WIDENED: [f64; 4] = [1.0, 4.0, 16.0, 64.0];
-/// Deviations of an angle (rad) and of a length (m) beyond which no wider prior is tried.
+/// How large a change may be, in such deviations: less where the prior is wide, more where it is narrow.
+const SIZES: [f64; 5] = [0.25, 1.0, 4.0, 16.0, 64.0];
+/// Deviations of an angle (rad) and of a length (m) beyond which no larger change is tried, and below which no smaller one.
 const WIDEST: f64 = 0.5;
+const NARROWEST: f64 = 0.05;
 /// The share of changes that change the body as a whole.
 const WHOLE: f64 = 0.2;
 /// A step for differences, rad or m.
@@ -52,7 +58,7 @@ pub(super) fn log_determinant(root: &Cholesky<f64, Dyn>) -> f64 {
 /// All jumps from `state`; `prior` is the original prior's covariance in the chart there.
 pub(super) fn jumps(state: &State, layout: &Layout, prior: &DMatrix<f64>) -> Vec<Jump> {
     let m = layout.dimension();
-    let mut spaces: Vec<(DMatrix<f64>, DMatrix<f64>)> = Vec::new();
+    let mut spaces: Vec<(DMatrix<f64>, DMatrix<f64>, bool)> = Vec::new();
     let identity = DMatrix::<f64>::identity(m, m);
     let of_block = |range: &std::ops::Range<usize>| {
         let (start, size) = (range.start, range.len());
@@ -73,17 +79,27 @@ pub(super) fn jumps(state: &State, layout: &Layout, prior: &DMatrix<f64>) -> Vec
             for k in 0..6 {
                 spread[(size + k, size + k)] = VARIANCE * if k < 3 { length } else { angle };
             }
-            spaces.push((both, spread));
+            spaces.push((both, spread, true));
         }
-        spaces.push((directions, covariance));
+        if matches!(block, Block::Axis(_)) {
+            for quantity in [Quantity::Angle, Quantity::Length] {
+                let part: Vec<usize> = range.clone().filter(|k| layout.quantities()[*k] == quantity).collect();
+                if !part.is_empty() && part.len() < range.len() {
+                    let inner: Vec<usize> = part.iter().map(|k| k - range.start).collect();
+                    let covariance = covariance.select_columns(&inner).select_rows(&inner);
+                    spaces.push((identity.select_columns(&part), covariance, false));
+                }
+            }
+        }
+        spaces.push((directions, covariance, true));
     }
     let share = ((1.0 - WHOLE) / spaces.len().max(1) as f64).ln();
     let mut jumps: Vec<Jump> = Vec::new();
-    let mut offer = |directions: &DMatrix<f64>, covariance: &DMatrix<f64>, log_share: f64| {
-        for factor in WIDENED {
+    let mut offer = |directions: &DMatrix<f64>, covariance: &DMatrix<f64>, log_share: f64, is_whole: bool| {
+        for factor in SIZES {
             let widened = covariance * (factor * factor);
             let widest = widened.diagonal().iter().fold(0.0_f64, |most, x| most.max(x.sqrt()));
-            if factor != 1.0 && widest >= WIDEST {
+            if (factor > 1.0 && widest >= WIDEST) || (factor < 1.0 && widest < NARROWEST) {
                 continue;
             }
             // What cannot change is no jump.
@@ -94,13 +110,14 @@ pub(super) fn jumps(state: &State, layout: &Layout, prior: &DMatrix<f64>) -> Vec
                 information: root.inverse(),
                 log_determinant: log_determinant(&root),
                 log_share,
+                has_room: is_whole && factor >= 1.0,
             });
         }
     };
-    for (directions, covariance) in &spaces {
-        offer(directions, covariance, share);
+    for (directions, covariance, is_whole) in &spaces {
+        offer(directions, covariance, share, *is_whole);
     }
-    offer(&identity, &(prior * VARIANCE), WHOLE.ln());
+    offer(&identity, &(prior * VARIANCE), WHOLE.ln(), true);
     jumps
 }
 

@@ -85,6 +85,8 @@ pub struct Smoother {
     remembered: Vec<Left>,
     /// The movement at which it was noticed last that the body has changed.
     changed_at: Option<u64>,
+    /// When a change was told of whose account is still awaited.
+    told_at: Option<u64>,
     misfit: Option<Misfit>,
     /// The prior along a chain whose scales are learned, if it is one.
     scaled: Option<Scaled>,
@@ -127,6 +129,7 @@ impl Smoother {
             spare,
             remembered,
             changed_at: None,
+            told_at: None,
             misfit: None,
             scaled: None,
         };
@@ -312,9 +315,9 @@ impl Smoother {
         self.hypotheses.condense(self.settings.kept, &layout);
         // Before the noise is learned: it would take a change for larger noise.
         let change = self.notices_change();
-        let change_noticed = change.is_some() && !self.is_revising();
+        let change_noticed = change.is_some() && !self.is_revising() && self.told_at.is_none();
         if let Some(change) = change {
-            self.changed(&change);
+            self.noticed(&change);
         }
         self.learn_noise();
         self.doubt_noise(&[]);
@@ -326,7 +329,7 @@ impl Smoother {
         // What costs most is asked last.
         if self.belief.alternatives.is_empty() && self.explains() && self.is_determined() {
             self.hypotheses.calm += 1;
-            if self.is_settled() && self.posterior.measurements.len() > KEPT {
+            if self.is_settled() && self.told_at.is_none() && self.posterior.measurements.len() > KEPT {
                 let first = self.posterior.measurements[KEPT / 2].movement;
                 let settling = self.posterior.readings(&self.belief.state).take_while(|it| it.movement < first);
                 Arc::make_mut(&mut self.past).extend(settling);
