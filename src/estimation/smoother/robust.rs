@@ -1,7 +1,8 @@
 //! Noise as most readings have it.
 //!
-//! Least squares let one reading of −9999 decide how large noise is, and with noise that large nothing is an outlier. So scales that
-//! are learned are doubted wherever most readings scatter much less than the scale says: the median of their squares, over the
+//! Least squares let one reading of −9999 decide how large noise is, and with noise that large nothing is an outlier; a few readings
+//! that happen to be exact make it so small that all others are outliers. So scales that are learned are doubted wherever most
+//! readings scatter much less, or much more, than the scale says: the median of their squares, over the
 //! median of χ², is a scale that no minority of readings changes, whatever its size. From there modes are searched with
 //! Huber's loss, the scale in turn with them (an M-estimator with a scale of its own; Huber and Ronchetti, *Robust Statistics*, 7.8),
 //! and then as ever. Of the two, what has more evidence is kept,
@@ -94,8 +95,11 @@ impl Smoother {
         }
         let layout = self.belief.layout.clone();
         let best = self.hypotheses.modes.first();
-        let is_doubtful = best.is_none_or(|mode| self.is_exceeded(&self.common(mode, &layout)))
-            || starts.iter().any(|start| self.is_exceeded(&self.posterior.common_scales(start)));
+        let is_doubtful = best.is_none_or(|mode| {
+            // Where most readings are taken for outliers, hardly any equation is left that would tell by how much.
+            self.is_exceeded(&self.common(mode, &layout))
+                || self.falls_short(&self.posterior.common_scales(&mode.state))
+        }) || starts.iter().any(|start| self.is_exceeded(&self.posterior.common_scales(start)));
         if !is_doubtful {
             return false;
         }
@@ -115,6 +119,12 @@ impl Smoother {
     fn is_exceeded(&self, common: &[Option<f64>]) -> bool {
         let mut scales = common.iter().zip(&self.posterior.scales).zip(&self.unknown);
         scales.any(|((common, scale), unknown)| *unknown && common.is_some_and(|common| common < DOUBTFUL * scale))
+    }
+
+    /// Whether a scale that is learned is much smaller than that of most readings, which are taken for outliers.
+    fn falls_short(&self, common: &[Option<f64>]) -> bool {
+        let mut scales = common.iter().zip(&self.posterior.scales).zip(&self.unknown);
+        scales.any(|((common, scale), unknown)| *unknown && common.is_some_and(|common| *scale < DOUBTFUL * common))
     }
 
     /// Takes the scales of most readings for those that are learned, as far as these tell them.
@@ -345,6 +355,29 @@ mod tests {
             }
             let scale = smoother.noise()[0].scale;
             assert!((0.7..1.4).contains(&scale), "seed {seed}: {scale}");
+        }
+    }
+
+    /// Nor do the first ten, as of a sensor that repeats what it has been told: once there are more of the others than of these, it is
+    /// these that tell how large noise is.
+    #[test]
+    fn many_readings_without_an_error_do_not_reject_those_after() {
+        for seed in 1001..=1006 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let truth = random_arm(&mut rng, 4);
+            let layout = Layout::new(&truth, (0..4).map(Block::Axis));
+            let deviations = nalgebra::DVector::from_element(layout.dimension(), 1e-2);
+            let prior = Prior::with_deviations(truth.clone(), &layout, &deviations).expect("a prior");
+            let rig = Arc::new(Rig::tracker(SIGMA));
+            let mut smoother = plain(prior, layout, &rig, 1, true);
+            for movement in 0..40 {
+                let size = if movement < 10 { 0.0 } else { 1.0 };
+                let (theta, observation) = seen_by(&rig, &truth, size, &mut rng);
+                smoother.correct(&theta, &observation).expect("absorbed");
+            }
+            let outliers = smoother.readings().iter().filter(|it| it.weight < 0.5).count();
+            let scale = smoother.noise()[0].scale;
+            assert!(outliers == 0 && (0.6..1.4).contains(&scale), "seed {seed}: {outliers} outliers, {scale}");
         }
     }
 }
