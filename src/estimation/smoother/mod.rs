@@ -39,6 +39,7 @@ mod posterior;
 mod prior_scale;
 mod robust;
 mod settled;
+mod wider_prior;
 
 use std::sync::Arc;
 
@@ -88,6 +89,9 @@ pub struct Smoother {
     /// When a change was told of whose account is still awaited.
     told_at: Option<u64>,
     misfit: Option<Misfit>,
+    /// How many times as wide the prior of axes has become as was said, and when that was tried last.
+    widened: f64,
+    prior_doubted_at: u64,
     /// The prior along a chain whose scales are learned, if it is one.
     scaled: Option<Scaled>,
 }
@@ -131,6 +135,8 @@ impl Smoother {
             changed_at: None,
             told_at: None,
             misfit: None,
+            widened: 1.0,
+            prior_doubted_at: 0,
             scaled: None,
         };
         smoother.begin();
@@ -321,6 +327,7 @@ impl Smoother {
         }
         self.learn_noise();
         self.doubt_noise(&[]);
+        self.doubt_prior();
         self.learn_scales();
         if self.hypotheses.modes.is_empty() {
             return Err(EstimationError::Diverged(self.hypotheses.why()));

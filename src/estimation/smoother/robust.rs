@@ -177,7 +177,7 @@ impl Smoother {
     }
 
     /// The logarithm of the evidence of the heaviest mode and its scales, beside those of another.
-    fn evidence_beside(&self, other: &Self) -> f64 {
+    pub(super) fn evidence_beside(&self, other: &Self) -> f64 {
         let Some(mode) = self.hypotheses.modes.first() else { return f64::NEG_INFINITY };
         let fits = self.posterior.fit(&mode.state, &self.belief.layout);
         let all = self.posterior.equations_by_noise();
