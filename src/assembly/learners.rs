@@ -145,6 +145,9 @@ impl Scenario {
             Some(known) => smoother.knowing(known.clone()),
             None => smoother,
         };
+        // What people tell of a robot elsewhere is a guess.
+        let is_elsewhere = matches!(self.world, WorldSpec::Outside { .. });
+        let smoother = if is_elsewhere { smoother.doubting_prior() } else { smoother };
         // Recorded bodies do not change: what looks like it is an outlier or a model that does not hold.
         let is_recorded = matches!(self.world, WorldSpec::Measured { .. });
         Ok(if is_recorded { smoother.never_forgetting() } else { smoother })

@@ -89,6 +89,8 @@ pub struct Smoother {
     /// When a change was told of whose account is still awaited.
     told_at: Option<u64>,
     misfit: Option<Misfit>,
+    /// Whether the robot may be further off than the prior says.
+    doubts_prior: bool,
     /// How many times as wide the prior of axes has become as was said, and when that was tried last.
     widened: f64,
     prior_doubted_at: u64,
@@ -135,6 +137,7 @@ impl Smoother {
             changed_at: None,
             told_at: None,
             misfit: None,
+            doubts_prior: false,
             widened: 1.0,
             prior_doubted_at: 0,
             scaled: None,
@@ -154,6 +157,11 @@ impl Smoother {
     /// The same for a body that never changes: an alarm is raised as ever, but nothing is dropped.
     pub fn never_forgetting(self) -> Self {
         Self { forgets: false, ..self }
+    }
+
+    /// The same for a robot that may be further off than the prior says: this is widened where that has more evidence.
+    pub fn doubting_prior(self) -> Self {
+        Self { doubts_prior: true, ..self }
     }
 
     /// The same where some kinds of noise (in the order of [`Rig::noises`]) are not known: the σ of the rig is then only a unit,
@@ -327,7 +335,9 @@ impl Smoother {
         }
         self.learn_noise();
         self.doubt_noise(&[]);
-        self.doubt_prior();
+        if self.doubts_prior {
+            self.doubt_prior();
+        }
         self.learn_scales();
         if self.hypotheses.modes.is_empty() {
             return Err(EstimationError::Diverged(self.hypotheses.why()));

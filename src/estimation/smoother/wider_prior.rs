@@ -109,7 +109,8 @@ mod tests {
         let settings = HypothesisSettings { kept: 4, spawned: 4 };
         let mut smoother = Smoother::new(prior, Arc::new(layout), rig.clone(), settings, rng.clone())
             .with_loss(loss)
-            .with_unknown_noise(vec![true]);
+            .with_unknown_noise(vec![true])
+            .doubting_prior();
         for _ in 0..MOVEMENTS {
             let theta: Vec<f64> = (0..JOINTS).map(|_| rng.random_range(-1.5..1.5)).collect();
             let noise: Vec<f64> = (0..3).map(|_| rng.sample(rand_distr::StandardNormal)).collect();
