@@ -6,8 +6,8 @@
     python examples/panda_pybullet.py --url http://localhost:8080     # the same through a server
 
 Every joint's frame is shifted by up to 1 cm and turned by up to 3 degrees, a marker hangs somewhere on the last link, and its
-position is read with noise of 0.5 mm. Nobody says how wrong the URDF is. After 20 movements the learned URDF is loaded back into PyBullet and predicts the marker at
-200 postures that nobody has seen.
+position is read with noise of 0.5 mm. Nobody says how wrong the URDF is. After 20 movements the learned URDF is loaded back into
+PyBullet and predicts the marker at 200 postures that nobody has seen.
 """
 
 from __future__ import annotations

@@ -250,6 +250,7 @@ impl Smoother {
         } else {
             let latest = self.posterior.measurements.split_off(change.since.min(self.posterior.measurements.len()));
             self.posterior = self.posterior.anew(self.original.clone(), latest);
+            self.widened = 1.0;
             self.begin();
             let found = self.posterior.mode_from_afar(&mode.state, &layout, THOROUGH);
             self.hypotheses.modes.extend(found);

@@ -117,14 +117,17 @@ impl Smoother {
 
     /// Whether a scale that is learned is much larger than that of most readings.
     fn is_exceeded(&self, common: &[Option<f64>]) -> bool {
-        let mut scales = common.iter().zip(&self.posterior.scales).zip(&self.unknown);
-        scales.any(|((common, scale), unknown)| *unknown && common.is_some_and(|common| common < DOUBTFUL * scale))
+        self.is_off(common, |common, scale| common < DOUBTFUL * scale)
     }
 
     /// Whether a scale that is learned is much smaller than that of most readings, which are taken for outliers.
     fn falls_short(&self, common: &[Option<f64>]) -> bool {
+        self.is_off(common, |common, scale| scale < DOUBTFUL * common)
+    }
+
+    fn is_off(&self, common: &[Option<f64>], is_off: impl Fn(f64, f64) -> bool) -> bool {
         let mut scales = common.iter().zip(&self.posterior.scales).zip(&self.unknown);
-        scales.any(|((common, scale), unknown)| *unknown && common.is_some_and(|common| *scale < DOUBTFUL * common))
+        scales.any(|((common, scale), unknown)| *unknown && common.is_some_and(|common| is_off(common, *scale)))
     }
 
     /// Takes the scales of most readings for those that are learned, as far as these tell them.
@@ -335,17 +338,23 @@ mod tests {
         }
     }
 
+    /// An arm that is as described, which is known to a centimetre, and noise that is to be learned.
+    fn described_exactly(seed: u64) -> (State, Arc<Rig>, Smoother, ChaCha8Rng) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let truth = random_arm(&mut rng, 4);
+        let layout = Layout::new(&truth, (0..4).map(Block::Axis));
+        let deviations = nalgebra::DVector::from_element(layout.dimension(), 1e-2);
+        let prior = Prior::with_deviations(truth.clone(), &layout, &deviations).expect("a prior");
+        let rig = Arc::new(Rig::tracker(SIGMA));
+        let smoother = plain(prior, layout, &rig, 1, true);
+        (truth, rig, smoother, rng)
+    }
+
     /// A first reading that the guess explains to the last digit does not tell that there is no noise, so that all others were outliers.
     #[test]
     fn a_first_reading_without_an_error_rejects_no_other() {
         for seed in 1..=6 {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let truth = random_arm(&mut rng, 4);
-            let layout = Layout::new(&truth, (0..4).map(Block::Axis));
-            let deviations = nalgebra::DVector::from_element(layout.dimension(), 1e-2);
-            let prior = Prior::with_deviations(truth.clone(), &layout, &deviations).expect("a prior");
-            let rig = Arc::new(Rig::tracker(SIGMA));
-            let mut smoother = plain(prior, layout, &rig, 1, true);
+            let (truth, rig, mut smoother, mut rng) = described_exactly(seed);
             for movement in 0..30 {
                 let size = if movement == 0 { 0.0 } else { 1.0 };
                 let (theta, observation) = seen_by(&rig, &truth, size, &mut rng);
@@ -363,13 +372,7 @@ mod tests {
     #[test]
     fn many_readings_without_an_error_do_not_reject_those_after() {
         for seed in 1001..=1006 {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let truth = random_arm(&mut rng, 4);
-            let layout = Layout::new(&truth, (0..4).map(Block::Axis));
-            let deviations = nalgebra::DVector::from_element(layout.dimension(), 1e-2);
-            let prior = Prior::with_deviations(truth.clone(), &layout, &deviations).expect("a prior");
-            let rig = Arc::new(Rig::tracker(SIGMA));
-            let mut smoother = plain(prior, layout, &rig, 1, true);
+            let (truth, rig, mut smoother, mut rng) = described_exactly(seed);
             for movement in 0..40 {
                 let size = if movement < 10 { 0.0 } else { 1.0 };
                 let (theta, observation) = seen_by(&rig, &truth, size, &mut rng);
