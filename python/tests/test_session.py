@@ -161,13 +161,19 @@ def test_other_threads_run_while_it_plans() -> None:
 
     ticking = threading.Thread(target=tick)
     ticking.start()
-    start = time.perf_counter()
-    session.suggest(3)
-    end = time.perf_counter()
+    # How long a plan takes and how often a busy machine wakes a thread are not promised. Whoever holds the interpreter
+    # throughout a call lets at most one tick in as it begins and one as it ends.
+    most = 0
+    for _ in range(200):
+        start = time.perf_counter()
+        session.suggest(3)
+        end = time.perf_counter()
+        most = max(most, sum(start < at < end for at in ticks))
+        if most > 2:
+            break
     done.set()
     ticking.join()
-    inside = [at for at in ticks if start < at < end]
-    assert len(inside) > 5, f"{len(inside)} in {end - start} s"
+    assert most > 2
 
 
 def test_everything_that_is_public_is_documented() -> None:
