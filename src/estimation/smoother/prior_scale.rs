@@ -27,7 +27,7 @@ use std::{collections::HashMap, sync::Arc};
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Smoother, factor::Factor, mode::Mode, posterior::Posterior};
+use super::{Smoother, factor::Factor, mode::Mode, noise::LEAST_SCALE, posterior::Posterior};
 use crate::model::{ChainPrior, Inverted, Layout, Scales};
 
 /// A prior along a chain, and the scales that it has now.
@@ -83,7 +83,7 @@ impl Smoother {
             self.posterior.prior = prior;
             self.scaled = Some(Scaled { chain, scales: found.scales });
             for (scale, _) in self.posterior.scales.iter_mut().zip(&self.unknown).filter(|(_, unknown)| **unknown) {
-                *scale *= found.log_noise.exp();
+                *scale = (*scale * found.log_noise.exp()).max(LEAST_SCALE);
             }
             self.hypotheses.follow(&self.posterior, &layout);
             self.hypotheses.condense(self.settings.kept, &layout);
@@ -112,6 +112,8 @@ struct Data {
     equations: f64,
     /// By kind of unknown noise: ln of its scale in what is likely.
     sigmas: Vec<f64>,
+    /// The least ln τ: no noise is smaller than the least that is learned, at which equations still are regular.
+    least_log_noise: f64,
 }
 
 impl Data {
@@ -140,6 +142,9 @@ impl Data {
             information,
             equations: seen.iter().map(|noise| fits[*noise].equations).sum(),
             sigmas: seen.iter().map(|noise| (posterior.scales[*noise] / LIKELY_SIGMA).ln()).collect(),
+            least_log_noise: (seen.iter().map(|noise| (LEAST_SCALE / posterior.scales[*noise]).ln()))
+                .fold(f64::NEG_INFINITY, f64::max)
+                .min(0.0),
         };
         (data.squares.is_finite() && data.information.iter().all(|x| x.is_finite())).then_some(data)
     }
@@ -289,7 +294,7 @@ impl<'a> Lattice<'a> {
     fn evidence(&mut self, (origins, noise): Place) -> Option<f64> {
         let log_noise = f64::from(noise) * self.step;
         let probability = self.probabilities[origins];
-        if log_noise.abs() > REACH {
+        if log_noise.abs() > REACH || log_noise < self.data.least_log_noise {
             return None;
         }
         let (chain, zeros) = (self.chain, &self.zeros);
