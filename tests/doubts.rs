@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use body_schema::{
     doubts::{Doubt, DoubtKind, Evidence, Examination, Subject, examine},
+    kinematics::Joint,
     model::urdf::Urdf,
     scenario::Scenario,
     table::{Columns, Quantity, Table},
@@ -192,6 +193,27 @@ fn repeats_tell_the_noise_and_what_had_not_settled() {
     );
 }
 
+/// A chain that is described as well as calibration files say by default.
+fn subject<'a>(
+    columns: &'a [String],
+    joints: &'a [Joint],
+    limits: &'a [Option<(f64, f64)>],
+    target: Point3<f64>,
+) -> Subject<'a> {
+    Subject {
+        columns,
+        joints,
+        limits,
+        target,
+        target_sd_m: 0.3,
+        unknowns: 9,
+        sigma_m: 5e-4,
+        direction_rad: 0.01,
+        point_m: 0.005,
+        base: None,
+    }
+}
+
 /// The doubts about a table of a Panda whose ball was held in two sockets, and nothing measured but joint angles.
 fn panda(spoil: impl FnOnce(&mut Sheet)) -> Vec<Doubt> {
     let mut sheet = Sheet::new(PANDA_CSV);
@@ -207,8 +229,7 @@ fn panda(spoil: impl FnOnce(&mut Sheet)) -> Vec<Doubt> {
     let mut sockets = BTreeMap::new();
     let state = chain.state();
     let limits: Vec<_> = chain.moving().map(|segment| segment.limits).collect();
-    let subject =
-        Subject { columns: &names, joints: &state.joints, limits: &limits, target: Point3::origin(), unknowns: 40 };
+    let subject = subject(&names, &state.joints, &limits, Point3::origin());
     let (lines, configurations): (Vec<usize>, Vec<Vec<f64>>) =
         rows.iter().map(|row| (row.line, row.positions.clone())).unzip();
     let socket = |label: &String| {
@@ -240,13 +261,8 @@ fn a_long_chain_takes_time_that_grows_with_its_joints() {
     let configurations: Vec<Vec<f64>> =
         (0..300).map(|row| (0..800).map(|k| ((row * 31 + k * 17) as f64).sin() * 0.1).collect()).collect();
     let lines: Vec<usize> = (2..302).collect();
-    let subject = Subject {
-        columns: &names,
-        joints: &joints,
-        limits: &vec![None; 800],
-        target: Point3::new(0.1, 0.0, 1.0),
-        unknowns: 9,
-    };
+    let limits = vec![None; 800];
+    let subject = subject(&names, &joints, &limits, Point3::new(0.1, 0.0, 1.0));
     let sockets = Some((0..300).map(|row| row % 3).collect());
     let started = std::time::Instant::now();
     examine(&subject, &Evidence { lines: &lines, configurations: &configurations, sockets, ..Evidence::default() });

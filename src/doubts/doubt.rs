@@ -15,6 +15,16 @@ pub enum DoubtKind {
     Order,
     /// The handedness of a target's coordinates.
     Mirror,
+    /// The size of everything that was seen.
+    Size,
+    /// How poses are written: inverted, or their rotations in another convention.
+    Pose,
+    /// Joints and measurements that do not belong together.
+    Lag,
+    /// Where the base stands.
+    Base,
+    /// Nothing explains the table.
+    Misfit,
     /// A joint that does not move.
     Constant,
     /// Rows outside a joint's limits.

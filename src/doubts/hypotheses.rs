@@ -1,30 +1,43 @@
-//! Other ways to read columns, compared by how well they fit.
+//! Other ways to read a table, compared by how well the description explains them.
+//!
+//! A way is first tried with the chain as it is described, base and target free. Those few that fit best are then compared by the
+//! evidence of the description with its own errors ([`description`](super::description)): what calibration would mend is no fault
+//! of the table. A table of sockets, whose evidence nothing gives a scale, and that of a very long chain are judged by what is left
+//! alone.
 
 use std::f64::consts::PI;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 
 use super::{
     Doubt, DoubtKind, Evidence, Subject,
+    description::{Explained, explain},
     doubt::length,
-    fit::{Fit, Sight},
+    fit::{self, Fit, Placed, Sight},
 };
 use crate::{
     kinematics::{Joint, JointKind},
     most::middle,
 };
 
-/// A way to read a column must bring the residual below this share of what it was.
+/// Where nothing gives evidence a scale a way to read the table must bring the residual below this share of what it was.
 const CONVINCING: f64 = 0.5;
-/// Zeros that are off by less are what calibration is for, radians.
-const OFF: f64 = 0.05;
+/// The logarithm of the odds from which on a way to read the table is told.
+const TOLD: f64 = 15.0;
+/// Zeros that are off by less are what calibration is for, radians; and so are sizes, by less than this share.
+const OFF: f64 = 0.1;
+const ANOTHER_SIZE: f64 = 0.03;
 /// Faults that are looked for one after the other.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 5;
 /// Rows of fits, and the joints above which fits take fewer.
-const ROWS: usize = 200;
+const ROWS: usize = 100;
 const MANY_JOINTS: usize = 40;
 /// Up to so many joints any two columns are tried in each other's place, and beyond it neighbours.
 const SWAPS: usize = 12;
+/// Ways to read the table of which the evidence is asked.
+const ASKED: usize = 8;
+/// A description does not fit where more is left of its readings, once calibrated: a share of how far they are spread, and radians.
+const MISFIT: (f64, f64) = (0.05, 0.09);
 
 /// A way to read the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,41 +50,70 @@ enum Hypothesis {
     Shifted(usize, f64),
     /// Two joints' columns in each other's place.
     Swapped(usize, usize),
-    /// The target's coordinates times a factor.
+    /// The target's coordinates times a factor: another unit.
     Target(f64),
+    /// The same, where it is no unit.
+    Size(f64),
     /// The target's coordinates in a left-handed frame.
     Mirrored,
+    /// The pose of the measurements' frame in the target's.
+    Inverted,
+    /// Rotations the other way round, positions as they are.
+    Transposed,
+    /// The real part of quaternions in the other place: first for last, or last for first.
+    RealFirst,
+    RealLast,
+    /// Rotation vectors that are roll, pitch and yaw; and the other way round.
+    RollPitchYaw,
+    RotationVector,
+    /// Joints as they were so many rows later.
+    Lag(isize),
 }
 
 pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
     let Some(mut readings) = Readings::new(subject, evidence) else { return Vec::new() };
     let mut doubts: Vec<Doubt> = Vec::new();
-    let mut residual = readings.sight.fit(&readings.motions());
+    let mut standing = readings.judged();
     for _ in 0..ROUNDS {
-        let Some((hypothesis, left)) = readings.best().filter(|(_, left)| left.judged < CONVINCING * residual.judged)
-        else {
+        if readings.is_explained(&standing.fit) {
             break;
-        };
-        doubts.push(hypothesis.doubt(subject, &readings.target, residual, left));
-        readings.apply(hypothesis);
-        residual = left;
+        }
+        let Some((hypothesis, found)) = readings.best(&mut standing) else { break };
+        doubts.push(hypothesis.doubt(subject, &readings, &standing.fit, &found.fit));
+        readings = readings.applied(hypothesis);
+        standing = found;
+    }
+    doubts.extend(readings.elsewhere(&standing));
+    if let Some(misfit) = readings.misfit(&standing) {
+        doubts.insert(0, misfit);
     }
     doubts
 }
 
-/// The rows of the fits as they are read at present.
+/// The table as it is read at present.
+#[derive(Clone)]
 struct Readings<'a> {
-    joints: &'a [Joint],
+    subject: Subject<'a>,
+    /// By row that was seen: where the joints were.
     configurations: Vec<Vec<f64>>,
     sight: Sight,
     /// The name of the target.
     target: String,
+    /// By how much the target's coordinates have been scaled.
+    size: f64,
+}
+
+/// What the description makes of a table.
+struct Judged {
+    fit: Fit,
+    /// `None` where evidence has no scale.
+    explained: Option<Explained>,
 }
 
 impl<'a> Readings<'a> {
     fn new(subject: &Subject<'a>, evidence: &Evidence) -> Option<Self> {
-        let most = if subject.joints.len() > MANY_JOINTS { ROWS / 4 } else { ROWS };
-        let usable: Vec<usize> = match (&evidence.sockets, evidence.targets.first()) {
+        let seen = evidence.targets.first();
+        let usable: Vec<usize> = match (&evidence.sockets, seen) {
             (Some(sockets), _) => (0..sockets.len()).collect(),
             (None, Some(seen)) => (0..seen.points.len()).filter(|row| seen.points[*row].is_some()).collect(),
             (None, None) => return None,
@@ -80,31 +122,65 @@ impl<'a> Readings<'a> {
         if usable.len() < 6 {
             return None;
         }
-        let count = usable.len().min(most);
-        let rows: Vec<usize> = (0..count).map(|k| usable[k * usable.len() / count]).collect();
-        let sight = match (&evidence.sockets, evidence.targets.first()) {
-            (Some(sockets), _) => Sight::Sockets(rows.iter().map(|row| sockets[*row]).collect()),
-            (None, seen) => Sight::Points(subject.target, rows.iter().filter_map(|row| seen?.points[*row]).collect()),
+        let sight = match (&evidence.sockets, seen) {
+            (Some(sockets), _) => Sight::Sockets(usable.iter().map(|row| sockets[*row]).collect()),
+            (None, seen) => {
+                let seen = seen?;
+                let turn = |row: usize| seen.turns.get(row).copied().unwrap_or_default();
+                let pose = |row: &usize| Some(Isometry3::from_parts(seen.points[*row]?.coords.into(), turn(*row)));
+                let poses = usable.iter().filter_map(pose).collect();
+                Sight::Target(fit::Seen {
+                    guess: subject.target,
+                    poses,
+                    arm: seen.arm_m.filter(|_| !seen.turns.is_empty()),
+                })
+            }
         };
-        let configurations = rows.iter().map(|row| evidence.configurations[*row].clone()).collect();
-        let target = evidence.targets.first().map(|seen| seen.name.clone()).unwrap_or_default();
-        Some(Self { joints: subject.joints, configurations, sight, target })
+        let configurations = usable.iter().map(|row| evidence.configurations[*row].clone()).collect();
+        let target = seen.map(|seen| seen.name.clone()).unwrap_or_default();
+        Some(Self { subject: *subject, configurations, sight, target, size: 1.0 })
+    }
+
+    fn joints(&self) -> &'a [Joint] {
+        self.subject.joints
+    }
+
+    /// The rows that fits take, spread evenly over the table.
+    fn taken(&self) -> Self {
+        let joints = self.joints().len();
+        let most = if joints > MANY_JOINTS { ROWS / 2 } else { ROWS };
+        let all = self.configurations.len();
+        let count = all.min(most);
+        let rows: Vec<usize> = (0..count).map(|k| k * all / count).collect();
+        let sight = match &self.sight {
+            Sight::Target(seen) => Sight::Target(seen.of(&rows)),
+            Sight::Sockets(sockets) => Sight::Sockets(rows.iter().map(|row| sockets[*row]).collect()),
+        };
+        let configurations = rows.iter().map(|row| self.configurations[*row].clone()).collect();
+        Self { configurations, sight, target: self.target.clone(), ..*self }
     }
 
     /// By row: what the joints do to the last link.
     fn motions(&self) -> Vec<Isometry3<f64>> {
         let motion = |row: &Vec<f64>| {
-            self.joints.iter().zip(row).fold(Isometry3::identity(), |motion, (joint, q)| motion * joint.exp(*q))
+            self.joints().iter().zip(row).fold(Isometry3::identity(), |motion, (joint, q)| motion * joint.exp(*q))
         };
         self.configurations.iter().map(motion).collect()
     }
 
-    fn apply(&mut self, hypothesis: Hypothesis) {
-        if let Sight::Points(_, points) = &mut self.sight {
-            points.iter_mut().for_each(|point| *point = hypothesis.of_point(point));
+    /// The table as a hypothesis reads it.
+    fn applied(&self, hypothesis: Hypothesis) -> Self {
+        let mut read = self.clone();
+        if let Sight::Target(seen) = &mut read.sight {
+            seen.poses.iter_mut().for_each(|pose| *pose = hypothesis.of_pose(pose));
         }
-        let kinds: Vec<JointKind> = self.joints.iter().map(Joint::kind).collect();
-        for row in &mut self.configurations {
+        let kinds: Vec<JointKind> = self.joints().iter().map(Joint::kind).collect();
+        match hypothesis {
+            Hypothesis::Target(factor) | Hypothesis::Size(factor) => read.size *= factor,
+            Hypothesis::Lag(rows) => read.lag(rows),
+            _ => {}
+        }
+        for row in &mut read.configurations {
             match hypothesis {
                 Hypothesis::Scaled(joint, factor) => row[joint] *= factor,
                 Hypothesis::Shifted(joint, by) => row[joint] += by,
@@ -113,55 +189,183 @@ impl<'a> Readings<'a> {
                     let angles = row.iter_mut().zip(&kinds).filter(|(_, kind)| **kind == JointKind::Revolute);
                     angles.for_each(|(angle, _)| *angle *= factor);
                 }
-                Hypothesis::Target(_) | Hypothesis::Mirrored => {}
+                _ => {}
             }
         }
+        read
     }
 
-    /// The hypothesis that fits best, and what it leaves.
-    fn best(&self) -> Option<(Hypothesis, Fit)> {
-        let mut tried = self.of_target();
-        tried.extend(self.of_order());
-        tried.extend(self.of_joints());
-        tried.into_iter().filter(|(_, left)| left.judged.is_finite()).min_by(|a, b| a.1.judged.total_cmp(&b.1.judged))
+    /// What was seen beside the joints of so many rows later.
+    fn lag(&mut self, rows: isize) {
+        let all = self.configurations.len();
+        let pairs: Vec<(usize, usize)> =
+            (0..all).filter_map(|row| Some((row, row.checked_add_signed(rows).filter(|of| *of < all)?))).collect();
+        self.configurations = pairs.iter().map(|(_, joints)| self.configurations[*joints].clone()).collect();
+        let kept: Vec<usize> = pairs.iter().map(|(row, _)| *row).collect();
+        self.sight = match &self.sight {
+            Sight::Target(seen) => Sight::Target(seen.of(&kept)),
+            Sight::Sockets(sockets) => Sight::Sockets(kept.iter().map(|row| sockets[*row]).collect()),
+        };
+    }
+
+    fn judged(&self) -> Judged {
+        let taken = self.taken();
+        let fit = taken.sight.fit(&taken.motions(), true);
+        let explained = taken.explained(&fit, None);
+        Judged { fit, explained }
+    }
+
+    /// What the description makes of the rows of a fit, its own errors included.
+    fn explained(&self, fit: &Fit, from: Option<Placed>) -> Option<Explained> {
+        let (Sight::Target(seen), Some((placed, rows))) = (&self.sight, &fit.placed) else { return None };
+        if self.joints().len() > MANY_JOINTS {
+            return None;
+        }
+        let configurations: Vec<Vec<f64>> = rows.iter().map(|row| self.configurations[*row].clone()).collect();
+        let subject = Subject { sigma_m: self.subject.sigma_m * self.size, ..self.subject };
+        let found = explain(&subject, &configurations, &seen.of(rows), from.unwrap_or(*placed), None)?;
+        // Readings of another unit are as likely as those that they stand for, per unit of their own.
+        let counted = self.subject.counted(rows.len() * 3);
+        // A target is spread as far as its robot reaches, to a factor of two or so.
+        let (expected, spread) = self.spreads(seen);
+        let far = (spread / expected).ln() / 2_f64.ln();
+        let unlikely = if far.is_finite() { 0.5 * far * far } else { 0.0 };
+        Some(Explained { log_evidence: found.log_evidence + counted * self.size.abs().ln() - unlikely, ..found })
+    }
+
+    /// Whether the description explains everything by itself.
+    fn is_explained(&self, fit: &Fit) -> bool {
+        fit.placed.is_some() && fit.judged <= 2.0 * self.subject.sigma_m * self.size
+    }
+
+    /// The hypothesis that is told, if any is, and what it makes of the table; `standing` is found anew where the hypothesis leads to a
+    /// better place.
+    fn best(&self, standing: &mut Judged) -> Option<(Hypothesis, Judged)> {
+        let taken = self.taken();
+        let mut tried = taken.of_target();
+        tried.extend(taken.of_order());
+        tried.extend(taken.of_joints());
+        tried.extend(self.of_lags());
+        let left = |(hypothesis, fit): &(Hypothesis, Fit)| fit.judged / hypothesis.size();
+        tried.retain(|it| left(it).is_finite());
+        tried.sort_by(|a, b| left(a).total_cmp(&left(b)));
+        let Some(before) = standing.explained else {
+            let first = tried.into_iter().next().filter(|it| left(it) < CONVINCING * standing.fit.judged);
+            return first.map(|(hypothesis, fit)| (hypothesis, Judged { fit, explained: None }));
+        };
+        // Another unit may be right and leave much, as long as something else is wrong too.
+        let is_unit = |it: &(Hypothesis, Fit)| matches!(it.0, Hypothesis::Target(_) | Hypothesis::Inverted);
+        tried.retain(|it| is_unit(it) || left(it) < 0.95 * standing.fit.judged);
+        tried.sort_by_key(|it| !is_unit(it));
+        let asked = tried.into_iter().take(ASKED).filter_map(|(hypothesis, _)| {
+            let read = self.applied(hypothesis).taken();
+            let fit = read.sight.fit(&read.motions(), true);
+            let explained = read.explained(&fit, None)?;
+            Some((
+                hypothesis,
+                explained.log_evidence + hypothesis.log_prior(self),
+                Judged { fit, explained: Some(explained) },
+            ))
+        });
+        let asked: Vec<_> = asked.collect();
+        if std::env::var("DBG").is_ok() { eprintln!("null {:?} {:?} {:?}", before, standing.fit.rms, standing.fit.turned); for a in &asked { eprintln!("  {:?} ev {} rms {} {:?} ex {:?}", a.0, a.1, a.2.fit.rms, a.2.fit.turned, a.2.explained); } }
+        let asked = asked.into_iter();
+        let (hypothesis, evidence, found) = asked.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        if evidence - before.log_evidence < TOLD {
+            return None;
+        }
+        // The description as it is read may explain everything where it was not looked for.
+        let there = found.fit.placed.as_ref().and_then(|(placed, _)| taken.explained(&standing.fit, Some(*placed)));
+        if let Some(there) = there.filter(|there| there.log_evidence > before.log_evidence) {
+            standing.explained = Some(there);
+            if evidence - there.log_evidence < TOLD {
+                return None;
+            }
+        }
+        Some((hypothesis, found))
     }
 
     fn whole(&self, hypothesis: Hypothesis) -> (Hypothesis, Fit) {
-        let mut readings = Self {
-            joints: self.joints,
-            configurations: self.configurations.clone(),
-            sight: self.sight.clone(),
-            target: String::new(),
-        };
-        readings.apply(hypothesis);
-        (hypothesis, readings.sight.fit(&readings.motions()))
+        let read = self.applied(hypothesis);
+        (hypothesis, read.sight.fit(&read.motions(), false))
     }
 
     fn of_target(&self) -> Vec<(Hypothesis, Fit)> {
         let mut tried = vec![self.whole(Hypothesis::Angles(PI / 180.0)), self.whole(Hypothesis::Angles(180.0 / PI))];
-        if let Sight::Points(guess, points) = &self.sight {
-            let motions = self.motions();
-            let expected = spread(&motions.iter().map(|motion| motion * guess).collect::<Vec<_>>());
-            for hypothesis in [Hypothesis::Target(1e-3), Hypothesis::Target(1e3), Hypothesis::Mirrored] {
-                let read: Vec<Point3<f64>> = points.iter().map(|point| hypothesis.of_point(point)).collect();
-                // Points that shrink come nearer to anything: they must be spread as the robot's are.
-                let is_likely = (0.2..5.0).contains(&(spread(&read) / expected));
-                let fit = Sight::Points(*guess, read).fit(&motions);
-                tried.extend(is_likely.then_some((hypothesis, fit)));
-            }
+        let Sight::Target(seen) = &self.sight else { return tried };
+        let (expected, spread) = self.spreads(seen);
+        for hypothesis in [Hypothesis::Target(1e-3), Hypothesis::Target(1e3), Hypothesis::Mirrored] {
+            // Points that shrink come nearer to anything: they must be spread as the robot's are.
+            let is_likely = (0.2..5.0).contains(&(hypothesis.size() * spread / expected));
+            tried.extend(is_likely.then(|| self.whole(hypothesis)));
+        }
+        if (0.3..3.0).contains(&(spread / expected)) {
+            let (size, fit) = self.sized();
+            tried.extend(((size - 1.0).abs() > ANOTHER_SIZE).then_some((Hypothesis::Size(size), fit)));
+        }
+        if seen.arm.is_some() {
+            let of_poses = [
+                Hypothesis::Inverted,
+                Hypothesis::Transposed,
+                Hypothesis::RealFirst,
+                Hypothesis::RealLast,
+                Hypothesis::RollPitchYaw,
+                Hypothesis::RotationVector,
+            ];
+            tried.extend(of_poses.map(|hypothesis| self.whole(hypothesis)));
         }
         tried
     }
 
+    /// How far the target would be spread, and how far it was seen to be, metres.
+    fn spreads(&self, seen: &fit::Seen) -> (f64, f64) {
+        let at: Vec<Point3<f64>> = self.motions().iter().map(|motion| motion * seen.guess).collect();
+        let points: Vec<Point3<f64>> = seen.poses.iter().map(|pose| pose.translation.vector.into()).collect();
+        (spread(&at), spread(&points))
+    }
+
+    /// The size with which coordinates fit best.
+    fn sized(&self) -> (f64, Fit) {
+        let left = |log: f64| {
+            let fit = self.whole(Hypothesis::Size(log.exp())).1;
+            (fit.judged / log.exp(), fit)
+        };
+        let grid = (-10..=10).map(|k| f64::from(k) * 0.05);
+        let mut best =
+            grid.map(|log| (log, left(log))).min_by(|a, b| a.1.0.total_cmp(&b.1.0)).unwrap_or((0.0, left(0.0)));
+        let mut step = 0.025;
+        while step > 5e-4 {
+            for log in [best.0 - step, best.0 + step] {
+                let there = left(log);
+                if there.0 < best.1.0 {
+                    best = (log, there);
+                }
+            }
+            step /= 2.0;
+        }
+        (best.0.exp(), best.1.1)
+    }
+
+    fn of_lags(&self) -> Vec<(Hypothesis, Fit)> {
+        if self.configurations.len() < 10 {
+            return Vec::new();
+        }
+        let of = |rows: isize| {
+            let read = self.applied(Hypothesis::Lag(rows)).taken();
+            (Hypothesis::Lag(rows), read.sight.fit(&read.motions(), false))
+        };
+        [-2, -1, 1, 2].map(of).into()
+    }
+
     fn of_order(&self) -> Vec<(Hypothesis, Fit)> {
-        let joints = self.joints.len();
+        let joints = self.joints().len();
         let reach = if joints > SWAPS { 1 } else { joints };
         let pairs = (0..joints).flat_map(|one| (one + 1..joints.min(one + 1 + reach)).map(move |other| (one, other)));
         if joints > MANY_JOINTS {
             return Vec::new();
         }
         pairs
-            .filter(|(one, other)| self.joints[*one].kind() == self.joints[*other].kind() || joints <= SWAPS)
+            .filter(|(one, other)| self.joints()[*one].kind() == self.joints()[*other].kind() || joints <= SWAPS)
             .map(|(one, other)| self.whole(Hypothesis::Swapped(one, other)))
             .collect()
     }
@@ -172,14 +376,14 @@ impl<'a> Readings<'a> {
         let mut tried = Vec::new();
         let mut before: Vec<Isometry3<f64>> = vec![Isometry3::identity(); self.configurations.len()];
         let mut behind = self.motions();
-        for (index, joint) in self.joints.iter().enumerate() {
+        for (index, joint) in self.joints().iter().enumerate() {
             for (row, behind) in self.configurations.iter().zip(&mut behind) {
                 *behind = joint.exp(-row[index]) * *behind;
             }
             let read = |of: &dyn Fn(f64) -> f64| {
                 let rows = self.configurations.iter().zip(before.iter().zip(&behind));
                 let motions = rows.map(|(row, (before, behind))| before * joint.exp(of(row[index])) * behind);
-                self.sight.fit(&motions.collect::<Vec<_>>())
+                self.sight.fit(&motions.collect::<Vec<_>>(), false)
             };
             let factors: &[f64] = match joint.kind() {
                 JointKind::Revolute => &[-1.0, PI / 180.0, 180.0 / PI],
@@ -187,7 +391,7 @@ impl<'a> Readings<'a> {
             };
             tried.extend(factors.iter().map(|&factor| (Hypothesis::Scaled(index, factor), read(&|q| factor * q))));
             if joint.kind() == JointKind::Revolute {
-                let (by, left) = shift(&|by| read(&|q| q + by), self.joints.len() <= MANY_JOINTS);
+                let (by, left) = shift(&|by| read(&|q| q + by), self.joints().len() <= MANY_JOINTS);
                 tried.extend((by.abs() > OFF).then_some((Hypothesis::Shifted(index, by), left)));
             }
             for (row, before) in self.configurations.iter().zip(&mut before) {
@@ -195,6 +399,63 @@ impl<'a> Readings<'a> {
             }
         }
         tried
+    }
+
+    /// The doubt that the base is where the file says.
+    fn elsewhere(&self, standing: &Judged) -> Option<Doubt> {
+        let base = self.subject.base?;
+        let taken = self.taken();
+        let (Sight::Target(seen), Some((placed, rows))) = (&taken.sight, &standing.fit.placed) else { return None };
+        let free = standing.explained?;
+        let configurations: Vec<Vec<f64>> = rows.iter().map(|row| taken.configurations[*row].clone()).collect();
+        let subject = Subject { sigma_m: self.subject.sigma_m * self.size, ..self.subject };
+        let known = explain(&subject, &configurations, &seen.of(rows), *placed, Some(&base))?;
+        let counted = self.subject.counted(rows.len() * 3);
+        let odds = free.log_evidence - known.log_evidence - counted * self.size.abs().ln();
+        let is_better = free.rms.max(self.subject.sigma_m) < CONVINCING * known.rms;
+        if odds < TOLD || !is_better {
+            return None;
+        }
+        let shift = (placed.base.translation.vector - base.at.translation.vector).norm();
+        let turn = placed.base.rotation.angle_to(&base.at.rotation).to_degrees();
+        Some(Doubt {
+            kind: DoubtKind::Base,
+            column: None,
+            lines: Vec::new(),
+            what: format!("the base stands elsewhere than [base] says, by {} and {turn:.0} deg", length(shift)),
+            evidence: format!(
+                "free, the description fits to {} instead of {} rms",
+                length(standing.fit.rms),
+                length(known.rms)
+            ),
+            mend: "correct [base], or leave it out: then it is found from the rows".to_owned(),
+        })
+    }
+
+    /// The doubt that anything explains the table.
+    fn misfit(&self, standing: &Judged) -> Option<Doubt> {
+        let left = standing.explained?;
+        let Sight::Target(seen) = &self.sight else { return None };
+        let (_, spread) = self.spreads(seen);
+        let turned = left.turned.unwrap_or(0.0);
+        if left.rms <= MISFIT.0 * spread && turned <= MISFIT.1 {
+            return None;
+        }
+        let turned = left.turned.map(|turned| format!(" and {:.1} deg", turned.to_degrees())).unwrap_or_default();
+        Some(Doubt {
+            kind: DoubtKind::Misfit,
+            column: None,
+            lines: Vec::new(),
+            what: "the description does not fit these rows".to_owned(),
+            evidence: format!(
+                "{}{turned} rms are left of `{}` where base, target and all axes are fitted, and no other unit, sign, zero, order or frame \
+                 of a column explains them",
+                length(left.rms),
+                self.target
+            ),
+            mend: "is this the robot, and is its target on the link that is named? No calibration of it can be trusted"
+                .to_owned(),
+        })
     }
 }
 
@@ -224,15 +485,57 @@ fn spread(points: &[Point3<f64>]) -> f64 {
 }
 
 impl Hypothesis {
-    fn of_point(self, point: &Point3<f64>) -> Point3<f64> {
+    fn of_pose(self, pose: &Isometry3<f64>) -> Isometry3<f64> {
+        let at = |translation: Vector3<f64>, rotation: UnitQuaternion<f64>| {
+            Isometry3::from_parts(translation.into(), rotation)
+        };
+        let (place, turn) = (pose.translation.vector, pose.rotation);
+        let quaternion = |q: [f64; 4]| UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
         match self {
-            Self::Target(factor) => point * factor,
-            Self::Mirrored => Point3::new(point.y, point.x, point.z),
-            _ => *point,
+            Self::Target(factor) | Self::Size(factor) => at(place * factor, turn),
+            Self::Mirrored => at(Vector3::new(place.y, place.x, place.z), turn),
+            Self::Inverted => pose.inverse(),
+            Self::Transposed => at(place, turn.inverse()),
+            // Read as x, y, z, w, written as w, x, y, z; and the other way round.
+            Self::RealFirst => at(place, quaternion([turn.i, turn.j, turn.k, turn.w])),
+            Self::RealLast => at(place, quaternion([turn.k, turn.w, turn.i, turn.j])),
+            Self::RollPitchYaw => {
+                let it = turn.scaled_axis();
+                at(place, UnitQuaternion::from_euler_angles(it.x, it.y, it.z))
+            }
+            Self::RotationVector => {
+                let (roll, pitch, yaw) = turn.euler_angles();
+                at(place, UnitQuaternion::from_scaled_axis(Vector3::new(roll, pitch, yaw)))
+            }
+            _ => *pose,
         }
     }
 
-    fn doubt(self, subject: &Subject, target: &str, residual: Fit, left: Fit) -> Doubt {
+    /// By how much coordinates are scaled.
+    fn size(self) -> f64 {
+        match self {
+            Self::Target(factor) | Self::Size(factor) => factor,
+            _ => 1.0,
+        }
+    }
+
+    /// The logarithm of how likely such a fault is beside others, before the table is looked at: where two ways explain it alike, the
+    /// plainer one is told.
+    fn log_prior(self, readings: &Readings) -> f64 {
+        let joints = readings.joints().len() as f64;
+        match self {
+            Self::Angles(_) | Self::Target(_) | Self::Inverted | Self::RealFirst | Self::RealLast => 0.0,
+            Self::Scaled(_, factor) if factor < 0.0 => -joints.ln(),
+            Self::Mirrored | Self::Transposed | Self::RollPitchYaw | Self::RotationVector => -1.0,
+            Self::Size(_) => -2.0,
+            Self::Scaled(..) => -1.0 - joints.ln(),
+            Self::Shifted(..) => -2.0 - joints.ln(),
+            Self::Swapped(..) | Self::Lag(_) => -2.0 - 2.0 * joints.ln(),
+        }
+    }
+
+    fn doubt(self, subject: &Subject, readings: &Readings, residual: &Fit, left: &Fit) -> Doubt {
+        let target = || Some(readings.target.clone());
         let column = |joint: usize| subject.columns[joint].clone();
         let turns = |joint: usize| subject.joints[joint].kind() == JointKind::Revolute;
         let small = |factor: f64| factor.abs() < 1.0;
@@ -293,25 +596,86 @@ impl Hypothesis {
             ),
             Self::Target(factor) if small(factor) => (
                 DoubtKind::Unit,
-                Some(target.to_owned()),
+                target(),
                 "positions are millimetres, read as metres".to_owned(),
                 "end their titles with `_mm`",
             ),
             Self::Target(_) => (
                 DoubtKind::Unit,
-                Some(target.to_owned()),
+                target(),
                 "positions are metres, read as millimetres".to_owned(),
                 "end their titles with `_m`",
             ),
+            Self::Size(factor) => (
+                DoubtKind::Size,
+                target(),
+                format!("everything is seen {:.3} times as large as it is described", factor.recip()),
+                "look over the size of the tag or board that was told to what sees it, the unit, and the description's lengths",
+            ),
             Self::Mirrored => (
                 DoubtKind::Mirror,
-                Some(target.to_owned()),
+                target(),
                 "positions are in a left-handed frame".to_owned(),
                 "exchange two coordinates' titles, or turn one's sign round",
             ),
+            Self::Inverted => (
+                DoubtKind::Pose,
+                target(),
+                "poses are inverted: they are those of the sensor as the target sees it".to_owned(),
+                "invert them: as for a camera that is given where a board stands before it",
+            ),
+            Self::Transposed => (
+                DoubtKind::Pose,
+                target(),
+                "rotations are inverted, positions are not".to_owned(),
+                "transpose the rotations: they take the measurements' frame to the target's",
+            ),
+            Self::RealFirst => (
+                DoubtKind::Pose,
+                target(),
+                "quaternions begin with their real part, which is read as the last".to_owned(),
+                "title the columns in the order qw, qx, qy, qz",
+            ),
+            Self::RealLast => (
+                DoubtKind::Pose,
+                target(),
+                "quaternions end with their real part, which is read as the first".to_owned(),
+                "title the columns in the order qx, qy, qz, qw",
+            ),
+            Self::RollPitchYaw => (
+                DoubtKind::Pose,
+                target(),
+                "rotations are roll, pitch and yaw, read as rotation vectors".to_owned(),
+                "title their columns roll, pitch and yaw",
+            ),
+            Self::RotationVector => (
+                DoubtKind::Pose,
+                target(),
+                "rotations are rotation vectors, read as roll, pitch and yaw".to_owned(),
+                "title their columns rx, ry and rz",
+            ),
+            Self::Lag(rows) => {
+                let (count, which) = (rows.unsigned_abs(), if rows > 0 { "below" } else { "above" });
+                (
+                    DoubtKind::Lag,
+                    None,
+                    format!(
+                        "what was measured belongs to the joints {count} line{} {which}",
+                        if count > 1 { "s" } else { "" }
+                    ),
+                    "pair joints and measurements by their times anew",
+                )
+            }
         };
-        let evidence =
-            format!("read so, the description fits to {} instead of {} rms", length(left.rms), length(residual.rms));
+        let turned =
+            |fit: &Fit| fit.turned.map(|turned| format!(" and {:.2} deg", turned.to_degrees())).unwrap_or_default();
+        let evidence = format!(
+            "read so, the description fits to {}{} instead of {}{} rms",
+            length(left.rms),
+            turned(left),
+            length(residual.rms),
+            turned(residual)
+        );
         Doubt { kind, column, lines: Vec::new(), what, evidence, mend: mend.to_owned() }
     }
 }

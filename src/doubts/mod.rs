@@ -4,20 +4,23 @@
 //! evidence. It corrects nothing.
 //!
 //! Whether numbers fit the description is judged by fits in which what nobody knows is free: where the base stands and
-//! where the target is on the last link (nine numbers), or the target alone where it was held in sockets (three). A column
-//! is doubted where reading it otherwise, in another unit, with the other sign, from another zero or in another's
-//! place, brings the fit's residual to less than half. The offset of the first joint moves the whole robot and that of
-//! the last may move the target with it: what the base and the target absorb cannot be seen.
+//! where the target is on the last link, or the target alone where it was held in sockets. A column is doubted where
+//! reading it otherwise, in another unit, with the other sign, from another zero, in another's place, as another
+//! convention of poses or beside other rows, is much likelier by the evidence of the description, whose own errors are those that
+//! calibration is for; of sockets, where it brings the residual to less than half. Where nothing explains the table, that is said
+//! first. The offset of the first joint moves the whole robot and that of the last may move the target with it: what
+//! the base and the target absorb cannot be seen.
 //!
 //! Time and memory grow with rows and joints: fits use rows spread evenly over the table, at most some hundreds.
 
 mod columns;
+mod description;
 mod doubt;
 mod fit;
 mod hypotheses;
 mod repeats;
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3, UnitQuaternion};
 
 pub use doubt::{Doubt, DoubtKind};
 
@@ -34,8 +37,29 @@ pub struct Subject<'a> {
     pub limits: &'a [Option<(f64, f64)>],
     /// Where the target may be at θ = 0, metres: on the last link, to within some decimetres.
     pub target: Point3<f64>,
+    /// How well that is known, metres.
+    pub target_sd_m: f64,
     /// Parameters that are to be learned.
     pub unknowns: usize,
+    /// What the maker of the sensor promises: one standard deviation of a position per coordinate, metres.
+    pub sigma_m: f64,
+    /// How well the description is known, joint by joint: one standard deviation of a turn, radians.
+    pub direction_rad: f64,
+    /// The same of a shift, metres.
+    pub point_m: f64,
+    /// Where the base is said to be; `None` where nobody knows.
+    pub base: Option<Base>,
+}
+
+/// Where a base is said to be.
+#[derive(Clone, Copy, Debug)]
+pub struct Base {
+    /// In the frame of the measurements.
+    pub at: Isometry3<f64>,
+    /// One standard deviation of its place per coordinate, metres, and of its rotation per axis, radians.
+    pub sd_m: f64,
+    /// See `sd_m`.
+    pub sd_rad: f64,
 }
 
 /// What the table says.
@@ -54,12 +78,16 @@ pub struct Evidence<'a> {
 }
 
 /// Where a target was seen.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Seen {
     /// Its name.
     pub name: String,
     /// By row, metres.
     pub points: Vec<Option<Point3<f64>>>,
+    /// By row how it was turned; empty where no rotation was measured.
+    pub turns: Vec<UnitQuaternion<f64>>,
+    /// A turn by one radian is as unlikely a noise as a shift by so many metres.
+    pub arm_m: Option<f64>,
 }
 
 /// What came of an examination.

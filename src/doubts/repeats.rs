@@ -130,7 +130,7 @@ mod tests {
         let lines: Vec<usize> = (2..12).collect();
         let at = |x: f64| Some(Point3::new(x, 0.0, 0.0));
         let points = [vec![at(0.0), at(0.002)], vec![None; 8]].concat();
-        let targets = vec![Seen { name: "hand".to_owned(), points }];
+        let targets = vec![Seen { name: "hand".to_owned(), points, ..Seen::default() }];
         let evidence = Evidence { lines: &lines, configurations: &configurations, targets, ..Evidence::default() };
         let (_, sigma) = doubts(&evidence);
         // 1 mm to either side: of one coordinate of three, with one degree of freedom each.

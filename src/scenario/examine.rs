@@ -1,11 +1,16 @@
 //! What is doubtful in a scenario's data, and in its prior.
 
-use super::{Measurements, Scenario, ScenarioError, WorldSpec};
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::{Known, Measurements, Scenario, ScenarioError, WorldSpec};
 use crate::{
-    doubts::{Evidence, Examination, Seen, Subject, examine},
-    model::PriorError,
+    doubts::{Base, Evidence, Examination, Seen, Subject, examine},
+    model::{Block, PriorError},
     sensing::Observation,
 };
+
+/// How far a target may be from where the file has it, for all that is known before any row is looked at, metres.
+const TARGET_M: f64 = 0.3;
 
 impl Scenario {
     /// Examines recorded measurements; `None` where the world is simulated.
@@ -22,7 +27,12 @@ impl Scenario {
             joints: &robot.state.joints,
             limits: &limits,
             target: robot.state.marker(),
+            target_sd_m: TARGET_M,
             unknowns: robot.layout.dimension(),
+            sigma_m: self.smoother.sigma,
+            direction_rad: self.prior.direction_rad,
+            point_m: self.prior.point_m,
+            base: self.base_said(),
         };
         let evidence = Evidence {
             lines: &measurements.lines,
@@ -34,6 +44,18 @@ impl Scenario {
         Some(examine(&subject, &evidence))
     }
 
+    /// Where the base is said to be, and how well.
+    fn base_said(&self) -> Option<Base> {
+        let at = self.robot.state.base;
+        match (self.robot.layout.block(Block::Base), self.prior.of(Block::Base)) {
+            (None, _) => Some(Base { at, sd_m: Known::EXACTLY, sd_rad: Known::EXACTLY }),
+            (_, Some(Known::Within { length_m, angle_rad, .. })) => {
+                Some(Base { at, sd_m: length_m, sd_rad: angle_rad })
+            }
+            _ => None,
+        }
+    }
+
     /// Where targets on the last link were seen.
     fn seen(&self, measurements: &Measurements) -> Vec<Seen> {
         let state = &self.robot.state;
@@ -42,8 +64,25 @@ impl Scenario {
             let position = |observation: &Observation| channel.position(observation.readings.get(index)?.as_ref()?);
             let (target, _) = measurements.observations.iter().find_map(position)?;
             let points = measurements.observations.iter().map(|observation| position(observation).map(|seen| seen.1));
-            (state.targets[target].link == state.joints.len())
-                .then(|| Seen { name: name.clone(), points: points.collect() })
+            // A pose: its rotation follows as a rotation vector.
+            let is_pose = channel.equations() == 6;
+            let turn = |observation: &Observation| {
+                let turn =
+                    observation.readings.get(index).and_then(Option::as_ref).and_then(|reading| reading.get(3..6));
+                turn.map_or_else(UnitQuaternion::identity, |it| {
+                    UnitQuaternion::from_scaled_axis(Vector3::from_column_slice(it))
+                })
+            };
+            let turns = measurements.observations.iter().filter(|_| is_pose).map(turn).collect();
+            let arm_m = is_pose
+                .then(|| channel.nominal(0).0 / channel.nominal(3).0)
+                .filter(|arm| arm.is_finite() && *arm > 0.0);
+            (state.targets[target].link == state.joints.len()).then(|| Seen {
+                name: name.clone(),
+                points: points.collect(),
+                turns,
+                arm_m,
+            })
         });
         seen.collect()
     }
