@@ -20,6 +20,8 @@ pub struct Seen {
     pub guess: Point3<f64>,
     /// By row its pose; of a position the rotation says nothing.
     pub poses: Vec<Isometry3<f64>>,
+    /// By row the rotation vector as it was written, which may be longer than half a turn.
+    pub turns: Vec<Vector3<f64>>,
     /// A turn by one radian counts as much as a shift by so many metres; `None` of positions.
     pub arm: Option<f64>,
 }
@@ -86,7 +88,9 @@ impl Seen {
 
     /// These rows alone.
     pub fn of(&self, rows: &[usize]) -> Self {
-        Self { poses: rows.iter().map(|row| self.poses[*row]).collect(), ..self.clone() }
+        let poses = rows.iter().map(|row| self.poses[*row]).collect();
+        let turns = rows.iter().map(|row| self.turns[*row]).collect();
+        Self { poses, turns, ..*self }
     }
 
     /// The fit to all but a few rows that are far off.

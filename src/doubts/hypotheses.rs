@@ -126,12 +126,14 @@ impl<'a> Readings<'a> {
             (Some(sockets), _) => Sight::Sockets(usable.iter().map(|row| sockets[*row]).collect()),
             (None, seen) => {
                 let seen = seen?;
-                let turn = |row: usize| seen.turns.get(row).copied().unwrap_or_default();
-                let pose = |row: &usize| Some(Isometry3::from_parts(seen.points[*row]?.coords.into(), turn(*row)));
-                let poses = usable.iter().filter_map(pose).collect();
+                let turn = |row: &usize| seen.turns.get(*row).copied().unwrap_or_default();
+                let turned = |row: &usize| UnitQuaternion::from_scaled_axis(turn(row));
+                let pose = |row: &usize| Some(Isometry3::from_parts(seen.points[*row]?.coords.into(), turned(row)));
+                let (poses, turns) = (usable.iter().filter_map(pose).collect(), usable.iter().map(turn).collect());
                 Sight::Target(fit::Seen {
                     guess: subject.target,
                     poses,
+                    turns,
                     arm: seen.arm_m.filter(|_| !seen.turns.is_empty()),
                 })
             }
@@ -173,6 +175,10 @@ impl<'a> Readings<'a> {
         let mut read = self.clone();
         if let Sight::Target(seen) = &mut read.sight {
             seen.poses.iter_mut().for_each(|pose| *pose = hypothesis.of_pose(pose));
+            if hypothesis == Hypothesis::RollPitchYaw {
+                let numbers = seen.poses.iter_mut().zip(&seen.turns);
+                numbers.for_each(|(pose, it)| pose.rotation = UnitQuaternion::from_euler_angles(it.x, it.y, it.z));
+            }
         }
         let kinds: Vec<JointKind> = self.joints().iter().map(Joint::kind).collect();
         match hypothesis {
@@ -238,6 +244,13 @@ impl<'a> Readings<'a> {
         fit.placed.is_some() && fit.judged <= 2.0 * self.subject.sigma_m * self.size
     }
 
+    /// Whether what is left of a table, with the errors of the description, is no more than what calibration leaves.
+    fn fits(&self, left: &Explained) -> bool {
+        let Sight::Target(seen) = &self.sight else { return true };
+        let most = (MISFIT.0 * self.spreads(seen).1).max(10.0 * self.subject.sigma_m * self.size);
+        left.rms <= most && left.turned.is_none_or(|turned| turned <= MISFIT.1)
+    }
+
     /// The hypothesis that is told, if any is, and what it makes of the table; `standing` is found anew where the hypothesis leads to a
     /// better place.
     fn best(&self, standing: &mut Judged) -> Option<(Hypothesis, Judged)> {
@@ -260,7 +273,7 @@ impl<'a> Readings<'a> {
         let asked = tried.into_iter().take(ASKED).filter_map(|(hypothesis, _)| {
             let read = self.applied(hypothesis).taken();
             let fit = read.sight.fit(&read.motions(), true);
-            let explained = read.explained(&fit, None)?;
+            let explained = read.explained(&fit, None).filter(|it| hypothesis.may_leave_much() || read.fits(it))?;
             Some((
                 hypothesis,
                 explained.log_evidence + hypothesis.log_prior(self),
@@ -268,7 +281,12 @@ impl<'a> Readings<'a> {
             ))
         });
         let asked: Vec<_> = asked.collect();
-        if std::env::var("DBG").is_ok() { eprintln!("null {:?} {:?} {:?}", before, standing.fit.rms, standing.fit.turned); for a in &asked { eprintln!("  {:?} ev {} rms {} {:?} ex {:?}", a.0, a.1, a.2.fit.rms, a.2.fit.turned, a.2.explained); } }
+        if std::env::var("DBG").is_ok() {
+            eprintln!("null {:?} {:?} {:?}", before, standing.fit.rms, standing.fit.turned);
+            for a in &asked {
+                eprintln!("  {:?} ev {} rms {} {:?} ex {:?}", a.0, a.1, a.2.fit.rms, a.2.fit.turned, a.2.explained);
+            }
+        }
         let asked = asked.into_iter();
         let (hypothesis, evidence, found) = asked.max_by(|a, b| a.1.total_cmp(&b.1))?;
         if evidence - before.log_evidence < TOLD {
@@ -435,10 +453,7 @@ impl<'a> Readings<'a> {
     /// The doubt that anything explains the table.
     fn misfit(&self, standing: &Judged) -> Option<Doubt> {
         let left = standing.explained?;
-        let Sight::Target(seen) = &self.sight else { return None };
-        let (_, spread) = self.spreads(seen);
-        let turned = left.turned.unwrap_or(0.0);
-        if left.rms <= MISFIT.0 * spread && turned <= MISFIT.1 {
+        if self.fits(&left) {
             return None;
         }
         let turned = left.turned.map(|turned| format!(" and {:.1} deg", turned.to_degrees())).unwrap_or_default();
@@ -499,10 +514,6 @@ impl Hypothesis {
             // Read as x, y, z, w, written as w, x, y, z; and the other way round.
             Self::RealFirst => at(place, quaternion([turn.i, turn.j, turn.k, turn.w])),
             Self::RealLast => at(place, quaternion([turn.k, turn.w, turn.i, turn.j])),
-            Self::RollPitchYaw => {
-                let it = turn.scaled_axis();
-                at(place, UnitQuaternion::from_euler_angles(it.x, it.y, it.z))
-            }
             Self::RotationVector => {
                 let (roll, pitch, yaw) = turn.euler_angles();
                 at(place, UnitQuaternion::from_scaled_axis(Vector3::new(roll, pitch, yaw)))
@@ -517,6 +528,12 @@ impl Hypothesis {
             Self::Target(factor) | Self::Size(factor) => factor,
             _ => 1.0,
         }
+    }
+
+    /// Whether it may be right and leave much, since something else is wrong too. What changes all readings by as much as fits best is
+    /// found for anything.
+    fn may_leave_much(self) -> bool {
+        !matches!(self, Self::Size(_) | Self::Lag(_) | Self::RollPitchYaw | Self::RotationVector | Self::Transposed)
     }
 
     /// The logarithm of how likely such a fault is beside others, before the table is looked at: where two ways explain it alike, the

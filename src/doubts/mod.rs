@@ -20,7 +20,7 @@ mod fit;
 mod hypotheses;
 mod repeats;
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 pub use doubt::{Doubt, DoubtKind};
 
@@ -84,8 +84,8 @@ pub struct Seen {
     pub name: String,
     /// By row, metres.
     pub points: Vec<Option<Point3<f64>>>,
-    /// By row how it was turned; empty where no rotation was measured.
-    pub turns: Vec<UnitQuaternion<f64>>,
+    /// By row its rotation vector, as it was written; empty where no rotation was measured.
+    pub turns: Vec<Vector3<f64>>,
     /// A turn by one radian is as unlikely a noise as a shift by so many metres.
     pub arm_m: Option<f64>,
 }

@@ -1,6 +1,6 @@
 //! What is doubtful in a scenario's data, and in its prior.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
 use super::{Known, Measurements, Scenario, ScenarioError, WorldSpec};
 use crate::{
@@ -69,9 +69,7 @@ impl Scenario {
             let turn = |observation: &Observation| {
                 let turn =
                     observation.readings.get(index).and_then(Option::as_ref).and_then(|reading| reading.get(3..6));
-                turn.map_or_else(UnitQuaternion::identity, |it| {
-                    UnitQuaternion::from_scaled_axis(Vector3::from_column_slice(it))
-                })
+                turn.map_or_else(Vector3::zeros, Vector3::from_column_slice)
             };
             let turns = measurements.observations.iter().filter(|_| is_pose).map(turn).collect();
             let arm_m = is_pose
