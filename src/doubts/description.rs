@@ -34,7 +34,7 @@ const FOUND: f64 = 1e-3;
 const COUNTED: f64 = 60.0;
 
 /// What a description explains.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Explained {
     /// The logarithm of the evidence, but for what does not depend on the description.
     pub log_evidence: f64,
@@ -42,6 +42,24 @@ pub struct Explained {
     pub rms: f64,
     /// The same of rotations, radians, where these were seen.
     pub turned: Option<f64>,
+    /// By how much every joint that turns stands beside its reading, rad.
+    pub zeros: Vec<f64>,
+}
+
+/// What is known beside the subject.
+#[derive(Clone, Copy, Debug)]
+pub struct Known<'a> {
+    /// Where the base is; `None` where nobody knows.
+    pub base: Option<&'a Base>,
+    /// Standard deviation of the zeros of joints that turn, rad.
+    pub zero_rad: f64,
+}
+
+impl Known<'_> {
+    /// Nothing but that the description is right, but for what calibration mends.
+    pub const DESCRIBED: Self = Self { base: None, zero_rad: ZERO_RAD };
+    /// That any joint's zero may be anywhere.
+    pub const ZEROS_ANYWHERE: Self = Self { base: None, zero_rad: 1.5 };
 }
 
 /// A chain whose frames may be off.
@@ -70,13 +88,14 @@ pub fn explain(
     rows: &[Vec<f64>],
     seen: &Seen,
     start: Placed,
-    base: Option<&Base>,
+    known: Known<'_>,
 ) -> Option<Explained> {
+    let base = known.base;
     let chain = Chain::new(subject.joints, rows, seen);
     let parameters = PLACES + 6 * subject.joints.len();
     let share = seen.share();
     let equations = (rows.len() * seen.equations()) as f64;
-    let deviations = chain.deviations(subject, seen, base);
+    let deviations = chain.deviations(subject, seen, known);
     let information_before = DMatrix::from_diagonal(&deviations.map(|sd| (sd * sd).recip()));
     let mut standing = Standing {
         placed: base.map_or(start, |base| Placed { base: base.at, ..start }),
@@ -143,7 +162,8 @@ pub fn explain(
     let data = equations * variance.ln() + squares / variance;
     let log_evidence = -0.5 * (counted * data + cost_of_prior(&off) + log_determinant);
     let (rms, turned) = chain.left(&standing);
-    log_evidence.is_finite().then_some(Explained { log_evidence, rms, turned })
+    let zeros = (0..subject.joints.len()).map(|joint| standing.errors[6 * joint + 5]).collect();
+    log_evidence.is_finite().then_some(Explained { log_evidence, rms, turned, zeros })
 }
 
 impl Subject<'_> {
@@ -165,15 +185,16 @@ impl<'a> Chain<'a> {
         Self { joints, frames: frames.collect(), seen, body: seen.body(), rows }
     }
 
-    fn deviations(&self, subject: &Subject, seen: &Seen, base: Option<&Base>) -> DVector<f64> {
-        let (place, turn) = base.map_or(ANYWHERE, |base| (base.sd_m, base.sd_rad));
+    fn deviations(&self, subject: &Subject, seen: &Seen, known: Known<'_>) -> DVector<f64> {
+        let (place, turn) = known.base.map_or(ANYWHERE, |base| (base.sd_m, base.sd_rad));
         let target_turns = if seen.arm.is_some() { ANYWHERE.1 } else { 1e-6 };
         let target = subject.target_sd_m;
         let mut all = vec![place, place, place, turn, turn, turn, target, target, target];
         all.extend([target_turns; 3]);
         let [shift, turn] = [subject.point_m, subject.direction_rad].map(|sd| sd.clamp(1e-6, 1.0));
-        for _ in self.joints {
-            all.extend([shift, shift, shift, turn, turn, turn.max(ZERO_RAD)]);
+        for joint in self.joints {
+            let zero = if joint.line().is_some() { turn.max(known.zero_rad) } else { turn };
+            all.extend([shift, shift, shift, turn, turn, zero]);
         }
         DVector::from_vec(all)
     }

@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 
 use super::{
     Doubt, DoubtKind, Evidence, Subject,
-    description::{Explained, explain},
+    description::{Explained, Known, explain},
     doubt::length,
     fit::{self, Fit, Placed, Sight},
 };
@@ -38,6 +38,9 @@ const SWAPS: usize = 12;
 const ASKED: usize = 8;
 /// A description does not fit where more is left of its readings, once calibrated: a share of how far they are spread, and radians.
 const MISFIT: (f64, f64) = (0.05, 0.09);
+
+/// A robot that reaches farther is described in another unit, metres.
+const LARGE: f64 = 30.0;
 
 /// A way to read the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,7 +81,17 @@ pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
         if readings.is_explained(&standing.fit) {
             break;
         }
-        let Some((hypothesis, found)) = readings.best(&mut standing) else { break };
+        let best = readings.best(&mut standing);
+        let evidence = best.as_ref().and_then(|(_, found)| found.explained.as_ref()).map(|it| it.log_evidence);
+        if let Some((shifts, found)) = readings.of_zeros(&standing, evidence) {
+            doubts.push(zeros_doubt(subject, &shifts, &standing.fit, &found.fit));
+            readings = shifts
+                .iter()
+                .fold(readings, |readings, (joint, by)| readings.applied(Hypothesis::Shifted(*joint, *by)));
+            standing = found;
+            continue;
+        }
+        let Some((hypothesis, found)) = best else { break };
         doubts.push(hypothesis.doubt(subject, &readings, &standing.fit, &found.fit));
         readings = readings.applied(hypothesis);
         standing = found;
@@ -217,19 +230,19 @@ impl<'a> Readings<'a> {
     fn judged(&self) -> Judged {
         let taken = self.taken();
         let fit = taken.sight.fit(&taken.motions(), true);
-        let explained = taken.explained(&fit, None);
+        let explained = taken.explained(&fit, None, Known::DESCRIBED);
         Judged { fit, explained }
     }
 
     /// What the description makes of the rows of a fit, its own errors included.
-    fn explained(&self, fit: &Fit, from: Option<Placed>) -> Option<Explained> {
+    fn explained(&self, fit: &Fit, from: Option<Placed>, known: Known<'_>) -> Option<Explained> {
         let (Sight::Target(seen), Some((placed, rows))) = (&self.sight, &fit.placed) else { return None };
         if self.joints().len() > MANY_JOINTS {
             return None;
         }
         let configurations: Vec<Vec<f64>> = rows.iter().map(|row| self.configurations[*row].clone()).collect();
         let subject = Subject { sigma_m: self.subject.sigma_m * self.size, ..self.subject };
-        let found = explain(&subject, &configurations, &seen.of(rows), from.unwrap_or(*placed), None)?;
+        let found = explain(&subject, &configurations, &seen.of(rows), from.unwrap_or(*placed), known)?;
         // Readings of another unit are as likely as those that they stand for, per unit of their own.
         let counted = self.subject.counted(rows.len() * 3);
         // A target is spread as far as its robot reaches, to a factor of two or so.
@@ -262,7 +275,7 @@ impl<'a> Readings<'a> {
         let left = |(hypothesis, fit): &(Hypothesis, Fit)| fit.judged / hypothesis.size();
         tried.retain(|it| left(it).is_finite());
         tried.sort_by(|a, b| left(a).total_cmp(&left(b)));
-        let Some(before) = standing.explained else {
+        let Some(before) = standing.explained.clone() else {
             let first = tried.into_iter().next().filter(|it| left(it) < CONVINCING * standing.fit.judged);
             return first.map(|(hypothesis, fit)| (hypothesis, Judged { fit, explained: None }));
         };
@@ -273,34 +286,53 @@ impl<'a> Readings<'a> {
         let asked = tried.into_iter().take(ASKED).filter_map(|(hypothesis, _)| {
             let read = self.applied(hypothesis).taken();
             let fit = read.sight.fit(&read.motions(), true);
-            let explained = read.explained(&fit, None).filter(|it| hypothesis.may_leave_much() || read.fits(it))?;
+            let explained = read.explained(&fit, None, Known::DESCRIBED).filter(|it| {
+                hypothesis.may_leave_much()
+                    || read.fits(it)
+                    || left(&(hypothesis, fit.clone())) < CONVINCING * standing.fit.judged
+            })?;
             Some((
                 hypothesis,
                 explained.log_evidence + hypothesis.log_prior(self),
                 Judged { fit, explained: Some(explained) },
             ))
         });
-        let asked: Vec<_> = asked.collect();
-        if std::env::var("DBG").is_ok() {
-            eprintln!("null {:?} {:?} {:?}", before, standing.fit.rms, standing.fit.turned);
-            for a in &asked {
-                eprintln!("  {:?} ev {} rms {} {:?} ex {:?}", a.0, a.1, a.2.fit.rms, a.2.fit.turned, a.2.explained);
-            }
-        }
-        let asked = asked.into_iter();
         let (hypothesis, evidence, found) = asked.max_by(|a, b| a.1.total_cmp(&b.1))?;
         if evidence - before.log_evidence < TOLD {
             return None;
         }
         // The description as it is read may explain everything where it was not looked for.
-        let there = found.fit.placed.as_ref().and_then(|(placed, _)| taken.explained(&standing.fit, Some(*placed)));
+        let there = found
+            .fit
+            .placed
+            .as_ref()
+            .and_then(|(placed, _)| taken.explained(&standing.fit, Some(*placed), Known::DESCRIBED));
         if let Some(there) = there.filter(|there| there.log_evidence > before.log_evidence) {
+            let odds = evidence - there.log_evidence;
             standing.explained = Some(there);
-            if evidence - there.log_evidence < TOLD {
+            if odds < TOLD {
                 return None;
             }
         }
         Some((hypothesis, found))
+    }
+
+    /// The zeros of several joints that are off at once, as where a robot was assembled or homed otherwise than it is described, where
+    /// that explains more than anything else does, of which the evidence is given.
+    fn of_zeros(&self, standing: &Judged, other: Option<f64>) -> Option<(Vec<(usize, f64)>, Judged)> {
+        let before = standing.explained.as_ref().filter(|left| !self.fits(left))?;
+        let taken = self.taken();
+        let free = taken.explained(&standing.fit, None, Known::ZEROS_ANYWHERE)?;
+        let off: Vec<(usize, f64)> = free.zeros.iter().copied().enumerate().filter(|(_, by)| by.abs() > OFF).collect();
+        let read =
+            off.iter().fold(self.clone(), |read, (joint, by)| read.applied(Hypothesis::Shifted(*joint, *by))).taken();
+        let fit = read.sight.fit(&read.motions(), true);
+        let explained = read.explained(&fit, None, Known::DESCRIBED).filter(|left| read.fits(left))?;
+        let doubtful = off.len() as f64 * (2.0 + (self.joints().len() as f64).ln());
+        let evidence = explained.log_evidence - doubtful;
+        let is_told =
+            off.len() > 1 && evidence > before.log_evidence + TOLD && other.is_none_or(|other| evidence > other);
+        is_told.then_some((off, Judged { fit, explained: Some(explained) }))
     }
 
     fn whole(&self, hypothesis: Hypothesis) -> (Hypothesis, Fit) {
@@ -333,6 +365,11 @@ impl<'a> Readings<'a> {
             tried.extend(of_poses.map(|hypothesis| self.whole(hypothesis)));
         }
         tried
+    }
+
+    /// Whether the robot as it is described is as large as no robot is.
+    fn is_too_large(&self) -> bool {
+        matches!(&self.sight, Sight::Target(seen) if self.spreads(seen).0 > LARGE)
     }
 
     /// How far the target would be spread, and how far it was seen to be, metres.
@@ -424,10 +461,16 @@ impl<'a> Readings<'a> {
         let base = self.subject.base?;
         let taken = self.taken();
         let (Sight::Target(seen), Some((placed, rows))) = (&taken.sight, &standing.fit.placed) else { return None };
-        let free = standing.explained?;
+        let free = standing.explained.as_ref()?;
         let configurations: Vec<Vec<f64>> = rows.iter().map(|row| taken.configurations[*row].clone()).collect();
         let subject = Subject { sigma_m: self.subject.sigma_m * self.size, ..self.subject };
-        let known = explain(&subject, &configurations, &seen.of(rows), *placed, Some(&base))?;
+        let known = explain(
+            &subject,
+            &configurations,
+            &seen.of(rows),
+            *placed,
+            Known { base: Some(&base), ..Known::DESCRIBED },
+        )?;
         let counted = self.subject.counted(rows.len() * 3);
         let odds = free.log_evidence - known.log_evidence - counted * self.size.abs().ln();
         let is_better = free.rms.max(self.subject.sigma_m) < CONVINCING * known.rms;
@@ -452,8 +495,8 @@ impl<'a> Readings<'a> {
 
     /// The doubt that anything explains the table.
     fn misfit(&self, standing: &Judged) -> Option<Doubt> {
-        let left = standing.explained?;
-        if self.fits(&left) {
+        let left = standing.explained.as_ref()?;
+        if self.fits(left) {
             return None;
         }
         let turned = left.turned.map(|turned| format!(" and {:.1} deg", turned.to_degrees())).unwrap_or_default();
@@ -472,6 +515,33 @@ impl<'a> Readings<'a> {
                 .to_owned(),
         })
     }
+}
+
+/// The doubt about the zeros of several joints.
+fn zeros_doubt(subject: &Subject, shifts: &[(usize, f64)], residual: &Fit, left: &Fit) -> Doubt {
+    let columns: Vec<&str> = shifts.iter().map(|(joint, _)| subject.columns[*joint].as_str()).collect();
+    let angles: Vec<String> = shifts.iter().map(|(_, by)| format!("{:.0}", -by.to_degrees())).collect();
+    Doubt {
+        kind: DoubtKind::Zero,
+        column: Some(columns.join(", ")),
+        lines: Vec::new(),
+        what: format!("their zeros are {} deg from the description's", angles.join(", ")),
+        evidence: read_so(residual, left),
+        mend: "correct the columns or the joints' <origin>, or learn offsets that wide".to_owned(),
+    }
+}
+
+/// By how much better the description fits.
+fn read_so(residual: &Fit, left: &Fit) -> String {
+    let turned =
+        |fit: &Fit| fit.turned.map(|turned| format!(" and {:.2} deg", turned.to_degrees())).unwrap_or_default();
+    format!(
+        "read so, the description fits to {}{} instead of {}{} rms",
+        length(left.rms),
+        turned(left),
+        length(residual.rms),
+        turned(residual)
+    )
 }
 
 /// The shift within half a turn that leaves least: on a grid of 30 deg, then between its neighbours if `fine`.
@@ -611,6 +681,12 @@ impl Hypothesis {
                 format!("in the place of column `{}`, and that in its", column(other)),
                 "exchange the two titles",
             ),
+            Self::Target(_) if readings.is_too_large() => (
+                DoubtKind::Unit,
+                None,
+                "the description is in millimetres: it should be in metres".to_owned(),
+                "divide the lengths of the URDF by 1000",
+            ),
             Self::Target(factor) if small(factor) => (
                 DoubtKind::Unit,
                 target(),
@@ -684,15 +760,7 @@ impl Hypothesis {
                 )
             }
         };
-        let turned =
-            |fit: &Fit| fit.turned.map(|turned| format!(" and {:.2} deg", turned.to_degrees())).unwrap_or_default();
-        let evidence = format!(
-            "read so, the description fits to {}{} instead of {}{} rms",
-            length(left.rms),
-            turned(left),
-            length(residual.rms),
-            turned(residual)
-        );
+        let evidence = read_so(residual, left);
         Doubt { kind, column, lines: Vec::new(), what, evidence, mend: mend.to_owned() }
     }
 }

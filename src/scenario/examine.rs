@@ -9,7 +9,7 @@ use crate::{
     sensing::Observation,
 };
 
-/// How far a target may be from where the file has it, for all that is known before any row is looked at, metres.
+/// How far a target may be from where the file has it, and a base of which the file says no more than that, for all that is known before any row is looked at, metres.
 const TARGET_M: f64 = 0.3;
 
 impl Scenario {
@@ -49,7 +49,7 @@ impl Scenario {
         let at = self.robot.state.base;
         match (self.robot.layout.block(Block::Base), self.prior.of(Block::Base)) {
             (None, _) => Some(Base { at, sd_m: Known::EXACTLY, sd_rad: Known::EXACTLY }),
-            (_, Some(Known::Within { length_m, angle_rad, .. })) => {
+            (_, Some(Known::Within { length_m, angle_rad, .. })) if length_m < TARGET_M => {
                 Some(Base { at, sd_m: length_m, sd_rad: angle_rad })
             }
             _ => None,
