@@ -128,6 +128,12 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         })
     };
     let scenario = case.scenario;
+    let examination = scenario.examine().unwrap_or_default();
+    let noise = case.noise(&fit);
+    let share = if has_folds { 1.0 - 1.0 / splits.len() as f64 } else { 1.0 };
+    let judged_by = held_out.as_ref().map(|held_out| (&held_out.after, share));
+    let more_rows = case.more_rows(&fit, judged_by, &noise, examination.sigma_m);
+    let doubts = examination.doubts.iter().map(ToString::to_string);
     let report = Report {
         scenario: scenario.name.clone(),
         title: scenario.title.clone(),
@@ -140,9 +146,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         rows: case.rows.len(),
         training_rows: training.len(),
         held_out_by: case.held_out_by(&splits),
-        doubts: (scenario.examine().into_iter().flat_map(|it| it.doubts).map(|doubt| doubt.to_string()))
-            .chain(case.beyond_prior(&fit))
-            .collect(),
+        doubts: doubts.chain(case.beyond_prior(&fit)).collect(),
         parameters: case.determined(&fit),
         training: comparison,
         held_out,
@@ -151,13 +155,13 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         extras: trials.clone(),
         compliance: case.compliance(&fuller),
         outliers: case.outliers(&fit, unlearned.iter().map(|(row, _)| *row).collect()),
-        noise: case.noise(&fit),
+        noise,
         reading_sigmas: fit.reading_sigmas.clone(),
         base: case.base(&fit),
         targets: case.targets(&fit)?,
         joints: case.joints(&fit),
         correlations: case.correlations(&fit),
-        more_rows: case.more_rows(&fit),
+        more_rows,
         residuals: case.readings(&fit, &splits, &judged, selection.as_ref()),
         selection,
         active,

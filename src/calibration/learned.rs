@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Vector3};
 
-use super::{CalibrationError, Case, Correction, Correlation, Fit, Joint, MoreRows, Noise, Placement, Sensed, Target};
+use super::{CalibrationError, Case, Correction, Correlation, Fit, Joint, Noise, Placement, Sensed, Target};
 use crate::{
     kinematics::{self, JointKind, chart},
-    model::{Block, Place, State, Workspace},
+    model::{Block, Place, State},
     sensing::Occasion,
 };
 
@@ -166,57 +166,7 @@ impl Case<'_> {
         };
         name.cloned().unwrap_or_else(|| format!("sensor {}", number + 1))
     }
-
-    /// What more rows would bring.
-    pub(super) fn more_rows(&self, fit: &Fit) -> MoreRows {
-        let configurations = fit.rows.iter().map(|row| self.rows[*row].positions.clone()).take(WORKSPACE).collect();
-        let workspace = Workspace { configurations, up_to_motion: self.scenario.robot.up_to_motion };
-        let mut certain = fit.belief.clone();
-        certain.model_error_m = 0.0;
-        let mm = |metres: f64| metres * 1e3;
-        let from_parameters_mm = certain.expected_error_m(&workspace).map(mm);
-        let (floor, wanted, rows) = (mm(fit.belief.model_error_m), mm(self.scenario.settled_below_m), fit.rows.len());
-        let spare = wanted * wanted - floor * floor;
-        let to_spare: f64 = fit.noise.iter().map(|noise| noise.equations - noise.absorbed).sum();
-        let rows_needed = from_parameters_mm
-            .filter(|_| spare > 0.0 && to_spare >= 1.0)
-            .map(|error| (rows as f64 * error * error / spare).ceil() as u64)
-            .map(|needed| needed.max(1));
-        let said = match (from_parameters_mm, rows_needed) {
-            (None, _) => "nothing is predicted without rows".to_owned(),
-            _ if to_spare < 1.0 => format!(
-                "{rows} rows leave no equation to spare by which it could be told how good predictions are, or how many more rows \
-                 they take: measure more"
-            ),
-            (Some(_), None) => format!(
-                "no number of rows reaches {wanted:.2} mm: {floor:.2} mm of the error is explained by no parameter (gears, \
-                 bending, a loose target), and more rows of the same kind do not make it smaller"
-            ),
-            (Some(error), Some(needed)) if needed as usize <= rows => {
-                format!(
-                    "{wanted:.2} mm are reached: {error:.2} mm are expected from what is not known of the parameters"
-                )
-            }
-            (Some(_), Some(needed)) => format!(
-                "about {} rows more of the same kind, {needed} in all, reach {wanted:.2} mm: what is not known of the \
-                 parameters falls with the root of the number of rows",
-                needed as usize - rows
-            ),
-        };
-        MoreRows {
-            rows,
-            expected_mm: fit.belief.expected_error_m(&workspace).map(mm),
-            from_parameters_mm,
-            model_error_mm: floor,
-            wanted_mm: wanted,
-            rows_needed,
-            said,
-        }
-    }
 }
-
-/// Postures over which expected errors are taken.
-const WORKSPACE: usize = 300;
 
 impl Fit {
     /// The state without what a URDF cannot hold.

@@ -41,6 +41,7 @@ mod init;
 mod laws;
 mod learned;
 mod loads;
+mod more_rows;
 mod outcome;
 mod progress;
 #[cfg(feature = "app")]

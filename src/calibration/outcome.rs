@@ -259,21 +259,31 @@ pub struct Correlation {
     pub correlation: f64,
 }
 
-/// What more rows of the same kind would bring: e² = m² + p² n/N after N rows instead of n.
+/// What more rows of the same kind would bring: e² = m² + p²(N) after N rows instead of n, where p falls as far as the rows tell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MoreRows {
     /// n, the rows that there are.
     pub rows: usize,
-    /// e, the error of a prediction that the model itself expects, millimetres.
+    /// e, the error of a prediction where the table's postures are, by the model itself and by what held-out rows say of it,
+    /// millimetres.
     pub expected_mm: Option<f64>,
     /// p, what of it more rows make smaller, millimetres.
     pub from_parameters_mm: Option<f64>,
     /// m, what no parameter explains, millimetres.
     pub model_error_mm: f64,
+    /// What of p no number of rows like these makes smaller, millimetres.
+    #[serde(default)]
+    pub untold_mm: f64,
+    /// The error of held-out rows without their own noise, root mean square, millimetres; null where no length was held out.
+    #[serde(default)]
+    pub held_out_mm: Option<f64>,
     /// The accuracy that the scenario wants, millimetres.
     pub wanted_mm: f64,
     /// Rows in all that reach it; null where no number does.
     pub rows_needed: Option<u64>,
+    /// The same if m were noise of the sensor; null where repeats tell, or where it makes no difference.
+    #[serde(default)]
+    pub rows_needed_if_noise: Option<u64>,
     /// The same in words.
     pub said: String,
 }
