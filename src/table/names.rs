@@ -125,7 +125,7 @@ impl<'a> Title<'a> {
 
     /// Whether it is of what is called `name`.
     pub fn is_of(&self, name: &str) -> bool {
-        self.before.eq_ignore_ascii_case(name)
+        self.before.eq_ignore_ascii_case(name.trim_end_matches(is_gap))
     }
 }
 

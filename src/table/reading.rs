@@ -240,8 +240,18 @@ fn expected(titles: &[String]) -> String {
 
 /// By title its place in the layout of a position or a pose, and how the rotation is written, if there is one.
 fn in_space(titles: &[String]) -> Result<(Vec<usize>, Rotation), TableError> {
+    // What is complete as it stands needs no guess: a target may be called `q` or `rot`.
+    let plain: Vec<Option<Component>> = titles.iter().map(|title| Some(Title::parse(title)?.component)).collect();
+    let is_complete = |kind: &Rotation| {
+        let mut wanted = Component::PLACE.iter().chain(kind.components()).take(titles.len());
+        let count = if titles.len() == 3 { 3 } else { 3 + kind.components().len() };
+        count == titles.len() && wanted.all(|component| plain.contains(&Some(*component)))
+    };
     let words = last_words(titles);
-    let mut found: Vec<Option<Component>> = titles.iter().map(|title| listed(title, &words)).collect();
+    let mut found = match Rotation::ALL.iter().any(is_complete) {
+        true => plain,
+        false => titles.iter().map(|title| listed(title, &words)).collect(),
+    };
     let is_in_picture = |of: &Component| PICTURE.contains(of) || *of == Component::Distance;
     found.iter_mut().for_each(|of| *of = of.filter(|of| !is_in_picture(of)));
     // x1, x2 and x3 are coordinates by number.
@@ -473,6 +483,8 @@ mod tests {
         };
         for (layout, list, wanted) in [
             (Layout::Pixels(2), "u1,u2,v1,v2", "u1,v1,u2,v2"),
+            (Layout::Position, "q_z,q_x,q_y", "q_x,q_y,q_z"),
+            (Layout::Pose, "rot_x,rot_y,rot_z,rot_rx,rot_rz,rot_ry", "rot_x,rot_y,rot_z,rot_rx,rot_ry,rot_rz"),
             (Layout::Pixels(2), "b_v,b_u,a_u,a_v", "b_u,b_v,a_u,a_v"),
             (Layout::Pixels(1), "cam_y,cam_x", "cam_x,cam_y"),
             (Layout::Pixels(1), "u3,v3", "u3,v3"),
