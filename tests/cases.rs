@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use body_schema::{
-    calibration::{Calibration, Case, Options, Silent, calibrate},
+    calibration::{Calibration, CalibrationError, Case, Options, Silent, calibrate},
+    doubts::{Doubt, DoubtKind},
     scenario::{Problem, Scenario, ScenarioError},
 };
 
@@ -38,6 +39,17 @@ fn calibrated(scenario: &Scenario) -> Calibration {
 
 fn as_it_is(_: &str, text: String) -> String {
     text
+}
+
+/// What is doubted of this kind.
+fn doubts(scenario: &Scenario, kind: DoubtKind) -> Vec<Doubt> {
+    let found = scenario.examine().expect("measured").doubts;
+    found.into_iter().filter(|doubt| doubt.kind == kind).collect()
+}
+
+/// The first so many rows of a table.
+fn first_rows(text: &str, count: usize) -> String {
+    text.lines().take(count + 1).map(|line| format!("{line}\n")).collect()
 }
 
 /// Quaternions whose scalar stands first, by their titles.
@@ -110,4 +122,115 @@ fn joints_are_read_in_their_units() {
         if file == "cal.toml" { text.replace("\"x_cm\",", "\"pan\",") } else { text }
     };
     assert!(problem(case, &joint).what.contains("`pan` is the column of a joint"));
+}
+
+/// Forty-two rows of seven postures: fresh postures are off by 12 mm, and so are folds that hold out whole postures.
+#[test]
+fn folds_keep_repeats_together() {
+    let name = "f22b-7postures-6-repeats";
+    let scenario = valid(name, &as_it_is);
+    let report = calibrated(&scenario).report;
+    let held_out = report.held_out.expect("folds");
+    let mean = held_out.after.mean_mm.expect("lengths");
+    assert!(mean > 5.0, "{mean} mm");
+    assert!(report.held_out_by.contains("holds out postures f, f + 5"), "{}", report.held_out_by);
+    assert!(report.doubts.iter().any(|doubt| doubt.contains("folds keep repeats together")), "{:?}", report.doubts);
+    for fold in &held_out.folds {
+        assert!(fold.rows.len().is_multiple_of(6), "{:?}", fold.rows);
+        assert!(fold.rows.iter().all(|row| fold.rows.contains(&((row - 1) / 6 * 6 + 1))), "{:?}", fold.rows);
+    }
+    // Asked on the command line, and more folds than postures.
+    let case = Case::new(&scenario).expect("measured");
+    let splits = case.splits(Some(9)).expect("folds");
+    assert_eq!(splits.len(), 7);
+    assert!(splits.iter().all(|split| split.held_out.len() == 6 && split.training.len() == 36));
+    let in_nine = |file: &str, text: String| {
+        if file == "cal.toml" { text.replace("folds = 5", "folds = 9") } else { text }
+    };
+    let few = doubts(&valid(name, &in_nine), DoubtKind::FewFolds);
+    assert!(few[0].to_string().contains("9 folds are asked for, and 7 are made (42 rows are 7 postures"), "{few:?}");
+    // One posture says nothing of others.
+    let one = |file: &str, text: String| if file == "data.csv" { first_rows(&text, 6) } else { text };
+    let found = problem(name, &one);
+    assert!(found.what.contains("all 6 rows are one posture") && found.mend.contains("rows = []"), "{found}");
+    let none = |file: &str, text: String| match file {
+        "cal.toml" => text.replace("folds = 5", "rows = []"),
+        "data.csv" => first_rows(&text, 6),
+        _ => text,
+    };
+    let scenario = valid(name, &none);
+    let refused = Case::new(&scenario).expect("measured").splits(Some(3)).expect_err("one posture");
+    assert_eq!(refused, CalibrationError::OnePosture { rows: 6 });
+    // Where no row repeats another a fold is every K-th row.
+    let distinct = valid("t13-columns-cm", &as_it_is);
+    let splits = Case::new(&distinct).expect("measured").splits(Some(4)).expect("folds");
+    assert_eq!(splits[1].held_out, [1, 5, 9, 13, 17, 21]);
+}
+
+/// Encoders that repeat to some hundredths of a milliradian: a draw holds out whole postures too.
+#[test]
+fn draws_keep_repeats_together() {
+    let noisy = |file: &str, text: String| match file {
+        "cal.toml" => text.replace("folds = 5", "count = 14"),
+        "data.csv" => {
+            let mut lines = text.lines();
+            let mut table = lines.next().expect("titles").to_owned() + "\n";
+            for (row, line) in lines.enumerate() {
+                let (first, rest) = line.split_once(',').expect("cells");
+                let pan: f64 = first.parse().expect("a number");
+                table += &format!("{},{rest}\n", pan + 1.5e-5 * (row * 7 % 5) as f64);
+            }
+            table
+        }
+        _ => text,
+    };
+    let scenario = valid("f22b-7postures-6-repeats", &noisy);
+    let splits = Case::new(&scenario).expect("measured").splits(None).expect("as the file says");
+    assert_eq!(splits[0].held_out.len(), 12, "two postures of six");
+    assert!(splits[0].held_out.iter().all(|row| splits[0].held_out.contains(&(row / 6 * 6))));
+    let fewer = |file: &str, text: String| noisy(file, text).replace("count = 14", "count = 5");
+    let found = problem("f22b-7postures-6-repeats", &fewer);
+    assert!(found.what.contains("each posture has 6 rows or more"), "{found}");
+}
+
+#[test]
+fn held_out_rows_that_repeat_training_rows_are_told() {
+    let name = "f22b-7postures-6-repeats";
+    let rows = |rows: &'static str| {
+        move |file: &str, text: String| if file == "cal.toml" { text.replace("folds = 5", rows) } else { text }
+    };
+    let listed = doubts(&valid(name, &rows("rows = [3, 41]")), DoubtKind::Leakage);
+    let [leak] = listed.as_slice() else { panic!("{listed:?}") };
+    assert_eq!(leak.lines, [5, 43]);
+    assert!(leak.evidence.contains("line 5 repeats line 2"), "{leak}");
+    assert!(doubts(&valid(name, &rows("rows = [0, 1, 2, 3, 4, 5]")), DoubtKind::Leakage).is_empty(), "a whole posture");
+    // A second file, one of whose rows repeats one.
+    let second = |file: &str, text_of: String| match file {
+        "cal.toml" => text_of.replace("folds = 5", "file = \"later.csv\""),
+        _ => text_of,
+    };
+    let open = |file: &str| {
+        let lines = text("t13-columns-cm", "data.csv").replace("_cm", "_m");
+        Ok(match file {
+            "later.csv" => lines
+                .lines()
+                .take(3)
+                .chain([lines.lines().nth(7).expect("a row")])
+                .map(|it| it.to_owned() + "\n")
+                .collect(),
+            "data.csv" => lines
+                .lines()
+                .enumerate()
+                .filter(|(at, _)| !(1..3).contains(at))
+                .map(|(_, it)| it.to_owned() + "\n")
+                .collect(),
+            _ => text("t13-columns-cm", file),
+        })
+    };
+    let toml = text("t13-columns-cm", "cal.toml").replace("_cm", "_m");
+    let scenario = Scenario::parse("cal.toml", &second("cal.toml", toml.replace("folds=5", "folds = 5")), &open);
+    let found = doubts(&scenario.unwrap_or_else(|error| panic!("{error}")), DoubtKind::Leakage);
+    let [leak] = found.as_slice() else { panic!("{found:?}") };
+    assert_eq!(leak.lines, [4]);
+    assert!(leak.evidence.contains("line 4 of the file that is held out repeats line 6"), "{leak}");
 }

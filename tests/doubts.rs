@@ -207,8 +207,14 @@ fn panda(spoil: impl FnOnce(&mut Sheet)) -> Vec<Doubt> {
     let mut sockets = BTreeMap::new();
     let state = chain.state();
     let limits: Vec<_> = chain.moving().map(|segment| segment.limits).collect();
-    let subject =
-        Subject { columns: &names, joints: &state.joints, limits: &limits, target: Point3::origin(), unknowns: 40 };
+    let subject = Subject {
+        columns: &names,
+        joints: &state.joints,
+        limits: &limits,
+        target: Point3::origin(),
+        learned: &[true; 7],
+        unknowns: 40,
+    };
     let (lines, configurations): (Vec<usize>, Vec<Vec<f64>>) =
         rows.iter().map(|row| (row.line, row.positions.clone())).unzip();
     let socket = |label: &String| {
@@ -245,6 +251,7 @@ fn a_long_chain_takes_time_that_grows_with_its_joints() {
         joints: &joints,
         limits: &vec![None; 800],
         target: Point3::new(0.1, 0.0, 1.0),
+        learned: &[true; 800],
         unknowns: 9,
     };
     let sockets = Some((0..300).map(|row| row % 3).collect());

@@ -8,7 +8,7 @@ use super::{
     extras::TRIED,
     figures::{Sensed, Unit},
 };
-use crate::{most::middle, selection::Optimality};
+use crate::{doubts::few_folds, most::middle, selection::Optimality};
 
 /// What is asked beside the fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -128,6 +128,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         })
     };
     let scenario = case.scenario;
+    let few = options.folds.and_then(|folds| few_folds(folds, splits.len(), case.rows.len()));
     let report = Report {
         scenario: scenario.name.clone(),
         title: scenario.title.clone(),
@@ -141,6 +142,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         training_rows: training.len(),
         held_out_by: case.held_out_by(&splits),
         doubts: (scenario.examine().into_iter().flat_map(|it| it.doubts).map(|doubt| doubt.to_string()))
+            .chain(few.map(|doubt| doubt.to_string()))
             .chain(case.beyond_prior(&fit))
             .collect(),
         parameters: case.determined(&fit),
@@ -219,7 +221,13 @@ impl Case<'_> {
         let held_out = splits.iter().map(|split| split.held_out.len()).sum::<usize>();
         match splits.len() {
             folds @ 2.. => {
-                format!("every row once, in {folds} folds: fold f holds out rows f, f + {folds}, …, counted from 0")
+                let held_out = format!("f, f + {folds}, …, counted from 0");
+                let has_repeats = self.postures.iter().enumerate().any(|(row, posture)| row != *posture);
+                let of = match has_repeats {
+                    true => format!("postures {held_out}, each with all its rows"),
+                    false => format!("rows {held_out}"),
+                };
+                format!("every row once, in {folds} folds: fold f holds out {of}")
             }
             _ if held_out == 0 => "no row, so how good the model is on new data is not known".to_owned(),
             _ => format!("{held_out} of {} rows, as the file says", self.rows.len()),

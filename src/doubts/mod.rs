@@ -15,11 +15,14 @@ mod columns;
 mod doubt;
 mod fit;
 mod hypotheses;
+mod postures;
 mod repeats;
 
 use nalgebra::Point3;
 
 pub use doubt::{Doubt, DoubtKind};
+pub use postures::{SAME, postures};
+pub use repeats::few_folds;
 
 use crate::kinematics::Joint;
 
@@ -34,6 +37,8 @@ pub struct Subject<'a> {
     pub limits: &'a [Option<(f64, f64)>],
     /// Where the target may be at θ = 0, metres: on the last link, to within some decimetres.
     pub target: Point3<f64>,
+    /// By joint, whether its axis is to be learned.
+    pub learned: &'a [bool],
     /// Parameters that are to be learned.
     pub unknowns: usize,
 }
@@ -49,6 +54,10 @@ pub struct Evidence<'a> {
     pub targets: Vec<Seen>,
     /// By row, where a target was held in sockets: which socket at which place.
     pub sockets: Option<Vec<usize>>,
+    /// Equations of everything that was measured; where it is not told, those of `targets` and `sockets`.
+    pub equations: Option<usize>,
+    /// Rows that are held out because they are listed, labelled so, or in a file of their own.
+    pub held_out: &'a [usize],
     /// Columns that repeat another, with that other (see [`Rows::repeated_columns`](crate::table::Rows::repeated_columns)).
     pub repeated: &'a [(String, String)],
 }
