@@ -234,3 +234,68 @@ fn held_out_rows_that_repeat_training_rows_are_told() {
     assert_eq!(leak.lines, [4]);
     assert!(leak.evidence.contains("line 4 of the file that is held out repeats line 6"), "{leak}");
 }
+
+#[test]
+fn equations_are_those_of_what_was_measured() {
+    for (name, rows, evidence, more) in [
+        ("k02-distances", 8, "24 equations for 33 unknowns", "some 3 rows more"),
+        ("f13b-side-for-half-side", 3, "24 equations for ", "rows more"),
+    ] {
+        assert!(doubts(&valid(name, &as_it_is), DoubtKind::TooFewRows).is_empty(), "{name}");
+        let short = |file: &str, text: String| match file {
+            "cal.toml" => text.replace("folds=5", "rows=[]"),
+            "data.csv" => first_rows(&text, rows),
+            _ => text,
+        };
+        let found = doubts(&valid(name, &short), DoubtKind::TooFewRows);
+        let [few] = found.as_slice() else { panic!("{name}: {found:?}") };
+        assert_eq!(few.what, format!("{rows} rows are too few"));
+        assert!(few.evidence.contains(evidence) && few.mend.contains(more), "{few}");
+    }
+    // A pose is six.
+    let free = |file: &str, text: String| match file {
+        "cal.toml" => text.replace("hold = [", "# hold = [").replace("folds = 5", "rows = []"),
+        "data.csv" => first_rows(&text, 3),
+        _ => text,
+    };
+    let found = doubts(&valid("t11-explicit-wxyz", &free), DoubtKind::TooFewRows);
+    assert!(found[0].evidence.starts_with("18 equations for"), "{found:?}");
+}
+
+#[test]
+fn only_joints_whose_axes_are_learned_are_asked_to_move() {
+    let name = "f05-one-axis-only";
+    assert!(doubts(&valid(name, &as_it_is), DoubtKind::Constant).is_empty());
+    let without = |file: &str, text: String| if file == "cal.toml" { text.replace("\"elbow\", ", "") } else { text };
+    let found = doubts(&valid(name, &without), DoubtKind::Constant);
+    let [still] = found.as_slice() else { panic!("{found:?}") };
+    assert!(still.to_string().contains("`elbow`: this joint never moves (2.38121853 in all 15 rows)"), "{still}");
+    assert!(still.mend.contains("or hold it"), "{still}");
+}
+
+/// A joint that was left to its servo: it moved by some tenths of a milliradian.
+#[test]
+fn a_joint_that_hardly_moves_is_told_by_its_range() {
+    let column = |scale: f64| {
+        move |file: &str, text: String| {
+            if file != "data.csv" {
+                return text;
+            }
+            let mut lines = text.lines();
+            let mut table = lines.next().expect("titles").to_owned() + "\n";
+            for line in lines {
+                let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+                cells[3] = (0.7 + scale * cells[3].parse::<f64>().expect("a number").sin()).to_string();
+                table += &(cells.join(",") + "\n");
+            }
+            table
+        }
+    };
+    let found = doubts(&valid("t13-columns-cm", &column(0.00015)), DoubtKind::Constant);
+    let [still] = found.as_slice() else { panic!("{found:?}") };
+    assert!(
+        still.to_string().contains("`w1`: this joint hardly moves") && still.evidence.contains("a range of 2.9"),
+        "{still}"
+    );
+    assert!(doubts(&valid("t13-columns-cm", &column(0.05)), DoubtKind::Constant).is_empty());
+}
