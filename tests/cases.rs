@@ -299,3 +299,21 @@ fn a_joint_that_hardly_moves_is_told_by_its_range() {
     );
     assert!(doubts(&valid("t13-columns-cm", &column(0.05)), DoubtKind::Constant).is_empty());
 }
+
+#[test]
+fn lenses_are_straightened_before() {
+    let name = "f14b-distortion-key";
+    for key in ["distortion", "dist", "k1", "distortion_coefficients", "distCoeffs"] {
+        let keyed = |file: &str, text: String| {
+            if file == "cal.toml" { text.replace("distortion=", &format!("{key}=")) } else { text }
+        };
+        let found = problem(name, &keyed);
+        assert!(found.key.ends_with(key) && found.what == "unknown key", "{found}");
+        assert!(found.mend.contains("undistort the points first") && found.mend.contains("P set to the camera matrix"));
+    }
+    // Other keys are as they were.
+    let other = |file: &str, text: String| {
+        if file == "cal.toml" { text.replace("distortion=[-0.25,0.05,0,0,0]", "focal_length=1") } else { text }
+    };
+    assert!(!problem(name, &other).mend.contains("undistort"));
+}
