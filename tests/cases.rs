@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use body_schema::{
-    calibration::{Calibration, CalibrationError, Case, Options, Silent, calibrate},
+    calibration::{Calibration, CalibrationError, Case, Options, Silent, Sources, begin, calibrate},
     doubts::{Doubt, DoubtKind},
     scenario::{Problem, Scenario, ScenarioError},
 };
@@ -89,6 +89,33 @@ fn titles_say_units() {
         assert!(found.what.contains(&format!("column `x{unit}`: {said}")), "{found}");
         assert!(found.mend.contains("_m, _cm, _mm, _um, _in"), "{found}");
     }
+}
+
+/// What `init` takes titles for is what a calibration reads.
+#[test]
+fn files_are_begun_by_the_same_titles() {
+    let robot = text("t11-explicit-wxyz", "robot.urdf");
+    let begun = |table: &str| {
+        begin(&Sources {
+            name: "cal",
+            urdf_file: "robot.urdf",
+            urdf: &robot,
+            table_file: "data.csv",
+            table,
+            base: None,
+            tip: None,
+        })
+    };
+    let table = text("t11-explicit-wxyz", "data.csv").replace("x,y,z,qw,qx,qy,qz", "X (m),Y (m),Z (m),QW,QX,QY,QZ");
+    let file = begun(&table).unwrap_or_else(|error| panic!("{error}")).text;
+    assert!(file.contains(r#"columns = ["X (m)", "Y (m)", "Z (m)", "QX", "QY", "QZ", "QW"]"#), "{file}");
+    let open = |file: &str| Ok(if file == "data.csv" { table.clone() } else { robot.clone() });
+    let scenario = Scenario::parse("cal.toml", &file, &open).unwrap_or_else(|error| panic!("{error}"));
+    let as_listed = valid("t11-explicit-wxyz", &as_it_is);
+    let rows = |scenario: &Scenario| Case::new(scenario).expect("measured").rows;
+    assert_eq!(rows(&scenario), rows(&as_listed));
+    let error = begun(&table.replace("(m)", "(ft)")).expect_err("feet").to_string();
+    assert!(error.contains("data.csv: line 1, column `X (ft)`: `ft` is no unit"), "{error}");
 }
 
 /// Joints have units too.
