@@ -31,7 +31,7 @@ pub struct Case<'a> {
     guess: State,
     /// The rows, in the order of the table.
     pub rows: Vec<Row>,
-    /// By row, its [posture](crate::doubts::postures).
+    /// By row, its [posture](fn@crate::doubts::postures).
     pub(super) postures: Vec<usize>,
     /// What everything is called.
     pub names: Names,

@@ -12,7 +12,7 @@ pub struct HeldOut {
     pub rows: usize,
     /// Which of them.
     pub rule: HeldOutRule,
-    /// By row, its [posture](postures): rows of one are held out together, unless they are listed.
+    /// By row, its [posture](fn@crate::doubts::postures): rows of one are held out together, unless they are listed.
     pub postures: Vec<usize>,
 }
 
