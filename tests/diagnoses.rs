@@ -256,6 +256,7 @@ fn doubts(case: &Case) -> Vec<Doubt> {
         limits: &limits,
         target: case.target,
         target_sd_m: 0.3,
+        learned: &[],
         unknowns: 0,
         sigma_m: SIGMA,
         direction_rad: 0.01,

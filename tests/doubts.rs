@@ -206,6 +206,7 @@ fn subject<'a>(
         limits,
         target,
         target_sd_m: 0.3,
+        learned: &[],
         unknowns: 9,
         sigma_m: 5e-4,
         direction_rad: 0.01,

@@ -1,6 +1,5 @@
 //! The channels of a session: their names, and the shapes in which their readings are told.
 
-use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -9,6 +8,7 @@ use crate::{
     magnitude::is_usable,
     scenario::{Robot, SocketSpec},
     sensing::{Channel, Occasion, Rig},
+    table::Rotation,
 };
 
 /// What a channel is called, and how its readings are told.
@@ -47,8 +47,6 @@ pub enum Shape {
 
 /// The key of all sockets together.
 pub(super) const SOCKET: &str = "socket";
-/// How far the length of a quaternion may be from 1.
-const UNIT_TOLERANCE: f64 = 0.01;
 
 /// The channels that a robot's readings are told by: those that always read in the order of the rig, then that of the sockets.
 pub(super) fn shapes(robot: &Robot, rig: &Rig) -> Vec<ChannelShape> {
@@ -114,13 +112,11 @@ impl Shape {
                 let Some((mut reading, rotation)) = parts.filter(|_| only) else {
                     return refuse("write {\"position\": [x, y, z], \"quaternion\": [x, y, z, w]}, in metres");
                 };
-                let quaternion = numbers(rotation, 4).map(|q| Quaternion::new(q[3], q[0], q[1], q[2]));
-                let is_unit = |q: &Quaternion<f64>| (q.norm() - 1.0).abs() <= UNIT_TOLERANCE;
-                let Some(quaternion) = quaternion.filter(is_unit) else {
+                let Some(vector) = numbers(rotation, 4).and_then(|numbers| Rotation::Quaternion.read(&numbers)) else {
                     let what = format!("{} is no unit quaternion", shown(rotation));
                     return Err(Fault::new(format!("{field}.quaternion"), what, "write x, y, z, w of length 1"));
                 };
-                reading.extend_from_slice(UnitQuaternion::new_normalize(quaternion).scaled_axis().as_slice());
+                reading.extend_from_slice(vector.as_slice());
                 Ok(reading)
             }
             Self::Sockets { .. } => self.socket(field, told).map(|_| vec![0.0; 3]),

@@ -1,9 +1,9 @@
 //! The observations as a table that `calibrate` reads, and the file that goes with it.
 
-use nalgebra::{UnitQuaternion, Vector3};
 use toml::{Table, Value};
 
 use super::{ChannelShape, Session, Shape, channel::SOCKET};
+use crate::table::{Layout, Reading, Titles};
 
 /// What the table is called.
 pub(super) const FILE: &str = "observations.csv";
@@ -11,55 +11,32 @@ pub(super) const FILE: &str = "observations.csv";
 /// How a channel's numbers become the cells of a row.
 struct Cells {
     titles: Vec<String>,
-    rotation: Rotation,
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Rotation {
-    Vector,
-    RollPitchYaw,
-    Quaternion,
+    /// None of sockets, which have columns of their own.
+    reading: Option<Reading>,
 }
 
 impl Cells {
     /// Of the columns that a calibration names, or else as titles are by themselves.
     fn new(ChannelShape { name, shape }: &ChannelShape, named: Option<Vec<String>>) -> Self {
-        let all = |ends: &[&str]| ends.iter().map(|end| format!("{name}_{end}")).collect::<Vec<String>>();
-        let usual = match shape {
-            Shape::Position => all(&["x", "y", "z"]),
-            Shape::Pose => all(&["x", "y", "z", "rx", "ry", "rz"]),
-            Shape::Pixels { points: 1 } => all(&["u", "v"]),
-            Shape::Pixels { points } => {
-                (1..=*points).flat_map(|k| all(&[&format!("u{k}"), &format!("v{k}")])).collect()
-            }
-            Shape::Distance => vec![name.clone()],
-            Shape::Sockets { .. } => Vec::new(),
+        let (layout, usual) = match shape {
+            Shape::Position => (Layout::Position, Layout::Position.titles(name)),
+            Shape::Pose => (Layout::Pose, Layout::Pose.titles(name)),
+            Shape::Pixels { points } => (Layout::Pixels(*points), Layout::Pixels(*points).titles(name)),
+            Shape::Distance => (Layout::Distance, vec![name.clone()]),
+            Shape::Sockets { .. } => return Self { titles: Vec::new(), reading: None },
         };
         let titles = named.unwrap_or(usual);
-        let rotation = match titles.get(3) {
-            _ if titles.len() == 7 => Rotation::Quaternion,
-            Some(title) if *shape == Shape::Pose && title.contains("roll") => Rotation::RollPitchYaw,
-            _ => Rotation::Vector,
-        };
-        Self { titles, rotation }
+        // What cannot be read was refused when the session began.
+        let reading = Titles::listed(titles.clone()).and_then(|all| all.reading_titled(layout, &titles)).ok();
+        Self { titles, reading }
     }
 
-    fn of(&self, reading: &[f64]) -> Vec<f64> {
-        let mut numbers = reading.to_vec();
-        if let (Some(&[x, y, z]), true) = (reading.get(3..6), self.rotation != Rotation::Vector) {
-            let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(x, y, z));
-            numbers.truncate(3);
-            match self.rotation {
-                Rotation::RollPitchYaw => numbers.extend::<[f64; 3]>(rotation.euler_angles().into()),
-                _ => numbers.extend_from_slice(rotation.coords.as_slice()),
-            }
+    fn of(&self, reading: &[f64]) -> Vec<String> {
+        let mut cells = vec![String::new(); self.titles.len()];
+        for (index, cell) in self.reading.iter().flat_map(|columns| columns.cells(reading)) {
+            cells[index] = cell.to_string();
         }
-        let factor = |title: &str| match title {
-            _ if title.ends_with("_mm") => 1e3,
-            _ if title.ends_with("_deg") => 1_f64.to_degrees(),
-            _ => 1.0,
-        };
-        numbers.iter().zip(&self.titles).map(|(number, title)| number * factor(title)).collect()
+        cells
     }
 }
 
@@ -93,7 +70,7 @@ impl Session {
             row.extend(executed.movement.configuration.iter().map(f64::to_string));
             for (cells, reading) in cells.iter().zip(&executed.observation.readings) {
                 match reading {
-                    Some(reading) => row.extend(cells.of(reading).iter().map(f64::to_string)),
+                    Some(reading) => row.extend(cells.of(reading)),
                     None => row.extend(cells.titles.iter().map(|_| String::new())),
                 }
             }

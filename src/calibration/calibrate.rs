@@ -8,7 +8,7 @@ use super::{
     extras::TRIED,
     figures::{Sensed, Unit},
 };
-use crate::{most::middle, selection::Optimality};
+use crate::{doubts::few_folds, most::middle, selection::Optimality};
 
 /// What is asked beside the fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -134,6 +134,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     let judged_by = held_out.as_ref().map(|held_out| (&held_out.after, share));
     let more_rows = case.more_rows(&fit, judged_by, &noise, examination.sigma_m);
     let doubts = examination.doubts.iter().map(ToString::to_string);
+    let few = options.folds.and_then(|folds| few_folds(folds, splits.len(), case.rows.len()));
     let report = Report {
         scenario: scenario.name.clone(),
         title: scenario.title.clone(),
@@ -146,7 +147,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         rows: case.rows.len(),
         training_rows: training.len(),
         held_out_by: case.held_out_by(&splits),
-        doubts: doubts.chain(case.beyond_prior(&fit)).collect(),
+        doubts: doubts.chain(few.map(|doubt| doubt.to_string())).chain(case.beyond_prior(&fit)).collect(),
         parameters: case.determined(&fit),
         training: comparison,
         held_out,
@@ -223,7 +224,13 @@ impl Case<'_> {
         let held_out = splits.iter().map(|split| split.held_out.len()).sum::<usize>();
         match splits.len() {
             folds @ 2.. => {
-                format!("every row once, in {folds} folds: fold f holds out rows f, f + {folds}, …, counted from 0")
+                let held_out = format!("f, f + {folds}, …, counted from 0");
+                let has_repeats = self.postures.iter().enumerate().any(|(row, posture)| row != *posture);
+                let of = match has_repeats {
+                    true => format!("postures {held_out}, each with all its rows"),
+                    false => format!("rows {held_out}"),
+                };
+                format!("every row once, in {folds} folds: fold f holds out {of}")
             }
             _ if held_out == 0 => "no row, so how good the model is on new data is not known".to_owned(),
             _ => format!("{held_out} of {} rows, as the file says", self.rows.len()),

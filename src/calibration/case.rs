@@ -31,6 +31,8 @@ pub struct Case<'a> {
     guess: State,
     /// The rows, in the order of the table.
     pub rows: Vec<Row>,
+    /// By row, its [posture](fn@crate::doubts::postures).
+    pub(super) postures: Vec<usize>,
     /// What everything is called.
     pub names: Names,
     /// The URDF, where the robot comes from one.
@@ -56,7 +58,7 @@ impl<'a> Case<'a> {
     ///
     /// [`CalibrationError::Simulated`] where it simulates its world.
     pub fn new(scenario: &'a Scenario) -> Result<Self, CalibrationError> {
-        let WorldSpec::Measured { measurements, .. } = &scenario.world else {
+        let WorldSpec::Measured { measurements, held_out } = &scenario.world else {
             return Err(CalibrationError::Simulated { scenario: scenario.name.clone() });
         };
         let row = |index: usize| Row {
@@ -71,6 +73,7 @@ impl<'a> Case<'a> {
             scenario,
             guess,
             rows: (0..measurements.rows()).map(row).collect(),
+            postures: held_out.postures.clone(),
             names: scenario.robot.called(),
             described: scenario.robot.described.as_deref(),
             known: measurements.beforehand.as_ref(),
@@ -120,11 +123,13 @@ impl<'a> Case<'a> {
         Layout::new(self.guess(), learned.filter(|block| wanted(*block)))
     }
 
-    /// Rows to learn from and rows to judge by, as the scenario says, or by `folds`: fold f holds out rows f, f + K, …
+    /// Rows to learn from and rows to judge by, as the scenario says, or by `folds`: fold f holds out postures f, f + K, …, each
+    /// with all its rows. There are no more folds than postures.
     ///
     /// # Errors
     ///
-    /// [`CalibrationError::Folds`] where there are fewer rows than folds, or fewer than two folds.
+    /// [`CalibrationError::Folds`] where there are fewer rows than folds, or fewer than two folds;
+    /// [`CalibrationError::OnePosture`] where all rows repeat each other.
     pub fn splits(&self, folds: Option<usize>) -> Result<Vec<Split>, CalibrationError> {
         let Some(folds) = folds else {
             let WorldSpec::Measured { held_out, .. } = &self.scenario.world else { return Ok(Vec::new()) };
@@ -139,7 +144,10 @@ impl<'a> Case<'a> {
         if folds < 2 || folds > rows.len() {
             return Err(CalibrationError::Folds { folds, rows: rows.len() });
         }
-        Ok(Split::folds(&rows, folds))
+        if Split::numbered(&rows, &self.postures).1 < 2 {
+            return Err(CalibrationError::OnePosture { rows: rows.len() });
+        }
+        Ok(Split::folds(&rows, folds, &self.postures))
     }
 
     /// Whether nothing is measured but that targets are where they were before.

@@ -25,6 +25,14 @@ pub enum CalibrationError {
         /// The rows there are.
         rows: usize,
     },
+    /// Nothing can be held out.
+    #[error(
+        "all {rows} rows are one posture, and its rows stay together: nothing can be held out; measure more postures"
+    )]
+    OnePosture {
+        /// The rows there are.
+        rows: usize,
+    },
     /// Rows cannot be chosen.
     #[error("{asked} rows cannot be chosen from {rows} training rows; write a number from 1 to that")]
     Active {

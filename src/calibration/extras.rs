@@ -33,7 +33,7 @@ pub(super) const TRIED: [&[Extra]; 5] = [
     &[Extra::Ratios, Extra::Eccentricity, Extra::Compliance],
 ];
 
-/// Folds among the training rows, and how many rows there must be for any.
+/// Folds among the training rows, and how many postures there must be for any.
 const FOLDS: usize = 5;
 const FEWEST: usize = 10;
 /// Rows of the inner folds at most, spread evenly over the table: that many decide.
@@ -100,12 +100,12 @@ impl Case<'_> {
             kept: false,
         };
         let mut trials: Vec<Trial> = TRIED.iter().zip(&layouts).map(trial).collect();
-        if rows.len() < FEWEST {
+        if Split::numbered(rows, &self.postures).1 < FEWEST {
             return Ok(trials);
         }
         let count = rows.len().min(MOST);
         let spread: Vec<usize> = (0..count).map(|index| rows[index * rows.len() / count]).collect();
-        let folds = Split::folds(&spread, FOLDS);
+        let folds = Split::folds(&spread, FOLDS, &self.postures);
         let without = self.inner(&plain, &folds, near)?;
         for (trial, layout) in trials.iter_mut().zip(&layouts) {
             let with = self.inner(layout, &folds, near)?;

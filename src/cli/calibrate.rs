@@ -19,7 +19,8 @@ pub struct Arguments {
     /// The path of a calibration file (`body-schema init` writes one), or a built-in scenario with measured data
     #[arg(value_name = "FILE")]
     file: String,
-    /// Hold every row out once, in K folds, whatever the file holds out: fold f holds out rows f, f + K, …
+    /// Hold every row out once, in K folds, whatever the file holds out: fold f holds out rows f, f + K, …; rows of
+    /// one posture stay together
     #[arg(long, value_name = "K")]
     folds: Option<usize>,
     /// Also choose the N most informative training rows one by one, and set them beside 20 random orders

@@ -1,15 +1,21 @@
 //! What a column shows by itself.
 
 use super::{Doubt, DoubtKind, Evidence, Subject};
-use crate::kinematics::JointKind;
+use crate::kinematics::{Joint, JointKind};
 
 /// What is forgiven to limits, rad or m: rounding, and where a robot comes to rest.
 const SLACK: f64 = 1e-3;
 
+/// How far an axis may well be off, rad, and what of it at the target no sensor tells, metres.
+const AXIS: f64 = 0.01;
+const SEEN: f64 = 2e-5;
+/// How far a target is from an axis at least, metres: it can be moved away from it.
+const ARM: f64 = 0.5;
+
 pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
     let mut doubts = Vec::new();
     for (joint, column) in subject.columns.iter().enumerate() {
-        doubts.extend(constant(joint, column, evidence));
+        doubts.extend(constant(joint, column, subject, evidence));
         doubts.extend(outside(joint, column, subject, evidence));
     }
     doubts.extend(repeated(evidence));
@@ -17,18 +23,37 @@ pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
     doubts
 }
 
-fn constant(joint: usize, column: &str, evidence: &Evidence) -> Option<Doubt> {
-    let first = evidence.configurations.first()?[joint];
-    if evidence.configurations.len() < 2 || evidence.configurations.iter().any(|row| (row[joint] - first).abs() > 1e-9)
-    {
+/// A joint that moves too little for its axis to be told.
+fn constant(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
+    let count = evidence.configurations.len();
+    if count < 2 || !subject.learned.get(joint).copied().unwrap_or(true) {
+        return None;
+    }
+    let values = evidence.configurations.iter().map(|row| row[joint]);
+    let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(x), most.max(x)));
+    let range = most - least;
+    let (unit, arm) = match &subject.joints[joint] {
+        Joint::Revolute(axis) => ("rad", (subject.target - axis.point).norm().max(ARM)),
+        Joint::Prismatic(_) => ("m", 1.0),
+    };
+    let is_still = range <= 1e-9;
+    if !is_still && range * arm * AXIS >= SEEN {
         return None;
     }
     Some(Doubt {
         kind: DoubtKind::Constant,
         column: Some(column.to_owned()),
         lines: Vec::new(),
-        what: "this joint never moves".to_owned(),
-        evidence: format!("{first} in all {} rows", evidence.configurations.len()),
+        what: if is_still { "this joint never moves" } else { "this joint hardly moves" }.to_owned(),
+        evidence: if is_still {
+            format!("{least} in all {count} rows")
+        } else {
+            format!(
+                "between {least:.6} and {most:.6} {unit}, a range of {range:.2e}, in all {count} rows: an axis that is off by \
+                 {AXIS} rad moves the target by {:.4} mm",
+                range * arm * AXIS * 1e3
+            )
+        },
         mend: "its axis cannot be told from such data: add rows in which it moves, or hold it".to_owned(),
     })
 }
@@ -73,14 +98,16 @@ fn repeated(evidence: &Evidence) -> Option<Doubt> {
 
 fn too_few(subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
     let rows = evidence.configurations.len();
-    let equations = match &evidence.sockets {
+    let equations = evidence.equations.unwrap_or_else(|| match &evidence.sockets {
         // The first row in a socket says where that is.
         Some(sockets) => {
             let places: std::collections::BTreeSet<&usize> = sockets.iter().collect();
             3 * rows.saturating_sub(places.len())
         }
         None => 3 * evidence.targets.iter().map(|seen| seen.points.iter().flatten().count()).sum::<usize>(),
-    };
+    });
+    // What one more row brings, as rows bring so far.
+    let each = if equations > 0 { equations as f64 / rows.max(1) as f64 } else { 3.0 };
     (equations < subject.unknowns).then(|| Doubt {
         kind: DoubtKind::TooFewRows,
         column: None,
@@ -89,7 +116,7 @@ fn too_few(subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
         evidence: format!("{equations} equations for {} unknowns", subject.unknowns),
         mend: format!(
             "measure some {} rows more, or learn less: what rows do not tell stays as described",
-            (subject.unknowns - equations).div_ceil(3)
+            ((subject.unknowns - equations) as f64 / each).ceil()
         ),
     })
 }

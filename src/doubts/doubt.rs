@@ -39,6 +39,10 @@ pub enum DoubtKind {
     Unsettled,
     /// Fewer equations than unknowns.
     TooFewRows,
+    /// Rows that are held out and repeat the posture of rows that are learned from.
+    Leakage,
+    /// More folds than postures.
+    FewFolds,
 }
 
 /// Something in a table that may be wrong. It reads as a sentence that names row or column, evidence and mend.

@@ -18,11 +18,14 @@ mod description;
 mod doubt;
 mod fit;
 mod hypotheses;
+mod postures;
 mod repeats;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
 pub use doubt::{Doubt, DoubtKind};
+pub use postures::{SAME, postures};
+pub use repeats::few_folds;
 
 use crate::kinematics::Joint;
 
@@ -39,6 +42,8 @@ pub struct Subject<'a> {
     pub target: Point3<f64>,
     /// How well that is known, metres.
     pub target_sd_m: f64,
+    /// By joint, whether its axis is to be learned.
+    pub learned: &'a [bool],
     /// Parameters that are to be learned.
     pub unknowns: usize,
     /// What the maker of the sensor promises: one standard deviation of a position per coordinate, metres.
@@ -73,6 +78,10 @@ pub struct Evidence<'a> {
     pub targets: Vec<Seen>,
     /// By row, where a target was held in sockets: which socket at which place.
     pub sockets: Option<Vec<usize>>,
+    /// Equations of everything that was measured; where it is not told, those of `targets` and `sockets`.
+    pub equations: Option<usize>,
+    /// Rows that are held out because they are listed, labelled so, or in a file of their own.
+    pub held_out: &'a [usize],
     /// Columns that repeat another, with that other (see [`Rows::repeated_columns`](crate::table::Rows::repeated_columns)).
     pub repeated: &'a [(String, String)],
 }

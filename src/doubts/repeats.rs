@@ -1,13 +1,11 @@
 //! Postures that were measured more than once.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Doubt, DoubtKind, Evidence, doubt::length};
+use super::{Doubt, DoubtKind, Evidence, SAME, doubt::length, postures};
 
-/// Postures that differ by less are one, rad or m: what encoders repeat to.
-const SAME: f64 = 1e-4;
 /// A row so many robust standard deviations from its posture's others had not settled.
 const FAR: f64 = 6.0;
 /// Deviations, in coordinates, below which none is far from the others.
@@ -15,14 +13,12 @@ const TELLING: usize = 9;
 
 /// The doubts, and σ per coordinate.
 pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
-    let mut postures: HashMap<Vec<i64>, Vec<usize>> = HashMap::new();
-    for (row, configuration) in evidence.configurations.iter().enumerate() {
-        let key = configuration.iter().map(|position| (position / SAME).round() as i64).collect();
-        postures.entry(key).or_default().push(row);
-    }
-    let mut repeated: Vec<Vec<usize>> = postures.into_values().filter(|rows| rows.len() > 1).collect();
-    repeated.sort_unstable();
+    let by_row = postures(evidence.configurations);
+    let mut postures: Vec<Vec<usize>> = vec![Vec::new(); by_row.iter().max().map_or(0, |last| last + 1)];
+    by_row.iter().enumerate().for_each(|(row, posture)| postures[*posture].push(row));
+    let mut repeated: Vec<Vec<usize>> = postures.into_iter().filter(|rows| rows.len() > 1).collect();
     let mut doubts = Vec::new();
+    doubts.extend(leakage(&by_row, evidence));
     doubts.extend(copies(&mut repeated, evidence));
     repeated.retain(|rows| rows.len() > 1);
     let Some(seen) = evidence.targets.first().filter(|_| !repeated.is_empty()) else { return (doubts, None) };
@@ -57,9 +53,54 @@ pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
         lines: repeated.iter().flatten().map(|row| evidence.lines[*row]).collect(),
         what: format!("{} postures were measured more than once", repeated.len()),
         evidence: format!("σ is {} per coordinate as far as they tell", length(sigma)),
-        mend: "new postures would have taught more; let folds keep repeats together".to_owned(),
+        mend: "new postures would have taught more; folds keep repeats together".to_owned(),
     });
     (doubts, Some(sigma))
+}
+
+/// Rows that are held out although a row in the same posture is learned from.
+fn leakage(postures: &[usize], evidence: &Evidence) -> Option<Doubt> {
+    let held_out: BTreeSet<usize> = evidence.held_out.iter().copied().collect();
+    let mut trained: HashMap<usize, usize> = HashMap::new();
+    for row in (0..postures.len()).filter(|row| !held_out.contains(row)) {
+        trained.entry(postures[row]).or_insert(row);
+    }
+    let leaks = held_out.iter().filter_map(|row| Some((*row, *trained.get(postures.get(*row)?)?)));
+    let leaks: Vec<(usize, usize)> = leaks.collect();
+    let (row, original) = *leaks.first()?;
+    let lines: Vec<usize> = leaks.iter().map(|(row, _)| evidence.lines[*row]).collect();
+    // Lines of a second file are counted anew.
+    let begins = *held_out.first()?;
+    let is_second = begins > 0 && evidence.lines[begins] <= evidence.lines[begins - 1];
+    let of_file = if is_second { " of the file that is held out" } else { "" };
+    Some(Doubt {
+        kind: DoubtKind::Leakage,
+        column: None,
+        what: "held out, though the same posture is learned from".to_owned(),
+        evidence: format!(
+            "line {}{of_file} repeats line {} to {SAME} rad or m; {} of {} rows that are held out do so",
+            evidence.lines[row],
+            evidence.lines[original],
+            lines.len(),
+            held_out.len()
+        ),
+        lines,
+        mend: "they tell how well measuring is repeated, not how good the model is elsewhere: hold out postures that nothing is \
+               learned from, or let folds choose"
+            .to_owned(),
+    })
+}
+
+/// The doubt about more folds than `rows` rows have postures.
+pub fn few_folds(folds: usize, postures: usize, rows: usize) -> Option<Doubt> {
+    (postures < folds).then(|| Doubt {
+        kind: DoubtKind::FewFolds,
+        column: None,
+        lines: Vec::new(),
+        what: format!("{folds} folds are asked for, and {postures} are made"),
+        evidence: format!("{rows} rows are {postures} postures, and rows of one posture stay together"),
+        mend: "measure more postures: what is held out says little of so few".to_owned(),
+    })
 }
 
 /// Rows that are equal to an earlier one in every number; they are taken out of `repeated`.

@@ -8,6 +8,7 @@ use super::{RecordingError, metrics};
 use crate::{
     experiment::{Comparison, Description, Quantiles, StepReport},
     kinematics::JointKind,
+    table::{Component, Title},
 };
 
 /// Writes one row per step and learner. Units stand in the names of the columns; what is null is empty.
@@ -28,7 +29,8 @@ impl<W: io::Write> StepsCsv<W> {
             JointKind::Prismatic => format!("q_{}_m", joint.name),
         }));
         for what in ["measured", "predicted"] {
-            header.extend(["x", "y", "z"].map(|axis| format!("{what}_{axis}_m")));
+            let title = |component| Title { before: what, component, number: "", unit: "m" }.to_string();
+            header.extend(Component::PLACE.map(title));
         }
         table.writer.write_record(&header)?;
         Ok(table)

@@ -1,12 +1,14 @@
 //! What is doubtful in a scenario's data, and in its prior.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Vector3;
 
-use super::{Known, Measurements, Scenario, ScenarioError, WorldSpec};
+use super::{HeldOutRule, Known, Measurements, Scenario, ScenarioError, WorldSpec};
 use crate::{
-    doubts::{Base, Evidence, Examination, Seen, Subject, examine},
+    doubts::{Base, Evidence, Examination, Seen, Subject, examine, few_folds},
     model::{Block, PriorError},
-    sensing::Observation,
+    sensing::{Observation, Occasion},
 };
 
 /// How far a target may be from where the file has it, and a base of which the file says no more than that, for all that is known before any row is looked at, metres.
@@ -15,7 +17,7 @@ const TARGET_M: f64 = 0.3;
 impl Scenario {
     /// Examines recorded measurements; `None` where the world is simulated.
     pub fn examine(&self) -> Option<Examination> {
-        let WorldSpec::Measured { measurements, .. } = &self.world else { return None };
+        let WorldSpec::Measured { measurements, held_out } = &self.world else { return None };
         let robot = &self.robot;
         let limits = match &robot.described {
             Some(described) => described.chain.moving().map(|segment| segment.limits).collect(),
@@ -28,20 +30,47 @@ impl Scenario {
             limits: &limits,
             target: robot.state.marker(),
             target_sd_m: TARGET_M,
+            learned: &(0..robot.state.joints.len()).map(|joint| robot.layout.is_learned(joint)).collect::<Vec<_>>(),
             unknowns: robot.layout.dimension(),
             sigma_m: self.smoother.sigma,
             direction_rad: self.prior.direction_rad,
             point_m: self.prior.point_m,
             base: self.base_said(),
         };
+        let listed = match &held_out.rule {
+            HeldOutRule::Rows(rows) => rows.as_slice(),
+            _ => &[],
+        };
         let evidence = Evidence {
             lines: &measurements.lines,
             configurations: &measurements.configurations,
             targets: self.seen(measurements),
             sockets: held_in.filter(|sockets| !sockets.is_empty()),
+            equations: Some(self.equations(measurements)),
+            held_out: listed,
             repeated: &measurements.repeated,
         };
-        Some(examine(&subject, &evidence))
+        let mut found = examine(&subject, &evidence);
+        if let HeldOutRule::Folds(folds) = held_out.rule {
+            found.doubts.extend(few_folds(folds, held_out.count_postures(), held_out.rows));
+        }
+        Some(found)
+    }
+
+    /// Equations of all that was measured. The first row in a socket says where that is, and no more.
+    fn equations(&self, measurements: &Measurements) -> usize {
+        let channels = self.rig.channels();
+        let always = |observation: &Observation| -> usize {
+            let read = channels.iter().zip(&observation.readings).filter(|(_, reading)| reading.is_some());
+            read.filter(|(channel, _)| channel.occasion() == Occasion::Always)
+                .map(|(channel, _)| channel.equations())
+                .sum()
+        };
+        let measured: usize = measurements.observations.iter().map(always).sum();
+        let held: Vec<usize> = measurements.sockets.iter().copied().flatten().collect();
+        let places: BTreeSet<usize> = held.iter().copied().collect();
+        let beforehand = measurements.beforehand.iter().flat_map(|known| known.readings.iter().flatten());
+        measured + 3 * (held.len() - places.len()) + beforehand.map(Vec::len).sum::<usize>()
     }
 
     /// Where the base is said to be, and how well.

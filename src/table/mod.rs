@@ -23,13 +23,15 @@
 //!
 //! # Units
 //!
-//! Inside there are metres and radians only. A title's end says what its numbers are: `_m` or `_mm`, `_rad` or `_deg`, `_px`;
-//! without one they are metres, radians or pixels, as in a URDF. A joint's column is titled with the joint's name.
+//! Inside there are metres and radians only. A title's end says what its numbers are: `_m`, `_cm`, `_mm`, `_um` or `_in`, `_rad` or
+//! `_deg`, `_px`; without one they are metres, radians or pixels, as in a URDF. Words (`_inches`), capitals and brackets
+//! (`x (mm)`) say the same; another unit, as in `x_ft`, is refused. A joint's column is titled with the joint's name.
 //!
 //! # Readings
 //!
 //! Titles begin with the name of the target (`hand` here), for pixels with the camera's and the target's (`cam_hand`);
-//! with nothing before them where there is no doubt. Titles of other kinds can be named one by one.
+//! with nothing before them where there is no doubt; capitals count for nothing. Titles of other kinds can be named one by one:
+//! where they are names of components, as `qw`, these say which number is which, in any order, and else their order does.
 //!
 //! | layout | titles | a line |
 //! |---|---|---|
@@ -52,12 +54,15 @@
 mod error;
 mod guard;
 mod lines;
+mod names;
 mod reading;
 mod rows;
 mod titles;
 
 pub use error::TableError;
 pub use guard::{Guard, MOST_BYTES};
-pub use reading::{Layout, Reading};
+pub(crate) use names::split;
+pub use names::{Component, Title};
+pub use reading::{Layout, Reading, Rotation};
 pub use rows::{Columns, Row, Rows, Table};
 pub use titles::{Column, Quantity, Titles};

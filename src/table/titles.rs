@@ -2,7 +2,11 @@
 
 use std::collections::HashMap;
 
-use super::{TableError, error::AS_TEXT};
+use super::{
+    Component, TableError, Title,
+    error::AS_TEXT,
+    names::{NAME, split},
+};
 use crate::{
     magnitude::{is_usable, what_is_wrong},
     similar::similar,
@@ -22,14 +26,12 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Ends of titles, and what the numbers below them are multiplied by.
-    fn units(self) -> &'static [(&'static str, f64)] {
-        const DEGREE: f64 = std::f64::consts::PI / 180.0;
+    fn called(self) -> &'static str {
         match self {
-            Self::Angle => &[("", 1.0), ("_rad", 1.0), ("_deg", DEGREE)],
-            Self::Length => &[("", 1.0), ("_m", 1.0), ("_mm", 1e-3)],
-            Self::Pixels => &[("", 1.0), ("_px", 1.0)],
-            Self::Number => &[("", 1.0)],
+            Self::Angle => "an angle",
+            Self::Length => "a length",
+            Self::Pixels => "a point in a picture",
+            Self::Number => "a number without a unit",
         }
     }
 }
@@ -51,7 +53,15 @@ pub struct Titles {
 
 impl Titles {
     pub(super) fn new(record: &csv::StringRecord) -> Result<Self, TableError> {
-        let titles: Vec<String> = record.iter().map(str::to_owned).collect();
+        Self::listed(record.iter().map(str::to_owned).collect())
+    }
+
+    /// Of a list of titles.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`] if there are none, or one of them twice.
+    pub fn listed(titles: Vec<String>) -> Result<Self, TableError> {
         let mut seen = HashMap::new();
         // Spreadsheets leave columns without a title at the end.
         for (index, title) in titles.iter().enumerate().filter(|(_, title)| !title.is_empty()) {
@@ -79,21 +89,52 @@ impl Titles {
     ///
     /// # Errors
     ///
-    /// [`TableError`] where there is none, or more than one.
+    /// [`TableError`] where there is none, or more than one, or where its unit is not known.
     pub fn find(&self, name: &str, quantity: Quantity) -> Result<Column, TableError> {
-        let units = quantity.units().iter();
-        let mut found = units.filter_map(|(unit, factor)| {
-            let index = self.titles.iter().position(|title| title.strip_prefix(name) == Some(unit))?;
-            Some(Column { index, factor: *factor })
-        });
-        match (found.next(), found.next()) {
-            (Some(column), None) => Ok(column),
-            (Some(one), Some(other)) => {
-                let what =
-                    format!("line 1: `{}` and `{}` say the same", self.titles[one.index], self.titles[other.index]);
-                Err(TableError::new(what, "leave one of the two columns"))
-            }
-            (None, _) => Err(self.unknown(name)),
+        let is_named = |title: &&String| *title == name || split(title).0 == name;
+        let named: Vec<&String> = self.titles.iter().filter(is_named).collect();
+        // Beside a column of this very name another that ends with a unit of something else has a name of its own.
+        let has_exact = named.iter().any(|title| *title == name);
+        let says_it = |title: &&String| {
+            let word = split(title).1;
+            !has_exact || *title == name || word != NAME && quantity.factor(word).is_some()
+        };
+        let found: Vec<&String> = named.into_iter().filter(says_it).collect();
+        match found.as_slice() {
+            [one] if *one == name => Ok(Column { index: self.label(one)?, factor: 1.0 }),
+            [one] => self.in_unit(one, quantity),
+            [one, other, ..] => Err(TableError::new(
+                format!("line 1: `{one}` and `{other}` say the same"),
+                "leave one of the two columns",
+            )),
+            [] => Err(self.unknown(name)),
+        }
+    }
+
+    /// The column of a component of what is called `before`, with `number` behind it.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`] where there is none, or more than one, or where its unit is not known.
+    pub(super) fn component(&self, before: &str, component: Component, number: &str) -> Result<Column, TableError> {
+        let of = |title: &&String| {
+            let is_it = |it: &Title<'_>| it.component == component && it.number == number && it.is_of(before);
+            Title::parse(title).is_some_and(|it| is_it(&it))
+        };
+        let mut found: Vec<&String> = self.titles.iter().filter(of).collect();
+        // Titles that differ in nothing but capitals: what is spelt as it is asked for.
+        let written = Title { before, component, number, unit: "" }.to_string();
+        let is_spelt = |title: &&&String| split(title).0 == written;
+        if found.len() > 1 && found.iter().any(|title| is_spelt(&title)) {
+            found.retain(|title| is_spelt(&title));
+        }
+        match found.as_slice() {
+            [one] => self.in_unit(one, component.quantity()),
+            [one, other, ..] => Err(TableError::new(
+                format!("line 1: `{one}` and `{other}` say the same"),
+                "leave one of the two columns, or list those that are meant as `columns` of the sensor",
+            )),
+            [] => Err(self.unknown(&written)),
         }
     }
 
@@ -101,10 +142,36 @@ impl Titles {
     ///
     /// # Errors
     ///
-    /// [`TableError`] where there is none.
+    /// [`TableError`] where there is none, or where its unit is not known.
     pub fn titled(&self, title: &str, quantity: Quantity) -> Result<Column, TableError> {
-        let factor = quantity.units().iter().rev().find(|(unit, _)| title.ends_with(unit)).map_or(1.0, |unit| unit.1);
-        Ok(Column { index: self.label(title)?, factor })
+        if split(title).1 == NAME && quantity != Quantity::Length && Title::parse(title).is_none() {
+            return Ok(Column { index: self.label(title)?, factor: 1.0 });
+        }
+        self.in_unit(title, quantity)
+    }
+
+    fn in_unit(&self, title: &str, quantity: Quantity) -> Result<Column, TableError> {
+        let (index, word) = (self.label(title)?, split(title).1);
+        let factor = quantity.factor(word).ok_or_else(|| {
+            let what = format!("line 1, column `{title}`: `{word}` is no unit in which {} is read", quantity.called());
+            TableError::new(what, format!("convert the numbers and title them so: {}", quantity.ends()))
+        })?;
+        Ok(Column { index, factor })
+    }
+
+    /// The same; where no title is spelt so, that which differs in capitals alone.
+    pub(super) fn titled_in_any_case(&self, title: &str, quantity: Quantity) -> Result<Column, TableError> {
+        let mut alike = self.titles.iter().filter(|given| given.eq_ignore_ascii_case(title));
+        match (self.titles.iter().any(|given| given == title), alike.next(), alike.next()) {
+            (false, Some(only), None) => self.titled(only, quantity),
+            _ => self.titled(title, quantity),
+        }
+    }
+
+    /// What stands before the titles that end with x, alone or with a unit: targets whose positions may be there.
+    pub(crate) fn prefixes(&self) -> Vec<&str> {
+        let found = self.titles.iter().filter_map(|title| Title::parse(title));
+        found.filter(|it| it.component == Component::X && it.number.is_empty()).map(|it| it.before).collect()
     }
 
     /// The index of the column with exactly this title, of any text.

@@ -110,6 +110,43 @@ fn poses_and_distances() {
     assert_eq!(fault.field, "measurements.hand.quaternion");
 }
 
+/// Whatever columns the calibration names, in any order and with any rotation, the table has in them what was told.
+#[test]
+fn what_is_written_is_titled_as_what_it_is() {
+    for columns in [
+        ["x", "y", "z", "Roll", "Pitch", "Yaw"].as_slice(),
+        &["Yaw_deg", "z_mm", "x_in", "roll (deg)", "y", "PITCH"],
+        &["x_tool", "y_tool", "z_tool", "qw_tool", "qx_tool", "qy_tool", "qz_tool"],
+        &["tx", "ty", "tz", "rot_x", "rot_y", "rot_z"],
+        &["a", "b", "c", "d", "e", "f", "g"],
+    ] {
+        let keys = json!({
+            "target": [{ "name": "hand", "at_m": [0.3, 0.0, 0.05], "rpy_deg": [0, 0, 0], "known": { "to_m": 0.1, "to_deg": 5 } }],
+            "sensor": { "channel": "pose", "sigma_m": 0.0005, "sigma_deg": 0.05, "columns": columns },
+        });
+        let (session, robot) = told(keys, 4, |robot, theta| {
+            let pose = hand(robot, theta);
+            let (t, q) = (pose.translation.vector, pose.rotation.coords);
+            json!({ "hand": { "position": [t.x, t.y, t.z], "quaternion": [q.x, q.y, q.z, q.w] } })
+        });
+        let csv = session.observations_csv();
+        let open = |file: &str| Ok(if file == "robot.urdf" { session.setup().urdf().to_owned() } else { csv.clone() });
+        let scenario = Scenario::parse("calibration.toml", &session.calibration_toml(), &open);
+        let scenario = scenario.unwrap_or_else(|error| panic!("{columns:?}: {error}"));
+        for row in Case::new(&scenario).expect("a table").rows {
+            let reading = row.observation.readings[0].clone().expect("seen");
+            let pose = hand(&robot, &row.positions);
+            let turned = (pose.rotation.scaled_axis() - Vector3::from_column_slice(&reading[3..])).norm();
+            let moved = (pose.translation.vector - Vector3::from_column_slice(&reading[..3])).norm();
+            assert!(turned < 1e-9 && moved < 1e-9, "{columns:?}: {turned}, {moved}\n{csv}");
+        }
+    }
+    let mut calibration = quick();
+    calibration["sensor"] = json!({ "channel": "position", "columns": ["x", "y", "x_mm"], "sigma_m": 0.001 });
+    let error = Session::open(Setup::new(calibration)).map(drop).expect_err("no z").to_string();
+    assert!(error.contains("both taken for x, and none is z"), "{error}");
+}
+
 #[test]
 fn pixels() {
     let keys = json!({

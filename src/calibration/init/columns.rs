@@ -1,10 +1,6 @@
 //! What the columns of a table are, by their titles.
 
-/// Ends of titles that say a unit, longest first.
-const UNITS: [&str; 5] = ["_deg", "_rad", "_mm", "_px", "_m"];
-/// How a rotation is written behind a place, by its titles.
-const ROTATIONS: [&[&str]; 4] =
-    [&["rx", "ry", "rz"], &["roll", "pitch", "yaw"], &["qx", "qy", "qz", "qw"], &["phix", "phiy", "phiz"]];
+use crate::table::{Component, Layout, Rotation, Title, split};
 
 /// What is measured beside the joints.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -32,9 +28,27 @@ pub struct Sensor {
     pub sigmas: &'static str,
 }
 
+impl Sensor {
+    /// What its readings look like in a table.
+    pub fn layout(&self) -> Layout {
+        match self.channel {
+            "pose" => Layout::Pose,
+            "pixels" => Layout::Pixels(1),
+            "distance" => Layout::Distance,
+            _ => Layout::Position,
+        }
+    }
+}
+
 /// A title without the unit at its end.
 fn stem(title: &str) -> &str {
-    UNITS.iter().find_map(|unit| title.strip_suffix(unit)).unwrap_or(title)
+    split(title).0
+}
+
+/// The first title that says this component of what another says one of.
+fn find(titles: &[String], of: &Title<'_>, component: Component) -> Option<String> {
+    let is_it = |it: &Title<'_>| it.component == component && it.is_of(of.before) && it.number == of.number;
+    titles.iter().find(|title| Title::parse(title).is_some_and(|it| is_it(&it))).cloned()
 }
 
 /// Whether there is a column for a joint.
@@ -67,17 +81,13 @@ pub fn measured(titles: &[String], joints: &[String]) -> Measured {
 /// The first columns that are called u and v alike: a point in a picture. What stands before them is the camera and the target, as in
 /// `cam_tag_u`; of points with numbers, as in `cam_tag_u1`, each is a target of its own.
 fn first_picture(titles: &[String]) -> Option<Sensor> {
-    let find = |wanted: &str| titles.iter().find(|title| stem(title) == wanted).cloned();
     titles.iter().find_map(|title| {
-        let (before, number) = around('u', stem(title))?;
-        let columns = vec![find(&format!("{before}u{number}"))?, find(&format!("{before}v{number}"))?];
-        let (camera, target) = match before.trim_end_matches('_').rsplit_once('_') {
-            Some((camera, target)) => (camera, target),
-            None => ("camera", before.trim_end_matches('_')),
-        };
+        let it = Title::parse(title).filter(|it| it.component == Component::U)?;
+        let columns = vec![title.clone(), find(titles, &it, Component::V)?];
+        let (camera, target) = it.before.rsplit_once('_').unwrap_or(("camera", it.before));
         let target = if target.is_empty() { "marker" } else { target };
         Some(Sensor {
-            name: format!("{target}{number}"),
+            name: format!("{target}{}", it.number),
             channel: "pixels",
             camera: Some(camera.to_owned()),
             columns,
@@ -89,10 +99,9 @@ fn first_picture(titles: &[String]) -> Option<Sensor> {
 /// The first column that is called a distance.
 fn first_distance(titles: &[String]) -> Option<Sensor> {
     titles.iter().find_map(|title| {
-        let before = stem(title).strip_suffix("distance")?;
-        let target = before.strip_suffix('_').or_else(|| before.is_empty().then_some("marker"))?;
+        let it = Title::parse(title).filter(|it| it.component == Component::Distance && it.number.is_empty())?;
         Some(Sensor {
-            name: target.to_owned(),
+            name: if it.before.is_empty() { "marker" } else { it.before }.to_owned(),
             channel: "distance",
             camera: None,
             columns: vec![title.clone()],
@@ -103,18 +112,17 @@ fn first_distance(titles: &[String]) -> Option<Sensor> {
 
 /// The first columns that are called x, y and z alike, with those of a rotation that begin alike.
 fn first_place(titles: &[String]) -> Option<Sensor> {
-    let find = |wanted: &str| titles.iter().find(|title| stem(title) == wanted).cloned();
     titles.iter().find_map(|title| {
-        let (before, after) = around('x', stem(title))?;
-        let named = |letter: &str| find(&format!("{before}{letter}{after}"));
-        let mut columns = vec![named("x")?, named("y")?, named("z")?];
-        let rotation = ROTATIONS.iter().find_map(|ends| {
-            ends.iter().map(|end| named(end).or_else(|| named(&end.to_uppercase()))).collect::<Option<Vec<_>>>()
-        });
-        let name = match (before.trim_end_matches('_'), after) {
+        let it = Title::parse(title).filter(|it| it.component == Component::X)?;
+        let named = |components: &[Component]| -> Option<Vec<String>> {
+            components.iter().map(|component| find(titles, &it, *component)).collect()
+        };
+        let mut columns = named(&Component::PLACE)?;
+        let rotation = Rotation::ALL.iter().find_map(|rotation| named(rotation.components()));
+        let name = match (it.before, it.number) {
             ("", "") => "marker".to_owned(),
-            ("", after) => format!("marker{after}"),
-            (before, after) => format!("{before}{after}"),
+            ("", number) => format!("marker{number}"),
+            (before, number) => format!("{before}{number}"),
         };
         let (channel, sigmas) = match rotation {
             None => ("position", "sigma_m = 0.0005\n"),
@@ -125,13 +133,6 @@ fn first_place(titles: &[String]) -> Option<Sensor> {
         };
         Some(Sensor { name, channel, camera: None, columns, sigmas })
     })
-}
-
-/// What stands before and after the letter of a coordinate: `x`, `x1`, `hand_x`, `cam_tag_u2`.
-fn around(letter: char, stem: &str) -> Option<(&str, &str)> {
-    let bare = stem.trim_end_matches(|c: char| c.is_ascii_digit());
-    let before = bare.strip_suffix(letter)?;
-    (before.is_empty() || before.ends_with('_')).then_some((before, &stem[bare.len()..]))
 }
 
 #[cfg(test)]

@@ -124,6 +124,9 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
                     .to_owned(),
         });
     }
+    for sensor in &sensors {
+        titles.reading_titled(sensor.layout(), &sensor.columns).map_err(of_table)?;
+    }
     let mut trained = None;
     if let Some((place, socket)) = &sockets {
         guesses.push(format!("sockets: a target is held in one, which the columns `{place}` and `{socket}` tell"));

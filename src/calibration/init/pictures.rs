@@ -1,7 +1,7 @@
 //! How large the pictures are that a table's points lie in.
 
 use super::columns::Sensor;
-use crate::table::{Columns, Layout, Table, TableError};
+use crate::table::{Columns, Table, TableError};
 
 /// A camera, with width and height of its picture, pixels.
 pub type Picture = (String, [u32; 2]);
@@ -27,7 +27,7 @@ pub fn sizes(sensors: &[Sensor], table: &str) -> Result<Vec<Picture>, TableError
         return Ok(Vec::new());
     }
     let table = Table::open(table.as_bytes())?;
-    let titled = |(_, sensor): &(&String, &Sensor)| table.titles().reading_titled(Layout::Pixels(1), &sensor.columns);
+    let titled = |(_, sensor): &(&String, &Sensor)| table.titles().reading_titled(sensor.layout(), &sensor.columns);
     let readings = seen.iter().map(titled).collect::<Result<Vec<_>, _>>()?;
     for row in table.rows(Columns { readings, ..Columns::default() }) {
         for ((camera, _), reading) in seen.iter().zip(&row?.observation.readings) {

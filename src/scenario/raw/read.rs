@@ -75,7 +75,9 @@ fn problem(text: &str, path: &str, error: &toml::de::Error) -> Problem {
     match quoted.split_first() {
         Some((unknown, expected)) if message.starts_with("unknown field") => {
             let with_unit = expected.iter().find(|known| known.starts_with(&format!("{unknown}_")));
+            let is_of_camera = path.starts_with("camera") || path.starts_with("sensor");
             let mend = match (with_unit, similar(unknown, expected.iter().copied())) {
+                _ if is_of_camera && bends(unknown) => UNDISTORT.to_owned(),
                 (Some(known), _) => format!("write `{known}`: the unit belongs to the key"),
                 (None, Some(known)) => format!("did you mean `{known}`? The keys here are {}", expected.join(", ")),
                 (None, None) => format!("remove it; the keys here are {}", expected.join(", ")),
@@ -109,6 +111,20 @@ fn problem(text: &str, path: &str, error: &toml::de::Error) -> Problem {
             Problem { line, key, what, mend }
         }
     }
+}
+
+/// What to do with a lens that bends lines: points are read as a pinhole sees them.
+const UNDISTORT: &str = "undistort the points first (for example with OpenCV's undistortPoints, with P set to the camera matrix) \
+                         and leave this key out";
+
+/// Whether a key says how a lens bends lines.
+fn bends(key: &str) -> bool {
+    const COEFFICIENTS: [&str; 11] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "d", "k", "coeffs"];
+    let key = key.to_ascii_lowercase();
+    key.starts_with("dist") && !key.starts_with("distance")
+        || key.starts_with("radial")
+        || key.starts_with("tangential")
+        || COEFFICIENTS.contains(&key.as_str())
 }
 
 /// The unit that a key names, as the end of a sentence.

@@ -6,10 +6,7 @@ use std::ops::Range;
 use toml::Spanned;
 
 use super::raw;
-use crate::{
-    sensing::Keys,
-    table::{Layout, Titles},
-};
+use crate::{sensing::Keys, table::Titles};
 
 /// What nothing is known of where the robot stands.
 const BASE_M: f64 = 1.0;
@@ -59,18 +56,19 @@ pub(super) fn complete(raw: &mut raw::Scenario, titles: Option<&Titles>) {
 /// The targets that titles name: what stands before x, y and z.
 fn prefixes(titles: &Titles) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
-    for title in titles.all() {
-        let bare = ["_mm", "_m"].iter().find_map(|unit| title.strip_suffix(unit)).unwrap_or(title);
-        let prefix = if bare == "x" { Some("") } else { bare.strip_suffix("_x") };
-        let prefix = prefix.filter(|prefix| titles.reading(Layout::Position, prefix).is_ok());
-        found.extend(prefix.map(|prefix| if prefix.is_empty() { "marker" } else { prefix }.to_owned()));
+    for prefix in titles.prefixes() {
+        let is_place = titles.has_position(prefix);
+        let name = if prefix.is_empty() { "marker" } else { prefix };
+        if is_place && !found.iter().any(|known| known.eq_ignore_ascii_case(name)) {
+            found.push(name.to_owned());
+        }
     }
     found
 }
 
 /// A sensor of a target's pose where its titles have a rotation, or else of its position.
 fn keys_of(target: String, titles: Option<&Titles>) -> Keys {
-    let has_pose = |prefix: &&str| titles.is_some_and(|titles| titles.reading(Layout::Pose, prefix).is_ok());
+    let has_pose = |prefix: &&str| titles.is_some_and(|titles| titles.has_pose(prefix));
     let is_pose = ["", &target].iter().any(has_pose);
     let channel = if is_pose { "pose" } else { "position" };
     Keys { channel: Some(channel.to_owned()), target: Some(target), ..Keys::default() }

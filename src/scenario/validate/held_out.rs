@@ -1,5 +1,7 @@
 //! Which rows of a table are held out.
 
+use std::ops::Range;
+
 use toml::Spanned;
 
 use super::{Check, raw};
@@ -23,14 +25,17 @@ impl Check<'_> {
         read: &dyn Fn(&str) -> Result<Measurements, TableError>,
     ) -> Option<HeldOut> {
         let count = rows.rows();
+        let found = HeldOut::new(HeldOutRule::Nothing, &rows.configurations);
         let old = raw.measurements.as_ref().and_then(|given| given.get_ref().held_out.as_ref());
         let Some(spanned) = &raw.held_out else {
             let rule = match old {
                 Some(held_out) => self.drawn("measurements.held_out", held_out, count)?,
-                None if count < 2 => HeldOutRule::Nothing,
-                None => HeldOutRule::Folds(FOLDS.min(count)),
+                None => match found.count_postures() {
+                    0 | 1 => HeldOutRule::Nothing,
+                    postures => HeldOutRule::Folds(FOLDS.min(postures)),
+                },
             };
-            return Some(HeldOut { rows: count, rule });
+            return self.whole(HeldOut { rule, ..found }, old.map_or(0..0, Spanned::span));
         };
         if let Some(old) = old {
             let mend = "remove it; [held_out] says what is held out";
@@ -55,7 +60,28 @@ impl Check<'_> {
             let mend = "add `by = \"…\"`, the column that has these values";
             self.problem(train.span(), "held_out.train", "it says nothing without a column", mend);
         }
-        Some(HeldOut { rows: rows.rows(), rule })
+        self.whole(HeldOut::new(rule, &rows.configurations), spanned.span())
+    }
+
+    /// That rows which are held out leave none behind in their postures.
+    fn whole(&mut self, held_out: HeldOut, span: Range<usize>) -> Option<HeldOut> {
+        let postures = held_out.count_postures();
+        let mut sizes = vec![0; postures];
+        held_out.postures.iter().for_each(|posture| sizes[*posture] += 1);
+        let least = sizes.iter().copied().min().unwrap_or(0);
+        let stay = "rows of one posture stay together";
+        let (what, mend) = match held_out.rule {
+            HeldOutRule::Folds(_) | HeldOutRule::Count(_) if postures < 2 => (
+                format!("all {} rows are one posture: {stay}", held_out.rows),
+                "measure more postures, or write `rows = []`, which holds nothing out".to_owned(),
+            ),
+            HeldOutRule::Count(count) if count < least => {
+                (format!("each posture has {least} rows or more: {stay}"), format!("hold out {least} rows or more"))
+            }
+            _ => return Some(held_out),
+        };
+        self.problem(span, "held_out", what, mend);
+        None
     }
 
     fn drawn(&mut self, key: &str, held_out: &Spanned<usize>, count: usize) -> Option<HeldOutRule> {

@@ -58,9 +58,22 @@ impl Check<'_> {
             let labels =
                 sockets.iter().flat_map(|it| it.place.iter().chain([&it.socket])).chain(by.map(Spanned::get_ref));
             let labels: BTreeSet<&String> = labels.collect();
+            let joints = columns.iter().map(|column| column.find(titles)).collect::<Result<Vec<_>, TableError>>()?;
+            let readings = readings(raw, robot, titles)?;
+            let mut measured = readings.iter().flat_map(|reading| &reading.columns);
+            if let Some(both) = measured.find(|column| joints.iter().any(|joint| joint.index == column.index)) {
+                let what = format!(
+                    "line 1: `{}` is the column of a joint, and read as measured too",
+                    titles.all()[both.index]
+                );
+                return Err(TableError::new(
+                    what,
+                    "name the columns of what was measured: `columns = […]` of the [[sensor]]",
+                ));
+            }
             Ok(Columns {
-                joints: columns.iter().map(|column| column.find(titles)).collect::<Result<_, TableError>>()?,
-                readings: readings(raw, robot, titles)?,
+                joints,
+                readings,
                 labels: labels.into_iter().map(|title| titles.label(title)).collect::<Result<_, _>>()?,
             })
         };
@@ -81,8 +94,9 @@ impl Check<'_> {
         }
         let mut columns = Vec::new();
         for (index, joint) in raw.robot.joints.get_ref().iter().enumerate() {
+            let kind = joint.get_ref().kind;
             match &joint.get_ref().column {
-                Some(column) => columns.push(JointColumn::Titled(column.get_ref().clone())),
+                Some(column) => columns.push(JointColumn::Titled(column.get_ref().clone(), kind)),
                 None => {
                     let mend = "add `column = \"…\"`, the column of the data file with this joint's position";
                     self.problem(joint.span(), format!("robot.joint[{index}].column"), "missing", mend);
@@ -118,20 +132,20 @@ impl Check<'_> {
 /// How the column of a joint is found.
 enum JointColumn {
     /// By exactly this title, whose end says the unit; without one it is rad or m.
-    Titled(String),
+    Titled(String, JointKind),
     /// By the joint's name, with its unit or without.
     Named(String, JointKind),
 }
 
 impl JointColumn {
     fn find(&self, titles: &Titles) -> Result<Column, TableError> {
+        let quantity = |kind: &JointKind| match kind {
+            JointKind::Revolute => Quantity::Angle,
+            JointKind::Prismatic => Quantity::Length,
+        };
         match self {
-            Self::Titled(title) => {
-                let (angle, length) = (titles.titled(title, Quantity::Angle)?, titles.titled(title, Quantity::Length)?);
-                Ok(Column { factor: angle.factor * length.factor, ..angle })
-            }
-            Self::Named(name, JointKind::Revolute) => titles.find(name, Quantity::Angle),
-            Self::Named(name, JointKind::Prismatic) => titles.find(name, Quantity::Length),
+            Self::Titled(title, kind) => titles.titled(title, quantity(kind)),
+            Self::Named(name, kind) => titles.find(name, quantity(kind)),
         }
     }
 }
@@ -147,22 +161,27 @@ fn readings(raw: &raw::Scenario, robot: &Robot, titles: &Titles) -> Result<Vec<R
 }
 
 fn reading(keys: &Keys, robot: &Robot, titles: &Titles) -> Result<Reading, TableError> {
+    let (layout, prefix) = told(keys, robot);
+    if let Some(columns) = &keys.columns {
+        return titles.reading_titled(layout, columns);
+    }
+    // With nothing before them where there is no doubt.
+    titles.reading_of(layout, &prefix)
+}
+
+/// What a sensor's reading looks like in a table, and what its titles begin with.
+pub(super) fn told(keys: &Keys, robot: &Robot) -> (Layout, String) {
     let equipment = &robot.equipment;
     let named = |name: &Option<String>| name.clone();
     let target = named(&keys.target).or_else(|| Some(equipment.targets.first()?.name.clone())).unwrap_or_default();
     let camera = named(&keys.camera).or_else(|| Some(equipment.cameras.first()?.name.clone())).unwrap_or_default();
     let points = equipment.targets.iter().find(|kind| kind.name == target).map_or(1, |kind| kind.points.len());
-    let (layout, prefix) = match keys.channel.as_deref() {
+    match keys.channel.as_deref() {
         Some("pose") => (Layout::Pose, target),
         Some("distance") => (Layout::Distance, target),
         Some("pixels") => (Layout::Pixels(points), format!("{camera}_{target}")),
         _ => (Layout::Position, target),
-    };
-    if let Some(columns) = &keys.columns {
-        return titles.reading_titled(layout, columns);
     }
-    // With nothing before them where there is no doubt.
-    titles.reading(layout, &prefix).or_else(|error| titles.reading(layout, "").map_err(|_| error))
 }
 
 fn socket_columns(raw: &raw::Scenario, titles: &Titles) -> Option<SocketColumns> {

@@ -198,7 +198,7 @@ impl Check<'_> {
         let rig = self.rig(raw, &robot);
         let readings = self.readings(raw, &robot, rig.as_deref());
         let rig = rig.map(|rig| Arc::new(rig.as_ref().clone().with_joint_noise(readings.noise.clone())));
-        let rows = recorded.as_ref().map(|(_, held_out)| held_out.split(0).0.len() as u64);
+        let rows = recorded.as_ref().map(|(_, held_out)| held_out.fewest_training() as u64);
         let world = self.world(raw, &robot, rig.as_deref(), recorded);
         let kind = match (self.is_outside, &raw.measurements) {
             (true, _) => WorldKind::Outside,

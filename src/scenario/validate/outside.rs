@@ -7,12 +7,14 @@ use toml::Spanned;
 
 use super::{
     Check,
+    measured::told,
     raw::{self, Known},
     recorded_sockets::{SIGMA_DISTANCE_M, SIGMA_M},
 };
 use crate::{
     scenario::{Robot, WorldSpec},
     sensing::{Observation, Occasion, Rig},
+    table::{TableError, Titles},
 };
 
 impl Check<'_> {
@@ -66,6 +68,18 @@ impl Check<'_> {
         (self.problems.len() == found).then_some(())
     }
 
+    /// That a table can be written in the columns that sensors name, and read again.
+    fn columns_to_write(&mut self, raw: &raw::Scenario, robot: &Robot) {
+        for keys in raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0) {
+            let Some(columns) = &keys.get_ref().columns else { continue };
+            let titles = Titles::listed(columns.clone());
+            let read = titles.and_then(|titles| titles.reading_titled(told(keys.get_ref(), robot).0, columns));
+            if let Err(TableError { what, mend }) = read {
+                self.problem(keys.span(), "sensor.columns", what, mend);
+            }
+        }
+    }
+
     /// Hands every socket what is known of all of them.
     pub(super) fn share_what_sockets_have_in_common(&mut self, raw: &mut raw::Scenario) {
         let Some(held) = &raw.held else { return };
@@ -99,6 +113,7 @@ impl Check<'_> {
             (Some(view), Some(rig)) => self.view(view, robot, rig),
             _ => None,
         };
+        self.columns_to_write(raw, robot);
         let distance = raw.held.as_ref().and_then(|held| held.get_ref().distance_m.as_ref());
         let known = distance.zip(rig).map(|(distance, rig)| {
             let is_known = |occasion: Occasion| occasion == Occasion::Beforehand;

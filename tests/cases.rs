@@ -1,0 +1,346 @@
+//! Files that users have, each an instance of a kind of mistake or circumstance: what comes of them.
+
+use std::path::Path;
+
+use body_schema::{
+    calibration::{Calibration, CalibrationError, Case, Options, Silent, Sources, begin, calibrate},
+    doubts::{Doubt, DoubtKind},
+    scenario::{Problem, Scenario, ScenarioError},
+};
+
+/// The text of a file of a case.
+fn text(case: &str, file: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(case).join(file);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// A case, after `changed` has had its files by name.
+fn parsed(case: &str, changed: &dyn Fn(&str, String) -> String) -> Result<Scenario, ScenarioError> {
+    let open = |file: &str| Ok(changed(file, text(case, file)));
+    Scenario::parse("cal.toml", &changed("cal.toml", text(case, "cal.toml")), &open)
+}
+
+fn valid(case: &str, changed: &dyn Fn(&str, String) -> String) -> Scenario {
+    parsed(case, changed).unwrap_or_else(|error| panic!("{case}: {error}"))
+}
+
+/// The only problem of a case.
+fn problem(case: &str, changed: &dyn Fn(&str, String) -> String) -> Problem {
+    match parsed(case, changed) {
+        Err(ScenarioError::Invalid { mut problems, .. }) if problems.len() == 1 => problems.remove(0),
+        other => panic!("one problem expected: {:?}", other.map(|scenario| scenario.name)),
+    }
+}
+
+fn calibrated(scenario: &Scenario) -> Calibration {
+    let case = Case::new(scenario).expect("measured");
+    calibrate(&case, &Options::default(), &Silent).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn as_it_is(_: &str, text: String) -> String {
+    text
+}
+
+/// What is doubted of this kind.
+fn doubts(scenario: &Scenario, kind: DoubtKind) -> Vec<Doubt> {
+    let found = scenario.examine().expect("measured").doubts;
+    found.into_iter().filter(|doubt| doubt.kind == kind).collect()
+}
+
+/// The first so many rows of a table.
+fn first_rows(text: &str, count: usize) -> String {
+    text.lines().take(count + 1).map(|line| format!("{line}\n")).collect()
+}
+
+/// Quaternions whose scalar stands first, by their titles.
+#[test]
+fn titles_say_which_number_of_a_quaternion_is_which() {
+    let held_out = |scenario: &Scenario| calibrated(scenario).report.held_out.expect("folds").after;
+    let mean = held_out(&valid("t11-explicit-wxyz", &as_it_is)).mean_deg.expect("rotations");
+    assert!(mean < 0.06, "{mean} degrees");
+    // In any order in the list, and in capitals in the file.
+    let shuffled = |file: &str, text: String| match file {
+        "cal.toml" => {
+            text.replace(r#"["x", "y", "z", "qw", "qx", "qy", "qz"]"#, r#"["qz", "y", "qw", "x", "qx", "z", "qy"]"#)
+        }
+        "data.csv" => text.replace("qw,qx,qy,qz", "Qw,QX,qy,Qz"),
+        _ => text,
+    };
+    assert_eq!(held_out(&valid("t11-explicit-wxyz", &shuffled)).mean_deg, Some(mean));
+    let twice = |file: &str, text: String| match file {
+        "cal.toml" => text.replace(r#""qw", "qx", "qy", "qz"]"#, r#""qx", "qx", "qy", "qz"]"#),
+        _ => text,
+    };
+    let found = problem("t11-explicit-wxyz", &twice);
+    assert!(found.what.contains("`qx` and `qx` are both taken for qx, and none is qw"), "{found}");
+    assert!(found.mend.contains("name x, y and z, and qx, qy, qz and qw"), "{found}");
+}
+
+#[test]
+fn titles_say_units() {
+    let scenario = valid("t13-columns-cm", &as_it_is);
+    let before = calibrated(&scenario).report.training.before.mean_mm.expect("lengths");
+    assert!(before < 50.0, "{before} mm");
+    let titled = |unit: &'static str| move |_: &str, text: String| text.replace("_cm", unit);
+    for (unit, said) in
+        [("_ft", "`ft` is no unit"), (" (furlong)", "`furlong` is no unit"), ("_deg", "`deg` is no unit")]
+    {
+        let found = problem("t13-columns-cm", &titled(unit));
+        assert!(found.what.contains(&format!("column `x{unit}`: {said}")), "{found}");
+        assert!(found.mend.contains("_m, _cm, _mm, _um, _in"), "{found}");
+    }
+}
+
+/// What `init` takes titles for is what a calibration reads.
+#[test]
+fn files_are_begun_by_the_same_titles() {
+    let robot = text("t11-explicit-wxyz", "robot.urdf");
+    let begun = |table: &str| {
+        begin(&Sources {
+            name: "cal",
+            urdf_file: "robot.urdf",
+            urdf: &robot,
+            table_file: "data.csv",
+            table,
+            base: None,
+            tip: None,
+        })
+    };
+    let table = text("t11-explicit-wxyz", "data.csv").replace("x,y,z,qw,qx,qy,qz", "X (m),Y (m),Z (m),QW,QX,QY,QZ");
+    let file = begun(&table).unwrap_or_else(|error| panic!("{error}")).text;
+    assert!(file.contains(r#"columns = ["X (m)", "Y (m)", "Z (m)", "QX", "QY", "QZ", "QW"]"#), "{file}");
+    let open = |file: &str| Ok(if file == "data.csv" { table.clone() } else { robot.clone() });
+    let scenario = Scenario::parse("cal.toml", &file, &open).unwrap_or_else(|error| panic!("{error}"));
+    let as_listed = valid("t11-explicit-wxyz", &as_it_is);
+    let rows = |scenario: &Scenario| Case::new(scenario).expect("measured").rows;
+    assert_eq!(rows(&scenario), rows(&as_listed));
+    let error = begun(&table.replace("(m)", "(ft)")).expect_err("feet").to_string();
+    assert!(error.contains("data.csv: line 1, column `X (ft)`: `ft` is no unit"), "{error}");
+}
+
+/// Joints have units too.
+#[test]
+fn joints_are_read_in_their_units() {
+    let in_degrees = |file: &str, text: String| {
+        if file != "data.csv" {
+            return text;
+        }
+        let mut lines = text.lines();
+        let mut table = lines.next().expect("titles").replacen("pan,", "pan (deg),", 1) + "\n";
+        for line in lines {
+            let (pan, rest) = line.split_once(',').expect("cells");
+            table += &format!("{},{rest}\n", pan.parse::<f64>().expect("a number").to_degrees());
+        }
+        table
+    };
+    let case = "t13-columns-cm";
+    let means = [valid(case, &as_it_is), valid(case, &in_degrees)]
+        .map(|scenario| calibrated(&scenario).report.training.before.mean_mm.expect("lengths"));
+    assert!((means[0] - means[1]).abs() < 1e-6, "{means:?}");
+    for unit in ["_mm", "_grad", "_in"] {
+        let titled = |file: &str, text: String| {
+            if file == "data.csv" { text.replacen("pan,", &format!("pan{unit},"), 1) } else { text }
+        };
+        let found = problem(case, &titled);
+        assert!(found.what.contains(&format!("column `pan{unit}`")) && found.mend.contains("_rad, _deg"), "{found}");
+    }
+    // What is measured is no joint.
+    let joint = |file: &str, text: String| {
+        if file == "cal.toml" { text.replace("\"x_cm\",", "\"pan\",") } else { text }
+    };
+    assert!(problem(case, &joint).what.contains("`pan` is the column of a joint"));
+}
+
+/// Forty-two rows of seven postures: fresh postures are off by 12 mm, and so are folds that hold out whole postures.
+#[test]
+fn folds_keep_repeats_together() {
+    let name = "f22b-7postures-6-repeats";
+    let scenario = valid(name, &as_it_is);
+    let report = calibrated(&scenario).report;
+    let held_out = report.held_out.expect("folds");
+    let mean = held_out.after.mean_mm.expect("lengths");
+    assert!(mean > 5.0, "{mean} mm");
+    assert!(report.held_out_by.contains("holds out postures f, f + 5"), "{}", report.held_out_by);
+    assert!(report.doubts.iter().any(|doubt| doubt.contains("folds keep repeats together")), "{:?}", report.doubts);
+    for fold in &held_out.folds {
+        assert!(fold.rows.len().is_multiple_of(6), "{:?}", fold.rows);
+        assert!(fold.rows.iter().all(|row| fold.rows.contains(&((row - 1) / 6 * 6 + 1))), "{:?}", fold.rows);
+    }
+    // Asked on the command line, and more folds than postures.
+    let case = Case::new(&scenario).expect("measured");
+    let splits = case.splits(Some(9)).expect("folds");
+    assert_eq!(splits.len(), 7);
+    assert!(splits.iter().all(|split| split.held_out.len() == 6 && split.training.len() == 36));
+    let in_nine = |file: &str, text: String| {
+        if file == "cal.toml" { text.replace("folds = 5", "folds = 9") } else { text }
+    };
+    let few = doubts(&valid(name, &in_nine), DoubtKind::FewFolds);
+    assert!(few[0].to_string().contains("9 folds are asked for, and 7 are made (42 rows are 7 postures"), "{few:?}");
+    // One posture says nothing of others.
+    let one = |file: &str, text: String| if file == "data.csv" { first_rows(&text, 6) } else { text };
+    let found = problem(name, &one);
+    assert!(found.what.contains("all 6 rows are one posture") && found.mend.contains("rows = []"), "{found}");
+    let none = |file: &str, text: String| match file {
+        "cal.toml" => text.replace("folds = 5", "rows = []"),
+        "data.csv" => first_rows(&text, 6),
+        _ => text,
+    };
+    let scenario = valid(name, &none);
+    let refused = Case::new(&scenario).expect("measured").splits(Some(3)).expect_err("one posture");
+    assert_eq!(refused, CalibrationError::OnePosture { rows: 6 });
+    // Where no row repeats another a fold is every K-th row.
+    let distinct = valid("t13-columns-cm", &as_it_is);
+    let splits = Case::new(&distinct).expect("measured").splits(Some(4)).expect("folds");
+    assert_eq!(splits[1].held_out, [1, 5, 9, 13, 17, 21]);
+}
+
+/// Encoders that repeat to some hundredths of a milliradian: a draw holds out whole postures too.
+#[test]
+fn draws_keep_repeats_together() {
+    let noisy = |file: &str, text: String| match file {
+        "cal.toml" => text.replace("folds = 5", "count = 14"),
+        "data.csv" => {
+            let mut lines = text.lines();
+            let mut table = lines.next().expect("titles").to_owned() + "\n";
+            for (row, line) in lines.enumerate() {
+                let (first, rest) = line.split_once(',').expect("cells");
+                let pan: f64 = first.parse().expect("a number");
+                table += &format!("{},{rest}\n", pan + 1.5e-5 * (row * 7 % 5) as f64);
+            }
+            table
+        }
+        _ => text,
+    };
+    let scenario = valid("f22b-7postures-6-repeats", &noisy);
+    let splits = Case::new(&scenario).expect("measured").splits(None).expect("as the file says");
+    assert_eq!(splits[0].held_out.len(), 12, "two postures of six");
+    assert!(splits[0].held_out.iter().all(|row| splits[0].held_out.contains(&(row / 6 * 6))));
+    let fewer = |file: &str, text: String| noisy(file, text).replace("count = 14", "count = 5");
+    let found = problem("f22b-7postures-6-repeats", &fewer);
+    assert!(found.what.contains("each posture has 6 rows or more"), "{found}");
+}
+
+#[test]
+fn held_out_rows_that_repeat_training_rows_are_told() {
+    let name = "f22b-7postures-6-repeats";
+    let rows = |rows: &'static str| {
+        move |file: &str, text: String| if file == "cal.toml" { text.replace("folds = 5", rows) } else { text }
+    };
+    let listed = doubts(&valid(name, &rows("rows = [3, 41]")), DoubtKind::Leakage);
+    let [leak] = listed.as_slice() else { panic!("{listed:?}") };
+    assert_eq!(leak.lines, [5, 43]);
+    assert!(leak.evidence.contains("line 5 repeats line 2"), "{leak}");
+    assert!(doubts(&valid(name, &rows("rows = [0, 1, 2, 3, 4, 5]")), DoubtKind::Leakage).is_empty(), "a whole posture");
+    // A second file, one of whose rows repeats one.
+    let second = |file: &str, text_of: String| match file {
+        "cal.toml" => text_of.replace("folds = 5", "file = \"later.csv\""),
+        _ => text_of,
+    };
+    let open = |file: &str| {
+        let lines = text("t13-columns-cm", "data.csv").replace("_cm", "_m");
+        Ok(match file {
+            "later.csv" => lines
+                .lines()
+                .take(3)
+                .chain([lines.lines().nth(7).expect("a row")])
+                .map(|it| it.to_owned() + "\n")
+                .collect(),
+            "data.csv" => lines
+                .lines()
+                .enumerate()
+                .filter(|(at, _)| !(1..3).contains(at))
+                .map(|(_, it)| it.to_owned() + "\n")
+                .collect(),
+            _ => text("t13-columns-cm", file),
+        })
+    };
+    let toml = text("t13-columns-cm", "cal.toml").replace("_cm", "_m");
+    let scenario = Scenario::parse("cal.toml", &second("cal.toml", toml.replace("folds=5", "folds = 5")), &open);
+    let found = doubts(&scenario.unwrap_or_else(|error| panic!("{error}")), DoubtKind::Leakage);
+    let [leak] = found.as_slice() else { panic!("{found:?}") };
+    assert_eq!(leak.lines, [4]);
+    assert!(leak.evidence.contains("line 4 of the file that is held out repeats line 6"), "{leak}");
+}
+
+#[test]
+fn equations_are_those_of_what_was_measured() {
+    for (name, rows, evidence, more) in [
+        ("k02-distances", 8, "24 equations for 33 unknowns", "some 3 rows more"),
+        ("f13b-side-for-half-side", 3, "24 equations for ", "rows more"),
+    ] {
+        assert!(doubts(&valid(name, &as_it_is), DoubtKind::TooFewRows).is_empty(), "{name}");
+        let short = |file: &str, text: String| match file {
+            "cal.toml" => text.replace("folds=5", "rows=[]"),
+            "data.csv" => first_rows(&text, rows),
+            _ => text,
+        };
+        let found = doubts(&valid(name, &short), DoubtKind::TooFewRows);
+        let [few] = found.as_slice() else { panic!("{name}: {found:?}") };
+        assert_eq!(few.what, format!("{rows} rows are too few"));
+        assert!(few.evidence.contains(evidence) && few.mend.contains(more), "{few}");
+    }
+    // A pose is six.
+    let free = |file: &str, text: String| match file {
+        "cal.toml" => text.replace("hold = [", "# hold = [").replace("folds = 5", "rows = []"),
+        "data.csv" => first_rows(&text, 3),
+        _ => text,
+    };
+    let found = doubts(&valid("t11-explicit-wxyz", &free), DoubtKind::TooFewRows);
+    assert!(found[0].evidence.starts_with("18 equations for"), "{found:?}");
+}
+
+#[test]
+fn only_joints_whose_axes_are_learned_are_asked_to_move() {
+    let name = "f05-one-axis-only";
+    assert!(doubts(&valid(name, &as_it_is), DoubtKind::Constant).is_empty());
+    let without = |file: &str, text: String| if file == "cal.toml" { text.replace("\"elbow\", ", "") } else { text };
+    let found = doubts(&valid(name, &without), DoubtKind::Constant);
+    let [still] = found.as_slice() else { panic!("{found:?}") };
+    assert!(still.to_string().contains("`elbow`: this joint never moves (2.38121853 in all 15 rows)"), "{still}");
+    assert!(still.mend.contains("or hold it"), "{still}");
+}
+
+/// A joint that was left to its servo: it moved by some tenths of a milliradian.
+#[test]
+fn a_joint_that_hardly_moves_is_told_by_its_range() {
+    let column = |scale: f64| {
+        move |file: &str, text: String| {
+            if file != "data.csv" {
+                return text;
+            }
+            let mut lines = text.lines();
+            let mut table = lines.next().expect("titles").to_owned() + "\n";
+            for line in lines {
+                let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+                cells[3] = (0.7 + scale * cells[3].parse::<f64>().expect("a number").sin()).to_string();
+                table += &(cells.join(",") + "\n");
+            }
+            table
+        }
+    };
+    let found = doubts(&valid("t13-columns-cm", &column(0.00015)), DoubtKind::Constant);
+    let [still] = found.as_slice() else { panic!("{found:?}") };
+    assert!(
+        still.to_string().contains("`w1`: this joint hardly moves") && still.evidence.contains("a range of 2.9"),
+        "{still}"
+    );
+    assert!(doubts(&valid("t13-columns-cm", &column(0.05)), DoubtKind::Constant).is_empty());
+}
+
+#[test]
+fn lenses_are_straightened_before() {
+    let name = "f14b-distortion-key";
+    for key in ["distortion", "dist", "k1", "distortion_coefficients", "distCoeffs"] {
+        let keyed = |file: &str, text: String| {
+            if file == "cal.toml" { text.replace("distortion=", &format!("{key}=")) } else { text }
+        };
+        let found = problem(name, &keyed);
+        assert!(found.key.ends_with(key) && found.what == "unknown key", "{found}");
+        assert!(found.mend.contains("undistort the points first") && found.mend.contains("P set to the camera matrix"));
+    }
+    // Other keys are as they were.
+    let other = |file: &str, text: String| {
+        if file == "cal.toml" { text.replace("distortion=[-0.25,0.05,0,0,0]", "focal_length=1") } else { text }
+    };
+    assert!(!problem(name, &other).mend.contains("undistort"));
+}
