@@ -159,12 +159,15 @@ fn what_is_no_urdf_is_refused() {
         ("<sdf/>", 1, "<sdf> is not the description of a robot", "give a URDF"),
         ("<!DOCTYPE robot>\n<robot/>", 1, "<!DOCTYPE>", "remove it"),
         ("<robot>\n<xacro:property name=\"a\"/></robot>", 2, "a template in xacro", "xacro robot.urdf.xacro"),
-        ("<robot>\n<gz:plugin/></robot>", 2, "`gz:` is not declared", "xmlns:gz"),
+        ("INFO: expanded\n<?xml version=\"1.0\"?><robot/>", 1, "begins with `INFO: expanded`", "before <?xml"),
+        ("<x:sdf/>", 1, "<x:sdf> is not the description of a robot", "give a URDF"),
         ("<robot>\n<link/></robot>", 2, "<link> has no `name`", "add name"),
     ] {
         let error = Urdf::parse(text).expect_err(text);
         assert!(error.what.contains(what) && error.mend.contains(mend) && error.line == line, "{text}: {error}");
     }
+    refused("type=\"revolute\"", "type=\"${type}\"", (7, 32), "`${type}` is an expression of xacro", "expand it first");
+    refused("<axis xyz=\"0 1 0\"/>", "<xacro:axis/>", (10, 5), "<xacro:axis>: this is a template", "expand it first");
     let template = ARM.replace("  <link name=\"hand\"/>", "  <xacro:include filename=\"hand.xacro\"/>");
     let error = Urdf::parse(&template).expect_err("a template");
     assert!(error.what.contains("<xacro:include>") && error.line == 6, "{error}");
@@ -181,4 +184,72 @@ fn depth_and_size_do_no_harm() {
     let joints: String = (0..19_999).map(joint).collect();
     let urdf = Urdf::parse(&format!("<robot>{links}{joints}</robot>")).expect("a long chain");
     assert_eq!(urdf.chain("l0", "l19999").expect("a long chain").moving().count(), 19_999);
+}
+
+/// What `text` is with the first origin moved, written; what is to be the same otherwise.
+fn is_written_in_place(text: &str) {
+    let urdf = Urdf::parse(text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let mut chain = urdf.chain("base", "hand").unwrap_or_else(|error| panic!("{error}\n{text}"));
+    assert_eq!(urdf.written(&chain), text);
+    chain.segments[0].origin.translation.vector.z = 1.25;
+    chain.segments[1].origin.translation.vector.x = 0.5;
+    let written = urdf.written(&chain);
+    let inserted = "<origin xyz=\"0.5 0 0\" rpy=\"0 0 0\"/>\n    <parent link=\"upper\"/>";
+    let wanted = text.replace("\"0 0 1\"", "\"0 0 1.25\"").replace("<parent link=\"upper\"/>", inserted);
+    assert_eq!(written, wanted);
+}
+
+#[test]
+fn prefixes_that_nobody_declares_are_parts_of_names() {
+    for (from, to) in [
+        ("<limit lower", "<limit drake:acceleration=\"2.5\" ü:é=\"1\" lower"),
+        ("<link name=\"hand\"/>", "<link name=\"hand\"><gz:plugin mujoco:a='b'><gz:c/></gz:plugin></link>"),
+        // No joint, link or origin of this description.
+        ("<link name=\"hand\"/>", "<link name=\"hand\"/><drake:joint name=\"shoulder\"/><drake:link/>"),
+        ("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 0\"/><drake:axis xyz=\"1 0 0\"/>"),
+        ("<origin xyz", "<origin my:xyz=\"9 9 9\" xyz"),
+        ("<robot name=\"arm\"", "<robot name=\"arm\" xmlns=\"http://ros.org\" xmlns:drake=\"http://drake.mit.edu\""),
+        ("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 0\"/><!-- ---- was: <a:b c=\"--\"/> ---->"),
+    ] {
+        assert!(ARM.contains(from), "the test's own premise: {from}");
+        is_written_in_place(&ARM.replacen(from, to, 1));
+    }
+    // A declared one is another's as well.
+    let other = "<drake:joint name=\"elbow\" xmlns:drake=\"http://drake.mit.edu\"/>\n  <link name=\"hand\"/>";
+    is_written_in_place(&ARM.replacen("<link name=\"hand\"/>", other, 1));
+}
+
+#[test]
+fn anything_but_text_may_stand_before_the_declaration() {
+    let declared = "<?xml version=\"1.0\"?>\n";
+    for before in
+        ["\n", " \t\r\n", "<!-- made by -- a tool -->\n", "\u{feff}\n", "\n\u{feff}", "\u{feff}\u{feff}", declared]
+    {
+        is_written_in_place(&format!("{before}{ARM}"));
+        let error = error(&format!("{before}{}", ARM.replace("0 1 0", "0 0 0")), "base", "hand");
+        assert_eq!((error.line, error.column), (10 + before.matches('\n').count(), 16), "{before:?}");
+    }
+    is_written_in_place(&ARM.replace("<?xml version=\"1.0\"?>", "<?xml encoding='utf-8'?>"));
+    is_written_in_place(&ARM.replace("<?xml version=\"1.0\"?>\n", ""));
+}
+
+#[test]
+fn xacro_where_no_kinematics_is_counts_for_nothing() {
+    let parts = [
+        "<visual><xacro:grey/></visual>",
+        "<collision><geometry><xacro:box size=\"${w}\"/></geometry></collision>",
+        "<xacro:inertia m=\"${mass}\"/>",
+    ];
+    for part in parts {
+        is_written_in_place(&ARM.replacen("<link name=\"fore\"/>", &format!("<link name=\"fore\">{part}</link>"), 1));
+    }
+    for element in ["material name=\"grey\"", "gazebo reference=\"fore\"", "transmission name=\"t\""] {
+        let name = element.split(' ').next().unwrap_or_default();
+        let with = format!("<{element}><xacro:rest a=\"$(arg b)\"/></{name}>\n</robot>");
+        is_written_in_place(&ARM.replacen("</robot>", &with, 1));
+    }
+    // By any prefix that is declared for it.
+    let text = ARM.replace("xmlns:xacro=\"http://www.ros.org/wiki/xacro\"", "xmlns:x=\"http://wiki.ros.org/xacro\"");
+    let error = error(&text.replace("</robot>", "<x:arm/></robot>"), "base", "hand");
+    assert!(error.what.contains("<x:arm>: this is a template"), "{error}");
 }

@@ -7,7 +7,7 @@ use roxmltree::Node;
 
 use super::{
     SegmentKind, UrdfError,
-    values::{error, number, numbers, only_child, required},
+    values::{EXPAND, error, is_expression, number, numbers, only_child, required},
 };
 
 /// What a joint's element says besides its name and its links.
@@ -58,6 +58,9 @@ pub enum Insert {
 impl Body {
     pub fn read(node: Node) -> Result<Self, UrdfError> {
         let (kind, at) = required(node, "type")?;
+        if is_expression(kind) {
+            return Err(error(node, at.start, format!("`{kind}` is an expression of xacro"), EXPAND));
+        }
         let kind = match kind {
             "revolute" => SegmentKind::Revolute,
             "continuous" => SegmentKind::Continuous,

@@ -50,6 +50,7 @@ mod element;
 mod error;
 mod fitted;
 mod kinematics;
+mod plain;
 mod read;
 mod rotation;
 mod values;

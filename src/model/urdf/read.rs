@@ -7,6 +7,7 @@ use roxmltree::{Document, Error, Node, ParsingOptions};
 use super::{
     UrdfError,
     element::Body,
+    plain::{COLON, plain},
     values::{EXPAND, error, only_child, required},
 };
 use crate::similar::similar;
@@ -44,17 +45,19 @@ pub(super) struct JointElement {
 }
 
 impl Urdf {
-    /// Reads a description. Unknown elements and attributes are passed over.
+    /// Reads a description. Unknown elements and attributes are passed over, those of other namespaces too, whether these are
+    /// declared or not. Blanks, comments and a byte order mark may stand before the declaration of XML.
     ///
     /// # Errors
     ///
-    /// [`UrdfError`] where the text is no XML, is xacro, or its links and joints form no tree.
+    /// [`UrdfError`] where the text is no XML, its links and joints are xacro, or they form no tree.
     pub fn parse(text: &str) -> Result<Self, UrdfError> {
         let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
-        let document = Document::parse_with_options(text, options).map_err(|found| no_xml(text, &found))?;
+        let strict = plain(text);
+        let document = Document::parse_with_options(&strict, options).map_err(|found| no_xml(text, &found))?;
         let robot = document.root_element();
         if robot.tag_name().name() != "robot" {
-            let what = format!("<{}> is not the description of a robot", robot.tag_name().name());
+            let what = format!("<{}> is not the description of a robot", as_written(robot.tag_name().name()));
             return Err(error(robot, robot.range().start, what, "give a URDF, whose first element is <robot>"));
         }
         refuse_xacro(robot)?;
@@ -151,29 +154,48 @@ fn link_of(joint: Node, tag: &str, name: &str, links: &Names) -> Result<(usize, 
     Err(error(node, place.start, format!("there is no link `{link}`, which joint `{name}` names"), mend))
 }
 
+/// The name of an element as the description has it.
+fn as_written(name: &str) -> String {
+    name.replace(COLON, ":")
+}
+
+/// Refuses xacro where kinematics is: between links and joints, and in joints. What is left of a template elsewhere, as a colour in
+/// a `<visual>`, says nothing of how the robot moves.
 fn refuse_xacro(robot: Node) -> Result<(), UrdfError> {
-    let is_xacro = |node: &Node| node.tag_name().namespace().is_some_and(|name| name.ends_with("/xacro"));
-    match robot.descendants().find(is_xacro) {
+    let declared = |prefix: &str| {
+        let mut attributes = robot.attributes();
+        let name = format!("xmlns{COLON}{prefix}");
+        attributes
+            .any(|attribute| attribute.name() == name && attribute.value().trim_end_matches('/').ends_with("/xacro"))
+    };
+    let is_xacro = |node: &Node| {
+        let prefix = node.tag_name().name().split_once(COLON).map(|(prefix, _)| prefix);
+        prefix.is_some_and(|prefix| prefix == "xacro" || declared(prefix))
+    };
+    let of_joints =
+        robot.children().filter(|node| node.tag_name().name() == "joint").flat_map(|joint| joint.descendants());
+    let mut found: Vec<Node> = robot.children().chain(of_joints).filter(is_xacro).collect();
+    found.sort_by_key(|node| node.range().start);
+    match found.first() {
         None => Ok(()),
         Some(node) => {
-            let what = format!("<xacro:{}>: this is a template in xacro, not a URDF", node.tag_name().name());
-            Err(error(node, node.range().start, what, EXPAND))
+            let what = format!("<{}>: this is a template in xacro, not a URDF", as_written(node.tag_name().name()));
+            Err(error(*node, node.range().start, what, EXPAND))
         }
     }
 }
 
 fn no_xml(text: &str, found: &Error) -> UrdfError {
     let position = found.pos();
+    let before = text.trim_start_matches('\u{feff}').split('<').next().unwrap_or_default().trim();
     let (what, mend) = match found {
-        Error::UnknownNamespace(prefix, _) if prefix == "xacro" => {
-            ("this is a template in xacro, not a URDF".to_owned(), EXPAND.to_owned())
-        }
-        Error::UnknownNamespace(prefix, _) => (
-            format!("the prefix `{prefix}:` is not declared"),
-            format!("declare it, <robot xmlns:{prefix}=\"…\" …>, or remove the element"),
-        ),
         Error::DtdDetected => ("there is a <!DOCTYPE>".to_owned(), "remove it; a URDF needs none".to_owned()),
         _ if text.trim().is_empty() => ("the file is empty".to_owned(), "give a URDF".to_owned()),
+        _ if !before.is_empty() && text.contains("<robot") => {
+            let shown: String = before.chars().take(40).collect();
+            let mend = "remove what stands before <?xml or <robot: often what a program has said of itself".to_owned();
+            (format!("this is not XML: it begins with `{shown}`"), mend)
+        }
         _ => {
             let message = found.to_string();
             let what = message.rsplit_once(" at ").map_or(message.as_str(), |(what, _)| what);
