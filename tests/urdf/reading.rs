@@ -101,10 +101,22 @@ fn what_is_wrong_has_line_column_and_mend() {
     refused("0 0 1\"", "0 0 inf\"", (8, 18), "`inf` in `xyz` is not a finite number", "0.03");
     refused("0 0 1\"", "0 0 1e13\"", (8, 18), "`1e13` in `xyz` is beyond ±1e12", "0.03");
     refused("0 0 1\"", "0 0 ${height}\"", (8, 18), "expression of xacro", "xacro robot.urdf.xacro");
-    refused("type=\"revolute\"", "type=\"ball\"", (7, 32), "type `ball`", "revolute, continuous, prismatic and fixed");
+    refused(
+        "type=\"revolute\"",
+        "type=\"ball\"",
+        (7, 32),
+        "`shoulder` is of type `ball`",
+        "as `upper`, which it carries, for the base",
+    );
     refused(" type=\"revolute\"", "", (7, 3), "<joint> has no `type`", "add type");
     refused("    <limit lower=\"-1\" upper=\"2\"/>\n", "", (7, 3), "joint `shoulder` has no <limit>", "`continuous`");
-    refused("lower=\"-1\"", "lower=\"3\"", (11, 5), "the lower limit 3 is above", "lower=\"2\" upper=\"3\"");
+    refused(
+        "lower=\"-1\"",
+        "lower=\"3\"",
+        (11, 5),
+        "`shoulder`: the lower limit 3 is above",
+        "lower=\"2\" upper=\"3\"",
+    );
     refused("name=\"elbow\"", "name=\"shoulder\"", (13, 16), "`shoulder` is on line 7 already", "name of its own");
     refused(
         "<link name=\"hand\"/>",
@@ -252,4 +264,77 @@ fn xacro_where_no_kinematics_is_counts_for_nothing() {
     let text = ARM.replace("xmlns:xacro=\"http://www.ros.org/wiki/xacro\"", "xmlns:x=\"http://wiki.ros.org/xacro\"");
     let error = error(&text.replace("</robot>", "<x:arm/></robot>"), "base", "hand");
     assert!(error.what.contains("<x:arm>: this is a template"), "{error}");
+}
+
+/// The limits of `shoulder`, and the range in which it is moved.
+fn limited(limit: &str) -> (Option<(f64, f64)>, (f64, f64)) {
+    let text = ARM.replacen("lower=\"-1\" upper=\"2\"", limit, 1);
+    let chain =
+        Urdf::parse(&text).and_then(|urdf| urdf.chain("base", "hand")).unwrap_or_else(|error| panic!("{error}"));
+    (chain.readings[0].limits, chain.limits().expect("a box").joints()[0])
+}
+
+#[test]
+fn limits_that_stand_for_none_are_none() {
+    use std::f64::consts::{PI, TAU};
+
+    for (limit, lower, upper) in [
+        ("-999999", -PI, PI),
+        ("-1e16", -PI, PI),
+        ("-1e300", -PI, PI),
+        ("-inf", -PI, PI),
+        ("-Infinity", -PI, PI),
+        ("-10000", -PI, PI),
+        // Far, though it may be meant: nobody need turn so far.
+        ("-9999", -TAU, TAU),
+        ("-7", -TAU, TAU),
+        ("-6.2832", -6.2832, 6.2832),
+    ] {
+        let positive = &limit[1..];
+        let (limits, range) = limited(&format!("lower=\"{limit}\" upper=\"{positive}\""));
+        assert_eq!(range, (lower, upper), "{limit}");
+        assert_eq!(limits.is_none(), lower == -PI, "{limit}");
+    }
+    for (lower, upper, range) in [
+        ("0", "1e9", (0.0, TAU)),
+        ("-999999", "1", (-TAU, 1.0)),
+        ("10", "inf", (10.0, 10.0 + TAU)),
+        ("-1000", "-6.28", (-6.28 - TAU, -6.28)),
+        ("10", "11", (10.0, 11.0)),
+        ("-3", "20", (-3.0, TAU)),
+    ] {
+        let (limits, found) = limited(&format!("lower=\"{lower}\" upper=\"{upper}\""));
+        assert_eq!(found, range, "{lower} {upper}");
+        assert!(limits.is_some(), "the other limit counts");
+    }
+}
+
+#[test]
+fn limits_of_joints_that_cannot_move_are_told() {
+    let shoulder = "lower=\"-1\" upper=\"2\"";
+    refused(
+        shoulder,
+        "lower=\"0\" upper=\"0\"",
+        (11, 5),
+        "`shoulder`: it cannot move, as its limits are both 0",
+        "`continuous`",
+    );
+    refused(shoulder, "lower=\"0.5\" upper=\"0.5\"", (11, 5), "both 0.5", "or `fixed`");
+    refused(shoulder, "effort=\"9\"", (11, 5), "its <limit> has no `lower` and no `upper`", "in radians");
+    refused(shoulder, "lower=\"nan\" upper=\"1\"", (11, 19), "`nan` in `lower` is not a finite number", "0.03");
+    refused(shoulder, "lower=\"inf\" upper=\"-inf\"", (11, 5), "the lower limit inf is above", "lower=\"-inf\"");
+    let slide = "lower=\"0\" upper=\"0.2\"";
+    refused(slide, "lower=\"0\" upper=\"0\"", (20, 5), "`slide`: it cannot move", "how far it slides, in metres");
+    refused(
+        slide,
+        "lower=\"-1e16\" upper=\"1e16\"",
+        (20, 5),
+        "`slide`: a limit of 10000 m or more",
+        "how far it slides",
+    );
+    // That which follows another moves as the other does.
+    let follower = ARM
+        .replace("type=\"continuous\"", "type=\"revolute\"")
+        .replace("<axis xyz=\"0 0 3\"/>", "<limit effort=\"1\"/>");
+    Urdf::parse(&follower).and_then(|urdf| urdf.chain("base", "hand")).expect("a chain");
 }
