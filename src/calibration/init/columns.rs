@@ -1,5 +1,7 @@
 //! What the columns of a table are, by their titles.
 
+use crate::kinematics::JointKind;
+
 /// Ends of titles that say a unit, longest first.
 const UNITS: [&str; 5] = ["_deg", "_rad", "_mm", "_px", "_m"];
 /// How a rotation is written behind a place, by its titles.
@@ -37,14 +39,18 @@ fn stem(title: &str) -> &str {
     UNITS.iter().find_map(|unit| title.strip_suffix(unit)).unwrap_or(title)
 }
 
-/// Whether there is a column for a joint.
-pub fn has_joint(titles: &[String], joint: &str) -> bool {
-    titles.iter().any(|title| title == joint || stem(title) == joint)
+/// The column of a joint: that with its name alone, or else with a unit of its kind behind it.
+pub fn of_joint<'t>(titles: &'t [String], joint: &str, kind: JointKind) -> Option<&'t String> {
+    let units = match kind {
+        JointKind::Revolute => ["", "_deg", "_rad"],
+        JointKind::Prismatic => ["", "_mm", "_m"],
+    };
+    units.iter().find_map(|unit| titles.iter().find(|title| title.strip_prefix(joint) == Some(unit)))
 }
 
-/// What the columns that belong to no joint are.
+/// What the columns that belong to no joint are. `joints` are the titles of those that do.
 pub fn measured(titles: &[String], joints: &[String]) -> Measured {
-    let is_joint = |title: &&String| joints.iter().any(|joint| *title == joint || stem(title) == joint);
+    let is_joint = |title: &&String| joints.contains(title);
     let mut others: Vec<String> =
         titles.iter().filter(|title| !is_joint(title) && !title.is_empty()).cloned().collect();
     let mut measured = Measured::default();
@@ -145,11 +151,21 @@ mod tests {
     #[test]
     fn joints_targets_and_the_rest_are_told_apart() {
         let titles = titles("x1,y1,z1,x2_mm,y2_mm,z2_mm,hand_x,hand_y,hand_z,hand_rx,hand_ry,hand_rz,time,elbow_deg");
-        let found = measured(&titles, &["elbow".to_owned()]);
+        let elbow = of_joint(&titles, "elbow", JointKind::Revolute).expect("a column").clone();
+        let found = measured(&titles, &[elbow]);
         let told: Vec<_> = found.sensors.iter().map(|it| (it.name.as_str(), it.channel, it.columns.len())).collect();
         assert_eq!(told, [("marker1", "position", 3), ("marker2", "position", 3), ("hand", "pose", 6)]);
         assert_eq!((found.others, found.sockets), (vec!["time".to_owned()], None));
-        assert!(has_joint(&titles, "elbow") && !has_joint(&titles, "elbo"));
+        assert_eq!(of_joint(&titles, "elbo", JointKind::Revolute), None);
+        assert_eq!(of_joint(&titles, "elbow", JointKind::Prismatic), None, "it does not slide by degrees");
+    }
+
+    #[test]
+    fn a_title_that_is_a_joints_name_is_its_column() {
+        let all = titles("y_mm,x,y,x_mm,z_mm,lift_mm");
+        let joints = ["x", "y", "lift"].map(|joint| of_joint(&all, joint, JointKind::Prismatic).expect(joint).clone());
+        assert_eq!(joints, ["x", "y", "lift_mm"]);
+        assert_eq!(measured(&all, &joints).sensors[0].columns, ["x_mm", "y_mm", "z_mm"]);
     }
 
     #[test]

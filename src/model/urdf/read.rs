@@ -10,7 +10,7 @@ use super::{
     plain::{COLON, plain},
     values::{EXPAND, error, only_child, required},
 };
-use crate::similar::similar;
+use crate::{kinematics::JointKind, similar::similar};
 
 /// More elements than any robot has.
 const MOST_NODES: u32 = 2_000_000;
@@ -39,9 +39,42 @@ pub(super) struct JointElement {
     /// Indices of links.
     pub parent: usize,
     pub child: usize,
+    /// Its type as written.
+    pub kind: String,
     /// Where it begins, as a byte.
     pub at: usize,
     pub body: Result<Body, UrdfError>,
+}
+
+/// A joint for those who look for a chain.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JointEnds<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// The link that carries it.
+    pub parent: &'a str,
+    /// The link that it carries.
+    pub child: &'a str,
+    /// Its type as written.
+    pub kind: &'a str,
+    /// What it is on a chain, or why it is not.
+    body: Result<&'a Body, &'a UrdfError>,
+}
+
+impl JointEnds<'_> {
+    /// How it moves on a chain, if it does.
+    ///
+    /// # Errors
+    ///
+    /// Why it cannot be part of a chain.
+    pub fn moves(&self) -> Result<Option<JointKind>, &UrdfError> {
+        self.body.map(|body| body.kind.moves())
+    }
+
+    /// The joint that it mimics.
+    pub fn mimics(&self) -> Option<&str> {
+        Some(self.body.ok()?.mimic.as_ref()?.joint.as_str())
+    }
 }
 
 impl Urdf {
@@ -80,7 +113,8 @@ impl Urdf {
                 let what = format!("link `{}` hangs on joint `{other}` already", links.names[child]);
                 return Err(error(node, place.start, what, "a link hangs on one joint; correct one of the two"));
             }
-            joints.push(JointElement { name, parent, child, at: node.range().start, body: Body::read(node) });
+            let kind = node.attribute("type").unwrap_or_default().to_owned();
+            joints.push(JointElement { name, parent, child, kind, at: node.range().start, body: Body::read(node) });
         }
         let start = robot.range().start;
         let name = robot.attribute("name").unwrap_or_default().to_owned();
@@ -92,16 +126,52 @@ impl Urdf {
         &self.name
     }
 
-    /// The link that hangs on nothing, the first if there are several.
+    /// The link that hangs on nothing, the first of [several](Self::roots).
     pub fn root(&self) -> Option<&str> {
-        let root = self.carried_by.iter().position(Option::is_none)?;
-        Some(&self.links[root])
+        self.roots().next()
     }
 
-    /// The links on which nothing hangs, in the file's order.
+    /// The links that hang on nothing and on which others hang, in the file's order; all of them where there is no joint.
+    pub fn roots(&self) -> impl Iterator<Item = &str> {
+        self.ends(|link| self.carried_by[link].is_none())
+    }
+
+    /// The links on which nothing hangs and that hang on others, in the file's order; all of them where there is no joint.
     pub fn leaves(&self) -> impl Iterator<Item = &str> {
-        let is_leaf = |link: &usize| self.joints.iter().all(|joint| joint.parent != *link);
-        (0..self.links.len()).filter(is_leaf).map(|link| self.links[link].as_str())
+        self.ends(|link| self.joints.iter().all(|joint| joint.parent != link))
+    }
+
+    /// The links at one end, but for those that no joint names.
+    fn ends(&self, is_end: impl Fn(usize) -> bool) -> impl Iterator<Item = &str> {
+        let is_part = |link: usize| {
+            self.joints.is_empty() || self.joints.iter().any(|joint| joint.parent == link || joint.child == link)
+        };
+        let ends = (0..self.links.len()).filter(move |link| is_end(*link) && is_part(*link));
+        ends.map(|link| self.links[link].as_str())
+    }
+
+    /// Its joints, in the file's order.
+    pub(crate) fn joints(&self) -> impl Iterator<Item = JointEnds<'_>> {
+        (0..self.joints.len()).map(|joint| self.joint_ends(joint))
+    }
+
+    /// The joints on which a link hangs, the one that carries it first.
+    pub(crate) fn carriers<'a>(&'a self, link: &str) -> Vec<JointEnds<'a>> {
+        let mut carriers = Vec::new();
+        let mut link = self.links.iter().position(|known| known == link);
+        while let Some(joint) =
+            link.and_then(|link| self.carried_by[link]).filter(|_| carriers.len() < self.joints.len())
+        {
+            carriers.push(self.joint_ends(joint));
+            link = Some(self.joints[joint].parent);
+        }
+        carriers
+    }
+
+    fn joint_ends(&self, joint: usize) -> JointEnds<'_> {
+        let JointElement { name, parent, child, kind, body, .. } = &self.joints[joint];
+        let (parent, child) = (self.links[*parent].as_str(), self.links[*child].as_str());
+        JointEnds { name, parent, child, kind, body: body.as_ref() }
     }
 
     /// The names of its links, in the file's order.

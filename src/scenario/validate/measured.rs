@@ -53,13 +53,15 @@ impl Check<'_> {
         let text = self.table_text(&measurements.file)?;
         let columns = columns?;
         let sockets = Table::open(text.as_bytes()).ok().and_then(|table| socket_columns(raw, table.titles()));
+        let sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0);
+        let taken: Vec<&String> = sensors.flat_map(|keys| keys.get_ref().columns.iter().flatten()).collect();
         let by = raw.held_out.as_ref().and_then(|held_out| held_out.get_ref().by.as_ref());
         let wanted = |titles: &Titles| {
             let labels =
                 sockets.iter().flat_map(|it| it.place.iter().chain([&it.socket])).chain(by.map(Spanned::get_ref));
             let labels: BTreeSet<&String> = labels.collect();
             Ok(Columns {
-                joints: columns.iter().map(|column| column.find(titles)).collect::<Result<_, TableError>>()?,
+                joints: columns.iter().map(|column| column.find(titles, &taken)).collect::<Result<_, TableError>>()?,
                 readings: readings(raw, robot, titles)?,
                 labels: labels.into_iter().map(|title| titles.label(title)).collect::<Result<_, _>>()?,
             })
@@ -124,14 +126,21 @@ enum JointColumn {
 }
 
 impl JointColumn {
-    fn find(&self, titles: &Titles) -> Result<Column, TableError> {
+    /// The column; of several that a joint's name fits that which no sensor `taken` has.
+    fn find(&self, titles: &Titles, taken: &[&String]) -> Result<Column, TableError> {
         match self {
             Self::Titled(title) => {
                 let (angle, length) = (titles.titled(title, Quantity::Angle)?, titles.titled(title, Quantity::Length)?);
                 Ok(Column { factor: angle.factor * length.factor, ..angle })
             }
-            Self::Named(name, JointKind::Revolute) => titles.find(name, Quantity::Angle),
-            Self::Named(name, JointKind::Prismatic) => titles.find(name, Quantity::Length),
+            Self::Named(name, kind) => {
+                let quantity = match kind {
+                    JointKind::Revolute => Quantity::Angle,
+                    JointKind::Prismatic => Quantity::Length,
+                };
+                let found = titles.find(name, quantity);
+                found.or_else(|error| titles.besides(taken).find(name, quantity).map_err(|_| error))
+            }
         }
     }
 }
