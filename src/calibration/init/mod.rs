@@ -12,7 +12,7 @@ mod written;
 
 use crate::{
     model::urdf::{Urdf, UrdfError},
-    table::{Columns, Table, TableError},
+    table::{Columns, Table, TableError, is_absent},
 };
 use chain::Search;
 use columns::Measured;
@@ -121,7 +121,7 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
         let mut places: Vec<String> = Vec::new();
         for row in rows {
             let label = row.map_err(of_table)?.labels.swap_remove(0);
-            if !places.contains(&label) {
+            if !is_absent(&label) && !places.contains(&label) {
                 places.push(label);
             }
         }

@@ -12,14 +12,14 @@ pub const COLON: char = '.';
 /// The byte order mark.
 const MARK: char = '\u{feff}';
 
-/// The text with [`COLON`] for the colons in names of elements and attributes, with blanks for the declaration of XML and for byte
-/// order marks behind the first, and without the hyphens in comments. Every byte of the rest is what and where it was, and so are
+/// The text with [`COLON`] for the colons in names of elements and attributes, with blanks for the declaration of XML, for a
+/// `<!DOCTYPE>` without entities and for byte order marks behind the first, and without the hyphens in comments. Every byte of the rest is what and where it was, and so are
 /// all ends of lines.
 pub fn plain(text: &str) -> Cow<'_, str> {
     let mut plain = String::with_capacity(text.len());
-    let (mut done, mut depth_known) = (0, false);
+    let (mut done, mut is_within) = (0, false);
     while let Some(at) = text[done..].find('<').map(|at| done + at) {
-        if depth_known {
+        if is_within {
             plain.push_str(&text[done..at]);
         } else {
             before_root(&text[done..at], done == 0, &mut plain);
@@ -38,15 +38,16 @@ pub fn plain(text: &str) -> Cow<'_, str> {
         } else if let Some(length) = end("<?", "?>") {
             let is_declaration =
                 rest[2..].starts_with("xml") && rest[5..].starts_with(|c: char| c.is_ascii_whitespace() || c == '?');
-            if is_declaration && !depth_known {
+            if is_declaration && !is_within {
                 blanks(&rest[..length], &mut plain);
             } else {
                 plain.push_str(&rest[..length]);
             }
             length
+        } else if rest.starts_with("<!") {
+            doctype(rest, &mut plain)
         } else {
-            // A declaration such as <!DOCTYPE is no root.
-            depth_known |= !rest.starts_with("<!");
+            is_within = true;
             tag(rest, &mut plain)
         };
         done = at + length;
@@ -70,6 +71,18 @@ fn before_root(text: &str, is_start: bool, plain: &mut String) {
 /// Blanks for all but the ends of lines.
 fn blanks(text: &str, plain: &mut String) {
     text.bytes().for_each(|byte| plain.push(if matches!(byte, b'\n' | b'\r') { byte.into() } else { ' ' }));
+}
+
+/// A <!DOCTYPE>, which says nothing of a robot: blanks, unless it defines entities, which the parser refuses; how long it is.
+fn doctype(text: &str, plain: &mut String) -> usize {
+    let end = text.find('>').map_or(text.len(), |end| end + 1);
+    let (found, is_whole) = (&text[..end], text[..end].ends_with('>'));
+    if is_whole && found.starts_with("<!DOCTYPE") && !found.contains('[') {
+        blanks(found, plain);
+    } else {
+        plain.push_str(found);
+    }
+    end
 }
 
 /// A comment: two hyphens end one, and are found within many.
@@ -120,6 +133,8 @@ mod tests {
             ("\n<?xml\nversion='1.0'?>\u{feff}<r/>", "\n     \n               \u{20}  <r/>"),
             ("\u{feff}<r>\u{feff}</r>", "\u{feff}<r>\u{feff}</r>"),
             ("<r><?xml version='1.0'?></r>", "<r><?xml version='1.0'?></r>"),
+            ("<!DOCTYPE r SYSTEM\n'a'>\n<r/>", "                  \n    \n<r/>"),
+            ("<!DOCTYPE r [<!ENTITY a 'b'>]><r/>", "<!DOCTYPE r [<!ENTITY a 'b'>]><r/>"),
             ("<r a:b='c", "<r a.b='c"),
             ("<!-- a--", "<!-- a--"),
         ] {

@@ -79,7 +79,7 @@ impl JointEnds<'_> {
 
 impl Urdf {
     /// Reads a description. Unknown elements and attributes are passed over, those of other namespaces too, whether these are
-    /// declared or not. Blanks, comments and a byte order mark may stand before the declaration of XML.
+    /// declared or not. Blanks, comments, a byte order mark and a `<!DOCTYPE>` without entities may stand before it.
     ///
     /// # Errors
     ///
@@ -259,7 +259,9 @@ fn no_xml(text: &str, found: &Error) -> UrdfError {
     let position = found.pos();
     let before = text.trim_start_matches('\u{feff}').split('<').next().unwrap_or_default().trim();
     let (what, mend) = match found {
-        Error::DtdDetected => ("there is a <!DOCTYPE>".to_owned(), "remove it; a URDF needs none".to_owned()),
+        Error::DtdDetected => {
+            ("its <!DOCTYPE> defines entities".to_owned(), "remove it, and write what they stand for".to_owned())
+        }
         _ if text.trim().is_empty() => ("the file is empty".to_owned(), "give a URDF".to_owned()),
         _ if !before.is_empty() && text.contains("<robot") => {
             let shown: String = before.chars().take(40).collect();
