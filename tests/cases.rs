@@ -65,6 +65,21 @@ fn what_others_read_is_read() {
     read("n03-dual-arm", None, Some("rl6"));
 }
 
+/// Joints that are called as coordinates are, in a file without sensors.
+#[test]
+fn the_columns_of_joints_are_not_measured() {
+    let urdf = text("t14c-gantry-x-and-x_mm", "robot.urdf");
+    let file = "name = \"gantry\"\n[robot]\nurdf = \"robot.urdf\"\nbase = \"base_link\"\ntip = \"tool0\"\n[measurements]\nfile = \"data.csv\"\n";
+    for titles in ["x,y,z,tool_x,tool_y,tool_z", "x_mm,y_mm,z_m,tool_x_mm,tool_y_mm,tool_z_mm"] {
+        let rows: String = (0..9).map(|row| format!("0.{row},0.{},-0.2,0.3,0.{row},1\n", 9 - row)).collect();
+        let table = format!("{titles}\n{rows}");
+        let open = |name: &str| Ok(if name == "robot.urdf" { urdf.clone() } else { table.clone() });
+        let scenario = Scenario::parse("gantry.toml", file, &open).unwrap_or_else(|error| panic!("{error}"));
+        let targets: Vec<&str> = scenario.robot.equipment.targets.iter().map(|target| target.name.as_str()).collect();
+        assert_eq!(targets, ["tool"], "{titles}");
+    }
+}
+
 #[test]
 fn what_is_not_taken_is_named() {
     for (case, said) in [

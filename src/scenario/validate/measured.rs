@@ -7,6 +7,7 @@ use toml::Spanned;
 use super::{Check, raw};
 use crate::{
     kinematics::JointKind,
+    model::urdf::Urdf,
     scenario::{Described, HeldOut, Measurements, Robot},
     sensing::Keys,
     table::{Column, Columns, Layout, Quantity, Reading, Table, TableError, Titles},
@@ -53,16 +54,22 @@ impl Check<'_> {
         let text = self.table_text(&measurements.file)?;
         let columns = columns?;
         let sockets = Table::open(text.as_bytes()).ok().and_then(|table| socket_columns(raw, table.titles()));
-        let sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0);
-        let taken: Vec<&String> = sensors.flat_map(|keys| keys.get_ref().columns.iter().flatten()).collect();
+        let taken = taken(raw);
         let by = raw.held_out.as_ref().and_then(|held_out| held_out.get_ref().by.as_ref());
         let wanted = |titles: &Titles| {
             let labels =
                 sockets.iter().flat_map(|it| it.place.iter().chain([&it.socket])).chain(by.map(Spanned::get_ref));
             let labels: BTreeSet<&String> = labels.collect();
+            let joints =
+                columns.iter().map(|column| column.find(titles, &taken)).collect::<Result<Vec<_>, TableError>>()?;
+            // What is a joint's is not measured, unless its column is named.
+            let of_joints: Vec<&String> = match robot.described {
+                Some(_) => joints.iter().map(|column| &titles.all()[column.index]).collect(),
+                None => Vec::new(),
+            };
             Ok(Columns {
-                joints: columns.iter().map(|column| column.find(titles, &taken)).collect::<Result<_, TableError>>()?,
-                readings: readings(raw, robot, titles)?,
+                readings: readings(raw, robot, titles, &titles.besides(&of_joints))?,
+                joints,
                 labels: labels.into_iter().map(|title| titles.label(title)).collect::<Result<_, _>>()?,
             })
         };
@@ -73,6 +80,21 @@ impl Check<'_> {
             self.recorded_sockets(raw, &columns, &mut rows, &held_out, robot)?;
         }
         Some((rows, held_out))
+    }
+
+    /// The titles without those of the joints' columns, as far as the description tells which these are.
+    pub(super) fn beside_joints(&mut self, raw: &raw::Scenario, titles: &Titles) -> Titles {
+        let (urdf, base, tip) = (&raw.robot.urdf, &raw.robot.base, &raw.robot.tip);
+        let (Some(urdf), Some(base), Some(tip)) = (urdf, base, tip) else { return titles.clone() };
+        let text = self.opened(urdf.get_ref()).unwrap_or_default();
+        // What is wrong with it is told where it is needed.
+        let Ok(chain) = Urdf::parse(&text).and_then(|urdf| urdf.chain(base.get_ref(), tip.get_ref())) else {
+            return titles.clone();
+        };
+        let taken = taken(raw);
+        let joints = chain.readings.into_iter().map(|reading| JointColumn::Named(reading.name, reading.kind));
+        let found = joints.filter_map(|joint| joint.find(titles, &taken).ok());
+        titles.besides(&found.map(|column| &titles.all()[column.index]).collect::<Vec<_>>())
     }
 
     /// The columns of the joints; `None` has left a problem behind.
@@ -145,17 +167,23 @@ impl JointColumn {
     }
 }
 
-/// The columns of every sensor.
-fn readings(raw: &raw::Scenario, robot: &Robot, titles: &Titles) -> Result<Vec<Reading>, TableError> {
+/// The titles that sensors name.
+fn taken(raw: &raw::Scenario) -> Vec<&String> {
+    let sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0);
+    sensors.flat_map(|keys| keys.get_ref().columns.iter().flatten()).collect()
+}
+
+/// The columns of every sensor, by titles that it names, or else of those that are `beside` the joints'.
+fn readings(raw: &raw::Scenario, robot: &Robot, titles: &Titles, beside: &Titles) -> Result<Vec<Reading>, TableError> {
     let marker = raw.measurements.as_ref().and_then(|given| given.get_ref().marker_columns_m.as_ref());
     if let Some(columns) = marker {
         return Ok(vec![titles.reading_titled(Layout::Position, &columns.get_ref().0)?]);
     }
     let sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0);
-    sensors.map(|keys| reading(keys.get_ref(), robot, titles)).collect()
+    sensors.map(|keys| reading(keys.get_ref(), robot, titles, beside)).collect()
 }
 
-fn reading(keys: &Keys, robot: &Robot, titles: &Titles) -> Result<Reading, TableError> {
+fn reading(keys: &Keys, robot: &Robot, titles: &Titles, beside: &Titles) -> Result<Reading, TableError> {
     let equipment = &robot.equipment;
     let named = |name: &Option<String>| name.clone();
     let target = named(&keys.target).or_else(|| Some(equipment.targets.first()?.name.clone())).unwrap_or_default();
@@ -171,7 +199,9 @@ fn reading(keys: &Keys, robot: &Robot, titles: &Titles) -> Result<Reading, Table
         return titles.reading_titled(layout, columns);
     }
     // With nothing before them where there is no doubt.
-    titles.reading(layout, &prefix).or_else(|error| titles.reading(layout, "").map_err(|_| error))
+    let found = beside.reading(layout, &prefix).or_else(|_| beside.reading(layout, ""));
+    // All titles are told where there is none.
+    found.or_else(|_| titles.reading(layout, &prefix).or_else(|error| titles.reading(layout, "").map_err(|_| error)))
 }
 
 fn socket_columns(raw: &raw::Scenario, titles: &Titles) -> Option<SocketColumns> {
