@@ -3,7 +3,7 @@
 use super::{InitError, Sources, columns};
 use crate::{
     kinematics::JointKind,
-    model::urdf::{Chain, JointEnds, Urdf, UrdfError},
+    model::urdf::{Chain, Follows, JointEnds, Urdf, UrdfError},
 };
 
 /// Looks for the chain.
@@ -125,6 +125,8 @@ impl Search<'_> {
             let base = if of_bases { format!("--base {} ", chain.base) } else { String::new() };
             format!("{base}--tip {}", chain.tip())
         };
+        let mut options: Vec<String> = ends.iter().map(option).collect();
+        options.extend(Self::parting(ends).map(|link| format!("--tip {link}, where they part")));
         InitError::Misfit {
             what: format!(
                 "{} chains move by as many joints that {} has columns for: {}",
@@ -132,11 +134,18 @@ impl Search<'_> {
                 self.sources.table_file,
                 ends.iter().map(of).collect::<Vec<_>>().join("; ")
             ),
-            mend: format!(
-                "say which carries what was measured: {}",
-                ends.iter().map(option).collect::<Vec<_>>().join(" or ")
-            ),
+            mend: format!("say which carries what was measured: {}", options.join(" or ")),
         }
+    }
+
+    /// The last link that chains have in common, where most joints come before it: the hand that carries two fingers, say.
+    fn parting(ends: &[&Chain]) -> Option<String> {
+        let (first, others) = ends.split_first()?;
+        let is_shared = |name: &String| others.iter().all(|other| other.segments.iter().any(|it| it.name == *name));
+        let shared: Vec<_> = first.segments.iter().take_while(|segment| is_shared(&segment.name)).collect();
+        let moving = shared.iter().filter(|segment| segment.kind.moves().is_some()).count();
+        (2 * moving > first.moving().count()).then_some(())?;
+        Some(shared.last()?.link.clone())
     }
 
     /// The joints beside a chain that have columns. Those behind it would make it longer if nothing was wrong with them.
@@ -200,8 +209,28 @@ impl Search<'_> {
                     self.without_column(&chain).join(", "),
                     self.titles.join(", ")
                 ),
-                mend: "title a column with each joint's name (`_deg` and `_mm` at its end say the unit)".to_owned(),
+                mend: self.behind_missing(&chain),
             },
+        }
+    }
+
+    /// What to do about a chain of which joints lack columns: where they come before all others they may have stood still.
+    fn behind_missing(&self, chain: &Chain) -> String {
+        let mend = "title a column with each joint's name (`_deg` and `_mm` at its end say the unit)";
+        let missing = self.without_column(chain);
+        let is_missing = |name: &str| missing.contains(&name);
+        let reading = |follows: Follows| chain.readings.get(follows.reading).is_some_and(|it| is_missing(&it.name));
+        let lacks: Vec<bool> = chain.segments.iter().map(|segment| segment.follows.is_some_and(reading)).collect();
+        let moves = chain.segments.iter().map(|segment| segment.kind.moves().is_some());
+        let first = moves.zip(&lacks).position(|(moves, lacks)| moves && !lacks);
+        match (first, lacks.iter().rposition(|lacks| *lacks)) {
+            (Some(first), Some(last)) if last < first => {
+                format!(
+                    "{mend}, or, if it stood still, begin the chain behind it: --base {}",
+                    chain.segments[last].link
+                )
+            }
+            _ => mend.to_owned(),
         }
     }
 

@@ -71,6 +71,11 @@ fn chains_that_tie_are_named_and_none_is_taken() {
     // A shorter one is not passed over in silence.
     let shorter = begun(&two_arms("fixed"), table, None, None);
     taken(shorter, &["tip = \"left_hand\"", "not on that chain, though they have columns: `r1`", "--tip right, say"]);
+    // Two fingers of a hand.
+    let hand = urdf("base one two left right", &[PLAIN[0], PLAIN[1], "f prismatic two left", "g prismatic two right"]);
+    refused(&hand, "a,b,f,g,x,y,z\n0,0,0,0,1,2,3\n", &["--tip left or --tip right or --tip two, where they part"]);
+    let both = begun(&two_arms("revolute"), table, None, None).expect_err("a tie");
+    assert!(!both.contains("where they part"), "most joints come behind: {both}");
     // Two robots in one description.
     let two = urdf("one hand two paw", &["a revolute one hand", "b revolute two paw"]);
     refused(
@@ -152,7 +157,11 @@ fn joints_that_cannot_be_taken_are_named_with_the_reason() {
     // A column is missing within.
     let three = urdf("base one two three", &[PLAIN[0], PLAIN[1], "c revolute two three"]);
     refused(&three, "a,c,x,y,z\n0,0,1,2,3\n", &["a column for joint `c` and none for b", "--tip one"]);
-    refused(&three, "b,c,x,y,z\n0,0,1,2,3\n", &["a column for joint `c` and none for a", "b, c, x, y, z"]);
+    refused(
+        &three,
+        "b,c,x,y,z\n0,0,1,2,3\n",
+        &["a column for joint `c` and none for a", "b, c, x, y, z", "--base one"],
+    );
 }
 
 #[test]
