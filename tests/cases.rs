@@ -106,3 +106,20 @@ fn a_session_asks_for_no_more_than_a_turn() {
     let error = still.map(drop).expect_err("it cannot move").to_string();
     assert!(error.contains("joint `a`: it cannot move, as its limits are both 0"), "{error}");
 }
+
+/// A link that no joint names, and a table beside the robot, are no part of it.
+#[test]
+fn a_session_begins_where_its_tip_hangs() {
+    let urdf = text("u01-drake-prefix", "robot.urdf");
+    for (beside, tip) in [
+        ("<link name=\"orphan\"/>", None),
+        (
+            "<link name=\"table\"/><link name=\"leg\"/><joint name=\"t\" type=\"fixed\"><parent link=\"table\"/><child link=\"leg\"/></joint>",
+            Some("tool0"),
+        ),
+    ] {
+        let with = urdf.replacen("<link name=\"base_link\"/>", &format!("{beside}<link name=\"base_link\"/>"), 1);
+        let opened = Session::open(Setup::from_urdf(&with, None, tip)).map(drop);
+        opened.unwrap_or_else(|error| panic!("{beside}: {error}"));
+    }
+}

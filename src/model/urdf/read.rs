@@ -133,21 +133,25 @@ impl Urdf {
 
     /// The links that hang on nothing and on which others hang, in the file's order; all of them where there is no joint.
     pub fn roots(&self) -> impl Iterator<Item = &str> {
-        self.ends(|link| self.carried_by[link].is_none())
+        let carries = self.carries();
+        let is_root =
+            move |link: &usize| self.carried_by[*link].is_none() && (carries[*link] || self.joints.is_empty());
+        (0..self.links.len()).filter(is_root).map(|link| self.links[link].as_str())
     }
 
     /// The links on which nothing hangs and that hang on others, in the file's order; all of them where there is no joint.
     pub fn leaves(&self) -> impl Iterator<Item = &str> {
-        self.ends(|link| self.joints.iter().all(|joint| joint.parent != link))
+        let carries = self.carries();
+        let is_leaf =
+            move |link: &usize| !carries[*link] && (self.carried_by[*link].is_some() || self.joints.is_empty());
+        (0..self.links.len()).filter(is_leaf).map(|link| self.links[link].as_str())
     }
 
-    /// The links at one end, but for those that no joint names.
-    fn ends(&self, is_end: impl Fn(usize) -> bool) -> impl Iterator<Item = &str> {
-        let is_part = |link: usize| {
-            self.joints.is_empty() || self.joints.iter().any(|joint| joint.parent == link || joint.child == link)
-        };
-        let ends = (0..self.links.len()).filter(move |link| is_end(*link) && is_part(*link));
-        ends.map(|link| self.links[link].as_str())
+    /// By link, whether others hang on it.
+    fn carries(&self) -> Vec<bool> {
+        let mut carries = vec![false; self.links.len()];
+        self.joints.iter().for_each(|joint| carries[joint.parent] = true);
+        carries
     }
 
     /// Its joints, in the file's order.
