@@ -95,6 +95,35 @@ fn empty_cells_are_no_reading_and_labels_are_text() {
 }
 
 #[test]
+fn words_for_nothing_are_no_reading() {
+    let titles = "elbow,hand_x,hand_y,hand_z,cam_tag_u,cam_tag_v";
+    let read = |cells: &str| {
+        let text = format!("{titles}\n0.1,{cells}\n");
+        let table = Table::open(text.as_bytes()).expect("titles");
+        let joints = vec![table.titles().find("elbow", Quantity::Angle).expect("a column")];
+        let readings = [(Layout::Position, "hand"), (Layout::Pixels(1), "cam_tag")]
+            .map(|(layout, prefix)| table.titles().reading(layout, prefix).expect("columns"));
+        let columns = Columns { joints, readings: readings.into(), labels: Vec::new() };
+        table.rows(columns).next().expect("a row").map(|row| row.observation.readings)
+    };
+    // One sensor of two saw nothing.
+    for word in ["nan", "NaN", "-nan", "NA", "n/a", "#N/A", "<NA>", "None", "NULL", "-"] {
+        let found = read(&format!("{word},{word},{word},412,208")).expect(word);
+        assert_eq!(found, [None, Some(vec![412.0, 208.0])], "{word}");
+    }
+    assert_eq!(read("1,2,3,nan,").expect("nothing in the picture"), [Some(vec![1.0, 2.0, 3.0]), None]);
+    for (cells, what, mend) in [
+        ("1,nan,3,412,208", "line 2, column `hand_y`: `nan` is not a finite number", "all cells of this reading empty"),
+        ("1,,3,412,208", "line 2, column `hand_y` is empty", "all cells of this reading empty"),
+        ("inf,inf,inf,412,208", "line 2, column `hand_x`: `inf` is not a finite number", "such as 0.03"),
+        ("no,no,no,412,208", "line 2, column `hand_x`: `no` is not a finite number", "such as 0.03"),
+    ] {
+        let error = read(cells).expect_err(cells);
+        assert!(error.what.contains(what) && error.mend.contains(mend), "{cells}: {error}");
+    }
+}
+
+#[test]
 fn lines_are_counted_whatever_ends_them() {
     let text = "elbow,place\n\n1,a\n\n\n2,\"b\nc\"\n3,d\nx,e";
     for end in ["\n", "\r\n", "\r"] {
@@ -130,6 +159,7 @@ fn what_is_wrong_has_line_column_and_mend() {
         ("elbow\tx\n1\t2\n", "separated by tabs", "write commas"),
         ("elbow,x\n1,2\n1\n", "line 3 has 1 values, line 1 names 2 columns", "one value per column"),
         ("elbow\nnan\n", "line 2, column `elbow`: `nan` is not a finite number", "0.03"),
+        ("elbow\n1\nNone\n", "line 3, column `elbow`: `None` is not a finite number", "where the joint was, as 0.03"),
         ("elbow\n1\ninf\n", "line 3, column `elbow`: `inf` is not a finite number", "0.03"),
         ("elbow\n-2e12\n", "line 2, column `elbow`: `-2e12` is beyond ±1e12", "0.03"),
         ("elbow,x\n1,1\n,1\n", "line 3, column `elbow` is empty", "remove the line"),

@@ -120,7 +120,9 @@ impl Observation {
             let (Some((lower, upper)), Some(position)) = (segment.limits, self.configuration.get(&segment.name)) else {
                 continue;
             };
-            let slack = BEYOND * (upper - lower);
+            // Where there is no limit to one side, of a turn.
+            let range = if (upper - lower).is_finite() { upper - lower } else { std::f64::consts::TAU };
+            let slack = BEYOND * range;
             if !(lower - slack..=upper + slack).contains(position) {
                 let unit = if segment.kind.moves() == Some(JointKind::Prismatic) { "metres" } else { "radians" };
                 let what = format!("{position} is far beyond its limits in the URDF, {lower} and {upper}");

@@ -136,7 +136,11 @@ impl Setup {
         let is_sound = |c: &char| c.is_ascii_alphanumeric() || "-_".contains(*c);
         let own: String = description.name().chars().filter(is_sound).take(MOST_NAME_CHARACTERS).collect();
         let leaves: Vec<&str> = description.leaves().collect();
-        let ends = [("base", description.root()), ("tip", leaves.first().copied().filter(|_| leaves.len() == 1))];
+        let only_leaf = leaves.first().copied().filter(|_| leaves.len() == 1);
+        let tip = robot.get("tip").and_then(toml::Value::as_str).or(only_leaf);
+        // Of several links that hang on nothing that on which the tip hangs.
+        let root = tip.and_then(|tip| description.carriers(tip).last().map(|joint| joint.parent));
+        let ends = [("base", root.or_else(|| description.root())), ("tip", only_leaf)];
         for (key, link) in ends.into_iter().filter_map(|(key, link)| Some((key, link?.to_owned()))) {
             robot.entry(key).or_insert_with(|| link.into());
         }

@@ -34,8 +34,8 @@ pub struct Measurements {
 
 impl Measurements {
     /// Reads the columns that `wanted` finds among the titles of a CSV text: columns are separated by commas, and a number has
-    /// a decimal point if anything (`0.03`, `.03`, `3e-2`). Titles may end with a unit (see [`table`](crate::table)). An
-    /// error says which line or column is at fault.
+    /// a decimal point if anything (`0.03`, `.03`, `3e-2`). Titles may end with a unit (see [`table`](crate::table)). A line on
+    /// which nothing was measured, in a table without labels, is passed over. An error says which line or column is at fault.
     pub fn from_csv(
         text: &str,
         wanted: impl FnOnce(&Titles) -> Result<Columns, TableError>,
@@ -59,12 +59,13 @@ impl Measurements {
         let is_measured = !columns.readings.is_empty() && columns.labels.is_empty();
         let labels: Vec<String> = columns.labels.iter().map(|index| title(*index)).collect();
         let mut rows = table.rows(columns);
+        let mut unmeasured = 0;
         for row in rows.by_ref() {
             let row = row?;
+            // A line without a reading says nothing; without labels it has no other part in anything.
             if is_measured && row.observation.is_miss() {
-                let what =
-                    format!("line {}: nothing was measured, {} are empty", row.line, measurements.readings.join(", "));
-                return Err(TableError::new(what, "write numbers, or remove the line"));
+                unmeasured += 1;
+                continue;
             }
             for (title, label) in labels.iter().zip(row.labels) {
                 measurements.labels.entry(title.clone()).or_default().push(label);
@@ -72,6 +73,10 @@ impl Measurements {
             measurements.observations.push(row.observation);
             measurements.configurations.push(row.positions);
             measurements.lines.push(row.line);
+        }
+        if unmeasured > 0 && measurements.rows() == 0 {
+            let what = format!("nothing was measured: {} are empty on every line", measurements.readings.join(", "));
+            return Err(TableError::new(what, "write numbers into these columns, or name others"));
         }
         measurements.repeated = rows.repeated_columns();
         measurements.repeated.retain(|(repeating, repeated)| used.contains(repeating) || used.contains(repeated));
@@ -126,14 +131,26 @@ mod tests {
     }
 
     #[test]
+    fn a_line_without_a_reading_counts_for_nothing() {
+        for absent in ["nan,nan,nan", "NaN,,", "None,None,None", "-,n/a,NULL", "<NA>,#N/A,--", ",,"] {
+            let measurements =
+                read(&format!("x,y,z,a\n1,2,3,4\n{absent},5\n4,5,6,7\n"), &["a"]).expect("a valid table");
+            assert_eq!(measurements.observations, [Observation::of([1.0, 2.0, 3.0]), Observation::of([4.0, 5.0, 6.0])]);
+            assert_eq!((measurements.configurations, measurements.lines), (vec![vec![4.0], vec![7.0]], vec![2, 4]));
+        }
+    }
+
+    #[test]
     fn names_what_is_wrong_and_how_to_mend_it() {
         for (text, joint, what, mend) in [
-            (TEXT, "a", "line 3, column `a`: `nan` is not a finite number", "such as 0.03"),
+            (TEXT, "a", "line 3, column `a`: `nan` is not a finite number", "remove the line"),
             (TEXT, "c", "has no column `c`; its columns are x, y, z, a, b", "correct the name"),
             ("x,y,z,elbow\n1,2,3,4\n", "elbo", "has no column `elbo`", "did you mean `elbow`"),
             ("x,y,z,a\n1,2\n", "a", "line 2 has 2 values, line 1 names 4 columns", "one value per column"),
             ("x,y,z,a\n1,2,,4\n", "a", "line 2, column `z` is empty", "write a number"),
-            ("x,y,z,a\n,,,4\n", "a", "line 2: nothing was measured, x, y, z are empty", "remove the line"),
+            ("x,y,z,a\n,,,4\n", "a", "nothing was measured: x, y, z are empty on every line", "write numbers"),
+            ("x,y,z,a\n1,2,3,4\n1,2,3,N/A\n", "a", "line 3, column `a`: `N/A` is not", "where the joint was"),
+            ("x,y,z,a\n1,inf,3,4\n", "a", "line 2, column `y`: `inf` is not a finite number", "such as 0.03"),
             // What spreadsheets write where the comma is decimal.
             ("x;y;z;a\n1;2;3;4\n", "a", "line 1: the columns are separated by semicolons", "write commas"),
             ("x;y;z;a\n1,5;2,5;3,5;4,5\n", "a", "line 1: the columns are separated by semicolons", "1.5, not 1,5"),

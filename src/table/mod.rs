@@ -44,13 +44,15 @@
 //! | [`Distance`](Layout::Distance) | `elbow,hand_distance_mm` | `0.5,742.5` |
 //! | labels, as of sockets | `elbow,place,socket` | `0.5,front left,1` |
 //!
-//! Where a sensor had no reading its cells are empty, all of them.
+//! Where a sensor had no reading its cells are empty, all of them, or say so: `nan`, `NA`, `N/A`, `None`, `null` or `-`, in any case.
+//! A joint was always somewhere: where its cell says nothing, the line is refused.
 //!
 //! # Errors
 //!
 //! [`TableError`] names line and column. What is no text, what is longer than [`MOST_BYTES`], two columns with one title, a
 //! line with too few or too many cells, and what is no finite number are refused as soon as they are seen.
 
+mod absent;
 mod error;
 mod guard;
 mod lines;
@@ -59,6 +61,7 @@ mod reading;
 mod rows;
 mod titles;
 
+pub(crate) use absent::is_absent;
 pub use error::TableError;
 pub use guard::{Guard, MOST_BYTES};
 pub(crate) use names::split;

@@ -313,6 +313,11 @@ impl Quantity {
         unit(word).filter(|unit| unit.quantity == self).map(|unit| unit.factor)
     }
 
+    /// Whether a title ends with a unit of it.
+    pub(crate) fn is_in(self, title: &str) -> bool {
+        self.factor(split(title).1).is_some()
+    }
+
     /// How titles may end, in words.
     pub(super) fn ends(self) -> String {
         let units = UNITS.iter().filter(|unit| unit.quantity == self);

@@ -6,7 +6,12 @@ use std::{
     io::Read,
 };
 
-use super::{Column, Guard, MOST_BYTES, Reading, TableError, Titles, lines::Lines, titles::number};
+use super::{
+    Column, Guard, MOST_BYTES, Reading, TableError, Titles,
+    absent::is_absent,
+    lines::Lines,
+    titles::{JOINT, READING, number},
+};
 use crate::sensing::Observation;
 
 /// A table whose titles have been read.
@@ -132,15 +137,15 @@ impl<R: Read> Rows<R> {
             return Err(TableError::new(what, mend));
         }
         let cell = |column: &Column| self.record.get(column.index).unwrap_or_default();
-        let value = |column: &Column| {
+        let value = |column: &Column, absent: &str| {
             let place = || format!("line {line}, column `{}`", self.titles.all()[column.index]);
-            Ok(number(cell(column), &place)? * column.factor)
+            Ok(number(cell(column), absent, &place)? * column.factor)
         };
         let reading = |reading: &Reading| -> Result<Option<Vec<f64>>, TableError> {
-            if reading.columns.iter().all(|column| cell(column).is_empty()) {
+            if reading.columns.iter().all(|column| is_absent(cell(column))) {
                 return Ok(None);
             }
-            let numbers = reading.columns.iter().map(value).collect::<Result<Vec<_>, _>>()?;
+            let numbers = reading.columns.iter().map(|column| value(column, READING)).collect::<Result<Vec<_>, _>>()?;
             reading.of(numbers).map(Some).ok_or_else(|| {
                 let title = reading.columns.get(3).map_or("", |column| &self.titles.all()[column.index]);
                 let what = format!("line {line}, column `{title}`: the quaternion's length is not 1");
@@ -150,7 +155,7 @@ impl<R: Read> Rows<R> {
         let Columns { joints, readings, labels } = &self.columns;
         Ok(Row {
             line,
-            positions: joints.iter().map(value).collect::<Result<_, TableError>>()?,
+            positions: joints.iter().map(|column| value(column, JOINT)).collect::<Result<_, TableError>>()?,
             observation: Observation { readings: readings.iter().map(reading).collect::<Result<_, _>>()? },
             labels: labels.iter().map(|index| self.record.get(*index).unwrap_or_default().to_owned()).collect(),
         })

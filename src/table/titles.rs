@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::{
     Component, TableError, Title,
+    absent::is_absent,
     error::AS_TEXT,
     names::{NAME, split},
 };
@@ -183,16 +184,33 @@ impl Titles {
         self.titles.iter().position(|given| given == title).ok_or_else(|| self.unknown(title))
     }
 
+    /// What is wrong where columns are separated by something else than commas.
+    pub(crate) fn separated(&self) -> Option<TableError> {
+        let filled: Vec<&String> = self.titles.iter().filter(|title| !title.is_empty()).collect();
+        // Words may well stand in one title among several.
+        let is_alone =
+            |title: &str| filled.len() == 1 && self.titles.len() == 1 && title.split_whitespace().count() > 2;
+        let plural = match () {
+            () if filled.iter().any(|title| title.contains(';')) => "semicolons",
+            () if filled.iter().any(|title| title.contains('\t')) => "tabs",
+            () if filled.len() == 1 && filled.iter().any(|title| title.contains('|')) => "bars",
+            () if filled.iter().any(|title| is_alone(title)) => "blanks",
+            () => return None,
+        };
+        let what = format!("line 1: the columns are separated by {plural}");
+        Some(TableError::new(what, "write commas between columns, and a decimal point in numbers: 1.5, not 1,5"))
+    }
+
+    /// These titles without some, so that what is found is another column.
+    pub(crate) fn besides(&self, taken: &[&String]) -> Self {
+        let kept = |title: &String| if taken.contains(&title) { String::new() } else { title.clone() };
+        Self { titles: self.titles.iter().map(kept).collect() }
+    }
+
     fn unknown(&self, name: &str) -> TableError {
         let line = self.titles.join(", ");
-        for (separator, plural) in [(';', "semicolons"), ('\t', "tabs")] {
-            if line.split(separator).any(|title| title.trim().starts_with(name)) && line.contains(separator) {
-                let what = format!("line 1: the columns are separated by {plural}");
-                return TableError::new(
-                    what,
-                    "write commas between columns, and a decimal point in numbers: 1.5, not 1,5",
-                );
-            }
+        if let Some(error) = self.separated() {
+            return error;
         }
         let mend = match similar(name, self.titles.iter().map(String::as_str)) {
             Some(known) => format!("did you mean `{known}`?"),
@@ -202,18 +220,24 @@ impl Titles {
     }
 }
 
-/// A finite number. A comma in it is refused: it may separate decimals or thousands.
-pub(super) fn number(text: &str, place: &dyn Fn() -> String) -> Result<f64, TableError> {
+/// What to do about a joint's cell that holds nothing.
+pub(super) const JOINT: &str = "write where the joint was, as 0.03, or remove the line";
+/// What to do where some cells of a reading hold nothing and others do not.
+pub(super) const READING: &str =
+    "write a number such as 0.03, or leave all cells of this reading empty, or remove the line";
+
+/// A finite number; `absent` says what to do where there is none. A comma in it is refused: it may separate decimals or thousands.
+pub(super) fn number(text: &str, absent: &str, place: &dyn Fn() -> String) -> Result<f64, TableError> {
     match text.parse::<f64>() {
         Ok(value) if is_usable(value) => Ok(value),
-        _ if text.is_empty() => {
-            Err(TableError::new(format!("{} is empty", place()), "write a number, or remove the line"))
-        }
+        _ if text.is_empty() => Err(TableError::new(format!("{} is empty", place()), absent)),
         _ if text.len() > 1000 => Err(TableError::new(format!("{} holds no number", place()), AS_TEXT)),
         _ => {
             let with_point = text.replacen(',', ".", 1);
             let mend = if with_point != text && with_point.parse::<f64>().is_ok() {
                 format!("write a decimal point: {with_point}")
+            } else if is_absent(text) {
+                absent.to_owned()
             } else {
                 "write a number such as 0.03, or remove the line".to_owned()
             };

@@ -101,10 +101,22 @@ fn what_is_wrong_has_line_column_and_mend() {
     refused("0 0 1\"", "0 0 inf\"", (8, 18), "`inf` in `xyz` is not a finite number", "0.03");
     refused("0 0 1\"", "0 0 1e13\"", (8, 18), "`1e13` in `xyz` is beyond ±1e12", "0.03");
     refused("0 0 1\"", "0 0 ${height}\"", (8, 18), "expression of xacro", "xacro robot.urdf.xacro");
-    refused("type=\"revolute\"", "type=\"ball\"", (7, 32), "type `ball`", "revolute, continuous, prismatic and fixed");
+    refused(
+        "type=\"revolute\"",
+        "type=\"ball\"",
+        (7, 32),
+        "`shoulder` is of type `ball`",
+        "as `upper`, which it carries, for the base",
+    );
     refused(" type=\"revolute\"", "", (7, 3), "<joint> has no `type`", "add type");
     refused("    <limit lower=\"-1\" upper=\"2\"/>\n", "", (7, 3), "joint `shoulder` has no <limit>", "`continuous`");
-    refused("lower=\"-1\"", "lower=\"3\"", (11, 5), "the lower limit 3 is above", "lower=\"2\" upper=\"3\"");
+    refused(
+        "lower=\"-1\"",
+        "lower=\"3\"",
+        (11, 5),
+        "`shoulder`: the lower limit 3 is above",
+        "lower=\"2\" upper=\"3\"",
+    );
     refused("name=\"elbow\"", "name=\"shoulder\"", (13, 16), "`shoulder` is on line 7 already", "name of its own");
     refused(
         "<link name=\"hand\"/>",
@@ -157,14 +169,17 @@ fn what_is_no_urdf_is_refused() {
         ("hello", 1, "not XML", "correct it"),
         ("<robot>\n<link name=\"a\">\n</robot>", 3, "not XML", "correct it"),
         ("<sdf/>", 1, "<sdf> is not the description of a robot", "give a URDF"),
-        ("<!DOCTYPE robot>\n<robot/>", 1, "<!DOCTYPE>", "remove it"),
+        ("<!DOCTYPE robot [<!ENTITY a \"1\">]>\n<robot/>", 1, "<!DOCTYPE> defines entities", "remove it"),
         ("<robot>\n<xacro:property name=\"a\"/></robot>", 2, "a template in xacro", "xacro robot.urdf.xacro"),
-        ("<robot>\n<gz:plugin/></robot>", 2, "`gz:` is not declared", "xmlns:gz"),
+        ("INFO: expanded\n<?xml version=\"1.0\"?><robot/>", 1, "begins with `INFO: expanded`", "before <?xml"),
+        ("<x:sdf/>", 1, "<x:sdf> is not the description of a robot", "give a URDF"),
         ("<robot>\n<link/></robot>", 2, "<link> has no `name`", "add name"),
     ] {
         let error = Urdf::parse(text).expect_err(text);
         assert!(error.what.contains(what) && error.mend.contains(mend) && error.line == line, "{text}: {error}");
     }
+    refused("type=\"revolute\"", "type=\"${type}\"", (7, 32), "`${type}` is an expression of xacro", "expand it first");
+    refused("<axis xyz=\"0 1 0\"/>", "<xacro:axis/>", (10, 5), "<xacro:axis>: this is a template", "expand it first");
     let template = ARM.replace("  <link name=\"hand\"/>", "  <xacro:include filename=\"hand.xacro\"/>");
     let error = Urdf::parse(&template).expect_err("a template");
     assert!(error.what.contains("<xacro:include>") && error.line == 6, "{error}");
@@ -181,4 +196,146 @@ fn depth_and_size_do_no_harm() {
     let joints: String = (0..19_999).map(joint).collect();
     let urdf = Urdf::parse(&format!("<robot>{links}{joints}</robot>")).expect("a long chain");
     assert_eq!(urdf.chain("l0", "l19999").expect("a long chain").moving().count(), 19_999);
+}
+
+/// What `text` is with the first origin moved, written; what is to be the same otherwise.
+fn is_written_in_place(text: &str) {
+    let urdf = Urdf::parse(text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let mut chain = urdf.chain("base", "hand").unwrap_or_else(|error| panic!("{error}\n{text}"));
+    assert_eq!(urdf.written(&chain), text);
+    chain.segments[0].origin.translation.vector.z = 1.25;
+    chain.segments[1].origin.translation.vector.x = 0.5;
+    let written = urdf.written(&chain);
+    let inserted = "<origin xyz=\"0.5 0 0\" rpy=\"0 0 0\"/>\n    <parent link=\"upper\"/>";
+    let wanted = text.replace("\"0 0 1\"", "\"0 0 1.25\"").replace("<parent link=\"upper\"/>", inserted);
+    assert_eq!(written, wanted);
+}
+
+#[test]
+fn prefixes_that_nobody_declares_are_parts_of_names() {
+    for (from, to) in [
+        ("<limit lower", "<limit drake:acceleration=\"2.5\" ü:é=\"1\" lower"),
+        ("<link name=\"hand\"/>", "<link name=\"hand\"><gz:plugin mujoco:a='b'><gz:c/></gz:plugin></link>"),
+        // No joint, link or origin of this description.
+        ("<link name=\"hand\"/>", "<link name=\"hand\"/><drake:joint name=\"shoulder\"/><drake:link/>"),
+        ("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 0\"/><drake:axis xyz=\"1 0 0\"/>"),
+        ("<origin xyz", "<origin my:xyz=\"9 9 9\" xyz"),
+        ("<robot name=\"arm\"", "<robot name=\"arm\" xmlns=\"http://ros.org\" xmlns:drake=\"http://drake.mit.edu\""),
+        ("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 0\"/><!-- ---- was: <a:b c=\"--\"/> ---->"),
+    ] {
+        assert!(ARM.contains(from), "the test's own premise: {from}");
+        is_written_in_place(&ARM.replacen(from, to, 1));
+    }
+    // A declared one is another's as well.
+    let other = "<drake:joint name=\"elbow\" xmlns:drake=\"http://drake.mit.edu\"/>\n  <link name=\"hand\"/>";
+    is_written_in_place(&ARM.replacen("<link name=\"hand\"/>", other, 1));
+}
+
+#[test]
+fn anything_but_text_may_stand_before_the_declaration() {
+    let declared = "<?xml version=\"1.0\"?>\n";
+    for before in
+        ["\n", " \t\r\n", "<!-- made by -- a tool -->\n", "\u{feff}\n", "\n\u{feff}", "\u{feff}\u{feff}", declared]
+    {
+        is_written_in_place(&format!("{before}{ARM}"));
+        let error = error(&format!("{before}{}", ARM.replace("0 1 0", "0 0 0")), "base", "hand");
+        assert_eq!((error.line, error.column), (10 + before.matches('\n').count(), 16), "{before:?}");
+    }
+    is_written_in_place(&ARM.replacen('\n', "\n<!DOCTYPE robot>\n", 1));
+    is_written_in_place(&ARM.replace("<?xml version=\"1.0\"?>", "<?xml encoding='utf-8'?>"));
+    is_written_in_place(&ARM.replace("<?xml version=\"1.0\"?>\n", ""));
+}
+
+#[test]
+fn xacro_where_no_kinematics_is_counts_for_nothing() {
+    let parts = [
+        "<visual><xacro:grey/></visual>",
+        "<collision><geometry><xacro:box size=\"${w}\"/></geometry></collision>",
+        "<xacro:inertia m=\"${mass}\"/>",
+    ];
+    for part in parts {
+        is_written_in_place(&ARM.replacen("<link name=\"fore\"/>", &format!("<link name=\"fore\">{part}</link>"), 1));
+    }
+    for element in ["material name=\"grey\"", "gazebo reference=\"fore\"", "transmission name=\"t\""] {
+        let name = element.split(' ').next().unwrap_or_default();
+        let with = format!("<{element}><xacro:rest a=\"$(arg b)\"/></{name}>\n</robot>");
+        is_written_in_place(&ARM.replacen("</robot>", &with, 1));
+    }
+    // By any prefix that is declared for it.
+    let text = ARM.replace("xmlns:xacro=\"http://www.ros.org/wiki/xacro\"", "xmlns:x=\"http://wiki.ros.org/xacro\"");
+    let error = error(&text.replace("</robot>", "<x:arm/></robot>"), "base", "hand");
+    assert!(error.what.contains("<x:arm>: this is a template"), "{error}");
+}
+
+/// The limits of `shoulder`, and the range in which it is moved.
+fn limited(limit: &str) -> (Option<(f64, f64)>, (f64, f64)) {
+    let text = ARM.replacen("lower=\"-1\" upper=\"2\"", limit, 1);
+    let chain =
+        Urdf::parse(&text).and_then(|urdf| urdf.chain("base", "hand")).unwrap_or_else(|error| panic!("{error}"));
+    (chain.readings[0].limits, chain.limits().expect("a box").joints()[0])
+}
+
+#[test]
+fn limits_that_stand_for_none_are_none() {
+    use std::f64::consts::{PI, TAU};
+
+    for (limit, lower, upper) in [
+        ("-999999", -PI, PI),
+        ("-1e16", -PI, PI),
+        ("-1e300", -PI, PI),
+        ("-inf", -PI, PI),
+        ("-Infinity", -PI, PI),
+        ("-10000", -PI, PI),
+        // Far, though it may be meant: nobody need turn so far.
+        ("-9999", -TAU, TAU),
+        ("-7", -TAU, TAU),
+        ("-6.29", -6.29, 6.29),
+    ] {
+        let positive = &limit[1..];
+        let (limits, range) = limited(&format!("lower=\"{limit}\" upper=\"{positive}\""));
+        assert_eq!(range, (lower, upper), "{limit}");
+        assert_eq!(limits.is_none(), lower == -PI, "{limit}");
+    }
+    for (lower, upper, range) in [
+        ("0", "1e9", (0.0, TAU)),
+        ("-999999", "1", (-TAU, 1.0)),
+        ("10", "inf", (10.0, 10.0 + TAU)),
+        ("-1000", "-6.2", (-6.2 - TAU, -6.2)),
+        ("10", "11", (10.0, 11.0)),
+        ("-3", "20", (-3.0, TAU)),
+    ] {
+        let (limits, found) = limited(&format!("lower=\"{lower}\" upper=\"{upper}\""));
+        assert_eq!(found, range, "{lower} {upper}");
+        assert!(limits.is_some(), "the other limit counts");
+    }
+}
+
+#[test]
+fn limits_of_joints_that_cannot_move_are_told() {
+    let shoulder = "lower=\"-1\" upper=\"2\"";
+    refused(
+        shoulder,
+        "lower=\"0\" upper=\"0\"",
+        (11, 5),
+        "`shoulder`: it cannot move, as its limits are both 0",
+        "`continuous`",
+    );
+    refused(shoulder, "lower=\"0.5\" upper=\"0.5\"", (11, 5), "both 0.5", "or `fixed`");
+    refused(shoulder, "effort=\"9\"", (11, 5), "its <limit> has no `lower` and no `upper`", "in radians");
+    refused(shoulder, "lower=\"nan\" upper=\"1\"", (11, 19), "`nan` in `lower` is not a finite number", "0.03");
+    refused(shoulder, "lower=\"inf\" upper=\"-inf\"", (11, 5), "the lower limit inf is above", "lower=\"-inf\"");
+    let slide = "lower=\"0\" upper=\"0.2\"";
+    refused(slide, "lower=\"0\" upper=\"0\"", (20, 5), "`slide`: it cannot move", "how far it slides, in metres");
+    refused(
+        slide,
+        "lower=\"-1e16\" upper=\"1e16\"",
+        (20, 5),
+        "`slide`: a limit of 10000 m or more",
+        "how far it slides",
+    );
+    // That which follows another moves as the other does.
+    let follower = ARM
+        .replace("type=\"continuous\"", "type=\"revolute\"")
+        .replace("<axis xyz=\"0 0 3\"/>", "<limit effort=\"1\"/>");
+    Urdf::parse(&follower).and_then(|urdf| urdf.chain("base", "hand")).expect("a chain");
 }

@@ -1,6 +1,9 @@
 //! What the columns of a table are, by their titles.
 
-use crate::table::{Component, Layout, Rotation, Title, split};
+use crate::{
+    kinematics::JointKind,
+    table::{Component, Layout, Quantity, Rotation, Title, split},
+};
 
 /// What is measured beside the joints.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -40,25 +43,25 @@ impl Sensor {
     }
 }
 
-/// A title without the unit at its end.
-fn stem(title: &str) -> &str {
-    split(title).0
-}
-
 /// The first title that says this component of what another says one of.
 fn find(titles: &[String], of: &Title<'_>, component: Component) -> Option<String> {
     let is_it = |it: &Title<'_>| it.component == component && it.is_of(of.before) && it.number == of.number;
     titles.iter().find(|title| Title::parse(title).is_some_and(|it| is_it(&it))).cloned()
 }
 
-/// Whether there is a column for a joint.
-pub fn has_joint(titles: &[String], joint: &str) -> bool {
-    titles.iter().any(|title| title == joint || stem(title) == joint)
+/// The column of a joint: that with its name alone, or else with a unit of its kind behind it.
+pub fn of_joint<'t>(titles: &'t [String], joint: &str, kind: JointKind) -> Option<&'t String> {
+    let quantity = match kind {
+        JointKind::Revolute => Quantity::Angle,
+        JointKind::Prismatic => Quantity::Length,
+    };
+    let exact = titles.iter().find(|title| *title == joint);
+    exact.or_else(|| titles.iter().find(|title| split(title).0 == joint && quantity.is_in(title)))
 }
 
-/// What the columns that belong to no joint are.
+/// What the columns that belong to no joint are. `joints` are the titles of those that do.
 pub fn measured(titles: &[String], joints: &[String]) -> Measured {
-    let is_joint = |title: &&String| joints.iter().any(|joint| *title == joint || stem(title) == joint);
+    let is_joint = |title: &&String| joints.contains(title);
     let mut others: Vec<String> =
         titles.iter().filter(|title| !is_joint(title) && !title.is_empty()).cloned().collect();
     let mut measured = Measured::default();
@@ -146,11 +149,21 @@ mod tests {
     #[test]
     fn joints_targets_and_the_rest_are_told_apart() {
         let titles = titles("x1,y1,z1,x2_mm,y2_mm,z2_mm,hand_x,hand_y,hand_z,hand_rx,hand_ry,hand_rz,time,elbow_deg");
-        let found = measured(&titles, &["elbow".to_owned()]);
+        let elbow = of_joint(&titles, "elbow", JointKind::Revolute).expect("a column").clone();
+        let found = measured(&titles, &[elbow]);
         let told: Vec<_> = found.sensors.iter().map(|it| (it.name.as_str(), it.channel, it.columns.len())).collect();
         assert_eq!(told, [("marker1", "position", 3), ("marker2", "position", 3), ("hand", "pose", 6)]);
         assert_eq!((found.others, found.sockets), (vec!["time".to_owned()], None));
-        assert!(has_joint(&titles, "elbow") && !has_joint(&titles, "elbo"));
+        assert_eq!(of_joint(&titles, "elbo", JointKind::Revolute), None);
+        assert_eq!(of_joint(&titles, "elbow", JointKind::Prismatic), None, "it does not slide by degrees");
+    }
+
+    #[test]
+    fn a_title_that_is_a_joints_name_is_its_column() {
+        let all = titles("y_mm,x,y,x_mm,z_mm,lift_mm");
+        let joints = ["x", "y", "lift"].map(|joint| of_joint(&all, joint, JointKind::Prismatic).expect(joint).clone());
+        assert_eq!(joints, ["x", "y", "lift_mm"]);
+        assert_eq!(measured(&all, &joints).sensors[0].columns, ["x_mm", "y_mm", "z_mm"]);
     }
 
     #[test]

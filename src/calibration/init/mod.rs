@@ -3,14 +3,18 @@
 //! What the two say is matched: columns that are called as joints are, and what the other columns measure. Everything that
 //! had to be guessed is said, in the file and to whoever asked.
 
+mod chain;
 mod columns;
 mod pictures;
+#[cfg(test)]
+mod tests;
 mod written;
 
 use crate::{
-    model::urdf::{Chain, Urdf, UrdfError},
-    table::{Columns, Table, TableError},
+    model::urdf::{Urdf, UrdfError},
+    table::{Columns, Table, TableError, is_absent},
 };
+use chain::Search;
 use columns::Measured;
 use written::written;
 
@@ -75,8 +79,8 @@ pub enum InitError {
 ///
 /// # Errors
 ///
-/// [`InitError`] where a file cannot be read, no chain moves by joints that the table has columns for, or its other columns
-/// measure nothing.
+/// [`InitError`] where a file cannot be read, no chain moves by joints that the table has columns for, several do that are as
+/// long, or its other columns measure nothing.
 pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     let of_urdf = |source| InitError::Urdf { file: sources.urdf_file.to_owned(), source };
     let of_table = |source| InitError::Table { file: sources.table_file.to_owned(), source };
@@ -84,38 +88,23 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     let table = Table::open(sources.table.as_bytes()).map_err(of_table)?;
     let titles = table.titles().clone();
     let mut guesses = Vec::new();
-    let base = match sources.base {
-        Some(base) => base.to_owned(),
-        None => {
-            let root = urdf.root().unwrap_or_default().to_owned();
-            guesses.push(format!("base: `{root}`, the link that hangs on nothing; --base names another"));
-            root
-        }
-    };
-    let chain = match sources.tip {
-        Some(tip) => urdf.chain(&base, tip).map_err(of_urdf)?,
-        None => tip(&urdf, &base, titles.all(), &mut guesses)?,
-    };
-    let missing: Vec<&str> = chain
-        .readings
-        .iter()
-        .map(|reading| reading.name.as_str())
-        .filter(|name| !columns::has_joint(titles.all(), name))
-        .collect();
-    if !missing.is_empty() {
-        return Err(InitError::Misfit {
-            what: format!("{} has no column for {}; its columns are {}", sources.table_file, missing.join(", "), titles.all().join(", ")),
-            mend: "title a column with each joint's name (`_deg` and `_mm` at its end say the unit), or name another --tip".to_owned(),
-        });
+    if let Some(error) = titles.separated() {
+        return Err(of_table(error));
     }
+    let chain = Search { sources, urdf: &urdf, titles: titles.all() }.chain(&mut guesses)?;
     let joints: Vec<String> = chain.readings.iter().map(|reading| reading.name.clone()).collect();
     guesses.push(format!("joints: {}, by the titles of columns", joints.join(", ")));
-    let Measured { sensors, sockets, others } = columns::measured(titles.all(), &joints);
+    let of_joints = chain.readings.iter();
+    let of_joints =
+        of_joints.filter_map(|reading| columns::of_joint(titles.all(), &reading.name, reading.kind).cloned());
+    let of_joints: Vec<String> = of_joints.collect();
+    let Measured { sensors, sockets, others } = columns::measured(titles.all(), &of_joints);
     if sensors.is_empty() && sockets.is_none() {
         return Err(InitError::Misfit {
             what: format!(
-                "nothing is measured in {}: its columns beside the joints are {}",
+                "nothing is measured in {}: of its columns, {}, those beside the joints' are {}",
                 sources.table_file,
+                titles.all().join(", "),
                 listed(&others)
             ),
             mend:
@@ -135,7 +124,7 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
         let mut places: Vec<String> = Vec::new();
         for row in rows {
             let label = row.map_err(of_table)?.labels.swap_remove(0);
-            if !places.contains(&label) {
+            if !is_absent(&label) && !places.contains(&label) {
                 places.push(label);
             }
         }
@@ -179,34 +168,4 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
 
 fn listed(names: &[String]) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
-}
-
-/// The chain with the most joints of which all have columns; of those that move by the same the one whose tip nothing hangs
-/// on, if it is the only one, else the link behind the last joint.
-fn tip(urdf: &Urdf, base: &str, titles: &[String], guesses: &mut Vec<String>) -> Result<Chain, InitError> {
-    let chains = urdf.links().iter().filter_map(|link| urdf.chain(base, link).ok());
-    let fits = |chain: &Chain| chain.readings.iter().all(|reading| columns::has_joint(titles, &reading.name));
-    let fitting: Vec<Chain> = chains.filter(fits).collect();
-    let most = fitting.iter().map(|chain| chain.readings.len()).max().unwrap_or(0);
-    let mut best: Vec<&Chain> = fitting.iter().filter(|chain| chain.readings.len() == most).collect();
-    best.sort_by_key(|chain| chain.segments.len());
-    let leaves: Vec<&str> = urdf.leaves().collect();
-    let at_end: Vec<&&Chain> = best.iter().filter(|chain| leaves.contains(&chain.tip())).collect();
-    let (chosen, why) = match (at_end.as_slice(), best.first()) {
-        ([only], _) => (**only, "the end of the longest chain whose joints all have columns"),
-        (_, Some(first)) => (*first, "behind the last joint that has a column; several links hang on it"),
-        (_, None) => {
-            let mut joints: Vec<String> = Vec::new();
-            for chain in leaves.iter().filter_map(|leaf| urdf.chain(base, leaf).ok()) {
-                let new = chain.readings.into_iter().map(|reading| reading.name).filter(|name| !joints.contains(name));
-                joints.extend(new.collect::<Vec<_>>());
-            }
-            return Err(InitError::Misfit {
-                what: format!("no chain from `{base}` moves by joints that the table has columns for"),
-                mend: format!("title columns with the joints' names: {}", joints.join(", ")),
-            });
-        }
-    };
-    guesses.push(format!("tip: `{}`, {why}; --tip names another", chosen.tip()));
-    Ok(chosen.clone())
 }

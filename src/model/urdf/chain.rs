@@ -1,6 +1,6 @@
 //! The chain between two links.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3};
 
@@ -51,7 +51,8 @@ pub struct Segment {
     pub origin: Isometry3<f64>,
     /// The axis in the joint's frame.
     pub axis: UnitVector3<f64>,
-    /// Rad or m; none of a continuous or a fixed joint.
+    /// Rad or m; none of a fixed joint, of a continuous one, and of a revolute one whose limits are 1e4 or more to both sides, which
+    /// stand for none. To one side alone they are ±∞.
     pub limits: Option<(f64, f64)>,
     /// What moves it, if it moves: `θ = multiplier · q + offset`, q a [`Reading`] by index.
     pub follows: Option<Follows>,
@@ -82,6 +83,26 @@ impl Segment {
             None => Isometry3::identity(),
         }
     }
+
+    /// The positions that it is asked to take, rad or m: those between its limits, of a joint that turns those within a turn to
+    /// either side; half a turn to each side where it turns without end.
+    fn range(&self) -> (f64, f64) {
+        // As limits are rounded.
+        const ABOUT_A_TURN: f64 = TAU + 0.01;
+        let Some((lower, upper)) = self.limits else { return (-PI, PI) };
+        let is_within = lower >= -ABOUT_A_TURN && upper <= ABOUT_A_TURN;
+        if is_within || self.kind == SegmentKind::Prismatic {
+            return (lower, upper);
+        }
+        let (from, to) = (lower.max(-TAU), upper.min(TAU));
+        if to - from >= (upper - lower).min(PI) {
+            (from, to)
+        } else if lower > -upper {
+            (lower, upper.min(lower + TAU))
+        } else {
+            (lower.max(upper - TAU), upper)
+        }
+    }
 }
 
 /// What a robot reports of itself: the position of a joint that follows no other.
@@ -91,7 +112,7 @@ pub struct Reading {
     pub name: String,
     /// Radians or metres.
     pub kind: JointKind,
-    /// Rad or m; none of a continuous joint.
+    /// Rad or m; none of a joint that turns without end, ±∞ where there is none to one side.
     pub limits: Option<(f64, f64)>,
 }
 
@@ -122,13 +143,14 @@ impl Chain {
         self.moving().map(|segment| segment.name.clone()).collect()
     }
 
-    /// The limits of the joints that move, rad or m; half a turn to each side where a joint turns without end.
+    /// The limits of the joints that move, rad or m; half a turn to each side where a joint turns without end. Where one turns further
+    /// than that, no more than a turn to either side: beyond there is nothing that is not to be seen within.
     ///
     /// # Errors
     ///
     /// [`JointBoxError`] where limits are so far apart that their difference is no number.
     pub fn limits(&self) -> Result<JointBox, JointBoxError> {
-        JointBox::new(self.moving().map(|segment| segment.limits.unwrap_or((-PI, PI))).collect())
+        JointBox::new(self.moving().map(Segment::range).collect())
     }
 
     /// The positions of the joints that move (rad or m) at so many [`readings`](Self::readings).

@@ -7,7 +7,7 @@ use roxmltree::Node;
 
 use super::{
     SegmentKind, UrdfError,
-    values::{error, number, numbers, only_child, required},
+    values::{EXPAND, error, is_expression, number, numbers, only_child, required},
 };
 
 /// What a joint's element says besides its name and its links.
@@ -18,7 +18,7 @@ pub struct Body {
     pub text: OriginText,
     /// In the joint's frame; x of a fixed joint.
     pub axis: UnitVector3<f64>,
-    /// Rad or m; none of a continuous or a fixed joint.
+    /// Rad or m; none of a fixed joint and of one that turns without end. To one side, too, there may be none: ±∞.
     pub limits: Option<(f64, f64)>,
     pub mimic: Option<Mimic>,
 }
@@ -58,15 +58,23 @@ pub enum Insert {
 impl Body {
     pub fn read(node: Node) -> Result<Self, UrdfError> {
         let (kind, at) = required(node, "type")?;
+        if is_expression(kind) {
+            return Err(error(node, at.start, format!("`{kind}` is an expression of xacro"), EXPAND));
+        }
         let kind = match kind {
             "revolute" => SegmentKind::Revolute,
             "continuous" => SegmentKind::Continuous,
             "prismatic" => SegmentKind::Prismatic,
             "fixed" => SegmentKind::Fixed,
             other => {
-                let mend = "a chain has revolute, continuous, prismatic and fixed joints; name links between which there \
-                            are no others";
-                return Err(error(node, at.start, format!("a joint of type `{other}` is not part of a chain"), mend));
+                let child = node.children().find(|child| child.tag_name().name() == "child");
+                let child = child.and_then(|child| child.attribute("link")).unwrap_or_default();
+                let what = format!("joint `{}` is of type `{other}`, which is not part of a chain", name_of(node));
+                let mend = format!(
+                    "a chain has revolute, continuous, prismatic and fixed joints; name links between which there are no others, as \
+                     `{child}`, which it carries, for the base"
+                );
+                return Err(error(node, at.start, what, mend));
             }
         };
         let (origin, text) = origin(node)?;
@@ -79,7 +87,7 @@ impl Body {
             }
             _ => None,
         };
-        Ok(Self { kind, origin, text, axis: axis(node, kind)?, limits: limits(node, kind)?, mimic })
+        Ok(Self { kind, origin, text, axis: axis(node, kind)?, limits: limits(node, kind, mimic.is_some())?, mimic })
     }
 }
 
@@ -153,20 +161,64 @@ fn axis(joint: Node, kind: SegmentKind) -> Result<UnitVector3<f64>, UrdfError> {
     })
 }
 
-fn limits(joint: Node, kind: SegmentKind) -> Result<Option<(f64, f64)>, UrdfError> {
+/// Limits from which on nobody means an angle, radians, or a length, metres: they stand for none.
+const PLACEHOLDER: f64 = 1e4;
+
+fn limits(joint: Node, kind: SegmentKind, follows: bool) -> Result<Option<(f64, f64)>, UrdfError> {
     if matches!(kind, SegmentKind::Fixed | SegmentKind::Continuous) {
         return Ok(None);
     }
+    let name = name_of(joint);
     let Some(node) = only_child(joint, "limit")? else {
-        let what = format!("joint `{}` has no <limit>", joint.attribute("name").unwrap_or_default());
+        let what = format!("joint `{name}` has no <limit>");
         let mend = "add <limit lower=\"…\" upper=\"…\" effort=\"0\" velocity=\"0\"/>, in radians or metres; a joint that \
                     turns without end is `continuous`";
         return Err(error(joint, joint.range().start, what, mend));
     };
-    let (lower, upper) = (number(node, "lower", 0.0)?, number(node, "upper", 0.0)?);
+    let (lower, upper) = (limit(node, "lower")?, limit(node, "upper")?);
+    let wrong =
+        |what: String, mend: &str| Err(error(node, node.range().start, format!("joint `{name}`: {what}"), mend));
     if lower > upper {
-        let what = format!("the lower limit {lower} is above the upper {upper}");
-        return Err(error(node, node.range().start, what, format!("write lower=\"{upper}\" upper=\"{lower}\"")));
+        let mend = format!("write lower=\"{upper}\" upper=\"{lower}\"");
+        return wrong(format!("the lower limit {lower} is above the upper {upper}"), &mend);
     }
-    Ok(Some((lower, upper)))
+    let is_unlimited = lower.is_infinite() || upper.is_infinite();
+    match kind {
+        SegmentKind::Prismatic if is_unlimited => wrong(
+            format!("a limit of {PLACEHOLDER} m or more stands for none, and it has to have one"),
+            "write how far it slides, in metres",
+        ),
+        // Where another joint moves it, that one's limits count.
+        _ if lower == upper && !follows => {
+            let is_said = node.has_attribute("lower") || node.has_attribute("upper");
+            let what = if is_said {
+                format!("it cannot move, as its limits are both {lower}")
+            } else {
+                "it cannot move, as its <limit> has no `lower` and no `upper`, which are 0 then".to_owned()
+            };
+            let mend = match kind {
+                SegmentKind::Prismatic => "write how far it slides, in metres, or make it `fixed`",
+                _ => {
+                    "write how far it turns, in radians, make it `continuous` if it turns without end, or `fixed` if it does not turn"
+                }
+            };
+            wrong(what, mend)
+        }
+        _ if lower == f64::NEG_INFINITY && upper == f64::INFINITY => Ok(None),
+        _ => Ok(Some((lower, upper))),
+    }
+}
+
+/// A limit; infinite where it stands for none.
+fn limit(node: Node, name: &str) -> Result<f64, UrdfError> {
+    let written = node.attribute(name).and_then(|value| value.trim().parse::<f64>().ok());
+    match written {
+        Some(far) if far.abs() >= PLACEHOLDER => Ok(far.signum() * f64::INFINITY),
+        _ => number(node, name, 0.0),
+    }
+}
+
+/// What a joint is called.
+fn name_of<'a>(joint: Node<'a, '_>) -> &'a str {
+    joint.attribute("name").unwrap_or_default()
 }

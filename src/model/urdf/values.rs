@@ -19,6 +19,11 @@ pub fn error(node: Node, byte: usize, what: impl Into<String>, mend: impl Into<S
     UrdfError::at(node.document().input_text(), byte, what, mend)
 }
 
+/// Whether a value is what xacro is to fill in.
+pub fn is_expression(value: &str) -> bool {
+    value.contains("${") || value.contains("$(")
+}
+
 /// An attribute that must be there.
 pub fn required<'a>(node: Node<'a, '_>, name: &str) -> Result<(&'a str, Range<usize>), UrdfError> {
     if let Some(attribute) = node.attribute_node(name) {
@@ -58,7 +63,7 @@ pub fn number(node: Node, name: &str, default: f64) -> Result<f64, UrdfError> {
 pub fn numbers<const N: usize>(node: Node, attribute: &Attribute) -> Result<[f64; N], UrdfError> {
     let (value, name) = (attribute.value(), attribute.name());
     let wrong = |what: String, mend: String| error(node, attribute.range_value().start, what, mend);
-    if value.contains("${") || value.contains("$(") {
+    if is_expression(value) {
         return Err(wrong(format!("`{value}` is an expression of xacro"), EXPAND.to_owned()));
     }
     let mut numbers = Vec::with_capacity(N);

@@ -7,6 +7,7 @@ use toml::Spanned;
 use super::{Check, raw};
 use crate::{
     kinematics::JointKind,
+    model::urdf::Urdf,
     scenario::{Described, HeldOut, Measurements, Robot},
     sensing::Keys,
     table::{Column, Columns, Layout, Quantity, Reading, Table, TableError, Titles},
@@ -53,13 +54,20 @@ impl Check<'_> {
         let text = self.table_text(&measurements.file)?;
         let columns = columns?;
         let sockets = Table::open(text.as_bytes()).ok().and_then(|table| socket_columns(raw, table.titles()));
+        let taken = taken(raw);
         let by = raw.held_out.as_ref().and_then(|held_out| held_out.get_ref().by.as_ref());
         let wanted = |titles: &Titles| {
             let labels =
                 sockets.iter().flat_map(|it| it.place.iter().chain([&it.socket])).chain(by.map(Spanned::get_ref));
             let labels: BTreeSet<&String> = labels.collect();
-            let joints = columns.iter().map(|column| column.find(titles)).collect::<Result<Vec<_>, TableError>>()?;
-            let readings = readings(raw, robot, titles)?;
+            let joints =
+                columns.iter().map(|column| column.find(titles, &taken)).collect::<Result<Vec<_>, TableError>>()?;
+            // What is a joint's is not measured, unless its column is named.
+            let of_joints: Vec<&String> = match robot.described {
+                Some(_) => joints.iter().map(|column| &titles.all()[column.index]).collect(),
+                None => Vec::new(),
+            };
+            let readings = readings(raw, robot, titles, &titles.besides(&of_joints))?;
             let mut measured = readings.iter().flat_map(|reading| &reading.columns);
             if let Some(both) = measured.find(|column| joints.iter().any(|joint| joint.index == column.index)) {
                 let what = format!(
@@ -84,6 +92,21 @@ impl Check<'_> {
             self.recorded_sockets(raw, &columns, &mut rows, &held_out, robot)?;
         }
         Some((rows, held_out))
+    }
+
+    /// The titles without those of the joints' columns, as far as the description tells which these are.
+    pub(super) fn beside_joints(&mut self, raw: &raw::Scenario, titles: &Titles) -> Titles {
+        let (urdf, base, tip) = (&raw.robot.urdf, &raw.robot.base, &raw.robot.tip);
+        let (Some(urdf), Some(base), Some(tip)) = (urdf, base, tip) else { return titles.clone() };
+        let text = self.opened(urdf.get_ref()).unwrap_or_default();
+        // What is wrong with it is told where it is needed.
+        let Ok(chain) = Urdf::parse(&text).and_then(|urdf| urdf.chain(base.get_ref(), tip.get_ref())) else {
+            return titles.clone();
+        };
+        let taken = taken(raw);
+        let joints = chain.readings.into_iter().map(|reading| JointColumn::Named(reading.name, reading.kind));
+        let found = joints.filter_map(|joint| joint.find(titles, &taken).ok());
+        titles.besides(&found.map(|column| &titles.all()[column.index]).collect::<Vec<_>>())
     }
 
     /// The columns of the joints; `None` has left a problem behind.
@@ -138,35 +161,45 @@ enum JointColumn {
 }
 
 impl JointColumn {
-    fn find(&self, titles: &Titles) -> Result<Column, TableError> {
+    /// The column; of several that a joint's name fits that which no sensor `taken` has.
+    fn find(&self, titles: &Titles, taken: &[&String]) -> Result<Column, TableError> {
         let quantity = |kind: &JointKind| match kind {
             JointKind::Revolute => Quantity::Angle,
             JointKind::Prismatic => Quantity::Length,
         };
         match self {
             Self::Titled(title, kind) => titles.titled(title, quantity(kind)),
-            Self::Named(name, kind) => titles.find(name, quantity(kind)),
+            Self::Named(name, kind) => {
+                let found = titles.find(name, quantity(kind));
+                found.or_else(|error| titles.besides(taken).find(name, quantity(kind)).map_err(|_| error))
+            }
         }
     }
 }
 
-/// The columns of every sensor.
-fn readings(raw: &raw::Scenario, robot: &Robot, titles: &Titles) -> Result<Vec<Reading>, TableError> {
+/// The titles that sensors name.
+fn taken(raw: &raw::Scenario) -> Vec<&String> {
+    let sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0);
+    sensors.flat_map(|keys| keys.get_ref().columns.iter().flatten()).collect()
+}
+
+/// The columns of every sensor, by titles that it names, or else of those that are `beside` the joints'.
+fn readings(raw: &raw::Scenario, robot: &Robot, titles: &Titles, beside: &Titles) -> Result<Vec<Reading>, TableError> {
     let marker = raw.measurements.as_ref().and_then(|given| given.get_ref().marker_columns_m.as_ref());
     if let Some(columns) = marker {
         return Ok(vec![titles.reading_titled(Layout::Position, &columns.get_ref().0)?]);
     }
     let sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0);
-    sensors.map(|keys| reading(keys.get_ref(), robot, titles)).collect()
+    sensors.map(|keys| reading(keys.get_ref(), robot, titles, beside)).collect()
 }
 
-fn reading(keys: &Keys, robot: &Robot, titles: &Titles) -> Result<Reading, TableError> {
+fn reading(keys: &Keys, robot: &Robot, titles: &Titles, beside: &Titles) -> Result<Reading, TableError> {
     let (layout, prefix) = told(keys, robot);
     if let Some(columns) = &keys.columns {
         return titles.reading_titled(layout, columns);
     }
-    // With nothing before them where there is no doubt.
-    titles.reading_of(layout, &prefix)
+    // With nothing before them where there is no doubt; all titles are told where there is none.
+    beside.reading_of(layout, &prefix).or_else(|_| titles.reading_of(layout, &prefix))
 }
 
 /// What a sensor's reading looks like in a table, and what its titles begin with.

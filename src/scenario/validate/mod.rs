@@ -182,6 +182,7 @@ impl Check<'_> {
         let is_recorded = raw.initial_error.is_none() && !self.is_outside;
         if let (Some(measurements), Some(_), true) = (&raw.measurements, &raw.robot.urdf, is_recorded) {
             let titles = self.titles(measurements.get_ref())?;
+            let titles = self.beside_joints(&raw, &titles);
             completed::complete(&mut raw, Some(&titles));
         }
         let raw = &raw;

@@ -7,6 +7,7 @@ use crate::{
     model::{Block, Layout},
     scenario::{HeldOut, HeldOutRule, Measurements, Robot, SocketSpec},
     sensing::{Observation, Spacing},
+    table::is_absent,
 };
 
 /// What play and the noise of the joints amount to at the target, unless a scenario says otherwise, metres.
@@ -46,7 +47,7 @@ impl Check<'_> {
             let (place, name) = label(row);
             // A row may hold nothing.
             let label = (place.clone(), name.clone());
-            if name.is_empty() || numbers.contains_key(&label) {
+            if is_absent(&name) || numbers.contains_key(&label) {
                 continue;
             }
             numbers.insert(label, numbers.len());

@@ -1,0 +1,154 @@
+//! A text that a strict reader of XML takes, byte by byte where the description has it.
+//!
+//! Readers of URDFs are lenient: a prefix of a namespace that nobody declares is a part of a name to them, and what stands before the
+//! declaration does not matter. Here a description becomes strict XML before it is parsed, and no byte moves, so that the places that
+//! the parser tells are places in the description.
+
+use std::borrow::Cow;
+
+/// What stands in names for the colon of a prefix: a letter of names that hardly any name has.
+pub const COLON: char = '.';
+
+/// The byte order mark.
+const MARK: char = '\u{feff}';
+
+/// The text with [`COLON`] for the colons in names of elements and attributes, with blanks for the declaration of XML, for a
+/// `<!DOCTYPE>` without entities and for byte order marks behind the first, and without the hyphens in comments. Every byte of the rest is what and where it was, and so are
+/// all ends of lines.
+pub fn plain(text: &str) -> Cow<'_, str> {
+    let mut plain = String::with_capacity(text.len());
+    let (mut done, mut is_within) = (0, false);
+    while let Some(at) = text[done..].find('<').map(|at| done + at) {
+        if is_within {
+            plain.push_str(&text[done..at]);
+        } else {
+            before_root(&text[done..at], done == 0, &mut plain);
+        }
+        let rest = &text[at..];
+        let end = |start: &str, end: &str| {
+            let found = rest.strip_prefix(start)?.find(end);
+            Some(found.map_or(rest.len(), |found| start.len() + found + end.len()))
+        };
+        let length = if let Some(length) = end("<!--", "-->") {
+            comment(&rest[..length], &mut plain);
+            length
+        } else if let Some(length) = end("<![CDATA[", "]]>") {
+            plain.push_str(&rest[..length]);
+            length
+        } else if let Some(length) = end("<?", "?>") {
+            let is_declaration =
+                rest[2..].starts_with("xml") && rest[5..].starts_with(|c: char| c.is_ascii_whitespace() || c == '?');
+            if is_declaration && !is_within {
+                blanks(&rest[..length], &mut plain);
+            } else {
+                plain.push_str(&rest[..length]);
+            }
+            length
+        } else if rest.starts_with("<!") {
+            doctype(rest, &mut plain)
+        } else {
+            is_within = true;
+            tag(rest, &mut plain)
+        };
+        done = at + length;
+    }
+    plain.push_str(&text[done..]);
+    debug_assert_eq!(plain.len(), text.len());
+    if plain == text { Cow::Borrowed(text) } else { Cow::Owned(plain) }
+}
+
+/// What stands between markup before the first element. A byte order mark that begins the text is left to the parser.
+fn before_root(text: &str, is_start: bool, plain: &mut String) {
+    for (at, c) in text.char_indices() {
+        if c == MARK && !(is_start && at == 0) {
+            (0..MARK.len_utf8()).for_each(|_| plain.push(' '));
+        } else {
+            plain.push(c);
+        }
+    }
+}
+
+/// Blanks for all but the ends of lines.
+fn blanks(text: &str, plain: &mut String) {
+    text.bytes().for_each(|byte| plain.push(if matches!(byte, b'\n' | b'\r') { byte.into() } else { ' ' }));
+}
+
+/// A <!DOCTYPE>, which says nothing of a robot: blanks, unless it defines entities, which the parser refuses; how long it is.
+fn doctype(text: &str, plain: &mut String) -> usize {
+    let end = text.find('>').map_or(text.len(), |end| end + 1);
+    let (found, is_whole) = (&text[..end], text[..end].ends_with('>'));
+    if is_whole && found.starts_with("<!DOCTYPE") && !found.contains('[') {
+        blanks(found, plain);
+    } else {
+        plain.push_str(found);
+    }
+    end
+}
+
+/// A comment: two hyphens end one, and are found within many.
+fn comment(text: &str, plain: &mut String) {
+    match text.strip_prefix("<!--").and_then(|inner| inner.strip_suffix("-->")) {
+        Some(inner) => {
+            plain.push_str("<!--");
+            plain.push_str(&inner.replace('-', " "));
+            plain.push_str("-->");
+        }
+        None => plain.push_str(text),
+    }
+}
+
+/// A tag, up to the `>` that ends it; how long it is.
+fn tag(text: &str, plain: &mut String) -> usize {
+    let mut quote = None;
+    for (at, c) in text.char_indices() {
+        match (quote, c) {
+            (None, ':') => {
+                plain.push(COLON);
+                continue;
+            }
+            (None, '"' | '\'') => quote = Some(c),
+            (Some(open), _) if open == c => quote = None,
+            _ => {}
+        }
+        plain.push(c);
+        if quote.is_none() && c == '>' {
+            return at + 1;
+        }
+    }
+    text.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn names_lose_their_colons_and_nothing_else_does() {
+        for (text, wanted) in [
+            ("<a:b c:d=\"e:f\" g='h:i>'>j:k</a:b>", "<a.b c.d=\"e:f\" g='h:i>'>j:k</a.b>"),
+            ("<!-- a:b -- <c:d> --><e:f/>", "<!-- a:b    <c:d> --><e.f/>"),
+            ("<r><![CDATA[<a:b>]]><?a:b c:d?></r>", "<r><![CDATA[<a:b>]]><?a:b c:d?></r>"),
+            ("\n<?xml\nversion='1.0'?>\u{feff}<r/>", "\n     \n               \u{20}  <r/>"),
+            ("\u{feff}<r>\u{feff}</r>", "\u{feff}<r>\u{feff}</r>"),
+            ("<r><?xml version='1.0'?></r>", "<r><?xml version='1.0'?></r>"),
+            ("<!DOCTYPE r SYSTEM\n'a'>\n<r/>", "                  \n    \n<r/>"),
+            ("<!DOCTYPE r [<!ENTITY a 'b'>]><r/>", "<!DOCTYPE r [<!ENTITY a 'b'>]><r/>"),
+            ("<r a:b='c", "<r a.b='c"),
+            ("<!-- a--", "<!-- a--"),
+        ] {
+            assert_eq!(plain(text), wanted, "{text}");
+        }
+        assert!(matches!(plain("<robot name=\"a:b\"/>"), Cow::Borrowed(_)));
+    }
+
+    proptest! {
+        #[test]
+        fn no_byte_moves(text in "[<>!?\\-:'\"=a \n\u{feff}é\\[\\]]{0,60}|(<\\?xml|<!--|-->|<a:b |>|\\?>|\u{feff}|é){0,12}") {
+            let plain = plain(&text);
+            prop_assert_eq!(plain.len(), text.len());
+            prop_assert_eq!(plain.matches('\n').count(), text.matches('\n').count());
+        }
+    }
+}
