@@ -123,3 +123,15 @@ fn a_session_begins_where_its_tip_hangs() {
         opened.unwrap_or_else(|error| panic!("{beside}: {error}"));
     }
 }
+
+/// Rows that are held out are those of the file: a line without a reading before them moves none.
+#[test]
+fn rows_are_held_out_by_their_numbers_in_the_file() {
+    let case = "t10-nan-row";
+    let calibration = begun(case, None, None).expect("begun").replace("folds = 5", "rows = [4, 5]");
+    let scenario = scenario(case, &calibration);
+    let WorldSpec::Measured { measurements, held_out, .. } = &scenario.world else { panic!("{case}: measured") };
+    let lines: Vec<usize> = held_out.split(1).1.into_iter().map(|row| measurements.lines[row]).collect();
+    // Row 4 is line 6, of which nothing was measured.
+    assert_eq!(lines, [7]);
+}

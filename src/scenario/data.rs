@@ -17,6 +17,8 @@ pub struct Measurements {
     pub observations: Vec<Observation>,
     /// The line of its file that each row stands on, counted from 1.
     pub lines: Vec<usize>,
+    /// By row its number in its file, from 0; lines on which nothing was measured are counted.
+    pub numbers: Vec<usize>,
     /// By row the socket in which a target was held: its number among the robot's sockets, those that are held out after the
     /// others. Empty where there are none.
     pub sockets: Vec<Option<usize>>,
@@ -60,7 +62,7 @@ impl Measurements {
         let labels: Vec<String> = columns.labels.iter().map(|index| title(*index)).collect();
         let mut rows = table.rows(columns);
         let mut unmeasured = 0;
-        for row in rows.by_ref() {
+        for (number, row) in rows.by_ref().enumerate() {
             let row = row?;
             // A line without a reading says nothing; without labels it has no other part in anything.
             if is_measured && row.observation.is_miss() {
@@ -73,6 +75,7 @@ impl Measurements {
             measurements.observations.push(row.observation);
             measurements.configurations.push(row.positions);
             measurements.lines.push(row.line);
+            measurements.numbers.push(number);
         }
         if unmeasured > 0 && measurements.rows() == 0 {
             let what = format!("nothing was measured: {} are empty on every line", measurements.readings.join(", "));
@@ -93,6 +96,7 @@ impl Measurements {
         self.configurations.extend(other.configurations);
         self.observations.extend(other.observations);
         self.lines.extend(other.lines);
+        self.numbers.extend(other.numbers);
         for (title, labels) in other.labels {
             self.labels.entry(title).or_default().extend(labels);
         }

@@ -194,10 +194,10 @@ fn a_title_that_is_a_joints_name_is_no_measurement() {
         begun(&gantry, "x_mm,y_mm,z_mm,p_x,p_y,p_z\n0,0,0,1,2,3\n", None, None),
         &["columns = [\"p_x\", \"p_y\", \"p_z\"]"],
     );
-    refused(
-        &gantry,
-        "x,y,z,x_cm,y_cm,z_cm\n0,0,0,1,2,3\n",
-        &["nothing is measured", "beside the joints' are x_cm, y_cm, z_cm"],
+    taken(
+        begun(&gantry, "x,y,z,x_cm,y_cm,z_cm\n0,0,0,1,2,3\n", None, None),
+        &["columns = [\"x_cm\", \"y_cm\", \"z_cm\"]"],
     );
+    refused(&gantry, "x,y,z,far,near\n0,0,0,1,2\n", &["nothing is measured", "beside the joints' are far, near"]);
     refused(&gantry, "x,y,z\n0,0,0\n", &["of its columns, x, y, z, those beside the joints' are none"]);
 }

@@ -47,7 +47,7 @@ impl Check<'_> {
             (Some(folds), None, None, None, None) => self.fold(folds, count)?,
             (None, Some(held_out), None, None, None) => self.drawn("held_out.count", held_out, count)?,
             (None, None, Some(by), None, None) => self.by_label(by, given.train.as_ref(), rows)?,
-            (None, None, None, Some(held_out), None) => self.told(held_out, count)?,
+            (None, None, None, Some(held_out), None) => self.told(held_out, &rows.numbers)?,
             (None, None, None, None, Some(file)) => self.second_file(file, rows, read)?,
             _ => {
                 let mend = "write one of `folds = 5`, `by = \"place\"` with `train = […]`, `rows = […]`, `file = \"…\"` and \
@@ -132,11 +132,12 @@ impl Check<'_> {
         Some(HeldOutRule::Rows(held_out))
     }
 
-    fn told(&mut self, held_out: &Spanned<Vec<usize>>, count: usize) -> Option<HeldOutRule> {
-        let mut rows = held_out.get_ref().clone();
-        rows.sort_unstable();
-        rows.dedup();
-        if rows.last().is_some_and(|last| *last >= count) || rows.len() == count {
+    /// Rows as they are numbered in the file; those on which nothing was measured count, and hold nothing out.
+    fn told(&mut self, held_out: &Spanned<Vec<usize>>, numbers: &[usize]) -> Option<HeldOutRule> {
+        let told = held_out.get_ref();
+        let count = numbers.last().map_or(0, |last| last + 1);
+        let rows: Vec<usize> = (0..numbers.len()).filter(|row| told.contains(&numbers[*row])).collect();
+        if told.iter().any(|row| *row >= count) || rows.len() == numbers.len() {
             let what = format!("of {count} rows these cannot be held out");
             let mend = format!("write some of 0 to {}, row 0 being the line after the titles", count.saturating_sub(1));
             self.problem(held_out.span(), "held_out.rows", what, mend);
