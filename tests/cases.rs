@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use body_schema::{
-    calibration::{Calibration, CalibrationError, Case, Options, Silent, Sources, begin, calibrate},
+    calibration::{Calibration, CalibrationError, Case, Options, Silent, Sources, Use, begin, calibrate},
     doubts::{Doubt, DoubtKind},
     scenario::{Problem, Scenario, ScenarioError},
 };
@@ -343,4 +343,105 @@ fn lenses_are_straightened_before() {
         if file == "cal.toml" { text.replace("distortion=[-0.25,0.05,0,0,0]", "focal_length=1") } else { text }
     };
     assert!(!problem(name, &other).mend.contains("undistort"));
+}
+
+/// What is said first of a case, and its evidence.
+fn first(case: &str) -> String {
+    let doubts = valid(case, &as_it_is).examine().expect("measured").doubts;
+    doubts.first().unwrap_or_else(|| panic!("{case}: no doubt")).to_string()
+}
+
+/// What is wrong is told first, and by its name.
+#[test]
+fn gross_misfits_get_their_cause() {
+    for (case, said) in [
+        ("f03-eye-in-hand-raw", "poses are inverted"),
+        ("f10b-sign-w3-pose-target-on-axis", "column `w3`: its sign is reversed"),
+        ("f11-lerobot-90deg-default", "their zeros are -89, 89, -44 deg"),
+        ("f29-scale-1.1-tag-size", "everything is seen 1.09"),
+        ("m02-two-scale-1.1", "everything is seen 1.1"),
+        ("f36-urdf-in-mm", "the description is in millimetres"),
+        ("f40-base-exact-but-turned-180", "the base stands elsewhere than [base] says, by 2.49 mm and 180 deg"),
+    ] {
+        let first = first(case);
+        assert!(first.contains(said), "{case}: {first}");
+    }
+    // A picture of a tag that is half as large as is said: no reading of a column explains it.
+    let some = |_: &str, text: String| text.replace("folds=5", "count=8");
+    let found = calibrated(&valid("f13b-side-for-half-side", &some)).report;
+    assert!(found.doubts[0].contains("the description does not fit these rows"), "{:?}", found.doubts);
+    assert_eq!(found.verdict.r#use, Use::No);
+    // Nor is a table of another robot's anything but a misfit.
+    let mixed = |file: &str, text: String| match file {
+        "data.csv" => {
+            let mut lines: Vec<&str> = text.lines().collect();
+            let half = lines.len() / 2;
+            // What was measured, beside joints that have nothing to do with it.
+            let cells: Vec<Vec<&str>> = lines.iter().map(|line| line.split(',').collect()).collect();
+            let mixed: Vec<String> = (1..lines.len())
+                .map(|row| {
+                    let other = 1 + (row * 7 + half) % (lines.len() - 1);
+                    [&cells[row][..6], &cells[other][6..]].concat().join(",")
+                })
+                .collect();
+            lines.truncate(1);
+            format!("{}\n{}\n", lines[0], mixed.join("\n"))
+        }
+        _ => text,
+    };
+    let doubts = valid("f26d-one-zero", &mixed).examine().expect("measured").doubts;
+    assert_eq!(doubts.first().map(|doubt| doubt.kind), Some(DoubtKind::Misfit), "{doubts:?}");
+}
+
+/// What the description explains by itself or calibrated is no reason to doubt a table.
+#[test]
+fn what_is_right_is_not_doubted() {
+    for case in [
+        "f16b-scara-on-axis-target",
+        "s02-cartpole-1",
+        "s02-wrist-9",
+        "m01-two-one-9999",
+        "f26d-one-zero",
+        "f26e-one-9999",
+        "f11-lerobot-4deg-offsets",
+        "k02-distances",
+    ] {
+        let doubts = valid(case, &as_it_is).examine().expect("measured").doubts;
+        assert!(doubts.is_empty(), "{case}: {doubts:?}");
+    }
+}
+
+/// One row that went wrong among others counts for nothing, and is named.
+#[test]
+fn a_row_that_went_wrong_is_named() {
+    for (case, line, held_out_mm) in
+        [("m01-two-one-9999", 7, 0.01), ("f26d-one-zero", 8, 0.45), ("f26e-one-9999", 8, 0.45)]
+    {
+        let report = calibrated(&valid(case, &as_it_is)).report;
+        let lines: Vec<usize> = report.outliers.iter().map(|outlier| outlier.line).collect();
+        assert_eq!(lines, [line], "{case}");
+        let mean = report.held_out.expect("folds").after.mean_mm.expect("lengths");
+        assert!(mean < held_out_mm, "{case}: {mean}");
+        assert_eq!(report.verdict.r#use, Use::Yes, "{case}");
+    }
+}
+
+/// Directions that no row tells never fall: no number of rows reaches what is wanted.
+#[test]
+fn no_number_of_rows_tells_what_none_of_them_does() {
+    let more_rows = calibrated(&valid("f37-rows-claim-40", &as_it_is)).report.more_rows;
+    assert!(more_rows.rows_needed.is_none() && more_rows.untold_mm > more_rows.wanted_mm, "{more_rows:?}");
+    assert!(more_rows.said.contains("no number of rows like these"), "{}", more_rows.said);
+}
+
+/// Without noise there is no smallest scale at which some rows are explained and all others are outliers.
+#[test]
+fn exact_tables_of_small_robots_are_explained() {
+    for case in ["u09-limits-zero", "s02-wrist-9", "s02-cartpole-1"] {
+        // The limits of one case are none.
+        let moving = |_: &str, text: String| text.replace("lower=\"0\" upper=\"0\"", "lower=\"-2\" upper=\"2\"");
+        let report = calibrated(&valid(case, &moving)).report;
+        let mean = report.held_out.expect("folds").after.mean_mm.expect("lengths");
+        assert!(mean < 0.01 && report.outliers.is_empty(), "{case}: {mean} mm");
+    }
 }

@@ -3,12 +3,17 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    CalibrationError, Case, Chain, Choice, Comparison, Extra, Figures, Fit, Fold, HeldOut, Outlier, Progress, Reading,
-    Report, Residual, Split,
+    CalibrationError, Case, Chain, Choice, Comparison, Extra, Figures, Fit, Fold, HeldOut, Noise, Outlier, Progress,
+    Reading, Report, Residual, Split, Verdict,
     extras::TRIED,
     figures::{Sensed, Unit},
+    verdict::Grounds,
 };
-use crate::{doubts::few_folds, most::middle, selection::Optimality};
+use crate::{
+    doubts::{Doubt, DoubtKind, few_folds},
+    most::middle,
+    selection::Optimality,
+};
 
 /// What is asked beside the fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -133,8 +138,22 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     let share = if has_folds { 1.0 - 1.0 / splits.len() as f64 } else { 1.0 };
     let judged_by = held_out.as_ref().map(|held_out| (&held_out.after, share));
     let more_rows = case.more_rows(&fit, judged_by, &noise, examination.sigma_m);
-    let doubts = examination.doubts.iter().map(ToString::to_string);
-    let few = options.folds.and_then(|folds| few_folds(folds, splits.len(), case.rows.len()));
+    let mut doubts = examination.doubts;
+    doubts.extend(options.folds.and_then(|folds| few_folds(folds, splits.len(), case.rows.len())));
+    let outliers = case.outliers(&fit, unlearned.iter().map(|(row, _)| *row).collect());
+    let misfit = misfit(&noise, held_out.as_ref().map(|it| &it.after), outliers.len(), case.rows.len());
+    if let Some(misfit) = misfit.filter(|_| doubts.iter().all(|doubt| doubt.kind != DoubtKind::Misfit)) {
+        doubts.insert(0, misfit);
+    }
+    let unit = held_out.as_ref().map_or(comparison.after.unit(), |held_out| held_out.after.unit());
+    let grounds = Grounds {
+        doubts: &doubts,
+        held_out: held_out.as_ref(),
+        more_rows: &more_rows,
+        outliers: (outliers.len(), case.rows.len()),
+        unit,
+    };
+    let verdict = Verdict::of(&grounds);
     let report = Report {
         scenario: scenario.name.clone(),
         title: scenario.title.clone(),
@@ -147,15 +166,17 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         rows: case.rows.len(),
         training_rows: training.len(),
         held_out_by: case.held_out_by(&splits),
-        doubts: doubts.chain(few.map(|doubt| doubt.to_string())).chain(case.beyond_prior(&fit)).collect(),
+        doubts: doubts.iter().map(ToString::to_string).chain(case.beyond_prior(&fit)).collect(),
         parameters: case.determined(&fit),
+        verdict,
+        unit,
         training: comparison,
         held_out,
         sockets: if has_folds { Vec::new() } else { case.distances(&fit, &first.held_out) },
         span_1m_sd_mm: if case.meets_itself() { case.span_sd_mm(&fit) } else { None },
         extras: trials.clone(),
         compliance: case.compliance(&fuller),
-        outliers: case.outliers(&fit, unlearned.iter().map(|(row, _)| *row).collect()),
+        outliers,
         noise,
         reading_sigmas: fit.reading_sigmas.clone(),
         base: case.base(&fit),
@@ -170,6 +191,54 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     };
     let extras = trials.iter().find(|trial| trial.kept).map(|trial| trial.extras.clone()).unwrap_or_default();
     Ok(Calibration { report, nominal, fit, extras, fuller, folds: if has_folds { folds } else { Vec::new() } })
+}
+
+/// So many times the σ that is stated is no noise of that sensor.
+const NO_NOISE: f64 = 10.0;
+/// Nor is so many times what held-out rows are missed by an error that calibration leaves, with so many equations to spare.
+const NO_ERROR: f64 = 60.0;
+const ENOUGH: f64 = 60.0;
+/// Rows of which so large a share are outliers are none.
+const NO_OUTLIERS: f64 = 0.3;
+
+/// The doubt that the description explains the readings at all, calibrated.
+fn misfit(noise: &[Noise], held_out: Option<&Figures>, outliers: usize, rows: usize) -> Option<Doubt> {
+    let times = |noise: &Noise| noise.explaining_sigma.map_or(0.0, |sigma| sigma / noise.sigma);
+    let worst = noise.iter().max_by(|a, b| times(a).total_cmp(&times(b))).filter(|noise| times(noise) > NO_NOISE);
+    let evidence = match worst {
+        Some(worst) => {
+            format!(
+                "calibrated, it leaves {:.0} times as much of `{}` as the σ that is stated",
+                times(worst),
+                worst.sensor
+            )
+        }
+        None if outliers as f64 > NO_OUTLIERS * rows as f64 => {
+            format!("calibrated, it takes {outliers} of {rows} rows for outliers")
+        }
+        None => {
+            let rms = |unit: &str| {
+                held_out.and_then(|it| if unit == "px" { it.rms_px } else { it.rms_mm.map(|mm| mm / 1e3) })
+            };
+            let off = |noise: &Noise| rms(&noise.unit).map_or(0.0, |rms| rms / noise.sigma);
+            let is_off = |noise: &&Noise| noise.degrees > ENOUGH && matches!(noise.unit.as_str(), "m" | "px");
+            let worst = noise.iter().filter(is_off).find(|noise| off(noise) > NO_ERROR)?;
+            format!(
+                "calibrated, it misses rows of `{}` that it has not seen by {:.0} times the σ that is stated",
+                worst.sensor,
+                off(worst)
+            )
+        }
+    };
+    Some(Doubt {
+        kind: DoubtKind::Misfit,
+        column: None,
+        lines: Vec::new(),
+        what: "the description does not fit these rows".to_owned(),
+        evidence,
+        mend: "is this the robot, is its target on the link that is named and as large as is said, and is σ what it should be?"
+            .to_owned(),
+    })
 }
 
 impl Case<'_> {

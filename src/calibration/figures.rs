@@ -116,13 +116,16 @@ impl Figures {
 
 /// The one unit in which the errors of a table are compared: that of lengths where any was measured, else of pictures, else of
 /// rotations. Readings that have none of it do not count then.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Unit {
     /// mm.
+    #[serde(rename = "mm")]
     Millimetres,
     /// px.
+    #[serde(rename = "px")]
     Pixels,
     /// deg.
+    #[serde(rename = "deg")]
     Degrees,
 }
 

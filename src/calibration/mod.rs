@@ -49,6 +49,7 @@ pub mod report;
 mod span;
 mod split;
 mod undetermined;
+mod verdict;
 
 pub use active::{ActivePoint, ORDERS};
 pub use calibrate::{Calibration, Options, calibrate};
@@ -62,3 +63,4 @@ pub use init::{Begun, InitError, Sources, begin};
 pub use outcome::*;
 pub use progress::{Progress, Silent};
 pub use split::Split;
+pub use verdict::{Use, Verdict};

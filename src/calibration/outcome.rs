@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{ActivePoint, Figures, SocketDistance, Trial, Unit};
+use super::{ActivePoint, Figures, SocketDistance, Trial, Unit, Verdict};
 
 /// Everything that a report says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,6 +25,10 @@ pub struct Report {
     pub doubts: Vec<String>,
     /// What was learned.
     pub parameters: Parameters,
+    /// Whether what was learned is to be used.
+    pub verdict: Verdict,
+    /// The unit in which errors are compared; also that of `active` and `learning`, whatever their names say.
+    pub unit: Unit,
     /// Errors on the rows that were learned from.
     pub training: Comparison,
     /// Errors on rows that were not; null where none are held out.
@@ -63,13 +67,6 @@ pub struct Report {
     pub learning: Vec<ActivePoint>,
     /// Every reading.
     pub residuals: Vec<Reading>,
-}
-
-impl Report {
-    /// The unit in which its errors are compared.
-    pub fn unit(&self) -> Unit {
-        self.training.after.unit()
-    }
 }
 
 /// Which links of which description.

@@ -124,11 +124,15 @@ fn write(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<Path
 }
 
 fn summarise(report: &Report) -> Result<()> {
+    output::say(report.verdict.said(if report.chain.is_some() { "calibrated.urdf" } else { "these axes" }))?;
+    if report.joints.iter().any(|joint| joint.offset.is_some()) {
+        output::say("the learned offsets are in calibrated.urdf already: add them to no reading of the robot as well")?;
+    }
     output::say(format!(
         "{}: {} rows, {} learned from; held out: {}",
         report.scenario, report.rows, report.training_rows, report.held_out_by
     ))?;
-    let (unit, mut rows) = (report.unit(), Vec::new());
+    let (unit, mut rows) = (report.unit, Vec::new());
     if let Some(held_out) = &report.held_out {
         rows.push(line("held out, as described", &held_out.before, unit));
         rows.push(line("held out, calibrated", &held_out.after, unit));

@@ -92,11 +92,11 @@ pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &s
         let described = described.get(&row).map_or(&[][..], Vec::as_slice);
         let readings = readings.get(&row).map_or(&[][..], Vec::as_slice);
         scene.log(&mut rows, row, case, &mut uncertainty, (described, readings));
-        log_residuals(&mut rows, row, found.report.unit(), described, readings);
+        log_residuals(&mut rows, row, found.report.unit, described, readings);
     }
     let mut file = RrdFile::create(path)?;
     file.append(&[message::store_info(&store)])?;
-    file.append(&arrangement(&scene.stage, application, found.report.unit())?)?;
+    file.append(&arrangement(&scene.stage, application, found.report.unit)?)?;
     let messages: Vec<_> =
         rows.steps(|_| true)?.iter().map(|chunk| message::data(&store, chunk)).collect::<Result<_, _>>()?;
     file.append(&messages)?;

@@ -53,7 +53,7 @@ pub(super) fn sentence(said: &str) -> String {
 }
 
 fn headline(document: &mut Document, report: &Report, case: &Case<'_>) {
-    let unit = report.unit();
+    let unit = report.unit;
     let means = report.held_out.as_ref().map(|held_out| (held_out.before.mean(), held_out.after.mean()));
     let said = match means {
         Some((Some(before), Some(after))) => {
@@ -79,7 +79,9 @@ fn headline(document: &mut Document, report: &Report, case: &Case<'_>) {
                 .to_owned()
         }
     };
-    document.parts.push(Part::Lead(said));
+    let of = if case.described.is_some() { "calibrated.urdf" } else { "these axes" };
+    document.parts.push(Part::Lead(sentence(&report.verdict.said(of))));
+    document.text(said);
     document.text(format!(
         "The table has {} rows; the calibrated model is learned from {} of them. Held out: {}. As described means the chain as the file has it, with base, targets, \
          cameras and sockets fitted to the same rows: what can be reached without touching the description. Errors are the \
@@ -283,7 +285,7 @@ fn by_number(document: &mut Document, report: &Report) {
     if points.is_empty() {
         return;
     }
-    let unit = report.unit();
+    let unit = report.unit;
     let step = points.len().div_ceil(SHOWN);
     let shown = points.iter().enumerate().filter(|(index, _)| (points.len() - 1 - index).is_multiple_of(step));
     let row = |(_, point): (usize, &crate::calibration::ActivePoint)| {
@@ -302,7 +304,7 @@ fn folds(document: &mut Document, report: &Report) {
         return;
     };
     document.heading("Fold by fold");
-    let unit = report.unit();
+    let unit = report.unit;
     let row = |fold: &crate::calibration::Fold| {
         let mean = |figures: &Figures| number(figures.mean());
         let figures = [&fold.before, &fold.after, &fold.full_model].map(mean);
@@ -311,6 +313,21 @@ fn folds(document: &mut Document, report: &Report) {
     };
     let described = format!("as described ({unit})");
     document.table(0, ["fold", "rows held out", &described, "calibrated", "fuller model"], folds.iter().map(row));
+}
+
+/// What calibrated.urdf holds.
+fn origins(report: &Report) -> String {
+    let about = if report.joints.iter().any(|joint| joint.offset.is_some()) {
+        "The learned offsets of readings are in these origins already: frames are turned or shifted by them along and about their axes, \
+         and whoever adds them to the readings of the robot as well counts them twice. Frames of all other joints stay where they were \
+         along and about their axes."
+    } else {
+        "Frames stay where they were along and about their axes."
+    };
+    format!(
+        "calibrated.urdf: the description, byte for byte, with other origins of the learned joints. {about} Limits stay in the readings \
+         of old."
+    )
 }
 
 fn written(document: &mut Document, report: &Report, case: &Case<'_>) {
@@ -323,9 +340,7 @@ fn written(document: &mut Document, report: &Report, case: &Case<'_>) {
         return;
     }
     let mut said = vec![
-        "calibrated.urdf: the description, byte for byte, with other origins of the learned joints. Frames stay where they \
-         were along and about their axes. Limits stay in the readings of old."
-            .to_owned(),
+        origins(report),
         "kinematics.yaml: the same origins, as descriptions made by xacro take them.".to_owned(),
         "readings.yaml: the fuller model, with axes of its own.".to_owned(),
         "report.json: every number of this report, and every reading.".to_owned(),
@@ -341,7 +356,7 @@ fn written(document: &mut Document, report: &Report, case: &Case<'_>) {
 
 fn readings(document: &mut Document, report: &Report) {
     document.heading("Readings");
-    let unit = report.unit();
+    let unit = report.unit;
     let error_of = |reading: &Reading| unit.of_reading(reading).unwrap_or(0.0);
     let mut shown: Vec<&Reading> = report.residuals.iter().collect();
     if shown.len() > LISTED {

@@ -21,7 +21,7 @@ pub(super) fn write(document: &mut Document, report: &Report) {
          the standard error of the difference. Rows that are held out decide nothing. {}",
         if kept { "What stays is in readings.yaml, with axes of its own." } else { "Nothing stays." }
     ));
-    let unit = report.unit();
+    let unit = report.unit;
     let row = |trial: &Trial| {
         let name = listed(trial.extras.iter().map(|extra: &Extra| extra.name().to_owned()).collect());
         [

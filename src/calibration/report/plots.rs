@@ -16,7 +16,7 @@ pub fn plots(report: &Report) -> Vec<Part> {
 }
 
 fn residuals(report: &Report) -> Option<Part> {
-    let unit = report.unit();
+    let unit = report.unit;
     let panels: Vec<Panel> = [by_row(report, unit), by_number(report, unit)].into_iter().flatten().collect();
     if panels.is_empty() {
         return None;
