@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    CalibrationError, Case, Chain, Choice, Comparison, Extra, Figures, Fit, Fold, HeldOut, Noise, Outlier, Progress,
-    Reading, Report, Residual, Split, Verdict,
+    CalibrationError, Case, Chain, Choice, Comparison, Coverage, Extra, Figures, Fit, Fold, HeldOut, Noise, Outlier,
+    Progress, Reading, Report, Residual, Split, Verdict,
     extras::TRIED,
     figures::{Sensed, Unit},
     verdict::Grounds,
@@ -48,6 +48,8 @@ struct Judged {
     fuller: Vec<Residual>,
     /// By what is tried.
     tried: Vec<Vec<Residual>>,
+    /// By reading: its row, and whether it lies within what is stated.
+    covered: Vec<(usize, bool)>,
 }
 
 /// Calibrates a case.
@@ -145,6 +147,10 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     if let Some(misfit) = misfit.filter(|_| doubts.iter().all(|doubt| doubt.kind != DoubtKind::Misfit)) {
         doubts.insert(0, misfit);
     }
+    let stray_rows: BTreeSet<usize> = strays.iter().map(|(row, _)| *row).collect();
+    let covered: Vec<(usize, bool)> =
+        judged.iter().flat_map(|it| &it.covered).filter(|(row, _)| !stray_rows.contains(row)).copied().collect();
+    let coverage = Coverage::of(&covered);
     let unit = held_out.as_ref().map_or(comparison.after.unit(), |held_out| held_out.after.unit());
     let grounds = Grounds {
         doubts: &doubts,
@@ -166,9 +172,13 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         rows: case.rows.len(),
         training_rows: training.len(),
         held_out_by: case.held_out_by(&splits),
-        doubts: doubts.iter().map(ToString::to_string).chain(case.beyond_prior(&fit)).collect(),
+        doubts: (doubts.iter().map(ToString::to_string))
+            .chain(coverage.as_ref().and_then(Coverage::warning))
+            .chain(case.beyond_prior(&fit))
+            .collect(),
         parameters: case.determined(&fit),
         verdict,
+        coverage,
         unit,
         training: comparison,
         held_out,
@@ -249,7 +259,8 @@ impl Case<'_> {
             Ok(judged(&fit))
         });
         let tried = tried.collect::<Result<_, CalibrationError>>()?;
-        Ok(Judged { before: judged(nominal), after: judged(fit), fuller: judged(fuller), tried })
+        let covered = self.covered(fit, &split.held_out);
+        Ok(Judged { before: judged(nominal), after: judged(fit), fuller: judged(fuller), tried, covered })
     }
 
     fn folds(

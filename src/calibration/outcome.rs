@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{ActivePoint, Figures, SocketDistance, Trial, Unit, Verdict};
+use super::{ActivePoint, Coverage, Figures, SocketDistance, Trial, Unit, Verdict};
 
 /// Everything that a report says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,6 +33,8 @@ pub struct Report {
     pub training: Comparison,
     /// Errors on rows that were not; null where none are held out.
     pub held_out: Option<HeldOut>,
+    /// What share of the held-out readings lies within what is stated for them; null where too few are held out, and of sockets.
+    pub coverage: Option<Coverage>,
     /// With sockets: how far the two of every place are apart that nothing was learned from; empty otherwise.
     pub sockets: Vec<SocketDistance>,
     /// With sockets: the standard deviation of a span of 1 m of the calibrated robot, the scale that a scatter is blind to,

@@ -12,7 +12,7 @@ use body_schema::{
 };
 use indicatif::ProgressBar;
 
-use super::{load_scenario, output, progress};
+use super::{BadInput, load_scenario, output, progress};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -72,17 +72,19 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
     for doubt in &doubts {
         eprintln!("warning: {doubt}");
     }
-    let bars = Bars::default();
-    let options = Options { folds: arguments.folds, active: arguments.active };
-    let found = calibration::calibrate(&case, &options, &bars);
-    bars.finish();
-    let found = found?;
     let to_stdout = arguments.json.as_deref().is_some_and(output::is_stdout);
     let folder = match &arguments.out {
         Some(folder) => Some(folder.clone()),
         None if to_stdout => None,
         None => Some(PathBuf::from(format!("{}-calibration", scenario.name))),
     };
+    // Before anybody waits for what cannot be written.
+    folder.as_deref().map_or(Ok(()), refuse_other)?;
+    let bars = Bars::default();
+    let options = Options { folds: arguments.folds, active: arguments.active };
+    let found = calibration::calibrate(&case, &options, &bars);
+    bars.finish();
+    let found = found?;
     let mut written = Vec::new();
     if let Some(folder) = &folder {
         written = write(folder, &found, &case)?;
@@ -100,8 +102,81 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Writes all files below a folder, and tells those that lie in it.
+/// Writes all files into a folder, and tells those that lie in it. They are written aside, and the folder of an earlier calibration is
+/// exchanged for them, so that nothing of it is left, and nothing is lost where writing fails.
 fn write(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<PathBuf>> {
+    refuse_other(folder)?;
+    let name = folder
+        .file_name()
+        .with_context(|| format!("{} is no name for a folder; name one with --out", folder.display()))?;
+    let beside = |end: &str| {
+        let mut hidden = std::ffi::OsString::from(".");
+        hidden.push(name);
+        hidden.push(format!(".{end}-{}", std::process::id()));
+        folder.with_file_name(hidden)
+    };
+    let (aside, before) = (beside("new"), beside("old"));
+    let written = write_into(&aside, found, case).and_then(|told| {
+        let exchange = || -> std::io::Result<()> {
+            let is_there = folder.exists();
+            if is_there {
+                std::fs::rename(folder, &before)?;
+            }
+            if let Err(error) = std::fs::rename(&aside, folder) {
+                if is_there {
+                    std::fs::rename(&before, folder)?;
+                }
+                return Err(error);
+            }
+            if is_there { std::fs::remove_dir_all(&before) } else { Ok(()) }
+        };
+        exchange().with_context(|| {
+            format!("cannot write {}; name a folder that may be written to with --out", folder.display())
+        })?;
+        Ok(told.into_iter().map(|file| folder.join(file)).collect())
+    });
+    if written.is_err() {
+        // What was written aside is of no use; that it cannot be removed is no reason to say something else.
+        let _ = std::fs::remove_dir_all(&aside);
+    }
+    written
+}
+
+/// Whether a name is that of a file that a calibration writes.
+fn is_ours(name: &str) -> bool {
+    const OURS: [&str; 7] = [
+        "calibrated.urdf",
+        "kinematics.yaml",
+        "readings.yaml",
+        "report.json",
+        "report.md",
+        "report.html",
+        "calibration.rrd",
+    ];
+    OURS.contains(&name) || name == "folds" || name.ends_with(".svg")
+}
+
+/// Refuses a folder that holds what no calibration wrote.
+fn refuse_other(folder: &Path) -> Result<()> {
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return match folder.exists() {
+            true => Err(BadInput(format!("{} is no folder; name another with --out", folder.display())).into()),
+            false => Ok(()),
+        };
+    };
+    let names = entries.filter_map(|entry| Some(entry.ok()?.file_name().to_string_lossy().into_owned()));
+    match names.into_iter().find(|name| !is_ours(name)) {
+        Some(other) => Err(BadInput(format!(
+            "{} holds `{other}`, which no calibration wrote: it would be lost; name another folder with --out",
+            folder.display()
+        ))
+        .into()),
+        None => Ok(()),
+    }
+}
+
+/// Writes all files below a folder, and tells the names of those that lie in it.
+fn write_into(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<String>> {
     let mut told = Vec::new();
     for File { path, text } in found.files(case)?.into_iter().chain(report::files(found, case)) {
         let place = folder.join(&path);
@@ -113,13 +188,12 @@ fn write(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<Path
             format!("cannot write {}; name a folder that may be written to with --out", place.display())
         })?;
         if !path.contains('/') && !path.ends_with(".svg") {
-            told.push(place);
+            told.push(path);
         }
     }
     let markdown = report::markdown(found, case);
-    let recording = folder.join("calibration.rrd");
-    recording::calibration(&recording, found, case, &markdown)?;
-    told.push(recording);
+    recording::calibration(&folder.join("calibration.rrd"), found, case, &markdown)?;
+    told.push("calibration.rrd".to_owned());
     Ok(told)
 }
 

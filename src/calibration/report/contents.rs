@@ -4,7 +4,7 @@ use super::{
     document::{Document, Part},
     extras, plots,
 };
-use crate::calibration::{Case, Figures, Placement, Reading, Report, SocketDistance, Unit};
+use crate::calibration::{Case, Coverage, Figures, Placement, Reading, Report, SocketDistance, Unit};
 
 /// Readings listed at most; of more the worst.
 const LISTED: usize = 200;
@@ -24,6 +24,7 @@ pub fn document(report: &Report, case: &Case<'_>) -> Document {
     document.parts.extend(drawings.next());
     outliers(&mut document, report);
     noise(&mut document, report);
+    document.parts.extend(report.coverage.as_ref().map(|it| Part::Text(covered(it))));
     document.heading("What was learned");
     placements(&mut document, report, case);
     corrections(&mut document, report, case);
@@ -107,6 +108,18 @@ fn headline(document: &mut Document, report: &Report, case: &Case<'_>) {
         document.table(1, ["place", "predicted (mm)", "known (mm)"], report.sockets.iter().map(row));
     }
     document.parts.extend(report.span_1m_sd_mm.map(|sd_mm| Part::Text(span(sd_mm))));
+}
+
+fn covered(coverage: &Coverage) -> String {
+    let percent = |share: f64| format!("{:.0}\u{a0}%", 100.0 * share);
+    format!(
+        "Of {} held-out readings {} lie within the 95\u{a0}% that are stated for them, by the noise and the uncertainty of what was learned \
+         ({} to {}, 95\u{a0}% interval, clustered by posture).",
+        coverage.readings,
+        percent(coverage.share),
+        percent(coverage.low),
+        percent(coverage.high)
+    )
 }
 
 fn span(sd_mm: f64) -> String {
