@@ -207,6 +207,25 @@ fn a_calibration_writes_its_report() {
     assert!(!out.join("calibrated.urdf").exists() && html.contains("so none is written"));
 }
 
+/// A calibration that is done again leaves nothing of the one before, and takes no folder that holds anything else.
+#[test]
+fn a_folder_is_exchanged_as_a_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let path = out.to_str().expect("text");
+    done(&["calibrate", "positioner", "--folds", "3", "--out", path]);
+    assert!(out.join("folds/0/calibrated.urdf").exists());
+    let said = done(&["calibrate", "positioner", "--out", path]);
+    assert!(said.starts_with("use calibrated.urdf: yes, because on rows that it has not seen"), "{said}");
+    let folds = std::fs::read_dir(out.join("folds")).map_or(0, Iterator::count);
+    assert!(out.join("calibrated.urdf").exists() && folds != 3, "{folds} folds");
+    assert_eq!(std::fs::read_dir(folder.path()).expect("readable").count(), 1, "nothing is left beside it");
+    std::fs::write(out.join("notes.txt"), "mine").expect("written");
+    let (code, error) = failure(&["calibrate", "positioner", "--out", path]);
+    assert!(code == 2 && error.contains("holds `notes.txt`, which no calibration wrote"), "{code} {error}");
+    assert_eq!(std::fs::read_to_string(out.join("notes.txt")).expect("there"), "mine");
+}
+
 #[test]
 fn with_json_on_standard_output_there_is_nothing_else() {
     let folder = tempfile::tempdir().expect("a folder");
