@@ -48,7 +48,7 @@ impl Verdict {
         let answer = |r#use: Use, because: String| Self { r#use, because };
         if let Some(doubt) = doubts.iter().find(|doubt| is_grave(doubt.kind)) {
             let column = doubt.column.as_ref().map(|column| format!("`{column}`: ")).unwrap_or_default();
-            return answer(Use::No, format!("look into this first: {column}{}", doubt.what));
+            return answer(Use::No, format!("of a doubt that is to be looked into first: {column}{}", doubt.what));
         }
         let means = held_out.map(|it| (it.before.told(*unit)[0], it.after.told(*unit)[0]));
         let Some((Some(before), Some(after))) = means else {
@@ -152,7 +152,7 @@ mod tests {
         let reversed = verdict(5.0, 0.5, 0.1, &[doubt(DoubtKind::Sign)]);
         assert_eq!(
             reversed.said("calibrated.urdf"),
-            "use calibrated.urdf: no, because look into this first: `elbow`: its sign is reversed"
+            "use calibrated.urdf: no, because of a doubt that is to be looked into first: `elbow`: its sign is reversed"
         );
         assert_eq!(verdict(5.0, 0.5, 0.1, &[doubt(DoubtKind::Limits)]).r#use, Use::Yes);
     }
