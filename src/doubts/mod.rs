@@ -18,6 +18,7 @@ mod description;
 mod doubt;
 mod fit;
 mod hypotheses;
+mod hypothesis;
 mod postures;
 mod repeats;
 
