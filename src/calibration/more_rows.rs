@@ -12,7 +12,7 @@
 //! the σ that the sensor's maker promises, which may as well be noise unless the same posture was measured again and tells; and what
 //! held-out rows are off beyond all that is expected.
 
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::Cholesky;
 
 use super::{Case, Figures, Fit, MoreRows, Noise};
 use crate::model::Workspace;
@@ -121,13 +121,7 @@ impl Case<'_> {
     fn falls(&self, fit: &Fit, workspace: &Workspace) -> Option<Falls> {
         let belief = &fit.belief;
         let factor = Cholesky::new(belief.covariance.clone()?)?.l();
-        let m = belief.layout.dimension();
-        let mut information = DMatrix::zeros(m, m);
-        for row in fit.rows.iter().map(|row| &self.rows[*row]) {
-            let rows = belief.rig.equations_of(&belief.state, &belief.layout, &row.positions, &row.observation).rows;
-            information += &rows * rows.transpose();
-        }
-        let eigen = (factor.transpose() * information * &factor).symmetric_eigen();
+        let eigen = (factor.transpose() * self.information(fit) * &factor).symmetric_eigen();
         let moved = workspace.jacobian(&belief.state, &belief.layout) * factor * eigen.eigenvectors;
         let squares: Vec<f64> = moved.column_iter().map(|column| column.norm_squared()).collect();
         let total: f64 = squares.iter().sum();

@@ -26,6 +26,11 @@ impl Case<'_> {
 
     /// An orthonormal basis of what no row tells (m × k).
     fn undetermined(&self, fit: &Fit) -> DMatrix<f64> {
+        null_space(&self.information(fit))
+    }
+
+    /// What the rows of a fit tell of its parameters, without the prior (m × m).
+    pub(super) fn information(&self, fit: &Fit) -> DMatrix<f64> {
         let belief = &fit.belief;
         let m = belief.layout.dimension();
         let mut information = DMatrix::zeros(m, m);
@@ -33,7 +38,7 @@ impl Case<'_> {
             let rows = belief.rig.equations_of(&belief.state, &belief.layout, &row.positions, &row.observation).rows;
             information += &rows * rows.transpose();
         }
-        null_space(&information)
+        information
     }
 
     /// Blocks of which every coordinate is known hardly better than before.

@@ -434,20 +434,11 @@ impl<'a> Readings<'a> {
     /// The doubt that the base is where the file says.
     fn elsewhere(&self, standing: &Judged) -> Option<Doubt> {
         let base = self.subject.base?;
-        let taken = self.taken();
-        let (Sight::Target(seen), Some((placed, rows))) = (&taken.sight, &standing.fit.placed) else { return None };
+        let (placed, _) = standing.fit.placed.as_ref()?;
         let free = standing.explained.as_ref()?;
-        let configurations: Vec<Vec<f64>> = rows.iter().map(|row| taken.configurations[*row].clone()).collect();
-        let subject = Subject { sigma_m: self.subject.sigma_m * self.size, ..self.subject };
-        let known = explain(
-            &subject,
-            &configurations,
-            &seen.of(rows),
-            *placed,
-            Known { base: Some(&base), ..Known::DESCRIBED },
-        )?;
-        let counted = self.subject.counted(rows.len() * 3);
-        let odds = free.log_evidence - known.log_evidence - counted * self.size.abs().ln();
+        let said = Known { base: Some(&base), ..Known::DESCRIBED };
+        let known = self.taken().explained(&standing.fit, None, said)?;
+        let odds = free.log_evidence - known.log_evidence;
         let is_better = free.rms.max(self.subject.sigma_m) < CONVINCING * known.rms;
         if odds < TOLD || !is_better {
             return None;

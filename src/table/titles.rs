@@ -9,6 +9,7 @@ use super::{
     names::{NAME, split},
 };
 use crate::{
+    kinematics::JointKind,
     magnitude::{is_usable, what_is_wrong},
     similar::similar,
 };
@@ -27,6 +28,14 @@ pub enum Quantity {
 }
 
 impl Quantity {
+    /// What the readings of a joint measure.
+    pub(crate) fn of(kind: JointKind) -> Self {
+        match kind {
+            JointKind::Revolute => Self::Angle,
+            JointKind::Prismatic => Self::Length,
+        }
+    }
+
     fn called(self) -> &'static str {
         match self {
             Self::Angle => "an angle",

@@ -51,10 +51,7 @@ fn find(titles: &[String], of: &Title<'_>, component: Component) -> Option<Strin
 
 /// The column of a joint: that with its name alone, or else with a unit of its kind behind it.
 pub fn of_joint<'t>(titles: &'t [String], joint: &str, kind: JointKind) -> Option<&'t String> {
-    let quantity = match kind {
-        JointKind::Revolute => Quantity::Angle,
-        JointKind::Prismatic => Quantity::Length,
-    };
+    let quantity = Quantity::of(kind);
     let exact = titles.iter().find(|title| *title == joint);
     exact.or_else(|| titles.iter().find(|title| split(title).0 == joint && quantity.is_in(title)))
 }

@@ -163,15 +163,11 @@ enum JointColumn {
 impl JointColumn {
     /// The column; of several that a joint's name fits that which no sensor `taken` has.
     fn find(&self, titles: &Titles, taken: &[&String]) -> Result<Column, TableError> {
-        let quantity = |kind: &JointKind| match kind {
-            JointKind::Revolute => Quantity::Angle,
-            JointKind::Prismatic => Quantity::Length,
-        };
         match self {
-            Self::Titled(title, kind) => titles.titled(title, quantity(kind)),
+            Self::Titled(title, kind) => titles.titled(title, Quantity::of(*kind)),
             Self::Named(name, kind) => {
-                let found = titles.find(name, quantity(kind));
-                found.or_else(|error| titles.besides(taken).find(name, quantity(kind)).map_err(|_| error))
+                let found = titles.find(name, Quantity::of(*kind));
+                found.or_else(|error| titles.besides(taken).find(name, Quantity::of(*kind)).map_err(|_| error))
             }
         }
     }
