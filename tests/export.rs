@@ -126,7 +126,7 @@ fn what_cannot_be_exported_is_said_before_anything_runs() {
         (&new, &["arm-6dof", "--learner", "clever"], &["`clever`"]),
         (&new, &["arm-6dof", "--learner", "human"], &["a person chooses", "body-schema serve"]),
         (&new, &["arm-6dof", "--steps", "0"], &["1 to 1000 steps"]),
-        (&new, &["tiago-mocap", "--steps", "28"], &["`tiago-mocap`", "--steps 27"]),
+        (&new, &["tiago-mocap", "--steps", "38"], &["`tiago-mocap`", "--steps 37"]),
         (&new, &["arm-6dof", "--seed", "5..1"], &["write 1..5"]),
         (&new, &["arm-6dof", "--address", "example.org"], &["https://example.org/demo/"]),
     ];

@@ -329,7 +329,7 @@ fn a_ball_in_two_sockets_calibrates_a_panda_and_a_kinova() {
 
 #[test]
 fn held_out_error_falls_on_every_robot_that_ships() {
-    for (name, most) in [("tiago-mocap-3", 3.05), ("talos-contact", 1.0), ("ur10-camera", 6.0), ("positioner", 1.0)] {
+    for (name, most) in [("tiago-mocap-3", 2.6), ("talos-contact", 1.0), ("ur10-camera", 6.0), ("positioner", 1.0)] {
         let [learned, nominal] = held_out(name, |metrics| metrics.prediction_mean_m);
         assert!(learned <= most && learned < nominal, "{name}: {learned} of {nominal} mm");
     }
@@ -339,7 +339,7 @@ fn held_out_error_falls_on_every_robot_that_ships() {
 fn tables_that_ship_are_doubted_where_they_are_doubtful() {
     let doubted: BTreeMap<&str, &[&str]> = BTreeMap::from([
         ("tiago-mocap", &[] as &[&str]),
-        ("tiago-mocap-3", &["x4, y4, z4"]),
+        ("tiago-mocap-3", &[]),
         ("talos-contact", &[]),
         ("ur10-camera", &[]),
         ("positioner", &[]),

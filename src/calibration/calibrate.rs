@@ -160,6 +160,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         unit,
     };
     let verdict = Verdict::of(&grounds);
+    let shown = case.in_gauge(&fit);
     let report = Report {
         scenario: scenario.name.clone(),
         title: scenario.title.clone(),
@@ -189,10 +190,10 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         outliers,
         noise,
         reading_sigmas: fit.reading_sigmas.clone(),
-        base: case.base(&fit),
-        targets: case.targets(&fit)?,
-        joints: case.joints(&fit),
-        correlations: case.correlations(&fit),
+        base: case.base(&shown),
+        targets: case.targets(&shown)?,
+        joints: case.joints(&shown),
+        correlations: case.correlations(&shown),
         more_rows,
         residuals: case.readings(&fit, &splits, &judged, selection.as_ref()),
         selection,
@@ -271,14 +272,15 @@ impl Case<'_> {
         figures: &dyn Fn(&mut dyn Iterator<Item = &Residual>) -> Figures,
     ) -> Result<Vec<Fold>, CalibrationError> {
         let of = |(fold, ((split, fit), judged)): (usize, ((&Split, &Fit), &Judged))| {
+            let shown = self.in_gauge(fit);
             Ok(Fold {
                 fold,
                 rows: split.held_out.iter().map(|row| row + 1).collect(),
                 before: figures(&mut judged.before.iter()),
                 after: figures(&mut judged.after.iter()),
                 full_model: figures(&mut judged.fuller.iter()),
-                base: self.base(fit),
-                targets: self.targets(fit)?,
+                base: self.base(&shown),
+                targets: self.targets(&shown)?,
             })
         };
         splits.iter().zip(fits).zip(judged).enumerate().map(of).collect()
@@ -416,15 +418,15 @@ mod tests {
         let Calibration { report, folds, .. } = calibrate(&case, &options, &Silent).expect("calibrated");
         let held_out = report.held_out.expect("folds");
         let mean = |figures: &Figures| figures.mean_mm.expect("lengths");
-        assert!((3.9..4.5).contains(&mean(&held_out.before)), "{held_out:?}");
-        assert!(mean(&held_out.after) < 3.1, "{held_out:?}");
+        assert!((2.9..3.5).contains(&mean(&held_out.before)), "{held_out:?}");
+        assert!(mean(&held_out.after) < 2.2, "{held_out:?}");
         assert!(mean(&report.training.after) < mean(&report.training.before));
-        assert_eq!((folds.len(), held_out.folds.len(), held_out.after.readings), (5, 5, 34));
+        assert_eq!((folds.len(), held_out.folds.len(), held_out.after.readings), (5, 5, 96));
         let rows: Vec<usize> = report.residuals.iter().map(|reading| reading.row).collect();
-        assert_eq!(rows, (1..=34).collect::<Vec<_>>());
+        assert_eq!(rows, (1..=96).collect::<Vec<_>>());
         // Means of folds are the mean of all.
         let sum: f64 = held_out.folds.iter().map(|fold| mean(&fold.after) * fold.after.readings as f64).sum();
-        assert!((sum / 34.0 - mean(&held_out.after)).abs() < 1e-9);
+        assert!((sum / 96.0 - mean(&held_out.after)).abs() < 1e-9);
     }
 
     /// What rows that are held out say changes nothing that is learned.
@@ -465,9 +467,9 @@ mod tests {
         let scenario = tiago();
         let case = Case::new(&scenario).expect("measured");
         let refused = |folds, active| calibrate(&case, &Options { folds, active }, &Silent).expect_err("refused");
-        assert_eq!(refused(Some(1), None), CalibrationError::Folds { folds: 1, rows: 34 });
-        assert_eq!(refused(Some(35), None), CalibrationError::Folds { folds: 35, rows: 34 });
-        assert_eq!(refused(None, Some(28)), CalibrationError::Active { asked: 28, rows: 27 });
+        assert_eq!(refused(Some(1), None), CalibrationError::Folds { folds: 1, rows: 96 });
+        assert_eq!(refused(Some(97), None), CalibrationError::Folds { folds: 97, rows: 96 });
+        assert_eq!(refused(None, Some(38)), CalibrationError::Active { asked: 38, rows: 37 });
         let simulated = builtin("arm-6dof").expect("built in");
         assert!(matches!(Case::new(&simulated), Err(CalibrationError::Simulated { .. })));
     }

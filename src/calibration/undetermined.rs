@@ -4,10 +4,13 @@
 //! greatest are told by no row: the estimate stays there where the description has it. Beside these stand parameters that the
 //! rows tell so little of that their deviation has hardly fallen from the prior's.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 
 use super::{Case, Fit, Parameters};
-use crate::model::{Block, listed, null_space};
+use crate::{
+    kinematics::Joint,
+    model::{Block, Layout, Place, State, listed, null_space},
+};
 
 /// The share of a parameter that undetermined directions must hold for it to be named.
 const NAMED: f64 = 0.05;
@@ -19,14 +22,85 @@ impl Case<'_> {
     pub(super) fn determined(&self, fit: &Fit) -> Parameters {
         let layout = &*fit.belief.layout;
         let free = self.undetermined(fit);
-        let untold = self.names.untold(layout, &free, "these rows");
-        let undetermined = untold.into_iter().chain(self.hardly(fit, &free)).collect();
+        let (mut undetermined, left) = self.meanings(fit.state(), layout, &free);
+        undetermined.extend(self.names.untold(layout, &left, "these rows"));
+        undetermined.extend(self.hardly(fit, &free));
         Parameters { learned: layout.dimension(), rank: layout.dimension() - free.ncols(), undetermined }
+    }
+
+    /// The same fit with the covariance of what is written down: what no row tells is as the file has it, and has no deviation.
+    pub(super) fn in_gauge(&self, fit: &Fit) -> Fit {
+        let free = self.undetermined(fit);
+        let mut shown = fit.clone();
+        let fixed = || {
+            let covariance = fit.belief.covariance.as_ref().filter(|_| free.ncols() > 0)?;
+            let weighed = free.tr_mul(&covariance.clone().cholesky()?.solve(&free));
+            Some(covariance - &free * weighed.cholesky()?.inverse() * free.transpose())
+        };
+        if let Some(covariance) = fixed() {
+            shown.belief.covariance = Some(covariance);
+        }
+        shown
+    }
+
+    /// What directions among `free` (m × k, orthonormal) mean, in words, and those of which the meaning is not known.
+    fn meanings(&self, state: &State, layout: &Layout, free: &DMatrix<f64>) -> (Vec<String>, DMatrix<f64>) {
+        let (mut said, mut left) = (Vec::new(), free.clone());
+        let mut take = |moved: Vec<State>| {
+            let before = left.ncols();
+            for other in moved {
+                let Some(direction) = state.local(layout, &other).and_then(|it| it.try_normalize(0.0)) else {
+                    continue;
+                };
+                let within = &left * left.tr_mul(&direction);
+                if (&direction - &within).norm() < ALIKE {
+                    left = without(&left, &within);
+                }
+            }
+            before - left.ncols()
+        };
+        let joints = &self.names.joints;
+        let base = if layout.block(Block::Base).is_some() { moved_with_base(state) } else { Vec::new() };
+        match (take(base), joints.first()) {
+            (0, _) | (_, None) => {}
+            (count, Some(first)) => said.push(format!(
+                "where the base stands cannot be separated from where {first} and all that it carries are on it: {} no reading",
+                together(count)
+            )),
+        }
+        let mut turned = |joint: usize| take(vec![moved_behind(state, joint)]) > 0;
+        let zeros: Vec<usize> = (0..joints.len()).filter(|j| layout.block(Block::Offset(*j)).is_some()).collect();
+        let zeros: Vec<String> = zeros.into_iter().filter(|joint| turned(*joint)).map(|j| joints[j].clone()).collect();
+        match zeros.len() {
+            0 => {}
+            1 => said.push(format!(
+                "the zero of {} cannot be separated from where the axes and targets behind it are",
+                listed(zeros)
+            )),
+            _ => said.push(format!(
+                "the zeros of {} cannot be separated from where the axes and targets behind each are",
+                listed(zeros)
+            )),
+        }
+        if take(vec![larger(state)]) > 0 {
+            said.push(
+                "how large the robot is cannot be told: with all lengths longer by the same share every reading stays"
+                    .to_owned(),
+            );
+        }
+        (said, left)
     }
 
     /// An orthonormal basis of what no row tells (m × k).
     fn undetermined(&self, fit: &Fit) -> DMatrix<f64> {
-        null_space(&self.information(fit))
+        let belief = &fit.belief;
+        let mut information = self.information(fit);
+        if let Some(known) = self.known {
+            let nowhere = vec![0.0; belief.state.joints.len()];
+            let rows = belief.rig.equations_of(&belief.state, &belief.layout, &nowhere, known).rows;
+            information += &rows * rows.transpose();
+        }
+        null_space(&information)
     }
 
     /// What the rows of a fit tell of its parameters, without the prior (m × m).
@@ -65,4 +139,87 @@ impl Case<'_> {
             )
         })
     }
+}
+
+/// A direction is told where less of it than this share is beside it.
+const ALIKE: f64 = 1e-4;
+/// How far states are moved for directions: rad, or share of lengths.
+const STEP: f64 = 1e-6;
+
+fn together(count: usize) -> String {
+    match count {
+        1 => "1 direction in which both move together changes".to_owned(),
+        _ => format!("{count} directions in which both move together change"),
+    }
+}
+
+/// An orthonormal basis of what is across `direction` in the space of `basis`.
+fn without(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
+    let k = basis.ncols();
+    let Some(along) = basis.tr_mul(direction).try_normalize(0.0) else { return basis.clone() };
+    // The reflection that brings the last unit vector to `along`: its other columns are across it.
+    let mut towards = along.clone();
+    towards[k - 1] -= if along[k - 1] > 0.0 { -1.0 } else { 1.0 };
+    let square = towards.norm_squared();
+    let reflection = DMatrix::identity(k, k) - &towards * towards.transpose() * (2.0 / square);
+    basis * reflection.columns(0, k - 1)
+}
+
+/// The state with what hangs on links from one on carried by a motion, in the frame of the base at θ = 0.
+fn carried(state: &State, from: usize, motion: &Isometry3<f64>) -> State {
+    let mut moved = state.clone();
+    moved.joints.iter_mut().skip(from).for_each(|joint| *joint = joint.transformed(motion));
+    for target in moved.targets.iter_mut().filter(|target| target.link >= from) {
+        target.place = match &target.place {
+            Place::Point(point) => Place::Point(motion * point),
+            Place::Pose(pose) => Place::Pose(motion * pose),
+        };
+    }
+    for device in moved.devices.iter_mut().filter(|device| device.link.is_some_and(|link| link >= from)) {
+        device.pose = motion * device.pose;
+    }
+    moved
+}
+
+/// A base that moves one way, and all that it carries the other.
+fn moved_with_base(state: &State) -> Vec<State> {
+    let motions = (0..6).map(|k| {
+        let unit = Vector3::from_fn(|axis, _| if axis == k % 3 { STEP } else { 0.0 });
+        if k < 3 { Isometry3::translation(unit.x, unit.y, unit.z) } else { Isometry3::rotation(unit) }
+    });
+    let moved = |motion: Isometry3<f64>| {
+        let mut moved = carried(state, 0, &motion.inverse());
+        moved.base *= motion;
+        moved
+    };
+    motions.map(moved).collect()
+}
+
+/// A zero that is off, and all that is behind it turned or shifted the other way.
+fn moved_behind(state: &State, joint: usize) -> State {
+    let mut moved = carried(state, joint + 1, &state.joints[joint].exp(-STEP));
+    moved.corrections[joint].offset += STEP;
+    moved
+}
+
+/// All lengths longer by a share.
+fn larger(state: &State) -> State {
+    let longer = |pose: &mut Isometry3<f64>| pose.translation.vector *= 1.0 + STEP;
+    let mut moved = state.clone();
+    longer(&mut moved.base);
+    for (joint, correction) in moved.joints.iter_mut().zip(&mut moved.corrections) {
+        match joint {
+            Joint::Revolute(line) => line.point *= 1.0 + STEP,
+            Joint::Prismatic(_) => correction.ratio *= 1.0 + STEP,
+        }
+    }
+    for target in &mut moved.targets {
+        match &mut target.place {
+            Place::Point(point) => *point *= 1.0 + STEP,
+            Place::Pose(pose) => longer(pose),
+        }
+    }
+    moved.devices.iter_mut().for_each(|device| longer(&mut device.pose));
+    moved.sockets.iter_mut().for_each(|socket| *socket *= 1.0 + STEP);
+    moved
 }

@@ -44,6 +44,18 @@ pub struct Explained {
     pub turned: Option<f64>,
     /// By how much every joint that turns stands beside its reading, rad.
     pub zeros: Vec<f64>,
+    /// How the chain stands then.
+    pub standing: Standing,
+}
+
+impl Explained {
+    /// Where the target is explained to be at other rows, in the frame of the measurements.
+    pub fn places(&self, subject: &Subject, rows: &[Vec<f64>], seen: &Seen) -> Vec<Point3<f64>> {
+        let chain = Chain::new(subject.joints, rows, seen);
+        let errors = chain.errors(&self.standing);
+        let at = |row: &Vec<f64>| chain.tip(&self.standing, &errors, row) * self.standing.placed.target;
+        rows.iter().map(|row| at(row).translation.vector.into()).collect()
+    }
 }
 
 /// What is known beside the subject.
@@ -73,8 +85,8 @@ struct Chain<'a> {
 }
 
 /// How a chain stands.
-#[derive(Clone)]
-struct Standing {
+#[derive(Clone, Debug)]
+pub struct Standing {
     placed: Placed,
     /// By joint: a shift and a turn in its axes.
     errors: DVector<f64>,
@@ -163,7 +175,7 @@ pub fn explain(
     let log_evidence = -0.5 * (counted * data + cost_of_prior(&off) + log_determinant);
     let (rms, turned) = chain.left(&standing);
     let zeros = (0..subject.joints.len()).map(|joint| standing.errors[6 * joint + 5]).collect();
-    log_evidence.is_finite().then_some(Explained { log_evidence, rms, turned, zeros })
+    log_evidence.is_finite().then_some(Explained { log_evidence, rms, turned, zeros, standing })
 }
 
 impl Subject<'_> {

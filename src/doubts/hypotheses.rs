@@ -15,6 +15,7 @@ use super::{
     doubt::length,
     fit::{self, Fit, Placed, Sight},
     hypothesis::{Hypothesis, zeros_doubt},
+    moving,
 };
 use crate::{
     kinematics::{Joint, JointKind},
@@ -37,6 +38,8 @@ const MANY_JOINTS: usize = 40;
 const SWAPS: usize = 12;
 /// Ways to read the table of which the evidence is asked.
 const ASKED: usize = 8;
+/// Rows that lag by less are told by what moves, if by anything.
+const LAGGING: f64 = 0.02;
 /// A description does not fit where more is left of its readings, once calibrated: a share of how far they are spread, and radians.
 const MISFIT: (f64, f64) = (0.05, 0.09);
 
@@ -67,6 +70,7 @@ pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
         standing = found;
     }
     doubts.extend(readings.elsewhere(&standing));
+    doubts.extend(readings.moving(&standing));
     if let Some(misfit) = readings.misfit(&standing) {
         doubts.insert(0, misfit);
     }
@@ -79,6 +83,8 @@ pub struct Readings<'a> {
     subject: Subject<'a>,
     /// By row that was seen: where the joints were.
     configurations: Vec<Vec<f64>>,
+    /// The lines of the file.
+    lines: Vec<usize>,
     sight: Sight,
     /// The name of the target.
     target: String,
@@ -123,7 +129,8 @@ impl<'a> Readings<'a> {
         };
         let configurations = usable.iter().map(|row| evidence.configurations[*row].clone()).collect();
         let target = seen.map(|seen| seen.name.clone()).unwrap_or_default();
-        Some(Self { subject: *subject, configurations, sight, target, size: 1.0 })
+        let lines = usable.iter().map(|row| evidence.lines.get(*row).copied().unwrap_or(*row)).collect();
+        Some(Self { subject: *subject, configurations, lines, sight, target, size: 1.0 })
     }
 
     /// What its target is called.
@@ -147,7 +154,8 @@ impl<'a> Readings<'a> {
             Sight::Sockets(sockets) => Sight::Sockets(rows.iter().map(|row| sockets[*row]).collect()),
         };
         let configurations = rows.iter().map(|row| self.configurations[*row].clone()).collect();
-        Self { configurations, sight, target: self.target.clone(), ..*self }
+        let lines = rows.iter().map(|row| self.lines[*row]).collect();
+        Self { configurations, lines, sight, target: self.target.clone(), ..*self }
     }
 
     /// By row: what the joints do to the last link.
@@ -190,12 +198,18 @@ impl<'a> Readings<'a> {
     }
 
     /// What was seen beside the joints of so many rows later.
-    fn lag(&mut self, rows: isize) {
+    fn lag(&mut self, rows: f64) {
         let all = self.configurations.len();
-        let pairs: Vec<(usize, usize)> =
-            (0..all).filter_map(|row| Some((row, row.checked_add_signed(rows).filter(|of| *of < all)?))).collect();
-        self.configurations = pairs.iter().map(|(_, joints)| self.configurations[*joints].clone()).collect();
-        let kept: Vec<usize> = pairs.iter().map(|(row, _)| *row).collect();
+        let (whole, part) = (rows.floor() as isize, rows - rows.floor());
+        let later = |row: usize, by: isize| self.configurations.get(row.checked_add_signed(by)?);
+        let between = |row: usize| {
+            let before = later(row, whole)?;
+            let after = if part > 0.0 { later(row, whole + 1)? } else { before };
+            Some((row, before.iter().zip(after).map(|(a, b)| a + part * (b - a)).collect()))
+        };
+        let (kept, configurations): (Vec<usize>, Vec<Vec<f64>>) = (0..all).filter_map(between).unzip();
+        self.configurations = configurations;
+        self.lines = kept.iter().map(|row| self.lines[*row]).collect();
         self.sight = match &self.sight {
             Sight::Target(seen) => Sight::Target(seen.of(&kept)),
             Sight::Sockets(sockets) => Sight::Sockets(kept.iter().map(|row| sockets[*row]).collect()),
@@ -224,7 +238,8 @@ impl<'a> Readings<'a> {
         let (expected, spread) = self.spreads(seen);
         let far = (spread / expected).ln() / 2_f64.ln();
         let unlikely = if far.is_finite() { 0.5 * far * far } else { 0.0 };
-        Some(Explained { log_evidence: found.log_evidence + counted * self.size.abs().ln() - unlikely, ..found })
+        let log_evidence = found.log_evidence + counted * self.size.abs().ln() - unlikely;
+        Some(Explained { log_evidence, ..found })
     }
 
     /// Whether the description explains everything by itself.
@@ -380,11 +395,28 @@ impl<'a> Readings<'a> {
         if self.configurations.len() < 10 {
             return Vec::new();
         }
-        let of = |rows: isize| {
+        let of = |rows: f64| {
             let read = self.applied(Hypothesis::Lag(rows)).taken();
             (Hypothesis::Lag(rows), read.sight.fit(&read.motions(), false))
         };
-        [-2, -1, 1, 2].map(of).into()
+        let mut tried = [-2.0, -1.0, 1.0, 2.0].map(of).to_vec();
+        // A robot that was followed while it moved may lag by less than a row.
+        let parts = [-1.5, -0.5, -0.2, 0.2, 0.5, 1.5].map(of);
+        if let Some((Hypothesis::Lag(mut by), mut best)) =
+            parts.into_iter().min_by(|a, b| a.1.judged.total_cmp(&b.1.judged))
+        {
+            let mut step = 0.16;
+            while step > 0.005 {
+                for (hypothesis, there) in [of(by - step), of(by + step)] {
+                    if let (true, Hypothesis::Lag(rows)) = (there.judged < best.judged, hypothesis) {
+                        (by, best) = (rows, there);
+                    }
+                }
+                step /= 2.0;
+            }
+            tried.extend((by.abs() > LAGGING).then_some((Hypothesis::Lag(by), best)));
+        }
+        tried
     }
 
     fn of_order(&self) -> Vec<(Hypothesis, Fit)> {
@@ -457,6 +489,14 @@ impl<'a> Readings<'a> {
             ),
             mend: "correct [base], or leave it out: then it is found from the rows".to_owned(),
         })
+    }
+
+    /// The doubt that the robot stood still at every row.
+    fn moving(&self, standing: &Judged) -> Option<Doubt> {
+        let (Sight::Target(seen), Some(explained)) = (&self.sight, &standing.explained) else { return None };
+        let places = explained.places(&self.subject, &self.configurations, seen);
+        let seen: Vec<Point3<f64>> = seen.poses.iter().map(|pose| pose.translation.vector.into()).collect();
+        moving::doubt(&self.lines, &places, &seen, self.subject.sigma_m * self.size)
     }
 
     /// The doubt that anything explains the table.

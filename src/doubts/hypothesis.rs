@@ -32,8 +32,8 @@ pub enum Hypothesis {
     /// Rotation vectors that are roll, pitch and yaw; and the other way round.
     RollPitchYaw,
     RotationVector,
-    /// Joints as they were so many rows later.
-    Lag(isize),
+    /// Joints as they were so many rows later; between two rows on the straight way from one to the other.
+    Lag(f64),
 }
 
 impl Hypothesis {
@@ -215,13 +215,14 @@ impl Hypothesis {
                 "title their columns rx, ry and rz",
             ),
             Self::Lag(rows) => {
-                let (count, which) = (rows.unsigned_abs(), if rows > 0 { "below" } else { "above" });
+                let which = if rows > 0.0 { "below" } else { "above" };
+                let count = if rows.fract() == 0.0 { format!("{}", rows.abs()) } else { format!("{:.2}", rows.abs()) };
                 (
                     DoubtKind::Lag,
                     None,
                     format!(
                         "what was measured belongs to the joints {count} line{} {which}",
-                        if count > 1 { "s" } else { "" }
+                        if rows.abs() == 1.0 { "" } else { "s" }
                     ),
                     "pair joints and measurements by their times anew",
                 )

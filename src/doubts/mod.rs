@@ -19,6 +19,7 @@ mod doubt;
 mod fit;
 mod hypotheses;
 mod hypothesis;
+mod moving;
 mod postures;
 mod repeats;
 

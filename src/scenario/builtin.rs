@@ -58,6 +58,7 @@ macro_rules! files {
 /// The files that they name: tables of measurements, and descriptions of robots.
 const DATA: &[(&str, &str)] = files![
     "tiago-mocap.csv",
+    "tiago-mocap-1504.csv",
     "tiago.urdf",
     "talos-contact.csv",
     "talos.urdf",

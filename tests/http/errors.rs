@@ -117,7 +117,7 @@ async fn steps_that_cannot_be_made() {
     assert_eq!(fresh.status(), StatusCode::OK);
 
     let recorded = server.open(json!({ "scenario": "tiago-mocap" })).await;
-    assert_eq!(server.get_json(&recorded).await["remaining"], 27);
+    assert_eq!(server.get_json(&recorded).await["remaining"], 37);
     server.step(&recorded, 20).await;
     let many = server.post(&format!("{recorded}/steps"), json!({ "count": 8 })).await;
     let many = problem(many, 422, Some("count")).await;

@@ -6,6 +6,9 @@ use super::document::{Document, Part, Table};
 
 const STYLE: &str = include_str!("report.css");
 
+/// A cell with more letters has several lines.
+const LONG: usize = 36;
+
 /// The text of `report.html`.
 pub fn page(document: &Document) -> String {
     let mut body = String::new();
@@ -45,7 +48,12 @@ pub fn page(document: &Document) -> String {
 fn rows(table: &Table) -> String {
     let line = |cells: &[String], tag: &str| {
         let cell = |(column, cell): (usize, &String)| {
-            let class = if column < table.words { " class=\"words\"" } else { "" };
+            // Six numbers of a pose are wider than a page has room for.
+            let class = match (column < table.words, cell.len() > LONG) {
+                (true, _) => " class=\"words\"",
+                (false, true) => " class=\"long\"",
+                (false, false) => "",
+            };
             format!("<{tag}{class}>{}</{tag}>", escaped(cell))
         };
         let cells: String = cells.iter().enumerate().map(cell).collect();
