@@ -39,6 +39,8 @@ pub(super) struct Plan {
     chances: Vec<Vec<f64>>,
     /// By pose and hypothesis: Hᵀ, whitened.
     rows: Vec<Arc<[DMatrix<f64>]>>,
+    /// By pose and hypothesis: what must be left of a downdate.
+    sound: Vec<Arc<[f64]>>,
 }
 
 impl Plan {
@@ -53,6 +55,7 @@ impl Plan {
             told: Vec::new(),
             chances: Vec::new(),
             rows: Vec::new(),
+            sound: Vec::new(),
         }
     }
 
@@ -79,7 +82,8 @@ impl Plan {
     pub fn add(&mut self, pose: Vec<f64>, expected: Expected) {
         let Expected { chances, told, rows } = expected;
         let rows: Arc<[DMatrix<f64>]> = rows.unwrap_or_else(|| jacobians(&self.after, &pose)).into();
-        self.each(&rows, &chances, 1.0);
+        by_rows(&mut self.after, &rows, &[], counted(&chances, 1.0));
+        self.sound.push(sound(&self.now, &rows));
         self.poses.push(pose);
         self.chances.push(chances);
         self.told.push(told);
@@ -90,12 +94,12 @@ impl Plan {
     pub fn remove(&mut self, index: usize) -> Vec<f64> {
         let (pose, chances) = (self.poses.remove(index), self.chances.remove(index));
         self.told.remove(index);
-        let rows = self.rows.remove(index);
-        if !self.each(&rows, &chances, -1.0) {
+        let (rows, sound) = (self.rows.remove(index), self.sound.remove(index));
+        if !by_rows(&mut self.after, &rows, &sound, counted(&chances, -1.0)) {
             // Too much would cancel: from the beginning, without it.
             self.after = (*self.now).clone();
-            for (rows, chances) in self.rows.clone().iter().zip(self.chances.clone()) {
-                self.each(rows, &chances, 1.0);
+            for (rows, chances) in self.rows.iter().zip(&self.chances) {
+                by_rows(&mut self.after, rows, &[], counted(chances, 1.0));
             }
         }
         pose
@@ -110,7 +114,9 @@ impl Plan {
         for (hypothesis, ((share, covariance), rows)) in estimate.chain(others).zip(self.rows[index].iter()).enumerate()
         {
             let c = often(hypothesis);
-            let gained = if c.abs() < NOTHING { 0.0 } else { weights.squares(&root(level, covariance, rows, c)?) };
+            let sound = self.sound[index].get(hypothesis).copied().unwrap_or(SOUND);
+            let gained =
+                if c.abs() < NOTHING { 0.0 } else { weights.squares(&root(level, covariance, rows, c, sound)?) };
             sum += share * (weights.trace(covariance) + gained);
         }
         Some(sum)
@@ -131,11 +137,6 @@ impl Plan {
         let counted = || self.told.iter().enumerate().filter(|(index, _)| Some(*index) != left_out);
         (0..pairs).map(|pair| counted().map(|(_, told)| told[pair]).sum()).collect()
     }
-
-    /// The update (sign 1) or downdate (sign −1) of every hypothesis' covariance by a pose; whether that was sound.
-    fn each(&mut self, rows: &[DMatrix<f64>], chances: &[f64], sign: f64) -> bool {
-        by_rows(&mut self.after, rows, counted(chances, sign))
-    }
 }
 
 /// How often a pose counts that each hypothesis expects to be seen with these chances.
@@ -147,7 +148,8 @@ fn counted(chances: &[f64], sign: f64) -> impl Fn(usize) -> f64 {
 /// times, by hypothesis; a negative weight takes it out again. Whether that was sound.
 pub(super) fn condition(belief: &mut Belief, pose: &[f64], weight: impl Fn(usize) -> f64) -> bool {
     let rows = jacobians(belief, pose);
-    by_rows(belief, &rows, weight)
+    let sound = sound(belief, &rows);
+    by_rows(belief, &rows, &sound, weight)
 }
 
 /// Hᵀ, whitened, of a pose under every hypothesis, of the channels that would read there: how likely any does is told apart.
@@ -157,43 +159,62 @@ fn jacobians(belief: &Belief, pose: &[f64]) -> Vec<DMatrix<f64>> {
     states.map(|state| rig.believed_jacobian(state, layout, pose)).collect()
 }
 
-fn by_rows(belief: &mut Belief, rows: &[DMatrix<f64>], weight: impl Fn(usize) -> f64) -> bool {
+/// Updates or downdates every hypothesis; `least` must be left of a downdate, by hypothesis. Whether that was sound.
+fn by_rows(belief: &mut Belief, rows: &[DMatrix<f64>], least: &[f64], weight: impl Fn(usize) -> f64) -> bool {
     let Belief { covariance, alternatives, .. } = belief;
     let others = alternatives.iter_mut().map(|Alternative { covariance, .. }| Some(covariance));
     let (level, mut sound) = (Level::new(), true);
     for (index, (covariance, rows)) in std::iter::once(covariance.as_mut()).chain(others).zip(rows).enumerate() {
-        sound &= covariance.is_none_or(|covariance| update(level, covariance, rows, weight(index)));
+        sound &= covariance.is_none_or(|covariance| {
+            let least = least.get(index).copied().unwrap_or(SOUND);
+            update(level, covariance, rows, weight(index), least)
+        });
     }
     sound
 }
 
-/// A downdate is sound while what is left of I/c − H P Hᵀ, by the squares of its Cholesky factor's diagonal, exceeds this:
-/// far above the rounding of H P Hᵀ, which the noise magnifies.
+/// A downdate is sound while what is left of I/c − H P Hᵀ, by the squares of its Cholesky factor's diagonal, exceeds this, and so
+/// many times the rounding of H P Hᵀ: that of P is the rounding of P₀, from which updates took it, and the noise magnifies it.
 const SOUND: f64 = 1e-6;
+const ROUNDINGS: f64 = 1e5;
+
+/// By hypothesis what must be left of downdates by `rows`, with P₀ the covariance before all updates.
+fn sound(before: &Belief, rows: &[DMatrix<f64>]) -> Arc<[f64]> {
+    let Belief { covariance, alternatives, .. } = before;
+    let others = alternatives.iter().map(|alternative| Some(&alternative.covariance));
+    let of = |(covariance, rows): (Option<&DMatrix<f64>>, &DMatrix<f64>)| {
+        let Some(covariance) = covariance else { return SOUND };
+        let (m, d) = rows.shape();
+        let spread = DMatrix::from_vec(m, d, times_few(Level::new(), rows.as_slice(), covariance.as_slice(), m));
+        let largest = rows.component_mul(&spread).row_sum().max();
+        SOUND.max(ROUNDINGS * f64::EPSILON * largest)
+    };
+    std::iter::once(covariance.as_ref()).chain(others).zip(rows).map(of).collect()
+}
 
 /// What counts less often than this changes nothing.
 const NOTHING: f64 = 1e-9;
 
 /// P ← (P⁻¹ + c HᵀH)⁻¹ = P − P Hᵀ (I/c + H P Hᵀ)⁻¹ H P, for c < 0 a downdate; as it was, where c is nothing. False where a
 /// downdate would cancel what is known.
-fn update(level: Level, covariance: &mut DMatrix<f64>, rows: &DMatrix<f64>, c: f64) -> bool {
+fn update(level: Level, covariance: &mut DMatrix<f64>, rows: &DMatrix<f64>, c: f64, least: f64) -> bool {
     if c.abs() < NOTHING {
         return true;
     }
-    let Some(root) = root(level, covariance, rows, c) else { return false };
+    let Some(root) = root(level, covariance, rows, c, least) else { return false };
     add_few_squares(level, root.as_slice(), -c.signum(), covariance.as_mut_slice());
     true
 }
 
 /// X (m × d), of whose square X Xᵀ P loses by an update, or gains by a downdate; `None` where that would cancel what is known.
-fn root(level: Level, covariance: &DMatrix<f64>, rows: &DMatrix<f64>, c: f64) -> Option<DMatrix<f64>> {
+fn root(level: Level, covariance: &DMatrix<f64>, rows: &DMatrix<f64>, c: f64, least: f64) -> Option<DMatrix<f64>> {
     let (m, d) = rows.shape();
     let numerator = DMatrix::from_vec(m, d, times_few(level, rows.as_slice(), covariance.as_slice(), m));
     let spread = rows.tr_mul(&numerator);
     let middle = (DMatrix::identity(d, d) / c + (&spread + spread.transpose()) * 0.5) * c.signum();
     let cholesky = Cholesky::new(middle)?;
     let l = cholesky.l_dirty();
-    if c < 0.0 && l.diagonal().iter().any(|x| x * x < SOUND) {
+    if c < 0.0 && l.diagonal().iter().any(|x| x * x < least) {
         return None;
     }
     // With L Lᵀ = ±(I/c + H P Hᵀ), X = P Hᵀ L⁻ᵀ, column by column.
