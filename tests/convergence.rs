@@ -87,9 +87,8 @@ fn within_a_field_of_view_active_beats_random_and_seldom_misses() {
 }
 
 #[test]
-fn a_real_robot_is_predicted_better_after_learning_and_sooner_when_chosen_actively() {
+fn a_real_robot_is_predicted_better_in_another_session_after_learning() {
     let scenario = builtin("tiago-mocap").expect("built in");
-    // So many, since 20 splits scatter by as much as the bar leaves: the ratio is 0.89 over the seeds 1001 to 1100.
     let seeds: Vec<u64> = (1..=100).collect();
     let mean = |learner: &str| {
         let outcome = compare(&scenario, learner, &seeds, 37);
@@ -97,10 +96,14 @@ fn a_real_robot_is_predicted_better_after_learning_and_sooner_when_chosen_active
             outcome.curve[movements].prediction_mean_m.expect("held-out measurements").mean * 1e3
         })
     };
-    let ([start, active_12, active_end], [_, random_12, random_end]) = (mean("active"), mean("random"));
+    let ([start, _, active_end], [_, random_12, random_end]) = (mean("active"), mean("random"));
+    let [_, nominal_12, nominal_end] = mean("nominal");
     assert!(start > 100.0, "{start} mm before learning: nobody has told where it stands");
-    assert!(active_end <= 3.3 && random_end <= 3.3, "{active_end} and {random_end} mm with all rows");
-    assert!(active_12 <= 0.92 * random_12, "{active_12} and {random_12} mm at 12 rows");
+    assert!(active_end <= 2.5 && random_end <= 2.5, "{active_end} and {random_end} mm with all rows");
+    assert!(
+        random_12 <= 0.9 * nominal_12 && random_end <= 0.75 * nominal_end,
+        "{random_12} of {nominal_12} mm at 12 rows"
+    );
 }
 
 #[test]

@@ -57,7 +57,7 @@ fn constraints_are_held_to_the_robot() {
         (
             TIAGO,
             "limits_deg = { arm_1_joint = [150.0, 157.0] }",
-            "all 34 postures tried are excluded by the limits of `arm_1_joint`",
+            "all 74 postures tried are excluded by the limits of `arm_1_joint`",
         ),
     ] {
         let found =

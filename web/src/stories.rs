@@ -216,20 +216,20 @@ pub const STORIES: [Story; 6] = [
         teaser: "Measured movements of a real robot",
         scenario: "tiago-mocap",
         seed: 13,
-        learners: &[],
+        learners: &["active", "nominal"],
         step: 1,
         cards: &[
             Card {
                 title: "Measured, not simulated",
                 text: "These movements were made by a real robot and recorded with cameras. No truth is known: the error \
-                       is that of predicting measurements that were held out from learning.",
+                       is that of predicting 59 postures of another session, which nobody learns from.",
                 spot: Spot::Chart,
                 acts: &[Act::PlayOn(2.0)],
             },
             Card {
-                title: "Choosing among what was recorded",
-                text: "In the end all have used every movement, so the curves meet. On this seed active predicts well \
-                       sooner. Was that luck? There are few movements to choose among: ten other seeds hold out others.",
+                title: "What learning the axes brings",
+                text: "nominal keeps the axes as they are described and learns where the robot stands; active learns the \
+                       axes too, and in the end misses by a third less. Ten other seeds take the rows in other orders.",
                 spot: Spot::Ending,
                 acts: &[Act::Seeds],
             },
