@@ -45,6 +45,7 @@
 //! | [`scenario`] | scenario files, strictly read |
 //! | [`assembly`] | the experiments that are drawn from them |
 //! | [`calibration`] | a robot calibrated by a table: fits, folds, figures, corrected descriptions |
+//! | [`json`] | texts of JSON, whose faults are named by their fields |
 //! | [`ask_tell`] | sessions with a robot elsewhere, which is asked to move and tells what it saw |
 //!
 //! These do no input or output, know no threads but those of the feature `parallel`, and build without default
@@ -90,6 +91,7 @@ pub mod estimation;
 pub mod experiment;
 #[cfg(feature = "app")]
 pub mod export;
+pub mod json;
 pub mod kinematics;
 mod lanes;
 pub mod magnitude;

@@ -13,9 +13,9 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from ._engine import setup_of_file, setup_of_urdf
+from ._engine import Engine, setup_of_file, setup_of_urdf
 from ._errors import ConflictError, EngineError, Error, FieldError, NotFoundError, ServerError
-from ._words import Asking, kept, setup_with, text_of_urdf, written
+from ._words import Asking, kept, setup_with, text_of_session, text_of_urdf, written
 
 TRIES = 3
 """How often a request is sent where no answer comes."""
@@ -63,18 +63,29 @@ class Client:
     def load(self, path: str | PathLike[str]) -> RemoteSession:
         """A session of its own that goes on where ``save`` left one, here or on a server. Nothing is chosen again."""
         try:
-            saved = json.loads(Path(path).read_text(encoding="utf-8"))
+            saved = json.loads(text_of_session(path))
             setup = {**saved["setup"], "version": saved["version"], "events": saved["events"]}
         except (ValueError, KeyError, TypeError) as error:
-            raise EngineError(f"{fspath(path)} is no session of body-schema: {error!r}") from None
-        return self._open(setup)
+            raise EngineError(f"this is no session of body-schema: {fspath(path)}: {error!r}") from None
+        try:
+            return self._open(setup)
+        except FieldError as error:
+            # What nobody has written by hand has no field to mend.
+            if error.field.split("[")[0].split(".")[0] in ("events", "version"):
+                raise EngineError(str(error)) from None
+            raise
 
     def session(self, id: str) -> RemoteSession:
         """A session that is there already, by its id."""
         return RemoteSession(self, id, self.request("GET", f"/v1/sessions/{urllib.parse.quote(id, safe='')}"))
 
     def _open(self, setup: dict[str, Any]) -> RemoteSession:
-        opened = self.request("POST", "/v1/sessions", {"world": "outside", **setup})
+        try:
+            opened = self.request("POST", "/v1/sessions", written("calibration", {"world": "outside", **setup}))
+        except FieldError as error:
+            # A key is called as it is in the calibration, as it is where the session is computed here.
+            error.field = error.field.removeprefix("calibration.")
+            raise
         return RemoteSession(self, opened["id"], opened)
 
     def request(self, method: str, path: str, body: object = None, key: str | None = None) -> Any:
@@ -88,7 +99,7 @@ class Client:
         data = None
         if body is not None:
             headers["Content-Type"] = "application/json"
-            data = written("body", body).encode()
+            data = (body if isinstance(body, str) else written("body", body)).encode()
         if key is not None:
             headers["Idempotency-Key"] = key
         if self._token is not None:
@@ -121,16 +132,16 @@ class RemoteSession(Asking):
         self._path = f"/v1/sessions/{urllib.parse.quote(id, safe='')}"
 
     def _suggest(self, ask: dict[str, Any]) -> dict[str, Any]:
-        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/suggestions", ask)
+        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/suggestions", written("suggest", ask))
         return answer
 
     def _observe(self, observation: dict[str, Any]) -> dict[str, Any]:
-        key = str(uuid.uuid4())
-        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/observations", observation, key)
+        key, body = str(uuid.uuid4()), written("observation", observation)
+        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/observations", body, key)
         return answer
 
     def _outcome(self, id: int, outcome: dict[str, Any]) -> dict[str, Any]:
-        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/suggestions/{id}/outcome", outcome)
+        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/suggestions/{id}/outcome", written("outcome", outcome))
         return answer
 
     def _joints(self) -> list[str]:
@@ -142,7 +153,7 @@ class RemoteSession(Asking):
         return answer
 
     def observations(self) -> list[dict[str, Any]]:
-        """All observations: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
+        """All observations by ``number``: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
         answer: list[dict[str, Any]] = self._client.request("GET", f"{self._path}/observations")["observations"]
         return answer
 
@@ -174,13 +185,20 @@ class RemoteSession(Asking):
     def _resource(self) -> Any:
         return self._client.request("GET", self._path)
 
-    def exclude(self, observation: int) -> None:
-        """Take an observation out, by its number: the belief becomes what the others give."""
-        self._client.text("DELETE", f"{self._path}/observations/{observation}")
+    def estimate(self) -> dict[str, Any]:
+        """The robot as it is believed now: every joint's axis at zero with its covariance, the marker; m and rad.
 
-    def include(self, observation: int) -> None:
-        """Take an excluded observation in again: the belief becomes as if it had never been excluded."""
-        self._client.text("PUT", f"{self._path}/observations/{observation}/included")
+        It is computed here, from the events of the session.
+        """
+        answer: dict[str, Any] = json.loads(Engine.load(self.save()).estimate())
+        return answer
+
+    def _predict(self, rows: list[list[float]]) -> list[list[float]]:
+        return [list(point) for point in Engine.load(self.save()).predict(rows)]
+
+    def _mark(self, observation: int, excluded: bool) -> None:
+        path = f"{self._path}/observations/{observation}"
+        self._client.text(*("DELETE", path) if excluded else ("PUT", f"{path}/included"))
 
     def report(self) -> dict[str, Any]:
         """What ``body-schema calibrate`` says of the observations: the content of ``report.json``."""
@@ -222,9 +240,12 @@ def _refused(status: int, text: str) -> Error:
     if not isinstance(problem, dict):
         problem = {}
     detail = str(problem.get("detail") or problem.get("title") or text or f"HTTP {status}")
+    kind = _KINDS.get(str(problem.get("type") or "").rpartition(":")[2])
+    if kind is not None:
+        return kind(detail)
     if status in (400, 413, 422) and problem.get("field"):
-        field, what, mend = (str(problem.get(key) or "") for key in ("field", "what", "mend"))
-        return FieldError(detail, field, what or detail, mend)
+        field, what, hint = (str(problem.get(key) or "") for key in ("field", "what", "hint"))
+        return FieldError(detail, field, what or detail, hint)
     if status == 404:
         return NotFoundError(detail)
     if status == 409:
@@ -232,3 +253,15 @@ def _refused(status: int, text: str) -> Error:
     if status == 422:
         return EngineError(detail)
     return ServerError(detail, status)
+
+
+_KINDS: dict[str, type[Error]] = {
+    "unknown-suggestion": NotFoundError,
+    "unknown-observation": NotFoundError,
+    "not-pending": ConflictError,
+    "session-full": EngineError,
+    "nothing-to-suggest": EngineError,
+    "nothing-to-show": EngineError,
+    "diverged": EngineError,
+}
+"""Problems that a session here has too, by their type, as the exceptions that it raises."""

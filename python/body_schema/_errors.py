@@ -19,6 +19,11 @@ class FieldError(Error, ValueError):
         self.what = what
         self.mend = mend
 
+    @property
+    def hint(self) -> str:
+        """What to write; another name of ``mend``."""
+        return self.mend
+
 
 class NotFoundError(Error, LookupError):
     """There is no such suggestion, observation or session."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
 from ._engine import Engine, setup_of_file, setup_of_urdf
-from ._words import Asking, Configuration, kept, setup_with, text_of_urdf, written
+from ._words import Asking, kept, setup_with, text_of_session, text_of_urdf, written
 
 
 class Session(Asking):
@@ -67,7 +67,7 @@ class Session(Asking):
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Session:
         """A session that ``save`` wrote. Nothing is chosen again."""
-        return cls(Engine.load(Path(path).read_text(encoding="utf-8")))
+        return cls(Engine.load(text_of_session(path)))
 
     def save(self, path: str | PathLike[str] | None = None) -> str:
         """The whole session as JSON, setup and events; written to ``path`` if there is one."""
@@ -82,20 +82,15 @@ class Session(Asking):
         return answer
 
     def _outcome(self, id: int, outcome: dict[str, Any]) -> dict[str, Any]:
-        told = self._engine.outcome(id, outcome["state"], outcome.get("reason"), time.time())
-        answer: dict[str, Any] = json.loads(told)
+        answer: dict[str, Any] = json.loads(self._engine.outcome(id, written("outcome", outcome), time.time()))
         return answer
 
     def _joints(self) -> list[str]:
         return [joint["name"] for joint in self.description()["joints"]]
 
-    def exclude(self, observation: int) -> None:
-        """Take an observation out, by its number: the belief becomes what the others give."""
-        self._engine.exclude(observation, time.time())
-
-    def include(self, observation: int) -> None:
-        """Take an excluded observation in again: the belief becomes as if it had never been excluded."""
-        self._engine.include(observation, time.time())
+    def _mark(self, observation: int, excluded: bool) -> None:
+        mark = self._engine.exclude if excluded else self._engine.include
+        mark(observation, time.time())
 
     def suggestions(self) -> list[dict[str, Any]]:
         """All suggestions that were ever made, whoever asked, each with its ``state``."""
@@ -103,7 +98,7 @@ class Session(Asking):
         return answer
 
     def observations(self) -> list[dict[str, Any]]:
-        """All observations: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
+        """All observations by ``number``: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
         answer: list[dict[str, Any]] = json.loads(self._engine.observations())
         return answer
 
@@ -137,11 +132,8 @@ class Session(Asking):
         answer: dict[str, Any] = json.loads(self._engine.model())
         return answer
 
-    def predict(self, configurations: Sequence[Configuration]) -> list[list[float]]:
-        """Where the hand is believed to be at these configurations, ``[x, y, z]`` each, m, frame of the measurements."""
-        names = self.joints
-        rows = [[it[name] for name in names] if isinstance(it, Mapping) else list(it) for it in configurations]
-        return [list(point) for point in self._engine.predict([[float(q) for q in row] for row in rows])]
+    def _predict(self, rows: list[list[float]]) -> list[list[float]]:
+        return [list(point) for point in self._engine.predict(rows)]
 
     def report(self) -> dict[str, Any]:
         """What ``body-schema calibrate`` says of the observations: the content of ``report.json``."""

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import json
+import operator
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, Union
 
-from ._errors import FieldError
+from ._errors import EngineError, FieldError
 
 Configuration = Union[Mapping[str, float], Sequence[float]]
-"""Joint positions by name, or in the order of ``joints``; rad (revolute) or m (prismatic)."""
+"""Joint positions by name; rad (revolute) or m (prismatic). A list of them needs the names of its joints beside it."""
 
 PENDING: Literal["pending"] = "pending"
 
@@ -28,8 +29,7 @@ def written(field: str, value: object) -> str:
     try:
         return json.dumps(value, default=plain, allow_nan=False)
     except (TypeError, ValueError) as error:
-        what, mend = str(error), "write finite numbers, texts, lists and dicts"
-        raise FieldError(f"`{field}`: {what}; {mend}", field, what, mend) from None
+        raise _wrong(field, str(error), "write finite numbers, texts, lists and dicts") from None
 
 
 def text_of_urdf(urdf: str | PathLike[str]) -> str:
@@ -39,8 +39,53 @@ def text_of_urdf(urdf: str | PathLike[str]) -> str:
     try:
         return Path(urdf).read_text(encoding="utf-8")
     except OSError as error:
-        what, mend = f"{urdf}: {error.strerror}", "name a file that can be read, or pass its text"
-        raise FieldError(f"`urdf`: {what}; {mend}", "urdf", what, mend) from None
+        raise _wrong("urdf", f"{urdf}: {error.strerror}", "name a file that can be read, or pass its text") from None
+
+
+def by_name(configuration: Configuration, joints: Sequence[str] | None, known: Sequence[str]) -> dict[str, float]:
+    """Positions by name, of a list in the order of ``joints``.
+
+    A list without ``joints`` is refused: values in another order, as in the alphabet, are positions as good as any.
+    """
+    if isinstance(configuration, Mapping):
+        if joints is not None:
+            raise _wrong("joints", "the configuration names its joints already", "leave `joints` out")
+        return dict(configuration)
+    order = ", ".join(known)
+    if joints is None:
+        what = "a list does not say which joint each position is of"
+        mend = f"tell a dict of positions by name, or name the order of the list: joints=[…], some order of {order}"
+        raise _wrong("configuration", what, mend)
+    names, positions = list(joints), list(configuration)
+    if isinstance(joints, str) or sorted(map(str, names)) != sorted(known):
+        raise _wrong("joints", f"{', '.join(map(str, names))} are not the joints", f"name each of {order}, once")
+    if len(positions) != len(names):
+        what = f"{len(positions)} positions are none of {len(names)} joints"
+        raise _wrong("configuration", what, f"tell all of {', '.join(names)}")
+    return dict(zip(names, positions))
+
+
+def whole(field: str, number: object) -> int:
+    """A number by which something is counted."""
+    try:
+        counted = operator.index(number)  # type: ignore[arg-type]
+    except TypeError:
+        counted = -1
+    if isinstance(number, bool) or not 0 <= counted < 2**63:
+        raise _wrong(field, f"{number!r} is no number of anything", "write a whole number, counted from 1")
+    return counted
+
+
+def _wrong(field: str, what: str, mend: str) -> FieldError:
+    return FieldError(f"`{field}`: {what}; {mend}", field, what, mend)
+
+
+def text_of_session(path: str | PathLike[str]) -> str:
+    """The text that ``save`` wrote."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise EngineError(f"this is no session of body-schema: {error}") from None
 
 
 def setup_with(setup: dict[str, Any], agent: str | None, seed: int, **calibration: Any) -> dict[str, Any]:
@@ -79,7 +124,7 @@ class Asking(ABC):
 
     @abstractmethod
     def observations(self) -> list[dict[str, Any]]:
-        """All observations: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
+        """All observations by ``number``: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
 
     @abstractmethod
     def events(self) -> list[dict[str, Any]]:
@@ -106,12 +151,14 @@ class Asking(ABC):
         """
 
     @abstractmethod
-    def exclude(self, observation: int) -> None:
-        """Take an observation out, by its number: the belief becomes what the others give."""
+    def estimate(self) -> dict[str, Any]:
+        """The robot as it is believed now: every joint's axis at zero with its covariance, the marker; m and rad."""
 
     @abstractmethod
-    def include(self, observation: int) -> None:
-        """Take an excluded observation in again: the belief becomes as if it had never been excluded."""
+    def _predict(self, rows: list[list[float]]) -> list[list[float]]: ...
+
+    @abstractmethod
+    def _mark(self, observation: int, excluded: bool) -> None: ...
 
     @abstractmethod
     def report(self) -> dict[str, Any]:
@@ -144,6 +191,20 @@ class Asking(ABC):
         """The names of the joints that move, base first."""
         return self._joints()
 
+    def predict(
+        self, configurations: Sequence[Configuration], *, joints: Sequence[str] | None = None
+    ) -> list[list[float]]:
+        """Where the hand is believed to be at these configurations, ``[x, y, z]`` each, m, frame of the measurements.
+
+        Each is told by name, or as a list whose order ``joints`` names.
+        """
+        names = self.joints
+        rows = [by_name(it, None if isinstance(it, Mapping) else joints, names) for it in configurations]
+        for row in rows:
+            if missing := [name for name in names if name not in row]:
+                raise _wrong(f"configuration.{missing[0]}", "missing", "tell where every joint is")
+        return self._predict([[float(row[name]) for name in names] for row in rows])
+
     def suggest(
         self,
         count: int = 1,
@@ -155,7 +216,7 @@ class Asking(ABC):
         """Where to move next.
 
         Gives ``{"suggestions": […], "enough": {…}}``: the client's pending suggestions, topped up to ``count`` and chosen
-        together. Each has ``id``, ``configuration`` by joint name (rad, m), ``expected_gain``, ``expected_error_mm_after``,
+        together. Each has ``id``, ``configuration`` by joint name (rad, m), ``joints`` (their names, base first), ``expected_gain``, ``expected_error_mm_after``,
         ``chance_seen``, ``travel_rad`` and ``state``. Asking again gives the same until they are observed or rejected, unless
         ``replan`` replaces them. ``enough`` is there once the expected error of predictions (``expected_error_mm``) has been
         below what was wanted for five movements.
@@ -164,6 +225,7 @@ class Asking(ABC):
         seconds, for ever without it.
         """
         ask = {"count": count, "client": client, "replan": replan, "expires_s": expires_s}
+        ask["count"] = whole("count", count)
         return self._suggest({key: value for key, value in ask.items() if value is not None})
 
     def pending(self, client: str | None = None) -> list[dict[str, Any]]:
@@ -175,6 +237,7 @@ class Asking(ABC):
         configuration: Configuration,
         /,
         *,
+        joints: Sequence[str] | None = None,
         suggestion_id: int | Literal["pending"] | None = PENDING,
         client: str | None = None,
         measurements: Mapping[str, Any] | None = None,
@@ -182,9 +245,9 @@ class Asking(ABC):
     ) -> dict[str, Any]:
         """Tell where the robot moved, and what was seen there.
 
-        ``configuration`` is where the joints *were*, by name or in the order of ``joints``, rad or m: what was executed, not
-        what was suggested. What was seen is told by channel, as keywords or in ``measurements``; ``None``, and a channel that
-        is left out, saw nothing:
+        ``configuration`` is where the joints *were*, by name, rad or m: what was executed, not what was suggested. A list of
+        positions is taken where ``joints`` names its order. What was seen is told by channel, as keywords or in
+        ``measurements``; ``None``, and a channel that is left out, saw nothing:
 
         ========  =======================  ==========================================================
         channel   its name                 shape
@@ -204,16 +267,11 @@ class Asking(ABC):
         """
         if suggestion_id == PENDING:
             suggestion_id = next((it["id"] for it in self.pending(client)), None)
-        if not isinstance(configuration, Mapping):
-            positions, names = list(configuration), self.joints
-            if len(positions) != len(names):
-                what, mend = f"{len(positions)} positions are none of {len(names)} joints", f"tell all of {', '.join(names)}"
-                raise FieldError(f"`configuration`: {what}; {mend}", "configuration", what, mend)
-            configuration = dict(zip(names, positions))
+        told = by_name(configuration, joints, self.joints)
         seen = {**(measurements or {}), **channels}
-        body: dict[str, Any] = {"configuration": dict(configuration), "measurements": seen}
+        body: dict[str, Any] = {"configuration": told, "measurements": seen}
         if suggestion_id is not None:
-            body["suggestion_id"] = suggestion_id
+            body["suggestion_id"] = whole("suggestion_id", suggestion_id)
         return self._observe(body)
 
     def reject(
@@ -232,13 +290,20 @@ class Asking(ABC):
         if suggestion_id is None:
             pending = self.pending(client)
             if not pending:
-                what, mend = "nothing is pending", "ask for a suggestion first"
-                raise FieldError(f"`suggestion_id`: {what}; {mend}", "suggestion_id", what, mend)
+                raise _wrong("suggestion_id", "nothing is pending", "ask for a suggestion first")
             suggestion_id = pending[0]["id"]
         outcome: dict[str, Any] = {"state": state}
         if reason is not None:
             outcome["reason"] = reason
-        return self._outcome(suggestion_id, outcome)
+        return self._outcome(whole("suggestion_id", suggestion_id), outcome)
+
+    def exclude(self, observation: int) -> None:
+        """Take an observation out, by its number: the belief becomes what the others give."""
+        self._mark(whole("observation", observation), True)
+
+    def include(self, observation: int) -> None:
+        """Take an excluded observation in again: the belief becomes as if it had never been excluded."""
+        self._mark(whole("observation", observation), False)
 
 
 def kept(text: str, path: str | PathLike[str] | None) -> str:

@@ -18,6 +18,12 @@ impl Failure {
         Self { kind, message: message.to_string(), fault: None }
     }
 
+    /// The same, and in which file.
+    pub fn of_file(self, path: &str) -> Self {
+        let fault = self.fault.map(|fault| Fault { what: format!("{path}: {}", fault.what), ..fault });
+        Self { message: format!("{path}: {}", self.message), fault, ..self }
+    }
+
     fn field(message: impl ToString, fault: Fault) -> Self {
         Self { kind: "FieldError", message: message.to_string(), fault: Some(fault) }
     }
@@ -49,7 +55,7 @@ impl From<SetupError> for Failure {
                 None => Self::new("EngineError", error),
             },
             SetupError::Agent(why) => {
-                let mend = "name a learner of the calibration, or an estimator and a policy".to_owned();
+                let mend = SetupError::AGENT_MEND.to_owned();
                 let fault = Fault { field: "agent".to_owned(), what: why.to_string(), mend };
                 Self::field(&error, fault)
             }

@@ -8,15 +8,25 @@ use std::{
 use body_schema::{
     ask_tell::{Ask, Fault, Observation, Outcome, Session, Setup},
     calibration::Silent,
+    json::{self, Unreadable},
 };
 use pyo3::prelude::*;
-use serde::{Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::refusal::Failure;
 
 /// A session with a robot elsewhere.
 #[pyclass(frozen)]
 pub struct Engine(Mutex<Session>);
+
+/// What becomes of a suggestion that is not carried out.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Ended {
+    state: Outcome,
+    #[serde(default)]
+    reason: Option<String>,
+}
 
 type Answer = Result<String, Failure>;
 
@@ -55,14 +65,10 @@ impl Engine {
         Ok(answer?)
     }
 
-    fn outcome(&self, py: Python<'_>, id: u64, state: &str, reason: Option<&str>, now_s: f64) -> PyResult<String> {
+    fn outcome(&self, py: Python<'_>, id: u64, outcome: &str, now_s: f64) -> PyResult<String> {
         let answer = self.with(py, |mut session| -> Answer {
-            let outcome = serde_json::from_value::<Outcome>(state.into()).map_err(|_| Fault {
-                field: "state".to_owned(),
-                what: format!("`{state}` is no outcome"),
-                mend: "write `infeasible` or `abandoned`".to_owned(),
-            })?;
-            written(&session.outcome(id, outcome, reason, Some(now_s))?)
+            let Ended { state, reason } = read::<Ended>("outcome", outcome)?;
+            written(&session.outcome(id, state, reason.as_deref(), Some(now_s))?)
         });
         Ok(answer?)
     }
@@ -93,7 +99,8 @@ impl Engine {
     fn observations(&self, py: Python<'_>) -> PyResult<String> {
         let answer = self.with(py, |session| {
             let all = session.observations().iter().map(|told| {
-                serde_json::json!({ "told": told.observation, "answer": told.answer, "excluded": told.excluded })
+                let number = told.answer.observation;
+                serde_json::json!({ "number": number, "told": told.observation, "answer": told.answer, "excluded": told.excluded })
             });
             written(&all.collect::<Vec<_>>())
         });
@@ -183,7 +190,7 @@ pub fn setup_of_file(path: &str) -> PyResult<String> {
     let text = std::fs::read_to_string(path).map_err(|error| Failure::from(unreadable(error)))?;
     let folder = Path::new(path).parent().unwrap_or(Path::new("")).to_path_buf();
     let open = |file: &str| std::fs::read_to_string(folder.join(file)).map_err(|error| error.to_string());
-    let setup = Setup::from_toml(&text, &open).map_err(Failure::from)?;
+    let setup = Setup::from_toml(&text, &open).map_err(|error| Failure::from(error).of_file(path))?;
     Ok(written(&setup)?)
 }
 
@@ -199,9 +206,9 @@ fn written<T: Serialize + ?Sized>(value: &T) -> Answer {
     serde_json::to_string(value).map_err(|error| Failure::new("EngineError", error))
 }
 
-fn read<T: DeserializeOwned>(field: &str, text: &str) -> Result<T, Failure> {
-    serde_json::from_str(text).map_err(|error| {
-        let (field, mend) = (field.to_owned(), "write what the documentation says".to_owned());
-        Fault { field, what: error.to_string(), mend }.into()
+/// Reads JSON; `whole` is what is blamed where no field of it is.
+fn read<T: DeserializeOwned>(whole: &str, text: &str) -> Result<T, Failure> {
+    json::read(text.as_bytes()).map_err(|Unreadable { field, what, hint, .. }| {
+        Fault { field: field.unwrap_or_else(|| whole.to_owned()), what, mend: hint.to_owned() }.into()
     })
 }

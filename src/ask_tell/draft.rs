@@ -76,6 +76,7 @@ impl Draft {
             id: proposal.id + 1,
             revision: (self.revision + self.events.len()) as u64,
             client: ask.client.clone(),
+            joints: robot.names.clone(),
             configuration: self.ledger.named(&selection.movement.configuration),
             socket: socket.map(label),
             expected_gain: finite(selection.gain),

@@ -51,6 +51,11 @@ pub enum SetupError {
     Agent(ScenarioError),
 }
 
+impl SetupError {
+    /// What to do about an agent that cannot be made.
+    pub const AGENT_MEND: &str = "name a learner of the calibration, or an estimator and a policy";
+}
+
 impl From<Fault> for SetupError {
     fn from(fault: Fault) -> Self {
         Self::Invalid(vec![fault])

@@ -101,7 +101,9 @@ impl Ledger {
                     selection_ms: choice.selection_ms,
                 };
                 self.agent(AgentEvent::Proposed(proposal))?;
-                self.suggestions.push(Arc::new(suggestion.clone()));
+                // Those of older sessions do not say it.
+                let joints = self.scenario.robot.names.clone();
+                self.suggestions.push(Arc::new(Suggestion { joints, ..suggestion.clone() }));
             }
             Happened::Outcome { suggestion, state, .. } => {
                 self.end(*suggestion, (*state).into())?;

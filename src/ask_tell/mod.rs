@@ -53,8 +53,10 @@
 //!
 //! # Observations
 //!
-//! `configuration` is where the joints were, by name, in the units of the URDF (rad, m). `measurements` has one entry per
-//! channel; null, and an entry that is left out, mean that it saw nothing.
+//! `configuration` is where the joints were, by name, in the units of the URDF (rad, m); a list is refused. `measurements` has one
+//! entry per channel; null, and an entry that is left out, mean that it saw nothing. A joint more than a tenth of its range beyond its
+//! limits, or more than two turns beyond where it is asked to go, is refused, and a point more than a tenth of a picture's size outside
+//! it.
 //!
 //! | channel | its name | shape |
 //! |---|---|---|
@@ -69,7 +71,7 @@
 //! # Results
 //!
 //! [`Session::observations_csv`] and [`Session::calibration_toml`] are what `calibrate` reads; [`Session::calibrate`] does it
-//! here. See [`Results`].
+//! here. See [`Results`]. A setup whose observations `calibrate` could not read is refused by [`Session::open`].
 
 mod channel;
 mod draft;
@@ -81,6 +83,7 @@ mod ledger;
 mod limits;
 mod observation;
 mod prepare;
+mod rehearsal;
 mod results;
 mod session;
 mod setup;

@@ -1,8 +1,11 @@
 //! What a robot tells after it has moved.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, f64::consts::TAU, fmt};
 
-use serde::{Deserialize, Serialize};
+use serde::{
+    Deserialize, Deserializer, Serialize,
+    de::{MapAccess, Visitor, value::MapAccessDeserializer},
+};
 use serde_json::Value;
 
 use super::{ChannelShape, Fault, Shape, channel::SOCKET};
@@ -10,9 +13,10 @@ use crate::{
     experiment::Executed,
     kinematics::JointKind,
     magnitude::is_usable,
-    scenario::{Described, Scenario},
+    model::urdf::Segment,
+    scenario::Scenario,
     selection::Movement,
-    sensing::{Observation as Readings, Occasion},
+    sensing::{CameraKind, Observation as Readings, Occasion},
     similar::similar,
 };
 
@@ -25,6 +29,7 @@ pub struct Observation {
     #[serde(default, deserialize_with = "crate::whole::whole_or_none", skip_serializing_if = "Option::is_none")]
     pub suggestion_id: Option<u64>,
     /// Where the joints were, by name, in the units of the URDF (rad, m).
+    #[serde(deserialize_with = "by_name")]
     pub configuration: BTreeMap<String, f64>,
     /// By channel what it saw, in the shape of its kind (see the [module](super)); null where it saw nothing.
     #[serde(default)]
@@ -52,10 +57,58 @@ pub struct Answer {
     pub body_seems_changed: bool,
 }
 
-/// How far beyond its limits a joint may be said to be, as a share of its range: more is a mistake.
+/// How far beyond its limits a joint may be said to be, as a share of its range, and how far outside a picture a point, as a share of
+/// its size: more is a mistake.
 const BEYOND: f64 = 0.1;
+/// So many turns further than it is asked to go a joint may be said to be, whatever its limits: more are degrees.
+const TURNS: f64 = 2.0;
+
+/// Positions by name. A list is refused: it does not say which joint is which.
+fn by_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, f64>, D::Error> {
+    struct ByName;
+
+    impl<'de> Visitor<'de> for ByName {
+        type Value = BTreeMap<String, f64>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("the position of every joint by its name, as {\"elbow\": 0.5}, since a list does not say which joint is which")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+            BTreeMap::deserialize(MapAccessDeserializer::new(map))
+        }
+    }
+
+    deserializer.deserialize_map(ByName)
+}
+
+/// Whether two values are the same, numbers as numbers: 1 is 1.0.
+fn are_same(one: &Value, other: &Value) -> bool {
+    match (one, other) {
+        (Value::Number(one), Value::Number(other)) => one == other || one.as_f64() == other.as_f64(),
+        (Value::Array(one), Value::Array(other)) => {
+            one.len() == other.len() && one.iter().zip(other).all(|(one, other)| are_same(one, other))
+        }
+        (Value::Object(one), Value::Object(other)) => {
+            let is_there = |(key, value): (&String, &Value)| other.get(key).is_some_and(|other| are_same(value, other));
+            one.len() == other.len() && one.iter().all(is_there)
+        }
+        _ => one == other,
+    }
+}
 
 impl Observation {
+    /// Whether another tells the same. Numbers are compared as numbers, however they are written: 1 is 1.0.
+    pub fn tells_the_same(&self, other: &Self) -> bool {
+        let Self { suggestion_id, configuration, measurements } = self;
+        let is_there =
+            |(name, told): (&String, &Value)| other.measurements.get(name).is_some_and(|other| are_same(told, other));
+        *suggestion_id == other.suggestion_id
+            && *configuration == other.configuration
+            && measurements.len() == other.measurements.len()
+            && measurements.iter().all(is_there)
+    }
+
     /// The movement and its readings, by the channels of a scenario.
     pub(super) fn read(&self, scenario: &Scenario, shapes: &[ChannelShape]) -> Result<Executed, Fault> {
         let configuration = self.positions(scenario)?;
@@ -114,24 +167,67 @@ impl Observation {
         names.iter().map(of).collect()
     }
 
-    /// That no joint is said to be where it can hardly be.
-    pub(super) fn check_limits(&self, described: &Described) -> Result<(), Fault> {
-        for segment in described.chain.moving() {
-            let (Some((lower, upper)), Some(position)) = (segment.limits, self.configuration.get(&segment.name)) else {
-                continue;
-            };
-            // Where there is no limit to one side, of a turn.
-            let range = if (upper - lower).is_finite() { upper - lower } else { std::f64::consts::TAU };
-            let slack = BEYOND * range;
-            if !(lower - slack..=upper + slack).contains(position) {
-                let unit = if segment.kind.moves() == Some(JointKind::Prismatic) { "metres" } else { "radians" };
-                let what = format!("{position} is far beyond its limits in the URDF, {lower} and {upper}");
-                let mend = format!("write {unit}, or correct the limits");
-                return Err(Fault::new(format!("configuration.{}", segment.name), what, mend));
+    /// That nothing is told that can hardly be: a joint far beyond where it can go, a point far outside a picture. Such numbers are in
+    /// another unit, or of another joint.
+    pub(super) fn check_reach(
+        &self,
+        scenario: &Scenario,
+        shapes: &[ChannelShape],
+        executed: &Executed,
+    ) -> Result<(), Fault> {
+        let Scenario { robot, rig, .. } = scenario;
+        if let Some(described) = robot.described.as_deref() {
+            let asked = robot.limits.joints();
+            let mut joints = described.chain.moving().zip(asked).zip(&executed.movement.configuration);
+            joints.try_for_each(|((segment, asked), position)| within_reach(segment, *asked, *position))?;
+        }
+        let always = rig.channels().iter().zip(&executed.observation.readings);
+        let always = always.filter(|(channel, _)| channel.occasion() == Occasion::Always);
+        for ((channel, reading), ChannelShape { name, .. }) in always.zip(shapes) {
+            let camera = channel.sight().and_then(|(camera, _)| robot.equipment.cameras.get(camera));
+            if let (Some(camera), Some(reading)) = (camera, reading) {
+                within_picture(&format!("measurements.{name}"), camera, reading)?;
             }
         }
         Ok(())
     }
+}
+
+/// That a joint was not far beyond its limits, nor turned further than it is asked to by more than [`TURNS`].
+fn within_reach(segment: &Segment, asked: (f64, f64), position: f64) -> Result<(), Fault> {
+    let turns = segment.kind.moves() == Some(JointKind::Revolute);
+    let refuse = |what: String, mend: &str| Err(Fault::new(format!("configuration.{}", segment.name), what, mend));
+    if let Some((lower, upper)) = segment.limits {
+        // Where there is no limit to one side, of a turn.
+        let range = if (upper - lower).is_finite() { upper - lower } else { TAU };
+        let slack = BEYOND * range;
+        if !(lower - slack..=upper + slack).contains(&position) {
+            let what = format!("{position} is far beyond its limits in the URDF, {lower} and {upper}");
+            let mend = format!("write {}, or correct the limits", if turns { "radians" } else { "metres" });
+            return refuse(what, &mend);
+        }
+    }
+    let (from, to) = asked;
+    if turns && !(from - TURNS * TAU..=to + TURNS * TAU).contains(&position) {
+        let what =
+            format!("{position} is more than {TURNS} turns beyond where it is asked to go, {from:.4} to {to:.4}");
+        return refuse(what, "write radians, and leave out whole turns");
+    }
+    Ok(())
+}
+
+/// That points are not far outside a camera's picture.
+fn within_picture(field: &str, camera: &CameraKind, reading: &[f64]) -> Result<(), Fault> {
+    let [width, height] = camera.size_px;
+    let is_within = |x: f64, size: f64| (-BEYOND * size..=(1.0 + BEYOND) * size).contains(&x);
+    let outside = |point: &&[f64]| !matches!(point, [u, v] if is_within(*u, width) && is_within(*v, height));
+    let Some(point) = reading.chunks(2).find(outside) else { return Ok(()) };
+    let what = format!("{point:?} is far outside the picture of `{}`, {width} x {height} px", camera.name);
+    Err(Fault::new(
+        field,
+        what,
+        "write pixels from the picture's upper left corner, or correct `size_px` of the camera",
+    ))
 }
 
 fn unknown<'a>(field: &str, kind: &str, name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Fault {

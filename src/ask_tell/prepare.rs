@@ -116,9 +116,7 @@ impl Session {
             return Err(Refusal::UnknownSuggestion { id, count });
         }
         let executed = told.read(&draft.ledger.scenario, &draft.ledger.shapes)?;
-        if let Some(described) = self.scenario().robot.described.as_deref() {
-            told.check_limits(described)?;
-        }
+        told.check_reach(self.scenario(), self.channels(), &executed)?;
         let experiment = &draft.ledger.experiment;
         if let Some(failure) = experiment.agent().and_then(Agent::failure) {
             return Err(Refusal::Ended(failure.to_owned()));

@@ -39,9 +39,13 @@ impl Session {
         if csv.lines().count() < 2 {
             return Err(ResultsError::Nothing);
         }
-        let open = |file: &str| if file == FILE { Ok(csv.clone()) } else { self.setup().open(file) };
-        let scenario = Scenario::parse("calibration.toml", &self.calibration_toml(), &open)?;
-        Ok(Results { scenario })
+        Ok(Results { scenario: self.recorded(&csv)? })
+    }
+
+    /// What `calibrate` makes of a table of observations, and of the file that goes with it.
+    pub(super) fn recorded(&self, csv: &str) -> Result<Scenario, ScenarioError> {
+        let open = |file: &str| if file == FILE { Ok(csv.to_owned()) } else { self.setup().open(file) };
+        Scenario::parse("calibration.toml", &self.calibration_toml(), &open)
     }
 
     /// Everything that `calibrate` finds, its report and its files.

@@ -11,6 +11,7 @@ use super::{
 use crate::{
     estimation::Belief,
     experiment::{Description, Experiment, StepReport},
+    json::repeated,
     scenario::Scenario,
 };
 
@@ -29,12 +30,19 @@ impl Session {
     ///
     /// [`SetupError`] names the key that is wrong, and how to mend it.
     pub fn open(setup: Setup) -> Result<Self, SetupError> {
+        let session = Self::begun(setup)?;
+        session.check_results()?;
+        Ok(session)
+    }
+
+    /// The same of a setup that was opened before: whether there will be results is not asked again.
+    fn begun(setup: Setup) -> Result<Self, SetupError> {
         let scenario = Arc::new(setup.scenario()?);
         let ledger = Ledger::new(&setup, scenario)?;
         Ok(Self { setup, ledger, events: Vec::new() })
     }
 
-    /// A session of stored events. Nothing is chosen again.
+    /// A session of stored events. Nothing is chosen again. Whether there will be [results](Self::check_results) is not asked.
     ///
     /// # Errors
     ///
@@ -53,7 +61,7 @@ impl Session {
         events: Vec<Event>,
         tell: &mut dyn FnMut(StepReport),
     ) -> Result<Self, ReplayError> {
-        let Self { setup, ledger, .. } = Self::open(setup)?;
+        let Self { setup, ledger, .. } = Self::begun(setup)?;
         tell(ledger.experiment.latest().clone());
         let ledger = ledger.replayed(&events, tell).map_err(|(index, what)| ReplayError::Event { index, what })?;
         Ok(Self { setup, ledger, events })
@@ -70,6 +78,9 @@ impl Session {
             version: u32,
         }
         let not_a_session = |error: serde_json::Error| ReplayError::NotASession(error.to_string());
+        if let Some(key) = repeated(text.as_bytes()) {
+            return Err(ReplayError::NotASession(format!("`{key}` is there twice")));
+        }
         let Version { version: found } = serde_json::from_str(text).map_err(not_a_session)?;
         if found > VERSION {
             return Err(ReplayError::Version { found, known: VERSION });

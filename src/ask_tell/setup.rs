@@ -60,7 +60,12 @@ impl Setup {
     ///
     /// [`SetupError::Invalid`] where it is no TOML or the description cannot be opened.
     pub fn from_toml(text: &str, open: &dyn Fn(&str) -> Result<String, String>) -> Result<Self, SetupError> {
-        let unreadable = |error: toml::de::Error| Fault::new("calibration", error.message(), "correct the TOML");
+        let unreadable = |error: toml::de::Error| {
+            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+            let line = before.matches('\n').count() + 1;
+            let what = format!("line {line} of the calibration file: {}", error.message());
+            Fault::new("calibration", what, "correct the TOML")
+        };
         let mut table: Table = text.parse().map_err(unreadable)?;
         table.remove("measurements");
         if let Some(toml::Value::Table(robot)) = table.get_mut("robot")
@@ -130,7 +135,7 @@ impl Setup {
             return Err(Fault::new("robot.urdf", what, "write the text of the file, not its name"));
         }
         let description = Urdf::parse(urdf).map_err(|UrdfError { line, what, mend, .. }| {
-            Fault::new("robot.urdf", format!("line {line}: {what}"), mend)
+            Fault::new("robot.urdf", format!("{URDF}, line {line}: {what}"), mend)
         })?;
         // In letters that can stand in names of files and addresses.
         let is_sound = |c: &char| c.is_ascii_alphanumeric() || "-_".contains(*c);

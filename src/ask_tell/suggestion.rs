@@ -2,10 +2,10 @@
 
 use std::{collections::BTreeMap, fmt};
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer, ser::SerializeStruct};
 
-/// A movement that is suggested.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A movement that is suggested. As JSON its `configuration` lists the joints in the order of `joints`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[cfg_attr(feature = "app", derive(utoipa::ToSchema))]
 pub struct Suggestion {
     /// Counted from 1 over all clients.
@@ -15,6 +15,9 @@ pub struct Suggestion {
     /// For whom; null for who gave no name.
     #[serde(default)]
     pub client: Option<String>,
+    /// The names of the joints, base first: the order in which lists of positions are written.
+    #[serde(default)]
+    pub joints: Vec<String>,
     /// Where to move, by joint name, in the units of the URDF (rad, m).
     pub configuration: BTreeMap<String, f64>,
     /// The socket that the target is to be held in, as `PLACE/NAME`; null without sockets.
@@ -36,6 +39,43 @@ pub struct Suggestion {
     /// When it expires, seconds since 1970; null if it does not.
     #[serde(default)]
     pub expires_at_s: Option<f64>,
+}
+
+impl Serialize for Suggestion {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self { id, revision, client, joints, configuration, socket, .. } = self;
+        let Self { expected_gain, expected_error_mm_after, chance_seen, travel_rad, state, expires_at_s, .. } = self;
+        let mut fields = serializer.serialize_struct("Suggestion", 12)?;
+        fields.serialize_field("id", id)?;
+        fields.serialize_field("revision", revision)?;
+        fields.serialize_field("client", client)?;
+        fields.serialize_field("joints", joints)?;
+        fields.serialize_field("configuration", &InOrder { joints, configuration })?;
+        fields.serialize_field("socket", socket)?;
+        fields.serialize_field("expected_gain", expected_gain)?;
+        fields.serialize_field("expected_error_mm_after", expected_error_mm_after)?;
+        fields.serialize_field("chance_seen", chance_seen)?;
+        fields.serialize_field("travel_rad", travel_rad)?;
+        fields.serialize_field("state", state)?;
+        fields.serialize_field("expires_at_s", expires_at_s)?;
+        fields.end()
+    }
+}
+
+/// A configuration whose joints are written in this order. Programs that take the values of an object in the order of their text
+/// then have them base first.
+struct InOrder<'a> {
+    joints: &'a [String],
+    configuration: &'a BTreeMap<String, f64>,
+}
+
+impl Serialize for InOrder<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self { joints, configuration } = self;
+        let named = joints.iter().filter_map(|name| configuration.get_key_value(name));
+        let others = configuration.iter().filter(|(name, _)| !joints.contains(name));
+        serializer.collect_map(named.chain(others))
+    }
 }
 
 /// What became of a suggestion; see the [module](super).

@@ -3,7 +3,10 @@
 use toml::{Table, Value};
 
 use super::{ChannelShape, Session, Shape, channel::SOCKET};
-use crate::table::{Layout, Reading, Titles};
+use crate::{
+    experiment::Executed,
+    table::{Layout, Reading, Titles},
+};
 
 /// What the table is called.
 pub(super) const FILE: &str = "observations.csv";
@@ -45,6 +48,14 @@ impl Session {
     /// rad and m, readings in the columns that the calibration names, or else titled as `docs/calibrate.md` says. `calibrate`
     /// reads it by the file that [`calibration_toml`](Self::calibration_toml) gives.
     pub fn observations_csv(&self) -> String {
+        let counted = self.observations().iter().filter(|told| !told.excluded);
+        let read = counted.filter_map(|told| told.observation.read(self.scenario(), self.channels()).ok());
+        let seen: Vec<Executed> = read.filter(|executed| !executed.observation.is_miss()).collect();
+        self.csv_of(&seen)
+    }
+
+    /// The same of these observations.
+    pub(super) fn csv_of(&self, observations: &[Executed]) -> String {
         let mut writer = csv::Writer::from_writer(Vec::new());
         let names = &self.scenario().robot.names;
         let cells = self.cells();
@@ -57,11 +68,7 @@ impl Session {
         titles.extend(names.iter().cloned().chain(cells.iter().flat_map(|cells| cells.titles.clone())));
         // Writing to memory does not fail, and every row is as long as the titles.
         let _ = writer.write_record(&titles);
-        for told in self.observations().iter().filter(|told| !told.excluded) {
-            let Ok(executed) = told.observation.read(self.scenario(), self.channels()) else { continue };
-            if executed.observation.is_miss() {
-                continue;
-            }
+        for executed in observations {
             let held = executed.movement.socket.and_then(|socket| sockets.get(socket));
             let place = held.and_then(|socket| socket.place.clone()).unwrap_or_default();
             let mut row: Vec<String> = Vec::new();

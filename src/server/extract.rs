@@ -8,7 +8,7 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::IntoResponse,
 };
-use serde::de::{DeserializeOwned, IgnoredAny, IntoDeserializer};
+use serde::de::{DeserializeOwned, IntoDeserializer};
 
 use tokio::time::timeout;
 
@@ -16,7 +16,10 @@ use super::{
     App, Limits,
     problem::{Kind, Problem},
 };
-use crate::whole::MOST as MOST_WHOLE;
+use crate::{
+    json::{self, Unreadable},
+    whole::MOST as MOST_WHOLE,
+};
 
 /// A JSON body. An absent one, and `null`, count as `{}`, so that defaults need no body.
 pub(super) struct JsonBody<T>(pub(super) T);
@@ -71,33 +74,16 @@ fn is_json(headers: &HeaderMap) -> bool {
 }
 
 pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
-    // Syntax first: a body that breaks off is not blamed on the field where it does.
-    serde_json::from_slice::<IgnoredAny>(bytes)
-        .map_err(|error| Problem::new(Kind::Malformed, format!("the body is not JSON: {error}")))?;
-    if !bytes.trim_ascii_start().starts_with(b"{") {
-        return Err(Problem::new(Kind::InvalidValue, "the body must be a JSON object"));
-    }
-    // Then what it says, which also finds repeated fields and numbers that are too large.
-    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
-    serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
-        let message = error.inner().to_string();
-        let path = error.path().to_string();
-        // Missing, unknown and repeated fields are named in the message only; the path may end above them.
-        let named = message.split_once("field `").and_then(|(_, rest)| rest.split_once('`')).map(|(name, _)| name);
-        let field = match (named, path.as_str()) {
-            (Some(name), ".") => Some(name.to_owned()),
-            (None, ".") => None,
-            (Some(name), path) if path != name && !path.ends_with(&format!(".{name}")) => {
-                Some(format!("{path}.{name}"))
-            }
-            (_, path) => Some(path.to_owned()),
-        };
-        let what = message.split(" at line ").next().unwrap_or(&message);
+    json::read(bytes).map_err(|Unreadable { is_malformed, field, what, hint }| {
+        if is_malformed {
+            return Problem::new(Kind::Malformed, what);
+        }
         let detail = match &field {
-            Some(field) => format!("`{field}`: {what}"),
-            None => what.to_owned(),
+            Some(field) => format!("`{field}`: {what}; {hint}"),
+            None => format!("{what}; {hint}"),
         };
-        Problem { field: field.map(Into::into), ..Problem::new(Kind::InvalidValue, detail) }
+        let problem = Problem::new(Kind::InvalidValue, detail).hint(what, hint);
+        field.into_iter().fold(problem, Problem::field)
     })
 }
 
@@ -148,7 +134,12 @@ pub(super) fn last_event_id(headers: &HeaderMap) -> Result<Option<u64>, Problem>
 pub(super) fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
     const MOST_BYTES: usize = 200;
     const NAME: &str = "Idempotency-Key";
-    let Some(value) = headers.get(NAME) else { return Ok(None) };
+    let mut given = headers.get_all(NAME).iter();
+    let Some(value) = given.next() else { return Ok(None) };
+    if given.next().is_some() {
+        let detail = format!("`{NAME}` is there twice; send one with each observation");
+        return Err(Problem::new(Kind::Malformed, detail).field(NAME));
+    }
     let key = value.to_str().ok().filter(|key| (1..=MOST_BYTES).contains(&key.len()));
     let detail = || format!("`{NAME}` must have 1 to {MOST_BYTES} visible characters of ASCII");
     key.map(|key| Some(key.to_owned())).ok_or_else(|| Problem::new(Kind::Malformed, detail()).field(NAME))
@@ -207,6 +198,21 @@ mod tests {
         ] {
             let problem = parse::<Body>(body.as_bytes()).expect_err(body);
             assert_eq!((problem.status, problem.field.as_deref()), (status, field), "{body}: {}", problem.detail);
+        }
+    }
+
+    #[test]
+    fn there_is_one_idempotency_key_or_none() {
+        let with = |keys: &[&'static str]| {
+            let mut headers = HeaderMap::new();
+            keys.iter().for_each(|key| drop(headers.append("idempotency-key", key.parse().expect("a value"))));
+            idempotency_key(&headers)
+        };
+        assert_eq!(with(&[]).expect("none"), None);
+        assert_eq!(with(&["one"]).expect("one").as_deref(), Some("one"));
+        for keys in [&["one", "one"][..], &["one", "two"], &["one", ""], &[""]] {
+            let problem = with(keys).expect_err("not one");
+            assert_eq!((problem.status, problem.field.as_deref()), (400, Some("Idempotency-Key")), "{keys:?}");
         }
     }
 

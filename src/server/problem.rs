@@ -38,6 +38,14 @@ pub struct Problem {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<String>)]
     pub field: Option<Box<str>>,
+    /// What is wrong with `field`: the first part of `detail`, where it has two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<String>)]
+    pub what: Option<Box<str>>,
+    /// What to write instead: the second part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<String>)]
+    pub hint: Option<Box<str>>,
     /// The session's actual step, where it matters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<u64>,
@@ -83,6 +91,8 @@ pub(super) enum Kind {
     UnknownSession,
     UnknownLearner,
     UnknownSuggestion,
+    /// The same, where the body names it.
+    SuggestionOfBody,
     UnknownObservation,
     MethodNotAllowed,
     StepMismatch,
@@ -129,6 +139,7 @@ impl Kind {
             Self::UnknownSession => (404, urn!("unknown-session"), "There is no such session"),
             Self::UnknownLearner => (404, urn!("unknown-learner"), "There is no such learner"),
             Self::UnknownSuggestion => (404, urn!("unknown-suggestion"), "There is no such suggestion"),
+            Self::SuggestionOfBody => (422, urn!("unknown-suggestion"), "There is no such suggestion"),
             Self::UnknownObservation => (404, urn!("unknown-observation"), "There is no such observation"),
             Self::MethodNotAllowed => (405, urn!("method-not-allowed"), "This method is not allowed here"),
             Self::StepMismatch => (409, urn!("step-mismatch"), "The session is at another step"),
@@ -165,11 +176,17 @@ impl Problem {
     pub(super) fn new(kind: Kind, detail: impl Into<String>) -> Self {
         let (status, urn, title) = kind.parts();
         let detail = detail.into().into();
-        Self { kind: urn, title, status, detail, field: None, step: None, remaining: None, request_id: None }
+        let (field, what, hint, step, remaining, request_id) = Default::default();
+        Self { kind: urn, title, status, detail, field, what, hint, step, remaining, request_id }
     }
 
     pub(super) fn field(self, field: impl Into<String>) -> Self {
         Self { field: Some(field.into().into()), ..self }
+    }
+
+    /// What is wrong, and what to do about it, each by itself.
+    pub(super) fn hint(self, what: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self { what: Some(what.into().into()), hint: Some(hint.into().into()), ..self }
     }
 
     pub(super) fn step(self, step: u64) -> Self {
@@ -256,7 +273,14 @@ impl From<SetupError> for Problem {
             },
             SetupError::Agent(_) => "agent".to_owned(),
         };
-        Self::new(Kind::InvalidValue, error.to_string()).field(field)
+        let (what, hint) = match &error {
+            SetupError::Invalid(faults) => match faults.first() {
+                Some(fault) => (fault.what.clone(), fault.mend.clone()),
+                None => (error.to_string(), String::new()),
+            },
+            SetupError::Agent(why) => (why.to_string(), SetupError::AGENT_MEND.to_owned()),
+        };
+        Self::new(Kind::InvalidValue, error.to_string()).field(field).hint(what, hint)
     }
 }
 
@@ -281,6 +305,10 @@ impl From<Refusal> for Problem {
             Refusal::Stale => (Kind::Internal, None),
         };
         let problem = Self::new(kind, refusal.to_string());
+        let problem = match &refusal {
+            Refusal::Field(fault) => problem.hint(fault.what.as_str(), fault.mend.as_str()),
+            _ => problem,
+        };
         field.into_iter().fold(problem, Self::field)
     }
 }

@@ -159,6 +159,80 @@ async fn an_observation_counts_once_however_often_it_is_sent() {
     problem(send(&"x".repeat(201), 3).await, 400, Some("Idempotency-Key")).await;
     assert_eq!(send("three", 1).await.status(), StatusCode::CREATED, "the same may be seen twice");
     assert_eq!(server.get_json(&session).await["status"]["observations"], 3);
+
+    // The same numbers in other words are the same, under one key.
+    let raw = async |keys: &[&str], body: &str| {
+        let request = server.request(Method::POST, &path).header("content-type", "application/json");
+        let request = keys.iter().fold(request, |request, key| request.header("idempotency-key", *key));
+        request.body(body.to_owned()).send().await.expect("an answer")
+    };
+    let one = r#"{"configuration":{"pan":1,"lift":0.5,"elbow":-1},"measurements":{"marker":[0.4,0,1]}}"#;
+    let same = r#"{"measurements":{"marker":[4e-1,0.0,1.0]},"configuration":{"elbow":-1.0,"lift":5e-1,"pan":1.0}}"#;
+    let other = one.replace("0.4", "0.41");
+    assert_eq!(raw(&["four"], one).await.status(), StatusCode::CREATED);
+    assert_eq!(raw(&["four"], same).await.status(), StatusCode::OK);
+    problem(raw(&["four"], &other).await, 409, Some("Idempotency-Key")).await;
+    problem(raw(&["five", "five"], one).await, 400, Some("Idempotency-Key")).await;
+    problem(raw(&["five", "six"], one).await, 400, Some("Idempotency-Key")).await;
+    assert_eq!(server.get_json(&session).await["status"]["observations"], 4);
+    server.stop().await;
+}
+
+/// What is wrong, and what to write instead, each by itself.
+#[tokio::test]
+async fn a_wrong_value_is_named_with_a_hint() {
+    let server = Server::start().await;
+    let session = server.open(robot::opening()).await;
+    let observations = format!("{session}/observations");
+    let sent = async |path: &str, body: &str| {
+        let request = server.request(Method::POST, path).header("content-type", "application/json");
+        request.body(body.to_owned()).send().await.expect("an answer")
+    };
+    let opening = |from: &str, to: &str| {
+        let text = robot::opening().to_string();
+        assert!(text.contains(from), "{text}");
+        text.replace(from, to)
+    };
+    let sensor = r#""sensor":{"channel":"position""#;
+    let (sessions, at) = ("/v1/sessions", r#""pan":0,"lift":0,"elbow":0"#);
+    for (path, body, field, hint) in [
+        (&*observations, r#"{"configuration":[0,0,0]}"#.to_owned(), "configuration", ""),
+        (&observations, format!(r#"{{"configuration":{{{at},"pan":1}}}}"#), "configuration.pan", "once"),
+        (
+            &observations,
+            format!(r#"{{"configuration":{{{at}}},"measurements":{{"marker":[0,0,0],"marker":null}}}}"#),
+            "measurements.marker",
+            "once",
+        ),
+        (
+            &observations,
+            r#"{"configuration":{"pan":200,"lift":0,"elbow":0}}"#.to_owned(),
+            "configuration.pan",
+            "radians",
+        ),
+        (&observations, format!(r#"{{"configuration":{{{at}}},"suggestion_id":9}}"#), "suggestion_id", ""),
+        (sessions, opening(r#""name":"three""#, r#""name":"three","name":"four""#), "calibration.name", "once"),
+        (sessions, opening(r#""world":"outside""#, r#""world":"outside","seed":1,"seed":1"#), "seed", "once"),
+        (sessions, opening(r#""hypotheses":2"#, r#""hypotheses":5000"#), "calibration.smoother.hypotheses", "1000"),
+        (sessions, opening(r#""ahead":2"#, r#""ahead":500"#), "calibration.selection.ahead", "100"),
+        (
+            sessions,
+            opening(sensor, &format!(r#"{sensor},"columns":["pan","y","z"]"#)),
+            "calibration.sensor.columns",
+            "columns",
+        ),
+    ] {
+        let found = problem(sent(path, &body).await, 422, Some(field)).await;
+        let detail = found["detail"].as_str().expect("text");
+        if field != "suggestion_id" {
+            let [what, told] = ["what", "hint"].map(|part| found[part].as_str().unwrap_or_else(|| panic!("{found}")));
+            assert!(!what.is_empty() && detail.contains(what) && detail.contains(told), "{found}");
+            assert!(!told.is_empty() && told.contains(hint), "{found}");
+        } else {
+            assert_eq!(found["type"], "urn:body-schema:problem:unknown-suggestion");
+        }
+    }
+    assert_eq!(server.get_json(&session).await["status"]["observations"], 0);
     server.stop().await;
 }
 

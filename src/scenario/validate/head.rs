@@ -1,17 +1,24 @@
 //! The head that watches.
 
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 use toml::Spanned;
 
 use super::{Check, raw};
 use crate::{
     kinematics::JointKind,
-    scenario::Robot,
+    model::State,
+    scenario::{Prior, Robot},
     selection::Watch,
     sensing::{Head, Rig},
 };
 
 /// The limits of pan and tilt unless told otherwise, degrees.
 const SERVO_DEG: f64 = 15.0;
+/// So many robots are drawn to judge whether a pose may be in view, and one in so many has to be seen.
+const DRAWS: usize = 2000;
+const LEAST_SEEN: usize = 200;
 /// The half-angle of the lens unless told otherwise, degrees.
 const LENS_DEG: f64 = 20.0;
 
@@ -58,17 +65,29 @@ impl Check<'_> {
         Some(Watch { head: Some(head), visible_pose })
     }
 
-    /// What is known to be seen without a head: a posture in view of a sensor that sees some postures only.
-    pub(super) fn view(&mut self, spanned: &Spanned<raw::View>, robot: &Robot, rig: &Rig) -> Option<Watch> {
+    /// What is known to be seen without a head: a posture in view of a sensor that sees some postures only. Of a robot elsewhere nobody
+    /// knows exactly where things are; `prior` says how well.
+    pub(super) fn view(
+        &mut self,
+        spanned: &Spanned<raw::View>,
+        robot: &Robot,
+        rig: &Rig,
+        prior: Option<&Prior>,
+    ) -> Option<Watch> {
         let raw = &spanned.get_ref().visible_pose_deg;
         let key = "view.visible_pose_deg";
         let visible_pose = self.pose(key, raw, robot)?;
-        let mut clearances = vec![0.0; rig.channels().len()];
-        rig.clearances(None, &robot.state, &visible_pose, &mut clearances);
-        let best = clearances.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if best < 0.0 {
-            let what = format!("nothing is in view there: it is {:.1} degrees outside", -best.to_degrees());
-            self.problem(raw.span(), key, what, "name a pose in view");
+        let within = clearance(rig, &robot.state, &visible_pose);
+        if within < 0.0 && !prior.is_some_and(|prior| may_be_seen(rig, robot, prior, &visible_pose)) {
+            let (what, mend) = match prior {
+                Some(_) => (
+                    "whatever is known of where things are allows",
+                    "name a pose in view, or say how wrong `base`, `camera` and `target` may be: `known = { to_m = …, to_deg = … }`",
+                ),
+                None => ("as described", "name a pose in view"),
+            };
+            let what = format!("nothing is in view there, {what}: it is {:.1} degrees outside", -within.to_degrees());
+            self.problem(raw.span(), key, what, mend);
             return None;
         }
         if !rig.has_view() {
@@ -103,4 +122,24 @@ impl Check<'_> {
         }
         Some(pose)
     }
+}
+
+/// How far the channel that sees most is inside what it can see, radians.
+fn clearance(rig: &Rig, state: &State, pose: &[f64]) -> f64 {
+    let mut clearances = vec![0.0; rig.channels().len()];
+    rig.clearances(None, state, pose, &mut clearances);
+    clearances.into_iter().fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Whether something may be in view at a pose of a robot that is known as `prior` says: whether it is of one robot in [`LEAST_SEEN`]
+/// that are drawn from the prior.
+fn may_be_seen(rig: &Rig, robot: &Robot, prior: &Prior, pose: &[f64]) -> bool {
+    let layout = &robot.layout;
+    let deviations = prior.standard_deviations(layout);
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let seen = (0..DRAWS).filter(|_| {
+        let delta = deviations.map(|deviation| deviation * rng.sample::<f64, _>(StandardNormal));
+        clearance(rig, &robot.state.retract(layout, &delta), pose) >= 0.0
+    });
+    seen.take(DRAWS / LEAST_SEEN).count() == DRAWS / LEAST_SEEN
 }

@@ -46,6 +46,10 @@ const USUAL_TORQUE: f64 = 5.0;
 const USUAL_ZERO_RAD: f64 = 0.05;
 const USUAL_ZERO_M: f64 = 0.005;
 
+/// So many hypotheses there may be, and so many movements may be planned.
+const MOST_HYPOTHESES: u64 = 1000;
+const MOST_PLANNED: u64 = 100;
+
 /// How far from 1 the length of an axis may be: what is lost by writing six digits.
 const UNIT_TOLERANCE: f64 = 1e-5;
 
@@ -146,6 +150,17 @@ impl Check<'_> {
         *value.get_ref()
     }
 
+    /// A whole number from 1 to `most`; `usual` where none is given.
+    fn count(&mut self, key: &str, value: Option<&Spanned<u64>>, usual: usize, most: u64) -> usize {
+        let Some(value) = value else { return usual };
+        let number = *value.get_ref();
+        if !(1..=most).contains(&number) {
+            let mend = format!("write a whole number from 1 to {most}");
+            self.problem(value.span(), key, format!("{number} is out of range"), mend);
+        }
+        number.clamp(1, most) as usize
+    }
+
     fn point(&mut self, key: &str, value: &Spanned<raw::Exactly<f64, 3>>) -> Point3<f64> {
         let raw::Exactly(coordinates) = *value.get_ref();
         if !are_usable(&coordinates) {
@@ -200,7 +215,8 @@ impl Check<'_> {
         let readings = self.readings(raw, &robot, rig.as_deref());
         let rig = rig.map(|rig| Arc::new(rig.as_ref().clone().with_joint_noise(readings.noise.clone())));
         let rows = recorded.as_ref().map(|(_, held_out)| held_out.fewest_training() as u64);
-        let world = self.world(raw, &robot, rig.as_deref(), recorded);
+        let prior = self.prior(raw, &robot);
+        let world = self.world(raw, &robot, rig.as_deref(), &prior, recorded);
         let kind = match (self.is_outside, &raw.measurements) {
             (true, _) => WorldKind::Outside,
             (false, Some(_)) => WorldKind::Measured,
@@ -227,7 +243,7 @@ impl Check<'_> {
             name: name.clone(),
             title: raw.title.clone(),
             steps: self.at_least_one("steps", &raw.steps).min(rows.unwrap_or(u64::MAX)),
-            prior: self.prior(raw, &robot),
+            prior,
             filter,
             unscented,
             smoother,
@@ -352,12 +368,11 @@ impl Check<'_> {
             // A sensor without noise would make the posterior infinitely sharp.
             None => rig.map_or(0.0, Rig::sigma).max(1e-5),
         };
-        let mut count = |key: &str, value: Option<&Spanned<u64>>, default: usize| {
-            value.map_or(default, |value| self.at_least_one(key, value).min(1000) as usize)
-        };
+        let kept = given.and_then(|given| given.hypotheses.as_ref());
+        let spawned = given.and_then(|given| given.spawned.as_ref());
         let hypotheses = HypothesisSettings {
-            kept: count("smoother.hypotheses", given.and_then(|given| given.hypotheses.as_ref()), default.kept),
-            spawned: count("smoother.spawned", given.and_then(|given| given.spawned.as_ref()), default.spawned),
+            kept: self.count("smoother.hypotheses", kept, default.kept, MOST_HYPOTHESES),
+            spawned: self.count("smoother.spawned", spawned, default.spawned, MOST_HYPOTHESES),
         };
         // Of recorded data nobody knows more than the filter assumes.
         let is_told = raw.measurements.is_some() || self.is_outside;
@@ -451,13 +466,10 @@ impl Check<'_> {
             ..Settings::default()
         };
         let default = Planning::default();
-        let mut count = |key: &str, value: &Option<Spanned<u64>>, default: usize| {
-            value.as_ref().map_or(default, |value| self.at_least_one(key, value).min(100) as usize)
-        };
         let planning = Planning {
             optimality: raw.criterion,
-            ahead: count("selection.ahead", &raw.ahead, default.ahead),
-            batch: count("selection.batch", &raw.batch, default.batch),
+            ahead: self.count("selection.ahead", raw.ahead.as_ref(), default.ahead, MOST_PLANNED),
+            batch: self.count("selection.batch", raw.batch.as_ref(), default.batch, MOST_PLANNED),
             ..default
         };
         SelectionSpec { search, units, planning }

@@ -12,7 +12,7 @@ use super::{
     recorded_sockets::{SIGMA_DISTANCE_M, SIGMA_M},
 };
 use crate::{
-    scenario::{Robot, WorldSpec},
+    scenario::{Prior, Robot, WorldSpec},
     sensing::{Observation, Occasion, Rig},
     table::{TableError, Titles},
 };
@@ -75,6 +75,7 @@ impl Check<'_> {
             let titles = Titles::listed(columns.clone());
             let read = titles.and_then(|titles| titles.reading_titled(told(keys.get_ref(), robot).0, columns));
             if let Err(TableError { what, mend }) = read {
+                let what = format!("the session's observations.csv {what}");
                 self.problem(keys.span(), "sensor.columns", what, mend);
             }
         }
@@ -108,9 +109,15 @@ impl Check<'_> {
     }
 
     /// The world of a robot elsewhere.
-    pub(super) fn outside(&mut self, raw: &raw::Scenario, robot: &Robot, rig: Option<&Rig>) -> WorldSpec {
+    pub(super) fn outside(
+        &mut self,
+        raw: &raw::Scenario,
+        robot: &Robot,
+        rig: Option<&Rig>,
+        prior: &Prior,
+    ) -> WorldSpec {
         let watch = match (&raw.view, rig) {
-            (Some(view), Some(rig)) => self.view(view, robot, rig),
+            (Some(view), Some(rig)) => self.view(view, robot, rig, Some(prior)),
             _ => None,
         };
         self.columns_to_write(raw, robot);

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::{
     experiment::Outliers,
-    scenario::{HeldOut, InitialError, Measurements, Robot, WorldSpec},
+    scenario::{HeldOut, InitialError, Measurements, Prior, Robot, WorldSpec},
     sensing::{Channel, Rig, Socket},
 };
 
@@ -17,10 +17,11 @@ impl Check<'_> {
         raw: &raw::Scenario,
         robot: &Robot,
         rig: Option<&Rig>,
+        prior: &Prior,
         recorded: Option<(Measurements, HeldOut)>,
     ) -> Option<WorldSpec> {
         if self.is_outside {
-            return Some(self.outside(raw, robot, rig));
+            return Some(self.outside(raw, robot, rig, prior));
         }
         let socket = raw.sockets.first().map(Spanned::span);
         let is_replayed = raw.measurements.is_some();
@@ -47,7 +48,7 @@ impl Check<'_> {
                 );
                 let watch = match (&raw.head, &raw.view, rig) {
                     (Some(head), None, _) => self.head(head, robot),
-                    (None, Some(view), Some(rig)) => self.view(view, robot, rig),
+                    (None, Some(view), Some(rig)) => self.view(view, robot, rig, None),
                     (Some(_), Some(view), _) => {
                         let mend = "remove [view]: the head says which pose is in view";
                         self.problem(view.span(), "view", "there is a head that watches", mend);

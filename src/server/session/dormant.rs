@@ -233,7 +233,8 @@ impl Sessions {
             return Ok(remembered);
         }
         let (Some(Stored { setup, events, .. }), id) = (self.load(known.id).await?, known.id) else { return Ok(None) };
-        let opened = spawn_blocking(move || ask_tell::Session::open(setup)).await.map_err(|_| no_engine())?;
+        let opened =
+            spawn_blocking(move || ask_tell::Session::replay(setup, Vec::new())).await.map_err(|_| no_engine())?;
         let Ok(session) = opened else { return Ok(None) };
         let resource = SessionResource {
             id: id.to_string(),

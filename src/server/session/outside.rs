@@ -116,6 +116,7 @@ impl Elsewhere {
         let session = replayed.map_err(|error| if is_new { unusable(error) } else { error.into() })?;
         if is_new {
             session.check_within(most)?;
+            session.check_results()?;
         }
         // Each life of a session in memory records anew: viewers must not take two recordings for one.
         let target = Target::live(shared.live.clone()).with_recording_id(Uuid::new_v4().to_string());
@@ -206,7 +207,7 @@ impl Elsewhere {
         if let Some(key) = key
             && let Some(known) = self.keys.get(key).and_then(|number| self.told(*number))
         {
-            if known.observation == *told {
+            if known.observation.tells_the_same(told) {
                 return Ok((known.answer.clone(), true));
             }
             let detail = format!(
@@ -221,7 +222,7 @@ impl Elsewhere {
             let problem = Problem::from(refusal);
             // It is not the address that is wrong.
             match problem.is(Kind::UnknownSuggestion) {
-                true => Problem::new(Kind::InvalidValue, problem.detail).field("suggestion_id"),
+                true => Problem::new(Kind::SuggestionOfBody, problem.detail).field("suggestion_id"),
                 false => problem,
             }
         })?;
