@@ -122,7 +122,7 @@ impl Session {
     }
 
     /// The titles of place and socket.
-    fn socket_titles(&self) -> [String; 2] {
+    pub(super) fn socket_titles(&self) -> [String; 2] {
         let given = |key: &str| self.setup().calibration.get("sockets")?.get(key)?.as_str().map(str::to_owned);
         [("place_column", "place"), ("socket_column", SOCKET)]
             .map(|(key, usual)| given(key).unwrap_or_else(|| usual.to_owned()))

@@ -182,7 +182,7 @@ fn nothing_is_told_that_can_hardly_be() {
         (limit(999.0), 18.0, 19.0),
         (limit(360.0), 18.0, 19.0),
         (limit(20.0), 18.0, 19.0),
-        (limit(6.28), 7.0, 8.0),
+        (limit(6.2), 7.0, 8.0),
         (limit(1.5), 1.7, 1.9),
         ("<limit lower=\"-1e16\" upper=\"1.0\" effort=\"1\" velocity=\"1\"/>".to_owned(), 1.6, 1.7),
     ] {
