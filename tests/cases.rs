@@ -104,6 +104,7 @@ fn files_are_begun_by_the_same_titles() {
             table,
             base: None,
             tip: None,
+            socket_distance_m: None,
         })
     };
     let table = text("t11-explicit-wxyz", "data.csv").replace("x,y,z,qw,qx,qy,qz", "X (m),Y (m),Z (m),QW,QX,QY,QZ");

@@ -19,8 +19,16 @@ fn text(case: &str, file: &str) -> String {
 /// The calibration file that is begun, or what is said.
 fn begun(case: &str, base: Option<&str>, tip: Option<&str>) -> Result<String, String> {
     let (urdf, table) = (text(case, "robot.urdf"), text(case, "data.csv"));
-    let sources =
-        Sources { name: case, urdf_file: "robot.urdf", urdf: &urdf, table_file: "data.csv", table: &table, base, tip };
+    let sources = Sources {
+        name: case,
+        urdf_file: "robot.urdf",
+        urdf: &urdf,
+        table_file: "data.csv",
+        table: &table,
+        base,
+        tip,
+        socket_distance_m: None,
+    };
     begin(&sources).map(|begun| begun.text).map_err(|error| error.to_string())
 }
 

@@ -183,7 +183,7 @@ impl Scenario {
     }
 
     fn workspace(&self, configurations: Vec<Vec<f64>>) -> Workspace {
-        Workspace { configurations, up_to_motion: self.robot.up_to_motion }
+        Workspace { configurations, up_to_motion: self.robot.up_to_motion, ..Workspace::default() }
     }
 
     /// What one measurement of the marker is worth, metres: of the tracker, or where none sees it of the first sensor.
@@ -218,7 +218,9 @@ impl Scenario {
             layout: Arc::new(self.robot.layout.clone()),
             covariance: self.prior_covariance(&self.robot.layout),
             actions: Actions::Pool(pool),
-            workspace: self.workspace(configurations(&training)),
+            workspace: self
+                .asked_about(measurements, &test)
+                .unwrap_or_else(|| self.workspace(configurations(&training))),
             watch: None,
             beforehand: measurements.beforehand.clone(),
         };

@@ -5,10 +5,10 @@ use rand_distr::StandardNormal;
 
 use crate::{
     experiment::{HeldInSocket, Stream},
-    model::Manifold,
+    model::{Manifold, Workspace},
     scenario::{Measurements, Robot, Scenario, SocketSpec},
     selection::{Actions, Sockets},
-    sensing::Observation,
+    sensing::{Observation, Occasion},
 };
 
 /// Postures of every held-out socket.
@@ -53,6 +53,19 @@ impl Scenario {
             (postures.len() > 1).then_some(HeldInSocket { target: socket.target, postures })
         };
         sockets.iter().chain(held_out_sockets).enumerate().filter_map(of).collect()
+    }
+
+    /// What learners are asked about where nothing is measured but that targets meet themselves: how far the predicted target scatters in
+    /// sockets of the rows that are held out, by their postures alone. `None` where something else is measured, or there are none.
+    pub(super) fn asked_about(&self, measurements: &Measurements, rows: &[usize]) -> Option<Workspace> {
+        if self.rig.channels().iter().any(|channel| channel.occasion() == Occasion::Always) {
+            return None;
+        }
+        let held = rows.iter().filter_map(|row| {
+            let socket = measurements.sockets.get(*row).copied().flatten()?;
+            Some((socket, measurements.configurations[*row].as_slice()))
+        });
+        Some(Workspace::at_places(held)).filter(|asked| !asked.configurations.is_empty())
     }
 }
 

@@ -1,7 +1,9 @@
 //! Few rows instead of all: the most informative ones, beside random ones.
 //!
 //! Rows are picked one by one by the scenario's criterion. Before the first, the belief is the prior at the description; after
-//! each, everything is fitted anew to the rows picked so far, and predictions are judged by the rows that are held out.
+//! each, everything is fitted anew to the rows picked so far, and predictions are judged by the rows that are held out. Once what no
+//! parameter explains makes predictions worse than what is not known of the parameters, rows are picked to be distributed like the postures
+//! that are asked about, as a session's movements are.
 
 use nalgebra::DMatrix;
 use rand::seq::SliceRandom;
@@ -11,8 +13,8 @@ use super::{CalibrationError, Case, Figures, Fit, Progress, Split};
 use crate::parallel::mapped;
 use crate::{
     experiment::Stream,
-    model::{Layout, State, Workspace},
-    selection::{Criterion, Weights},
+    model::{Layout, State},
+    selection::{Criterion, Weights, herd},
 };
 
 /// Held-out error after so many rows.
@@ -44,10 +46,12 @@ const SEARCHED: usize = 8;
 const SEED: u64 = 1;
 
 impl Case<'_> {
-    /// The `count` most informative of `rows`, in the order of the choice, and what was learned after each.
+    /// The `count` most informative of `rows` for what is asked at `asked`, by their postures; in the order of the choice, and what was
+    /// learned after each.
     pub fn choose(
         &self,
         rows: &[usize],
+        asked: &[usize],
         count: usize,
         progress: &dyn Progress,
     ) -> Result<(Vec<usize>, Vec<Fit>), CalibrationError> {
@@ -60,16 +64,43 @@ impl Case<'_> {
         let deviations = self.deviations(&layout);
         let selection = &self.scenario.selection;
         let weights = Weights::new(selection.units, &layout, &deviations);
-        let configurations = pool.iter().map(|row| self.rows[*row].positions.clone()).collect();
-        let workspace = Workspace { configurations, up_to_motion: self.scenario.robot.up_to_motion };
         let (mut chosen, mut fits) = (Vec::new(), Vec::new());
         let mut fit = self.fit(&layout, &[], None)?;
+        let of_pool = self.predicted(&pool);
         while chosen.len() < count {
-            let criterion = Criterion::new(&fit.belief, &weights)?.by(selection.planning.optimality, &workspace);
-            let gains = mapped(&pool, |row| criterion.gain_of(&self.whitened(&fit, *row)));
-            let gain = |place: usize| if gains[place].is_finite() { gains[place] } else { f64::NEG_INFINITY };
-            // The first of equals: `max_by` would take the last.
-            let best = (0..pool.len()).rev().max_by(|a, b| gain(*a).total_cmp(&gain(*b)));
+            let choice: u32 = std::env::var("CHOICE").ok().and_then(|c| c.parse().ok()).unwrap_or(0);
+            let workspace = if choice & 4 > 0 {
+                of_pool.clone()
+            } else if choice & 16 > 0 {
+                self.predicted(asked)
+            } else if choice & 32 > 0 {
+                self.predicted(&[rows, asked].concat())
+            } else if choice & 64 > 0 {
+                self.in_sockets(&[rows, asked].concat())
+            } else if choice & 8 > 0 {
+                self.in_sockets(rows)
+            } else if self.meets_itself() {
+                self.met(fit.state(), asked)
+            } else {
+                of_pool.clone()
+            };
+            let stated = if choice & 1 > 0 { self.stated(fit.state(), &chosen) } else { None };
+            let judged = Fit { belief: stated.unwrap_or_else(|| fit.belief.clone()), ..fit.clone() };
+            let best = if choice & 2 == 0 && fit.belief.model_error_prevails(&workspace) {
+                if std::env::var("CHOICE").is_ok() {
+                    print!("herd@{} ", chosen.len());
+                }
+                let postures = |rows: &[usize]| -> Vec<&[f64]> {
+                    rows.iter().map(|row| self.rows[*row].positions.as_slice()).collect()
+                };
+                herd(&postures(&pool), &workspace.configurations, &postures(&chosen))
+            } else {
+                let criterion = Criterion::new(&judged.belief, &weights)?.by(selection.planning.optimality, &workspace);
+                let gains = mapped(&pool, |row| criterion.gain_of(&self.whitened(&judged, *row)));
+                let gain = |place: usize| if gains[place].is_finite() { gains[place] } else { f64::NEG_INFINITY };
+                // The first of equals: `max_by` would take the last.
+                (0..pool.len()).rev().max_by(|a, b| gain(*a).total_cmp(&gain(*b)))
+            };
             chosen.extend(best.map(|place| pool.remove(place)));
             fit = self.fit(&layout, &chosen, near(&fit, chosen.len()))?;
             fits.push(fit.clone());
@@ -97,7 +128,7 @@ impl Case<'_> {
         progress.stage("chosen rows", (splits.len() * count) as u64);
         let mut active = Vec::new();
         for split in splits {
-            let (_, fits) = self.choose(&split.training, count, progress)?;
+            let (_, fits) = self.choose(&split.training, &split.held_out, count, progress)?;
             active.push(fits.iter().map(|fit| self.held_out(fit, split)).collect::<Vec<Figures>>());
         }
         let sizes: Vec<usize> = (1..=count).collect();
@@ -202,6 +233,10 @@ fn point(rows: usize, active_mm: Option<f64>, random: &[f64]) -> ActivePoint {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibration::{
+        Silent,
+        laws::{REAL, learned_at},
+    };
 
     #[test]
     fn quartiles_lie_between_neighbours() {
@@ -211,5 +246,28 @@ mod tests {
             (Some(1.75), Some(2.5), Some(3.25))
         );
         assert_eq!(point(7, None, &[]).random_median_mm, None);
+    }
+
+    /// Of two real robots with a ball in sockets, at each of their places: twelve rows chosen by what is asked at the other places predict
+    /// the ball there better than random rows do.
+    #[test]
+    fn rows_chosen_by_what_is_asked_in_other_sockets_tell_more_than_random_ones() {
+        const ROWS: usize = 12;
+        for (name, places) in REAL {
+            let mut logarithms = Vec::new();
+            for place in places {
+                let scenario = learned_at(name, place, "criterion = \"i\"");
+                let case = Case::new(&scenario).expect("measured");
+                let splits = case.splits(None).expect("as the file says");
+                let (_, fits) =
+                    case.choose(&splits[0].training, &splits[0].held_out, ROWS, &Silent).expect("enough rows");
+                let chosen = case.held_out(&fits[ROWS - 1], &splits[0]).mean().expect("lengths");
+                let random = case.random(&splits, &[ROWS], 9, &Silent).expect("fitted").remove(0);
+                let random = point(ROWS, None, &random).random_median_mm.expect("orders");
+                logarithms.push((chosen / random).ln());
+            }
+            let ratio = (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp();
+            assert!(ratio < 0.9, "{name}: {ratio} of random rows, {logarithms:?}");
+        }
     }
 }

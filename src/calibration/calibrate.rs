@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
     CalibrationError, Case, Chain, Choice, Comparison, Coverage, Extra, Figures, Fit, Fold, HeldOut, Noise, Outlier,
-    Progress, Reading, Report, Residual, Split, Verdict,
+    Progress, Reading, Report, Residual, Split, Trial, Verdict,
     extras::TRIED,
     figures::{Sensed, Unit},
     verdict::Grounds,
@@ -75,7 +75,8 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     let fit = case.fit(&case.writable(), &training, Some(nominal.state()))?;
     progress.tick();
     let mut strays = case.strays(&fit);
-    let mut trials = case.trials(&without(&training, &strays), fit.state())?;
+    let asked = case.asked_about(fit.state(), &splits);
+    let mut trials = case.trials(&without(&training, &strays), &fit, &asked)?;
     let fuller = case.fuller(&trials, &fit)?;
     progress.tick();
 
@@ -85,7 +86,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         let (fold, verdict) = if has_folds {
             let nominal = case.nominal(&split.training)?;
             let fit = case.fit(&case.writable(), &split.training, Some(nominal.state()))?;
-            let trials = case.trials(&without(&split.training, &case.strays(&fit)), fit.state())?;
+            let trials = case.trials(&without(&split.training, &case.strays(&fit)), &fit, &asked)?;
             let fuller = case.fuller(&trials, &fit)?;
             let verdict = case.judge(split, &nominal, &fit, &fuller)?;
             (fit, verdict)
@@ -113,7 +114,8 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     let (mut active, mut selection, mut learning) = (Vec::new(), None, Vec::new());
     if let Some(count) = options.active {
         active = case.active(&without_strays, count, progress)?;
-        selection = Some(case.choice(&training, count, progress)?);
+        let asked = if has_folds { &training } else { &first.held_out };
+        selection = Some(case.choice(&training, asked, count, progress)?);
     } else {
         learning = case.learning(&without_strays, progress)?;
     }
@@ -139,7 +141,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     let noise = case.noise(&fit);
     let share = if has_folds { 1.0 - 1.0 / splits.len() as f64 } else { 1.0 };
     let judged_by = held_out.as_ref().map(|held_out| (&held_out.after, share));
-    let more_rows = case.more_rows(&fit, judged_by, &noise, examination.sigma_m);
+    let more_rows = case.more_rows(&fit, &asked, judged_by, (&noise, examination.sigma_m));
     let mut doubts = examination.doubts;
     doubts.extend(options.folds.and_then(|folds| few_folds(folds, splits.len(), case.rows.len())));
     let outliers = case.outliers(&fit, unlearned.iter().map(|(row, _)| *row).collect());
@@ -152,12 +154,14 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         judged.iter().flat_map(|it| &it.covered).filter(|(row, _)| !stray_rows.contains(row)).copied().collect();
     let coverage = Coverage::of(&covered);
     let unit = held_out.as_ref().map_or(comparison.after.unit(), |held_out| held_out.after.unit());
+    let span_1m_sd_mm = if case.meets_itself() { case.span_sd_mm(&fit) } else { None };
     let grounds = Grounds {
         doubts: &doubts,
         held_out: held_out.as_ref(),
         more_rows: &more_rows,
         outliers: (outliers.len(), case.rows.len()),
         unit,
+        unsized_mm: span_1m_sd_mm.filter(|_| case.known.is_none()),
     };
     let verdict = Verdict::of(&grounds);
     let shown = case.in_gauge(&fit);
@@ -176,6 +180,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         doubts: (doubts.iter().map(ToString::to_string))
             .chain(coverage.as_ref().and_then(Coverage::warning))
             .chain(case.beyond_prior(&fit))
+            .chain(trials.iter().find(|trial| trial.is_beyond).and_then(Trial::warning))
             .collect(),
         parameters: case.determined(&fit),
         verdict,
@@ -184,7 +189,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         training: comparison,
         held_out,
         sockets: if has_folds { Vec::new() } else { case.distances(&fit, &first.held_out) },
-        span_1m_sd_mm: if case.meets_itself() { case.span_sd_mm(&fit) } else { None },
+        span_1m_sd_mm,
         extras: trials.clone(),
         compliance: case.compliance(&fuller),
         outliers,
@@ -286,13 +291,22 @@ impl Case<'_> {
         splits.iter().zip(fits).zip(judged).enumerate().map(of).collect()
     }
 
-    fn choice(&self, training: &[usize], count: usize, progress: &dyn Progress) -> Result<Choice, CalibrationError> {
+    fn choice(
+        &self,
+        training: &[usize],
+        asked: &[usize],
+        count: usize,
+        progress: &dyn Progress,
+    ) -> Result<Choice, CalibrationError> {
         progress.stage("the rows that would be chosen of all", count as u64);
-        let (rows, _) = self.choose(training, count, progress)?;
+        let (rows, _) = self.choose(training, asked, count, progress)?;
         let criterion = match self.scenario.selection.planning.optimality {
             Optimality::A => "A: the mean squared error of the parameters",
             Optimality::D => "D: the volume of what is not known of the parameters",
             Optimality::E => "E: the error of the parameters that are known worst",
+            Optimality::I if self.meets_itself() => {
+                "I: the mean squared scatter of predictions in the sockets that are asked about"
+            }
             Optimality::I => "I: the mean squared error of predictions over the training rows",
         };
         Ok(Choice {

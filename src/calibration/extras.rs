@@ -2,6 +2,19 @@
 //!
 //! The rows that are held out decide nothing. Within the training rows there are folds of their own: what is added stays
 //! where the mean error over them falls by more than two standard errors, taken from the differences reading by reading.
+//!
+//! Folds say nothing of postures that lie elsewhere than all rows. With p and p′ the hand as predicted without and with what is added, P and
+//! P′ the covariances and J, J′ the Jacobians, all fitted to all rows, what is added changes predictions where the robot is asked about by
+//!
+//! ```text
+//! c = rms ‖p′ − p‖,    v = √ mean tr(J′ P′ J′ᵀ − J P Jᵀ)
+//! ```
+//!
+//! of which v is what it makes less certain. Postures that are asked about lie outside those of the rows where v is more than twice as large
+//! there as over the rows. What is added stays then only where c is above two v: a change that is certain. Where it is not, what stays
+//! may be a part of it for which both hold.
+
+use std::cmp::Ordering;
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +22,7 @@ use super::{CalibrationError, Case, Figures, Fit, Residual, Split, Unit};
 use crate::parallel::mapped;
 use crate::{
     kinematics::JointKind,
-    model::{Block, Layout, State},
+    model::{Block, Layout, State, Workspace, listed},
 };
 
 /// What can be added to axes.
@@ -36,6 +49,10 @@ pub(super) const TRIED: [&[Extra]; 5] = [
 /// Folds among the training rows, and how many postures there must be for any.
 const FOLDS: usize = 5;
 const FEWEST: usize = 10;
+/// Postures lie outside others where what is added is so many times as uncertain.
+const OUTSIDE: f64 = 2.0;
+/// Deviations by which a change of predictions is certain.
+const CERTAIN: f64 = 2.0;
 /// Rows of the inner folds at most, spread evenly over the table: that many decide.
 const MOST: usize = 2000;
 
@@ -56,8 +73,31 @@ pub struct Trial {
     pub standard_error: Option<f64>,
     /// Held-out figures with it; for the reader, who decides nothing by them either.
     pub held_out: Option<Figures>,
+    /// By how much it changes predictions where the robot is asked about, root mean square, millimetres; null where the folds do not speak
+    /// for it.
+    #[serde(default)]
+    pub change_mm: Option<f64>,
+    /// How much less certain it makes them there, one standard deviation, millimetres.
+    #[serde(default)]
+    pub change_sd_mm: Option<f64>,
+    /// Whether it does not stay, though folds speak for it, since the postures that are asked about lie outside those of the rows.
+    #[serde(default)]
+    pub is_beyond: bool,
     /// Whether it stays.
     pub kept: bool,
+}
+
+impl Trial {
+    /// Why it does not stay, though folds speak for it.
+    pub(super) fn warning(&self) -> Option<String> {
+        let (change, sd) = (self.change_mm.filter(|_| self.is_beyond)?, self.change_sd_mm?);
+        let names = listed(self.extras.iter().map(|extra| extra.name().to_owned()).collect());
+        Some(format!(
+            "the postures that are asked about lie outside those learned from: {names} would change predictions there by {change:.2} mm, \
+             of which {sd:.2} mm are uncertain, so that it does not stay, though it predicts better among the training rows; learn \
+             from rows that are spread as widely"
+        ))
+    }
 }
 
 impl Extra {
@@ -85,18 +125,22 @@ impl Extra {
 }
 
 impl Case<'_> {
-    /// What is worth adding, by folds among `rows`; `near` is a fit of them without it.
-    pub fn trials(&self, rows: &[usize], near: &State) -> Result<Vec<Trial>, CalibrationError> {
+    /// What is worth adding, by folds among `rows` and where the robot is `asked` about; `plain` is a fit of them without it.
+    pub fn trials(&self, rows: &[usize], plain: &Fit, asked: &Workspace) -> Result<Vec<Trial>, CalibrationError> {
+        let near = plain.state();
         let layouts: Vec<Layout> = TRIED.iter().map(|extras| self.extended(extras, near)).collect();
-        let plain = self.writable();
+        let writable = self.writable();
         let trial = |(extras, layout): (&&[Extra], &Layout)| Trial {
             extras: extras.to_vec(),
-            parameters: layout.dimension() - plain.dimension(),
+            parameters: layout.dimension() - writable.dimension(),
             merged: if extras.contains(&Extra::Compliance) { self.borne(extras, near).said } else { Vec::new() },
             inner_without: None,
             inner: None,
             standard_error: None,
             held_out: None,
+            change_mm: None,
+            change_sd_mm: None,
+            is_beyond: false,
             kept: false,
         };
         let mut trials: Vec<Trial> = TRIED.iter().zip(&layouts).map(trial).collect();
@@ -106,7 +150,7 @@ impl Case<'_> {
         let count = rows.len().min(MOST);
         let spread: Vec<usize> = (0..count).map(|index| rows[index * rows.len() / count]).collect();
         let folds = Split::folds(&spread, FOLDS, &self.postures);
-        let without = self.inner(&plain, &folds, near)?;
+        let without = self.inner(&writable, &folds, near)?;
         for (trial, layout) in trials.iter_mut().zip(&layouts) {
             let with = self.inner(layout, &folds, near)?;
             let figures = Figures::of(&without);
@@ -117,14 +161,38 @@ impl Case<'_> {
         let gain = |trial: &Trial| Some(trial.inner_without? - trial.inner?);
         let is_worth =
             |trial: &Trial| gain(trial).zip(trial.standard_error).is_some_and(|(gain, error)| gain > 2.0 * error);
-        let best = trials
-            .iter_mut()
-            .filter(|trial| is_worth(trial))
-            .max_by(|a, b| gain(a).partial_cmp(&gain(b)).unwrap_or(std::cmp::Ordering::Equal));
-        if let Some(best) = best {
-            best.kept = true;
+        let mut worth: Vec<usize> = (0..trials.len()).filter(|index| is_worth(&trials[*index])).collect();
+        worth.sort_by(|a, b| gain(&trials[*b]).partial_cmp(&gain(&trials[*a])).unwrap_or(Ordering::Equal));
+        // Of what reaches too far a part may not.
+        let most = worth.first().map_or(&[][..], |index| TRIED[*index]);
+        worth.retain(|index| TRIED[*index].iter().all(|extra| most.contains(extra)));
+        for index in worth {
+            let fit = self.fit(&layouts[index], &plain.rows, Some(near))?;
+            let trial = &mut trials[index];
+            let own = if self.meets_itself() { self.in_sockets(&fit.rows) } else { self.predicted(&fit.rows) };
+            if let (Some([change, sd]), Some([_, within])) =
+                (self.change(plain, &fit, asked), self.change(plain, &fit, &own))
+            {
+                (trial.change_mm, trial.change_sd_mm) = (Some(change), Some(sd));
+                trial.is_beyond = sd > OUTSIDE * within && change <= CERTAIN * sd;
+            }
+            if !trial.is_beyond {
+                trial.kept = true;
+                break;
+            }
         }
         Ok(trials)
+    }
+
+    /// c and v, millimetres; `None` where no covariance says.
+    fn change(&self, plain: &Fit, fuller: &Fit, asked: &Workspace) -> Option<[f64; 2]> {
+        let square = |fit: &Fit| {
+            let jacobian = asked.jacobian(fit.state(), &fit.belief.layout);
+            Some((&jacobian * fit.belief.covariance.as_ref()?).dot(&jacobian) / asked.configurations.len() as f64)
+        };
+        let (change, _) = asked.distance(&asked.points(fuller.state()), &asked.points(plain.state()))?;
+        let sd = (square(fuller)? - square(plain)?).max(0.0).sqrt();
+        (change.is_finite() && sd.is_finite()).then_some([change * 1e3, sd * 1e3])
     }
 
     fn inner(&self, layout: &Layout, folds: &[Split], near: &State) -> Result<Vec<Residual>, CalibrationError> {
@@ -156,4 +224,37 @@ fn standard_error(unit: Unit, before: &[Residual], after: &[Residual]) -> Option
     let mean = differences.iter().sum::<f64>() / count;
     let variance = differences.iter().map(|difference| (difference - mean).powi(2)).sum::<f64>() / (count - 1.0);
     Some((variance / count).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::laws::{REAL, learned_at};
+
+    /// Of two real robots with a ball in sockets, learned at each of their places: what is kept makes predictions at the other places no
+    /// worse, and what folds speak for in vain is told.
+    #[test]
+    fn what_is_kept_does_not_hurt_elsewhere() {
+        let mut beyond = 0;
+        for (name, places) in REAL {
+            for place in places {
+                let scenario = learned_at(name, place, "criterion = \"d\"");
+                let case = Case::new(&scenario).expect("measured");
+                let splits = case.splits(None).expect("as the file says");
+                let (training, held_out) = (&splits[0].training, &splits[0].held_out);
+                let nominal = case.nominal(training).expect("fitted");
+                let fit = case.fit(&case.writable(), training, Some(nominal.state())).expect("fitted");
+                let asked = case.asked_about(fit.state(), &splits);
+                let trials = case.trials(training, &fit, &asked).expect("tried");
+                let fuller = case.fuller(&trials, &fit).expect("fitted");
+                let mean = |fit| Figures::of(&case.residuals(fit, held_out)).mean().expect("lengths");
+                let (with, without) = (mean(&fuller), mean(&fit));
+                assert!(with <= 1.02 * without, "{name} {place}: {without} to {with} mm");
+                beyond += trials.iter().filter(|trial| trial.is_beyond && !trial.kept).count();
+                let said: Vec<String> = trials.iter().filter_map(Trial::warning).collect();
+                assert!(said.iter().all(|said| said.contains("lie outside those learned from")), "{said:?}");
+            }
+        }
+        assert!(beyond > 0, "nothing was left out");
+    }
 }

@@ -8,10 +8,33 @@ use rand_distr::StandardNormal;
 use super::{Calibration, Case, Figures, Options, Report, Silent, Unit, calibrate};
 use crate::{
     model::urdf::{Chain, Urdf},
-    scenario::Scenario,
+    scenario::{Scenario, builtin},
 };
 
 const UR10: &str = include_str!("../../scenarios/ur10.urdf");
+
+/// Real robots with a ball in sockets, by scenario, and the places where they were measured.
+pub(super) const REAL: [(&str, &[&str]); 2] = [
+    (
+        "panda-sockets",
+        &["back_left", "back_right", "front_center", "front_left", "front_right", "mid-high", "mid_left", "mid_right"],
+    ),
+    ("kinova-sockets", &["front", "front_rotated", "left", "right-high"]),
+];
+
+/// One of them that learns at a place, by a criterion.
+pub(super) fn learned_at(name: &str, place: &str, criterion: &str) -> Scenario {
+    let shipped = builtin(name).expect("built in");
+    let mut lines: Vec<String> = shipped.source.lines().map(str::to_owned).collect();
+    for line in &mut lines {
+        if line.starts_with("train = ") {
+            *line = format!("train = [\"{place}\"]");
+        } else if line.starts_with("criterion = ") {
+            *line = criterion.to_owned();
+        }
+    }
+    Scenario::parse("real.toml", &lines.join("\n"), &|file| shipped.data_file(file)).expect("valid")
+}
 
 /// A robot of so many joints that turn about x, y or z of frames that stand anywhere.
 fn random_urdf(joints: usize, rng: &mut ChaCha8Rng) -> String {

@@ -28,10 +28,12 @@
 //! This module does no input or output.
 
 mod active;
+mod asked;
 mod beyond;
 mod calibrate;
 mod case;
 mod coverage;
+mod design;
 mod error;
 mod extras;
 mod figures;
@@ -44,6 +46,8 @@ mod learned;
 mod loads;
 mod more_rows;
 mod outcome;
+#[cfg(test)]
+mod probe;
 mod progress;
 #[cfg(feature = "app")]
 pub mod report;

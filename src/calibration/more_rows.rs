@@ -11,14 +11,16 @@
 //! so that what no row tells (μ = 0) never falls, whatever their number. Beside that stands what no parameter explains: residuals beyond
 //! the σ that the sensor's maker promises, which may as well be noise unless the same posture was measured again and tells; and what
 //! held-out rows are off beyond all that is expected.
+//!
+//! A target that meets itself in sockets is asked about at other places than those learned from. What errs alike in all rows of one place
+//! shows in no residual there, so that residuals below the stated σ do not say that less than σ is to be reckoned with elsewhere:
+//! rows then count as σ has them, as k = s² < 1 times as many, s the scale that was found.
 
 use nalgebra::Cholesky;
 
 use super::{Case, Figures, Fit, MoreRows, Noise};
-use crate::model::Workspace;
+use crate::{estimation::NoiseFit, model::Workspace};
 
-/// Postures over which expected errors are taken, at most.
-const WORKSPACE: usize = 300;
 /// So many times the rows that there are is as many as anybody could measure.
 const MOST: f64 = 1e3;
 /// Deviations that chance is granted before held-out rows are said to be worse than expected.
@@ -32,29 +34,36 @@ impl Falls {
     fn at(&self, k: f64) -> f64 {
         self.0.iter().map(|(share, mu)| share / (1.0 + (k - 1.0) * mu)).sum()
     }
+
+    /// The error and its fall from where k is 1, of an `error` now.
+    fn from(self, k: f64, error: f64) -> (f64, Self) {
+        let square = self.at(k);
+        let of = |(share, mu): (f64, f64)| {
+            let grown = 1.0 + (k - 1.0) * mu;
+            (share / grown / square, k * mu / grown)
+        };
+        (error * square.sqrt(), Self(self.0.into_iter().map(of).collect()))
+    }
 }
 
 impl Case<'_> {
-    /// What more rows would bring, by what is expected and by what held-out rows say, each of which was predicted by `share` of the
-    /// rows; `repeats_m` is the noise that repeated postures tell, per coordinate.
+    /// What more rows would bring where the robot is `asked` about, by what is expected and by what held-out rows say, each of which was predicted by
+    /// `share` of the rows; `repeats_m` is the noise that repeated postures tell, per coordinate.
     pub(super) fn more_rows(
         &self,
         fit: &Fit,
+        asked: &Workspace,
         held_out: Option<(&Figures, f64)>,
-        noise: &[Noise],
-        repeats_m: Option<f64>,
+        (noise, repeats_m): (&[Noise], Option<f64>),
     ) -> MoreRows {
         let mm = |metres: f64| metres * 1e3;
         let (wanted, rows) = (mm(self.scenario.settled_below_m), fit.rows.len());
-        let workspace = self.asked_about();
-        let mut certain = fit.belief.clone();
-        certain.model_error_m = 0.0;
-        let from_parameters = certain.expected_error_m(&workspace).map(mm);
+        let falls = self.falls(fit, asked).map(|(error, falls)| falls.from(self.counted(fit, asked), mm(error)));
         let to_spare: f64 = fit.noise.iter().map(|noise| noise.equations - noise.absorbed).sum();
         let mut told = MoreRows {
             rows,
             expected_mm: None,
-            from_parameters_mm: from_parameters,
+            from_parameters_mm: falls.as_ref().map(|(error, _)| *error),
             model_error_mm: mm(fit.belief.model_error_m),
             untold_mm: 0.0,
             held_out_mm: None,
@@ -63,7 +72,7 @@ impl Case<'_> {
             rows_needed_if_noise: None,
             said: "nothing is predicted without rows".to_owned(),
         };
-        let (Some(error), Some(falls)) = (from_parameters, self.falls(fit, &workspace)) else { return told };
+        let Some((error, falls)) = falls else { return told };
         let sigmas = noise.iter().filter(|noise| noise.unit == "m");
         let sigma = sigmas.filter_map(|noise| Some((mm(noise.sigma), mm(noise.explaining_sigma?)))).next();
         if let (Some((_, explaining)), Some(repeats)) = (sigma, repeats_m.map(mm)) {
@@ -105,12 +114,15 @@ impl Case<'_> {
         told
     }
 
-    /// The postures of the table, spread over it: where the robot is asked about.
-    fn asked_about(&self) -> Workspace {
-        let all = self.rows.len();
-        let count = all.min(WORKSPACE);
-        let configurations = (0..count).map(|k| self.rows[k * all / count].positions.clone()).collect();
-        Workspace { configurations, up_to_motion: self.scenario.robot.up_to_motion }
+    /// As how many rows one counts for what is asked elsewhere.
+    fn counted(&self, fit: &Fit, asked: &Workspace) -> f64 {
+        let learned = |place: &usize| *place < fit.state().sockets.len();
+        if asked.places.iter().all(learned) {
+            return 1.0;
+        }
+        let sum = |of: &dyn Fn(&NoiseFit) -> f64| fit.noise.iter().map(of).sum::<f64>();
+        let equations = sum(&|noise| noise.equations);
+        if equations > 0.0 { (sum(&|noise| noise.equations * noise.scale.powi(2)) / equations).min(1.0) } else { 1.0 }
     }
 
     fn equations_of_a_row(&self, fit: &Fit) -> usize {
@@ -118,7 +130,8 @@ impl Case<'_> {
         fit.rows.iter().map(of).sum::<usize>() / fit.rows.len().max(1)
     }
 
-    fn falls(&self, fit: &Fit, workspace: &Workspace) -> Option<Falls> {
+    /// p, root mean square, metres; and how it falls.
+    fn falls(&self, fit: &Fit, workspace: &Workspace) -> Option<(f64, Falls)> {
         let belief = &fit.belief;
         let factor = Cholesky::new(belief.covariance.clone()?)?.l();
         let eigen = (factor.transpose() * self.information(fit) * &factor).symmetric_eigen();
@@ -128,14 +141,15 @@ impl Case<'_> {
         // Outliers hardly count in the covariance, so that a row may seem to tell more than everything.
         let shares =
             squares.iter().zip(eigen.eigenvalues.iter()).map(|(square, mu)| (square / total, mu.clamp(0.0, 1.0)));
-        (total > 0.0 && total.is_finite()).then(|| Falls(shares.collect()))
+        let error = (total / workspace.configurations.len() as f64).sqrt();
+        (total > 0.0 && total.is_finite()).then(|| (error, Falls(shares.collect())))
     }
 }
 
 /// The same in words.
 fn said(told: &MoreRows, is_told: bool) -> String {
     let MoreRows { rows, wanted_mm: wanted, model_error_mm: floor, untold_mm: untold, .. } = told;
-    let error = told.from_parameters_mm.unwrap_or_default();
+    let (error, expected) = (told.from_parameters_mm.unwrap_or_default(), told.expected_mm.unwrap_or_default());
     if !is_told {
         return format!(
             "{rows} rows leave no equation to spare by which it could be told how good predictions are, or how many more rows they \
@@ -143,40 +157,76 @@ fn said(told: &MoreRows, is_told: bool) -> String {
         );
     }
     let more = |needed: u64| needed.saturating_sub(*rows as u64);
+    let beside =
+        if *floor > 0.0 { format!(", and {floor:.2} mm from what no parameter explains") } else { String::new() };
+    let sum =
+        format!("{expected:.2} mm are expected, {error:.2} mm of it from what is not known of the parameters{beside}");
     match (told.rows_needed, told.rows_needed_if_noise) {
-        (Some(needed), _) if more(needed) == 0 => {
-            let beside = if *floor > 0.0 {
-                format!(", and {floor:.2} mm from what no parameter explains")
-            } else {
-                String::new()
-            };
-            format!(
-                "{wanted:.2} mm are reached: {error:.2} mm are expected from what is not known of the parameters{beside}"
-            )
-        }
+        (Some(needed), _) if more(needed) == 0 => format!("{wanted:.2} mm are reached: {sum}"),
         (Some(needed), _) => format!(
-            "about {} rows more of the same kind, {needed} in all, reach {wanted:.2} mm: {error:.2} mm come from what is not known of \
-             the parameters, which falls with the number of rows",
+            "about {} rows more of the same kind, {needed} in all, reach {wanted:.2} mm: {sum}; what is not known falls with the number \
+             of rows",
             more(needed)
         ),
         (None, Some(needed)) => {
             let rows = if more(needed) == 0 {
-                format!("{wanted:.2} mm are reached, with {error:.2} mm from what is not known of the parameters")
+                format!("{wanted:.2} mm are reached")
             } else {
                 format!("about {} rows more, {needed} in all, reach {wanted:.2} mm", more(needed))
             };
             format!(
-                "{floor:.2} mm are left beyond the σ that is stated. If that is noise of the sensor, {rows}; if it is what no parameter \
-                 explains (gears, bending, a loose target), no number of rows does. The same posture measured several times would tell"
+                "{sum}. If the latter is noise of the sensor, {rows}; if it is what no parameter explains (gears, bending, a loose \
+                 target), no number of rows does. The same posture measured several times would tell"
             )
         }
         (None, None) if untold > wanted => format!(
-            "no number of rows like these reaches {wanted:.2} mm: {untold:.2} mm of the {error:.2} mm that are expected are in what none of \
-             them tells, as said above; rows that tell it would"
+            "no number of rows like these reaches {wanted:.2} mm: {sum}; {untold:.2} mm are in what none of them tells, as said above; rows \
+             that tell it would"
         ),
         (None, None) => format!(
-            "no number of rows reaches {wanted:.2} mm: {floor:.2} mm of the error is explained by no parameter (gears, bending, a loose \
-             target), and more rows of the same kind do not make it smaller"
+            "no number of rows reaches {wanted:.2} mm: {sum} (gears, bending, a loose target), and more rows of the same kind do not make \
+             that smaller"
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// However it goes on, the sentence says the same error as the JSON, with what it is made of.
+    #[test]
+    fn the_sentence_says_the_figures_of_the_report() {
+        for (rows_needed, rows_needed_if_noise, untold_mm) in
+            [(Some(10), None, 0.0), (Some(90), None, 0.0), (None, Some(10), 0.0), (None, None, 3.0), (None, None, 0.0)]
+        {
+            let told = MoreRows {
+                rows: 20,
+                expected_mm: Some(0.325),
+                from_parameters_mm: Some(0.15),
+                model_error_mm: 0.288,
+                untold_mm,
+                held_out_mm: None,
+                wanted_mm: 1.0,
+                rows_needed,
+                rows_needed_if_noise,
+                said: String::new(),
+            };
+            let said = said(&told, true);
+            let sum = "0.33 mm are expected, 0.15 mm of it from what is not known of the parameters, and 0.29 mm from what no parameter";
+            assert!(said.contains(&sum.replace("0.33", &format!("{:.2}", 0.325))), "{said}");
+        }
+    }
+
+    /// Rows that count as half of them are worth half as many, and twice as many are then as good as all.
+    #[test]
+    fn rows_that_count_less_are_as_so_many_fewer() {
+        let falls = || Falls(vec![(0.5, 1.0), (0.3, 0.4), (0.2, 0.0)]);
+        let (error, fewer) = falls().from(0.5, 3.0);
+        assert!((error - 3.0 * falls().at(0.5).sqrt()).abs() < 1e-12);
+        for k in [0.3, 1.0, 2.0, 7.0] {
+            let same = 9.0 * falls().at(0.5 * k);
+            assert!((error * error * fewer.at(k) - same).abs() < 1e-12);
+        }
     }
 }

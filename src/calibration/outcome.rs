@@ -263,8 +263,8 @@ pub struct Correlation {
 pub struct MoreRows {
     /// n, the rows that there are.
     pub rows: usize,
-    /// e, the error of a prediction where the table's postures are, by the model itself and by what held-out rows say of it,
-    /// millimetres.
+    /// e, the error of a prediction where the robot is asked about (held-out rows, else the table's postures, with sockets places anywhere
+    /// in reach), by the model itself and by what held-out rows say of it, millimetres.
     pub expected_mm: Option<f64>,
     /// p, what of it more rows make smaller, millimetres.
     pub from_parameters_mm: Option<f64>,

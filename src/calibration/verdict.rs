@@ -39,12 +39,14 @@ pub(super) struct Grounds<'a> {
     /// Rows that are likelier outliers than not, of how many.
     pub outliers: (usize, usize),
     pub unit: Unit,
+    /// Of a robot of which nothing tells how large it is: the standard deviation of a span of 1 m, millimetres.
+    pub unsized_mm: Option<f64>,
 }
 
 impl Verdict {
     /// Weighs what a report says: first whether the table means what it says, then held-out rows, then what they do not tell.
     pub(super) fn of(grounds: &Grounds<'_>) -> Self {
-        let Grounds { doubts, held_out, more_rows, outliers, unit } = grounds;
+        let Grounds { doubts, held_out, more_rows, outliers, unit, unsized_mm } = grounds;
         let answer = |r#use: Use, because: String| Self { r#use, because };
         if let Some(doubt) = doubts.iter().find(|doubt| is_grave(doubt.kind)) {
             let column = doubt.column.as_ref().map(|column| format!("`{column}`: ")).unwrap_or_default();
@@ -77,6 +79,12 @@ impl Verdict {
                 more_rows.untold_mm
             ));
         }
+        limits.extend(unsized_mm.map(|mm| {
+            format!(
+                "nothing but the description tells how large it is, a span of 1 m to ± {mm:.1} mm: write `distance_m` of two sockets below \
+                 [sockets]"
+            )
+        }));
         if *unit == Unit::Millimetres && after > more_rows.wanted_mm {
             limits.push(format!("{:.2} mm are wanted", more_rows.wanted_mm));
         }
@@ -108,7 +116,7 @@ mod tests {
     use super::*;
     use crate::calibration::Figures;
 
-    fn verdict(before: f64, after: f64, untold_mm: f64, doubts: &[Doubt]) -> Verdict {
+    fn of_sockets(before: f64, after: f64, untold_mm: f64, doubts: &[Doubt], unsized_mm: Option<f64>) -> Verdict {
         let figures = |mean| Figures { readings: 20, mean_mm: Some(mean), ..Figures::default() };
         let held_out =
             HeldOut { before: figures(before), after: figures(after), full_model: figures(after), folds: Vec::new() };
@@ -130,8 +138,23 @@ mod tests {
             more_rows: &more_rows,
             outliers: (1, 20),
             unit: Unit::Millimetres,
+            unsized_mm,
         };
         Verdict::of(&grounds)
+    }
+
+    fn verdict(before: f64, after: f64, untold_mm: f64, doubts: &[Doubt]) -> Verdict {
+        of_sockets(before, after, untold_mm, doubts, None)
+    }
+
+    /// A ball that meets itself says nothing of lengths: without a distance of two sockets the file is good for no more than that.
+    #[test]
+    fn a_robot_of_unknown_size_is_used_within_limits() {
+        let verdict = of_sockets(5.0, 0.5, 0.1, &[], Some(9.8));
+        assert!(
+            verdict.r#use == Use::Limited && verdict.because.contains("± 9.8 mm: write `distance_m`"),
+            "{verdict:?}"
+        );
     }
 
     #[test]

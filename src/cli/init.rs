@@ -21,6 +21,9 @@ pub struct Arguments {
     /// The link that carries the targets [default: the end of the longest chain whose joints all have columns]
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
+    /// How far the two sockets of every place are apart, millimetres: it alone tells how large the robot is
+    #[arg(long, value_name = "MM", value_parser = millimetres)]
+    socket_distance: Option<f64>,
     /// Write to FILE, or to standard output for `-` [default: the table's name, with .toml]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -49,6 +52,7 @@ pub fn init(arguments: &Arguments) -> Result<()> {
         table: &table,
         base: arguments.base.as_deref(),
         tip: arguments.tip.as_deref(),
+        socket_distance_m: arguments.socket_distance.map(|mm| mm / 1e3),
     });
     let begun = begun.map_err(|error| BadInput(error.to_string()))?;
     if to_stdout {
@@ -59,6 +63,12 @@ pub fn init(arguments: &Arguments) -> Result<()> {
         output::say(guess)?;
     }
     output::say(format!("wrote {}; look it over, then: body-schema calibrate {}", out.display(), out.display()))
+}
+
+/// A distance that two sockets can have.
+fn millimetres(text: &str) -> Result<f64, String> {
+    let mm = text.parse::<f64>().ok().filter(|mm| *mm > 0.0 && mm.is_finite());
+    mm.ok_or_else(|| "a number of millimetres above 0 is needed, as 50".to_owned())
 }
 
 /// What the calibration is called: letters, digits and what else a name may have.

@@ -4,6 +4,11 @@
 //! only the shape of what is predicted counts, and errors are taken after the rigid motion that fits best. To first order that
 //! takes the part of every column of the stacked Jacobian away that one rigid motion of all predicted points explains:
 //! J − Q Qᵀ J, with Q an orthonormal basis of the six motions.
+//!
+//! Or nothing counts but that the hand is at one place in several postures, wherever that is (a ball in a socket). Then errors are taken
+//! from their mean over the postures of the place: Jᵢ − J̄, with J̄ the mean over those. A robot that is everywhere larger has none.
+
+use std::{collections::BTreeMap, ops::SubAssign};
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Rotation3, SVD, Translation3, UnitQuaternion, Vector3};
 
@@ -16,36 +21,61 @@ pub struct Workspace {
     pub configurations: Vec<Vec<f64>>,
     /// Whether errors are taken after the rigid motion that fits best.
     pub up_to_motion: bool,
+    /// By configuration the number of its place, where errors are taken from their mean over those of one place; empty otherwise.
+    pub places: Vec<usize>,
 }
 
 impl From<Vec<Vec<f64>>> for Workspace {
     fn from(configurations: Vec<Vec<f64>>) -> Self {
-        Self { configurations, up_to_motion: false }
+        Self { configurations, ..Self::default() }
     }
 }
 
 impl Workspace {
+    /// Of postures by the number of the place that each is at, where errors are taken from their mean over each place. Of one posture
+    /// there is nothing to compare.
+    pub fn at_places<'a>(postures: impl IntoIterator<Item = (usize, &'a [f64])>) -> Self {
+        let postures: Vec<(usize, &[f64])> = postures.into_iter().collect();
+        let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+        postures.iter().for_each(|(place, _)| *counts.entry(*place).or_default() += 1);
+        let compared = postures.into_iter().filter(|(place, _)| counts[place] > 1);
+        let (places, configurations) = compared.map(|(place, posture)| (place, posture.to_vec())).unzip();
+        Self { configurations, places, up_to_motion: false }
+    }
+
     /// The predicted hand at every configuration, metres.
     pub fn points(&self, state: &State) -> Vec<Point3<f64>> {
         self.configurations.iter().map(|theta| state.marker_at(theta)).collect()
     }
 
+    /// Whether nothing counts but that the hand is at one place in several postures.
+    fn meets_itself(&self) -> bool {
+        !self.places.is_empty()
+    }
+
     /// The Jacobians of the predicted hand, one upon the other (3N × m), without what a rigid motion of all explains if that
-    /// does not count.
+    /// does not count, or without their mean over each place.
     pub fn jacobian(&self, state: &State, layout: &Layout) -> DMatrix<f64> {
         let count = self.configurations.len();
+        let up_to_motion = self.up_to_motion && !self.meets_itself();
         let mut stacked = DMatrix::zeros(3 * count, layout.dimension());
-        let mut motions = DMatrix::zeros(if self.up_to_motion { 3 * count } else { 0 }, 6);
+        let mut motions = DMatrix::zeros(if up_to_motion { 3 * count } else { 0 }, 6);
         for (index, theta) in self.configurations.iter().enumerate() {
             let (point, h) = jacobian(state, layout, theta);
             stacked.rows_mut(3 * index, 3).copy_from(&h);
-            if self.up_to_motion {
+            if up_to_motion {
                 let mut motion = motions.rows_mut(3 * index, 3);
                 motion.columns_mut(0, 3).copy_from(&Matrix3::identity());
                 motion.columns_mut(3, 3).copy_from(&-point.coords.cross_matrix());
             }
         }
-        if self.up_to_motion && count > 0 {
+        for indices in self.by_place() {
+            let mut mean = DMatrix::zeros(3, layout.dimension());
+            indices.iter().for_each(|index| mean += stacked.rows(3 * index, 3));
+            mean /= indices.len() as f64;
+            indices.iter().for_each(|index| stacked.rows_mut(3 * index, 3).sub_assign(&mean));
+        }
+        if up_to_motion && count > 0 {
             // An orthonormal basis also where the points lie on a line.
             let Some(svd) = singular(motions, true) else { return stacked };
             let greatest = svd.singular_values.amax();
@@ -60,15 +90,29 @@ impl Workspace {
         stacked
     }
 
+    /// The configurations of each place, by their index; none where places do not count.
+    fn by_place(&self) -> impl Iterator<Item = Vec<usize>> {
+        let mut places: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        self.places.iter().enumerate().for_each(|(index, place)| places.entry(*place).or_default().push(index));
+        places.into_values()
+    }
+
     /// Root mean square and mean of the distances between two states' predictions, metres; `None` without configurations.
     pub fn distance(&self, predicted: &[Point3<f64>], wanted: &[Point3<f64>]) -> Option<(f64, f64)> {
         if predicted.is_empty() || predicted.len() != wanted.len() {
             return None;
         }
-        let motion = if self.up_to_motion { best_motion(predicted, wanted) } else { Isometry3::identity() };
+        let up_to_motion = self.up_to_motion && !self.meets_itself();
+        let motion = if up_to_motion { best_motion(predicted, wanted) } else { Isometry3::identity() };
+        let mut errors: Vec<Vector3<f64>> =
+            predicted.iter().zip(wanted).map(|(found, wanted)| motion * found - wanted).collect();
+        for indices in self.by_place() {
+            let mean = indices.iter().map(|index| errors[*index]).sum::<Vector3<f64>>() / indices.len() as f64;
+            indices.iter().for_each(|index| errors[*index] -= mean);
+        }
         let (mut squares, mut sum) = (0.0, 0.0);
-        for (found, wanted) in predicted.iter().zip(wanted) {
-            let distance = (motion * found - wanted).norm();
+        for error in &errors {
+            let distance = error.norm();
             squares += distance * distance;
             sum += distance;
         }
@@ -102,9 +146,12 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::model::{
-        Block,
-        laws::{random_arm, random_pose},
+    use crate::{
+        kinematics::JointBox,
+        model::{
+            Block, Manifold,
+            laws::{random_arm, random_pose},
+        },
     };
 
     fn case(seed: u64) -> (State, Layout, Workspace) {
@@ -112,7 +159,7 @@ mod tests {
         let state = random_arm(&mut rng, 5);
         let layout = Layout::new(&state, (0..5).map(Block::Axis).chain([Block::Base]));
         let configurations = (0..20).map(|_| (0..5).map(|_| rng.random_range(-2.0..2.0)).collect()).collect();
-        (state, layout, Workspace { configurations, up_to_motion: true })
+        (state, layout, Workspace { configurations, up_to_motion: true, places: Vec::new() })
     }
 
     #[test]
@@ -140,6 +187,36 @@ mod tests {
             let (rms, _) = workspace.distance(&moved, &workspace.points(&state)).expect("points");
             let expected = ((&jacobian * &delta).norm_squared() / 20.0).sqrt();
             assert!((rms / expected - 1.0).abs() < 1e-2, "{rms} {expected}");
+        }
+    }
+    /// Where the hand is at a place in several postures, neither a shift of the whole counts, nor that everything is larger; what is left
+    /// is how far the predicted hand scatters there.
+    #[test]
+    fn a_hand_that_meets_itself_is_blind_to_where_it_is_and_to_its_size() {
+        for seed in 1000..1010 {
+            let (state, layout, Workspace { configurations: drawn, .. }) = case(seed);
+            let limits = JointBox::new(vec![(-3.0, 3.0); 5]).expect("limits");
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let (mut configurations, mut places) = (Vec::new(), Vec::new());
+            for (place, theta) in drawn.iter().take(4).enumerate() {
+                let manifold = Manifold::new(&state, 0, state.marker_at(theta), &limits);
+                configurations.push(theta.clone());
+                configurations.extend((0..3).filter_map(|_| manifold.draw(&mut rng)));
+                places.resize(configurations.len(), place);
+            }
+            let points: Vec<Point3<f64>> = configurations.iter().map(|theta| state.marker_at(theta)).collect();
+            let workspace = Workspace { configurations, up_to_motion: true, places };
+            let jacobian = workspace.jacobian(&state, &layout);
+            let base = layout.block(Block::Base).expect("learned");
+            assert!(jacobian.columns(base.start, 3).amax() < 1e-9, "shifts do not count");
+            let larger: Vec<Point3<f64>> = points.iter().map(|point| point * 1.01).collect();
+            assert!(workspace.distance(&larger, &points).expect("points").0 < 1e-9);
+            let mut delta = DVector::zeros(layout.dimension());
+            delta.rows_mut(6, 8).fill(1e-5);
+            let moved = workspace.points(&state.retract(&layout, &delta));
+            let (rms, _) = workspace.distance(&moved, &points).expect("points");
+            let expected = ((&jacobian * &delta).norm_squared() / points.len() as f64).sqrt();
+            assert!((rms - expected).abs() < 1e-2 * expected + 1e-12, "{seed}: {rms} {expected}");
         }
     }
 }

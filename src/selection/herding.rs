@@ -12,7 +12,7 @@
 //! in similar postures, and k says how similar they are.
 
 /// The index of the candidate that makes `made` most like `wanted`; `None` without candidates.
-pub(super) fn herd<C: AsRef<[f64]>, W: AsRef<[f64]>, M: AsRef<[f64]>>(
+pub(crate) fn herd<C: AsRef<[f64]>, W: AsRef<[f64]>, M: AsRef<[f64]>>(
     candidates: &[C],
     wanted: &[W],
     made: &[M],

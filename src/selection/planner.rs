@@ -327,8 +327,12 @@ impl Policy for Planner {
                 let listed = movements.iter().map(|movement| movement.configuration.as_slice());
                 let made = situation.history.made();
                 let candidates: Vec<&[f64]> = listed.clone().collect();
-                let all: Vec<&[f64]> = listed.chain(made.iter().map(AsRef::as_ref)).collect();
-                let index = herd(&candidates, &all, made).ok_or(SelectionError::Exhausted)?;
+                let wanted: Vec<&[f64]> = match self.workspace.places.is_empty() {
+                    true => listed.chain(made.iter().map(AsRef::as_ref)).collect(),
+                    // What is asked about is elsewhere.
+                    false => self.workspace.configurations.iter().map(Vec::as_slice).collect(),
+                };
+                let index = herd(&candidates, &wanted, made).ok_or(SelectionError::Exhausted)?;
                 Ok(Selection::of(movements[index].clone()))
             }
             Domain::List { movements, joints: Some(joints) } => {

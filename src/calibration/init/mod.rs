@@ -6,17 +6,20 @@
 mod chain;
 mod columns;
 mod pictures;
+mod places;
 #[cfg(test)]
 mod tests;
 mod written;
 
 use crate::{
     model::urdf::{Urdf, UrdfError},
-    table::{Columns, Table, TableError, is_absent},
+    scenario::Scenario,
+    table::{Table, TableError},
 };
 use chain::Search;
 use columns::Measured;
-use written::written;
+use places::Held;
+use written::{Sockets, written};
 
 /// Two files, as the calibration file is to name them, and what they hold.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +38,8 @@ pub struct Sources<'a> {
     pub base: Option<&'a str>,
     /// The link that carries the targets, if it is known.
     pub tip: Option<&'a str>,
+    /// How far the two sockets of every place are apart, if it is known, metres.
+    pub socket_distance_m: Option<f64>,
 }
 
 /// A calibration file, and what was guessed.
@@ -116,21 +121,10 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     for sensor in &sensors {
         titles.reading_titled(sensor.layout(), &sensor.columns).map_err(of_table)?;
     }
-    let mut trained = None;
+    let mut held = None;
     if let Some((place, socket)) = &sockets {
         guesses.push(format!("sockets: a target is held in one, which the columns `{place}` and `{socket}` tell"));
-        let index = titles.label(place).map_err(of_table)?;
-        let rows = table.rows(Columns { labels: vec![index], ..Columns::default() });
-        let mut places: Vec<String> = Vec::new();
-        for row in rows {
-            let label = row.map_err(of_table)?.labels.swap_remove(0);
-            if !is_absent(&label) && !places.contains(&label) {
-                places.push(label);
-            }
-        }
-        if places.len() > 1 {
-            trained = places.into_iter().next();
-        }
+        held = Some(Held::read(table, [place, socket]).map_err(of_table)?);
     }
     for sensor in &sensors {
         guesses.push(format!(
@@ -157,12 +151,22 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     if !others.is_empty() {
         guesses.push(format!("passed over: {}", others.join(", ")));
     }
-    guesses.push(match (&trained, sockets.is_some()) {
-        (Some(place), _) => format!("held out: all places but `{place}`"),
-        (None, true) => "held out: every row once, in five folds, as there is one place alone".to_owned(),
-        (None, false) => "held out: every row once, in five folds".to_owned(),
-    });
-    let text = written(sources, &chain, (&sensors, &pictures), sockets.as_ref(), trained.as_deref(), &guesses);
+    let write = |trained: Option<&str>, distance_m: Option<f64>, guesses: &[String]| {
+        let sockets = sockets.as_ref().map(|columns| Sockets { columns, trained, distance_m });
+        written(sources, &chain, (&sensors, &pictures), sockets.as_ref(), guesses)
+    };
+    let mut trained = None;
+    if let Some(held) = &held {
+        let scenario = |place: Option<&str>, distance_m: Option<f64>| {
+            let open =
+                |file: &str| Ok(if file == sources.table_file { sources.table } else { sources.urdf }.to_owned());
+            Scenario::parse("init.toml", &write(place, distance_m, &[]), &open).ok()
+        };
+        trained = held.choose(sources.socket_distance_m, &scenario, &mut guesses);
+    } else {
+        guesses.push("held out: every row once, in five folds".to_owned());
+    }
+    let text = write(trained.as_deref(), sources.socket_distance_m, &guesses);
     Ok(Begun { text, guesses })
 }
 

@@ -3,13 +3,22 @@
 use super::{Sources, columns::Sensor, pictures::Picture};
 use crate::model::urdf::Chain;
 
+/// What is said of sockets.
+pub struct Sockets<'a> {
+    /// The columns of place and socket.
+    pub columns: &'a (String, String),
+    /// The place whose rows are learned from, where there are several.
+    pub trained: Option<&'a str>,
+    /// How far the two of a place are apart, metres.
+    pub distance_m: Option<f64>,
+}
+
 /// The file.
 pub fn written(
     sources: &Sources<'_>,
     chain: &Chain,
     (sensors, pictures): (&[Sensor], &[Picture]),
-    sockets: Option<&(String, String)>,
-    trained: Option<&str>,
+    sockets: Option<&Sockets<'_>>,
     guesses: &[String],
 ) -> String {
     let Sources { name, urdf_file, table_file, .. } = sources;
@@ -45,20 +54,27 @@ pub fn written(
             quoted(name)
         ));
     }
-    if let Some((place, socket)) = sockets {
+    if let Some(Sockets { columns: (place, socket), distance_m, .. }) = sockets {
+        let distance = match distance_m {
+            Some(metres) => format!(
+                "# How far the two sockets of one place are apart, and how well that is known: it tells how large the robot is.\n\
+                 distance_m = {metres:?}\nsigma_distance_m = 0.0001\n"
+            ),
+            None => "# MISSING, see above: how far the two sockets of one place are apart. Nothing else tells how large the robot is.\n\
+                     # distance_m =\n# sigma_distance_m = 0.0001\n"
+                .to_owned(),
+        };
         text.push_str(&format!(
             "\n[[target]]\nname = \"ball\"\n\n# The ball is put into sockets, and nothing but joints is measured.\n[sockets]\n\
-             place_column = {}\nsocket_column = {}\n# Play, and what the joints' readings scatter, at the ball.\nsigma_m = 0.0002\n\
-             # How far the sockets of one place are apart: without it nothing tells how large the robot is.\n\
-             # distance_m = 0.05\n# sigma_distance_m = 0.0001\n",
+             place_column = {}\nsocket_column = {}\n# Play, and what the joints' readings scatter, at the ball.\nsigma_m = 0.0002\n{distance}",
             quoted(place),
             quoted(socket)
         ));
     }
     text.push_str(&format!("\n[measurements]\nfile = {}\n\n", quoted(table_file)));
     text.push_str("# What nothing is learned from: it says how good the calibration is on data that it has not seen.\n[held_out]\n");
-    match (trained, sockets) {
-        (Some(trained), Some((place, _))) => {
+    match sockets {
+        Some(Sockets { columns: (place, _), trained: Some(trained), .. }) => {
             text.push_str(&format!("by = {}\ntrain = [{}]\n", quoted(place), quoted(trained)));
         }
         _ => text.push_str("folds = 5\n"),

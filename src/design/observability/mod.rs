@@ -128,7 +128,7 @@ impl Prospect {
     fn workspace(&self, count: usize, stream: u64) -> Workspace {
         let mut rng = course::rng(u64::MAX, stream);
         let configurations = (0..count).map(|_| self.limits.draw(&mut rng)).collect();
-        Workspace { configurations, up_to_motion: self.up_to_motion }
+        Workspace { configurations, up_to_motion: self.up_to_motion, ..Workspace::default() }
     }
 
     /// P once everything else is known: N (Nᵀ P₀⁻¹ N)⁻¹ Nᵀ.
