@@ -68,35 +68,15 @@ impl Case<'_> {
         let mut fit = self.fit(&layout, &[], None)?;
         let of_pool = self.predicted(&pool);
         while chosen.len() < count {
-            let choice: u32 = std::env::var("CHOICE").ok().and_then(|c| c.parse().ok()).unwrap_or(0);
-            let workspace = if choice & 4 > 0 {
-                of_pool.clone()
-            } else if choice & 16 > 0 {
-                self.predicted(asked)
-            } else if choice & 32 > 0 {
-                self.predicted(&[rows, asked].concat())
-            } else if choice & 64 > 0 {
-                self.in_sockets(&[rows, asked].concat())
-            } else if choice & 8 > 0 {
-                self.in_sockets(rows)
-            } else if self.meets_itself() {
-                self.met(fit.state(), asked)
-            } else {
-                of_pool.clone()
-            };
-            let stated = if choice & 1 > 0 { self.stated(fit.state(), &chosen) } else { None };
-            let judged = Fit { belief: stated.unwrap_or_else(|| fit.belief.clone()), ..fit.clone() };
-            let best = if choice & 2 == 0 && fit.belief.model_error_prevails(&workspace) {
-                if std::env::var("CHOICE").is_ok() {
-                    print!("herd@{} ", chosen.len());
-                }
+            let workspace = if self.meets_itself() { self.met(fit.state(), asked) } else { of_pool.clone() };
+            let best = if fit.belief.model_error_prevails(&workspace) {
                 let postures = |rows: &[usize]| -> Vec<&[f64]> {
                     rows.iter().map(|row| self.rows[*row].positions.as_slice()).collect()
                 };
                 herd(&postures(&pool), &workspace.configurations, &postures(&chosen))
             } else {
-                let criterion = Criterion::new(&judged.belief, &weights)?.by(selection.planning.optimality, &workspace);
-                let gains = mapped(&pool, |row| criterion.gain_of(&self.whitened(&judged, *row)));
+                let criterion = Criterion::new(&fit.belief, &weights)?.by(selection.planning.optimality, &workspace);
+                let gains = mapped(&pool, |row| criterion.gain_of(&self.whitened(&fit, *row)));
                 let gain = |place: usize| if gains[place].is_finite() { gains[place] } else { f64::NEG_INFINITY };
                 // The first of equals: `max_by` would take the last.
                 (0..pool.len()).rev().max_by(|a, b| gain(*a).total_cmp(&gain(*b)))

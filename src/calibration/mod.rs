@@ -46,8 +46,6 @@ mod learned;
 mod loads;
 mod more_rows;
 mod outcome;
-#[cfg(test)]
-mod probe;
 mod progress;
 #[cfg(feature = "app")]
 pub mod report;
