@@ -50,6 +50,8 @@ struct Judged {
     tried: Vec<Vec<Residual>>,
     /// By reading: its row, and whether it lies within what is stated.
     covered: Vec<(usize, bool)>,
+    /// By how much that was widened.
+    widening: f64,
 }
 
 /// Calibrates a case.
@@ -76,7 +78,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     progress.tick();
     let mut strays = case.strays(&fit);
     let asked = case.asked_about(fit.state(), &splits);
-    let mut trials = case.trials(&without(&training, &strays), &fit, &asked)?;
+    let (mut trials, widening) = case.trials(&without(&training, &strays), &fit, &asked)?;
     let fuller = case.fuller(&trials, &fit)?;
     progress.tick();
 
@@ -86,12 +88,12 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         let (fold, verdict) = if has_folds {
             let nominal = case.nominal(&split.training)?;
             let fit = case.fit(&case.writable(), &split.training, Some(nominal.state()))?;
-            let trials = case.trials(&without(&split.training, &case.strays(&fit)), &fit, &asked)?;
+            let (trials, widening) = case.trials(&without(&split.training, &case.strays(&fit)), &fit, &asked)?;
             let fuller = case.fuller(&trials, &fit)?;
-            let verdict = case.judge(split, &nominal, &fit, &fuller)?;
+            let verdict = case.judge(split, (&nominal, &fit, &fuller), widening)?;
             (fit, verdict)
         } else {
-            (fit.clone(), case.judge(split, &nominal, &fit, &fuller)?)
+            (fit.clone(), case.judge(split, (&nominal, &fit, &fuller), widening)?)
         };
         folds.push(fold);
         judged.push(verdict);
@@ -152,7 +154,8 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     let stray_rows: BTreeSet<usize> = strays.iter().map(|(row, _)| *row).collect();
     let covered: Vec<(usize, bool)> =
         judged.iter().flat_map(|it| &it.covered).filter(|(row, _)| !stray_rows.contains(row)).copied().collect();
-    let coverage = Coverage::of(&covered);
+    let widened = judged.iter().map(|it| it.widening).sum::<f64>() / judged.len().max(1) as f64;
+    let coverage = Coverage::of(&covered, widened);
     let unit = held_out.as_ref().map_or(comparison.after.unit(), |held_out| held_out.after.unit());
     let span_1m_sd_mm = if case.meets_itself() { case.span_sd_mm(&fit) } else { None };
     let grounds = Grounds {
@@ -258,15 +261,22 @@ fn misfit(noise: &[Noise], held_out: Option<&Figures>, outliers: usize, rows: us
 }
 
 impl Case<'_> {
-    fn judge(&self, split: &Split, nominal: &Fit, fit: &Fit, fuller: &Fit) -> Result<Judged, CalibrationError> {
+    /// `widening` says how much wider than by noise and uncertainty what is stated of readings is.
+    fn judge(
+        &self,
+        split: &Split,
+        (nominal, fit, fuller): (&Fit, &Fit, &Fit),
+        widening: f64,
+    ) -> Result<Judged, CalibrationError> {
         let judged = |fit: &Fit| self.residuals(fit, &split.held_out);
         let tried = TRIED.iter().map(|extras| {
             let fit = self.fit(&self.extended(extras, fit.state()), &split.training, Some(fit.state()))?;
             Ok(judged(&fit))
         });
         let tried = tried.collect::<Result<_, CalibrationError>>()?;
-        let covered = self.covered(fit, &split.held_out);
-        Ok(Judged { before: judged(nominal), after: judged(fit), fuller: judged(fuller), tried, covered })
+        let reaches = self.reaches(fit, &split.held_out);
+        let covered = reaches.into_iter().map(|(row, reach)| (row, reach <= widening)).collect();
+        Ok(Judged { before: judged(nominal), after: judged(fit), fuller: judged(fuller), tried, covered, widening })
     }
 
     fn folds(

@@ -18,7 +18,7 @@ use std::cmp::Ordering;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CalibrationError, Case, Figures, Fit, Residual, Split, Unit};
+use super::{CalibrationError, Case, Figures, Fit, Residual, Split, Unit, coverage::widening};
 use crate::parallel::mapped;
 use crate::{
     kinematics::JointKind,
@@ -125,8 +125,14 @@ impl Extra {
 }
 
 impl Case<'_> {
-    /// What is worth adding, by folds among `rows` and where the robot is `asked` about; `plain` is a fit of them without it.
-    pub fn trials(&self, rows: &[usize], plain: &Fit, asked: &Workspace) -> Result<Vec<Trial>, CalibrationError> {
+    /// What is worth adding, by folds among `rows` and where the robot is `asked` about; `plain` is a fit of them without it. And by how
+    /// much wider than is stated readings scatter in these folds.
+    pub fn trials(
+        &self,
+        rows: &[usize],
+        plain: &Fit,
+        asked: &Workspace,
+    ) -> Result<(Vec<Trial>, f64), CalibrationError> {
         let near = plain.state();
         let layouts: Vec<Layout> = TRIED.iter().map(|extras| self.extended(extras, near)).collect();
         let writable = self.writable();
@@ -145,14 +151,14 @@ impl Case<'_> {
         };
         let mut trials: Vec<Trial> = TRIED.iter().zip(&layouts).map(trial).collect();
         if Split::numbered(rows, &self.postures).1 < FEWEST {
-            return Ok(trials);
+            return Ok((trials, 1.0));
         }
         let count = rows.len().min(MOST);
         let spread: Vec<usize> = (0..count).map(|index| rows[index * rows.len() / count]).collect();
         let folds = Split::folds(&spread, FOLDS, &self.postures);
-        let without = self.inner(&writable, &folds, near)?;
+        let (without, reaches) = self.inner(&writable, &folds, near)?;
         for (trial, layout) in trials.iter_mut().zip(&layouts) {
-            let with = self.inner(layout, &folds, near)?;
+            let (with, _) = self.inner(layout, &folds, near)?;
             let figures = Figures::of(&without);
             let (before, after) = (figures.mean(), Figures::of(&with).mean());
             (trial.inner_without, trial.inner) = (before, after);
@@ -181,7 +187,7 @@ impl Case<'_> {
                 break;
             }
         }
-        Ok(trials)
+        Ok((trials, widening(&reaches)))
     }
 
     /// c and v, millimetres; `None` where no covariance says.
@@ -195,13 +201,15 @@ impl Case<'_> {
         (change.is_finite() && sd.is_finite()).then_some([change * 1e3, sd * 1e3])
     }
 
-    fn inner(&self, layout: &Layout, folds: &[Split], near: &State) -> Result<Vec<Residual>, CalibrationError> {
-        let judged = |fold: &Split| -> Result<Vec<Residual>, CalibrationError> {
+    /// What every fold leaves of the rows that it holds out, and how far they [reach](Self::reaches).
+    fn inner(&self, layout: &Layout, folds: &[Split], near: &State) -> Result<Inner, CalibrationError> {
+        let judged = |fold: &Split| -> Result<Inner, CalibrationError> {
             let fit = self.fit(layout, &fold.training, Some(near))?;
-            Ok(self.residuals(&fit, &fold.held_out))
+            Ok((self.residuals(&fit, &fold.held_out), self.reaches(&fit, &fold.held_out)))
         };
         let found = mapped(folds, judged).into_iter().collect::<Result<Vec<_>, _>>()?;
-        Ok(found.into_iter().flatten().collect())
+        let (residuals, reaches): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+        Ok((residuals.concat(), reaches.concat()))
     }
 
     /// The fit with what stays; `plain` itself where nothing does.
@@ -212,6 +220,9 @@ impl Case<'_> {
         }
     }
 }
+
+/// Residuals, and by reading its row and its reach.
+type Inner = (Vec<Residual>, Vec<(usize, f64)>);
 
 /// The standard error of the mean difference, reading by reading, in a unit.
 fn standard_error(unit: Unit, before: &[Residual], after: &[Residual]) -> Option<f64> {
@@ -245,7 +256,7 @@ mod tests {
                 let nominal = case.nominal(training).expect("fitted");
                 let fit = case.fit(&case.writable(), training, Some(nominal.state())).expect("fitted");
                 let asked = case.asked_about(fit.state(), &splits);
-                let trials = case.trials(training, &fit, &asked).expect("tried");
+                let (trials, _) = case.trials(training, &fit, &asked).expect("tried");
                 let fuller = case.fuller(&trials, &fit).expect("fitted");
                 let mean = |fit| Figures::of(&case.residuals(fit, held_out)).mean().expect("lengths");
                 let (with, without) = (mean(&fuller), mean(&fit));
