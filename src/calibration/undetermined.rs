@@ -52,9 +52,12 @@ impl Case<'_> {
                 let Some(direction) = state.local(layout, &other).and_then(|it| it.try_normalize(0.0)) else {
                     continue;
                 };
-                let within = &left * left.tr_mul(&direction);
-                if (&direction - &within).norm() < ALIKE {
-                    left = without(&left, &within);
+                if (&direction - free * free.tr_mul(&direction)).norm() > ALIKE {
+                    continue;
+                }
+                let beside = &left * left.tr_mul(&direction);
+                if beside.norm() > ALIKE {
+                    left = without(&left, &beside);
                 }
             }
             before - left.ncols()
@@ -222,4 +225,59 @@ fn larger(state: &State) -> State {
     moved.devices.iter_mut().for_each(|device| longer(&mut device.pose));
     moved.sockets.iter_mut().for_each(|socket| *socket *= 1.0 + STEP);
     moved
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{Scenario, builtin};
+
+    /// What is undetermined of a real robot whose scenario is changed so, and its fit's covariance as it was and in the file's gauge.
+    fn untold(name: &str, change: impl Fn(String) -> String) -> (Parameters, DMatrix<f64>, [DMatrix<f64>; 2]) {
+        let nominal = builtin(name).expect("built in");
+        let text = change(nominal.source.clone());
+        let scenario = Scenario::parse("my.toml", &text, &|file| nominal.data_file(file)).expect("valid");
+        let case = Case::new(&scenario).expect("measured");
+        let rows: Vec<usize> = (0..case.rows.len()).collect();
+        let nominal = case.nominal(&rows).expect("fitted");
+        let fit = case.fit(&case.writable(), &rows, Some(nominal.state())).expect("fitted");
+        let covariance = |fit: &Fit| fit.belief.covariance.clone().expect("kept");
+        let free = case.undetermined(&fit);
+        (case.determined(&fit), free, [covariance(&fit), covariance(&case.in_gauge(&fit))])
+    }
+
+    #[test]
+    fn directions_are_told_by_their_meaning() {
+        for (name, first) in [("ur10-camera", "shoulder_pan_joint"), ("tiago-mocap-3", "torso_lift_joint")] {
+            let (Parameters { learned, rank, undetermined }, ..) = untold(name, |text| text);
+            assert_eq!(learned - rank, 6, "{name}");
+            let said = format!("where the base stands cannot be separated from where {first} and all that it carries");
+            assert!(undetermined.len() == 1 && undetermined[0].starts_with(&said), "{undetermined:?}");
+            assert!(undetermined[0].contains("6 directions in which both move together"), "{undetermined:?}");
+        }
+        let learned = "[robot]\noffsets = [\"elbow_joint\", \"wrist_1_joint\"]";
+        let offsets = |text: String| text.replacen("[robot]", learned, 1);
+        let (Parameters { undetermined, .. }, ..) = untold("ur10-camera", offsets);
+        assert!(
+            undetermined.iter().any(|said| said.starts_with("the zeros of elbow_joint and wrist_1_joint")),
+            "{undetermined:?}"
+        );
+    }
+
+    /// In the file's gauge nothing is known of what is fixed, and what rows tell is known as well as before.
+    #[test]
+    fn what_is_fixed_has_no_deviation() {
+        let (_, free, [before, after]) = untold("ur10-camera", |text| text);
+        let inverse = before.clone().cholesky().expect("positive").inverse();
+        let across = free.tr_mul(&inverse);
+        assert!((&across * &after).amax() < 1e-6 * (&across * &before).amax());
+        for seed in 0..20 {
+            // A combination that rows tell: across all that they do not.
+            let some = DVector::from_fn(before.nrows(), |row, _| ((row * 7 + seed * 13) as f64).sin());
+            let told = &some - &free * free.tr_mul(&some);
+            let [one, other] = [&before, &after].map(|covariance| told.dot(&(covariance * &told)));
+            assert!((one - other).abs() < 1e-6 * one, "{one} {other}");
+        }
+        assert!((0..before.nrows()).all(|k| after[(k, k)] <= before[(k, k)] * (1.0 + 1e-9)));
+    }
 }
