@@ -56,5 +56,7 @@ mod signals;
 mod strangers;
 #[path = "http/streams.rs"]
 mod streams;
+#[path = "http/trust.rs"]
+mod trust;
 #[path = "http/walkthrough.rs"]
 mod walkthrough;

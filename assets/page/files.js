@@ -115,7 +115,7 @@ export function place(path) {
  * @returns {Promise<any>} throws a ProblemError
  */
 export async function ask(method, path, body) {
-  const [, , kind, name, part, learner, what] = path.split("/").map(decodeURIComponent);
+  const [, , kind, name, part, learner, what] = path.replace(/\?.*/, "").split("/").map(decodeURIComponent);
   const asked = [method, kind, name && "…", part, learner && "…", what].filter(Boolean).join(" ");
   switch (asked) {
     case "GET scenarios":

@@ -20,6 +20,8 @@ const KEYS = [" ", "ArrowLeft", "ArrowRight", "Escape", "+", "=", "-", "?", "r",
 const KEYS_OF_CONTROLS = [" ", "ArrowLeft", "ArrowRight"];
 const KNOWN = "body-schema-known";
 const OWN = "body-schema-own-session";
+/** How long a server may take to see that this page follows a session no longer, in milliseconds. */
+const LEFT_WITHIN = 1000;
 
 const element = (id) => document.getElementById(id);
 let panel = null;
@@ -28,6 +30,8 @@ let follower = null;
 let session = null;
 /** The id of its recording. */
 let recording = null;
+/** The session that was opened here. A new window begins with what the one that opened it had kept; a page that is loaded again is still itself. */
+let own = performance.getEntriesByType("navigation")[0]?.type === "reload" ? kept(OWN) : null;
 let controls = null;
 /** What the panel said of itself last. */
 let said = null;
@@ -105,11 +109,14 @@ const commands = {
 
   open({ scenario, seed, learners, ellipsoids }) {
     return request("open", "POST", "/v1/sessions", { scenario, seed, learners, ellipsoids }, (next) => {
-      // The old one goes only after the new one has come, and only if it was opened here.
-      const before = kept(OWN);
-      if (before !== null && before !== next.id) ask("DELETE", `/v1/sessions/${before}`).catch(() => {});
-      keep(OWN, next.id);
+      // The old one goes only after the new one has come, if it was opened here and nobody else watches it.
+      const before = own;
+      own = next.id;
+      keep(OWN, own);
       follow(next);
+      if (before !== null && before !== own) {
+        setTimeout(() => ask("DELETE", `/v1/sessions/${before}?if=unwatched`).catch(() => {}), LEFT_WITHIN);
+      }
     });
   },
 

@@ -41,7 +41,7 @@ impl From<Refusal> for Failure {
             Refusal::Field(fault) => return fault.clone().into(),
             Refusal::UnknownSuggestion { .. } | Refusal::UnknownObservation { .. } => "NotFoundError",
             Refusal::NotPending { .. } | Refusal::Stale => "ConflictError",
-            Refusal::Full { .. } | Refusal::Selection(_) | Refusal::Ended(_) => "EngineError",
+            Refusal::Full { .. } | Refusal::Selection(_) | Refusal::Ended(_) | Refusal::GivenUp => "EngineError",
         };
         Self::new(kind, refusal)
     }

@@ -108,6 +108,9 @@ pub enum Refusal {
     /// The estimate has left the range of numbers: nothing is learned any more.
     #[error("{0}; exclude the observation at which it happened")]
     Ended(String),
+    /// Whoever asked waits no longer.
+    #[error("nobody waits for it any longer, and nothing has happened; ask again")]
+    GivenUp,
     /// Something else was committed after this was prepared.
     #[error("the session has changed since this was prepared; prepare it anew")]
     Stale,

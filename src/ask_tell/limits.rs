@@ -2,6 +2,8 @@
 
 /// Bytes of a setup as JSON, the text of the URDF included.
 pub const MOST_SETUP_BYTES: usize = 8 << 20;
+/// Characters of any name, title or other text of a setup but the URDF.
+pub const MOST_TEXT_CHARACTERS: usize = 300;
 /// Joints that move.
 pub const MOST_JOINTS: usize = 40;
 /// Targets.

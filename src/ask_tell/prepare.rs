@@ -46,6 +46,20 @@ impl Session {
     ///
     /// [`Refusal`] of a wrong field, of more than fit, and where nothing can be chosen.
     pub fn prepare_suggest(&self, ask: &Ask, now_s: Option<f64>) -> Result<Prepared<Suggestions>, Refusal> {
+        self.prepare_suggest_while(ask, now_s, &|| true)
+    }
+
+    /// The same as long as somebody waits for it, which is asked before each suggestion.
+    ///
+    /// # Errors
+    ///
+    /// The same, and [`Refusal::GivenUp`].
+    pub fn prepare_suggest_while(
+        &self,
+        ask: &Ask,
+        now_s: Option<f64>,
+        is_wanted: &dyn Fn() -> bool,
+    ) -> Result<Prepared<Suggestions>, Refusal> {
         let count = ask.check(now_s)?;
         let mut draft = Draft::of(self, now_s)?;
         draft.drop_infeasible()?;
@@ -62,6 +76,9 @@ impl Session {
                 return Err(Refusal::Full { what: "pending suggestions", most: MOST_PENDING, mend });
             }
             self.check_room(draft.events.len() + 1)?;
+            if !is_wanted() {
+                return Err(Refusal::GivenUp);
+            }
             draft.suggest(ask)?;
         }
         let own = draft.ledger.pending().filter(|it| it.client == ask.client);

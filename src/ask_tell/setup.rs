@@ -158,7 +158,13 @@ impl Setup {
 /// JSON as TOML, which knows no null.
 fn tabled(path: &str, keys: &Map<String, Value>) -> Result<Table, Fault> {
     let given = keys.iter().filter(|(_, value)| !value.is_null());
-    given.map(|(key, value)| Ok((key.clone(), value_of(&below(path, key), value)?))).collect()
+    given
+        .map(|(key, value)| {
+            let path = below(path, &key.chars().take(MOST_TEXT_CHARACTERS).collect::<String>());
+            is_short(&path, key)?;
+            Ok((key.clone(), value_of(&path, value)?))
+        })
+        .collect()
 }
 
 fn value_of(path: &str, value: &Value) -> Result<toml::Value, Fault> {
@@ -166,7 +172,12 @@ fn value_of(path: &str, value: &Value) -> Result<toml::Value, Fault> {
     Ok(match value {
         Value::Null => return refuse("null is no element of a list"),
         Value::Bool(value) => (*value).into(),
-        Value::String(text) => text.as_str().into(),
+        Value::String(text) => {
+            if path != "robot.urdf" {
+                is_short(path, text)?;
+            }
+            text.as_str().into()
+        }
         Value::Number(number) => match (number.as_i64(), number.as_f64()) {
             (Some(whole), _) => whole.into(),
             (None, Some(number)) => number.into(),
@@ -178,6 +189,16 @@ fn value_of(path: &str, value: &Value) -> Result<toml::Value, Fault> {
         }
         Value::Object(keys) => tabled(path, keys)?.into(),
     })
+}
+
+/// Names and titles are told with every reading and every answer.
+fn is_short(path: &str, text: &str) -> Result<(), Fault> {
+    let count = text.chars().count();
+    if count <= MOST_TEXT_CHARACTERS {
+        return Ok(());
+    }
+    let what = format!("{count} characters are more than the {MOST_TEXT_CHARACTERS} that a text may have");
+    Err(Fault::new(path, what, "say it shorter"))
 }
 
 fn below(path: &str, key: &str) -> String {

@@ -84,7 +84,7 @@ impl Case<'_> {
             chosen.extend(best.map(|place| pool.remove(place)));
             fit = self.fit(&layout, &chosen, near(&fit, chosen.len()))?;
             fits.push(fit.clone());
-            progress.tick();
+            progress.advance()?;
         }
         Ok((chosen, fits))
     }
@@ -147,7 +147,7 @@ impl Case<'_> {
         let found = mapped(&numbers, |number| -> Result<Vec<Option<f64>>, CalibrationError> {
             let by_split = splits.iter().map(|split| self.in_order(&layout, split, sizes, *number));
             let by_split = by_split.collect::<Result<Vec<_>, _>>()?;
-            progress.tick();
+            progress.advance()?;
             let at = |index: usize| together(&by_split.iter().map(|figures| figures[index]).collect::<Vec<_>>());
             Ok((0..sizes.len()).map(at).collect())
         });

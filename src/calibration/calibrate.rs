@@ -73,14 +73,14 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     }
     progress.stage("all training rows", 3);
     let nominal = case.nominal(&training)?;
-    progress.tick();
+    progress.advance()?;
     let fit = case.fit(&case.writable(), &training, Some(nominal.state()))?;
-    progress.tick();
+    progress.advance()?;
     let mut strays = case.strays(&fit);
     let asked = case.asked_about(fit.state(), &splits);
     let (mut trials, widening) = case.trials(&without(&training, &strays), &fit, &asked)?;
     let fuller = case.fuller(&trials, &fit)?;
-    progress.tick();
+    progress.advance()?;
 
     progress.stage(if has_folds { "folds" } else { "held-out rows" }, splits.len() as u64);
     let (mut folds, mut judged) = (Vec::new(), Vec::new());
@@ -97,7 +97,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         };
         folds.push(fold);
         judged.push(verdict);
-        progress.tick();
+        progress.advance()?;
     }
     // What went wrong altogether counts for nothing in any figure, nor for what is judged by figures.
     let learned: BTreeSet<usize> = fit.rows.iter().copied().collect();

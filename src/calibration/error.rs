@@ -58,6 +58,9 @@ pub enum CalibrationError {
     /// No row could be chosen.
     #[error("no row could be chosen: {0}")]
     Selection(#[from] SelectionError),
+    /// Whoever asked waits no longer.
+    #[error("nobody waits for it any longer; ask again")]
+    GivenUp,
     /// What was learned does not fit into a URDF.
     #[error("what was learned cannot be written as a URDF: {0}")]
     Unwritable(#[from] Unwritable),
@@ -66,6 +69,6 @@ pub enum CalibrationError {
 impl CalibrationError {
     /// Whether the error lies in what was asked, and not in carrying it out.
     pub fn is_bad_input(&self) -> bool {
-        !matches!(self, Self::Estimation(_) | Self::Selection(_))
+        !matches!(self, Self::Estimation(_) | Self::Selection(_) | Self::GivenUp)
     }
 }

@@ -59,9 +59,9 @@ impl Calibration {
         }
         progress.stage("all training rows", 2);
         let nominal = case.nominal(&training)?;
-        progress.tick();
+        progress.advance()?;
         let fit = case.fit(&case.writable(), &training, Some(nominal.state()))?;
-        progress.tick();
+        progress.advance()?;
         described("", case, &fit)
     }
 

@@ -5,6 +5,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
+mod rows_needed;
+
 use super::{Calibration, Case, Figures, Options, Report, Silent, Unit, calibrate};
 use crate::{
     model::urdf::{Chain, Urdf},

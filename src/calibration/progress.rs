@@ -1,5 +1,7 @@
 //! How far a calibration has come.
 
+use super::CalibrationError;
+
 /// Is told what is being done; from any thread.
 pub trait Progress: Sync {
     /// So many steps of something begin.
@@ -7,6 +9,21 @@ pub trait Progress: Sync {
 
     /// One of them is done.
     fn tick(&self);
+
+    /// Whether nobody waits for it any longer; this is asked after each step.
+    fn is_given_up(&self) -> bool {
+        false
+    }
+
+    /// One step is done, and the next is wanted.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::GivenUp`] if it is not.
+    fn advance(&self) -> Result<(), CalibrationError> {
+        self.tick();
+        if self.is_given_up() { Err(CalibrationError::GivenUp) } else { Ok(()) }
+    }
 }
 
 /// Tells nobody.

@@ -84,7 +84,7 @@ fn discard(path: &Path) {
     }
 }
 
-fn failure(path: &Path, source: EncodeError) -> RecordingError {
+pub(super) fn failure(path: &Path, source: EncodeError) -> RecordingError {
     match source {
         EncodeError::Write(source) => RecordingError::Write { path: path.to_owned(), source },
         other => other.into(),

@@ -1,6 +1,10 @@
 //! A recording that is followed while it grows.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::{
+    io::Write,
+    path::Path,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
 
 use bytes::Bytes;
 use re_log_encoding::{CrateVersion, Encodable, Encoder, EncodingOptions, StreamHeader, ToTransport};
@@ -10,11 +14,14 @@ use super::{
     RecordingError, Shape, Theme,
     blueprint::Arranger,
     compact::{Keep, put_together},
+    file::failure,
     rerun::LogMsg,
 };
 
 /// How large a part is that is put together of others.
 const MOST_TOGETHER_BYTES: usize = 1 << 18;
+/// So many bytes of parts are taken apart at a time, to be put together: decoded they take some ten times as much.
+const TAKEN_APART_BYTES: usize = 4 << 20;
 
 /// A growing log of encoded parts, in memory, for any number of readers at any speed. Clones share one log.
 ///
@@ -215,9 +222,33 @@ impl LiveLog {
     /// with a footer.
     ///
     /// Takes about as long as it took to encode the session: run it where it may block.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError`] where it cannot be encoded.
     pub fn complete(&self) -> Result<Vec<u8>, RecordingError> {
-        let messages = put_together(self.parts_from(0).concat(), Keep::Steps)?;
-        Ok(Encoder::encode(messages.into_iter().map(Ok))?)
+        let mut bytes = Vec::new();
+        self.complete_to(&mut bytes, self.len())?;
+        Ok(bytes)
+    }
+
+    /// The same, of the first `parts`, written as it is put together: however long the recording, little more of it is in memory than
+    /// there is anyway.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError`] where it cannot be encoded or written.
+    pub fn complete_to(&self, writer: impl Write, parts: usize) -> Result<(), RecordingError> {
+        let failed = |source| failure(Path::new("that is put together"), source);
+        let encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, writer);
+        let mut encoder = encoder.map_err(failed)?;
+        let parts = self.batch_from(1, parts.saturating_sub(1));
+        for few in in_few(&parts) {
+            for message in put_together([&[self.header()], few].concat().concat(), Keep::Steps)? {
+                encoder.append(&message).map_err(failed)?;
+            }
+        }
+        encoder.finish().map_err(failed)
     }
 
     /// Some of its parts, without the header, as few: the many small chunks of a live session put together. Readers that are
@@ -227,11 +258,13 @@ impl LiveLog {
     /// Takes about as long as it took to encode the parts: run it where it may block.
     pub fn put_together(&self, parts: &[Bytes]) -> Result<Vec<Bytes>, RecordingError> {
         let mut together: Vec<Vec<u8>> = Vec::new();
-        for message in put_together([&[self.header()], parts].concat().concat(), Keep::Motion)? {
-            let bytes = encode(&message)?;
-            match together.last_mut() {
-                Some(part) if part.len() + bytes.len() <= MOST_TOGETHER_BYTES => part.extend_from_slice(&bytes),
-                _ => together.push(bytes.to_vec()),
+        for few in in_few(parts) {
+            for message in put_together([&[self.header()], few].concat().concat(), Keep::Motion)? {
+                let bytes = encode(&message)?;
+                match together.last_mut() {
+                    Some(part) if part.len() + bytes.len() <= MOST_TOGETHER_BYTES => part.extend_from_slice(&bytes),
+                    _ => together.push(bytes.to_vec()),
+                }
             }
         }
         Ok(together.into_iter().map(|part| Bytes::from(part.into_boxed_slice())).collect())
@@ -247,6 +280,22 @@ impl Default for LiveLog {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// The parts in groups, each of so few bytes that it may be taken apart at once.
+fn in_few(parts: &[Bytes]) -> impl Iterator<Item = &[Bytes]> {
+    let mut rest = parts;
+    std::iter::from_fn(move || {
+        let mut bytes = 0;
+        let fitting = rest.iter().take_while(|part| {
+            bytes += part.len();
+            bytes <= TAKEN_APART_BYTES
+        });
+        let count = fitting.count().max(1).min(rest.len());
+        let (few, others) = rest.split_at(count);
+        rest = others;
+        (count > 0).then_some(few)
+    })
 }
 
 fn encode(message: &LogMsg) -> Result<Bytes, RecordingError> {

@@ -7,22 +7,23 @@
 mod stream;
 
 use std::{
+    convert::Infallible,
     io,
     net::SocketAddr,
-    pin::{Pin, pin},
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-    task::{Context, Poll},
+    pin::pin,
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
 
 use axum::{
     Router,
-    body::Body,
     extract::{ConnectInfo, Request},
     http::StatusCode,
 };
 use bytes::Bytes;
-use http_body::{Body as HttpBody, Frame, SizeHint};
 use hyper::{
     body::Incoming,
     server::conn::http1,
@@ -38,6 +39,7 @@ use tokio::{
 use tokio_util::sync::CancellationToken;
 
 use super::{
+    holding::Holding,
     limits::Limits,
     metrics::Metrics,
     problem::{Kind, PROBLEM_JSON, Problem},
@@ -92,6 +94,8 @@ struct Connection {
     phase: watch::Sender<Phase>,
     /// It has to make room.
     evicted: CancellationToken,
+    /// A request was refused before it had come as a whole.
+    unread: AtomicBool,
 }
 
 impl Connection {
@@ -104,6 +108,11 @@ impl Connection {
             }
             is_idle
         });
+    }
+
+    /// Whether something of a request may be left that nobody will read.
+    fn has_unread(&self) -> bool {
+        self.unread.load(Ordering::Relaxed)
     }
 
     /// Since when it has waited for the head of a request; `None` while it serves one.
@@ -176,6 +185,7 @@ impl Connections {
         let connection = Arc::new(Connection {
             phase: watch::Sender::new(Phase::Asking(Instant::now())),
             evicted: CancellationToken::new(),
+            unread: AtomicBool::new(false),
         });
         self.lock().push(connection.clone());
         let place = Place { connection, all: self.clone(), _permit: permit };
@@ -236,8 +246,14 @@ impl Connections {
             let served = Served(asked.clone());
             asked.phase.send_replace(Phase::Busy);
             request.extensions_mut().insert(ConnectInfo(Reached::at(reached)));
-            let answering = service.call(request);
-            async move { answering.await.map(|response| response.map(|body| Sending { body, _served: served })) }
+            let (answering, connection) = (service.call(request), asked.clone());
+            async move {
+                let response = answering.await?;
+                if response.status() == StatusCode::PAYLOAD_TOO_LARGE {
+                    connection.unread.store(true, Ordering::Relaxed);
+                }
+                Ok::<_, Infallible>(response.map(|body| Holding::new(body, served)))
+            }
         });
         let serving = http1::Builder::new()
             // Phases have their own times.
@@ -316,29 +332,6 @@ struct Served(Arc<Connection>);
 impl Drop for Served {
     fn drop(&mut self) {
         self.0.phase.send_replace(Phase::Idle(Instant::now()));
-    }
-}
-
-/// The body of an answer.
-struct Sending {
-    body: Body,
-    _served: Served,
-}
-
-impl HttpBody for Sending {
-    type Data = Bytes;
-    type Error = axum::Error;
-
-    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        Pin::new(&mut self.body).poll_frame(cx)
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
     }
 }
 

@@ -124,10 +124,13 @@ pub(super) fn parameters<'a, const N: usize>(
     Ok(values)
 }
 
-/// The header `Last-Event-ID`: the last step that was seen.
-pub(super) fn last_event_id(headers: &HeaderMap) -> Result<Option<u64>, Problem> {
+/// The header `Last-Event-ID`: how often the history had been rewritten, and the last step of it that was seen.
+pub(super) fn last_event_id(headers: &HeaderMap) -> Result<Option<(u64, u64)>, Problem> {
     let Some(value) = headers.get("last-event-id") else { return Ok(None) };
-    whole_number("Last-Event-ID", value.to_str().unwrap_or_default()).map(Some)
+    let value = value.to_str().unwrap_or_default();
+    let (rewritten, step) = value.split_once(':').unwrap_or(("0", value));
+    let number = |value| whole_number("Last-Event-ID", value);
+    Ok(Some((number(rewritten)?, number(step)?)))
 }
 
 /// The header `Idempotency-Key`.
@@ -145,7 +148,7 @@ pub(super) fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Pro
     key.map(|key| Some(key.to_owned())).ok_or_else(|| Problem::new(Kind::Malformed, detail()).field(NAME))
 }
 
-fn whole_number(name: &str, value: &str) -> Result<u64, Problem> {
+pub(super) fn whole_number(name: &str, value: &str) -> Result<u64, Problem> {
     value.parse().ok().filter(|number| *number <= MOST_WHOLE).ok_or_else(|| {
         Problem::new(Kind::Malformed, format!("`{name}` must be a whole number from 0, not `{value}`")).field(name)
     })
@@ -215,6 +218,22 @@ mod tests {
         for keys in [&["one", "one"][..], &["one", "two"], &["one", ""], &[""]] {
             let problem = with(keys).expect_err("not one");
             assert_eq!((problem.status, problem.field.as_deref()), (400, Some("Idempotency-Key")), "{keys:?}");
+        }
+    }
+
+    #[test]
+    fn the_last_event_is_a_step_of_a_history() {
+        let of = |id: &'static str| {
+            last_event_id(&HeaderMap::from_iter([(
+                "last-event-id".parse().expect("a name"),
+                id.parse().expect("a value"),
+            )]))
+        };
+        assert_eq!(last_event_id(&HeaderMap::new()).expect("none"), None);
+        assert_eq!(of("7").expect("a step"), Some((0, 7)));
+        assert_eq!(of("2:7").expect("a step"), Some((2, 7)));
+        for id in ["", "x", "1:", ":1", "1:2:3", "-1", "1:-1"] {
+            assert_eq!(of(id).expect_err(id).field.as_deref(), Some("Last-Event-ID"));
         }
     }
 

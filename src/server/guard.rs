@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::{
     Router,
-    body::to_bytes,
+    body::{Body, HttpBody, to_bytes},
     extract::{ConnectInfo, DefaultBodyLimit, Request, State},
     http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header},
     middleware::{Next, from_fn, from_fn_with_state, map_response},
@@ -13,8 +13,10 @@ use axum::{
 
 use super::{
     App, FrameAncestor,
+    holding::Holding,
     problem::{Kind, PROBLEM_JSON, Problem},
     requests,
+    session::Taken,
     strangers::Reached,
 };
 
@@ -23,6 +25,8 @@ use super::{
 pub(crate) const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
      style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'";
 
+/// Answers from so many bytes on are counted.
+const LARGE_BYTES: usize = 64 << 10;
 /// So much is read of what an error that no handler made says.
 const MOST_SAID_BYTES: usize = 64 << 10;
 
@@ -79,6 +83,22 @@ async fn refuse_large_heads(State(app): State<Arc<App>>, request: Request, next:
         Some(detail) => Problem::new(Kind::HeadTooLarge, detail).into_response(),
         None => next.run(request).await,
     }
+}
+
+/// Has large answers count until they are sent, beyond as many as there may be those who only read are asked to come again.
+pub(super) async fn counted(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let only_reads = *request.method() == Method::GET;
+    let response = next.run(request).await;
+    let bytes = response.body().size_hint().exact().and_then(|bytes| usize::try_from(bytes).ok()).unwrap_or(0);
+    if bytes < LARGE_BYTES {
+        return response;
+    }
+    if only_reads && !app.answers.has_room() {
+        let detail = "as many large answers are on their way to clients as there may be; ask again later";
+        return Problem::new(Kind::Busy, detail).into_response();
+    }
+    let taken = Taken::of(&app.answers, bytes);
+    response.map(|body| Body::new(Holding::new(body, taken)))
 }
 
 /// Who has no business here: under a foreign name, without the token, or from a page of another origin, which must neither
@@ -143,7 +163,10 @@ async fn as_problem(response: Response) -> Response {
 async fn with_headers(always: Headers, mut response: Response) -> Response {
     let headers = response.headers_mut();
     for (name, value) in always.0.iter() {
-        headers.insert(name, value.clone());
+        // A document with its style within has said its own policy.
+        if *name != header::CONTENT_SECURITY_POLICY || !headers.contains_key(name) {
+            headers.insert(name, value.clone());
+        }
     }
     // What sessions say changes from step to step; assets have said themselves how long they hold.
     headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));

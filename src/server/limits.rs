@@ -57,6 +57,8 @@ pub struct Limits {
     pub idle_after: Duration,
 }
 
+/// So much of answers may be on its way however little memory there is.
+const LEAST_ANSWERS_BYTES: usize = 16 << 20;
 /// So much of a head is read at a time.
 const LEAST_HEADER_BYTES: usize = 8 << 10;
 /// So many times as large as it may be a head is still read, so that it gets an answer that says what is wrong.
@@ -93,6 +95,11 @@ impl Limits {
     /// How large the body may be that opens a session with a robot elsewhere, bytes.
     pub fn setup_body_bytes(&self) -> usize {
         MOST_SETUP_BYTES + self.body_bytes
+    }
+
+    /// How much of large answers may be on its way to clients, bytes.
+    pub(super) fn answers_bytes(&self) -> usize {
+        (self.memory_bytes / 8).max(LEAST_ANSWERS_BYTES)
     }
 
     /// How large a session with a robot elsewhere may be.

@@ -9,6 +9,7 @@
 //! aside     work that holds up nobody                    gzip     answers, compressed
 //! strangers who may ask at all                           frame    who may embed the page
 //! connections  how long each may keep us waiting          limits   how much is taken on
+//! holding   what an answer holds until it is sent
 //! requests  their ids and lines in the log                metrics  figures for Prometheus
 //! ```
 //!
@@ -23,6 +24,7 @@ mod extract;
 mod frame;
 mod guard;
 mod gzip;
+mod holding;
 mod limits;
 mod metrics;
 mod problem;
@@ -34,7 +36,8 @@ mod strangers;
 
 use std::{io, net::SocketAddr, path::PathBuf, sync::Arc};
 
-use axum::Router;
+use aside::Jobs;
+use axum::{Router, middleware::from_fn_with_state};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
@@ -102,7 +105,7 @@ pub enum ServerError {
 
 /// What all requests share.
 struct App {
-    sessions: Sessions,
+    sessions: Arc<Sessions>,
     assets: assets::Assets,
     /// The OpenAPI document, as it is sent.
     openapi: bytes::Bytes,
@@ -110,6 +113,10 @@ struct App {
     limits: Limits,
     metrics: Arc<Metrics>,
     connections: Arc<Connections>,
+    /// What takes a core for a while.
+    jobs: Jobs,
+    /// What is on its way to clients.
+    answers: Arc<Budget>,
 }
 
 /// A server that is ready to serve.
@@ -140,7 +147,8 @@ impl Server {
         let damage = store.damage().to_vec();
         let keeping = Keeping {
             store: store.holding(limits.stored_sessions, limits.stored_bytes),
-            recordings: options.data_dir.filter(|_| options.keep_recordings),
+            recordings: options.data_dir.clone().filter(|_| options.keep_recordings),
+            scratch: options.data_dir,
             limits: limits.clone(),
         };
         let most = Most { connections: limits.possible_connections(), memory_bytes: limits.memory_bytes };
@@ -152,9 +160,12 @@ impl Server {
             openapi: document,
             strangers: Strangers::new(options.token, options.allow_hosts, address.port()),
             connections: Connections::new(limits.clone(), metrics.clone()),
+            answers: Arc::new(Budget::new(limits.answers_bytes())),
             limits,
             metrics,
+            jobs: Jobs::default(),
         });
+        let routes = routes.layer(from_fn_with_state(app.clone(), guard::counted));
         let router = Router::new().merge(routes).merge(assets::routes(&app.assets));
         let router = guard::layered(router, &app, guard::Headers::new(&options.frame_ancestors));
         Ok(Self { listener, app, router, shutdown, damage })

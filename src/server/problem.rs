@@ -104,6 +104,7 @@ pub(super) enum Kind {
     Diverged,
     KeyTaken,
     NothingToShow,
+    Watched,
     NoConfiguration,
     ChoosesItself,
     BodyTooLarge,
@@ -118,6 +119,7 @@ pub(super) enum Kind {
     ServerFull,
     ShuttingDown,
     Dormant,
+    Busy,
     Storage,
     Damaged,
     Other(StatusCode),
@@ -151,6 +153,7 @@ impl Kind {
             Self::Diverged => (409, urn!("diverged"), "The estimate has diverged"),
             Self::KeyTaken => (409, urn!("key-taken"), "The key came with another body"),
             Self::NothingToShow => (409, urn!("nothing-to-show"), "There is nothing to show yet"),
+            Self::Watched => (409, urn!("watched"), "Somebody follows the session"),
             Self::NoConfiguration => (409, urn!("no-configuration"), "A person has not chosen the next movement"),
             Self::ChoosesItself => (409, urn!("chooses-itself"), "The learner chooses its movements itself"),
             Self::BodyTooSlow => (408, urn!("body-too-slow"), "The body did not come in time"),
@@ -166,6 +169,7 @@ impl Kind {
             Self::ServerFull => (503, urn!("server-full"), "The server holds as much as it can"),
             Self::ShuttingDown => (503, urn!("shutting-down"), "The server is shutting down"),
             Self::Dormant => (503, urn!("dormant"), "The session has just left memory"),
+            Self::Busy => (503, urn!("busy"), "The server is still at it"),
             Self::Storage => (507, urn!("storage"), "There is no room to write"),
             Self::Other(status) => (status.as_u16(), "about:blank", status.canonical_reason().unwrap_or("Error")),
         }
@@ -302,6 +306,7 @@ impl From<Refusal> for Problem {
             Refusal::Full { .. } => (Kind::SessionFull, None),
             Refusal::Selection(_) => (Kind::NothingToSuggest, None),
             Refusal::Ended(_) => (Kind::Diverged, None),
+            Refusal::GivenUp => (Kind::Busy, None),
             Refusal::Stale => (Kind::Internal, None),
         };
         let problem = Self::new(kind, refusal.to_string());
@@ -329,7 +334,9 @@ impl From<StoreError> for Problem {
                 let mend = "end the server and run `body-schema repair` on its folder to keep what is before that";
                 Self::new(Kind::Damaged, format!("{error}; {mend}"))
             }
-            StoreError::Gone { .. } => Self::new(Kind::Storage, format!("it has not happened: {error}")),
+            StoreError::Gone { .. } | StoreError::Changed { .. } => {
+                Self::new(Kind::Storage, format!("it has not happened: {error}"))
+            }
             _ if error.is_for_want_of_space() => {
                 let detail =
                     format!("it could not be written, and has not happened: {error}; free some space and ask again");

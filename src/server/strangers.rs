@@ -1,7 +1,8 @@
 //! Who may ask: a server that others can reach answers those who carry its token, and under names that are its own.
 //!
 //! Programs carry the token in `Authorization: Bearer`. A browser is opened once at `/?token=…`, which puts it into a cookie that
-//! scripts cannot read and other sites cannot send, and goes on to the page without it: a copied link never holds it.
+//! scripts cannot read and other sites cannot send, as a pass that is good at this server alone, and goes on to the page without it: a
+//! copied link never holds it.
 
 use std::{fmt, net::SocketAddr, str::FromStr};
 
@@ -10,6 +11,7 @@ use axum::{
     http::{HeaderMap, HeaderValue, Method, StatusCode, header},
     response::{IntoResponse, Response},
 };
+use sha2::{Digest, Sha256};
 use subtle::ConstantTimeEq;
 
 use super::problem::{Kind, Problem};
@@ -129,16 +131,21 @@ impl Strangers {
 
     /// What is answered to who does not carry the token; `None` to all others, who may come in.
     pub(super) fn turn_away(&self, request: &Request) -> Option<Response> {
-        let token = self.token.as_ref()?;
         let headers = request.headers();
-        if bearer(headers).is_some_and(|given| token.is(given)) || self.cookies(headers).any(|given| token.is(given)) {
-            return None;
-        }
+        let Some(token) = &self.token else {
+            let is_page = request.method() == Method::GET && request.uri().path() == "/";
+            let brought = request.uri().query().filter(|_| is_page).and_then(query_token);
+            return brought.map(|(_, rest)| to_page(&rest));
+        };
+        let is_known = bearer(headers).is_some_and(|given| token.is(given)) || self.has_cookie(token, headers);
         let brought = (request.method() == Method::GET && request.uri().path() == "/")
             .then(|| request.uri().query().and_then(query_token))
             .flatten();
         Some(match brought {
             Some((given, rest)) if token.is(given) => self.keep(token, &rest, headers),
+            // Whatever it is, it is not to stay in the address.
+            Some((_, rest)) if is_known => to_page(&rest),
+            _ if is_known => return None,
             _ => {
                 let detail = "send the token that the server printed when it started, or that of its --token-file, as \
                               `Authorization: Bearer TOKEN`; a browser is opened once at /?token=TOKEN";
@@ -147,28 +154,43 @@ impl Strangers {
         })
     }
 
-    fn cookies<'a>(&'a self, headers: &'a HeaderMap) -> impl Iterator<Item = &'a str> {
+    fn has_cookie(&self, token: &Token, headers: &HeaderMap) -> bool {
         let lines = headers.get_all(header::COOKIE).into_iter().filter_map(|value| value.to_str().ok());
         let pairs = lines.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('='));
-        pairs.filter(|(name, _)| *name == self.cookie).map(|(_, value)| value)
+        let mut given = pairs.filter(|(name, _)| *name == self.cookie).map(|(_, value)| value);
+        let right = self.pass(token);
+        given.any(|given| right.as_bytes().ct_eq(given.as_bytes()).into())
     }
 
-    /// Has the browser keep the token, and go to the page.
+    /// What a browser is given in place of the token: whoever reads it can neither ask another server with it, nor tell the token.
+    fn pass(&self, token: &Token) -> String {
+        let mut hash = Sha256::new();
+        for part in ["body-schema cookie", &self.cookie, token.as_str()] {
+            hash.update((part.len() as u64).to_be_bytes());
+            hash.update(part);
+        }
+        hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// Has the browser keep a pass, and go to the page.
     fn keep(&self, token: &Token, rest: &str, headers: &HeaderMap) -> Response {
-        let location = if rest.is_empty() { "/".to_owned() } else { format!("/?{rest}") };
         let is_encrypted = headers.get("x-forwarded-proto").is_some_and(|scheme| scheme == "https");
         let secure = if is_encrypted { "; Secure" } else { "" };
-        let Self { cookie, .. } = self;
-        let token = token.as_str();
-        let cookie = format!("{cookie}={token}; Path=/; Max-Age={KEPT_S}; HttpOnly; SameSite=Strict{secure}");
-        let mut response = StatusCode::SEE_OTHER.into_response();
-        // Both are of visible characters, as the address that was asked for is.
-        let values = [(header::LOCATION, location), (header::SET_COOKIE, cookie)];
-        for (name, value) in values {
-            response.headers_mut().extend(HeaderValue::from_str(&value).map(|value| (name, value)));
-        }
+        let (Self { cookie, .. }, pass) = (self, self.pass(token));
+        let cookie = format!("{cookie}={pass}; Path=/; Max-Age={KEPT_S}; HttpOnly; SameSite=Strict{secure}");
+        let mut response = to_page(rest);
+        response.headers_mut().extend(HeaderValue::from_str(&cookie).map(|value| (header::SET_COOKIE, value)));
         response
     }
+}
+
+/// To the page, with the rest of a query.
+fn to_page(rest: &str) -> Response {
+    let location = if rest.is_empty() { "/".to_owned() } else { format!("/?{rest}") };
+    let mut response = StatusCode::SEE_OTHER.into_response();
+    // It is of visible characters, as the address that was asked for is.
+    response.headers_mut().extend(HeaderValue::from_str(&location).map(|value| (header::LOCATION, value)));
+    response
 }
 
 fn bearer(headers: &HeaderMap) -> Option<&str> {

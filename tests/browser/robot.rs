@@ -88,6 +88,15 @@ pub async fn visit(page: &Browser, server: Server) {
 
     let address = page.evaluate("location.search").await;
     assert_eq!(address, format!("?v=1&session={id}"), "it names the session and nothing else");
+    // The report is a page of its own, with its style.
+    for _ in 0..8 {
+        program.moves(&session).await;
+    }
+    page.open(&server.at(&format!("{session}/report.html"))).await;
+    let width = page.evaluate("getComputedStyle(document.querySelector('main')).maxWidth").await;
+    assert_eq!(width, "960px", "as its style sheet says");
+    page.open(&server.at(&format!("?v=1&session={id}"))).await;
+    page.wait_for_state("the session again", "state.phase === 'ready'").await;
     // It was deleted by somebody else.
     program.http.delete(server.at(&session)).send().await.expect("an answer");
     reads(page, "This session was deleted.").await;

@@ -34,6 +34,9 @@ async fn results_are_what_calibrate_makes_of_the_files() {
         let response = server.get(&format!("{session}/{name}")).await;
         assert_eq!(response.status(), StatusCode::OK, "{name}");
         assert_eq!(response.headers()["content-type"], content_type, "{name}");
+        // The report has its style within.
+        let policy = response.headers()["content-security-policy"].to_str().expect("text");
+        assert_eq!(policy.contains("style-src 'unsafe-inline'"), name == "report.html", "{name}: {policy}");
         files.insert(name, response.text().await.expect("text"));
     }
     for name in ["calibration.toml", "observations.csv", "robot.urdf"] {

@@ -15,7 +15,10 @@ use tokio_tungstenite::{
     tungstenite::{Message, protocol::frame::coding::CloseCode},
 };
 
-use crate::support::{SOON, Server, timeless};
+use crate::{
+    robot,
+    support::{SOON, Server, timeless},
+};
 
 /// The chunks of a recording, without those of its blueprint.
 fn chunks_of_recording(bytes: &[u8]) -> impl Iterator<Item = Chunk> {
@@ -90,6 +93,10 @@ struct Events {
 
 impl Events {
     async fn open(server: &Server, session: &str, last: Option<u64>) -> Self {
+        Self::after(server, session, last.map(|last| last.to_string())).await
+    }
+
+    async fn after(server: &Server, session: &str, last: Option<String>) -> Self {
         let request = server.request(Method::GET, &format!("{session}/events"));
         let request = last.into_iter().fold(request, |request, last| request.header("last-event-id", last));
         let response = request.send().await.expect("an answer");
@@ -126,6 +133,43 @@ pub async fn steps_of_events(server: &Server, session: &str, last: u64) -> Vec<u
         steps.push(events.next().await.expect("an event").0);
     }
     steps
+}
+
+/// After an observation was excluded, steps count anew: whoever resumes in the old count is told so, and told all.
+#[tokio::test]
+async fn events_of_a_rewritten_history_begin_anew() {
+    let server = Server::start().await;
+    let session = server.open(robot::opening()).await;
+    let observe = async |number: usize| {
+        let told = robot::told(&robot::posture(number));
+        assert_eq!(server.post(&format!("{session}/observations"), told).await.status(), 201);
+    };
+    for number in 0..5 {
+        observe(number).await;
+    }
+    let excluded = server.request(Method::DELETE, &format!("{session}/observations/2")).send().await;
+    assert_eq!(excluded.expect("an answer").status(), 200);
+    observe(5).await;
+    let lines = async |last: &str, count: usize| {
+        let request = server.request(Method::GET, &format!("{session}/events")).header("last-event-id", last);
+        let mut response = request.send().await.expect("an answer");
+        let mut text = String::new();
+        while text.matches("\n\n").count() < count {
+            let more = timeout(SOON, response.chunk()).await.expect("an event soon").expect("a connection");
+            text.push_str(std::str::from_utf8(&more.expect("more")).expect("text"));
+        }
+        let wanted = |line: &&str| line.starts_with("id:") || line.starts_with("event:") || line.contains("rewritten");
+        text.lines().filter(wanted).map(|line| line.replace(": ", ":")).collect::<Vec<String>>()
+    };
+    let anew: Vec<String> = ["event:reset", "data:{\"rewritten\":1}"]
+        .map(str::to_owned)
+        .into_iter()
+        .chain((0..=5).map(|step| format!("id:1:{step}")))
+        .collect();
+    assert_eq!(lines("5", 7).await, anew);
+    assert_eq!(lines("1:3", 2).await, ["id:1:4", "id:1:5"]);
+    assert_eq!(lines("2:3", 7).await, anew);
+    server.stop().await;
 }
 
 #[tokio::test]

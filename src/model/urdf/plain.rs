@@ -57,6 +57,43 @@ pub fn plain(text: &str) -> Cow<'_, str> {
     if plain == text { Cow::Borrowed(text) } else { Cow::Owned(plain) }
 }
 
+/// Where a tag begins that has more attributes than `most`, if one does: what looks for one of them, and for two of a name, goes through
+/// all. In a text that is [plain].
+pub fn crowded(plain: &str, most: usize) -> Option<usize> {
+    let mut done = 0;
+    while let Some(at) = plain[done..].find('<').map(|at| done + at) {
+        let rest = &plain[at..];
+        let skipped = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")].into_iter().find_map(|(start, end)| {
+            let found = rest.strip_prefix(start)?.find(end);
+            Some(found.map_or(rest.len(), |found| start.len() + found + end.len()))
+        });
+        let length = match skipped {
+            Some(length) => length,
+            None => {
+                let (mut quote, mut count, mut length) = (None, 0, rest.len());
+                for (at, byte) in rest.bytes().enumerate() {
+                    match (quote, byte) {
+                        (None, b'"' | b'\'') => quote = Some(byte),
+                        (None, b'=') => count += 1,
+                        (None, b'>') => {
+                            length = at + 1;
+                            break;
+                        }
+                        (Some(open), _) if open == byte => quote = None,
+                        _ => {}
+                    }
+                }
+                if count > most {
+                    return Some(at);
+                }
+                length
+            }
+        };
+        done = at + length;
+    }
+    None
+}
+
 /// What stands between markup before the first element. A byte order mark that begins the text is left to the parser.
 fn before_root(text: &str, is_start: bool, plain: &mut String) {
     for (at, c) in text.char_indices() {
@@ -141,6 +178,20 @@ mod tests {
             assert_eq!(plain(text), wanted, "{text}");
         }
         assert!(matches!(plain("<robot name=\"a:b\"/>"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn a_tag_of_many_attributes_is_found() {
+        let many = |count: usize| (0..count).map(|k| format!(" a{k}='='")).collect::<String>();
+        for (text, wanted) in [
+            (format!("<r><a{}/></r>", many(3)), None),
+            (format!("<r><a{}/></r>", many(4)), Some(3)),
+            (format!("<r{}>", many(4)), Some(0)),
+            (format!("<!-- <a{}/> --><r b='<a c=\"1\" d=\"2\" e=\"3\" f=\"4\"'/>", many(4)), None),
+            (format!("<r{}", many(9)), Some(0)),
+        ] {
+            assert_eq!(crowded(&text, 3), wanted, "{text}");
+        }
     }
 
     proptest! {

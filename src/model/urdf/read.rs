@@ -14,6 +14,10 @@ use crate::{kinematics::JointKind, similar::similar};
 
 /// More elements than any robot has.
 const MOST_NODES: u32 = 2_000_000;
+/// Attributes of an element: the parser compares each with all others.
+const MOST_ATTRIBUTES: usize = 200;
+/// Bytes of a link's or a joint's name: it is told with every reading.
+const MOST_NAME_BYTES: usize = 300;
 
 /// A robot's description with its text.
 ///
@@ -87,6 +91,10 @@ impl Urdf {
     pub fn parse(text: &str) -> Result<Self, UrdfError> {
         let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
         let strict = plain(text);
+        if let Some(at) = crowded(&strict, MOST_ATTRIBUTES) {
+            let what = format!("this element has more than {MOST_ATTRIBUTES} attributes");
+            return Err(UrdfError::at(text, at, what, "leave out those that are none of a URDF's"));
+        }
         let document = Document::parse_with_options(&strict, options).map_err(|found| no_xml(text, &found))?;
         let robot = document.root_element();
         if robot.tag_name().name() != "robot" {
@@ -199,6 +207,10 @@ impl Names {
 
     fn add(&mut self, node: Node) -> Result<(), UrdfError> {
         let (name, place) = required(node, "name")?;
+        if name.len() > MOST_NAME_BYTES {
+            let what = format!("the name of this {} has {} bytes", self.kind, name.len());
+            return Err(error(node, place.start, what, format!("write a name of at most {MOST_NAME_BYTES}")));
+        }
         if let Some(first) = self.index.insert(name.to_owned(), self.names.len()) {
             let text = node.document().input_text();
             let first = UrdfError::at(text, self.places[first], "", "").line;

@@ -1,11 +1,14 @@
 //! What came out of a session, to take away.
 
-use std::sync::Arc;
+use std::{convert::Infallible, sync::Arc};
 
 use axum::{
+    body::{Body, Bytes},
     extract::{Path, State},
-    response::Response,
+    http::header,
+    response::{IntoResponse, Response},
 };
+use futures_util::stream;
 
 use super::{attachment, json};
 use crate::{
@@ -13,7 +16,6 @@ use crate::{
     recording::{RecordingError, StepsCsv},
     server::{
         App,
-        aside::aside,
         problem::{Kind, Problem},
         session::Session,
     },
@@ -26,16 +28,16 @@ use crate::{
         (status = 200, description = "An .rrd file with its footer", body = Vec<u8>, content_type = "application/octet-stream"),
         (status = 404, description = "There is no such session", body = Problem),
         (status = 500, description = "The recording could not be completed", body = Problem),
+        (status = 503, description = "The server has as much to compute as may wait", body = Problem),
+        (status = 507, description = "There is no room to put it together", body = Problem),
     )
 )]
 pub(super) async fn recording(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
     let session = app.sessions.get(&id).await?.watch();
     session.flush().await?;
-    let live = session.live().clone();
-    let complete = move || {
-        live.complete().map_err(|error| Problem::new(Kind::Internal, format!("no complete recording: {error}")))
-    };
-    Ok(file(&session, "rrd", "application/octet-stream", aside(complete).await?))
+    let completed = session.completed(&app.jobs).await?;
+    let length = [(header::CONTENT_LENGTH, completed.bytes)];
+    Ok((length, file(&session, "rrd", "application/octet-stream", completed.body())).into_response())
 }
 
 /// The metrics of every learner at every step.
@@ -49,16 +51,13 @@ pub(super) async fn recording(State(app): State<Arc<App>>, Path(id): Path<String
 )]
 pub(super) async fn steps_csv(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
     let session = app.sessions.get(&id).await?;
-    let (description, reports) = (session.description().clone(), session.reports(0, usize::MAX));
-    let table = move || {
-        let mut table = Vec::new();
-        StepsCsv::new(&description, &mut table)?.flush()?;
-        reports.iter().for_each(|report| table.extend_from_slice(&report.rows));
-        Ok(table)
-    };
+    let mut header = Vec::new();
     let failed = |error: RecordingError| Problem::new(Kind::Internal, error.to_string());
-    let table = aside(move || table().map_err(failed)).await?;
-    Ok(file(&session, "csv", "text/csv; charset=utf-8", table))
+    StepsCsv::new(session.description(), &mut header).and_then(|mut table| table.flush()).map_err(failed)?;
+    // Rows are written already, and shared by all who read them.
+    let rows = session.reports(0, usize::MAX).into_iter().map(|report| Bytes::from_owner(report.rows));
+    let table = stream::iter([header.into()].into_iter().chain(rows).map(Ok::<_, Infallible>));
+    Ok(file(&session, "csv", "text/csv; charset=utf-8", Body::from_stream(table)))
 }
 
 /// The outcome so far: the metrics and the learned models. It is that of whatever the session was asked before.
@@ -75,8 +74,8 @@ pub(super) async fn result(State(app): State<Arc<App>>, Path(id): Path<String>) 
     json(session.result().await?).await
 }
 
-fn file(session: &Session, extension: &str, content_type: &'static str, bytes: Vec<u8>) -> Response {
+fn file(session: &Session, extension: &str, content_type: &'static str, content: Body) -> Response {
     let description = session.description();
     let name = format!("{}-seed{}-step{}.{extension}", description.scenario, description.seed, session.step());
-    attachment(&name, content_type, bytes)
+    attachment(&name, content_type, content)
 }

@@ -90,8 +90,8 @@ pub enum Liveness {
         (name = "server", description = "The server itself")
     ),
     // What streams carry, and so no route returns.
-    // The last two are words of parameters, which utoipa names without taking them up.
-    components(schemas(StepReport, streams::LiveEvent, Shape, Theme))
+    // The last three are words of parameters, which utoipa names without taking them up.
+    components(schemas(StepReport, streams::LiveEvent, Shape, Theme, sessions::Condition))
 )]
 struct Document;
 

@@ -14,10 +14,9 @@ use axum::{
 use super::{attachment, refusals::OfEngines};
 use crate::{
     ask_tell::Session,
-    calibration::{self, File, Silent},
+    calibration::{self, File, Progress},
     server::{
         App,
-        aside::aside,
         problem::{Kind, Problem},
         session::ReportFiles,
     },
@@ -146,7 +145,7 @@ async fn of_session<T: Send + 'static>(
     work: impl FnOnce(&Session) -> Result<T, Problem> + Send + 'static,
 ) -> Result<T, Problem> {
     let session = app.sessions.tell(id, |robot| Ok(robot.copy())).await?;
-    aside(move || work(&session)).await
+    app.jobs.done(move |_| work(&session)).await
 }
 
 fn description(session: &Session) -> Result<Vec<File>, Problem> {
@@ -164,13 +163,13 @@ async fn report(app: &App, id: &str) -> Result<Arc<[File]>, Problem> {
     }
     let copy = app.sessions.tell(id, |robot| Ok(robot.copy())).await?;
     let revision = copy.events().len();
-    let files: Arc<[File]> = aside(move || report_files(&copy)).await?.into();
+    let files: Arc<[File]> = app.jobs.done(move |wanted| report_files(&copy, wanted)).await?.into();
     *kept = Some(ReportFiles { revision, files: files.clone() });
     Ok(files)
 }
 
-fn report_files(session: &Session) -> Result<Vec<File>, Problem> {
-    let (calibration, mut files) = session.calibrate(&Silent)?;
+fn report_files(session: &Session, wanted: &dyn Progress) -> Result<Vec<File>, Problem> {
+    let (calibration, mut files) = session.calibrate(wanted)?;
     let results = session.results()?;
     files.extend(calibration::report::files(&calibration, &results.case()?));
     files.retain(|file| file.path.starts_with("report."));

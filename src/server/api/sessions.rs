@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::{
     Json,
-    extract::{Path, State},
+    extract::{Path, RawQuery, State},
     http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
@@ -19,10 +19,10 @@ use crate::{
     recording::MOST_FRAMES,
     server::{
         App, Limits,
-        extract::{FromJson, JsonBody, parse},
+        extract::{self, FromJson, JsonBody, parse},
         problem::{Kind, Problem},
         requests,
-        session::{DamagedSession, NewOutsideSession, NewSession, SessionResource},
+        session::{DamagedSession, Listed, NewOutsideSession, NewSession, SessionResource},
     },
     whole::{whole, whole_or_none},
 };
@@ -30,10 +30,12 @@ use crate::{
 /// A request draws at most so many postures on the way: each takes some kilobytes of the session's memory.
 const MAX_FRAMES_PER_REQUEST: u64 = 1000;
 
+/// How many sessions are listed at a time.
+const MOST_LISTED: u64 = 1000;
 /// So many reports are put together at once; of more, aside.
 const FEW_REPORTS: usize = 16;
 
-/// All sessions.
+/// Sessions.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct SessionList {
     /// Oldest first.
@@ -41,6 +43,10 @@ pub struct SessionList {
     /// Sessions with robots elsewhere that were kept, and cannot be relied on any more: `body-schema repair` mends what can be.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub damaged: Vec<DamagedSession>,
+    /// The `after` with which to ask for those that follow; left out at the end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(format = "uuid")]
+    pub next: Option<String>,
 }
 
 /// How far to go.
@@ -91,14 +97,34 @@ fn all<S: Serializer>(reports: &[Arc<RawValue>], serializer: S) -> Result<S::Ok,
     serializer.collect_seq(reports.iter().map(AsRef::as_ref))
 }
 
-/// All sessions.
-#[utoipa::path(get, path = "/v1/sessions", tag = "sessions", operation_id = "listSessions", responses(
-    (status = 200, description = "All sessions, oldest first", body = SessionList),
-    (status = 500, description = "The sessions with robots elsewhere cannot be read", body = Problem),
-))]
-pub(super) async fn list(State(app): State<Arc<App>>) -> Result<Json<SessionList>, Problem> {
-    let (sessions, damaged) = app.sessions.list().await?;
-    Ok(Json(SessionList { sessions, damaged }))
+/// All sessions, oldest first, at most 1000 at a time.
+#[utoipa::path(get, path = "/v1/sessions", tag = "sessions", operation_id = "listSessions",
+    params(
+        ("after" = Option<String>, Query, description = "The id of the session after which to go on, as `next` of an answer has it",
+            format = "uuid"),
+        ("limit" = Option<u64>, Query, description = "How many at most", minimum = 1, maximum = 1000),
+    ),
+    responses(
+        (status = 200, description = "Sessions; `next` is there if there are more", body = SessionList),
+        (status = 400, description = "A parameter is none of those, or there is no session `after`", body = Problem),
+        (status = 500, description = "The sessions with robots elsewhere cannot be read", body = Problem),
+    )
+)]
+pub(super) async fn list(State(app): State<Arc<App>>, RawQuery(query): RawQuery) -> Result<Response, Problem> {
+    let [after, limit] = extract::parameters(query.as_deref(), ["after", "limit"])?;
+    let after = after.map(|after| {
+        Uuid::parse_str(after).map_err(|_| {
+            Problem::new(Kind::Malformed, format!("`after` must be the id of a session, not `{after}`")).field("after")
+        })
+    });
+    let limit = limit.map(|limit| extract::whole_number("limit", limit)).transpose()?;
+    let limit = limit.unwrap_or(MOST_LISTED);
+    if !(1..=MOST_LISTED).contains(&limit) {
+        let detail = format!("`limit` must be from 1 to {MOST_LISTED}, not {limit}");
+        return Err(Problem::new(Kind::Malformed, detail).field("limit"));
+    }
+    let Listed { sessions, damaged, next } = app.sessions.list(after.transpose()?, limit as usize).await?;
+    json(SessionList { sessions, damaged, next: next.map(|id| id.to_string()) }).await
 }
 
 /// What a session is made from: a scenario of ours, or a robot elsewhere.
@@ -174,11 +200,27 @@ pub(super) async fn get(State(app): State<Arc<App>>, Path(id): Path<String>) -> 
     Ok(Json(app.sessions.get(&id).await?.resource()))
 }
 
+/// When a session is to be ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Condition {
+    /// In any case.
+    #[default]
+    Always,
+    /// If no stream follows it.
+    Unwatched,
+}
+
 /// End a session. Its streams end, its recording is finished, and its memory is free again; one with a robot elsewhere is kept
 /// no longer.
 #[utoipa::path(delete, path = "/v1/sessions/{id}", tag = "sessions", operation_id = "deleteSession",
-    params(("id" = String, Path, description = "The session's id", format = "uuid")),
+    params(
+        ("id" = String, Path, description = "The session's id", format = "uuid"),
+        ("if" = Option<Condition>, Query, description = "`unwatched`: only if no stream follows it"),
+    ),
     responses(
+        (status = 400, description = "A parameter is none of those", body = Problem),
+        (status = 409, description = "A stream follows the session, and `if` is `unwatched`; it is still there", body = Problem),
         (status = 204, description = "The session is no more"),
         (status = 403, description = "The request comes from a foreign page", body = Problem),
         (status = 404, description = "There is no such session", body = Problem),
@@ -187,8 +229,19 @@ pub(super) async fn get(State(app): State<Arc<App>>, Path(id): Path<String>) -> 
         (status = 507, description = "There is no room to complete its recording, or to forget it; it is still there", body = Problem),
     )
 )]
-pub(super) async fn delete(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<StatusCode, Problem> {
+pub(super) async fn delete(
+    State(app): State<Arc<App>>,
+    Path(id): Path<String>,
+    RawQuery(query): RawQuery,
+) -> Result<StatusCode, Problem> {
+    let [condition] = extract::parameters(query.as_deref(), ["if"])?;
+    let condition: Condition = extract::word("if", condition)?;
     let id = Uuid::parse_str(&id).map_err(|_| Problem::unknown_session(id))?;
+    if condition == Condition::Unwatched && app.sessions.is_followed(id) {
+        let detail =
+            "somebody follows the session, and it is still there; leave out `if=unwatched` to delete it all the same";
+        return Err(Problem::new(Kind::Watched, detail).field("if"));
+    }
     to_its_end(async move { app.sessions.close(id).await }).await?;
     Ok(StatusCode::NO_CONTENT)
 }

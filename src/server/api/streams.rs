@@ -14,7 +14,10 @@ use axum::{
         sse::{Event, KeepAlive, Sse},
     },
 };
-use futures_util::{Stream, stream::unfold};
+use futures_util::{
+    Stream, StreamExt,
+    stream::{self, unfold},
+};
 use serde::Serialize;
 use serde_json::value::RawValue;
 use tokio::{sync::watch, time::sleep};
@@ -80,15 +83,21 @@ fn report<S: serde::Serializer>(report: &Arc<RawValue>, serializer: S) -> Result
 }
 
 /// The reports as server-sent events: all from step 0, or all after `Last-Event-ID`, then each as it is made.
+///
+/// With a robot elsewhere an observation may be excluded or included again, which rewrites the history and ends the stream. Whoever
+/// goes on with a `Last-Event-ID` of the old history is sent an event `reset` first, whose data has `rewritten`, how often that has
+/// happened, and then all reports of the new one from step 0.
 #[utoipa::path(get, path = "/v1/sessions/{id}/events", tag = "sessions", operation_id = "followReports",
     params(
         ("id" = String, Path, description = "The session's id", format = "uuid"),
-        ("Last-Event-ID" = Option<u64>, Header, description = "The last step seen; browsers send it when they reconnect"),
+        ("Last-Event-ID" = Option<String>, Header, description = "The id of the last event seen; browsers send it when they reconnect",
+            pattern = "^([0-9]+:)?[0-9]+$"),
     ),
     responses(
-        (status = 200, description = "Events whose id is the step and whose data is a StepReport. The stream ends with the session.",
+        (status = 200, description = "Events whose data is a StepReport. The id is its step, behind `N:` where the history was rewritten N times. \
+            The stream ends with the session.",
             body = String, content_type = "text/event-stream"),
-        (status = 400, description = "Last-Event-ID is not a step", body = Problem),
+        (status = 400, description = "Last-Event-ID is no id of an event", body = Problem),
         (status = 404, description = "There is no such session", body = Problem),
         OfStreams,
     )
@@ -99,10 +108,16 @@ pub(super) async fn events(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let session = app.sessions.get(&id).await?;
-    let first = extract::last_event_id(&headers)?.map_or(0, |last| last.saturating_add(1));
+    let rewritten = session.rewritten();
+    let (first, is_another) = match extract::last_event_id(&headers)? {
+        None => (0, false),
+        Some((of, last)) if of == rewritten => (last.saturating_add(1), false),
+        Some(_) => (0, true),
+    };
     let following = session.follow(app.limits.streams_per_session)?;
     let reader = (following, Reports::new(&session, first), Vec::new().into_iter());
-    let events = unfold(reader, |(following, mut reports, mut batch)| async {
+    let reset = is_another.then(|| Event::default().event("reset").data(format!("{{\"rewritten\":{rewritten}}}")));
+    let events = unfold(reader, move |(following, mut reports, mut batch)| async move {
         let report: Kept = match batch.next() {
             Some(report) => report,
             None => {
@@ -110,9 +125,14 @@ pub(super) async fn events(
                 batch.next()?
             }
         };
-        let event = Event::default().id(report.step.to_string()).data(report.json.get());
+        let id = match rewritten {
+            0 => report.step.to_string(),
+            times => format!("{times}:{}", report.step),
+        };
+        let event = Event::default().id(id).data(report.json.get());
         Some((Ok::<_, Infallible>(event), (following, reports, batch)))
     });
+    let events = stream::iter(reset.map(Ok)).chain(events);
     Ok(Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
 }
 
@@ -188,6 +208,7 @@ pub(super) async fn live(
     let (description, standing) = (session.description().clone(), session.standing());
     let upgrade = upgrade
         .max_message_size(READ_BUFFER_BYTES)
+        .max_frame_size(READ_BUFFER_BYTES)
         .read_buffer_size(READ_BUFFER_BYTES)
         .write_buffer_size(WRITE_BUFFER_BYTES)
         .max_write_buffer_size(MOST_BUFFERED_BYTES);

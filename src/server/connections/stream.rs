@@ -25,12 +25,20 @@ pub(super) struct Stream {
     /// Runs while something is to be written and nothing is taken.
     stalled: Option<Pin<Box<Sleep>>>,
     broken: Pin<Box<WaitForCancellationFutureOwned>>,
+    /// Runs while the rest of a request is taken that was refused.
+    draining: Option<Pin<Box<Sleep>>>,
     place: Place,
 }
 
+/// How long the rest of a refused request is taken, so that whoever sends it comes to read the answer: were the connection closed with
+/// something unread, the answer would be taken back.
+const DRAINED_WITHIN: Duration = Duration::from_secs(2);
+/// So much of it at a time.
+const DRAINED_BYTES: usize = 16 << 10;
+
 impl Stream {
     pub(super) fn new(tcp: TcpStream, write_timeout: Duration, broken: CancellationToken, place: Place) -> Self {
-        Self { tcp, write_timeout, stalled: None, broken: Box::pin(broken.cancelled_owned()), place }
+        Self { tcp, write_timeout, stalled: None, broken: Box::pin(broken.cancelled_owned()), draining: None, place }
     }
 
     fn check_broken(&mut self, cx: &mut Context<'_>) -> io::Result<()> {
@@ -92,6 +100,22 @@ impl AsyncWrite for Stream {
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.tcp).poll_shutdown(cx)
+        ready!(Pin::new(&mut self.tcp).poll_shutdown(cx))?;
+        if !self.place.connection.has_unread() {
+            return Poll::Ready(Ok(()));
+        }
+        let until = self.draining.get_or_insert_with(|| Box::pin(sleep(DRAINED_WITHIN)));
+        if until.as_mut().poll(cx).is_ready() || self.check_broken(cx).is_err() {
+            return Poll::Ready(Ok(()));
+        }
+        let mut rest = [0; DRAINED_BYTES];
+        loop {
+            let mut buffer = ReadBuf::new(&mut rest);
+            match ready!(Pin::new(&mut self.tcp).poll_read(cx, &mut buffer)) {
+                Ok(()) if !buffer.filled().is_empty() => {}
+                // It has come to its end, or broke off.
+                _ => return Poll::Ready(Ok(())),
+            }
+        }
     }
 }

@@ -4,15 +4,17 @@
 //! by replaying its events, when it is asked for.
 
 use std::{
-    sync::{Arc, Mutex, mpsc},
+    sync::{Arc, Mutex, OnceLock, mpsc},
     time::{Duration, Instant},
 };
 
+use serde::{Deserialize, Serialize};
 use tokio::{
-    sync::{Mutex as AsyncMutex, OwnedSemaphorePermit, oneshot},
+    sync::{Mutex as AsyncMutex, MutexGuard, OwnedSemaphorePermit, oneshot},
     task::spawn_blocking,
     time::{sleep, timeout},
 };
+use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{
@@ -21,18 +23,25 @@ use super::{
     registry::{END_WITHIN, no_engine, spawn},
 };
 use crate::{
-    ask_tell::{self, MOST_EVENTS, ReplayError, Setup, VERSION},
+    ask_tell::{self, ChannelShape, MOST_EVENTS, ReplayError, Setup, VERSION},
+    experiment::Description,
     scenario::WorldKind,
     server::{
         aside::aside,
         problem::{Kind, Problem},
         requests,
-        store::{Shown, Stored},
+        store::{Shown, StoreError, Stored},
     },
 };
 
 /// So often a request is tried again whose session left memory just before it came.
 const ATTEMPTS: usize = 3;
+/// How long a request waits for a session that comes or goes …
+const MOVED_WITHIN: Duration = Duration::from_secs(20);
+/// … and one that needs room for the engine of another that is to leave.
+const LEFT_WITHIN: Duration = Duration::from_secs(2);
+/// For so long a list looks whether sessions are as they were written; the others are looked at in the background.
+const LOOKED_AT_WITHIN: Duration = Duration::from_millis(200);
 /// How often it is looked for sessions that nobody asks for, at most.
 const LOOK_EVERY: Duration = Duration::from_secs(60);
 
@@ -40,15 +49,63 @@ const LOOK_EVERY: Duration = Duration::from_secs(60);
 pub(super) struct Known {
     id: Uuid,
     made_s: f64,
-    /// Held while it comes or goes, so that it is never in memory twice.
-    moving: AsyncMutex<()>,
+    /// Held while it comes or goes, so that it is never in memory twice. Within: the end of an engine that was told to end, and may
+    /// write until then.
+    moving: AsyncMutex<Option<CancellationToken>>,
     /// As it was when it left memory, or without its status as it was described at first.
     resource: Mutex<Option<SessionResource>>,
+    /// What is wrong with it, once it was looked at.
+    damage: OnceLock<Option<String>>,
+}
+
+/// Some of all sessions.
+#[derive(Default)]
+pub(in crate::server) struct Listed {
+    pub(in crate::server) sessions: Vec<SessionResource>,
+    /// Those that cannot be taken up.
+    pub(in crate::server) damaged: Vec<DamagedSession>,
+    /// After which there are more.
+    pub(in crate::server) next: Option<Uuid>,
+}
+
+/// What a list shows of a session, beside what changes.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Summary {
+    description: Description,
+    channels: Vec<ChannelShape>,
+}
+
+impl Summary {
+    pub(super) fn of(session: &ask_tell::Session) -> Self {
+        Self { description: session.description().clone(), channels: session.channels().to_vec() }
+    }
+
+    /// Of numbers, texts and lists alone, it can be written.
+    pub(super) fn text(&self) -> String {
+        serde_json::to_string(self).unwrap_or_default()
+    }
 }
 
 impl Known {
     pub(super) fn new(id: Uuid, made_s: f64) -> Self {
-        Self { id, made_s, moving: AsyncMutex::new(()), resource: Mutex::new(None) }
+        Self { id, made_s, moving: AsyncMutex::new(None), resource: Mutex::new(None), damage: OnceLock::new() }
+    }
+}
+
+impl Known {
+    /// Waits until nobody else moves it, and its last engine has ended.
+    async fn still(&self) -> Result<MutexGuard<'_, Option<CancellationToken>>, Problem> {
+        let still = timeout(MOVED_WITHIN, async {
+            let mut moving = self.moving.lock().await;
+            if let Some(ending) = moving.as_ref() {
+                ending.cancelled().await;
+            }
+            *moving = None;
+            moving
+        });
+        still
+            .await
+            .map_err(|_| Problem::new(Kind::Busy, "the session is coming to memory or leaving it; ask again later"))
     }
 }
 
@@ -67,6 +124,10 @@ impl Sessions {
         }
         let known = Arc::new(Known::new(Uuid::new_v4(), now_s()));
         let origin = Origin::New(Setup { calibration, agent, seed }, Shown { ellipsoids }, events);
+        if !self.budget.has_room() {
+            let detail = "the sessions together fill the server's memory; delete some and ask again";
+            return Err(Problem::new(Kind::ServerFull, detail));
+        }
         let session = self.begin(&known, origin).await?;
         tracing::info!(request = requests::id(), session = %session.id, "a session with a robot elsewhere was opened");
         lock(&self.known).push(known);
@@ -77,11 +138,23 @@ impl Sessions {
         lock(&self.known).iter().find(|known| known.id == id).cloned()
     }
 
-    /// Brings a session back to memory.
-    pub(super) async fn wake(&self, id: Uuid) -> Result<Arc<Session>, Problem> {
+    /// Brings a session back to memory, whether or not whoever asked still waits.
+    pub(super) async fn wake(self: &Arc<Self>, id: Uuid) -> Result<Arc<Session>, Problem> {
+        let all = self.clone();
+        let waking = tokio::spawn(requests::carried(async move { all.bring_back(id).await }));
+        match timeout(MOVED_WITHIN, waking).await {
+            Ok(woken) => woken.unwrap_or_else(|_| Err(no_engine())),
+            Err(_) => {
+                let detail = "what happened in the session is still being replayed; ask again later";
+                Err(Problem::new(Kind::Busy, detail))
+            }
+        }
+    }
+
+    async fn bring_back(&self, id: Uuid) -> Result<Arc<Session>, Problem> {
         let unknown = || Problem::unknown_session(id);
         let known = self.known(id).ok_or_else(unknown)?;
-        let _moving = known.moving.lock().await;
+        let _moving = known.still().await?;
         // Others may have been waiting for the same.
         if let Some(session) = self.in_memory(id) {
             return Ok(session);
@@ -105,7 +178,7 @@ impl Sessions {
         let description = opening.await.map_err(|_| no_engine())??;
         let engine = Engine::Elsewhere(jobs);
         let (used, watchers, streams) = (Mutex::new(Instant::now()), 0.into(), 0.into());
-        let (together, report) = (Default::default(), Default::default());
+        let (together, completed, report) = Default::default();
         let file = None;
         Ok(self.enter(Session {
             id,
@@ -118,44 +191,54 @@ impl Sessions {
             watchers,
             streams,
             together,
+            completed,
             report,
         }))
     }
 
     /// A place in memory, if need be that of the one that was not asked for longest.
     async fn place(&self) -> Result<OwnedSemaphorePermit, Problem> {
-        for _ in 0..ATTEMPTS {
-            if let Ok(permit) = self.places.clone().try_acquire_owned() {
+        if let Ok(permit) = self.places.clone().try_acquire_owned() {
+            return Ok(permit);
+        }
+        for session in self.idle(Session::is_elsewhere, Duration::ZERO) {
+            if self.put_to_sleep(&session).await
+                && let Ok(permit) = self.places.clone().try_acquire_owned()
+            {
                 return Ok(permit);
             }
-            let Some(session) = self.idle_longest(Session::is_elsewhere, Duration::ZERO) else { break };
-            self.put_to_sleep(&session).await;
         }
         self.places.clone().try_acquire_owned().map_err(|_| {
             Problem::new(Kind::ServerFull, "as many sessions are watched and busy as there may be; try again later")
         })
     }
 
-    /// Takes a session out of memory, unless somebody watches it.
-    async fn put_to_sleep(&self, session: &Arc<Session>) {
-        let Some(known) = self.known(session.id) else { return };
-        let _moving = known.moving.lock().await;
-        if session.is_watched() {
-            return;
+    /// Takes a session out of memory, unless somebody watches it, it is at something, or it comes or goes already. Tells whether
+    /// it has left.
+    async fn put_to_sleep(&self, session: &Arc<Session>) -> bool {
+        let Some(known) = self.known(session.id) else { return false };
+        let Ok(mut moving) = known.moving.try_lock() else { return false };
+        if !session.is_idle() || self.leave(session.id).is_none() {
+            return false;
         }
         *lock(&known.resource) = Some(SessionResource { recording: None, ..session.resource() });
-        self.leave(session.id);
         session.stop();
-        // However long that takes: nobody else may write its events meanwhile.
-        session.ended().cancelled().await;
-        tracing::info!(session = %session.id, "a session has left memory");
+        // Nobody else may write its events meanwhile.
+        *moving = Some(session.ended().clone());
+        let has_left = timeout(LEFT_WITHIN, session.ended().cancelled()).await.is_ok();
+        tracing::info!(session = %session.id, has_left, "a session leaves memory");
+        has_left
     }
 
     /// Takes sessions out of memory that nobody asks for, now and then, for ever.
     pub(in crate::server) async fn watch_over(&self) {
+        let known = lock(&self.known).clone();
+        for known in known {
+            self.look_at(&known).await;
+        }
         loop {
             sleep(self.limits.idle_after.min(LOOK_EVERY)).await;
-            while let Some(session) = self.idle_longest(Session::is_elsewhere, self.limits.idle_after) {
+            for session in self.idle(Session::is_elsewhere, self.limits.idle_after) {
                 self.put_to_sleep(&session).await;
             }
         }
@@ -163,7 +246,7 @@ impl Sessions {
 
     /// Forgets a session in the store and in memory.
     pub(super) async fn forget(&self, known: &Known) -> Result<(), Problem> {
-        let _moving = known.moving.lock().await;
+        let _moving = known.still().await?;
         let (store, id) = (self.store.clone(), known.id);
         self.known(id).ok_or_else(|| Problem::unknown_session(id))?;
         aside(move || store.delete(id)).await?;
@@ -179,7 +262,7 @@ impl Sessions {
 
     /// Has something done by the engine of a robot elsewhere, which comes back to memory for it if need be.
     pub(in crate::server) async fn tell<T: Send + 'static>(
-        &self,
+        self: &Arc<Self>,
         id: &str,
         work: impl Fn(&mut Elsewhere) -> Result<T, Problem> + Clone + Send + 'static,
     ) -> Result<T, Problem> {
@@ -194,63 +277,116 @@ impl Sessions {
     }
 
     /// How a session with a robot elsewhere stands, also while its engine is busy.
-    pub(in crate::server) async fn standing(&self, id: &str) -> Result<Arc<Standing>, Problem> {
+    pub(in crate::server) async fn standing(self: &Arc<Self>, id: &str) -> Result<Arc<Standing>, Problem> {
         let session = self.get(id).await?;
         let standing = session.standing().borrow().clone();
         standing.ok_or_else(|| Problem::not_outside(id))
     }
 
-    /// All sessions, oldest first, and those that are damaged.
-    pub(in crate::server) async fn list(&self) -> Result<(Vec<SessionResource>, Vec<DamagedSession>), Problem> {
-        let all = lock(&self.all).clone();
+    /// The sessions after that of an id, oldest first and so many at most; those among them that cannot be taken up; and the id of the
+    /// last, if there are more.
+    pub(in crate::server) async fn list(&self, after: Option<Uuid>, most: usize) -> Result<Listed, Problem> {
+        let all = self.all().clone();
+        let known = lock(&self.known).clone();
         let steps = all.iter().filter(|session| !session.is_elsewhere());
-        let mut resources: Vec<(f64, SessionResource)> =
-            steps.map(|session| (session.made_s, session.resource())).collect();
-        let (known, mut damaged) = (lock(&self.known).clone(), Vec::new());
-        for known in known {
-            let resource = match all.iter().find(|session| session.id == known.id) {
-                Some(session) => Some(session.resource()),
-                None => match self.described(&known).await {
-                    // One that cannot be read keeps nobody from the others.
-                    Err(problem) if problem.is(Kind::Damaged) => {
-                        damaged.push(DamagedSession { id: known.id.to_string(), detail: problem.detail.into() });
-                        None
-                    }
-                    described => described?,
+        let mut every: Vec<(f64, Uuid, Result<Arc<Session>, Arc<Known>>)> =
+            steps.map(|session| (session.made_s, session.id, Ok(session.clone()))).collect();
+        every.extend(known.into_iter().map(|known| {
+            let awake = all.iter().find(|session| session.id == known.id);
+            (known.made_s, known.id, awake.cloned().ok_or(known))
+        }));
+        every.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
+        let first = match after {
+            None => 0,
+            Some(after) => {
+                let found = every.iter().position(|(_, id, _)| *id == after);
+                1 + found.ok_or_else(|| {
+                    let detail =
+                        format!("there is no session `{after}` after which to go on; begin anew without `after`");
+                    Problem::new(Kind::Malformed, detail).field("after")
+                })?
+            }
+        };
+        let page = every.get(first..).unwrap_or_default();
+        let mut listed = Listed::default();
+        let (mut looking, begun) = (true, Instant::now());
+        for (_, id, session) in page.iter().take(most) {
+            match session {
+                Ok(session) => listed.sessions.push(session.resource()),
+                // One that cannot be read keeps nobody from the others.
+                Err(known) => match self.described(known, looking).await {
+                    Ok(resource) => listed.sessions.push(resource),
+                    Err(why) => listed.damaged.push(DamagedSession { id: id.to_string(), detail: why }),
                 },
-            };
-            resources.extend(resource.map(|resource| (known.made_s, resource)));
+            }
+            looking = begun.elapsed() < LOOKED_AT_WITHIN;
         }
-        resources.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-        Ok((resources.into_iter().map(|(_, resource)| resource).collect(), damaged))
+        listed.next = page.get(most.wrapping_sub(1)).filter(|_| page.len() > most).map(|(_, id, _)| *id);
+        Ok(listed)
     }
 
-    /// A session as it can be shown without replaying it. `None` for one that this program cannot take up: who asks for it is
-    /// told why.
-    async fn described(&self, known: &Known) -> Result<Option<SessionResource>, Problem> {
-        let remembered = lock(&known.resource).clone();
-        if remembered.is_some() {
-            return Ok(remembered);
+    /// A session as it can be shown without replaying it, or why it cannot be taken up. Whether it is as it was written is found out
+    /// if nobody has yet and this is to be `looking`.
+    async fn described(&self, known: &Arc<Known>, looking: bool) -> Result<SessionResource, String> {
+        if looking {
+            self.look_at(known).await;
         }
-        let (Some(Stored { setup, events, .. }), id) = (self.load(known.id).await?, known.id) else { return Ok(None) };
-        let opened =
-            spawn_blocking(move || ask_tell::Session::replay(setup, Vec::new())).await.map_err(|_| no_engine())?;
-        let Ok(session) = opened else { return Ok(None) };
+        if let Some(Some(why)) = known.damage.get() {
+            return Err(why.clone());
+        }
+        let remembered = lock(&known.resource).clone();
+        if let Some(resource) = remembered {
+            return Ok(resource);
+        }
+        let (store, id) = (self.store.clone(), known.id);
+        let found = aside(move || -> Result<_, StoreError> {
+            let noted = store.summary(id)?.and_then(|(text, step)| Some((serde_json::from_str(&text).ok()?, step)));
+            if noted.is_some() {
+                return Ok(noted);
+            }
+            let Some(Stored { setup, events, .. }) = store.load(id)? else { return Ok(None) };
+            let Ok(session) = ask_tell::Session::replay(setup, Vec::new()) else { return Ok(None) };
+            let (summary, step) = (Summary::of(&session), counted(&events));
+            // It is found out again where it cannot be noted.
+            drop(store.note(id, &summary.text(), step));
+            Ok(Some((summary, step)))
+        });
+        let found = found.await.map_err(|problem| String::from(problem.detail))?;
+        let (Summary { description, channels }, step) =
+            found.ok_or("it was written by another version of body-schema, which could read it")?;
         let resource = SessionResource {
             id: id.to_string(),
             world: WorldKind::Outside,
-            description: session.description().clone(),
-            step: counted(&events),
+            description,
+            step,
             remaining: None,
             recording: None,
             file: None,
             recording_failure: None,
             failure: None,
             status: None,
-            channels: session.channels().to_vec(),
+            channels,
         };
         *lock(&known.resource) = Some(resource.clone());
-        Ok(Some(resource))
+        Ok(resource)
+    }
+
+    /// Finds out whether a session is as it was written.
+    async fn look_at(&self, known: &Arc<Known>) {
+        if known.damage.get().is_some() {
+            return;
+        }
+        let (store, id) = (self.store.clone(), known.id);
+        let looked = spawn_blocking(move || store.load(id).map(drop)).await;
+        let damage = match looked {
+            Ok(Ok(())) => None,
+            Ok(Err(error @ (StoreError::Damaged { .. } | StoreError::Newer { .. }))) => {
+                Some(String::from(Problem::from(error).detail))
+            }
+            // The disk may be there again later.
+            Ok(Err(_)) | Err(_) => return,
+        };
+        drop(known.damage.set(damage));
     }
 
     async fn load(&self, id: Uuid) -> Result<Option<Stored>, Problem> {

@@ -20,7 +20,7 @@ impl Budget {
     }
 
     /// Whether more steps may be made. The last command before the limit may overshoot it by what it makes.
-    pub(super) fn has_room(&self) -> bool {
+    pub(in crate::server) fn has_room(&self) -> bool {
         self.used() < self.limit
     }
 
@@ -38,27 +38,40 @@ impl Budget {
     }
 }
 
+/// So much of a budget, until it is dropped.
+pub(in crate::server) struct Taken {
+    budget: Arc<Budget>,
+    bytes: usize,
+}
+
+impl Taken {
+    pub(in crate::server) fn of(budget: &Arc<Budget>, bytes: usize) -> Self {
+        budget.take(bytes);
+        Self { budget: budget.clone(), bytes }
+    }
+}
+
+impl Drop for Taken {
+    fn drop(&mut self) {
+        self.budget.give_back(self.bytes);
+    }
+}
+
 /// Bytes that count among what sessions keep, as long as anyone has them.
 pub(in crate::server) struct Counted {
     bytes: Vec<u8>,
-    budget: Arc<Budget>,
+    _taken: Taken,
 }
 
 impl Counted {
     pub(super) fn shared(bytes: Vec<u8>, budget: &Arc<Budget>) -> Bytes {
-        budget.take(bytes.len());
-        Bytes::from_owner(Self { bytes, budget: budget.clone() })
+        let taken = Taken::of(budget, bytes.len());
+        Bytes::from_owner(Self { bytes, _taken: taken })
     }
 }
 
 impl AsRef<[u8]> for Counted {
     fn as_ref(&self) -> &[u8] {
         &self.bytes
-    }
-}
-
-impl Drop for Counted {
-    fn drop(&mut self) {
-        self.budget.give_back(self.bytes.len());
     }
 }

@@ -4,6 +4,7 @@
 //! [`Kept`], [`Session`] is the way to both, and [`registry`] keeps them all; those with robots elsewhere are also in the
 //! store, and [`dormant`] ones there alone.
 
+mod completed;
 mod dormant;
 mod engine;
 mod kept;
@@ -29,9 +30,10 @@ use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
+pub(super) use dormant::Listed;
 use engine::{Command, recording_failed};
 pub(super) use kept::Kept;
-pub(super) use memory::Budget;
+pub(super) use memory::{Budget, Taken};
 pub(super) use outside::{Elsewhere, now_s};
 pub use registry::NewSession;
 pub(super) use registry::{Keeping, Sessions};
@@ -66,6 +68,8 @@ pub(super) struct Session {
     streams: AtomicUsize,
     /// The recording for those who come late.
     together: together::Kept,
+    /// The recording to take away.
+    completed: completed::Kept,
     /// Of a robot elsewhere.
     report: AsyncMutex<Option<ReportFiles>>,
 }
@@ -148,6 +152,11 @@ impl Session {
     /// Whether its history was rewritten, so that whoever follows it has to begin anew.
     pub(super) fn is_rewritten(&self) -> bool {
         self.shared.rewritten.load(Ordering::Relaxed)
+    }
+
+    /// How often its history was rewritten before it was as it is.
+    pub(super) fn rewritten(&self) -> u64 {
+        self.shared.rewritings.load(Ordering::Relaxed)
     }
 
     /// Of a robot elsewhere: the files of its report, as they were made last.
@@ -250,8 +259,12 @@ impl Session {
     ) -> Result<T, Problem> {
         let Engine::Elsewhere(jobs) = &self.engine else { return Err(Problem::not_outside(self.id)) };
         let (reply, answer) = oneshot::channel();
+        let counted = Job::of(&self.shared);
+        let given_up = CancellationToken::new();
+        let _waiting = given_up.clone().drop_guard();
         let job: outside::Job = Box::new(move |robot| {
-            let outcome = work(robot);
+            let _counted = counted;
+            let outcome = work(robot.for_whoever_waits(given_up));
             // Nobody may wait for it any longer; what was done stands all the same.
             Box::new(move || drop(reply.send(outcome)))
         });
@@ -293,8 +306,9 @@ impl Session {
         *lock(&self.used)
     }
 
-    fn is_watched(&self) -> bool {
-        self.watchers.load(Ordering::Relaxed) > 0
+    /// Whether nobody watches it, and its engine is at nothing.
+    fn is_idle(&self) -> bool {
+        self.watchers.load(Ordering::Relaxed) == 0 && self.shared.jobs.load(Ordering::Relaxed) == 0
     }
 
     /// The recording's file with what it lacks, if it is not complete.
@@ -313,6 +327,22 @@ impl Session {
             Engine::Steps(commands) => drop(commands.send(Command::Panic)),
             Engine::Elsewhere(jobs) => drop(jobs.send(Box::new(|_| panic!("as the test asked")))),
         }
+    }
+}
+
+/// Something that an engine is at, or will be.
+struct Job(Arc<Shared>);
+
+impl Job {
+    fn of(shared: &Arc<Shared>) -> Self {
+        shared.jobs.fetch_add(1, Ordering::Relaxed);
+        Self(shared.clone())
+    }
+}
+
+impl Drop for Job {
+    fn drop(&mut self) {
+        self.0.jobs.fetch_sub(1, Ordering::Relaxed);
     }
 }
 

@@ -6,21 +6,23 @@
 use std::{
     collections::BTreeMap,
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::{Arc, atomic::Ordering, mpsc},
-    time::{Duration, SystemTime},
+    sync::{Arc, Mutex, atomic::Ordering, mpsc},
+    time::{Duration, Instant, SystemTime},
 };
 
 use tokio::sync::{OwnedSemaphorePermit, oneshot};
+use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{
     Kept, Shared, Standing,
+    dormant::Summary,
     engine::{COMPLETE_AFTER, panicked, recording_failed},
 };
 use crate::{
     ask_tell::{
-        self, Answer, Ask, ChannelShape, Most, Observation, Outcome, Prepared, ReplayError, Setup, Status, Suggestion,
-        Suggestions, Told,
+        self, Answer, Ask, ChannelShape, Happened, Most, Observation, Outcome, Prepared, ReplayError, Setup, Status,
+        Suggestion, Suggestions, Told,
     },
     experiment::{Description, Experiment},
     recording::{Recorder, RecordingError, Target},
@@ -97,6 +99,10 @@ pub(in crate::server) struct Elsewhere {
     shared: Arc<Shared>,
     /// What was told counts otherwise than it did: the history has to be made anew.
     is_rewritten: bool,
+    /// Whoever asked for what is being done waits for it no longer.
+    given_up: CancellationToken,
+    /// By so much the clock is behind what it was when the session was last used, seconds.
+    ahead_s: f64,
 }
 
 impl Elsewhere {
@@ -130,9 +136,31 @@ impl Elsewhere {
         recorder.flush().map_err(recording_failed)?;
         if is_new {
             store.insert(id, made_s, session.setup(), shown, session.events())?;
+            let status = session.status();
+            // A list finds it out otherwise.
+            drop(store.note(id, &Summary::of(&session).text(), status.observations - status.excluded.len() as u64));
         }
+        let rewrites =
+            |event: &&ask_tell::Event| matches!(event.happened, Happened::Excluded { .. } | Happened::Included { .. });
+        shared.rewritings.store(session.events().iter().filter(rewrites).count() as u64, Ordering::Relaxed);
+        // What has happened was before now, whatever the clock says.
+        let last = session.events().iter().filter_map(|event| event.at_s).max_by(f64::total_cmp);
+        let ahead_s = last.map_or(0.0, |last| (last - now_s()).max(0.0));
+        shared.hold(session.setup().calibration.to_string().len());
         let (recorded, channels) = (session.latest().step, session.channels().into());
-        let mut robot = Self { id, session, channels, keys, recorder, recorded, store, shared, is_rewritten: false };
+        let mut robot = Self {
+            id,
+            session,
+            channels,
+            keys,
+            recorder,
+            recorded,
+            store,
+            shared,
+            is_rewritten: false,
+            given_up: CancellationToken::new(),
+            ahead_s,
+        };
         robot.show().map_err(recording_failed)?;
         robot.publish(reports);
         Ok(robot)
@@ -160,12 +188,20 @@ impl Elsewhere {
         }
     }
 
+    /// The same, at something that is wanted until then.
+    pub(super) fn for_whoever_waits(&mut self, given_up: CancellationToken) -> &mut Self {
+        self.given_up = given_up;
+        self
+    }
+
     /// Waits for the next job, and ends suggestions whose time runs out meanwhile.
     fn idle(&mut self, jobs: &mpsc::Receiver<Job>) -> Result<Job, mpsc::RecvError> {
         loop {
             let due = self.session.pending().filter_map(|suggestion| suggestion.expires_at_s).min_by(f64::total_cmp);
             let Some(due) = due else { return jobs.recv() };
-            match jobs.recv_timeout(Duration::from_secs_f64((due - now_s()).clamp(LOOK_AGAIN_S[0], LOOK_AGAIN_S[1]))) {
+            match jobs
+                .recv_timeout(Duration::from_secs_f64((due - self.now_s()).clamp(LOOK_AGAIN_S[0], LOOK_AGAIN_S[1])))
+            {
                 Ok(job) => return Ok(job),
                 Err(mpsc::RecvTimeoutError::Disconnected) => return Err(mpsc::RecvError),
                 // What cannot be written is tried again.
@@ -181,7 +217,9 @@ impl Elsewhere {
     /// The client's pending suggestions, topped up to as many as it asks for.
     pub(in crate::server) fn suggest(&mut self, ask: &Ask) -> Result<Suggestions, Problem> {
         self.has_room()?;
-        let prepared = self.session.prepare_suggest(ask, Some(now_s()))?;
+        let (stop, given_up) = (&self.shared.stop, &self.given_up);
+        let is_wanted = || !stop.is_cancelled() && !given_up.is_cancelled();
+        let prepared = self.session.prepare_suggest_while(ask, Some(self.now_s()), &is_wanted)?;
         self.commit(prepared, None)
     }
 
@@ -194,7 +232,7 @@ impl Elsewhere {
     ) -> Result<Suggestion, Problem> {
         // One whose time has run out is told to be, and not pending any more for anybody.
         self.expire()?;
-        let prepared = self.session.prepare_outcome(id, state, reason, Some(now_s()))?;
+        let prepared = self.session.prepare_outcome(id, state, reason, Some(self.now_s()))?;
         self.commit(prepared, None)
     }
 
@@ -218,7 +256,7 @@ impl Elsewhere {
             return Err(Problem::new(Kind::KeyTaken, detail).field("Idempotency-Key"));
         }
         self.has_room()?;
-        let prepared = self.session.prepare_observe(told.clone(), Some(now_s())).map_err(|refusal| {
+        let prepared = self.session.prepare_observe(told.clone(), Some(self.now_s())).map_err(|refusal| {
             let problem = Problem::from(refusal);
             // It is not the address that is wrong.
             match problem.is(Kind::UnknownSuggestion) {
@@ -234,7 +272,7 @@ impl Elsewhere {
 
     /// From now on an observation counts for nothing, or counts again. Tells how the session stands then.
     pub(in crate::server) fn mark(&mut self, number: u64, excluded: bool) -> Result<Status, Problem> {
-        let now = Some(now_s());
+        let now = Some(self.now_s());
         let prepared = match excluded {
             true => self.session.prepare_exclude(number, now)?,
             false => self.session.prepare_include(number, now)?,
@@ -246,7 +284,7 @@ impl Elsewhere {
 
     /// Ends the pending suggestions whose time has run out.
     pub(in crate::server) fn expire(&mut self) -> Result<(), Problem> {
-        let prepared = self.session.prepare_expire(now_s())?;
+        let prepared = self.session.prepare_expire(self.now_s())?;
         self.commit(prepared, None)
     }
 
@@ -258,6 +296,11 @@ impl Elsewhere {
     /// A copy as it is now, to work on elsewhere.
     pub(in crate::server) fn copy(&self) -> ask_tell::Session {
         self.session.clone()
+    }
+
+    /// Seconds since 1970, and never before what has happened.
+    fn now_s(&self) -> f64 {
+        now_s() + self.ahead_s
     }
 
     pub(super) fn experiment(&self) -> &Experiment {
@@ -368,7 +411,19 @@ fn unusable(error: ReplayError) -> Problem {
     }
 }
 
-/// Seconds since 1970.
+/// Seconds since 1970, of a clock that goes on where that of the machine is set back.
 pub(in crate::server) fn now_s() -> f64 {
-    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
+    let told = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
+    never_before(told)
+}
+
+/// The clock from now on: it has come to this time, if it was behind.
+fn never_before(told: f64) -> f64 {
+    static LATEST: Mutex<Option<(Instant, f64)>> = Mutex::new(None);
+    let mut latest = super::lock(&LATEST);
+    let now = Instant::now();
+    let gone_on = latest.map_or(f64::NEG_INFINITY, |(at, was)| was + (now - at).as_secs_f64());
+    let time = told.max(gone_on);
+    *latest = Some((now, time));
+    time
 }

@@ -2,7 +2,7 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, atomic::Ordering, mpsc},
+    sync::{Arc, Mutex, MutexGuard, atomic::Ordering, mpsc},
     thread,
     time::{Duration, Instant},
 };
@@ -65,14 +65,18 @@ pub(in crate::server) struct Keeping {
     pub(in crate::server) store: Store,
     /// Where the recordings of all others are kept as files, if they are.
     pub(in crate::server) recordings: Option<PathBuf>,
+    /// Where files without a name are made.
+    pub(in crate::server) scratch: Option<PathBuf>,
     /// How much there may be of them.
     pub(in crate::server) limits: Limits,
 }
 
 /// All sessions of a server.
+///
+/// Nobody waits for one of its locks while holding another, nor for any without end.
 pub(in crate::server) struct Sessions {
     /// Those in memory, in the order in which they came there; few enough to search one by one.
-    pub(super) all: Mutex<Vec<Arc<Session>>>,
+    all: Mutex<Vec<Arc<Session>>>,
     /// Those in the store, oldest first.
     pub(super) known: Mutex<Vec<Arc<Known>>>,
     /// One for each session that makes steps, also while it ends.
@@ -83,6 +87,7 @@ pub(in crate::server) struct Sessions {
     pub(super) metrics: Arc<Metrics>,
     pub(super) store: Arc<Store>,
     recordings: Option<PathBuf>,
+    scratch: Option<PathBuf>,
     pub(super) limits: Limits,
     pub(super) shutdown: CancellationToken,
 }
@@ -93,10 +98,10 @@ impl Sessions {
         keeping: Keeping,
         metrics: Arc<Metrics>,
         shutdown: CancellationToken,
-    ) -> Result<Self, StoreError> {
-        let Keeping { store, recordings, limits } = keeping;
+    ) -> Result<Arc<Self>, StoreError> {
+        let Keeping { store, recordings, scratch, limits } = keeping;
         let known = store.all()?.into_iter().map(|(id, made_s)| Arc::new(Known::new(id, made_s))).collect();
-        Ok(Self {
+        Ok(Arc::new(Self {
             all: Mutex::default(),
             known: Mutex::new(known),
             permits: Arc::new(Semaphore::new(limits.sessions)),
@@ -105,9 +110,10 @@ impl Sessions {
             metrics,
             store: Arc::new(store),
             recordings,
+            scratch,
             limits,
             shutdown,
-        })
+        }))
     }
 
     /// Opens a session: a thread, an experiment, its recording.
@@ -144,6 +150,7 @@ impl Sessions {
             watchers: 0.into(),
             streams: 0.into(),
             together: Default::default(),
+            completed: Default::default(),
             report: Default::default(),
         };
         let NewSession { scenario, seed, .. } = new;
@@ -153,7 +160,8 @@ impl Sessions {
 
     /// What the engine of a session is to leave.
     pub(super) fn shared(&self, id: Uuid) -> Shared {
-        Shared::new(id, self.shutdown.child_token(), self.budget.clone(), self.metrics.clone())
+        let counters = (self.budget.clone(), self.metrics.clone());
+        Shared::new(id, self.shutdown.child_token(), counters, self.scratch.clone())
     }
 
     /// Whether one more recording may be kept as a file.
@@ -173,16 +181,19 @@ impl Sessions {
     /// Adds a session to those in memory.
     pub(super) fn enter(&self, session: Session) -> Arc<Session> {
         let session = Arc::new(session);
-        let mut all = lock(&self.all);
-        // One that was there before has ended.
-        all.retain(|other| other.id != session.id);
-        all.push(session.clone());
-        drop(all);
+        self.all().push(session.clone());
         // A shutdown that began meanwhile has not seen this session.
         if self.shutdown.is_cancelled() {
             session.stop();
         }
         session
+    }
+
+    /// The sessions in memory. A robot elsewhere whose engine has ended is there no longer: it comes back from the store.
+    pub(super) fn all(&self) -> MutexGuard<'_, Vec<Arc<Session>>> {
+        let mut all = lock(&self.all);
+        all.retain(|session| !(session.is_elsewhere() && session.ended().is_cancelled()));
+        all
     }
 
     /// A place for one more session, if need be that of the one that has been idle longest.
@@ -191,7 +202,8 @@ impl Sessions {
         if let Ok(permit) = self.permits.clone().try_acquire_owned() {
             return Ok(permit);
         }
-        if let Some(session) = self.idle_longest(|session| !session.is_elsewhere(), self.limits.idle_after) {
+        let idle = self.idle(|session| !session.is_elsewhere(), self.limits.idle_after);
+        if let Some(session) = idle.into_iter().next() {
             tracing::info!(request = requests::id(), session = %session.id, "an idle session makes room for another");
             self.close(session.id).await?;
         }
@@ -208,12 +220,13 @@ impl Sessions {
         }
     }
 
-    /// The session in memory that was not asked for longest, and for so long, among those that nobody watches.
-    pub(super) fn idle_longest(&self, wanted: impl Fn(&Session) -> bool, idle: Duration) -> Option<Arc<Session>> {
-        let all = lock(&self.all);
-        let unwatched = all.iter().filter(|session| wanted(session) && !session.is_watched());
-        let longest = unwatched.min_by_key(|session| session.used());
-        longest.filter(|session| session.used().elapsed() > idle).cloned()
+    /// The sessions in memory that were not asked for so long, are at nothing and nobody watches; first that which was not
+    /// asked for longest.
+    pub(super) fn idle(&self, wanted: impl Fn(&Session) -> bool, idle: Duration) -> Vec<Arc<Session>> {
+        let is_idle = |session: &&Arc<Session>| wanted(session) && session.is_idle() && session.used().elapsed() > idle;
+        let mut found: Vec<Arc<Session>> = self.all().iter().filter(is_idle).cloned().collect();
+        found.sort_by_key(|session| session.used());
+        found
     }
 
     pub(in crate::server) fn is_shutting_down(&self) -> bool {
@@ -221,7 +234,7 @@ impl Sessions {
     }
 
     /// The session of that id, from the store if it is not in memory.
-    pub(in crate::server) async fn get(&self, id: &str) -> Result<Arc<Session>, Problem> {
+    pub(in crate::server) async fn get(self: &Arc<Self>, id: &str) -> Result<Arc<Session>, Problem> {
         let known = Uuid::parse_str(id).map_err(|_| Problem::unknown_session(id))?;
         let session = match self.in_memory(known) {
             Some(session) => session,
@@ -231,10 +244,14 @@ impl Sessions {
         Ok(session)
     }
 
-    /// One that is in memory. A robot elsewhere whose engine has ended comes back from the store.
+    /// One that is in memory.
     pub(super) fn in_memory(&self, id: Uuid) -> Option<Arc<Session>> {
-        let has_left = |session: &Session| session.is_elsewhere() && session.ended().is_cancelled();
-        lock(&self.all).iter().find(|session| session.id == id).filter(|session| !has_left(session)).cloned()
+        self.all().iter().find(|session| session.id == id).cloned()
+    }
+
+    /// Whether a stream follows a session.
+    pub(in crate::server) fn is_followed(&self, id: Uuid) -> bool {
+        self.in_memory(id).is_some_and(|session| session.streams.load(Ordering::Relaxed) > 0)
     }
 
     /// Ends a session and forgets it; its recording's file is complete afterwards, or its events are in the store no more.
@@ -263,18 +280,19 @@ impl Sessions {
 
     /// Takes a session out of memory.
     pub(super) fn leave(&self, id: Uuid) -> Option<Arc<Session>> {
-        let mut all = lock(&self.all);
+        let mut all = self.all();
         let index = all.iter().position(|session| session.id == id)?;
         Some(all.remove(index))
     }
 
     /// What there is at the moment, beside so many open connections.
     pub(in crate::server) fn present(&self, connections: usize) -> Present {
-        let all = lock(&self.all);
+        let stored_sessions = lock(&self.known).len();
+        let all = self.all();
         let of = |world| (world, all.iter().filter(|session| session.world() == world).count());
         Present {
             sessions: [WorldKind::Simulated, WorldKind::Measured, WorldKind::Outside].map(of),
-            stored_sessions: lock(&self.known).len(),
+            stored_sessions,
             streams: all.iter().map(|session| session.streams.load(Ordering::Relaxed)).sum(),
             connections,
             memory_bytes: self.budget.used(),
@@ -283,7 +301,7 @@ impl Sessions {
 
     /// Ends all sessions and waits, within bounds, until their recordings are complete. Tells which are not, and why.
     pub(in crate::server) async fn close_all(&self) -> Vec<String> {
-        let all = lock(&self.all).clone();
+        let all = self.all().clone();
         for session in &all {
             session.stop();
         }
@@ -321,9 +339,9 @@ mod tests {
     use super::*;
     use crate::server::metrics::Most;
 
-    fn sessions(memory: usize) -> Sessions {
+    fn sessions(memory: usize) -> Arc<Sessions> {
         let store = Store::in_memory().expect("a store");
-        let keeping = Keeping { store, recordings: None, limits: Limits::default() };
+        let keeping = Keeping { store, recordings: None, scratch: None, limits: Limits::default() };
         let metrics = Arc::new(Metrics::new(&Most { connections: 1, memory_bytes: memory }));
         Sessions::new(Budget::new(memory), keeping, metrics, CancellationToken::new()).expect("sessions")
     }

@@ -1,8 +1,11 @@
 //! What an engine leaves for everyone to read.
 
-use std::sync::{
-    Arc, Mutex, PoisonError, RwLock,
-    atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering},
+use std::{
+    path::PathBuf,
+    sync::{
+        Arc, Mutex, PoisonError, RwLock,
+        atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering},
+    },
 };
 
 use tokio::sync::watch;
@@ -11,6 +14,9 @@ use uuid::Uuid;
 
 use super::{Budget, Kept, Standing, lock};
 use crate::{recording::LiveLog, server::metrics::Metrics};
+
+/// Bytes that a session takes for each of its setup: the text as it was sent and as it is read, names and places in it.
+const SETUP_TAKES: usize = 4;
 
 /// What an engine leaves for everyone to read.
 pub(super) struct Shared {
@@ -30,6 +36,10 @@ pub(super) struct Shared {
     pub(super) standing: watch::Sender<Option<Arc<Standing>>>,
     /// The history is another than it was: whoever follows it begins anew.
     pub(super) rewritten: AtomicBool,
+    /// How often it was before it was as it is.
+    pub(super) rewritings: AtomicU64,
+    /// What the engine of a robot elsewhere is at, and what waits for it.
+    pub(super) jobs: AtomicUsize,
     /// Asks the engine to leave off the command that it is at.
     pub(super) interrupted: AtomicBool,
     /// Asks the engine to end.
@@ -39,14 +49,23 @@ pub(super) struct Shared {
     pub(super) budget: Arc<Budget>,
     /// Counts what engines do.
     pub(super) metrics: Arc<Metrics>,
+    /// Where files without a name are made; where the operating system has them if there is none.
+    pub(super) scratch: Option<PathBuf>,
     /// What this session has taken of the budget …
     taken: AtomicUsize,
-    /// … and how much of it for reports.
+    /// … and how much of it for reports …
     reported: AtomicUsize,
+    /// … and for what it is about.
+    held: AtomicUsize,
 }
 
 impl Shared {
-    pub(super) fn new(id: Uuid, stop: CancellationToken, budget: Arc<Budget>, metrics: Arc<Metrics>) -> Self {
+    pub(super) fn new(
+        id: Uuid,
+        stop: CancellationToken,
+        (budget, metrics): (Arc<Budget>, Arc<Metrics>),
+        scratch: Option<PathBuf>,
+    ) -> Self {
         Self {
             id,
             history: RwLock::default(),
@@ -57,21 +76,33 @@ impl Shared {
             recording_failure: Mutex::default(),
             standing: watch::Sender::new(None),
             rewritten: AtomicBool::new(false),
+            rewritings: AtomicU64::new(0),
+            jobs: AtomicUsize::new(0),
             interrupted: AtomicBool::new(false),
             stop,
             ended: CancellationToken::new(),
             budget,
             metrics,
+            scratch,
             taken: AtomicUsize::new(0),
             reported: AtomicUsize::new(0),
+            held: AtomicUsize::new(0),
         }
+    }
+
+    /// Counts what the session is about, of a setup of so many bytes.
+    pub(super) fn hold(&self, bytes: usize) {
+        let bytes = SETUP_TAKES * bytes;
+        self.held.fetch_add(bytes, Ordering::Relaxed);
+        self.taken.fetch_add(bytes, Ordering::Relaxed);
+        self.budget.take(bytes);
     }
 
     pub(super) fn publish(&self, reports: Vec<Kept>, remaining: Option<usize>) {
         // The engine alone publishes, so that nothing comes between these.
         let reported = self.reported.load(Ordering::Relaxed) + reports.iter().map(Kept::bytes).sum::<usize>();
         self.reported.store(reported, Ordering::Relaxed);
-        let taken = reported + self.live.bytes();
+        let taken = reported + self.live.bytes() + self.held.load(Ordering::Relaxed);
         self.budget.take(taken - self.taken.swap(taken, Ordering::Relaxed));
         self.remaining.store(remaining.map_or(u64::MAX, |left| left as u64), Ordering::Relaxed);
         let length = {

@@ -60,6 +60,14 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
+    /// Another program has written to the file, or has cut it off.
+    #[error(
+        "{} is not as it was left; end the server, and run `body-schema repair` on its folder", path.display()
+    )]
+    Changed {
+        /// The file.
+        path: PathBuf,
+    },
     /// As many sessions as may be.
     #[error("{0} sessions are kept already, the most that there may be; delete some")]
     Full(usize),
@@ -79,7 +87,7 @@ pub enum StoreError {
 impl StoreError {
     /// Whether what failed is to write, as on a full disk: it may succeed later.
     pub fn is_for_want_of_space(&self) -> bool {
-        if matches!(self, Self::Gone { .. }) {
+        if matches!(self, Self::Gone { .. } | Self::Changed { .. }) {
             return true;
         }
         let Self::Sqlite { source, .. } = self else { return false };

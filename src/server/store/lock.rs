@@ -1,27 +1,71 @@
 //! One process at a time.
 
 use std::{
-    fs::{File, TryLockError},
-    path::Path,
+    fs::{File, OpenOptions, TryLockError},
+    io,
+    path::{Path, PathBuf},
 };
 
-use super::StoreError;
+use super::{StoreError, checks::Place};
 
 /// The file that is locked; it stays, and means nothing by itself.
 const FILE: &str = "sessions.lock";
 
 /// A data directory held: the operating system lets go of it when the process ends, however it does.
-pub(super) struct Lock(#[expect(dead_code, reason = "it is locked as long as it is open")] File);
+pub(super) struct Lock {
+    path: PathBuf,
+    place: Option<Place>,
+    /// It is locked as long as it is open.
+    _file: File,
+}
 
 impl Lock {
     pub(super) fn take(directory: &Path) -> Result<Self, StoreError> {
+        let path = directory.join(FILE);
+        Self::of(path, directory)
+    }
+
+    /// That of the file itself in which sessions are kept: who removes the other lock admits nobody by that.
+    pub(super) fn of_file(file: &Path, directory: &Path) -> Result<Self, StoreError> {
+        Self::of(file.to_owned(), directory)
+    }
+
+    fn of(path: PathBuf, directory: &Path) -> Result<Self, StoreError> {
         let folder = |source| StoreError::Folder { path: directory.to_owned(), source };
-        let file =
-            File::options().create(true).truncate(false).write(true).open(directory.join(FILE)).map_err(folder)?;
+        let file = open(&path).map_err(folder)?;
         match file.try_lock() {
-            Ok(()) => Ok(Self(file)),
+            Ok(()) => Ok(Self { place: Place::of(&path), path, _file: file }),
             Err(TryLockError::WouldBlock) => Err(StoreError::Held { path: directory.to_owned() }),
             Err(TryLockError::Error(source)) => Err(folder(source)),
         }
     }
+
+    /// Whether it still keeps others away: whoever removes it and makes another would be let in.
+    pub(super) fn is_held(&self) -> bool {
+        self.place.is_none() || Place::of(&self.path) == self.place
+    }
+}
+
+/// A file of ours, made if need be, that nobody else on this machine may read. What is no file, as a pipe, would be waited for without
+/// end, and is refused.
+pub(super) fn open(path: &Path) -> io::Result<File> {
+    if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        let what = format!("{} is no file; move it away", path.display());
+        return Err(io::Error::other(what));
+    }
+    let mut options = OpenOptions::new();
+    options.create(true).truncate(false).read(true).write(true);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::OpenOptionsExt;
+        options.mode(0o600);
+    }
+    let file = options.open(path)?;
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // One that an earlier version has made; that of another owner may stay as it is.
+        drop(file.set_permissions(std::fs::Permissions::from_mode(0o600)));
+    }
+    Ok(file)
 }

@@ -1,7 +1,8 @@
 //! Sessions with robots elsewhere, kept: one SQLite file in the data directory.
 //!
 //! A session is its setup and its events, and they are all that is written. Whoever appends is told once they are on the
-//! disk (write-ahead log, full synchronisation); an error means that nothing was written.
+//! disk (rollback journal, full synchronisation); an error means that nothing was written. There is one file to lose: what is written
+//! is in it, and in no log beside it.
 
 mod checks;
 mod error;
@@ -13,7 +14,10 @@ mod schema;
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
@@ -50,8 +54,10 @@ pub struct Store {
     most_bytes: u64,
     /// What was found damaged when it was opened.
     damage: Vec<String>,
-    /// Held as long as the store is.
-    _lock: Option<Lock>,
+    /// How large the file was left, bytes.
+    left: AtomicU64,
+    /// Held as long as the store is, that of the folder and that of the file.
+    locks: Vec<Lock>,
 }
 
 /// A session as it was kept.
@@ -87,7 +93,7 @@ impl Store {
         let connection = Connection::open_in_memory().map_err(told)?;
         let page: i64 = connection.pragma_query_value(None, "page_size", |row| row.get(0)).map_err(told)?;
         connection.pragma_update(None, "max_page_count", MOST_MEMORY_BYTES / page.max(1)).map_err(told)?;
-        Self::ready(connection, path, None)
+        Self::ready(connection, path, Vec::new())
     }
 
     /// That of a data directory, which is made if need be, for this process alone until it ends.
@@ -106,7 +112,12 @@ impl Store {
     fn held(directory: &Path, lock: Lock) -> Result<Self, StoreError> {
         let path = directory.join(FILE);
         let damage = salvage::salvage(&path)?;
-        let opened = connected(&path).and_then(|connection| Self::ready(connection, path, Some(lock)));
+        let mut locks = vec![lock];
+        // Elsewhere SQLite itself could not read what is locked.
+        if cfg!(unix) {
+            locks.push(Lock::of_file(&path, directory)?);
+        }
+        let opened = connected(&path).and_then(|connection| Self::ready(connection, path, locks));
         let store = opened.map_err(|error| match error {
             // What keeps a store from being made: the folder, or the disk that it is on.
             StoreError::Sqlite { source, .. } => {
@@ -129,20 +140,20 @@ impl Store {
             Connection::open_with_flags(&path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE).map_err(told)?;
         connection.pragma_update(None, "query_only", true).map_err(told)?;
         let version = schema::check(&connection, &path)?;
-        Ok(Self::of(connection, path, version, None))
+        Ok(Self::of(connection, path, version, Vec::new()))
     }
 
-    fn ready(mut connection: Connection, path: PathBuf, lock: Option<Lock>) -> Result<Self, StoreError> {
+    fn ready(mut connection: Connection, path: PathBuf, locks: Vec<Lock>) -> Result<Self, StoreError> {
         schema::migrate(&mut connection, &path)?;
         let told = |source| StoreError::Sqlite { path: path.clone(), source };
         connection.pragma_update(None, "foreign_keys", true).map_err(told)?;
-        Ok(Self::of(connection, path, schema::KNOWN, lock))
+        Ok(Self::of(connection, path, schema::KNOWN, locks))
     }
 
-    fn of(connection: Connection, path: PathBuf, version: u32, lock: Option<Lock>) -> Self {
-        let (place, connection) = (Place::of(&path), Mutex::new(connection));
+    fn of(connection: Connection, path: PathBuf, version: u32, locks: Vec<Lock>) -> Self {
+        let (place, connection, left) = (Place::of(&path), Mutex::new(connection), AtomicU64::new(length(&path)));
         let (most, most_bytes, damage) = (usize::MAX, u64::MAX, Vec::new());
-        Self { connection, path, place, version, most, most_bytes, damage, _lock: lock }
+        Self { connection, path, place, version, most, most_bytes, damage, left, locks }
     }
 
     /// What was found damaged when it was opened, in words.
@@ -177,12 +188,13 @@ impl Store {
         let written = (|| {
             let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
             transaction.execute(
-                "INSERT INTO session (id, made_s, form, setup, shown, checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
-                params![id.to_string(), made_s, VERSION, setup, shown, checksum([&setup, &shown])],
+                "INSERT INTO session (id, made_s, form, setup, shown, checksum, counted) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+                params![id.to_string(), made_s, VERSION, setup, shown, checksum([&setup, &shown]), counted(events)],
             )?;
             insert_events(&transaction, id, 0, events, None)?;
             transaction.commit()
         })();
+        self.is_left();
         written.map_err(self.told())
     }
 
@@ -197,8 +209,14 @@ impl Store {
         let written = (|| {
             let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
             insert_events(&transaction, id, revision, events, key)?;
+            let more = counted(events);
+            if more != 0 {
+                let id = id.to_string();
+                transaction.execute("UPDATE session SET counted = counted + ?1 WHERE id = ?2", params![more, id])?;
+            }
             transaction.commit()
         })();
+        self.is_left();
         written.map_err(self.told())
     }
 
@@ -290,14 +308,49 @@ impl Store {
         Ok(rows.filter_map(|(id, made_s)| Some((Uuid::parse_str(&id).ok()?, made_s))).collect())
     }
 
+    /// How a list shows a session, as it was [noted](Self::note), and how many of its observations count; `None` where that is not
+    /// known, or there is no such session.
+    ///
+    /// # Errors
+    ///
+    /// [`StoreError`] where it cannot be read.
+    pub fn summary(&self, id: Uuid) -> Result<Option<(String, u64)>, StoreError> {
+        if self.version < schema::SUMMED_UP {
+            return Ok(None);
+        }
+        let select =
+            "SELECT summary, counted FROM session WHERE id = ?1 AND summary IS NOT NULL AND counted IS NOT NULL";
+        let connection = self.connection();
+        let found = connection.query_row(select, [id.to_string()], |row| Ok((row.get(0)?, row.get::<_, i64>(1)?)));
+        let found = found.optional().map_err(self.told())?;
+        Ok(found.map(|(summary, counted)| (summary, counted.max(0).unsigned_abs())))
+    }
+
+    /// Notes how a list is to show a session.
+    ///
+    /// # Errors
+    ///
+    /// [`StoreError`]: nothing is lost then but the time to find it out again.
+    pub fn note(&self, id: Uuid, summary: &str, counted: u64) -> Result<(), StoreError> {
+        let connection = self.connection();
+        self.is_there()?;
+        let counted = i64::try_from(counted).unwrap_or(i64::MAX);
+        let update = "UPDATE session SET summary = ?1, counted = ?2 WHERE id = ?3";
+        let noted = connection.execute(update, params![summary, counted, id.to_string()]);
+        self.is_left();
+        noted.map(drop).map_err(self.told())
+    }
+
     /// Forgets a session and all its events.
     ///
     /// # Errors
     ///
     /// [`StoreError`]: it is kept then.
     pub fn delete(&self, id: Uuid) -> Result<(), StoreError> {
+        let connection = self.connection();
         self.is_there()?;
-        let deleted = self.connection().execute("DELETE FROM session WHERE id = ?1", [id.to_string()]);
+        let deleted = connection.execute("DELETE FROM session WHERE id = ?1", [id.to_string()]);
+        self.is_left();
         deleted.map(drop).map_err(self.told())
     }
 
@@ -319,13 +372,24 @@ impl Store {
         Ok(count.map_err(self.told())? as usize)
     }
 
-    /// Whether what is written now would still be found.
+    /// Whether what is written now would still be found: the file is where it was and as long as it was left, and nobody else was let
+    /// in. Called by whoever holds the connection.
     fn is_there(&self) -> Result<(), StoreError> {
+        let path = || self.path.clone();
         match &self.place {
-            Some(place) if Place::of(&self.path).as_ref() != Some(place) => {
-                Err(StoreError::Gone { path: self.path.clone() })
+            Some(place) if Place::of(&self.path).as_ref() != Some(place) => Err(StoreError::Gone { path: path() }),
+            Some(_) if length(&self.path) != self.left.load(Ordering::Relaxed) => {
+                Err(StoreError::Changed { path: path() })
             }
+            _ if !self.locks.iter().all(Lock::is_held) => Err(StoreError::Gone { path: path().with_extension("lock") }),
             _ => Ok(()),
+        }
+    }
+
+    /// Remembers how large the file is, whatever became of what was to be written.
+    fn is_left(&self) {
+        if self.place.is_some() {
+            self.left.store(length(&self.path), Ordering::Relaxed);
         }
     }
 
@@ -347,12 +411,30 @@ impl Store {
 }
 
 fn connected(path: &Path) -> Result<Connection, StoreError> {
+    // Made here, if it is not there: SQLite would let others read it.
+    lock::open(path).map_err(|source| StoreError::Folder { path: path.to_owned(), source })?;
     let opened = Connection::open(path).and_then(|connection| {
-        connection.pragma_update(None, "journal_mode", "WAL")?;
+        // Whatever an earlier version has left in a log beside the file becomes part of it.
+        connection.pragma_update(None, "journal_mode", "TRUNCATE")?;
         connection.pragma_update(None, "synchronous", "FULL")?;
         Ok(connection)
     });
     opened.map_err(|source| StoreError::Sqlite { path: path.to_owned(), source })
+}
+
+/// How many observations more count after these events.
+fn counted(events: &[Event]) -> i64 {
+    let by = |event: &Event| match event.happened {
+        Happened::Observed { .. } | Happened::Included { .. } => 1,
+        Happened::Excluded { .. } => -1,
+        _ => 0,
+    };
+    events.iter().map(by).sum()
+}
+
+/// Bytes of a file; 0 where there is none.
+fn length(path: &Path) -> u64 {
+    std::fs::metadata(path).map_or(0, |found| found.len())
 }
 
 fn event_checksum(event: &str, key: Option<&str>) -> u32 {

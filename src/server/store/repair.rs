@@ -137,7 +137,7 @@ impl Store {
                 "DELETE FROM event WHERE session = (SELECT number FROM session WHERE id = ?1) AND number > ?2",
                 params![id.to_string(), i64::try_from(kept).unwrap_or(i64::MAX)],
             )?;
-            transaction.execute("UPDATE session SET damage = NULL WHERE id = ?1", [id.to_string()])?;
+            transaction.execute("UPDATE session SET damage = NULL, counted = NULL WHERE id = ?1", [id.to_string()])?;
             transaction.commit()
         })();
         written.map_err(self.told())

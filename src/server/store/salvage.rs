@@ -10,6 +10,8 @@ use rusqlite::{Connection, ErrorCode, params};
 
 use super::{StoreError, connected, schema};
 
+/// What stands beside a file for a while, as its name ends.
+const LOGS: [&str; 3] = ["-wal", "-shm", "-journal"];
 /// So many faults of a file are told.
 const MOST_FAULTS: u32 = 3;
 
@@ -29,8 +31,8 @@ pub(super) fn salvage(path: &Path) -> Result<Vec<String>, StoreError> {
         }
     }
     // What the old file's log holds belongs to no other.
-    for file in [beside(path, "-wal"), beside(path, "-shm")] {
-        remove_file(&file)?;
+    for end in LOGS {
+        remove_file(&beside(path, end))?;
     }
     fs::rename(&part, path).map_err(|source| StoreError::Folder { path: path.to_owned(), source })?;
     Ok(told)
@@ -63,7 +65,7 @@ pub(super) fn put_aside(path: &Path, why: &str) -> Result<PathBuf, StoreError> {
     let names = (1..).map(|number: u32| beside(path, &format!(".{why}-{number}")));
     let mut free = names.filter(|name| !name.exists());
     let aside = free.next().unwrap_or_else(|| beside(path, why));
-    for end in ["", "-wal"] {
+    for end in ["", "-wal", "-journal"] {
         let (from, to) = (beside(path, end), beside(&aside, end));
         if from.exists() {
             fs::copy(&from, &to).map_err(|source| StoreError::Folder { path: to, source })?;
@@ -79,7 +81,7 @@ fn beside(path: &Path, end: &str) -> PathBuf {
 }
 
 fn remove(path: &Path) -> Result<(), StoreError> {
-    ["", "-wal", "-shm"].iter().try_for_each(|end| remove_file(&beside(path, end)))
+    [""].iter().chain(&LOGS).try_for_each(|end| remove_file(&beside(path, end)))
 }
 
 fn remove_file(path: &Path) -> Result<(), StoreError> {

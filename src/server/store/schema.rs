@@ -10,7 +10,7 @@ use super::StoreError;
 const APPLICATION: u32 = 0x626f_6479;
 
 /// The step from each version to the next. The version is in `user_version`; an empty file is of version 0.
-const MIGRATIONS: [&str; 2] = [
+const MIGRATIONS: [&str; 3] = [
     "
     CREATE TABLE session (
         number INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -34,12 +34,18 @@ const MIGRATIONS: [&str; 2] = [
     ALTER TABLE session ADD COLUMN damage TEXT;      -- why events are missing, if any are
     ALTER TABLE event ADD COLUMN checksum INTEGER;
 ",
+    "
+    ALTER TABLE session ADD COLUMN summary TEXT;     -- how a list shows it, JSON; null where nobody has asked yet
+    ALTER TABLE session ADD COLUMN counted INTEGER;  -- how many of its observations count; null where nobody has counted
+",
 ];
 
 /// The version that this program writes.
 pub(super) const KNOWN: u32 = MIGRATIONS.len() as u32;
 /// The first version with checksums.
 pub(super) const CHECKED: u32 = 2;
+/// The first version with what a list shows.
+pub(super) const SUMMED_UP: u32 = 3;
 
 /// Refuses the file of another program, and one of a later version. Tells the version.
 pub(super) fn check(connection: &Connection, path: &Path) -> Result<u32, StoreError> {

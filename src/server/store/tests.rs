@@ -59,6 +59,53 @@ fn what_does_not_fit_leaves_no_trace() {
     assert_eq!(store.load(id).expect("read").expect("there").events, [expired(1), long]);
 }
 
+/// All that was acknowledged is in one file, and who removes or cuts what stands in the folder is noticed before anything more is.
+#[cfg(unix)]
+#[test]
+fn what_happens_to_the_files_is_noticed() {
+    use std::{fs, os::unix::fs::PermissionsExt, process::Command};
+    let held = |case: &str| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = Store::open(folder.path()).expect(case);
+        let id = Uuid::new_v4();
+        store.insert(id, 0.0, &setup(), Shown::default(), &[]).expect("kept");
+        (folder, store, id)
+    };
+    let (folder, store, id) = held("kept");
+    store.append(id, 0, &[expired(1)], None).expect("kept");
+    for found in fs::read_dir(folder.path()).expect("a folder") {
+        let (found, is_log) =
+            (found.expect("a file"), |name: &str| name.ends_with("-wal") || name.ends_with("-journal"));
+        let metadata = found.metadata().expect("of a file");
+        let name = found.file_name().into_string().expect("text");
+        assert!(!is_log(&name) || metadata.len() == 0, "{name}");
+        assert_eq!(metadata.permissions().mode() & 0o777, 0o600, "{name}");
+    }
+
+    let (folder, store, id) = held("its lock removed");
+    fs::remove_file(folder.path().join("sessions.lock")).expect("removed");
+    assert!(matches!(Store::open(folder.path()), Err(StoreError::Held { .. })));
+    let error = store.append(id, 0, &[expired(1)], None).expect_err("another could be let in");
+    assert!(error.is_for_want_of_space() && error.to_string().contains("sessions.lock"), "{error}");
+
+    let (folder, store, id) = held("cut off");
+    let file = folder.path().join(FILE);
+    let whole = fs::read(&file).expect("read");
+    fs::write(&file, &whole[..whole.len() / 2]).expect("cut");
+    let error = store.append(id, 0, &[expired(1)], None).expect_err("cut");
+    assert!(matches!(error, StoreError::Changed { .. }), "{error}");
+    fs::write(&file, whole).expect("put back");
+    store.append(id, 0, &[expired(1)], None).expect("kept again");
+
+    for file in ["sessions.lock", FILE] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let pipe = folder.path().join(file);
+        assert!(Command::new("mkfifo").arg(&pipe).status().expect("a program").success());
+        let error = Store::open(folder.path()).err().expect("it is a pipe").to_string();
+        assert!(error.contains("is no file"), "{error}");
+    }
+}
+
 #[test]
 fn a_directory_is_held_by_one_and_read_by_any() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -137,6 +184,7 @@ fn a_store_without_checksums_is_taken_up() {
         let store = Store::open(folder.path()).expect("a store");
         let id = filled(&store, 3);
         let old = "ALTER TABLE session DROP COLUMN checksum; ALTER TABLE session DROP COLUMN damage;
+                   ALTER TABLE session DROP COLUMN summary; ALTER TABLE session DROP COLUMN counted;
                    ALTER TABLE event DROP COLUMN checksum; PRAGMA user_version = 1;";
         store.connection().execute_batch(old).expect("as version 1 had it");
         id

@@ -1,0 +1,101 @@
+//! The recording so far as a file, for all who take it away: it is written once, to the disk, and no reader holds more of it than a
+//! piece.
+
+use std::{
+    fs::File,
+    io::{self, BufWriter, Read, Seek, SeekFrom, Write},
+    sync::{Arc, Mutex},
+};
+
+use axum::body::{Body, Bytes};
+use futures_util::stream::unfold;
+use tokio::{sync::Mutex as AsyncMutex, task::spawn_blocking};
+
+use super::{Session, lock};
+use crate::{
+    recording::RecordingError,
+    server::{
+        aside::Jobs,
+        problem::{Kind, Problem},
+    },
+};
+
+/// So much of it is read at a time.
+const PIECE_BYTES: usize = 256 << 10;
+
+/// A complete recording.
+pub(in crate::server) struct Completed {
+    /// How many parts of the recording are in it.
+    parts: usize,
+    /// It has no name any more, and goes with its last reader.
+    file: Mutex<File>,
+    pub(in crate::server) bytes: u64,
+}
+
+/// What was written last.
+pub(super) type Kept = AsyncMutex<Option<Arc<Completed>>>;
+
+impl Session {
+    /// All of the recording so far; whoever asks while it is written waits for the same file.
+    pub(in crate::server) async fn completed(&self, jobs: &Jobs) -> Result<Arc<Completed>, Problem> {
+        let mut kept = self.completed.lock().await;
+        let (live, folder) = (self.live().clone(), self.shared.scratch.clone());
+        if let Some(completed) = kept.as_ref().filter(|completed| completed.parts == live.len()) {
+            return Ok(completed.clone());
+        }
+        // Before the next is written: two of them are needed by no new reader.
+        *kept = None;
+        let parts = live.len();
+        let written = jobs.done(move |_| -> Result<Completed, Problem> {
+            let file = match &folder {
+                Some(folder) => tempfile::tempfile_in(folder),
+                None => tempfile::tempfile(),
+            };
+            let mut writer = BufWriter::new(file.map_err(|error| unwritten(&error))?);
+            live.complete_to(&mut writer, parts).map_err(|error| unwritten_recording(&error))?;
+            writer.flush().map_err(|error| unwritten(&error))?;
+            let file = writer.into_inner().map_err(|error| unwritten(error.error()))?;
+            let bytes = file.metadata().map_err(|error| unwritten(&error))?.len();
+            Ok(Completed { parts, file: Mutex::new(file), bytes })
+        });
+        let completed = Arc::new(written.await?);
+        *kept = Some(completed.clone());
+        Ok(completed)
+    }
+}
+
+impl Completed {
+    /// It, piece by piece.
+    pub(in crate::server) fn body(self: Arc<Self>) -> Body {
+        Body::from_stream(unfold((self, 0), |(completed, from)| async move {
+            if from >= completed.bytes {
+                return None;
+            }
+            let reading = completed.clone();
+            let piece =
+                spawn_blocking(move || reading.piece(from)).await.unwrap_or_else(|error| Err(io::Error::other(error)));
+            let next = from + piece.as_ref().map_or(completed.bytes, |piece| piece.len() as u64);
+            Some((piece, (completed, next)))
+        }))
+    }
+
+    fn piece(&self, from: u64) -> io::Result<Bytes> {
+        let mut piece = vec![0; PIECE_BYTES.min((self.bytes - from) as usize)];
+        let mut file = lock(&self.file);
+        file.seek(SeekFrom::Start(from))?;
+        file.read_exact(&mut piece)?;
+        Ok(piece.into())
+    }
+}
+
+fn unwritten(error: &io::Error) -> Problem {
+    let detail = format!("the recording could not be put together on the disk: {error}; free some space and ask again");
+    Problem::new(Kind::Storage, detail)
+}
+
+fn unwritten_recording(error: &RecordingError) -> Problem {
+    match error {
+        RecordingError::Write { source, .. } => unwritten(source),
+        error => Problem::new(Kind::Internal, format!("no complete recording: {error}")),
+    }
+}
