@@ -64,7 +64,10 @@ async fn only_who_carries_the_token_is_answered() {
     let stream = TcpStream::connect(server.address).await.expect("a connection");
     assert!(client_async(&url, stream).await.is_err(), "without the token there is none");
     let mut request = url.into_client_request().expect("a request");
-    let cookie = format!("other=1; body-schema-{}={TOKEN}", server.address.port());
+    let browser = Client::builder().no_proxy().redirect(Policy::none()).build().expect("a client");
+    let sent_on = browser.get(format!("http://{}/?token={TOKEN}", server.address)).send().await.expect("an answer");
+    let given = sent_on.headers()["set-cookie"].to_str().expect("text").split(';').next().expect("a pair").to_owned();
+    let cookie = format!("other=1; {given}");
     request.headers_mut().insert("cookie", cookie.parse().expect("a header"));
     let stream = TcpStream::connect(server.address).await.expect("a connection");
     let mut socket = client_async(request, stream).await.expect("a WebSocket").0;
@@ -94,6 +97,23 @@ async fn a_page_keeps_the_token_where_no_link_and_no_script_finds_it() {
     let page = page.expect("an answer");
     assert_eq!(page.status(), StatusCode::OK);
     assert!(!page.text().await.expect("text").contains(TOKEN));
+    // The token itself is no cookie, nor is the cookie a token, or one of another server.
+    assert!(!cookie.contains(TOKEN));
+    let (name, pass) = cookie.split_once('=').expect("a pair");
+    let forged = server.request(Method::GET, "/healthz").header("cookie", format!("{name}={TOKEN}"));
+    problem(forged.send().await.expect("an answer"), 401, Some("Authorization")).await;
+    let borne = server.request(Method::GET, "/healthz").bearer_auth(pass);
+    problem(borne.send().await.expect("an answer"), 401, Some("Authorization")).await;
+    let other = Server::at("127.0.0.1:0", guarded(&[])).await;
+    let taken =
+        other.request(Method::GET, "/healthz").header("cookie", format!("body-schema-{}={pass}", other.address.port()));
+    problem(taken.send().await.expect("an answer"), 401, Some("Authorization")).await;
+    other.stop().await;
+    // Whoever is known already is sent on without it, too, whatever it is.
+    for token in [TOKEN, "wrong-but-as-long-as-a-token"] {
+        let again = browser.get(format!("http://{}/?seed=2&token={token}", server.address)).header("cookie", &cookie);
+        assert_eq!(again.send().await.expect("an answer").headers()["location"], "/?seed=2", "{token}");
+    }
     // The cookie does not help the page of another origin.
     let foreign = server.request(Method::POST, "/v1/sessions").header("cookie", &cookie);
     let foreign = foreign.header("origin", "https://example.org").send().await.expect("an answer");

@@ -427,3 +427,19 @@ fn never_before(told: f64) -> f64 {
     *latest = Some((now, time));
     time
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_is_set_back_goes_on() {
+        let before = now_s();
+        let later = never_before(before + 100.0);
+        assert!(later >= before + 100.0);
+        let set_back = never_before(before - 1000.0);
+        assert!(set_back >= later && set_back < later + 60.0, "{later} {set_back}");
+        std::thread::sleep(Duration::from_millis(20));
+        assert!(never_before(before - 2000.0) >= set_back + 0.02);
+    }
+}
