@@ -172,6 +172,42 @@ async fn sessions_are_listed_by_pages() {
     server.stop().await;
 }
 
+/// However many there are: none is replayed, and none taken apart, to be listed.
+#[tokio::test]
+async fn ten_thousand_sessions_are_listed_soon_after_a_start() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let options = || Options { data_dir: Some(folder.path().to_owned()), ..Options::default() };
+    let server = Server::with(options()).await;
+    let session = server.open(robot::opening()).await;
+    told(&server, &session, 0..3).await;
+    server.stop().await;
+    let mut store = rusqlite::Connection::open(folder.path().join("sessions.sqlite")).expect("the store");
+    let many = store.transaction().expect("a transaction");
+    for number in 2..=10_000 {
+        let copy = "INSERT INTO session (number, id, made_s, form, setup, shown, checksum, summary, counted)
+                    SELECT ?1, ?2, made_s + ?1, form, setup, shown, checksum, summary, counted FROM session WHERE number = 1";
+        let id = format!("{number:08x}-0000-4000-8000-000000000000");
+        many.execute(copy, rusqlite::params![number, id]).expect("copied");
+    }
+    many.commit().expect("kept");
+    drop(store);
+    let server = Server::with(options()).await;
+    let (begun, mut after, mut count, mut slowest) = (Instant::now(), String::new(), 0, Duration::ZERO);
+    loop {
+        let asked = Instant::now();
+        let page = server.get_json(&format!("/v1/sessions{after}")).await;
+        slowest = slowest.max(asked.elapsed());
+        count += page["sessions"].as_array().expect("a list").len();
+        let Some(next) = page["next"].as_str() else { break };
+        after = format!("?after={next}");
+    }
+    println!("listed in {:?}, a page in {slowest:?}", begun.elapsed());
+    assert_eq!(count, 10_000);
+    // A tenth of this on a machine with nothing else to do.
+    assert!(slowest < Duration::from_secs(10), "{slowest:?}");
+    server.stop().await;
+}
+
 fn uuid_of_nobody() -> &'static str {
     "00000000-0000-4000-8000-000000000000"
 }

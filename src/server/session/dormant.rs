@@ -4,6 +4,7 @@
 //! by replaying its events, when it is asked for.
 
 use std::{
+    collections::BTreeMap,
     sync::{Arc, Mutex, OnceLock, mpsc},
     time::{Duration, Instant},
 };
@@ -30,7 +31,7 @@ use crate::{
         aside::aside,
         problem::{Kind, Problem},
         requests,
-        store::{Shown, StoreError, Stored},
+        store::{Shown, Store, StoreError, Stored},
     },
 };
 
@@ -40,8 +41,9 @@ const ATTEMPTS: usize = 3;
 const MOVED_WITHIN: Duration = Duration::from_secs(20);
 /// … and one that needs room for the engine of another that is to leave.
 const LEFT_WITHIN: Duration = Duration::from_secs(2);
-/// For so long a list looks whether sessions are as they were written; the others are looked at in the background.
-const LOOKED_AT_WITHIN: Duration = Duration::from_millis(200);
+/// At so many sessions, and then for so long, a list looks whether they are as they were written.
+const LOOKED_AT_FIRST: usize = 8;
+const LOOKED_AT_WITHIN: Duration = Duration::from_millis(20);
 /// How often it is looked for sessions that nobody asks for, at most.
 const LOOK_EVERY: Duration = Duration::from_secs(60);
 
@@ -308,67 +310,66 @@ impl Sessions {
             }
         };
         let page = every.get(first..).unwrap_or_default();
-        let mut listed = Listed::default();
-        let (mut looking, begun) = (true, Instant::now());
-        for (_, id, session) in page.iter().take(most) {
+        let has_more = page.len() > most;
+        let page = &page[..most.min(page.len())];
+        let asleep: Vec<Arc<Known>> = page.iter().filter_map(|(.., session)| session.as_ref().err().cloned()).collect();
+        self.look_at_some(&asleep).await;
+        let mut shown = self.described(&asleep).await?;
+        let mut listed = Listed { next: page.last().filter(|_| has_more).map(|(_, id, _)| *id), ..Listed::default() };
+        for (_, id, session) in page {
             match session {
                 Ok(session) => listed.sessions.push(session.resource()),
                 // One that cannot be read keeps nobody from the others.
-                Err(known) => match self.described(known, looking).await {
-                    Ok(resource) => listed.sessions.push(resource),
-                    Err(why) => listed.damaged.push(DamagedSession { id: id.to_string(), detail: why }),
+                Err(_) => match shown.remove(id) {
+                    Some(Ok(resource)) => listed.sessions.push(resource),
+                    Some(Err(why)) => listed.damaged.push(DamagedSession { id: id.to_string(), detail: why }),
+                    // It was deleted meanwhile.
+                    None => {}
                 },
             }
-            looking = begun.elapsed() < LOOKED_AT_WITHIN;
         }
-        listed.next = page.get(most.wrapping_sub(1)).filter(|_| page.len() > most).map(|(_, id, _)| *id);
         Ok(listed)
     }
 
-    /// A session as it can be shown without replaying it, or why it cannot be taken up. Whether it is as it was written is found out
-    /// if nobody has yet and this is to be `looking`.
-    async fn described(&self, known: &Arc<Known>, looking: bool) -> Result<SessionResource, String> {
-        if looking {
+    /// Sessions as they can be shown without replaying them, or why they cannot be taken up.
+    async fn described(
+        &self,
+        asleep: &[Arc<Known>],
+    ) -> Result<BTreeMap<Uuid, Result<SessionResource, String>>, Problem> {
+        let (store, asleep) = (self.store.clone(), asleep.to_vec());
+        aside(move || {
+            let mut shown = BTreeMap::new();
+            for known in asleep {
+                let remembered = lock(&known.resource).clone();
+                let found = match (known.damage.get(), remembered) {
+                    (Some(Some(why)), _) => Err(why.clone()),
+                    (_, Some(resource)) => Ok(resource),
+                    _ => match summed_up(&store, known.id) {
+                        Ok(None) => continue,
+                        Ok(Some(resource)) => {
+                            *lock(&known.resource) = Some(resource.clone());
+                            Ok(resource)
+                        }
+                        Err(why) => Err(why),
+                    },
+                };
+                shown.insert(known.id, found);
+            }
+            Ok::<_, Problem>(shown)
+        })
+        .await
+    }
+
+    /// Looks at those that nobody has looked at, at few of many: at the others it is looked in the background.
+    async fn look_at_some(&self, asleep: &[Arc<Known>]) {
+        let begun = Instant::now();
+        let new = asleep.iter().filter(|known| known.damage.get().is_none());
+        for (number, known) in new.enumerate() {
+            if number >= LOOKED_AT_FIRST && begun.elapsed() > LOOKED_AT_WITHIN {
+                break;
+            }
             self.look_at(known).await;
         }
-        if let Some(Some(why)) = known.damage.get() {
-            return Err(why.clone());
-        }
-        let remembered = lock(&known.resource).clone();
-        if let Some(resource) = remembered {
-            return Ok(resource);
-        }
-        let (store, id) = (self.store.clone(), known.id);
-        let found = aside(move || -> Result<_, StoreError> {
-            let noted = store.summary(id)?.and_then(|(text, step)| Some((serde_json::from_str(&text).ok()?, step)));
-            if noted.is_some() {
-                return Ok(noted);
-            }
-            let Some(Stored { setup, events, .. }) = store.load(id)? else { return Ok(None) };
-            let Ok(session) = ask_tell::Session::replay(setup, Vec::new()) else { return Ok(None) };
-            let (summary, step) = (Summary::of(&session), counted(&events));
-            // It is found out again where it cannot be noted.
-            drop(store.note(id, &summary.text(), step));
-            Ok(Some((summary, step)))
-        });
-        let found = found.await.map_err(|problem| String::from(problem.detail))?;
-        let (Summary { description, channels }, step) =
-            found.ok_or("it was written by another version of body-schema, which could read it")?;
-        let resource = SessionResource {
-            id: id.to_string(),
-            world: WorldKind::Outside,
-            description,
-            step,
-            remaining: None,
-            recording: None,
-            file: None,
-            recording_failure: None,
-            failure: None,
-            status: None,
-            channels,
-        };
-        *lock(&known.resource) = Some(resource.clone());
-        Ok(resource)
     }
 
     /// Finds out whether a session is as it was written.
@@ -393,6 +394,37 @@ impl Sessions {
         let store = self.store.clone();
         aside(move || store.load(id)).await
     }
+}
+
+/// A session in the store as it can be shown; `None` if it is not there any more.
+fn summed_up(store: &Store, id: Uuid) -> Result<Option<SessionResource>, String> {
+    let told = |error: StoreError| String::from(Problem::from(error).detail);
+    let noted = store.summary(id).map_err(told)?;
+    let noted = noted.and_then(|(text, step)| Some((serde_json::from_str::<Summary>(&text).ok()?, step)));
+    let (Summary { description, channels }, step) = match noted {
+        Some(noted) => noted,
+        None => {
+            let Some(Stored { setup, events, .. }) = store.load(id).map_err(told)? else { return Ok(None) };
+            let session = ask_tell::Session::replay(setup, Vec::new()).map_err(|error| error.to_string())?;
+            let (summary, step) = (Summary::of(&session), counted(&events));
+            // It is found out again where it cannot be noted.
+            drop(store.note(id, &summary.text(), step));
+            (summary, step)
+        }
+    };
+    Ok(Some(SessionResource {
+        id: id.to_string(),
+        world: WorldKind::Outside,
+        description,
+        step,
+        remaining: None,
+        recording: None,
+        file: None,
+        recording_failure: None,
+        failure: None,
+        status: None,
+        channels,
+    }))
 }
 
 /// How many observations of these events count.
