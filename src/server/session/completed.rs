@@ -15,7 +15,7 @@ use super::{Session, lock};
 use crate::{
     recording::RecordingError,
     server::{
-        aside::Jobs,
+        aside::{Jobs, Wanted},
         problem::{Kind, Problem},
     },
 };
@@ -46,13 +46,14 @@ impl Session {
         // Before the next is written: two of them are needed by no new reader.
         *kept = None;
         let parts = live.len();
-        let written = jobs.done(move |_| -> Result<Completed, Problem> {
+        let written = jobs.done(move |wanted| -> Result<Completed, Problem> {
             let file = match &folder {
                 Some(folder) => tempfile::tempfile_in(folder),
                 None => tempfile::tempfile(),
             };
             let mut writer = BufWriter::new(file.map_err(|error| unwritten(&error))?);
-            live.complete_to(&mut writer, parts).map_err(|error| unwritten_recording(&error))?;
+            let while_wanted = WhileWanted { writer: &mut writer, wanted };
+            live.complete_to(while_wanted, parts).map_err(|error| unwritten_recording(&error))?;
             writer.flush().map_err(|error| unwritten(&error))?;
             let file = writer.into_inner().map_err(|error| unwritten(error.error()))?;
             let bytes = file.metadata().map_err(|error| unwritten(&error))?.len();
@@ -85,6 +86,25 @@ impl Completed {
         file.seek(SeekFrom::Start(from))?;
         file.read_exact(&mut piece)?;
         Ok(piece.into())
+    }
+}
+
+/// Writes as long as anybody waits for it.
+struct WhileWanted<'a, W> {
+    writer: W,
+    wanted: &'a Wanted,
+}
+
+impl<W: Write> Write for WhileWanted<'_, W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.wanted.is_given_up() {
+            return Err(io::Error::other("nobody waits for it any longer"));
+        }
+        self.writer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
     }
 }
 
