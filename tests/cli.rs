@@ -316,15 +316,16 @@ fn doubts_about_data_are_warnings_unless_strict() {
     let toml =
         include_str!("../scenarios/tiago-mocap.toml").replace("\"x1\", \"y1\", \"z1\"", "\"x3\", \"y3\", \"z3\"");
     write("my.toml", &toml);
-    write("tiago-mocap.csv", include_str!("../scenarios/tiago-mocap.csv"));
+    write("tiago-mocap.csv", include_str!("doubts/tiago-late.csv"));
+    write("tiago-mocap-1504.csv", include_str!("../scenarios/tiago-mocap-1504.csv"));
     let path = folder.path().join("my.toml");
     let path = path.to_str().expect("a plain path");
     let output = body_schema(&["check", path]);
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && said.contains("warning: column `x4, y4, z4`: a copy of `x3, y3, z3`"), "{said}");
     let (code, message) = failure(&["check", path, "--strict"]);
-    assert!(code == 2 && message.contains("1 doubt about the data"), "{message}");
-    assert!(body_schema(&["check", "tiago-mocap", "--strict"]).status.success());
+    assert!(code == 2 && message.contains("3 doubts about the data"), "{message}");
+    assert!(body_schema(&["check", "ur10-camera", "--strict"]).status.success());
 }
 
 #[cfg(target_os = "linux")]
