@@ -12,11 +12,19 @@
 //! the σ that the sensor's maker promises, which may as well be noise unless the same posture was measured again and tells; and what
 //! held-out rows are off beyond all that is expected.
 //!
+//! Rows know their own postures better than others. Where it is asked about those, each is asked without the rows that were measured
+//! there, with H whitened and A = H P Hᵀ:
+//!
+//! ```text
+//! J P₋ᵣ Jᵀ = J P Jᵀ + C (I − A)⁻¹ Cᵀ,    C = J P Hᵀ
+//! e²(k) (1 + own / k)
+//! ```
+//!
 //! A target that meets itself in sockets is asked about at other places than those learned from. What errs alike in all rows of one place
 //! shows in no residual there, so that residuals below the stated σ do not say that less than σ is to be reckoned with elsewhere:
 //! rows then count as σ has them, as k = s² < 1 times as many, s the scale that was found.
 
-use nalgebra::Cholesky;
+use nalgebra::{Cholesky, DMatrix};
 
 use super::{Case, Figures, Fit, MoreRows, Noise};
 use crate::{estimation::NoiseFit, model::Workspace};
@@ -26,23 +34,33 @@ const MOST: f64 = 1e3;
 /// Deviations that chance is granted before held-out rows are said to be worse than expected.
 const CHANCE: f64 = 2.0;
 
-/// How the expected error falls: by direction, its share of the square now, and μ.
-struct Falls(Vec<(f64, f64)>);
+/// How the expected error falls.
+struct Falls {
+    /// By direction, its share of the square now where rows may know their own postures, and μ.
+    shares: Vec<(f64, f64)>,
+    /// By how much the square is larger now where they do not.
+    own: f64,
+}
 
 impl Falls {
     /// e²(k) / e²(1).
     fn at(&self, k: f64) -> f64 {
-        self.0.iter().map(|(share, mu)| share / (1.0 + (k - 1.0) * mu)).sum()
+        self.with_own(k) * (1.0 + self.own / k) / (1.0 + self.own)
+    }
+
+    fn with_own(&self, k: f64) -> f64 {
+        self.shares.iter().map(|(share, mu)| share / (1.0 + (k - 1.0) * mu)).sum()
     }
 
     /// The error and its fall from where k is 1, of an `error` now.
     fn from(self, k: f64, error: f64) -> (f64, Self) {
-        let square = self.at(k);
+        let (square, whole) = (self.with_own(k), self.at(k));
         let of = |(share, mu): (f64, f64)| {
             let grown = 1.0 + (k - 1.0) * mu;
             (share / grown / square, k * mu / grown)
         };
-        (error * square.sqrt(), Self(self.0.into_iter().map(of).collect()))
+        let shares = self.shares.into_iter().map(of).collect();
+        (error * whole.sqrt(), Self { shares, own: self.own / k })
     }
 }
 
@@ -141,8 +159,33 @@ impl Case<'_> {
         // Outliers hardly count in the covariance, so that a row may seem to tell more than everything.
         let shares =
             squares.iter().zip(eigen.eigenvalues.iter()).map(|(square, mu)| (square / total, mu.clamp(0.0, 1.0)));
-        let error = (total / workspace.configurations.len() as f64).sqrt();
-        (total > 0.0 && total.is_finite()).then(|| (error, Falls(shares.collect())))
+        let own = self.own(fit, workspace).map_or(0.0, |own| own / total);
+        let error = (total * (1.0 + own) / workspace.configurations.len() as f64).sqrt();
+        (total > 0.0 && total.is_finite()).then(|| (error, Falls { shares: shares.collect(), own }))
+    }
+
+    /// By how much the sum of squares is larger where no row knows its own posture.
+    fn own(&self, fit: &Fit, workspace: &Workspace) -> Option<f64> {
+        let belief = &fit.belief;
+        let covariance = belief.covariance.as_ref()?;
+        let jacobian = workspace.jacobian(&belief.state, &belief.layout);
+        let mut sum = 0.0;
+        for (index, asked) in workspace.configurations.iter().enumerate() {
+            let own = fit.rows.iter().filter(|row| self.rows[**row].positions == *asked);
+            let own: Vec<DMatrix<f64>> = own.map(|row| self.whitened(fit, *row)).collect();
+            let columns: Vec<_> = own.iter().flat_map(|rows| rows.column_iter()).collect();
+            if columns.is_empty() {
+                continue;
+            }
+            let rows = DMatrix::from_columns(&columns);
+            let known = covariance * &rows;
+            let left = DMatrix::identity(rows.ncols(), rows.ncols()) - rows.tr_mul(&known);
+            // Outliers hardly count in the covariance, so that a row may seem to tell more than everything.
+            let Some(left) = Cholesky::new(left) else { continue };
+            let moved = jacobian.rows(3 * index, 3) * known;
+            sum += moved.dot(&left.solve(&moved.transpose()).transpose());
+        }
+        Some(sum)
     }
 }
 
@@ -221,7 +264,7 @@ mod tests {
     /// Rows that count as half of them are worth half as many, and twice as many are then as good as all.
     #[test]
     fn rows_that_count_less_are_as_so_many_fewer() {
-        let falls = || Falls(vec![(0.5, 1.0), (0.3, 0.4), (0.2, 0.0)]);
+        let falls = || Falls { shares: vec![(0.5, 1.0), (0.3, 0.4), (0.2, 0.0)], own: 0.3 };
         let (error, fewer) = falls().from(0.5, 3.0);
         assert!((error - 3.0 * falls().at(0.5).sqrt()).abs() < 1e-12);
         for k in [0.3, 1.0, 2.0, 7.0] {
