@@ -7,7 +7,7 @@ use roxmltree::{Document, Error, Node, ParsingOptions};
 use super::{
     UrdfError,
     element::Body,
-    plain::{COLON, plain},
+    plain::{COLON, crowded, plain},
     values::{EXPAND, error, only_child, required},
 };
 use crate::{kinematics::JointKind, similar::similar};
