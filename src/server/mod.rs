@@ -48,7 +48,7 @@ pub use frame::{FrameAncestor, NoOrigin};
 pub(crate) use guard::CONTENT_SECURITY_POLICY;
 pub use limits::{Limits, raise_descriptors};
 use metrics::{Metrics, Most};
-pub use problem::{PROBLEM_JSON, Problem};
+pub use problem::{Beside, PROBLEM_JSON, Problem};
 use session::{Budget, Keeping, Sessions};
 pub use session::{DamagedSession, NewOutsideSession, NewSession, SessionResource};
 pub use store::{Finding, Held, Shown, State, Store, StoreError, Stored};

@@ -38,24 +38,30 @@ pub struct Problem {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<String>)]
     pub field: Option<Box<str>>,
-    /// What is wrong with `field`: the first part of `detail`, where it has two.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<String>)]
-    pub what: Option<Box<str>>,
-    /// What to write instead: the second part.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<String>)]
-    pub hint: Option<Box<str>>,
     /// The session's actual step, where it matters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<u64>,
     /// How many steps can still be made, where that is too few.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remaining: Option<u64>,
+    /// What is told beside.
+    #[serde(flatten)]
+    #[schema(inline)]
+    pub beside: Box<Beside>,
+}
+
+/// What is told of a problem beside the rest: members of the same object.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, ToSchema)]
+pub struct Beside {
+    /// What is wrong with `field`: the first part of `detail`, where it has two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub what: Option<String>,
+    /// What to write instead: the second part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hint: Option<String>,
     /// The id of the request, as in the answer's `X-Request-Id` and in the server's log.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<String>)]
-    pub request_id: Option<Box<str>>,
+    pub request_id: Option<String>,
 }
 
 /// What an answer that is a problem carries for the log.
@@ -180,8 +186,8 @@ impl Problem {
     pub(super) fn new(kind: Kind, detail: impl Into<String>) -> Self {
         let (status, urn, title) = kind.parts();
         let detail = detail.into().into();
-        let (field, what, hint, step, remaining, request_id) = Default::default();
-        Self { kind: urn, title, status, detail, field, what, hint, step, remaining, request_id }
+        let (field, step, remaining, beside) = Default::default();
+        Self { kind: urn, title, status, detail, field, step, remaining, beside }
     }
 
     pub(super) fn field(self, field: impl Into<String>) -> Self {
@@ -189,8 +195,9 @@ impl Problem {
     }
 
     /// What is wrong, and what to do about it, each by itself.
-    pub(super) fn hint(self, what: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self { what: Some(what.into().into()), hint: Some(hint.into().into()), ..self }
+    pub(super) fn hint(mut self, what: impl Into<String>, hint: impl Into<String>) -> Self {
+        (self.beside.what, self.beside.hint) = (Some(what.into()), Some(hint.into()));
+        self
     }
 
     pub(super) fn step(self, step: u64) -> Self {
@@ -348,16 +355,16 @@ impl From<StoreError> for Problem {
 }
 
 impl IntoResponse for Problem {
-    fn into_response(self) -> Response {
+    fn into_response(mut self) -> Response {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let refused = Refused { kind: self.kind, why: status.is_server_error().then(|| self.detail.to_string()) };
-        let told = Self { request_id: requests::id().map(Into::into), ..self };
-        let body = serde_json::to_vec(&told).unwrap_or_default();
+        self.beside.request_id = requests::id();
+        let body = serde_json::to_vec(&self).unwrap_or_default();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
         response.extensions_mut().insert(refused);
         if matches!(status, StatusCode::SERVICE_UNAVAILABLE | StatusCode::TOO_MANY_REQUESTS) {
             // A session that has left memory is back at once.
-            let after = if told.is(Kind::Dormant) { 0 } else { RETRY_AFTER_S };
+            let after = if self.is(Kind::Dormant) { 0 } else { RETRY_AFTER_S };
             response.headers_mut().insert(header::RETRY_AFTER, after.into());
         }
         if matches!(status, StatusCode::REQUEST_TIMEOUT) {
