@@ -70,6 +70,9 @@ pub(in crate::server) struct Listed {
     pub(in crate::server) next: Option<Uuid>,
 }
 
+/// A session in memory, or one that is in the store alone.
+type InMemory = Result<Arc<Session>, Arc<Known>>;
+
 /// What a list shows of a session, beside what changes.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Summary {
@@ -291,7 +294,7 @@ impl Sessions {
         let all = self.all().clone();
         let known = lock(&self.known).clone();
         let steps = all.iter().filter(|session| !session.is_elsewhere());
-        let mut every: Vec<(f64, Uuid, Result<Arc<Session>, Arc<Known>>)> =
+        let mut every: Vec<(f64, Uuid, InMemory)> =
             steps.map(|session| (session.made_s, session.id, Ok(session.clone()))).collect();
         every.extend(known.into_iter().map(|known| {
             let awake = all.iter().find(|session| session.id == known.id);
