@@ -371,14 +371,16 @@ fn runs_of_poses_and_sockets_tell_their_errors() {
 
 /// The numbers of a text that stand before a unit, as they are written.
 fn measures<'a>(text: &'a str, unit: &str) -> Vec<&'a str> {
-    let ends = text
-        .match_indices(&format!(" {unit}"))
-        .filter(|(at, found)| !text[at + found.len()..].starts_with(|next: char| next.is_ascii_alphanumeric()));
+    let unit = format!(" {unit}");
+    let is_whole =
+        |(at, found): &(usize, &str)| !text[at + found.len()..].starts_with(|next: char| next.is_ascii_alphanumeric());
+    let ends = text.match_indices(&unit).filter(is_whole);
     let number = |(at, _): (usize, &str)| {
         let before = &text[..at];
         &before[before.rfind(|c: char| !(c.is_ascii_digit() || c == '.')).map_or(0, |start| start + 1)..]
     };
-    ends.map(number).filter(|number| !number.is_empty()).collect()
+    let numbers = ends.map(number).filter(|number| !number.is_empty());
+    numbers.collect()
 }
 
 /// All numbers below a value.

@@ -269,7 +269,7 @@ async fn a_large_refusal_is_read() {
 mod memory {
     use std::sync::Arc;
 
-    use futures_util::{StreamExt, future::join_all};
+    use futures_util::future::join_all;
     use tokio_tungstenite::client_async;
 
     use super::*;
@@ -305,11 +305,10 @@ mod memory {
         let downloads = (0..8).map(|_| {
             let (api, path) = (api.clone(), format!("{session}/recording.rrd"));
             tokio::spawn(async move {
-                let response = api.api.request(Method::GET, &path).send().await.expect("an answer");
+                let mut response = api.api.request(Method::GET, &path).send().await.expect("an answer");
                 let status = response.status();
-                let mut stream = response.bytes_stream();
                 let mut bytes = 0;
-                while let Some(Ok(piece)) = stream.next().await {
+                while let Ok(Some(piece)) = response.chunk().await {
                     bytes += piece.len();
                 }
                 (status, bytes)
