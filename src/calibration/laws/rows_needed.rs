@@ -56,7 +56,8 @@ struct Arm {
 }
 
 const MARKER: [f64; 3] = [0.03, 0.02, 0.05];
-const CAMERA: [f64; 3] = [2.5, 0.4, 0.8];
+/// Two cameras: what one sees leaves open how far away it is.
+const CAMERAS: [[f64; 3]; 2] = [[2.5, 0.4, 0.8], [-0.6, -2.4, 1.1]];
 
 impl Arm {
     fn new((file, base, tip): (&str, &'static str, &'static str), sensor: Sensor, rng: &mut ChaCha8Rng) -> Self {
@@ -82,9 +83,9 @@ impl Arm {
         self.truth.tip_at(configuration)
     }
 
-    /// The camera's axes: it looks at the base's origin from where it stands.
-    fn camera() -> Matrix3<f64> {
-        let forward = -Vector3::from(CAMERA).normalize();
+    /// A camera's axes: it looks at the base's origin from where it stands.
+    fn axes(camera: [f64; 3]) -> Matrix3<f64> {
+        let forward = -Vector3::from(camera).normalize();
         let right = forward.cross(&Vector3::z()).normalize();
         Matrix3::from_columns(&[right, forward.cross(&right), forward])
     }
@@ -94,7 +95,7 @@ impl Arm {
         let columns = match self.sensor {
             Sensor::Position => "marker_x,marker_y,marker_z",
             Sensor::Pose => "marker_x,marker_y,marker_z,marker_rx,marker_ry,marker_rz",
-            Sensor::Pixels => "cam_marker_u,cam_marker_v",
+            Sensor::Pixels => "cam0_marker_u,cam0_marker_v,cam1_marker_u,cam1_marker_v",
             Sensor::Distances => "d0,d1,d2,d3",
         };
         let mut text = format!("{},{columns}\n", self.names().join(","));
@@ -112,9 +113,11 @@ impl Arm {
                     numbers.extend((UnitQuaternion::from_scaled_axis(error) * tip.rotation).scaled_axis().iter());
                 }
                 Sensor::Pixels => {
-                    let at = Self::camera().transpose() * (seen - Vector3::from(CAMERA));
-                    numbers.push(noisy(SIGMA_PX, 960.0 + FOCAL_PX * at.x / at.z));
-                    numbers.push(noisy(SIGMA_PX, 540.0 + FOCAL_PX * at.y / at.z));
+                    for camera in CAMERAS {
+                        let at = Self::axes(camera).transpose() * (seen - Vector3::from(camera));
+                        numbers.push(noisy(SIGMA_PX, 960.0 + FOCAL_PX * at.x / at.z));
+                        numbers.push(noisy(SIGMA_PX, 540.0 + FOCAL_PX * at.y / at.z));
+                    }
                 }
                 Sensor::Distances => {
                     numbers.extend(ANCHORS.map(|anchor| noisy(SIGMA_M, (seen - Vector3::from(anchor)).norm())));
@@ -134,13 +137,14 @@ impl Arm {
                 "[[sensor]]\nchannel = \"pose\"\ntarget = \"marker\"\nsigma_m = 0.001\nsigma_deg = {}\n",
                 SIGMA_RAD.to_degrees()
             ),
-            Sensor::Pixels => {
-                let [x, y, z] = CAMERA;
-                format!(
-                    "[[camera]]\nname = \"cam\"\nat_m = [{x}, {y}, {z}]\nlooks_at_m = [0.0, 0.0, 0.0]\nsize_px = [1920.0, 1080.0]\nfocal_px = \
-                     [{FOCAL_PX:?}, {FOCAL_PX:?}]\n[[sensor]]\nchannel = \"pixels\"\ncamera = \"cam\"\ntarget = \"marker\"\nsigma_px = {SIGMA_PX:?}\n"
+            Sensor::Pixels => (0..CAMERAS.len()).fold(String::new(), |text, k| {
+                text + &format!(
+                    "[[camera]]\nname = \"cam{k}\"\nat_m = {:?}\nlooks_at_m = [0.0, 0.0, 0.0]\nsize_px = [1920.0, 1080.0]\nfocal_px = \
+                     [{FOCAL_PX:?}, {FOCAL_PX:?}]\n[[sensor]]\nchannel = \"pixels\"\ncamera = \"cam{k}\"\ntarget = \"marker\"\n\
+                     sigma_px = {SIGMA_PX:?}\n",
+                    CAMERAS[k]
                 )
-            }
+            }),
             Sensor::Distances => (0..ANCHORS.len()).fold(String::new(), |text, k| {
                 text + &format!(
                     "[[sensor]]\nchannel = \"distance\"\ntarget = \"marker\"\ncolumns = [\"d{k}\"]\nto_m = {:?}\nsigma_m = 0.001\n",
