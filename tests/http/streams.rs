@@ -110,9 +110,12 @@ impl Events {
         loop {
             if let Some((event, rest)) = self.text.split_once("\n\n") {
                 let line = |name: &str| event.lines().find_map(|line| line.strip_prefix(name)).map(str::trim);
-                let event = line("id:")
-                    .zip(line("data:"))
-                    .map(|(id, data)| (id.parse().expect("a step"), serde_json::from_str(data).expect("JSON")));
+                let event = line("id:").zip(line("data:")).map(|(id, data)| {
+                    (
+                        id.rsplit(':').next().and_then(|step| step.parse().ok()).expect("a step"),
+                        serde_json::from_str(data).expect("JSON"),
+                    )
+                });
                 self.text = rest.to_owned();
                 if event.is_some() {
                     return event;

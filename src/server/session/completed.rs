@@ -4,6 +4,7 @@
 use std::{
     fs::File,
     io::{self, BufWriter, Read, Seek, SeekFrom, Write},
+    path::Path,
     sync::{Arc, Mutex},
 };
 
@@ -13,7 +14,7 @@ use tokio::{sync::Mutex as AsyncMutex, task::spawn_blocking};
 
 use super::{Session, lock};
 use crate::{
-    recording::RecordingError,
+    recording::{LiveLog, RecordingError},
     server::{
         aside::{Jobs, Wanted},
         problem::{Kind, Problem},
@@ -23,13 +24,22 @@ use crate::{
 /// So much of it is read at a time.
 const PIECE_BYTES: usize = 256 << 10;
 
+/// A recording of so few bytes is put together in memory where the disk has no room.
+const MOST_IN_MEMORY: usize = 16 << 20;
+
 /// A complete recording.
 pub(in crate::server) struct Completed {
     /// How many parts of the recording are in it.
     parts: usize,
-    /// It has no name any more, and goes with its last reader.
-    file: Mutex<File>,
+    whole: Whole,
     pub(in crate::server) bytes: u64,
+}
+
+/// Where it is.
+enum Whole {
+    /// It has no name any more, and goes with its last reader.
+    File(Mutex<File>),
+    Memory(Bytes),
 }
 
 /// What was written last.
@@ -46,18 +56,9 @@ impl Session {
         // Before the next is written: two of them are needed by no new reader.
         *kept = None;
         let parts = live.len();
-        let written = jobs.done(move |wanted| -> Result<Completed, Problem> {
-            let file = match &folder {
-                Some(folder) => tempfile::tempfile_in(folder),
-                None => tempfile::tempfile(),
-            };
-            let mut writer = BufWriter::new(file.map_err(|error| unwritten(&error))?);
-            let while_wanted = WhileWanted { writer: &mut writer, wanted };
-            live.complete_to(while_wanted, parts).map_err(|error| unwritten_recording(&error))?;
-            writer.flush().map_err(|error| unwritten(&error))?;
-            let file = writer.into_inner().map_err(|error| unwritten(error.error()))?;
-            let bytes = file.metadata().map_err(|error| unwritten(&error))?.len();
-            Ok(Completed { parts, file: Mutex::new(file), bytes })
+        let written = jobs.done(move |wanted| match Completed::on_disk(&live, parts, folder.as_deref(), wanted) {
+            Err(_) if live.bytes() <= MOST_IN_MEMORY && !wanted.is_given_up() => Completed::in_memory(&live, parts),
+            outcome => outcome,
         });
         let completed = Arc::new(written.await?);
         *kept = Some(completed.clone());
@@ -66,6 +67,22 @@ impl Session {
 }
 
 impl Completed {
+    fn on_disk(live: &LiveLog, parts: usize, folder: Option<&Path>, wanted: &Wanted) -> Result<Self, Problem> {
+        let file = folder.map_or_else(tempfile::tempfile, tempfile::tempfile_in);
+        let mut writer = BufWriter::new(file.map_err(|error| unwritten(&error))?);
+        let while_wanted = WhileWanted { writer: &mut writer, wanted };
+        live.complete_to(while_wanted, parts).map_err(|error| unwritten_recording(&error))?;
+        let file = writer.into_inner().map_err(|error| unwritten(error.error()))?;
+        let bytes = file.metadata().map_err(|error| unwritten(&error))?.len();
+        Ok(Self { parts, whole: Whole::File(Mutex::new(file)), bytes })
+    }
+
+    fn in_memory(live: &LiveLog, parts: usize) -> Result<Self, Problem> {
+        let mut whole = Vec::new();
+        live.complete_to(&mut whole, parts).map_err(|error| unwritten_recording(&error))?;
+        Ok(Self { parts, bytes: whole.len() as u64, whole: Whole::Memory(whole.into()) })
+    }
+
     /// It, piece by piece.
     pub(in crate::server) fn body(self: Arc<Self>) -> Body {
         Body::from_stream(unfold((self, 0), |(completed, from)| async move {
@@ -81,8 +98,13 @@ impl Completed {
     }
 
     fn piece(&self, from: u64) -> io::Result<Bytes> {
-        let mut piece = vec![0; PIECE_BYTES.min((self.bytes - from) as usize)];
-        let mut file = lock(&self.file);
+        let length = PIECE_BYTES.min((self.bytes - from) as usize);
+        let file = match &self.whole {
+            Whole::File(file) => file,
+            Whole::Memory(whole) => return Ok(whole.slice(from as usize..from as usize + length)),
+        };
+        let mut piece = vec![0; length];
+        let mut file = lock(file);
         file.seek(SeekFrom::Start(from))?;
         file.read_exact(&mut piece)?;
         Ok(piece.into())

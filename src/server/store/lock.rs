@@ -46,13 +46,17 @@ impl Lock {
     }
 }
 
-/// A file of ours, made if need be, that nobody else on this machine may read. What is no file, as a pipe, would be waited for without
-/// end, and is refused.
-pub(super) fn open(path: &Path) -> io::Result<File> {
-    if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-        let what = format!("{} is no file; move it away", path.display());
-        return Err(io::Error::other(what));
+/// What is no file, as a pipe, would be waited for without end.
+pub(super) fn refuse_what_is_no_file(path: &Path) -> io::Result<()> {
+    match std::fs::metadata(path) {
+        Ok(found) if !found.is_file() => Err(io::Error::other(format!("{} is no file; move it away", path.display()))),
+        _ => Ok(()),
     }
+}
+
+/// A file of ours, made if need be, that nobody else on this machine may read.
+pub(super) fn open(path: &Path) -> io::Result<File> {
+    refuse_what_is_no_file(path)?;
     let mut options = OpenOptions::new();
     options.create(true).truncate(false).read(true).write(true);
     #[cfg(unix)]

@@ -111,6 +111,8 @@ impl Store {
 
     fn held(directory: &Path, lock: Lock) -> Result<Self, StoreError> {
         let path = directory.join(FILE);
+        let folder = |source| StoreError::Folder { path: directory.to_owned(), source };
+        lock::refuse_what_is_no_file(&path).map_err(folder)?;
         let damage = salvage::salvage(&path)?;
         let mut locks = vec![lock];
         // Elsewhere SQLite itself could not read what is locked.

@@ -130,10 +130,10 @@ fn later_versions_and_foreign_files_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     drop(Store::open(folder.path()).expect("a store"));
     let file = folder.path().join(FILE);
-    let later = Connection::open(&file).and_then(|file| file.pragma_update(None, "user_version", 3));
+    let later = Connection::open(&file).and_then(|file| file.pragma_update(None, "user_version", schema::KNOWN + 1));
     later.expect("set");
     let error = Store::open(folder.path()).err().expect("later");
-    assert!(matches!(error, StoreError::Newer { found: 3, known: 2, .. }), "{error}");
+    assert!(matches!(error, StoreError::Newer { found, known, .. } if found == known + 1), "{error}");
     std::fs::remove_file(&file).expect("removed");
     Connection::open(&file).and_then(|file| file.execute_batch("CREATE TABLE other (a)")).expect("another's");
     let error = Store::open(folder.path()).err().expect("foreign");
