@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use super::{
     ScenarioArguments, Seeds, Threads, designs,
-    output::{self, Failures, Written},
+    output::{self, Failures},
     part::{self, About, Shard},
     progress, steps_of,
 };
@@ -115,7 +115,7 @@ impl Outputs {
 }
 
 fn write_csv(comparison: &Comparison, path: &Path) -> Result<()> {
-    let (file, whole) = Written::create(path)?.parts();
+    let (file, whole) = output::create(path)?;
     comparison_csv(comparison, file)?;
     Ok(whole.commit()?)
 }

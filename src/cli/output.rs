@@ -32,22 +32,10 @@ pub fn cannot(path: &Path) -> String {
     format!("cannot write {}; what was there before is as it was", path.display())
 }
 
-/// A file that is written bit by bit, and is there once it is whole.
-pub struct Written {
-    pub file: BufWriter<File>,
-    whole: AtomicFile,
-}
-
-impl Written {
-    pub fn create(path: &Path) -> Result<Self> {
-        let (file, whole) = AtomicFile::create(path).with_context(|| cannot(path))?;
-        Ok(Self { file: BufWriter::new(file), whole })
-    }
-
-    /// Apart, for who keeps the writer to himself.
-    pub fn parts(self) -> (BufWriter<File>, AtomicFile) {
-        (self.file, self.whole)
-    }
+/// Begins a file that is written bit by bit, and has its name once it is committed.
+pub fn create(path: &Path) -> Result<(BufWriter<File>, AtomicFile)> {
+    let (file, whole) = AtomicFile::create(path).with_context(|| cannot(path))?;
+    Ok((BufWriter::new(file), whole))
 }
 
 /// What a command writes, by the options that name it. It is checked before any work is done.

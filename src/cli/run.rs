@@ -16,7 +16,7 @@ use body_schema::{
 
 use super::{
     ScenarioArguments, designs,
-    output::{self, Failures, Outputs, Written},
+    output::{self, Failures, Outputs},
     progress,
     signals::{Interrupted, Interruption},
     steps_of,
@@ -195,7 +195,7 @@ impl<'a> Files<'a> {
 
 impl StepsTable {
     fn begin(experiment: &Experiment, path: &Path) -> Result<Self> {
-        let (file, whole) = Written::create(path)?.parts();
+        let (file, whole) = output::create(path)?;
         let rows = StepsCsv::new(experiment.description(), file).with_context(|| output::cannot(path))?;
         Ok(Self { rows, whole })
     }
