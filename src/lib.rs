@@ -49,9 +49,10 @@
 //! | [`ask_tell`] | sessions with a robot elsewhere, which is asked to move and tells what it saw |
 //!
 //! These do no input or output, know no threads but those of the feature `parallel`, and build without default
-//! features for `wasm32-unknown-unknown`. With the feature `app` (on by default) come `recording` (Rerun and CSV
-//! files), `chart` (panels of curves for print, as SVG and PNG; private), `paper` (the paper's experiments beside its
-//! numbers, drawn as charts), `server` (HTTP and the page), `export` (the page without a server) and the command line.
+//! features for `wasm32-unknown-unknown`. With the feature `app` (on by default) come `atomic` (files that are written whole or
+//! not at all), `recording` (Rerun and CSV files), `chart` (panels of curves for print, as SVG and PNG; private), `paper` (the
+//! paper's experiments beside its numbers, drawn as charts), `server` (HTTP and the page), `export` (the page without a
+//! server) and the command line.
 //!
 //! # Notation, frames and units
 //!
@@ -82,6 +83,8 @@
 
 pub mod ask_tell;
 pub mod assembly;
+#[cfg(feature = "app")]
+pub mod atomic;
 pub mod calibration;
 #[cfg(feature = "app")]
 mod chart;

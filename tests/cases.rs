@@ -47,6 +47,11 @@ fn doubts(scenario: &Scenario, kind: DoubtKind) -> Vec<Doubt> {
     found.into_iter().filter(|doubt| doubt.kind == kind).collect()
 }
 
+/// The lines that a doubt is about.
+fn numbers(doubt: &Doubt) -> Vec<usize> {
+    doubt.lines.iter().map(|line| line.number).collect()
+}
+
 /// The first so many rows of a table.
 fn first_rows(text: &str, count: usize) -> String {
     text.lines().take(count + 1).map(|line| format!("{line}\n")).collect()
@@ -229,7 +234,7 @@ fn held_out_rows_that_repeat_training_rows_are_told() {
     };
     let listed = doubts(&valid(name, &rows("rows = [3, 41]")), DoubtKind::Leakage);
     let [leak] = listed.as_slice() else { panic!("{listed:?}") };
-    assert_eq!(leak.lines, [5, 43]);
+    assert_eq!(numbers(leak), [5, 43]);
     assert!(leak.evidence.contains("line 5 repeats line 2"), "{leak}");
     assert!(doubts(&valid(name, &rows("rows = [0, 1, 2, 3, 4, 5]")), DoubtKind::Leakage).is_empty(), "a whole posture");
     // A second file, one of whose rows repeats one.
@@ -259,8 +264,8 @@ fn held_out_rows_that_repeat_training_rows_are_told() {
     let scenario = Scenario::parse("cal.toml", &second("cal.toml", toml.replace("folds=5", "folds = 5")), &open);
     let found = doubts(&scenario.unwrap_or_else(|error| panic!("{error}")), DoubtKind::Leakage);
     let [leak] = found.as_slice() else { panic!("{found:?}") };
-    assert_eq!(leak.lines, [4]);
-    assert!(leak.evidence.contains("line 4 of the file that is held out repeats line 6"), "{leak}");
+    assert_eq!((numbers(leak), leak.lines[0].file.as_deref()), (vec![4], Some("later.csv")));
+    assert!(leak.evidence.contains("line 4 of later.csv repeats line 6 of data.csv"), "{leak}");
 }
 
 #[test]

@@ -1,10 +1,18 @@
 //! The command line as a user meets it.
 #![cfg(feature = "app")]
 
+#[path = "cli/bounds.rs"]
+mod bounds;
+#[path = "cli/closed.rs"]
+mod closed;
+#[path = "cli/inputs.rs"]
+mod inputs;
 #[path = "cli/interrupted.rs"]
 mod interrupted;
 #[path = "cli/merge.rs"]
 mod merge;
+#[path = "cli/whole.rs"]
+mod whole;
 
 use std::process::{Command, Output};
 
@@ -313,19 +321,23 @@ fn a_scenario_can_be_a_path_with_data_beside_it() {
 fn doubts_about_data_are_warnings_unless_strict() {
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("written");
-    let toml =
-        include_str!("../scenarios/tiago-mocap.toml").replace("\"x1\", \"y1\", \"z1\"", "\"x3\", \"y3\", \"z3\"");
-    write("my.toml", &toml);
-    write("tiago-mocap.csv", include_str!("doubts/tiago-late.csv"));
-    write("tiago-mocap-1504.csv", include_str!("../scenarios/tiago-mocap-1504.csv"));
+    let table = include_str!("../scenarios/positioner.csv");
+    let row = table.lines().nth(1).expect("a row");
+    write("my.toml", include_str!("../scenarios/positioner.toml"));
+    write("positioner.urdf", include_str!("../scenarios/positioner.urdf"));
+    write("positioner.csv", &format!("{table}{row}\n"));
     let path = folder.path().join("my.toml");
     let path = path.to_str().expect("a plain path");
     let output = body_schema(&["check", path]);
     let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && said.contains("warning: column `x4, y4, z4`: a copy of `x3, y3, z3`"), "{said}");
+    let line = table.lines().count() + 1;
+    assert!(
+        output.status.success() && said.contains(&format!("warning: line {line}: a copy of an earlier row")),
+        "{said}"
+    );
     let (code, message) = failure(&["check", path, "--strict"]);
-    assert!(code == 2 && message.contains("3 doubts about the data"), "{message}");
-    assert!(body_schema(&["check", "ur10-camera", "--strict"]).status.success());
+    assert!(code == 2 && message.contains("1 doubt about the data"), "{message}");
+    assert!(body_schema(&["check", "positioner", "--strict"]).status.success());
 }
 
 #[cfg(target_os = "linux")]

@@ -244,12 +244,31 @@ fn a_recorder_moves_between_threads() {
 fn what_was_flushed_survives_a_kill() {
     let (description, reports) = run("arm-6dof", 2);
     let file = path("killed.rrd");
-    let mut recorder = Recorder::new(&description, Target::file(&file)).unwrap();
+    let mut recorder = Recorder::new(&description, Target::default().and_file(&file)).unwrap();
     reports.iter().for_each(|report| recorder.log(report).unwrap());
     recorder.flush().unwrap();
     // As if the process ended here: no footer, no drop.
     std::mem::forget(recorder);
     check(&Reading::of(&fs::read(&file).unwrap()), &description, &reports);
+}
+
+#[test]
+fn a_file_has_its_name_once_it_is_finished() {
+    let (description, reports) = run("arm-6dof", 1);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a.rrd");
+    fs::write(&file, "before").unwrap();
+    let begun = || {
+        let mut recorder = Recorder::new(&description, Target::file(&file)).unwrap();
+        recorder.log(&reports[0]).and_then(|()| recorder.flush()).unwrap();
+        assert_eq!(fs::read(&file).unwrap(), b"before");
+        recorder
+    };
+    begun().discard();
+    assert_eq!(fs::read(&file).unwrap(), b"before");
+    begun().finish().unwrap();
+    check(&Reading::of(&fs::read(&file).unwrap()), &description, &reports[..1]);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is beside it");
 }
 
 #[test]

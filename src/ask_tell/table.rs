@@ -5,7 +5,7 @@ use toml::{Table, Value};
 use super::{ChannelShape, Session, Shape, channel::SOCKET};
 use crate::{
     experiment::Executed,
-    table::{Layout, Reading, Titles},
+    table::{Layout, Reading, Titles, Writer},
 };
 
 /// What the table is called.
@@ -56,7 +56,7 @@ impl Session {
 
     /// The same of these observations.
     pub(super) fn csv_of(&self, observations: &[Executed]) -> String {
-        let mut writer = csv::Writer::from_writer(Vec::new());
+        let mut writer = Writer::new(Vec::new());
         let names = &self.scenario().robot.names;
         let cells = self.cells();
         let sockets = &self.scenario().robot.sockets;
@@ -67,7 +67,7 @@ impl Session {
         titles.extend((!sockets.is_empty()).then_some(socket));
         titles.extend(names.iter().cloned().chain(cells.iter().flat_map(|cells| cells.titles.clone())));
         // Writing to memory does not fail, and every row is as long as the titles.
-        let _ = writer.write_record(&titles);
+        let _ = writer.write(&titles);
         for executed in observations {
             let held = executed.movement.socket.and_then(|socket| sockets.get(socket));
             let place = held.and_then(|socket| socket.place.clone()).unwrap_or_default();
@@ -81,7 +81,7 @@ impl Session {
                     None => row.extend(cells.titles.iter().map(|_| String::new())),
                 }
             }
-            let _ = writer.write_record(&row);
+            let _ = writer.write(&row);
         }
         writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
     }

@@ -10,7 +10,7 @@ use super::{
     verdict::Grounds,
 };
 use crate::{
-    doubts::{Doubt, DoubtKind, few_folds},
+    doubts::{Doubt, DoubtKind, Line, few_folds},
     most::middle,
     selection::Optimality,
 };
@@ -345,7 +345,10 @@ impl Case<'_> {
 
     /// The rows that are likelier outliers than not by the fit that learned from them, and `others`.
     fn outliers(&self, fit: &Fit, others: BTreeSet<usize>) -> Vec<Outlier> {
-        let told = |(row, probability): (usize, f64)| Outlier { row: row + 1, line: self.rows[row].line, probability };
+        let told = |(row, probability): (usize, f64)| {
+            let Line { file, number } = &self.rows[row].line;
+            Outlier { row: row + 1, file: file.as_deref().map(str::to_owned), line: *number, probability }
+        };
         let others = others.into_iter().map(|row| (row, 1.0));
         let mut outliers: Vec<Outlier> = fit.suspected().into_iter().chain(others).map(told).collect();
         outliers.sort_by_key(|outlier| outlier.row);
@@ -376,7 +379,8 @@ impl Case<'_> {
         all.sort_by_key(|(residual, ..)| (residual.row, residual.sensor));
         let reading = |(residual, held_out, fold): (Residual, bool, Option<usize>)| Reading {
             row: residual.row + 1,
-            line: self.rows[residual.row].line,
+            file: self.rows[residual.row].line.file.as_deref().map(str::to_owned),
+            line: self.rows[residual.row].line.number,
             sensor: self.sensor(residual.sensor),
             held_out,
             fold,

@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use crate::{
+    doubts::Line,
     model::{Block, ChainPrior, Layout, Names, State},
     scenario::{Described, HeldOutRule, Scenario, WorldSpec},
     sensing::{Loss, Observation, Occasion, Rig},
@@ -13,8 +14,8 @@ use super::{CalibrationError, Extra, Split};
 /// A row of the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// The line of the file, counted from 1.
-    pub line: usize,
+    /// Where it stands.
+    pub line: Line,
     /// Joint positions, rad or m.
     pub positions: Vec<f64>,
     /// What was measured.
@@ -62,7 +63,7 @@ impl<'a> Case<'a> {
             return Err(CalibrationError::Simulated { scenario: scenario.name.clone() });
         };
         let row = |index: usize| Row {
-            line: measurements.lines[index],
+            line: Line { file: measurements.files.get(index).cloned(), number: measurements.lines[index] },
             positions: measurements.configurations[index].clone(),
             observation: measurements.observations[index].clone(),
             socket: measurements.sockets.get(index).copied().flatten(),

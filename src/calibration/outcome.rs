@@ -162,10 +162,13 @@ pub struct GivesWay {
 }
 
 /// A row that is likelier an outlier than not.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outlier {
     /// Counted from 1.
     pub row: usize,
+    /// The file, where rows are from more than one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
     /// The line of the file.
     pub line: usize,
     /// The probability.
@@ -303,6 +306,9 @@ pub struct Choice {
 pub struct Reading {
     /// The row, counted from 1.
     pub row: usize,
+    /// The file, where rows are from more than one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
     /// The line of the file.
     pub line: usize,
     /// What was measured.

@@ -2,17 +2,24 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::Mutex,
+    sync::{Arc, Mutex},
 };
 
 use anyhow::{Context, Result};
 use body_schema::{
-    calibration::{self, Calibration, Case, Figures, File, Options, Progress, Report, Unit, report},
+    atomic::AtomicFolder,
+    calibration::{self, Calibration, Case, Figures, File, Options, Outlier, Progress, Report, Unit, report},
+    doubts::{Line, listed},
     recording,
 };
+use clap::builder::RangedU64ValueParser;
 use indicatif::ProgressBar;
 
-use super::{BadInput, load_scenario, output, progress};
+use super::{
+    BadInput, files_of, load_scenario,
+    output::{self, Failures, Outputs},
+    progress,
+};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -21,10 +28,10 @@ pub struct Arguments {
     file: String,
     /// Hold every row out once, in K folds, whatever the file holds out: fold f holds out rows f, f + K, …; rows of
     /// one posture stay together
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = RangedU64ValueParser::<usize>::new().range(0..=MOST_ROWS))]
     folds: Option<usize>,
     /// Also choose the N most informative training rows one by one, and set them beside 20 random orders
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(0..=MOST_ROWS))]
     active: Option<usize>,
     /// Write the files to DIR [default: NAME-calibration; with `--json -` none]
     #[arg(long, value_name = "DIR")]
@@ -33,6 +40,9 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
+
+/// No table has more rows.
+const MOST_ROWS: u64 = body_schema::table::MOST_ROWS as u64;
 
 /// One bar for each stage.
 #[derive(Default)]
@@ -70,7 +80,7 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
     let case = Case::new(&scenario)?;
     let doubts = scenario.examine().map(|examination| examination.doubts).unwrap_or_default();
     for doubt in &doubts {
-        eprintln!("warning: {doubt}");
+        output::tell(format_args!("warning: {doubt}"));
     }
     let to_stdout = arguments.json.as_deref().is_some_and(output::is_stdout);
     let folder = match &arguments.out {
@@ -80,66 +90,49 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
     };
     // Before anybody waits for what cannot be written.
     folder.as_deref().map_or(Ok(()), refuse_other)?;
+    let outputs = Outputs::default().file("--json", arguments.json.as_deref());
+    outputs.folder("--out", folder.as_deref()).check(&files_of(&arguments.file, &scenario))?;
     let bars = Bars::default();
     let options = Options { folds: arguments.folds, active: arguments.active };
     let found = calibration::calibrate(&case, &options, &bars);
     bars.finish();
     let found = found?;
-    let mut written = Vec::new();
+    let (mut written, mut failures) = (Vec::new(), Failures::default());
     if let Some(folder) = &folder {
-        written = write(folder, &found, &case)?;
+        match write(folder, &found, &case) {
+            Ok(told) => written = told,
+            Err(error) => failures.keep(Err(error)),
+        }
     }
     if let Some(path) = &arguments.json {
-        output::write_json(path, &found.report)?;
+        match output::write_json(path, &found.report) {
+            Ok(()) => written.push(path.clone()),
+            Err(error) => failures.keep(Err(error)),
+        }
     }
-    if to_stdout {
-        return Ok(());
+    if !to_stdout {
+        summarise(&found.report)?;
+        for path in written {
+            output::say(format!("wrote {}", path.display()))?;
+        }
     }
-    summarise(&found.report)?;
-    for path in written.iter().chain(&arguments.json) {
-        output::say(format!("wrote {}", path.display()))?;
-    }
-    Ok(())
+    failures.end()
 }
 
 /// Writes all files into a folder, and tells those that lie in it. They are written aside, and the folder of an earlier calibration is
 /// exchanged for them, so that nothing of it is left, and nothing is lost where writing fails.
 fn write(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<PathBuf>> {
     refuse_other(folder)?;
-    let name = folder
-        .file_name()
-        .with_context(|| format!("{} is no name for a folder; name one with --out", folder.display()))?;
-    let beside = |end: &str| {
-        let mut hidden = std::ffi::OsString::from(".");
-        hidden.push(name);
-        hidden.push(format!(".{end}-{}", std::process::id()));
-        folder.with_file_name(hidden)
+    let cannot = || {
+        let folder = folder.display();
+        format!(
+            "cannot write {folder}; what was there before is as it was; name a folder that may be written to with --out"
+        )
     };
-    let (aside, before) = (beside("new"), beside("old"));
-    let written = write_into(&aside, found, case).and_then(|told| {
-        let exchange = || -> std::io::Result<()> {
-            let is_there = folder.exists();
-            if is_there {
-                std::fs::rename(folder, &before)?;
-            }
-            if let Err(error) = std::fs::rename(&aside, folder) {
-                if is_there {
-                    std::fs::rename(&before, folder)?;
-                }
-                return Err(error);
-            }
-            if is_there { std::fs::remove_dir_all(&before) } else { Ok(()) }
-        };
-        exchange().with_context(|| {
-            format!("cannot write {}; name a folder that may be written to with --out", folder.display())
-        })?;
-        Ok(told.into_iter().map(|file| folder.join(file)).collect())
-    });
-    if written.is_err() {
-        // What was written aside is of no use; that it cannot be removed is no reason to say something else.
-        let _ = std::fs::remove_dir_all(&aside);
-    }
-    written
+    let aside = AtomicFolder::beside(folder).with_context(cannot)?;
+    let told = write_into(aside.path(), found, case).with_context(cannot)?;
+    aside.replace(folder).with_context(cannot)?;
+    Ok(told.into_iter().map(|file| folder.join(file)).collect())
 }
 
 /// Whether a name is that of a file that a calibration writes.
@@ -158,6 +151,9 @@ fn is_ours(name: &str) -> bool {
 
 /// Refuses a folder that holds what no calibration wrote.
 fn refuse_other(folder: &Path) -> Result<()> {
+    if folder.file_name().is_none() {
+        return Err(BadInput(format!("{} is no name of a folder; name one with --out", folder.display())).into());
+    }
     let Ok(entries) = std::fs::read_dir(folder) else {
         return match folder.exists() {
             true => Err(BadInput(format!("{} is no folder; name another with --out", folder.display())).into()),
@@ -180,13 +176,8 @@ fn write_into(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec
     let mut told = Vec::new();
     for File { path, text } in found.files(case)?.into_iter().chain(report::files(found, case)) {
         let place = folder.join(&path);
-        let parent = place.parent().unwrap_or(folder);
-        std::fs::create_dir_all(parent).with_context(|| {
-            format!("cannot create {}; name a folder that may be written to with --out", parent.display())
-        })?;
-        std::fs::write(&place, text).with_context(|| {
-            format!("cannot write {}; name a folder that may be written to with --out", place.display())
-        })?;
+        std::fs::create_dir_all(place.parent().unwrap_or(folder))?;
+        std::fs::write(&place, text).context(path.clone())?;
         if !path.contains('/') && !path.ends_with(".svg") {
             told.push(path);
         }
@@ -225,13 +216,9 @@ fn summarise(report: &Report) -> Result<()> {
         output::say(said)?;
     }
     if !report.outliers.is_empty() {
-        let lines: Vec<String> = report.outliers.iter().take(8).map(|outlier| outlier.line.to_string()).collect();
-        let more = if report.outliers.len() > lines.len() { ", …" } else { "" };
-        output::say(format!(
-            "{} rows are likelier outliers than not: lines {}{more}",
-            report.outliers.len(),
-            lines.join(", ")
-        ))?;
+        let line = |it: &Outlier| Line { file: it.file.as_deref().map(Arc::from), number: it.line };
+        let lines: Vec<Line> = report.outliers.iter().map(line).collect();
+        output::say(format!("{} rows are likelier outliers than not: {}", lines.len(), listed(&lines)))?;
     }
     output::say(&report.more_rows.said)
 }

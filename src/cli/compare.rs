@@ -16,7 +16,8 @@ use comfy_table::Table;
 use rayon::prelude::*;
 
 use super::{
-    ScenarioArguments, Seeds, Threads, designs, output,
+    ScenarioArguments, Seeds, Threads, designs,
+    output::{self, Failures},
     part::{self, About, Shard},
     progress, steps_of,
 };
@@ -29,7 +30,7 @@ pub struct Arguments {
     #[arg(long, default_value = "20", value_name = "SEEDS")]
     seeds: Seeds,
     /// Movements of every run [default: the scenario's]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = super::steps)]
     steps: Option<u64>,
     #[command(flatten)]
     outputs: Outputs,
@@ -62,13 +63,13 @@ pub struct Outputs {
 pub fn compare(arguments: &Arguments) -> Result<()> {
     let (scenario, learners) = arguments.scenario.load()?;
     let steps = steps_of(&scenario, arguments.steps)?;
+    arguments.outputs.check(arguments.part.as_deref(), &arguments.scenario.files(&scenario))?;
     if let Some((shard, path)) = arguments.shard.zip(arguments.part.as_deref()) {
         return one_part(arguments, (&scenario, learners), steps, (shard, path));
     }
     if arguments.limits {
         designs::check(&scenario)?;
     }
-    arguments.outputs.check()?;
     let bar = progress::bar(
         arguments.seeds.count() * steps,
         &format!("{} × {} seeds", scenario.name, arguments.seeds.count()),
@@ -86,19 +87,20 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
 }
 
 impl Outputs {
-    /// That no two go to one file.
-    pub fn check(&self) -> Result<()> {
-        output::distinct([("--json", &self.json), ("--csv", &self.csv)])
+    /// That they, and the part that is written, can be written, and write over nothing that is read.
+    pub fn check(&self, part: Option<&Path>, inputs: &[PathBuf]) -> Result<()> {
+        let outputs = output::Outputs::default().file("--json", self.json.as_deref());
+        outputs.file("--csv", self.csv.as_deref()).file("--part", part).check(inputs)
     }
 
     /// Writes what is wanted, and says the rest.
     pub fn tell(&self, comparison: &Comparison) -> Result<()> {
+        let mut failures = Failures::default();
         if let Some(path) = &self.csv {
-            comparison_csv(comparison, output::create(path)?)
-                .with_context(|| format!("cannot write {}", path.display()))?;
+            failures.keep(write_csv(comparison, path).with_context(|| output::cannot(path)));
         }
         if let Some(path) = &self.json {
-            output::write_json(path, comparison)?;
+            failures.keep(output::write_json(path, comparison));
         }
         if !self.json.as_deref().is_some_and(output::is_stdout) {
             let Comparison { scenario, steps, learners, .. } = comparison;
@@ -108,8 +110,14 @@ impl Outputs {
             let efficiencies = learners.iter().map(|learner| (learner.name.as_str(), learner.efficiency));
             designs::say(comparison.movements_by_counting, &comparison.best_designs, efficiencies)?;
         }
-        Ok(())
+        failures.end()
     }
+}
+
+fn write_csv(comparison: &Comparison, path: &Path) -> Result<()> {
+    let (file, whole) = output::create(path)?;
+    comparison_csv(comparison, file)?;
+    Ok(whole.commit()?)
 }
 
 /// Runs one part of the seeds, and writes each run as it ends.

@@ -11,7 +11,11 @@ use body_schema::{
 };
 use uuid::Uuid;
 
-use super::{BadInput, load_scenario, no_person, output, progress, serve};
+use super::{
+    BadInput, files_of, load_scenario, no_person,
+    output::{self, Outputs},
+    progress, serve,
+};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -34,7 +38,7 @@ pub struct Arguments {
     #[arg(long = "seed", value_name = "SEEDS", value_delimiter = ',', default_value = "1")]
     seeds: Vec<SeedRange>,
     /// Movements of every run, at most 1000 [default: 100, after the change where the body changes]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = super::steps)]
     steps: Option<u64>,
     /// Write into a folder that holds other files
     #[arg(long)]
@@ -103,6 +107,10 @@ pub fn export(arguments: &Arguments) -> Result<()> {
     if names.len() < plans.len() {
         return Err(BadInput("a scenario is named twice, or two have one name; name each once".to_owned()).into());
     }
+    let named = arguments.scenarios.iter().zip(&scenarios);
+    let mut inputs: Vec<PathBuf> = named.flat_map(|(name, scenario)| files_of(name, scenario)).collect();
+    inputs.extend(data_dir(arguments)?.into_iter().chain(arguments.panel_dir.clone()));
+    Outputs::default().folder("--out", Some(&arguments.out)).check(&inputs)?;
     let export = Export {
         plans,
         seeds: seeds.into_iter().collect(),
@@ -117,12 +125,15 @@ pub fn export(arguments: &Arguments) -> Result<()> {
     output::say(format!("any static host serves it; here: python3 -m http.server -d {out}"))
 }
 
+/// Where sessions are read, if any are.
+fn data_dir(arguments: &Arguments) -> Result<Option<PathBuf>> {
+    let folder = || arguments.data_dir.clone().map_or_else(serve::usual_data_dir, Ok);
+    (!arguments.sessions.is_empty()).then(folder).transpose()
+}
+
 /// The stored sessions that are asked for.
 fn sessions(arguments: &Arguments) -> Result<Vec<Session>> {
-    if arguments.sessions.is_empty() {
-        return Ok(Vec::new());
-    }
-    let folder = arguments.data_dir.clone().map_or_else(serve::usual_data_dir, Ok)?;
+    let Some(folder) = data_dir(arguments)? else { return Ok(Vec::new()) };
     let mend = || format!("no sessions can be read in {}; name the server's folder with --data-dir", folder.display());
     let store = Store::read(&folder).with_context(mend)?;
     let session = |id: &Uuid| {

@@ -3,9 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use body_schema::calibration::{Sources, begin};
+use body_schema::{
+    atomic,
+    calibration::{Sources, begin},
+};
 
-use super::{BadInput, input::read_text, output};
+use super::{
+    BadInput,
+    input::read_data,
+    millimetres,
+    output::{self, Outputs},
+};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -31,11 +39,12 @@ pub struct Arguments {
 
 pub fn init(arguments: &Arguments) -> Result<()> {
     let read = |what: &str, path: &Path| {
-        read_text(path).map_err(|error| BadInput(format!("the {what} {} {error}", path.display())))
+        read_data(path).map_err(|error| BadInput(format!("the {what} {} {error}", path.display())))
     };
     let (urdf, table) = (read("URDF", &arguments.urdf)?, read("table", &arguments.csv)?);
     let out = arguments.out.clone().unwrap_or_else(|| arguments.csv.with_extension("toml"));
     let to_stdout = output::is_stdout(&out);
+    Outputs::default().file("--out", Some(&out)).check(&[arguments.urdf.clone(), arguments.csv.clone()])?;
     if !to_stdout && out.exists() {
         return Err(BadInput(format!(
             "{} is there already; remove it, or name another file with --out",
@@ -58,17 +67,12 @@ pub fn init(arguments: &Arguments) -> Result<()> {
     if to_stdout {
         return output::say(begun.text.trim_end());
     }
-    std::fs::write(&out, &begun.text).with_context(|| format!("cannot write {}", out.display()))?;
+    let written = atomic::write(&out, begun.text.as_bytes()).with_context(|| format!("cannot write {}", out.display()));
     for guess in &begun.guesses {
         output::say(guess)?;
     }
+    written?;
     output::say(format!("wrote {}; look it over, then: body-schema calibrate {}", out.display(), out.display()))
-}
-
-/// A distance that two sockets can have.
-fn millimetres(text: &str) -> Result<f64, String> {
-    let mm = text.parse::<f64>().ok().filter(|mm| *mm > 0.0 && mm.is_finite());
-    mm.ok_or_else(|| "a number of millimetres above 0 is needed, as 50".to_owned())
 }
 
 /// What the calibration is called: letters, digits and what else a name may have.
@@ -76,7 +80,8 @@ fn name(file: &Path) -> String {
     let stem = file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let name: String =
         stem.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
-    if name.is_empty() { "robot".to_owned() } else { name }
+    let name = name.trim_start_matches(['.', '-']);
+    if name.is_empty() { "robot".to_owned() } else { name.to_owned() }
 }
 
 /// How a file is named from another's folder: by its name where it lies there, else by its whole path.

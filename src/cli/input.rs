@@ -14,6 +14,9 @@ use body_schema::{
 
 use super::BadInput;
 
+/// A scenario file, or a description, is no longer, in bytes: neither is a table.
+const MOST_TEXT: u64 = 16 << 20;
+
 /// Reads the text of a scenario, as [`Scenario::parse`] does.
 type Parse = fn(&str, &str, &dyn Fn(&str) -> Result<String, String>) -> Result<Scenario, ScenarioError>;
 
@@ -47,17 +50,39 @@ fn load(name: &str, parse: Parse) -> Result<Scenario> {
     if !looks_like_a_path {
         return Ok(builtin(name)?);
     }
-    let text = read_text(&path).map_err(|error| BadInput(format!("the scenario {} {error}", path.display())))?;
+    let text =
+        read_text(&path, MOST_TEXT).map_err(|error| BadInput(format!("the scenario {} {error}", path.display())))?;
     let folder = path.parent().map(PathBuf::from).unwrap_or_default();
-    Ok(parse(name, &text, &|file| read_text(&folder.join(file)))?)
+    Ok(parse(name, &text, &|file| read_data(&folder.join(file)))?)
 }
 
-/// The text of a file. An error continues a sentence that begins with the file's name. What has no end, or is no text, is
-/// refused as soon as that is seen.
-pub(super) fn read_text(path: &Path) -> Result<String, String> {
+/// The files that a scenario was read from: none of a built-in one.
+pub fn files_of(name: &str, scenario: &Scenario) -> Vec<PathBuf> {
+    if BUILTIN.iter().any(|builtin| builtin.name == name) {
+        return Vec::new();
+    }
+    let path = PathBuf::from(name);
+    let folder = path.parent().map(PathBuf::from).unwrap_or_default();
+    scenario.data.iter().map(|(file, _)| folder.join(file)).chain([path.clone()]).collect()
+}
+
+/// The text of a table, or of a robot's description, by how the file is called.
+pub(super) fn read_data(path: &Path) -> Result<String, String> {
+    let is_description =
+        path.extension().is_some_and(|end| ["urdf", "xml", "xacro"].iter().any(|it| end.eq_ignore_ascii_case(it)));
+    read_text(path, if is_description { MOST_TEXT } else { MOST_BYTES })
+}
+
+/// The text of a file of so many bytes at most. An error continues a sentence that begins with the file's name. What has no end, or
+/// is no text, is refused as soon as that is seen.
+pub(super) fn read_text(path: &Path, most: u64) -> Result<String, String> {
     let file = File::open(path).map_err(|error| format!("cannot be read: {error}"))?;
+    let long = file.metadata().map(|found| found.len()).ok().filter(|long| *long > most);
+    if let Some(long) = long {
+        return Err(format!("has {} MiB, and {} MiB at most are read", long.div_ceil(1 << 20), most >> 20));
+    }
     let mut bytes = Vec::new();
-    Guard::new(file, MOST_BYTES).read_to_end(&mut bytes).map_err(|error| match error.kind() {
+    Guard::new(file, most).read_to_end(&mut bytes).map_err(|error| match error.kind() {
         ErrorKind::InvalidData => error.to_string(),
         _ => format!("cannot be read: {error}"),
     })?;
@@ -75,11 +100,19 @@ mod tests {
         let path = folder.path().join("data.csv");
         let error = |bytes: &[u8]| {
             std::fs::write(&path, bytes).expect("written");
-            read_text(&path).expect_err("no text")
+            read_text(&path, 100).expect_err("no text")
         };
         assert_eq!(error(b"x,y\n\x80"), "is not text in UTF-8: its byte 5 is not");
         assert_eq!(error(b"\xff\xfex\0"), "is text in UTF-16; save it in UTF-8");
         assert_eq!(error(b"x,y\n1,\0"), "is not text: its byte 7 is 0");
-        assert!(read_text(&folder.path().join("none")).expect_err("no file").starts_with("cannot be read: "));
+        assert!(read_text(&folder.path().join("none"), 1).expect_err("no file").starts_with("cannot be read: "));
+    }
+
+    #[test]
+    fn what_is_too_long_is_not_read() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("long.urdf");
+        File::create(&path).and_then(|file| file.set_len(MOST_TEXT + 1)).expect("a file with a hole");
+        assert_eq!(read_data(&path).expect_err("long"), "has 17 MiB, and 16 MiB at most are read");
     }
 }

@@ -1,54 +1,55 @@
 //! How much a server takes on, as arguments.
 
-use std::{num::NonZeroUsize, time::Duration};
+use std::time::Duration;
 
 use body_schema::server::Limits;
+use clap::builder::RangedU64ValueParser;
 
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Limits")]
 pub struct LimitArguments {
     /// Connections; never more than half of the descriptors that the process may open [default: 512]
-    #[arg(long, value_name = "N")]
-    max_connections: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = count())]
+    max_connections: Option<usize>,
     /// Streams that follow one session: events, growing recordings, WebSockets [default: 64]
-    #[arg(long, value_name = "N")]
-    max_streams_per_session: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = count())]
+    max_streams_per_session: Option<usize>,
     /// Sessions in memory, and as many again with robots elsewhere [default: 32]
-    #[arg(long, value_name = "N")]
-    max_sessions: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = count())]
+    max_sessions: Option<usize>,
     /// Sessions with robots elsewhere that are kept [default: 10000]
-    #[arg(long, value_name = "N")]
-    max_stored_sessions: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = count())]
+    max_stored_sessions: Option<usize>,
     /// Size of the file in which they are kept, MiB [default: 8192]
-    #[arg(long, value_name = "MIB")]
-    max_stored: Option<NonZeroUsize>,
+    #[arg(long, value_name = "MIB", value_parser = mebibytes())]
+    max_stored: Option<usize>,
     /// Size of all recordings that are kept as files together, MiB [default: 32768]
-    #[arg(long, value_name = "MIB")]
-    max_recordings: Option<NonZeroUsize>,
+    #[arg(long, value_name = "MIB", value_parser = mebibytes())]
+    max_recordings: Option<usize>,
     /// Joints that move of a robot elsewhere, never more than 40 [default: 40]
-    #[arg(long, value_name = "N")]
-    max_joints: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = count())]
+    max_joints: Option<usize>,
     /// Targets of a robot elsewhere, never more than 16 [default: 16]
-    #[arg(long, value_name = "N")]
-    max_targets: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = count())]
+    max_targets: Option<usize>,
     /// Evaluations of the criterion for each movement of a robot elsewhere, never more than 100000 [default: 100000]
-    #[arg(long, value_name = "N")]
-    max_evaluations: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = count())]
+    max_evaluations: Option<usize>,
     /// Steps of a session [default: 100000]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = steps())]
     max_steps: Option<u64>,
     /// Steps of one request [default: 1000]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = steps())]
     max_steps_per_request: Option<u64>,
     /// Memory for reports and recordings of all sessions, MiB [default: 2048]
-    #[arg(long, value_name = "MIB")]
-    max_memory: Option<NonZeroUsize>,
+    #[arg(long, value_name = "MIB", value_parser = mebibytes())]
+    max_memory: Option<usize>,
     /// Body of a request, KiB [default: 64]
-    #[arg(long, value_name = "KIB")]
-    max_body: Option<NonZeroUsize>,
+    #[arg(long, value_name = "KIB", value_parser = kibibytes())]
+    max_body: Option<usize>,
     /// Head of a request, KiB [default: 32]
-    #[arg(long, value_name = "KIB")]
-    max_header: Option<NonZeroUsize>,
+    #[arg(long, value_name = "KIB", value_parser = kibibytes())]
+    max_header: Option<usize>,
     /// Seconds that the head of a request may take to come [default: 10]
     #[arg(long, value_name = "S", value_parser = seconds)]
     header_timeout: Option<Duration>,
@@ -69,13 +70,11 @@ pub struct LimitArguments {
 impl LimitArguments {
     pub fn limits(&self) -> Limits {
         let usual = Limits::default();
-        let count = |given: Option<NonZeroUsize>, usual: usize| given.map_or(usual, NonZeroUsize::get);
-        let size = |given: Option<NonZeroUsize>, unit: usize, usual: usize| {
-            given.map_or(usual, |given| given.get().saturating_mul(unit))
-        };
-        let bytes = |given: Option<NonZeroUsize>, usual: u64| {
-            given.map_or(usual, |given| (given.get() as u64).saturating_mul(1 << 20))
-        };
+        let count = |given: Option<usize>, usual: usize| given.unwrap_or(usual);
+        let size =
+            |given: Option<usize>, unit: usize, usual: usize| given.map_or(usual, |given| given.saturating_mul(unit));
+        let bytes =
+            |given: Option<usize>, usual: u64| given.map_or(usual, |given| (given as u64).saturating_mul(1 << 20));
         Limits {
             connections: count(self.max_connections, usual.connections),
             streams_per_session: count(self.max_streams_per_session, usual.streams_per_session),
@@ -99,6 +98,26 @@ impl LimitArguments {
             ..usual
         }
     }
+}
+
+/// More than a machine can have, of whatever is counted: a slip of the finger.
+fn count() -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(1..=1_000_000)
+}
+
+/// 16 TiB at most.
+fn mebibytes() -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(1..=1 << 24)
+}
+
+/// 1 GiB at most: it is held in memory.
+fn kibibytes() -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(1..=1 << 20)
+}
+
+/// More than anybody waits for.
+fn steps() -> RangedU64ValueParser {
+    RangedU64ValueParser::new().range(1..=1_000_000_000)
 }
 
 /// As long as a day at most: more is meant as something else.
@@ -138,6 +157,9 @@ mod tests {
             ("--max-connections", "0"),
             ("--max-steps", "0"),
             ("--max-body", "-1"),
+            ("--max-sessions", "18446744073709551615"),
+            ("--max-memory", "18446744073709551615"),
+            ("--max-steps", "1000000001"),
             ("--idle-timeout", "0"),
             ("--idle-timeout", "nan"),
             ("--write-timeout", "1e300"),

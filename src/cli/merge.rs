@@ -16,6 +16,6 @@ pub struct Arguments {
 }
 
 pub fn merge(arguments: &Arguments) -> Result<()> {
-    arguments.outputs.check()?;
+    arguments.outputs.check(None, &arguments.parts)?;
     arguments.outputs.tell(&part::merged(&arguments.parts)?)
 }

@@ -23,7 +23,7 @@ mod signals;
 mod sweep;
 mod until;
 
-use std::sync::LazyLock;
+use std::{path::PathBuf, sync::LazyLock};
 
 use anyhow::{Context, Result};
 use body_schema::{
@@ -35,7 +35,7 @@ use body_schema::{
 };
 use clap::{Parser, Subcommand};
 
-use input::load_scenario;
+use input::{files_of, load_scenario};
 use seeds::Seeds;
 
 /// The version with the commit that it was built from, where that is known, and the version of Rerun whose recordings it writes.
@@ -58,7 +58,7 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Open the explorer: a web page and its HTTP interface
-    Serve(serve::Arguments),
+    Serve(Box<serve::Arguments>),
     /// Run the learners of a scenario once, and keep what you want of it
     Run(run::Arguments),
     /// Run the learners of a scenario over many seeds, and compare them
@@ -78,6 +78,7 @@ enum Command {
     /// Write the page with recorded runs to a folder that any static host serves
     Export(export::Arguments),
     /// Mend what a crash left of sessions that a server keeps, or of a recording
+    #[command(long_about = repair::ABOUT)]
     Repair(repair::Arguments),
     /// List the built-in scenarios
     Scenarios(scenarios::ListArguments),
@@ -106,6 +107,25 @@ impl ScenarioArguments {
         no_person(&chosen)?;
         Ok((scenario, learners))
     }
+
+    /// The files that it was read from.
+    fn files(&self, scenario: &Scenario) -> Vec<PathBuf> {
+        files_of(&self.scenario, scenario)
+    }
+}
+
+/// How many movements: more than so many nobody waits for.
+fn steps(text: &str) -> Result<u64, String> {
+    const MOST: u64 = 1_000_000_000;
+    let steps = text.parse().ok().filter(|steps| *steps <= MOST);
+    steps.ok_or_else(|| format!("write a number of movements from 0 to {MOST}"))
+}
+
+/// A length that robots have to do with.
+fn millimetres(text: &str) -> Result<f64, String> {
+    const MOST: f64 = 1e6;
+    let mm = text.parse::<f64>().ok().filter(|mm| *mm > 0.0 && *mm <= MOST);
+    mm.ok_or_else(|| format!("a number of millimetres above 0 is needed, at most {MOST}, as 50"))
 }
 
 /// Refuses learners for which a person chooses: on the command line nobody does.
@@ -122,6 +142,10 @@ fn no_person(learners: &[LearnerSpec]) -> Result<()> {
 
 /// Carries out a command.
 pub fn run(arguments: Arguments) -> Result<()> {
+    // These two bring what is under way to a good end.
+    if !matches!(arguments.command, None | Some(Command::Serve(_) | Command::Run(_))) {
+        signals::end_at_once()?;
+    }
     match arguments.command {
         None => serve::serve(&serve::Arguments::default()),
         Some(Command::Serve(arguments)) => serve::serve(&arguments),
@@ -226,6 +250,25 @@ mod tests {
     fn the_arguments_of_all_commands_go_together() {
         use clap::CommandFactory;
         Arguments::command().debug_assert();
+    }
+
+    /// Numbers are multiplied, and room is made for them.
+    #[test]
+    fn every_number_has_an_end() {
+        use clap::{CommandFactory, Parser};
+        const GREAT: &str = "18446744073709551615";
+        for command in Arguments::command().get_subcommands() {
+            for option in command.get_arguments() {
+                let name = option.get_value_names().and_then(|names| names.first()).map_or("", |name| name.as_str());
+                if !["N", "K", "MIB", "KIB", "S", "MM"].contains(&name) {
+                    continue;
+                }
+                let option = format!("--{}", option.get_long().expect("an option"));
+                let error = Arguments::try_parse_from(["body-schema", command.get_name(), &option, GREAT]);
+                let error = error.map_err(|error| error.to_string()).expect_err(&option);
+                assert!(error.contains(&option) && error.contains(GREAT), "{}: {error}", command.get_name());
+            }
+        }
     }
 
     #[test]

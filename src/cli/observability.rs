@@ -5,7 +5,11 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use body_schema::design::observability::{ErrorPoint, IndexTable, Observability};
 
-use super::{BadInput, input::load_robot, output, progress};
+use super::{
+    input::{files_of, load_robot},
+    output::{self, Failures, Outputs},
+    progress,
+};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -16,7 +20,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=1000))]
     postures: u16,
     /// The error of predictions that is wanted, millimetres [default: the file's `[settled]`]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = super::millimetres)]
     accuracy: Option<f64>,
     /// Write the outcome as JSON to FILE, or to standard output for `-`
     #[arg(long, value_name = "FILE")]
@@ -26,27 +30,22 @@ pub struct Arguments {
 pub fn observability(arguments: &Arguments) -> Result<()> {
     let scenario = load_robot(&arguments.file)?;
     scenario.check_prior()?;
-    let wanted_m = match arguments.accuracy {
-        Some(mm) if mm > 0.0 && mm.is_finite() => mm * 1e-3,
-        Some(mm) => {
-            return Err(
-                BadInput(format!("--accuracy {mm} is no accuracy; write a number above 0, in millimetres")).into()
-            );
-        }
-        None => scenario.settled_below_m,
-    };
+    Outputs::default().file("--json", arguments.json.as_deref()).check(&files_of(&arguments.file, &scenario))?;
+    let wanted_m = arguments.accuracy.map_or(scenario.settled_below_m, |mm| mm * 1e-3);
     let (prospect, postures) = (scenario.prospect(), usize::from(arguments.postures));
     let bar = progress::bar(prospect.steps(postures) as u64, "postures");
     let found = prospect.observability(postures, wanted_m, &|| bar.inc(1));
     bar.finish_and_clear();
     let found = found.with_context(|| format!("cannot choose postures for scenario `{}`", scenario.name))?;
+    let mut failures = Failures::default();
     if let Some(path) = &arguments.json {
-        output::write_json(path, &found)?;
+        failures.keep(output::write_json(path, &found));
         if output::is_stdout(path) {
-            return Ok(());
+            return failures.end();
         }
     }
-    summarise(&found)
+    summarise(&found)?;
+    failures.end()
 }
 
 fn summarise(found: &Observability) -> Result<()> {

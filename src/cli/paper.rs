@@ -6,7 +6,11 @@ use anyhow::Result;
 use body_schema::paper::{self, Agreement, EXPERIMENTS, Ending, PaperExperiment, Plan, Progress};
 use indicatif::ProgressBar;
 
-use super::{Threads, output, progress};
+use super::{
+    Threads,
+    output::{self, Failures, Outputs},
+    progress,
+};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -62,12 +66,15 @@ pub fn paper(arguments: &Arguments) -> Result<()> {
         only: arguments.only.clone(),
         out: arguments.out.clone().unwrap_or_else(|| paper::default_folder(arguments.quick)),
     };
+    let outputs = Outputs::default().file("--json", arguments.json.as_deref());
+    outputs.folder("--out", Some(&plan.out)).check(&[])?;
     let report = arguments.threads.run(|| Ok(paper::run(&plan, &Bars(Mutex::new(None)))?))?;
+    let mut failures = Failures::default();
     if let Some(path) = &arguments.json {
-        output::write_json(path, &report)?;
+        failures.keep(output::write_json(path, &report));
     }
     if arguments.json.as_deref().is_some_and(output::is_stdout) {
-        return Ok(());
+        return failures.end();
     }
     for row in &report.rows {
         let verdict = row.agrees.map_or("–", Agreement::name);
@@ -77,5 +84,6 @@ pub fn paper(arguments: &Arguments) -> Result<()> {
     for name in ["paper.md", "paper.json"] {
         output::say(format!("wrote {}", plan.out.join(name).display()))?;
     }
-    output::say(format!("wrote {} figures beside them, as SVG and PNG", report.figures.len()))
+    output::say(format!("wrote {} figures beside them, as SVG and PNG", report.figures.len()))?;
+    failures.end()
 }

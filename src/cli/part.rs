@@ -11,16 +11,23 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use body_schema::experiment::{Comparison, Trace};
+use body_schema::{
+    atomic::AtomicFile,
+    experiment::{Comparison, Trace},
+    table::Guard,
+};
 use flate2::{Compression, bufread::GzDecoder, write::GzEncoder};
 use serde::{Deserialize, Serialize};
 
-use super::{BadInput, seeds::MOST as MOST_SEEDS};
+use super::{BadInput, output, seeds::MOST as MOST_SEEDS};
 
 /// The form of these files.
 const FORM: u32 = 1;
 /// There is a seed for each.
 const MOST_PARTS: u64 = MOST_SEEDS;
+/// The longest part that is read, unpacked, and what all may have together, in bytes: they are held in memory.
+const MOST_BYTES: u64 = 256 << 20;
+const MOST_BYTES_OF_ALL: u64 = 4 << 30;
 /// So many missing parts are named.
 const NAMED: usize = 12;
 
@@ -101,19 +108,15 @@ impl About {
 /// A file that is being written. It has its name only once it is whole.
 pub struct Writer {
     path: PathBuf,
-    unfinished: PathBuf,
+    whole: AtomicFile,
     lines: GzEncoder<File>,
 }
 
 impl Writer {
     pub fn begin(path: &Path, about: &About) -> Result<Self> {
-        let mut unfinished = path.as_os_str().to_owned();
-        unfinished.push(".unfinished");
-        let unfinished = PathBuf::from(unfinished);
-        let cannot = || format!("cannot create {}", unfinished.display());
-        let file = File::create(&unfinished).with_context(cannot)?;
+        let (file, whole) = AtomicFile::create(path).with_context(|| output::cannot(path))?;
         let lines = GzEncoder::new(file, Compression::default());
-        let mut writer = Self { path: path.to_owned(), unfinished, lines };
+        let mut writer = Self { path: path.to_owned(), whole, lines };
         writer.line(about)?;
         Ok(writer)
     }
@@ -123,15 +126,13 @@ impl Writer {
     }
 
     pub fn end(self) -> Result<()> {
-        let Self { path, unfinished, lines } = self;
-        let written = lines.finish().and_then(|file| file.sync_all());
-        let written = written.and_then(|()| std::fs::rename(&unfinished, &path));
-        written.with_context(|| format!("cannot write {}", path.display()))
+        let Self { path, whole, lines } = self;
+        lines.finish().and_then(|_| whole.commit()).with_context(|| output::cannot(&path))
     }
 
     fn line(&mut self, value: &impl Serialize) -> Result<()> {
         let text = serde_json::to_string(value)?;
-        writeln!(self.lines, "{text}").with_context(|| format!("cannot write {}", self.unfinished.display()))
+        writeln!(self.lines, "{text}").with_context(|| output::cannot(&self.path))
     }
 }
 
@@ -139,8 +140,9 @@ impl Writer {
 pub fn merged(paths: &[PathBuf]) -> Result<Comparison> {
     let refuse = |path: &Path, why: &str| BadInput(format!("{}: {why}", path.display()));
     let (mut all, mut traces): (Vec<(About, &Path)>, Vec<Trace>) = (Vec::new(), Vec::new());
+    let mut left = MOST_BYTES_OF_ALL;
     for path in paths {
-        let (about, runs) = read(path)?;
+        let (about, runs) = read(path, &mut left)?;
         if let Some((first, place)) = all.first()
             && let Some(why) = about.differs_from(first)
         {
@@ -175,12 +177,21 @@ pub fn merged(paths: &[PathBuf]) -> Result<Comparison> {
     Ok(Comparison::of(&about.scenario, about.steps, &traces))
 }
 
-fn read(path: &Path) -> Result<(About, Vec<Trace>)> {
+/// Reads a part, and takes what it has of the bytes that are left for all.
+fn read(path: &Path, left: &mut u64) -> Result<(About, Vec<Trace>)> {
     let name = path.display();
     let file = File::open(path).with_context(|| format!("cannot read {name}"))?;
     let no_part =
         |why: String| BadInput(format!("{name} is no part of a comparison, or not whole: {why}; compute it again"));
-    let mut lines = BufReader::new(GzDecoder::new(BufReader::new(file))).lines();
+    let too_long = |what: &str, most: u64| {
+        BadInput(format!("{name}: {what} than {} MiB of parts, the most that are read; merge fewer runs", most >> 20))
+    };
+    // What is packed is no longer than what comes of it.
+    if file.metadata().is_ok_and(|found| found.len() > MOST_BYTES) {
+        return Err(too_long("it is longer", MOST_BYTES).into());
+    }
+    let unpacked = Guard::new(GzDecoder::new(BufReader::new(file)), MOST_BYTES);
+    let mut lines = BufReader::new(unpacked).lines();
     let first =
         lines.next().ok_or_else(|| no_part("it is empty".to_owned()))?.map_err(|error| no_part(error.to_string()))?;
     #[derive(Deserialize)]
@@ -200,6 +211,8 @@ fn read(path: &Path) -> Result<(About, Vec<Trace>)> {
     }
     let parsed = |line: std::io::Result<String>| -> Result<Trace, BadInput> {
         let line = line.map_err(|error| no_part(error.to_string()))?;
+        *left =
+            left.checked_sub(line.len() as u64).ok_or_else(|| too_long("with it there is more", MOST_BYTES_OF_ALL))?;
         serde_json::from_str(&line).map_err(|error| no_part(error.to_string()))
     };
     let traces = lines.map(parsed).collect::<Result<_, _>>()?;

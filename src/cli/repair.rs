@@ -12,19 +12,26 @@ use body_schema::{
     server::{Finding, Held, State},
 };
 
-use super::{BadInput, output};
+use super::{
+    BadInput,
+    output::{self, Outputs},
+};
 
-/// Looks at a data directory of `serve`, or at a recording, and mends what is damaged. Of everything that it changes it first puts a
-/// copy aside, named in what it tells.
-///
-/// Sessions with robots elsewhere: the database is checked, and if need be written anew from what can be read; a session's events
-/// are kept up to the first that is damaged. Recordings (.rrd) that lack their end are written anew up to their last whole
-/// message, with a footer, so that viewers open them.
-///
-/// Exit code 0 if everything is whole afterwards, 1 if something is not (with --check: if something has to be mended), 2 if there
-/// is nothing to look at.
+/// What `--help` tells.
+pub const ABOUT: &str = "\
+Mend what a crash left of sessions that a server keeps, or of a recording
+
+Looks at a data directory of `serve`, or at a recording, and mends what is damaged. Of everything that it changes it first puts a copy \
+aside, named in what it tells.
+
+Sessions with robots elsewhere: the database is checked, and if need be written anew from what can be read; a session's events are \
+kept up to the first that is damaged. Recordings (.rrd) that lack their end are written anew up to their last whole message, with a \
+footer, so that viewers open them.
+
+Exit code 0 if everything is whole afterwards, 1 if something is not (with --check: if something has to be mended), 2 if there is \
+nothing to look at.";
+
 #[derive(Debug, clap::Args)]
-#[command(verbatim_doc_comment)]
 pub struct Arguments {
     /// A data directory of `serve`, whose server has ended, or a recording
     #[arg(value_name = "PATH")]
@@ -39,6 +46,11 @@ pub struct Arguments {
 
 pub fn repair(arguments: &Arguments) -> Result<()> {
     let Arguments { path, out, check } = arguments;
+    Outputs::default().file("--out", out.as_deref()).check(std::slice::from_ref(path))?;
+    if let Some(out) = out.as_ref().filter(|out| out.symlink_metadata().is_ok()) {
+        let out = out.display();
+        return Err(BadInput(format!("{out} is there already; remove it, or name another file with --out")).into());
+    }
     let findings = match fs::metadata(path) {
         Err(error) => return Err(BadInput(format!("cannot look at {}: {error}", path.display())).into()),
         Ok(metadata) if metadata.is_dir() && out.is_some() => {
@@ -115,7 +127,10 @@ fn recording(path: &Path, out: Option<&Path>, check: bool) -> Result<Finding> {
     // One that an earlier attempt left.
     drop(fs::remove_file(&part));
     restore(path, &part)?;
-    let moved = fs::rename(path, &aside).and_then(|()| fs::rename(&part, path));
+    let moved = fs::rename(path, &aside).and_then(|()| {
+        // What cannot take its place leaves it to what was there.
+        fs::rename(&part, path).or_else(|error| fs::rename(&aside, path).and(Err(error)))
+    });
     moved.with_context(|| format!("cannot put {} in its place", part.display()))?;
     let detail =
         format!("{fault}; it has the {messages} whole messages before that, and is {} as it was", aside.display());

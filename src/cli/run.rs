@@ -1,16 +1,23 @@
 //! `run`: one seed, with everything that can be kept of it.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs::File,
+    io::BufWriter,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context, Result};
 use body_schema::{
-    design::best_designs,
+    atomic::AtomicFile,
+    design::{BestDesign, best_designs},
     experiment::{Experiment, RunResult},
     recording::{EllipsoidSize, Recorder, StepsCsv, Target},
 };
 
 use super::{
-    ScenarioArguments, designs, output, progress,
+    ScenarioArguments, designs,
+    output::{self, Failures, Outputs},
+    progress,
     signals::{Interrupted, Interruption},
     steps_of,
     until::{Ending, Until},
@@ -24,12 +31,13 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     seed: u64,
     /// Movements to make [default: the scenario's]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = super::steps)]
     steps: Option<u64>,
     /// Stop as soon as every learner that can tell calls itself settled, at the latest after the movements to make
     #[arg(long, value_name = "WHEN")]
     until: Option<Until>,
-    /// Write a Rerun recording to FILE (open it with Rerun 0.36)
+    /// Write a Rerun recording to FILE (open it with Rerun 0.36), which is there once the run has ended; `serve` shows a run while it goes
+    /// on
     #[arg(long, value_name = "FILE")]
     rrd: Option<PathBuf>,
     /// How large the recording's ellipsoids are
@@ -52,26 +60,23 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.limits {
         designs::check(&scenario)?;
     }
-    output::distinct([("--rrd", &arguments.rrd), ("--csv", &arguments.csv), ("--json", &arguments.json)])?;
+    let outputs = Outputs::default().file("--rrd", arguments.rrd.as_deref());
+    let outputs = outputs.file("--csv", arguments.csv.as_deref()).file("--json", arguments.json.as_deref());
+    outputs.check(&arguments.scenario.files(&scenario))?;
     let specs = scenario.chosen(learners)?;
     let ending = arguments.until.map(|Until::Settled| Ending::of(&scenario, &specs)).transpose()?;
     let mut experiment = scenario.experiment(arguments.seed, learners)?;
     let interruption = Interruption::watch()?;
-    let mut recorder =
-        arguments.rrd.as_deref().map(|path| recorder(&experiment, path, arguments.ellipsoids)).transpose()?;
-    let mut csv = match arguments.csv.as_deref().map(|path| steps_csv(&experiment, path)).transpose() {
-        Ok(csv) => csv,
-        Err(error) => {
-            recorder.into_iter().for_each(Recorder::discard);
-            return Err(error);
-        }
-    };
+    let mut files = Files::begin(&experiment, arguments)?;
 
     let bar = progress::bar(steps, &scenario.name);
-    observe(&experiment, recorder.as_mut(), csv.as_mut())?;
+    files.observe(&experiment);
     while experiment.latest().step < steps && interruption.signal().is_none() {
-        experiment.step()?;
-        observe(&experiment, recorder.as_mut(), csv.as_mut())?;
+        if let Err(error) = experiment.step() {
+            files.discard();
+            return Err(error.into());
+        }
+        files.observe(&experiment);
         bar.inc(1);
         if ending.as_ref().is_some_and(|ending| ending.is_reached(experiment.latest())) {
             break;
@@ -91,49 +96,109 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let told = format!("{signal} came at step {step} of {steps}; files end with it, and are complete");
         Interrupted { signal, told }
     });
-    if let Some(recorder) = &mut recorder {
-        recorder.log_best_designs(&result.best_designs)?;
-    }
-    if let Some(recorder) = recorder {
-        recorder.finish()?;
-    }
-    if let Some(csv) = &mut csv {
-        csv.flush().context("cannot finish the CSV file")?;
-    }
+    let (mut written, mut failures) = files.end(&result.best_designs);
     if let Some(path) = &arguments.json {
-        output::write_json(path, &result)?;
+        match output::write_json(path, &result) {
+            Ok(()) => written.push(path.clone()),
+            Err(error) => failures.keep(Err(error)),
+        }
     }
     if !arguments.json.as_deref().is_some_and(output::is_stdout) {
         summarise(&result)?;
         if let Some(ending) = &ending {
             output::say(ending.told(experiment.latest()))?;
         }
-        for path in [&arguments.rrd, &arguments.csv, &arguments.json].into_iter().flatten() {
+        for path in written {
             output::say(format!("wrote {}", path.display()))?;
         }
     }
+    failures.end()?;
     interrupted.map_or(Ok(()), |interrupted| Err(interrupted.into()))
 }
 
-type CsvFile = StepsCsv<std::io::BufWriter<std::fs::File>>;
-
-fn recorder(experiment: &Experiment, path: &Path, ellipsoids: EllipsoidSize) -> Result<Recorder> {
-    Ok(Recorder::new(experiment.description(), Target::file(path).with_ellipsoids(ellipsoids))?)
+/// What is written while the run goes on. A file that cannot be written is given up, and the run goes on without it.
+struct Files<'a> {
+    recording: Option<(&'a Path, Recorder)>,
+    table: Option<(&'a Path, StepsTable)>,
+    failures: Failures,
 }
 
-fn steps_csv(experiment: &Experiment, path: &Path) -> Result<CsvFile> {
-    StepsCsv::new(experiment.description(), output::create(path)?)
-        .with_context(|| format!("cannot write {}", path.display()))
+struct StepsTable {
+    rows: StepsCsv<BufWriter<File>>,
+    whole: AtomicFile,
 }
 
-fn observe(experiment: &Experiment, recorder: Option<&mut Recorder>, csv: Option<&mut CsvFile>) -> Result<()> {
-    if let Some(recorder) = recorder {
-        recorder.log(experiment.latest())?;
+impl<'a> Files<'a> {
+    fn begin(experiment: &Experiment, arguments: &'a Arguments) -> Result<Self> {
+        let recording = arguments.rrd.as_deref().map(|path| -> Result<_> {
+            let target = Target::file(path).with_ellipsoids(arguments.ellipsoids);
+            Ok((path, Recorder::new(experiment.description(), target)?))
+        });
+        let mut begun = Self { recording: recording.transpose()?, table: None, failures: Failures::default() };
+        let table = arguments.csv.as_deref().map(|path| Ok((path, StepsTable::begin(experiment, path)?)));
+        match table.transpose() {
+            Ok(table) => begun.table = table,
+            Err(error) => {
+                begun.discard();
+                return Err(error);
+            }
+        }
+        Ok(begun)
     }
-    if let Some(csv) = csv {
-        csv.write(experiment.latest()).context("cannot write the CSV file")?;
+
+    fn observe(&mut self, experiment: &Experiment) {
+        let report = experiment.latest();
+        let recorded = self.recording.as_mut().map_or(Ok(()), |(_, recorder)| recorder.log(report));
+        if let Err(error) = recorded {
+            self.recording.take().into_iter().for_each(|(_, recorder)| recorder.discard());
+            self.give_up(error.into());
+        }
+        let tabled = self
+            .table
+            .as_mut()
+            .map_or(Ok(()), |(path, table)| table.rows.write(report).with_context(|| output::cannot(path)));
+        if let Err(error) = tabled {
+            self.table = None;
+            self.give_up(error);
+        }
     }
-    Ok(())
+
+    fn give_up(&mut self, error: anyhow::Error) {
+        output::tell(format_args!("warning: {}; the run goes on without it", super::told(&error)));
+        self.failures.keep(Err(error));
+    }
+
+    /// Gives the files their names. Tells which have them, and what has failed.
+    fn end(self, designs: &[BestDesign]) -> (Vec<PathBuf>, Failures) {
+        let Self { recording, table, mut failures } = self;
+        let mut written = Vec::new();
+        let mut keep = |path: &Path, ended: Result<()>| match ended {
+            Ok(()) => written.push(path.to_owned()),
+            Err(error) => failures.keep(Err(error)),
+        };
+        if let Some((path, mut recorder)) = recording {
+            let recorded = recorder.log_best_designs(designs);
+            keep(path, recorded.and_then(|()| recorder.finish()).map_err(Into::into));
+        }
+        if let Some((path, mut table)) = table {
+            let flushed = table.rows.flush().map_err(anyhow::Error::from);
+            keep(path, flushed.and_then(|()| Ok(table.whole.commit()?)).with_context(|| output::cannot(path)));
+        }
+        (written, failures)
+    }
+
+    /// Leaves none of them.
+    fn discard(self) {
+        self.recording.into_iter().for_each(|(_, recorder)| recorder.discard());
+    }
+}
+
+impl StepsTable {
+    fn begin(experiment: &Experiment, path: &Path) -> Result<Self> {
+        let (file, whole) = output::create(path)?;
+        let rows = StepsCsv::new(experiment.description(), file).with_context(|| output::cannot(path))?;
+        Ok(Self { rows, whole })
+    }
 }
 
 fn summarise(result: &RunResult) -> Result<()> {

@@ -1,11 +1,14 @@
 //! `scenarios` and `check`.
 
-use std::{io::Write, path::PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use body_schema::scenario::{BUILTIN, ScenarioSummary, builtin};
 
-use super::{BadInput, load_scenario, output};
+use super::{
+    BadInput, load_scenario,
+    output::{self, Outputs},
+};
 
 #[derive(Debug, clap::Args)]
 pub struct ListArguments {
@@ -25,6 +28,7 @@ pub struct CheckArguments {
 }
 
 pub fn list(arguments: &ListArguments) -> Result<()> {
+    Outputs::default().file("--json", arguments.json.as_deref()).check(&[])?;
     let scenarios: Vec<ScenarioSummary> =
         BUILTIN.iter().map(|found| Ok(builtin(found.name)?.summary())).collect::<Result<_>>()?;
     if let Some(path) = &arguments.json {
@@ -44,26 +48,24 @@ pub fn list(arguments: &ListArguments) -> Result<()> {
     for column in table.column_iter_mut().skip(3) {
         column.set_cell_alignment(comfy_table::CellAlignment::Left);
     }
-    writeln!(std::io::stdout(), "{table}")?;
-    Ok(())
+    output::say(table)
 }
 
 pub fn check(arguments: &CheckArguments) -> Result<()> {
     let scenario = load_scenario(&arguments.file)?;
     scenario.check_prior()?;
     let summary = scenario.summary();
-    writeln!(
-        std::io::stdout(),
+    output::say(format!(
         "{}: valid scenario `{}`: {} joints, {} parameters to learn, learners {}",
         arguments.file,
         summary.name,
         summary.joints.len(),
         summary.parameters,
         summary.learners.iter().map(|learner| learner.name.as_str()).collect::<Vec<_>>().join(", ")
-    )?;
+    ))?;
     let doubts = scenario.examine().map(|examination| examination.doubts).unwrap_or_default();
     for doubt in &doubts {
-        writeln!(std::io::stderr(), "warning: {doubt}")?;
+        output::tell(format_args!("warning: {doubt}"));
     }
     match doubts.len() {
         0 => Ok(()),

@@ -12,8 +12,11 @@ use body_schema::server::{FrameAncestor, HostName, Options, Server, Token, raise
 use tokio_util::sync::CancellationToken;
 
 use super::{
+    BadInput,
+    input::read_text,
     limits::LimitArguments,
     logging::LoggingArguments,
+    output,
     signals::{INSTANT, Interrupted, Signal, Signals},
 };
 
@@ -48,6 +51,9 @@ pub struct Arguments {
     #[command(flatten)]
     limits: LimitArguments,
 }
+
+/// No file with a token is longer, in bytes.
+const MOST_TOKEN: u64 = 1 << 20;
 
 const DEFAULT_ADDRESS: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
 
@@ -94,41 +100,43 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
             (env!("CARGO_PKG_VERSION"), data_dir.as_deref().map(|folder| folder.display().to_string()));
         tracing::info!(version, %address, folder, needs_token = token.is_some(), "listening");
         for damage in server.damage() {
-            // Whoever closed standard error is served all the same.
-            drop(writeln!(std::io::stderr(), "warning: {damage}"));
+            output::tell(format_args!("warning: {damage}"));
         }
-        let mut out = std::io::stdout();
-        writeln!(out, "body-schema is at http://{address}/ (Ctrl-C ends it)")?;
+        say(format!("body-schema is at http://{address}/ (Ctrl-C ends it)"));
         match (&data_dir, &arguments.data_dir) {
-            (None, _) => writeln!(out, "nothing is kept: sessions end with the server")?,
-            (Some(folder), None) => writeln!(out, "sessions with robots elsewhere are kept in {}", folder.display())?,
+            (None, _) => say("nothing is kept: sessions end with the server".to_owned()),
+            (Some(folder), None) => say(format!("sessions with robots elsewhere are kept in {}", folder.display())),
             (Some(folder), Some(_)) => {
-                writeln!(out, "recordings, and sessions with robots elsewhere, are kept in {}", folder.display())?;
+                say(format!("recordings, and sessions with robots elsewhere, are kept in {}", folder.display()));
             }
         }
         match (&token, &arguments.token_file) {
             (None, _) => {}
             (Some(_), Some(file)) => {
-                writeln!(out, "only those who carry the token in {} are answered", file.display())?
+                say(format!("only those who carry the token in {} are answered", file.display()));
             }
             (Some(token), None) => {
                 let (token, reachable) = (token.as_str(), reachable(address));
-                writeln!(out, "only those who carry the token are answered. Open once in each browser:")?;
-                writeln!(out, "  http://{reachable}/?token={token}")?;
-                writeln!(out, "Programs send the header `Authorization: Bearer {token}`")?;
+                say("only those who carry the token are answered. Open once in each browser:".to_owned());
+                say(format!("  http://{reachable}/?token={token}"));
+                say(format!("Programs send the header `Authorization: Bearer {token}`"));
             }
         }
-        out.flush()?;
         server.run().await?;
         if let Some(&signal) = ordered.get() {
             return Err(Interrupted { signal, told: format!("ended at once, by a second {signal}") }.into());
         }
-        writeln!(out, "ended; every recording is complete")?;
+        say("ended; every recording is complete".to_owned());
         Ok(())
     });
     // Answers that nobody waits for any longer are left.
     runtime.shutdown_timeout(INSTANT);
     served
+}
+
+/// Prints a line. Whoever has closed standard output is served all the same.
+fn say(line: String) {
+    drop(writeln!(std::io::stdout(), "{line}"));
 }
 
 /// Where sessions are kept; `None` if nowhere.
@@ -152,7 +160,7 @@ fn token(arguments: &Arguments) -> Result<Option<Token>> {
     if let Some(file) = &arguments.token_file {
         let mend =
             || format!("cannot read the token in {}; name a file with one in it with --token-file", file.display());
-        let text = std::fs::read_to_string(file).with_context(mend)?;
+        let text = read_text(file, MOST_TOKEN).map_err(BadInput).with_context(mend)?;
         return Ok(Some(text.trim().parse().with_context(|| format!("{} holds no token", file.display()))?));
     }
     if arguments.bind.ip().to_canonical().is_loopback() {

@@ -14,6 +14,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
+use body_schema::atomic;
 
 /// A signal that asks to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,11 +41,21 @@ impl fmt::Display for Signal {
     }
 }
 
-/// All that ask to end, from when this is made on.
+/// All that ask to end, from when this is made on. A file that has become too large for the process (`ulimit -f`) is an error from then
+/// on, which is told, and no end without a word.
 pub struct Signals {
     #[cfg(unix)]
-    unix: [tokio::signal::unix::Signal; 3],
+    unix: [tokio::signal::unix::Signal; 2],
+    /// None where the program was started to stay when its terminal goes, as by `nohup`.
+    #[cfg(unix)]
+    hang_up: Option<tokio::signal::unix::Signal>,
+    #[cfg(unix)]
+    _too_large: tokio::signal::unix::Signal,
 }
+
+/// SIGXFSZ, on all systems but those on MIPS.
+#[cfg(unix)]
+const TOO_LARGE: i32 = if cfg!(any(target_arch = "mips", target_arch = "mips64")) { 31 } else { 25 };
 
 impl Signals {
     /// Within a runtime.
@@ -52,9 +63,9 @@ impl Signals {
         #[cfg(unix)]
         {
             use tokio::signal::unix::{SignalKind, signal};
-            let unix =
-                [signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?, signal(SignalKind::hangup())?];
-            Ok(Self { unix })
+            let unix = [signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?];
+            let hang_up = if ignores_hang_up() { None } else { Some(signal(SignalKind::hangup())?) };
+            Ok(Self { unix, hang_up, _too_large: signal(SignalKind::from_raw(TOO_LARGE))? })
         }
         #[cfg(not(unix))]
         Ok(Self {})
@@ -64,11 +75,17 @@ impl Signals {
     pub async fn next(&mut self) -> Signal {
         #[cfg(unix)]
         {
-            let [interrupt, terminate, hang_up] = &mut self.unix;
+            let Self { unix: [interrupt, terminate], hang_up, .. } = self;
+            let hung_up = async {
+                match hang_up {
+                    Some(hang_up) => drop(hang_up.recv().await),
+                    None => std::future::pending().await,
+                }
+            };
             tokio::select! {
                 _ = interrupt.recv() => Signal::INTERRUPT,
                 _ = terminate.recv() => Signal::TERMINATE,
-                _ = hang_up.recv() => Signal::HANG_UP,
+                () = hung_up => Signal::HANG_UP,
             }
         }
         #[cfg(not(unix))]
@@ -80,6 +97,14 @@ impl Signals {
             Signal::INTERRUPT
         }
     }
+}
+
+/// Whether whoever started the program had it ignore SIGHUP; known on Linux alone.
+#[cfg(unix)]
+fn ignores_hang_up() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    ignored.is_some_and(|ignored| ignored & 1 != 0)
 }
 
 /// For work that no runtime does: whether it was asked to end. A second signal ends the program at once.
@@ -97,20 +122,12 @@ impl Interruption {
     pub fn watch() -> Result<Self> {
         let told = Self(Arc::default());
         let number = told.0.clone();
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().context("cannot start")?;
-        let mut signals = {
-            let _within = runtime.enter();
-            Signals::new().context("cannot wait for signals")?
-        };
-        let wait = move || {
-            runtime.block_on(async {
-                number.store(signals.next().await.0, Ordering::Relaxed);
-                let order = signals.next().await;
-                tokio::time::sleep(INSTANT).await;
-                std::process::exit(order.exit_code().into());
-            })
-        };
-        thread::Builder::new().name("signals".to_owned()).spawn(wait).context("cannot start")?;
+        wait(async move |signals| {
+            number.store(signals.next().await.0, Ordering::Relaxed);
+            let order = signals.next().await;
+            tokio::time::sleep(INSTANT).await;
+            order
+        })?;
         Ok(told)
     }
 
@@ -142,6 +159,23 @@ impl Interruption {
             }
         }
     }
+}
+
+/// From now on the first signal ends the program at once: for work of which nothing is kept that is not whole.
+pub fn end_at_once() -> Result<()> {
+    wait(async |signals| signals.next().await)
+}
+
+/// Ends the program by the signal that `order` waits for, and leaves nothing unfinished.
+fn wait(order: impl AsyncFnOnce(&mut Signals) -> Signal + Send + 'static) -> Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().context("cannot start")?;
+    let mut signals = {
+        let _within = runtime.enter();
+        Signals::new().context("cannot wait for signals")?
+    };
+    let wait = move || atomic::exit(runtime.block_on(order(&mut signals)).exit_code().into());
+    thread::Builder::new().name("signals".to_owned()).spawn(wait).context("cannot start")?;
+    Ok(())
 }
 
 /// What was asked for was not done to the end, because of a signal.

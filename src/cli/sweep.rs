@@ -12,7 +12,12 @@ use body_schema::{
 use serde::Serialize;
 use toml::Value;
 
-use super::{BadInput, ScenarioArguments, Seeds, Threads, compare::over_seeds, output, progress, steps_of};
+use super::{
+    BadInput, ScenarioArguments, Seeds, Threads,
+    compare::over_seeds,
+    output::{self, Failures, Outputs},
+    progress, steps_of,
+};
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -25,7 +30,7 @@ pub struct Arguments {
     #[arg(long, default_value = "1001..1020", value_name = "SEEDS")]
     seeds: Seeds,
     /// Movements of every run [default: the scenario's]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = super::steps)]
     steps: Option<u64>,
     /// Write the ranking as JSON to FILE, or to standard output for `-`
     #[arg(long, value_name = "FILE")]
@@ -81,6 +86,11 @@ pub fn sweep(arguments: &Arguments) -> Result<()> {
         return Err(BadInput("a sweep ranks by one learner's own median; name it with --learner".into()).into());
     };
     let steps = steps_of(&base, arguments.steps)?;
+    Outputs::default().file("--json", arguments.json.as_deref()).check(&arguments.scenario.files(&base))?;
+    let points = arguments.axes.iter().fold(1_usize, |points, axis| points.saturating_mul(axis.values.len()));
+    if points > MOST_POINTS {
+        return Err(BadInput(format!("--set: the grid has more than {MOST_POINTS} points; name fewer values")).into());
+    }
     let grid = grid(&arguments.axes);
     let bar = progress::bar(
         grid.len() as u64 * arguments.seeds.count() * steps,
@@ -105,11 +115,12 @@ pub fn sweep(arguments: &Arguments) -> Result<()> {
         let ((late, missing, error), (other_late, other_missing, other_error)) = (a.rank(), b.rank());
         late.total_cmp(&other_late).then(missing.cmp(&other_missing)).then(error.total_cmp(&other_error))
     });
+    let mut failures = Failures::default();
     if let Some(path) = &arguments.json {
-        output::write_json(path, &trials)?;
+        failures.keep(output::write_json(path, &trials));
     }
     if arguments.json.as_deref().is_some_and(output::is_stdout) {
-        return Ok(());
+        return failures.end();
     }
     let best = recommended(&trials);
     let rows = trials.iter().enumerate().map(|(index, trial)| {
@@ -127,8 +138,12 @@ pub fn sweep(arguments: &Arguments) -> Result<()> {
     let header = ["values", "converged", "median", "90 %", "location (mm)", "predict. (mm)"];
     output::say(format!("{}, learner {learner}, {steps} movements, best first", base.name))?;
     output::say(output::table(header, rows))?;
-    output::say("* lowest 90th percentile among the medians within 5 % of the lowest")
+    output::say("* lowest 90th percentile among the medians within 5 % of the lowest")?;
+    failures.end()
 }
+
+/// A grid of more points is a slip of the finger.
+const MOST_POINTS: usize = 10_000;
 
 /// Medians this close cannot be told apart by a few dozen seeds.
 const INDISTINGUISHABLE: f64 = 1.05;

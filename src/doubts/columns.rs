@@ -1,6 +1,6 @@
 //! What a column shows by itself.
 
-use super::{Doubt, DoubtKind, Evidence, Subject};
+use super::{Doubt, DoubtKind, Evidence, Line, Subject};
 use crate::kinematics::{Joint, JointKind};
 
 /// What is forgiven to limits, rad or m: rounding, and where a robot comes to rest.
@@ -61,8 +61,8 @@ fn constant(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) 
 fn outside(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
     let (lower, upper) = subject.limits[joint]?;
     let beyond = |row: &[f64]| (lower - row[joint]).max(row[joint] - upper);
-    let rows = evidence.lines.iter().zip(evidence.configurations);
-    let lines: Vec<usize> = rows.filter(|(_, row)| beyond(row) > SLACK).map(|(line, _)| *line).collect();
+    let rows = (0..).zip(evidence.configurations).filter(|(_, row)| beyond(row) > SLACK);
+    let lines: Vec<Line> = rows.map(|(row, _)| evidence.line(row)).collect();
     let worst = evidence.configurations.iter().map(|row| beyond(row)).fold(0.0, f64::max);
     let unit = match subject.joints[joint].kind() {
         JointKind::Revolute => "rad",

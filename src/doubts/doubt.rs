@@ -1,6 +1,6 @@
 //! One doubt, said so that it can be looked into.
 
-use std::fmt;
+use std::{fmt, sync::Arc};
 
 /// What is doubted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,8 +52,8 @@ pub struct Doubt {
     pub kind: DoubtKind,
     /// The column, if it is about one.
     pub column: Option<String>,
-    /// The lines of the file, if it is about some.
-    pub lines: Vec<usize>,
+    /// The lines, if it is about some.
+    pub lines: Vec<Line>,
     /// What is suspected.
     pub what: String,
     /// Why.
@@ -74,16 +74,61 @@ impl fmt::Display for Doubt {
     }
 }
 
-/// "line 4" or "lines 4, 5, 9 and 12 more".
-fn listed(lines: &[usize]) -> String {
+/// A line of a table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Line {
+    /// The file, where rows are from more than one.
+    pub file: Option<Arc<str>>,
+    /// Its number in that file, counted from 1.
+    pub number: usize,
+}
+
+impl fmt::Display for Line {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}", self.number)?;
+        self.file.iter().try_for_each(|file| write!(f, " of {file}"))
+    }
+}
+
+/// "line 4" or "lines 4, 5, 9 and 12 more"; where there is more than one file "a.csv: lines 4, 5; b.csv: line 9".
+pub fn listed(lines: &[Line]) -> String {
     const SHOWN: usize = 8;
-    let shown: Vec<String> = lines.iter().take(SHOWN).map(ToString::to_string).collect();
-    let more = lines.len().saturating_sub(SHOWN);
-    let end = if more > 0 { format!(" and {more} more") } else { String::new() };
-    format!("line{} {}{end}", if lines.len() > 1 { "s" } else { "" }, shown.join(", "))
+    let mut files: Vec<(&Option<Arc<str>>, Vec<usize>)> = Vec::new();
+    for Line { file, number } in lines {
+        match files.iter_mut().find(|(known, _)| *known == file) {
+            Some((_, numbers)) => numbers.push(*number),
+            None => files.push((file, vec![*number])),
+        }
+    }
+    let told = files.into_iter().map(|(file, numbers)| {
+        let file = file.as_ref().map(|file| format!("{file}: ")).unwrap_or_default();
+        let shown: Vec<String> = numbers.iter().take(SHOWN).map(ToString::to_string).collect();
+        let more = numbers.len().saturating_sub(SHOWN);
+        let end = if more > 0 { format!(" and {more} more") } else { String::new() };
+        format!("{file}line{} {}{end}", if numbers.len() > 1 { "s" } else { "" }, shown.join(", "))
+    });
+    told.collect::<Vec<_>>().join("; ")
 }
 
 /// A length as a reader likes it.
 pub(super) fn length(metres: f64) -> String {
     if metres >= 1.0 { format!("{metres:.1} m") } else { format!("{:.2} mm", metres * 1e3) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_several_files_are_told_apart() {
+        let line = |file: Option<&str>, number| Line { file: file.map(Arc::from), number };
+        assert_eq!(listed(&[line(None, 4)]), "line 4");
+        assert_eq!(
+            listed(&(1..11).map(|number| line(None, number)).collect::<Vec<_>>()),
+            "lines 1, 2, 3, 4, 5, 6, 7, 8 and 2 more"
+        );
+        let both = [line(Some("a.csv"), 16), line(Some("b.csv"), 5), line(Some("a.csv"), 17)];
+        assert_eq!(listed(&both), "a.csv: lines 16, 17; b.csv: line 5");
+        assert_eq!(both[1].to_string(), "line 5 of b.csv");
+    }
 }

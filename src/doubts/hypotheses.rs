@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 use super::{
-    Doubt, DoubtKind, Evidence, Subject,
+    Doubt, DoubtKind, Evidence, Line, Subject,
     description::{Explained, Known, explain},
     doubt::length,
     fit::{self, Fit, Placed, Sight},
@@ -83,8 +83,8 @@ pub struct Readings<'a> {
     subject: Subject<'a>,
     /// By row that was seen: where the joints were.
     configurations: Vec<Vec<f64>>,
-    /// The lines of the file.
-    lines: Vec<usize>,
+    /// Where they stand.
+    lines: Vec<Line>,
     sight: Sight,
     /// The name of the target.
     target: String,
@@ -129,7 +129,7 @@ impl<'a> Readings<'a> {
         };
         let configurations = usable.iter().map(|row| evidence.configurations[*row].clone()).collect();
         let target = seen.map(|seen| seen.name.clone()).unwrap_or_default();
-        let lines = usable.iter().map(|row| evidence.lines.get(*row).copied().unwrap_or(*row)).collect();
+        let lines = usable.iter().map(|row| evidence.line(*row)).collect();
         Some(Self { subject: *subject, configurations, lines, sight, target, size: 1.0 })
     }
 
@@ -154,7 +154,7 @@ impl<'a> Readings<'a> {
             Sight::Sockets(sockets) => Sight::Sockets(rows.iter().map(|row| sockets[*row]).collect()),
         };
         let configurations = rows.iter().map(|row| self.configurations[*row].clone()).collect();
-        let lines = rows.iter().map(|row| self.lines[*row]).collect();
+        let lines = rows.iter().map(|row| self.lines[*row].clone()).collect();
         Self { configurations, lines, sight, target: self.target.clone(), ..*self }
     }
 
@@ -209,7 +209,7 @@ impl<'a> Readings<'a> {
         };
         let (kept, configurations): (Vec<usize>, Vec<Vec<f64>>) = (0..all).filter_map(between).unzip();
         self.configurations = configurations;
-        self.lines = kept.iter().map(|row| self.lines[*row]).collect();
+        self.lines = kept.iter().map(|row| self.lines[*row].clone()).collect();
         self.sight = match &self.sight {
             Sight::Target(seen) => Sight::Target(seen.of(&kept)),
             Sight::Sockets(sockets) => Sight::Sockets(kept.iter().map(|row| sockets[*row]).collect()),

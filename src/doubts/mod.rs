@@ -23,9 +23,11 @@ mod moving;
 mod postures;
 mod repeats;
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Point3, Vector3};
 
-pub use doubt::{Doubt, DoubtKind};
+pub use doubt::{Doubt, DoubtKind, Line, listed};
 pub use postures::{SAME, postures};
 pub use repeats::few_folds;
 
@@ -72,8 +74,10 @@ pub struct Base {
 /// What the table says.
 #[derive(Clone, Debug, Default)]
 pub struct Evidence<'a> {
-    /// By row: the line of the file.
+    /// By row: the line of its file.
     pub lines: &'a [usize],
+    /// By row: its file; empty where all rows are from one.
+    pub files: &'a [Arc<str>],
     /// By row: joint positions, rad or m.
     pub configurations: &'a [Vec<f64>],
     /// Targets on the last link whose positions were measured.
@@ -86,6 +90,13 @@ pub struct Evidence<'a> {
     pub held_out: &'a [usize],
     /// Columns that repeat another, with that other (see [`Rows::repeated_columns`](crate::table::Rows::repeated_columns)).
     pub repeated: &'a [(String, String)],
+}
+
+impl Evidence<'_> {
+    /// Where a row stands.
+    fn line(&self, row: usize) -> Line {
+        Line { file: self.files.get(row).cloned(), number: self.lines.get(row).copied().unwrap_or(row) }
+    }
 }
 
 /// Where a target was seen.

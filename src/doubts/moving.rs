@@ -11,7 +11,7 @@
 
 use nalgebra::Point3;
 
-use super::{Doubt, DoubtKind, doubt::length};
+use super::{Doubt, DoubtKind, Line, doubt::length};
 use crate::most::middle;
 
 /// A row is off where more is left of it than so many times what is left of the middle one.
@@ -25,7 +25,7 @@ const WITHIN: f64 = 40.0;
 const SHARE: f64 = 0.5;
 
 /// The doubt that the robot stood still, by where the target should be and where it was seen, row by row; less than `sigma` is not off.
-pub fn doubt(lines: &[usize], places: &[Point3<f64>], seen: &[Point3<f64>], sigma: f64) -> Option<Doubt> {
+pub fn doubt(lines: &[Line], places: &[Point3<f64>], seen: &[Point3<f64>], sigma: f64) -> Option<Doubt> {
     let left: Vec<_> = seen.iter().zip(places).map(|(seen, place)| seen - place).collect();
     let middle = middle(left.iter().map(nalgebra::Vector3::norm).collect()).filter(|middle| *middle > 0.0)?;
     let off: Vec<usize> = (0..left.len()).filter(|row| left[*row].norm() > OFF * middle.max(sigma)).collect();
@@ -49,7 +49,7 @@ pub fn doubt(lines: &[usize], places: &[Point3<f64>], seen: &[Point3<f64>], sigm
     Some(Doubt {
         kind: DoubtKind::Lag,
         column: None,
-        lines: rows.iter().map(|row| lines[*row]).collect(),
+        lines: rows.iter().map(|row| lines[*row].clone()).collect(),
         what: format!("measured while the robot moved, on its way {other}"),
         evidence: format!(
             "they miss by up to {}, the middle row by {}, and what is left of them points along that way",
@@ -79,7 +79,7 @@ mod tests {
         let places: Vec<Point3<f64>> = (0..30).map(|_| (normal(rng, 0.25)).into()).collect();
         let seen: Vec<Point3<f64>> =
             (0..30).map(|row| places[row] + normal(rng, 1e-3) + spoil(rng, &places, row)).collect();
-        let lines: Vec<usize> = (2..32).collect();
+        let lines: Vec<Line> = (2..32).map(|number| Line { file: None, number }).collect();
         doubt(&lines, &places, &seen, 1e-3)
     }
 
@@ -100,7 +100,8 @@ mod tests {
             };
             let is_right = |doubt: Option<Doubt>, words: &str| {
                 doubt.is_some_and(|it| {
-                    it.what.ends_with(words) && [6, 13, 22].iter().all(|line| it.lines.contains(line))
+                    it.what.ends_with(words)
+                        && [6, 13, 22].iter().all(|number| it.lines.iter().any(|line| line.number == *number))
                 })
             };
             forth += usize::from(is_right(to(1), "to that of the line below"));

@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Doubt, DoubtKind, Evidence, SAME, doubt::length, postures};
+use super::{Doubt, DoubtKind, Evidence, Line, SAME, doubt::length, postures};
 
 /// A row so many robust standard deviations from its posture's others had not settled.
 const FAR: f64 = 6.0;
@@ -41,7 +41,7 @@ pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
         doubts.push(Doubt {
             kind: DoubtKind::Unsettled,
             column: None,
-            lines: far.iter().map(|(row, _)| evidence.lines[*row]).collect(),
+            lines: far.iter().map(|(row, _)| evidence.line(*row)).collect(),
             what: format!("`{}` is not where it was in the same posture in other rows", seen.name),
             evidence: format!("by up to {}, while repeats scatter by {} per coordinate", length(worst), length(sigma)),
             mend: "was the robot still moving? Measure again when it stands, or leave the rows out".to_owned(),
@@ -50,7 +50,7 @@ pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
     doubts.push(Doubt {
         kind: DoubtKind::RepeatedPosture,
         column: None,
-        lines: repeated.iter().flatten().map(|row| evidence.lines[*row]).collect(),
+        lines: repeated.iter().flatten().map(|row| evidence.line(*row)).collect(),
         what: format!("{} postures were measured more than once", repeated.len()),
         evidence: format!("σ is {} per coordinate as far as they tell", length(sigma)),
         mend: "new postures would have taught more; folds keep repeats together".to_owned(),
@@ -68,19 +68,15 @@ fn leakage(postures: &[usize], evidence: &Evidence) -> Option<Doubt> {
     let leaks = held_out.iter().filter_map(|row| Some((*row, *trained.get(postures.get(*row)?)?)));
     let leaks: Vec<(usize, usize)> = leaks.collect();
     let (row, original) = *leaks.first()?;
-    let lines: Vec<usize> = leaks.iter().map(|(row, _)| evidence.lines[*row]).collect();
-    // Lines of a second file are counted anew.
-    let begins = *held_out.first()?;
-    let is_second = begins > 0 && evidence.lines[begins] <= evidence.lines[begins - 1];
-    let of_file = if is_second { " of the file that is held out" } else { "" };
+    let lines: Vec<Line> = leaks.iter().map(|(row, _)| evidence.line(*row)).collect();
     Some(Doubt {
         kind: DoubtKind::Leakage,
         column: None,
         what: "held out, though the same posture is learned from".to_owned(),
         evidence: format!(
-            "line {}{of_file} repeats line {} to {SAME} rad or m; {} of {} rows that are held out do so",
-            evidence.lines[row],
-            evidence.lines[original],
+            "{} repeats {} to {SAME} rad or m; {} of {} rows that are held out do so",
+            evidence.line(row),
+            evidence.line(original),
             lines.len(),
             held_out.len()
         ),
@@ -120,20 +116,20 @@ fn copies(repeated: &mut [Vec<usize>], evidence: &Evidence) -> Option<Doubt> {
         for &row in rows.iter() {
             match kept.last().filter(|last| is_copy(**last, row)) {
                 Some(original) => {
-                    lines.push(evidence.lines[row]);
-                    originals.push(evidence.lines[*original]);
+                    lines.push(evidence.line(row));
+                    originals.push(evidence.line(*original));
                 }
                 None => kept.push(row),
             }
         }
         *rows = kept;
     }
-    let original = *originals.first()?;
+    let original = originals.first()?;
     Some(Doubt {
         kind: DoubtKind::CopiedRow,
         column: None,
         what: format!("{} of an earlier row", if lines.len() > 1 { "copies" } else { "a copy" }),
-        evidence: format!("line {} says what line {original} said, number by number", lines[0]),
+        evidence: format!("{} says what {original} said, number by number", lines[0]),
         lines,
         mend: "leave copies out: they count as measurements and are none".to_owned(),
     })

@@ -16,7 +16,7 @@ mod page;
 mod run;
 
 use std::{
-    fs,
+    fs, io,
     path::{Path, PathBuf},
 };
 
@@ -27,6 +27,7 @@ pub use error::ExportError;
 
 use crate::{
     ask_tell::Session,
+    atomic::{AtomicFolder, undisturbed},
     scenario::{Scenario, ScenarioSummary, WorldSpec},
 };
 use error::Doing;
@@ -34,6 +35,11 @@ use run::Recorded;
 
 /// What says that a folder is an export, and what is in it.
 const MANIFEST: &str = "export.json";
+/// The folders of runs and scenario files.
+const RUNS: &str = "runs";
+const SCENARIOS: &str = "scenarios";
+/// Where those of an earlier export wait for their end.
+const OLD: &str = ".old";
 /// Raised when the meaning of a file changes.
 const FORMAT: u32 = 1;
 /// Steps of a run unless told otherwise.
@@ -162,33 +168,39 @@ impl Export<'_> {
     }
 
     /// Writes the folder. One that holds another export is replaced; one that holds anything else is refused unless `force`
-    /// says to write beside it. Seeds are run side by side;
-    /// `tick` is called after every step.
+    /// says to write beside it. Everything is written aside, and takes its place once it is complete: where that fails the folder is as
+    /// it was. Seeds are run side by side; `tick` is called after every step.
     pub fn write(&self, out: &Path, force: bool, tick: &(dyn Fn() + Sync)) -> Result<Written, ExportError> {
-        prepare(out, force)?;
+        let is_export = examine(out, force)?;
+        let is_there = out.exists();
+        let aside = if is_there { AtomicFolder::within(out) } else { AtomicFolder::beside(out) };
+        let aside = aside.doing("write into the folder", out)?;
+        let folder = aside.path();
         let files = page::Files::load(self.panel_dir.as_deref())?;
+        files.write(folder, &self.plans, self.address.as_deref())?;
         let mut manifest = Manifest {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             scenarios: Vec::new(),
             unpacked: files.unpacked(),
         };
-        // At once, so that a folder whose export was interrupted is still known for one.
-        write_json(&out.join(MANIFEST), &manifest)?;
-        files.write(out, &self.plans, self.address.as_deref())?;
         for plan in &self.plans {
-            manifest.scenarios.push(self.write_plan(plan, out, tick)?);
+            manifest.scenarios.push(self.write_plan(plan, folder, tick)?);
         }
-        write_json(&out.join(MANIFEST), &manifest)?;
+        write_json(&folder.join(MANIFEST), &manifest)?;
+        match is_there {
+            true => undisturbed(|| put(folder, out, is_export))?,
+            false => aside.replace(out).doing("write", out)?,
+        }
         measure(out)
     }
 
     fn write_plan(&self, plan: &Plan<'_>, out: &Path, tick: &(dyn Fn() + Sync)) -> Result<Exported, ExportError> {
         let scenario = plan.scenario;
-        let source = format!("scenarios/{}.toml", scenario.name);
+        let source = format!("{SCENARIOS}/{}.toml", scenario.name);
         write(&out.join(&source), scenario.source.as_bytes())?;
         let run = |&seed: &u64| {
-            let folder = format!("runs/{}/{seed}", scenario.name);
+            let folder = format!("{RUNS}/{}/{seed}", scenario.name);
             let recorded = run::record(plan, seed, &out.join(&folder), tick)?;
             Ok(ExportedRun { seed, steps: plan.steps, learners: plan.learners.clone(), recorded, folder })
         };
@@ -208,18 +220,49 @@ impl Export<'_> {
     }
 }
 
-/// Makes the folder ready: empty, or an export whose runs go.
-fn prepare(out: &Path, force: bool) -> Result<(), ExportError> {
-    fs::create_dir_all(out).doing("make the folder", out)?;
-    let is_empty = fs::read_dir(out).doing("read the folder", out)?.next().is_none();
+/// Whether the folder holds an export; refused where it holds something else.
+fn examine(out: &Path, force: bool) -> Result<bool, ExportError> {
+    if !out.exists() {
+        return Ok(false);
+    }
+    let is_other = |entry: io::Result<fs::DirEntry>| {
+        entry.map_or(true, |entry| !AtomicFolder::is_hidden(&entry.file_name().to_string_lossy()))
+    };
+    let is_empty = !fs::read_dir(out).doing("read the folder", out)?.any(is_other);
     let text = fs::read(out.join(MANIFEST)).unwrap_or_default();
     let is_export = serde_json::from_slice::<Manifest>(&text).is_ok();
-    if !(is_empty || is_export || force) {
-        return Err(ExportError::NotEmpty(out.to_owned()));
-    }
-    for folder in ["runs", "scenarios"].map(|name| out.join(name)).iter().filter(|folder| is_export && folder.exists())
-    {
-        fs::remove_dir_all(folder).doing("replace", folder)?;
+    if is_empty || is_export || force { Ok(is_export) } else { Err(ExportError::NotEmpty(out.to_owned())) }
+}
+
+/// Puts a whole export in the place of an earlier one, whose runs go with what is left of the new one's folder.
+fn put(from: &Path, to: &Path, is_export: bool) -> Result<(), ExportError> {
+    let old = from.join(OLD);
+    fs::create_dir(&old).doing("make the folder", &old)?;
+    let runs = || [RUNS, SCENARIOS].map(|name| (to.join(name), old.join(name))).into_iter();
+    let mut moved = runs().filter(|(place, _)| is_export && place.exists());
+    let placed = moved.try_for_each(|(place, aside)| fs::rename(&place, aside).doing("replace", &place));
+    placed.and_then(|()| place(from, to)).inspect_err(|_| {
+        for (place, aside) in runs().filter(|(_, aside)| aside.exists()) {
+            // Those of the new one, if there are any. What then cannot be put back nobody can.
+            let _ = fs::remove_dir_all(&place);
+            let _ = fs::rename(aside, place);
+        }
+    })
+}
+
+/// Moves all files of a folder to their places in another, the manifest last.
+fn place(from: &Path, to: &Path) -> Result<(), ExportError> {
+    let entries =
+        fs::read_dir(from).and_then(Iterator::collect::<io::Result<Vec<_>>>).doing("read the folder", from)?;
+    let mut names: Vec<_> = entries.iter().map(fs::DirEntry::file_name).filter(|name| name != OLD).collect();
+    names.sort_by_key(|name| name == MANIFEST);
+    for name in names {
+        let (old, new) = (from.join(&name), to.join(&name));
+        if old.is_dir() && new.exists() {
+            place(&old, &new)?;
+        } else {
+            fs::rename(&old, &new).doing("write", &new)?;
+        }
     }
     Ok(())
 }

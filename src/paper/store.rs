@@ -14,7 +14,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{PaperError, Plan, experiments::PaperExperiment, outcome::Outcome};
-use crate::scenario::Scenario;
+use crate::{atomic, scenario::Scenario};
 
 /// What an outcome depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -118,12 +118,7 @@ impl Store {
 
 /// Writes a file whole or not at all.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), PaperError> {
-    let partial = path.with_extension("partial");
-    let attempt = || -> io::Result<()> {
-        fs::write(&partial, bytes)?;
-        fs::rename(&partial, path)
-    };
-    attempt().map_err(|source| PaperError::Write { path: path.to_owned(), source })
+    atomic::write(path, bytes).map_err(|source| PaperError::Write { path: path.to_owned(), source })
 }
 
 #[cfg(test)]

@@ -2,13 +2,11 @@
 
 use std::io;
 
-use csv::Writer;
-
 use super::{RecordingError, metrics};
 use crate::{
     experiment::{Comparison, Description, Quantiles, StepReport},
     kinematics::JointKind,
-    table::{Component, Title},
+    table::{Component, Title, Writer},
 };
 
 /// Writes one row per step and learner. Units stand in the names of the columns; what is null is empty.
@@ -32,13 +30,13 @@ impl<W: io::Write> StepsCsv<W> {
             let title = |component| Title { before: what, component, number: "", unit: "m" }.to_string();
             header.extend(Component::PLACE.map(title));
         }
-        table.writer.write_record(&header)?;
+        table.writer.write(&header)?;
         Ok(table)
     }
 
     /// Goes on with a table whose header is written elsewhere.
     pub fn without_header(description: &Description, output: W) -> Self {
-        Self { writer: Writer::from_writer(output), joints: description.joints.len() }
+        Self { writer: Writer::new(output), joints: description.joints.len() }
     }
 
     /// Writes the rows of one step.
@@ -55,7 +53,7 @@ impl<W: io::Write> StepsCsv<W> {
             for marker in [measured, predicted] {
                 row.extend((0..3).map(|axis| cell(marker.map(|marker| marker[axis]))));
             }
-            self.writer.write_record(&row)?;
+            self.writer.write(&row)?;
         }
         Ok(())
     }
@@ -69,8 +67,8 @@ impl<W: io::Write> StepsCsv<W> {
 /// Writes the curves of a comparison in long format, one row per learner, number of movements and metric, over the
 /// seeds; metrics without a value have no row.
 pub fn comparison_csv(comparison: &Comparison, output: impl io::Write) -> Result<(), RecordingError> {
-    let mut writer = Writer::from_writer(output);
-    writer.write_record(["learner", "movements", "metric", "mean", "median", "q25", "q75"])?;
+    let mut writer = Writer::new(output);
+    writer.write(["learner", "movements", "metric", "mean", "median", "q25", "q75"])?;
     for learner in &comparison.learners {
         for point in &learner.curve {
             let metrics = [
@@ -85,10 +83,9 @@ pub fn comparison_csv(comparison: &Comparison, output: impl io::Write) -> Result
             ];
             for (metric, quantiles) in metrics {
                 let Some(Quantiles { mean, median, q25, q75 }) = quantiles else { continue };
-                writer.write_field(&learner.name)?;
-                writer.write_field(point.movements.to_string())?;
-                writer.write_field(metric)?;
-                writer.write_record([mean, median, q25, q75].map(|value| value.to_string()))?;
+                let numbers = [mean, median, q25, q75].map(|value| value.to_string());
+                let about = [learner.name.clone(), point.movements.to_string(), metric.to_owned()];
+                writer.write(about.into_iter().chain(numbers))?;
             }
         }
     }

@@ -29,6 +29,17 @@ pub enum RecordingError {
         /// Why.
         source: io::Error,
     },
+    /// The file could not be written as a whole; what was there before is as it was.
+    #[error(
+        "cannot write the recording {}: {source}; what was there before is as it was; free some space or record to another disk",
+        path.display()
+    )]
+    Unwritten {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
     /// The file could not be read.
     #[error("cannot read the recording {}: {source}", path.display())]
     Read {

@@ -9,29 +9,46 @@ use std::{
 use re_log_encoding::{CrateVersion, EncodeError, Encoder, EncodingOptions};
 
 use super::{RecordingError, rerun::LogMsg};
+use crate::atomic::AtomicFile;
 
 /// An .rrd file that is being written. Its footer, the index, is written at the end; dropping it tries to.
 pub(super) struct RrdFile {
     path: PathBuf,
     encoder: Encoder<BufWriter<File>>,
+    /// What gives it its name once it is whole; `None` where it grows in its place.
+    whole: Option<AtomicFile>,
     /// Whether a write has failed; nothing is written after that.
     broken: bool,
 }
 
 impl RrdFile {
-    /// Creates the file, or empties it.
+    /// Begins a file that replaces what is at `path` when it is finished.
     pub(super) fn create(path: &Path) -> Result<Self, RecordingError> {
         let create = |source| RecordingError::Create { path: path.to_owned(), source };
-        let file = BufWriter::new(File::create(path).map_err(create)?);
-        let encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, file);
-        let encoder = encoder.map_err(|source| failure(path, source)).inspect_err(|_| discard(path))?;
-        Ok(Self { path: path.to_owned(), encoder, broken: false })
+        let (file, whole) = AtomicFile::create(path).map_err(create)?;
+        Self::begin(path, file, Some(whole))
+    }
+
+    /// Creates the file, or empties it: it grows in its place, so that it outlives the process.
+    pub(super) fn create_growing(path: &Path) -> Result<Self, RecordingError> {
+        let create = |source| RecordingError::Create { path: path.to_owned(), source };
+        let file = File::create(path).map_err(create)?;
+        Self::begin(path, file, None).inspect_err(|_| discard(path))
+    }
+
+    fn begin(path: &Path, file: File, whole: Option<AtomicFile>) -> Result<Self, RecordingError> {
+        let encoder =
+            Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, BufWriter::new(file));
+        let encoder = encoder.map_err(|source| failure(path, whole.is_some(), source))?;
+        Ok(Self { path: path.to_owned(), encoder, whole, broken: false })
     }
 
     /// Leaves no file, unless it was none: a device stays.
     pub(super) fn discard(mut self) {
         self.encoder.do_not_emit_footer();
-        discard(&self.path);
+        if self.whole.is_none() {
+            discard(&self.path);
+        }
     }
 
     /// Appends messages and hands them to the operating system, so that they survive the death of the process.
@@ -39,9 +56,20 @@ impl RrdFile {
         self.attempt(|encoder| messages.iter().try_for_each(|message| encoder.append(message).map(drop)))
     }
 
-    /// Writes the footer.
+    /// Writes the footer, and gives the file its name.
     pub(super) fn finish(&mut self) -> Result<(), RecordingError> {
-        self.attempt(Encoder::finish)
+        self.attempt(Encoder::finish)?;
+        self.whole.take().map_or(Ok(()), AtomicFile::commit).map_err(|source| self.unwritten(source))
+    }
+
+    /// The same of a file that replaces none.
+    pub(super) fn finish_new(&mut self) -> Result<(), RecordingError> {
+        self.attempt(Encoder::finish)?;
+        self.whole.take().map_or(Ok(()), AtomicFile::commit_new).map_err(|source| self.unwritten(source))
+    }
+
+    fn unwritten(&self, source: io::Error) -> RecordingError {
+        RecordingError::Unwritten { path: self.path.clone(), source }
     }
 
     /// Puts a finished recording in its place, whatever became of what was written before.
@@ -72,7 +100,7 @@ impl RrdFile {
             // A message may stand there by half: what came after it could not be read, a footer least of all.
             self.broken = true;
             self.encoder.do_not_emit_footer();
-            failure(&self.path, source)
+            failure(&self.path, self.whole.is_some(), source)
         })
     }
 }
@@ -84,9 +112,11 @@ fn discard(path: &Path) {
     }
 }
 
-pub(super) fn failure(path: &Path, source: EncodeError) -> RecordingError {
+pub(super) fn failure(path: &Path, is_atomic: bool, source: EncodeError) -> RecordingError {
+    let path = path.to_owned();
     match source {
-        EncodeError::Write(source) => RecordingError::Write { path: path.to_owned(), source },
+        EncodeError::Write(source) if is_atomic => RecordingError::Unwritten { path, source },
+        EncodeError::Write(source) => RecordingError::Write { path, source },
         other => other.into(),
     }
 }

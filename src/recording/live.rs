@@ -239,7 +239,7 @@ impl LiveLog {
     ///
     /// [`RecordingError`] where it cannot be encoded or written.
     pub fn complete_to(&self, writer: impl Write, parts: usize) -> Result<(), RecordingError> {
-        let failed = |source| failure(Path::new("that is put together"), source);
+        let failed = |source| failure(Path::new("that is put together"), false, source);
         let encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, writer);
         let mut encoder = encoder.map_err(failed)?;
         let parts = self.batch_from(1, parts.saturating_sub(1));

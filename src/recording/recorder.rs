@@ -90,7 +90,8 @@ pub struct Recorder {
 impl Recorder {
     /// Opens the target and records what stays the same.
     pub fn new(description: &Description, target: Target) -> Result<Self, RecordingError> {
-        let Target { file, live, recording_id, ellipsoids } = target;
+        let Target { file, grows, live, recording_id, ellipsoids } = target;
+        let create = if grows { RrdFile::create_growing } else { RrdFile::create };
         let names: Vec<&str> = description.learners.iter().map(|learner| learner.name.as_str()).collect();
         // Viewers keep one arrangement per application: those of different learners must not meet.
         let application = format!("body-schema-{}-{}", description.scenario, names.join("-"));
@@ -104,7 +105,7 @@ impl Recorder {
             description: description.clone(),
             store: StoreId::recording(ApplicationId::new_or_unknown(application), recording),
             rows: Rows::default(),
-            file: file.as_deref().map(RrdFile::create).transpose()?,
+            file: file.as_deref().map(create).transpose()?,
             file_failure: None,
             live,
             hidden: learners.iter().flat_map(LearnerEntities::hidden).collect(),

@@ -42,19 +42,13 @@ pub fn examine(path: &Path) -> Result<Condition, RecordingError> {
 pub fn restore(path: &Path, out: &Path) -> Result<Condition, RecordingError> {
     // Before anything is created: what is no recording leaves no file.
     examine(path)?;
-    File::create_new(out).map_err(|source| RecordingError::Create { path: out.to_owned(), source })?;
-    let mut file = RrdFile::create(out)?;
-    let written = read(path, |messages| file.append(messages)).and_then(|condition| {
-        file.finish()?;
-        Ok(condition)
-    });
-    match written {
-        Ok(condition) => Ok(condition),
-        Err(error) => {
-            file.discard();
-            Err(error)
-        }
+    if out.symlink_metadata().is_ok() {
+        return Err(RecordingError::Create { path: out.to_owned(), source: std::io::ErrorKind::AlreadyExists.into() });
     }
+    let mut file = RrdFile::create(out)?;
+    let condition = read(path, |messages| file.append(messages))?;
+    file.finish_new()?;
+    Ok(condition)
 }
 
 fn read(path: &Path, take: impl FnMut(&[LogMsg]) -> Result<(), RecordingError>) -> Result<Condition, RecordingError> {

@@ -8,15 +8,17 @@ use super::{EllipsoidSize, LiveLog};
 #[derive(Clone, Default)]
 pub struct Target {
     pub(super) file: Option<PathBuf>,
+    /// Whether the file grows in its place.
+    pub(super) grows: bool,
     pub(super) live: Option<LiveLog>,
     pub(super) recording_id: Option<String>,
     pub(super) ellipsoids: EllipsoidSize,
 }
 
 impl Target {
-    /// A file, by convention `.rrd`. It is replaced if it exists.
+    /// A file, by convention `.rrd`. It has its name only once it is finished, and replaces then what was there.
     pub fn file(path: impl Into<PathBuf>) -> Self {
-        Self::default().and_file(path)
+        Self { file: Some(path.into()), ..Self::default() }
     }
 
     /// A log that viewers follow.
@@ -24,9 +26,9 @@ impl Target {
         Self { live: Some(log), ..Self::default() }
     }
 
-    /// Also a file.
+    /// Also a file, which grows in its place: what was written outlives the process. It is replaced if it exists.
     pub fn and_file(mut self, path: impl Into<PathBuf>) -> Self {
-        self.file = Some(path.into());
+        (self.file, self.grows) = (Some(path.into()), true);
         self
     }
 

@@ -1,6 +1,6 @@
 //! Recorded measurements, read from CSV.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use crate::{
     sensing::Observation,
@@ -17,6 +17,8 @@ pub struct Measurements {
     pub observations: Vec<Observation>,
     /// The line of its file that each row stands on, counted from 1.
     pub lines: Vec<usize>,
+    /// By row its file; empty where all rows are from one.
+    pub files: Vec<Arc<str>>,
     /// By row its number in its file, from 0; lines on which nothing was measured are counted.
     pub numbers: Vec<usize>,
     /// By row the socket in which a target was held: its number among the robot's sockets, those that are held out after the
@@ -91,8 +93,10 @@ impl Measurements {
         self.configurations.len()
     }
 
-    /// Adds the rows of another file with the same columns.
-    pub(super) fn append(&mut self, other: Self) {
+    /// Adds the rows of another file with the same columns; the two are called so.
+    pub(super) fn append(&mut self, other: Self, names: [&str; 2]) {
+        let [first, second] = names.map(Arc::from);
+        self.files = [vec![first; self.rows()], vec![second; other.rows()]].concat();
         self.configurations.extend(other.configurations);
         self.observations.extend(other.observations);
         self.lines.extend(other.lines);

@@ -43,6 +43,7 @@ impl Scenario {
         };
         let evidence = Evidence {
             lines: &measurements.lines,
+            files: &measurements.files,
             configurations: &measurements.configurations,
             targets: self.seen(measurements),
             sockets: held_in.filter(|sockets| !sockets.is_empty()),

@@ -49,7 +49,7 @@
 //!
 //! # Errors
 //!
-//! [`TableError`] names line and column. What is no text, what is longer than [`MOST_BYTES`], two columns with one title, a
+//! [`TableError`] names line and column. What is no text, what is longer than [`MOST_BYTES`] or has more than [`MOST_ROWS`], two columns with one title, a
 //! line with too few or too many cells, and what is no finite number are refused as soon as they are seen.
 
 mod absent;
@@ -60,6 +60,7 @@ mod names;
 mod reading;
 mod rows;
 mod titles;
+mod writer;
 
 pub(crate) use absent::is_absent;
 pub use error::TableError;
@@ -67,5 +68,6 @@ pub use guard::{Guard, MOST_BYTES};
 pub(crate) use names::split;
 pub use names::{Component, Title};
 pub use reading::{Layout, Reading, Rotation};
-pub use rows::{Columns, Row, Rows, Table};
+pub use rows::{Columns, MOST_ROWS, Row, Rows, Table};
 pub use titles::{Column, Quantity, Titles};
+pub use writer::Writer;

@@ -11,8 +11,12 @@ use super::{
     absent::is_absent,
     lines::Lines,
     titles::{JOINT, READING, number},
+    writer::unguarded,
 };
 use crate::sensing::Observation;
+
+/// The most rows that are read of a table.
+pub const MOST_ROWS: usize = 1_000_000;
 
 /// A table whose titles have been read.
 #[derive(Debug)]
@@ -69,7 +73,7 @@ impl<R: Read> Table<R> {
     pub fn rows(self, columns: Columns) -> Rows<R> {
         let traces = vec![Trace::default(); self.titles.all().len()];
         let Self { reader, titles } = self;
-        Rows { reader, titles, columns, record: csv::StringRecord::new(), traces, failed: false }
+        Rows { reader, titles, columns, record: csv::StringRecord::new(), traces, rows: 0, failed: false }
     }
 }
 
@@ -82,6 +86,7 @@ pub struct Rows<R> {
     record: csv::StringRecord,
     /// By column.
     traces: Vec<Trace>,
+    rows: usize,
     failed: bool,
 }
 
@@ -157,7 +162,10 @@ impl<R: Read> Rows<R> {
             line,
             positions: joints.iter().map(|column| value(column, JOINT)).collect::<Result<_, TableError>>()?,
             observation: Observation { readings: readings.iter().map(reading).collect::<Result<_, _>>()? },
-            labels: labels.iter().map(|index| self.record.get(*index).unwrap_or_default().to_owned()).collect(),
+            labels: labels
+                .iter()
+                .map(|index| unguarded(self.record.get(*index).unwrap_or_default()).to_owned())
+                .collect(),
         })
     }
 }
@@ -171,7 +179,12 @@ impl<R: Read> Iterator for Rows<R> {
         }
         let row = match self.reader.read_record(&mut self.record) {
             Ok(false) => return None,
+            Ok(true) if self.rows == MOST_ROWS => {
+                let what = format!("has more than {MOST_ROWS} rows, the most that are read");
+                Err(TableError::new(what, "take fewer, as every tenth: rows that are alike teach little"))
+            }
             Ok(true) => {
+                self.rows += 1;
                 self.record.iter().zip(&mut self.traces).for_each(|(cell, trace)| trace.add(cell));
                 self.row()
             }

@@ -7,6 +7,7 @@ use super::{
     absent::is_absent,
     error::AS_TEXT,
     names::{NAME, split},
+    writer::unguarded,
 };
 use crate::{
     kinematics::JointKind,
@@ -63,7 +64,7 @@ pub struct Titles {
 
 impl Titles {
     pub(super) fn new(record: &csv::StringRecord) -> Result<Self, TableError> {
-        Self::listed(record.iter().map(str::to_owned).collect())
+        Self::listed(record.iter().map(|title| unguarded(title).to_owned()).collect())
     }
 
     /// Of a list of titles.

@@ -3,7 +3,7 @@
 
 use std::{
     path::Path,
-    process::{Command, Output, Stdio},
+    process::{Child, Command, Output, Stdio},
     time::{Duration, Instant},
 };
 
@@ -26,14 +26,32 @@ fn interrupted(folder: &Path, signal: &str, more: &[&str]) -> Output {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
+    // Under names of their own until they are whole.
+    let lengths = || std::fs::read_dir(folder).expect("a folder").map(|entry| entry.and_then(|it| it.metadata()));
+    wait("steps", || lengths().filter(|file| file.as_ref().is_ok_and(|file| file.len() > 20_000)).count() >= 2);
+    send(&program, signal);
+    program.wait_with_output().expect("it ends")
+}
+
+fn wait(what: &str, mut is_there: impl FnMut() -> bool) {
     let begun = Instant::now();
-    while std::fs::metadata(file("run.csv")).map_or(0, |csv| csv.len()) < 20_000 {
-        assert!(begun.elapsed() < SOON, "it makes no steps");
+    while !is_there() {
+        assert!(begun.elapsed() < SOON, "there are no {what}");
         std::thread::sleep(Duration::from_millis(10));
     }
+}
+
+fn send(program: &Child, signal: &str) {
     let sent = Command::new("kill").args([&format!("-{signal}"), &program.id().to_string()]).status();
     assert!(sent.expect("kill").success());
-    program.wait_with_output().expect("it ends")
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("a folder");
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.expect("an entry").file_name().into_string().expect("text")).collect();
+    names.sort();
+    names
 }
 
 fn is_finished(recording: &[u8]) -> bool {
@@ -56,7 +74,50 @@ fn a_run_that_is_asked_to_end_leaves_complete_files_and_says_where_it_was() {
         assert!(DecoderApp::decode_eager(std::io::Cursor::new(recording)).expect("a recording").all(|m| m.is_ok()));
         let table = std::fs::read_to_string(folder.path().join("run.csv")).expect("the table");
         assert!(table.lines().last().expect("rows").starts_with(&format!("{steps},")), "{signal}");
+        assert_eq!(names(folder.path()), ["run.csv", "run.json", "run.rrd"]);
     }
+}
+
+#[test]
+fn what_is_asked_to_end_leaves_nothing_that_is_not_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
+    let (part, export) = (file("part"), file("export"));
+    let compare = ["compare", "arm-6dof", "--seeds", "1000", "--steps", "100000", "--shard", "1/1", "--part", &part];
+    let commands: [&[&str]; 2] =
+        [&compare, &["export", "arm-12dof", "--seed", "1..200", "--steps", "1000", "--out", &export]];
+    for (command, (signal, code)) in commands.into_iter().zip([("INT", 130), ("TERM", 143)]) {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_body-schema"))
+            .args(command)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        wait("files", || names(folder.path()).iter().any(|name| name.ends_with(".unfinished")));
+        send(&program, signal);
+        assert_eq!(program.wait().expect("it ends").code(), Some(code), "{command:?}");
+        assert_eq!(names(folder.path()), [""; 0], "{command:?}");
+    }
+}
+
+/// As `nohup` has it.
+#[test]
+fn a_terminal_that_goes_ends_nothing_that_was_started_to_stay() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let part = folder.path().join("part");
+    let mut program = Command::new("sh")
+        .args(["-c", "trap '' HUP; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_body-schema")])
+        .args(["compare", "arm-6dof", "--seeds", "1000", "--steps", "100000", "--shard", "1/1", "--part"])
+        .arg(&part)
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    wait("files", || !names(folder.path()).is_empty());
+    send(&program, "HUP");
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(program.try_wait().expect("a program").is_none(), "it has ended");
+    send(&program, "INT");
+    assert_eq!(program.wait().expect("it ends").code(), Some(130));
 }
 
 #[test]

@@ -174,9 +174,14 @@ fn outliers(document: &mut Document, report: &Report) {
         "Rows that are likelier outliers than not, by the residuals of their readings. They hardly count in the fit; what is off by more than ten times the median counts in no figure of errors either:",
     );
     let row = |outlier: &crate::calibration::Outlier| {
-        [outlier.row.to_string(), outlier.line.to_string(), format!("{:.3}", outlier.probability)]
+        [outlier.row.to_string(), line(outlier.line, outlier.file.as_deref()), format!("{:.3}", outlier.probability)]
     };
     document.table(0, ["row", "line of the file", "probability"], report.outliers.iter().map(row));
+}
+
+/// A line of the file; of which, where there is more than one.
+fn line(number: usize, file: Option<&str>) -> String {
+    file.map_or_else(|| number.to_string(), |file| format!("{number} of {file}"))
 }
 
 fn noise(document: &mut Document, report: &Report) {
@@ -388,7 +393,7 @@ fn readings(document: &mut Document, report: &Report) {
     let row = |it: &Reading| {
         [
             it.row.to_string(),
-            it.line.to_string(),
+            line(it.line, it.file.as_deref()),
             it.sensor.clone(),
             if it.held_out { "yes" } else { "no" }.to_owned(),
             it.chosen.map_or_else(String::new, |place| place.to_string()),

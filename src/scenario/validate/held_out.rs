@@ -48,7 +48,7 @@ impl Check<'_> {
             (None, Some(held_out), None, None, None) => self.drawn("held_out.count", held_out, count)?,
             (None, None, Some(by), None, None) => self.by_label(by, given.train.as_ref(), rows)?,
             (None, None, None, Some(held_out), None) => self.told(held_out, &rows.numbers)?,
-            (None, None, None, None, Some(file)) => self.second_file(file, rows, read)?,
+            (None, None, None, None, Some(file)) => self.second_file(file, raw, rows, read)?,
             _ => {
                 let mend = "write one of `folds = 5`, `by = \"place\"` with `train = […]`, `rows = […]`, `file = \"…\"` and \
                             `count = 7`; `rows = []` holds nothing out";
@@ -149,6 +149,7 @@ impl Check<'_> {
     fn second_file(
         &mut self,
         file: &Spanned<String>,
+        raw: &raw::Scenario,
         rows: &mut Measurements,
         read: &dyn Fn(&str) -> Result<Measurements, TableError>,
     ) -> Option<HeldOutRule> {
@@ -161,7 +162,8 @@ impl Check<'_> {
             self.problem(file.span(), "held_out.file", format!("{name} {what}"), mend);
         });
         let (first, more) = (rows.rows(), more.ok()?);
-        rows.append(more);
+        let trained = raw.measurements.as_ref().map_or("", |given| given.get_ref().file.get_ref().as_str());
+        rows.append(more, [trained, name]);
         Some(HeldOutRule::Rows((first..rows.rows()).collect()))
     }
 }

@@ -202,8 +202,10 @@ impl Check<'_> {
         }
         let raw = &raw;
         let name = raw.name.get_ref();
-        if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
-            let mend = "use letters, digits, '-', '_' and '.'; the name becomes part of file names and addresses";
+        let is_plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c));
+        if name.is_empty() || !is_plain || name.starts_with(['.', '-']) {
+            let mend = "use letters, digits, '-', '_' and '.', the first a letter, a digit or '_'; the name becomes part of file names \
+                        and addresses";
             self.problem(raw.name.span(), "name", format!("{name:?} cannot be a name"), mend);
         }
         let mut robot = self.robot(raw)?;

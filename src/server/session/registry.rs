@@ -104,8 +104,8 @@ impl Sessions {
         Ok(Arc::new(Self {
             all: Mutex::default(),
             known: Mutex::new(known),
-            permits: Arc::new(Semaphore::new(limits.sessions)),
-            places: Arc::new(Semaphore::new(limits.sessions)),
+            permits: Arc::new(Semaphore::new(limits.sessions.min(Semaphore::MAX_PERMITS))),
+            places: Arc::new(Semaphore::new(limits.sessions.min(Semaphore::MAX_PERMITS))),
             budget: Arc::new(budget),
             metrics,
             store: Arc::new(store),
