@@ -354,6 +354,18 @@ fn what_never_ends_is_refused_at_once() {
 }
 
 #[test]
+fn several_learners_are_named_with_commas_or_one_by_one() {
+    let compared = |learners: &[&str]| {
+        let output = body_schema(&[&["compare", "arm-6dof", "--seeds", "1", "--steps", "1"], learners].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let rows = String::from_utf8(output.stdout).expect("text");
+        ["random", "gradient", "active"].map(|learner| rows.contains(&format!("| {learner} ")))
+    };
+    assert_eq!(compared(&["--learner", "random,gradient"]), [true, true, false]);
+    assert_eq!(compared(&["--learner", "random", "--learner", "gradient"]), [true, true, false]);
+}
+
+#[test]
 fn a_sweep_ranks_by_the_learners_own_median() {
     let trials = json(&[
         "sweep",

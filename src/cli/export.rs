@@ -31,8 +31,8 @@ pub struct Arguments {
     /// The folder to write; an earlier export in it is replaced
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// A learner, or estimator:policy, as in smoother:random; repeat for several [default: those that the explorer compares]
-    #[arg(long = "learner", value_name = "NAME")]
+    /// A learner, or estimator:policy, as in smoother:random; commas or repeating for several [default: those that the explorer compares]
+    #[arg(long = "learner", value_name = "NAME", value_delimiter = ',')]
     learners: Vec<String>,
     /// Seeds to record: numbers and ranges with both ends, as 1,4 or 1..5
     #[arg(long = "seed", value_name = "SEEDS", value_delimiter = ',', default_value = "1")]

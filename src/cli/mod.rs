@@ -92,9 +92,9 @@ struct ScenarioArguments {
     /// A built-in scenario (see `body-schema scenarios`) or the path of a scenario file
     #[arg(value_name = "SCENARIO")]
     scenario: String,
-    /// A learner of the scenario, or estimator:policy, as in smoother:random; repeat for several [default: the scenario's
+    /// A learner of the scenario, or estimator:policy, as in smoother:random; commas or repeating for several [default: the scenario's
     /// main ones]
-    #[arg(long = "learner", value_name = "NAME")]
+    #[arg(long = "learner", value_name = "NAME", value_delimiter = ',')]
     learners: Vec<String>,
 }
 
