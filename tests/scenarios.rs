@@ -196,7 +196,8 @@ fn contradictions_are_refused() {
     let (problem, _) = one(ARM, "name = \"gradient\"", "name = \"world\"");
     assert_eq!(problem.key, "learner[2].name");
     let found = problems(&ARM.replace("learn_marker = false", "learn_marker = true"), Err("none"));
-    let keys: Vec<&str> = found.iter().map(|problem| problem.key.as_str()).collect();
+    let mut keys: Vec<&str> = found.iter().map(|problem| problem.key.as_str()).collect();
+    keys.sort_unstable();
     assert_eq!(keys, ["initial_error.marker_m", "prior.marker_m"]);
     let both =
         format!("{ARM}\n[measurements]\nfile = \"a.csv\"\nmarker_columns_m = [\"x\", \"y\", \"z\"]\nheld_out = 3\n");
