@@ -13,11 +13,11 @@ use crate::{
     scenario::Scenario,
 };
 
-const UR10: &str = include_str!("../../../scenarios/ur10.urdf");
-const PANDA: &str = include_str!("../../../scenarios/panda.urdf");
-const GEN3LITE: &str = include_str!("../../../scenarios/gen3lite.urdf");
-const TIAGO: &str = include_str!("../../../scenarios/tiago.urdf");
-const TALOS: &str = include_str!("../../../scenarios/talos.urdf");
+const UR10: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/ur10.urdf"));
+const PANDA: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/panda.urdf"));
+const GEN3LITE: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/gen3lite.urdf"));
+const TIAGO: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/tiago.urdf"));
+const TALOS: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/talos.urdf"));
 
 /// Ten arms: a URDF, from where to where.
 const ARMS: [(&str, &str, &str); 10] = [
