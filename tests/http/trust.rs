@@ -168,7 +168,7 @@ async fn sessions_are_listed_by_pages() {
     {
         problem(server.get(&format!("/v1/sessions?{query}")).await, 400, Some(field)).await;
     }
-    problem(server.get(&format!("/v1/sessions?after={}", uuid_of_nobody())).await, 400, Some("after")).await;
+    problem(server.get(&format!("/v1/sessions?after={}", uuid_of_nobody())).await, 404, Some("after")).await;
     server.stop().await;
 }
 

@@ -106,7 +106,8 @@ fn all<S: Serializer>(reports: &[Arc<RawValue>], serializer: S) -> Result<S::Ok,
     ),
     responses(
         (status = 200, description = "Sessions; `next` is there if there are more", body = SessionList),
-        (status = 400, description = "A parameter is none of those, or there is no session `after`", body = Problem),
+        (status = 400, description = "A parameter is none of those", body = Problem),
+        (status = 404, description = "There is no session `after`", body = Problem),
         (status = 500, description = "The sessions with robots elsewhere cannot be read", body = Problem),
     )
 )]

@@ -91,7 +91,7 @@ fn report<S: serde::Serializer>(report: &Arc<RawValue>, serializer: S) -> Result
     params(
         ("id" = String, Path, description = "The session's id", format = "uuid"),
         ("Last-Event-ID" = Option<String>, Header, description = "The id of the last event seen; browsers send it when they reconnect",
-            pattern = "^([0-9]+:)?[0-9]+$"),
+            pattern = "^([0-9]{1,15}:)?[0-9]{1,15}$"),
     ),
     responses(
         (status = 200, description = "Events whose data is a StepReport. The id is its step, behind `N:` where the history was rewritten N times. \

@@ -308,7 +308,7 @@ impl Sessions {
                 1 + found.ok_or_else(|| {
                     let detail =
                         format!("there is no session `{after}` after which to go on; begin anew without `after`");
-                    Problem::new(Kind::Malformed, detail).field("after")
+                    Problem::new(Kind::UnknownSession, detail).field("after")
                 })?
             }
         };
