@@ -91,7 +91,7 @@ fn a_real_robot_is_predicted_better_where_its_axes_are_learned() {
     assert!(run.says("59 postures") && run.says("misses by a third less"));
     let places = ["active", "nominal"].map(|name| run.place(name));
     let movements = run.experiment.remaining().expect("a table");
-    let report = run.to(movements);
+    let report = run.to(movements as u64);
     let [learned, described] = places.map(|place| report.learners[place].metrics.prediction_mean_m.expect("held out"));
     assert!((0.6..0.72).contains(&(learned / described)), "{learned} of {described}");
 }
