@@ -400,7 +400,8 @@ fn no_sentence_of_a_report_contradicts_another() {
         let scenario = builtin(name).expect("built in");
         let case = Case::new(&scenario).expect("measured");
         let calibration = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
-        let files = report::files(&calibration, &case);
+        let mut files = calibration.files(&case).expect("written");
+        files.extend(report::files(&calibration, &case));
         let text = |path: &str| files.iter().find(|file| file.path == path).expect(path).text.clone();
         let json: serde_json::Value = serde_json::from_str(&text("report.json")).expect("JSON");
         let (markdown, Calibration { report, .. }) = (text("report.md"), &calibration);
