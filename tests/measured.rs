@@ -453,14 +453,15 @@ fn no_sentence_of_a_report_contradicts_another() {
         }
         let parts = more.from_parameters_mm.expect("told").hypot(more.model_error_mm);
         assert!((parts - expected).abs() < 1e-9 * expected, "{name}: {more:?}");
+        // A direction that rows do not tell is named, and only then.
+        let undetermined = report.parameters.learned - report.parameters.rank;
+        assert_eq!(report.parameters.undetermined.is_empty(), undetermined == 0, "{name}: {:?}", report.parameters);
         // Coverage warns where its interval says so, and nowhere else.
-        let coverage = report.coverage.as_ref().expect("rows are held out");
+        // How far a target scatters in sockets is one number a place.
+        let Some(coverage) = &report.coverage else { continue };
         let warned = report.doubts.iter().any(|doubt| doubt.contains("held-out readings lie within"));
         assert_eq!(warned, !(coverage.low..=coverage.high).contains(&0.95), "{name}: {coverage:?}");
         let share = format!("{:.0}\u{a0}%", 100.0 * coverage.share);
         assert!(markdown.contains(&share) || markdown.contains(&share.replace('\u{a0}', " ")), "{name}: {share}");
-        // A direction that rows do not tell is named, and only then.
-        let undetermined = report.parameters.learned - report.parameters.rank;
-        assert_eq!(report.parameters.undetermined.is_empty(), undetermined == 0, "{name}: {:?}", report.parameters);
     }
 }
