@@ -48,7 +48,8 @@ pub fn repair(arguments: &Arguments) -> Result<()> {
     let Arguments { path, out, check } = arguments;
     Outputs::default().file("--out", out.as_deref()).check(std::slice::from_ref(path))?;
     if let Some(out) = out.as_ref().filter(|out| out.symlink_metadata().is_ok()) {
-        bail!("{} is there already; remove it, or name another file with --out", out.display());
+        let out = out.display();
+        return Err(BadInput(format!("{out} is there already; remove it, or name another file with --out")).into());
     }
     let findings = match fs::metadata(path) {
         Err(error) => return Err(BadInput(format!("cannot look at {}: {error}", path.display())).into()),

@@ -183,7 +183,7 @@ async fn the_recordings_of_a_killed_server_are_mended() {
     assert_eq!(repair(&cut, &["--out", to]).0, 0);
     assert_eq!(fs::read(&cut).expect("as it was").len(), whole.len() * 2 / 3);
     assert!(fs::read(&out).expect("mended").windows(4).rev().take(64).any(|tail| tail == b"FOOT"));
-    assert_eq!(repair(&cut, &["--out", to]).0, 1, "nothing is overwritten");
+    assert_eq!(repair(&cut, &["--out", to]).0, 2, "nothing is overwritten");
     fs::write(&cut, "no recording").expect("written");
     let (code, said) = repair(&cut, &[]);
     assert!(code == 1 && said.contains("lost") && fs::read(&cut).expect("as it was") == b"no recording", "{said}");
