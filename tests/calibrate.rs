@@ -1,6 +1,9 @@
 //! Calibration as a user meets it: files in, files out.
 #![cfg(feature = "app")]
 
+#[path = "calibrate/sentences.rs"]
+mod sentences;
+
 use std::{
     path::Path,
     process::{Command, Output},

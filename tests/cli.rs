@@ -5,6 +5,8 @@
 mod bounds;
 #[path = "cli/closed.rs"]
 mod closed;
+#[path = "cli/heard.rs"]
+mod heard;
 #[path = "cli/inputs.rs"]
 mod inputs;
 #[path = "cli/interrupted.rs"]

@@ -24,6 +24,8 @@ mod errors;
 mod exported;
 #[path = "http/faults.rs"]
 mod faults;
+#[path = "cli/heard.rs"]
+mod heard;
 #[path = "http/logs.rs"]
 mod logs;
 #[path = "http/metrics.rs"]

@@ -83,6 +83,15 @@ enum Kind {
     Exact,
 }
 
+/// Puts the origins of joints off, by these standard deviations of each coordinate.
+fn put_off(chain: &mut Chain, shift_m: f64, turn_rad: f64, rng: &mut ChaCha8Rng) {
+    let mut normal = |sd: f64| Vector3::from_fn(|_, _| sd * rng.sample::<f64, _>(StandardNormal));
+    for segment in chain.segments.iter_mut().filter(|segment| segment.kind.moves().is_some()) {
+        let (shift, turn) = (normal(shift_m), normal(turn_rad));
+        segment.origin *= Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn));
+    }
+}
+
 fn made(urdf: String, kind: Kind, seed: u64, rows: usize) -> Made {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut chain = Urdf::parse(&urdf).and_then(|urdf| urdf.chain("base_link", "tool0")).expect("a chain");
@@ -91,11 +100,7 @@ fn made(urdf: String, kind: Kind, seed: u64, rows: usize) -> Made {
         Kind::Right => (0.0, 1.2e-3),
         Kind::Exact => (1.0, 0.0),
     };
-    for segment in chain.segments.iter_mut().filter(|segment| segment.kind.moves().is_some()) {
-        let mut normal = |sd: f64| Vector3::from_fn(|_, _| scale * sd * rng.sample::<f64, _>(StandardNormal));
-        let (shift, turn) = (normal(0.005), normal(0.01));
-        segment.origin *= Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn));
-    }
+    put_off(&mut chain, scale * 0.005, scale * 0.01, &mut rng);
     let joints = chain.moving().count();
     let marker = Point3::new(0.03, 0.02, 0.04);
     let mut draw = |noise: f64| {

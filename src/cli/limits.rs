@@ -115,9 +115,8 @@ fn kibibytes() -> RangedU64ValueParser<usize> {
     RangedU64ValueParser::new().range(1..=1 << 20)
 }
 
-/// More than anybody waits for.
 fn steps() -> RangedU64ValueParser {
-    RangedU64ValueParser::new().range(1..=1_000_000_000)
+    RangedU64ValueParser::new().range(1..=super::MOST_STEPS)
 }
 
 /// As long as a day at most: more is meant as something else.

@@ -114,11 +114,13 @@ impl ScenarioArguments {
     }
 }
 
-/// How many movements: more than so many nobody waits for.
+/// Movements: more nobody waits for.
+const MOST_STEPS: u64 = 1_000_000_000;
+
+/// How many movements.
 fn steps(text: &str) -> Result<u64, String> {
-    const MOST: u64 = 1_000_000_000;
-    let steps = text.parse().ok().filter(|steps| *steps <= MOST);
-    steps.ok_or_else(|| format!("write a number of movements from 0 to {MOST}"))
+    let steps = text.parse().ok().filter(|steps| *steps <= MOST_STEPS);
+    steps.ok_or_else(|| format!("write a number of movements from 0 to {MOST_STEPS}"))
 }
 
 /// A length that robots have to do with.

@@ -25,7 +25,7 @@ use axum::{
 };
 use bytes::Bytes;
 use hyper::{
-    body::Incoming,
+    body::{Body as _, Incoming},
     server::conn::http1,
     service::{Service, service_fn},
 };
@@ -94,7 +94,7 @@ struct Connection {
     phase: watch::Sender<Phase>,
     /// It has to make room.
     evicted: CancellationToken,
-    /// A request was refused before it had come as a whole.
+    /// The last request was refused, maybe before it had come as a whole.
     unread: AtomicBool,
 }
 
@@ -246,12 +246,12 @@ impl Connections {
             let served = Served(asked.clone());
             asked.phase.send_replace(Phase::Busy);
             request.extensions_mut().insert(ConnectInfo(Reached::at(reached)));
+            let has_body = !request.body().is_end_stream();
             let (answering, connection) = (service.call(request), asked.clone());
             async move {
                 let response = answering.await?;
-                if response.status() == StatusCode::PAYLOAD_TOO_LARGE {
-                    connection.unread.store(true, Ordering::Relaxed);
-                }
+                let is_refused = response.status().is_client_error() || response.status().is_server_error();
+                connection.unread.store(has_body && is_refused, Ordering::Relaxed);
                 Ok::<_, Infallible>(response.map(|body| Holding::new(body, served)))
             }
         });

@@ -10,7 +10,7 @@ use std::{
 use re_log_encoding::DecoderApp;
 use serde_json::Value;
 
-use crate::failure;
+use crate::{failure, heard::is_heard};
 
 /// Whatever takes longer than this hangs.
 const SOON: Duration = Duration::from_secs(60);
@@ -56,14 +56,6 @@ fn names(folder: &Path) -> Vec<String> {
 
 fn is_finished(recording: &[u8]) -> bool {
     recording.windows(4).rev().take(64).any(|tail| tail == b"FOOT")
-}
-
-/// Whether programs that are begun here hear of a signal: below `nohup` they are not to hear of HUP.
-fn is_heard(signal: &str) -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).map(str::trim);
-    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask, 16).ok()).unwrap_or(0);
-    signal != "HUP" || ignored & 1 == 0
 }
 
 #[test]

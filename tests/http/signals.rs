@@ -8,18 +8,10 @@ use tokio::{
     net::TcpStream,
 };
 
-use crate::{program::Program, streams::steps_of_recording};
+use crate::{heard::is_heard, program::Program, streams::steps_of_recording};
 
 /// Ending takes five seconds at most; the machine that runs this may be busy.
 const SOON: Duration = Duration::from_secs(8);
-
-/// Whether programs that are begun here hear of a signal: below `nohup` they are not to hear of HUP.
-fn is_heard(signal: &str) -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).map(str::trim);
-    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask, 16).ok()).unwrap_or(0);
-    signal != "HUP" || ignored & 1 == 0
-}
 
 /// Clients that would hold up an end that waits for them.
 async fn stubborn(program: &Program, session: &str) -> Vec<TcpStream> {

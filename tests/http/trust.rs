@@ -238,25 +238,29 @@ async fn a_large_refusal_is_read() {
     let server = Server::start().await;
     let address = server.address;
     let body = "x".repeat(24 << 20);
-    let head = format!(
-        "POST /v1/sessions HTTP/1.1\r\nhost: {address}\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n",
-        body.len()
-    );
-    for _ in 0..5 {
+    let head = |path: &str, bytes: usize| {
+        format!(
+            "POST {path} HTTP/1.1\r\nhost: {address}\r\ncontent-type: application/json\r\ncontent-length: {bytes}\r\n\r\n"
+        )
+    };
+    for (path, status) in
+        [("/v1/sessions", 413); 5].into_iter().chain([("/v1/nowhere", 404), ("/v1/openapi.json", 405)])
+    {
         let mut stream = TcpStream::connect(address).await.expect("a connection");
-        stream.write_all(head.as_bytes()).await.expect("sent");
+        stream.write_all(head(path, body.len()).as_bytes()).await.expect("sent");
         // All of it first, as simple clients do.
         timeout(Duration::from_secs(20), stream.write_all(body.as_bytes())).await.expect("taken").expect("no reset");
         let mut answer = String::new();
         timeout(Duration::from_secs(20), stream.read_to_string(&mut answer)).await.expect("soon").expect("no reset");
-        assert!(answer.starts_with("HTTP/1.1 413"), "{answer}");
+        assert!(answer.starts_with(&format!("HTTP/1.1 {status}")), "{answer}");
     }
     // One who goes on for ever does not hold the connection.
     let mut stream = Blocking::connect(address).expect("a connection");
+    let head = head("/v1/sessions", 99_999_999_999);
     let forever = tokio::task::spawn_blocking(move || {
         use std::io::Write;
         let begun = Instant::now();
-        drop(stream.write_all(head.replace(&body.len().to_string(), "99999999999").as_bytes()));
+        drop(stream.write_all(head.as_bytes()));
         while stream.write_all(&[b'x'; 1 << 16]).is_ok() && begun.elapsed() < Duration::from_secs(30) {}
         drop(stream.shutdown(Shutdown::Both));
         begun.elapsed()

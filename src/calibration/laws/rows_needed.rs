@@ -2,13 +2,14 @@
 
 use std::fmt::Write;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
+use super::put_off;
 use crate::{
-    calibration::{Case, Figures},
+    calibration::{Case, Figures, Fit, MoreRows},
     model::urdf::{Chain, Urdf},
     scenario::Scenario,
 };
@@ -63,11 +64,7 @@ impl Arm {
     fn new((file, base, tip): (&str, &'static str, &'static str), sensor: Sensor, rng: &mut ChaCha8Rng) -> Self {
         let urdf = file.to_owned();
         let mut truth = Urdf::parse(&urdf).and_then(|urdf| urdf.chain(base, tip)).expect("a chain");
-        let mut normal = |sd: f64| Vector3::from_fn(|_, _| sd * rng.sample::<f64, _>(StandardNormal));
-        for segment in truth.segments.iter_mut().filter(|segment| segment.kind.moves().is_some()) {
-            let (shift, turn) = (normal(0.003), normal(0.006));
-            segment.origin *= Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn));
-        }
+        put_off(&mut truth, 0.003, 0.006, rng);
         Self { urdf, ends: (base, tip), truth, sensor }
     }
 
@@ -161,12 +158,16 @@ impl Arm {
     }
 }
 
+/// What is learned from some rows.
+fn fitted(case: &Case<'_>, rows: &[usize]) -> Fit {
+    let nominal = case.nominal(rows).expect("fitted");
+    case.fit(&case.writable(), rows, Some(nominal.state())).expect("fitted")
+}
+
 /// How far the hand is from where it is believed to be, root mean square over postures within the limits, metres.
 fn missed(arm: &Arm, scenario: &Scenario, rng: &mut ChaCha8Rng) -> f64 {
     let case = Case::new(scenario).expect("measured");
-    let rows: Vec<usize> = (0..case.rows.len()).collect();
-    let nominal = case.nominal(&rows).expect("fitted");
-    let fit = case.fit(&case.writable(), &rows, Some(nominal.state())).expect("fitted");
+    let fit = fitted(&case, &(0..case.rows.len()).collect::<Vec<_>>());
     let square = |configuration: Vec<f64>| {
         let truth = arm.at(&configuration) * Point3::from(MARKER);
         (fit.state().marker_at(&configuration) - truth).norm_squared()
@@ -175,17 +176,12 @@ fn missed(arm: &Arm, scenario: &Scenario, rng: &mut ChaCha8Rng) -> f64 {
 }
 
 /// What a report says of it.
-fn said(scenario: &Scenario) -> crate::calibration::MoreRows {
+fn said(scenario: &Scenario) -> MoreRows {
     let case = Case::new(scenario).expect("measured");
     let splits = case.splits(None).expect("folds");
-    let fitted = |rows: &[usize]| {
-        let nominal = case.nominal(rows).expect("fitted");
-        case.fit(&case.writable(), rows, Some(nominal.state())).expect("fitted")
-    };
-    let rows: Vec<usize> = (0..case.rows.len()).collect();
-    let fit = fitted(&rows);
+    let fit = fitted(&case, &(0..case.rows.len()).collect::<Vec<_>>());
     let residuals: Vec<_> =
-        splits.iter().flat_map(|split| case.residuals(&fitted(&split.training), &split.held_out)).collect();
+        splits.iter().flat_map(|split| case.residuals(&fitted(&case, &split.training), &split.held_out)).collect();
     let figures = Figures::of(&residuals);
     let share = 1.0 - 1.0 / splits.len() as f64;
     case.more_rows(&fit, &case.asked_about(fit.state(), &splits), Some((&figures, share)), (&case.noise(&fit), None))

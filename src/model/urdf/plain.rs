@@ -15,7 +15,11 @@ const MARK: char = '\u{feff}';
 /// The text with [`COLON`] for the colons in names of elements and attributes, with blanks for the declaration of XML, for a
 /// `<!DOCTYPE>` without entities and for byte order marks behind the first, and without the hyphens in comments. Every byte of the rest is what and where it was, and so are
 /// all ends of lines.
-pub fn plain(text: &str) -> Cow<'_, str> {
+///
+/// # Errors
+///
+/// Where a tag begins that has more than `most` attributes: a parser compares each with all others.
+pub fn plain(text: &str, most: usize) -> Result<Cow<'_, str>, usize> {
     let mut plain = String::with_capacity(text.len());
     let (mut done, mut is_within) = (0, false);
     while let Some(at) = text[done..].find('<').map(|at| done + at) {
@@ -48,50 +52,17 @@ pub fn plain(text: &str) -> Cow<'_, str> {
             doctype(rest, &mut plain)
         } else {
             is_within = true;
-            tag(rest, &mut plain)
+            let (length, attributes) = tag(rest, &mut plain);
+            if attributes > most {
+                return Err(at);
+            }
+            length
         };
         done = at + length;
     }
     plain.push_str(&text[done..]);
     debug_assert_eq!(plain.len(), text.len());
-    if plain == text { Cow::Borrowed(text) } else { Cow::Owned(plain) }
-}
-
-/// Where a tag begins that has more attributes than `most`, if one does: what looks for one of them, and for two of a name, goes through
-/// all. In a text that is [plain].
-pub fn crowded(plain: &str, most: usize) -> Option<usize> {
-    let mut done = 0;
-    while let Some(at) = plain[done..].find('<').map(|at| done + at) {
-        let rest = &plain[at..];
-        let skipped = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")].into_iter().find_map(|(start, end)| {
-            let found = rest.strip_prefix(start)?.find(end);
-            Some(found.map_or(rest.len(), |found| start.len() + found + end.len()))
-        });
-        let length = match skipped {
-            Some(length) => length,
-            None => {
-                let (mut quote, mut count, mut length) = (None, 0, rest.len());
-                for (at, byte) in rest.bytes().enumerate() {
-                    match (quote, byte) {
-                        (None, b'"' | b'\'') => quote = Some(byte),
-                        (None, b'=') => count += 1,
-                        (None, b'>') => {
-                            length = at + 1;
-                            break;
-                        }
-                        (Some(open), _) if open == byte => quote = None,
-                        _ => {}
-                    }
-                }
-                if count > most {
-                    return Some(at);
-                }
-                length
-            }
-        };
-        done = at + length;
-    }
-    None
+    Ok(if plain == text { Cow::Borrowed(text) } else { Cow::Owned(plain) })
 }
 
 /// What stands between markup before the first element. A byte order mark that begins the text is left to the parser.
@@ -134,9 +105,9 @@ fn comment(text: &str, plain: &mut String) {
     }
 }
 
-/// A tag, up to the `>` that ends it; how long it is.
-fn tag(text: &str, plain: &mut String) -> usize {
-    let mut quote = None;
+/// A tag, up to the `>` that ends it; how long it is, and how many attributes it has.
+fn tag(text: &str, plain: &mut String) -> (usize, usize) {
+    let (mut quote, mut attributes) = (None, 0);
     for (at, c) in text.char_indices() {
         match (quote, c) {
             (None, ':') => {
@@ -144,15 +115,16 @@ fn tag(text: &str, plain: &mut String) -> usize {
                 continue;
             }
             (None, '"' | '\'') => quote = Some(c),
+            (None, '=') => attributes += 1,
             (Some(open), _) if open == c => quote = None,
             _ => {}
         }
         plain.push(c);
         if quote.is_none() && c == '>' {
-            return at + 1;
+            return (at + 1, attributes);
         }
     }
-    text.len()
+    (text.len(), attributes)
 }
 
 #[cfg(test)]
@@ -175,9 +147,9 @@ mod tests {
             ("<r a:b='c", "<r a.b='c"),
             ("<!-- a--", "<!-- a--"),
         ] {
-            assert_eq!(plain(text), wanted, "{text}");
+            assert_eq!(plain(text, 9).expect("few attributes"), wanted, "{text}");
         }
-        assert!(matches!(plain("<robot name=\"a:b\"/>"), Cow::Borrowed(_)));
+        assert!(matches!(plain("<robot name=\"a:b\"/>", 9), Ok(Cow::Borrowed(_))));
     }
 
     #[test]
@@ -190,14 +162,14 @@ mod tests {
             (format!("<!-- <a{}/> --><r b='<a c=\"1\" d=\"2\" e=\"3\" f=\"4\"'/>", many(4)), None),
             (format!("<r{}", many(9)), Some(0)),
         ] {
-            assert_eq!(crowded(&text, 3), wanted, "{text}");
+            assert_eq!(plain(&text, 3).err(), wanted, "{text}");
         }
     }
 
     proptest! {
         #[test]
         fn no_byte_moves(text in "[<>!?\\-:'\"=a \n\u{feff}é\\[\\]]{0,60}|(<\\?xml|<!--|-->|<a:b |>|\\?>|\u{feff}|é){0,12}") {
-            let plain = plain(&text);
+            let plain = plain(&text, usize::MAX).expect("as many as there are");
             prop_assert_eq!(plain.len(), text.len());
             prop_assert_eq!(plain.matches('\n').count(), text.matches('\n').count());
         }

@@ -7,14 +7,14 @@ use roxmltree::{Document, Error, Node, ParsingOptions};
 use super::{
     UrdfError,
     element::Body,
-    plain::{COLON, crowded, plain},
+    plain::{COLON, plain},
     values::{EXPAND, error, only_child, required},
 };
 use crate::{kinematics::JointKind, similar::similar};
 
 /// More elements than any robot has.
 const MOST_NODES: u32 = 2_000_000;
-/// Attributes of an element: the parser compares each with all others.
+/// Attributes of an element.
 const MOST_ATTRIBUTES: usize = 200;
 /// Bytes of a link's or a joint's name: it is told with every reading.
 const MOST_NAME_BYTES: usize = 300;
@@ -90,11 +90,10 @@ impl Urdf {
     /// [`UrdfError`] where the text is no XML, its links and joints are xacro, or they form no tree.
     pub fn parse(text: &str) -> Result<Self, UrdfError> {
         let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
-        let strict = plain(text);
-        if let Some(at) = crowded(&strict, MOST_ATTRIBUTES) {
+        let strict = plain(text, MOST_ATTRIBUTES).map_err(|at| {
             let what = format!("this element has more than {MOST_ATTRIBUTES} attributes");
-            return Err(UrdfError::at(text, at, what, "leave out those that are none of a URDF's"));
-        }
+            UrdfError::at(text, at, what, "leave out those that are none of a URDF's")
+        })?;
         let document = Document::parse_with_options(&strict, options).map_err(|found| no_xml(text, &found))?;
         let robot = document.root_element();
         if robot.tag_name().name() != "robot" {

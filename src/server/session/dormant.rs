@@ -129,10 +129,7 @@ impl Sessions {
         }
         let known = Arc::new(Known::new(Uuid::new_v4(), now_s()));
         let origin = Origin::New(Setup { calibration, agent, seed }, Shown { ellipsoids }, events);
-        if !self.budget.has_room() {
-            let detail = "the sessions together fill the server's memory; delete some and ask again";
-            return Err(Problem::new(Kind::ServerFull, detail));
-        }
+        self.budget.check()?;
         let session = self.begin(&known, origin).await?;
         tracing::info!(request = requests::id(), session = %session.id, "a session with a robot elsewhere was opened");
         lock(&self.known).push(known);
@@ -407,11 +404,12 @@ fn summed_up(store: &Store, id: Uuid) -> Result<Option<SessionResource>, String>
     let (Summary { description, channels }, step) = match noted {
         Some(noted) => noted,
         None => {
-            let Some(Stored { setup, events, .. }) = store.load(id).map_err(told)? else { return Ok(None) };
-            let session = ask_tell::Session::replay(setup, Vec::new()).map_err(|error| error.to_string())?;
-            let (summary, step) = (Summary::of(&session), counted(&events));
+            let Some(stored) = store.load(id).map_err(told)? else { return Ok(None) };
+            let step = stored.counted();
+            let session = ask_tell::Session::replay(stored.setup, Vec::new()).map_err(|error| error.to_string())?;
+            let summary = Summary::of(&session);
             // It is found out again where it cannot be noted.
-            drop(store.note(id, &summary.text(), step));
+            drop(store.note(id, &summary.text(), &stored.events));
             (summary, step)
         }
     };
@@ -428,20 +426,4 @@ fn summed_up(store: &Store, id: Uuid) -> Result<Option<SessionResource>, String>
         status: None,
         channels,
     }))
-}
-
-/// How many observations of these events count.
-fn counted(events: &[ask_tell::Event]) -> u64 {
-    use ask_tell::Happened;
-    let mut excluded = std::collections::BTreeSet::new();
-    let mut told = 0;
-    for event in events {
-        match &event.happened {
-            Happened::Observed { .. } => told += 1,
-            Happened::Excluded { observation } => drop(excluded.insert(*observation)),
-            Happened::Included { observation } => drop(excluded.remove(observation)),
-            _ => {}
-        }
-    }
-    told - excluded.len() as u64
 }

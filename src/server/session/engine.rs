@@ -215,7 +215,7 @@ impl Engine<'_> {
         recorder: &mut Recorder,
     ) -> Result<AppraisalReport, Problem> {
         // Every posture that is tried out takes memory.
-        self.has_no_room().map_or(Ok(()), Err)?;
+        self.shared.budget.check()?;
         let appraisal = self.experiment.set_configuration(learner, configuration)?;
         let learners = &self.experiment.description().learners;
         if let Some(index) = learners.iter().position(|described| described.name == learner) {
@@ -334,13 +334,7 @@ impl Engine<'_> {
             let detail = format!("a session makes at most {most} steps: {left} are left, not {count}");
             return Some(few(left, detail));
         }
-        self.has_no_room()
-    }
-
-    fn has_no_room(&self) -> Option<Problem> {
-        (!self.shared.budget.has_room()).then(|| {
-            Problem::new(Kind::ServerFull, "the sessions together fill the server's memory; delete some and go on")
-        })
+        self.shared.budget.check().err()
     }
 }
 

@@ -7,6 +7,8 @@ use std::sync::{
 
 use axum::body::Bytes;
 
+use crate::server::problem::{Kind, Problem};
+
 /// The memory that all sessions share for their reports and recordings.
 #[derive(Debug)]
 pub(in crate::server) struct Budget {
@@ -22,6 +24,17 @@ impl Budget {
     /// Whether more steps may be made. The last command before the limit may overshoot it by what it makes.
     pub(in crate::server) fn has_room(&self) -> bool {
         self.used() < self.limit
+    }
+
+    /// That there is room.
+    pub(super) fn check(&self) -> Result<(), Problem> {
+        match self.has_room() {
+            true => Ok(()),
+            false => Err(Problem::new(
+                Kind::ServerFull,
+                "the sessions together fill the server's memory, and nothing has happened; delete some and ask again",
+            )),
+        }
     }
 
     /// What is taken of it, bytes.

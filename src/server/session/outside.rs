@@ -15,7 +15,7 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{
-    Kept, Shared, Standing,
+    Kept, Shared, Standing, Taken,
     dormant::Summary,
     engine::{COMPLETE_AFTER, panicked, recording_failed},
 };
@@ -34,6 +34,9 @@ use crate::{
 
 /// How soon at least, and how late at most, it is looked again whether the time of a suggestion has run out, seconds.
 const LOOK_AGAIN_S: [f64; 2] = [0.5, 3600.0];
+
+/// Bytes that a session takes for each of its setup: the text as it was sent and as it is read, names and places in it.
+const SETUP_TAKES: usize = 4;
 
 /// Something to be done by the engine. What it returns tells whoever asked.
 pub(super) type Job = Box<dyn FnOnce(&mut Elsewhere) -> Reply + Send>;
@@ -101,6 +104,8 @@ pub(in crate::server) struct Elsewhere {
     is_rewritten: bool,
     /// Whoever asked for what is being done waits for it no longer.
     given_up: CancellationToken,
+    /// What the session is about takes memory as long as it is there.
+    _setup: Taken,
     /// By so much the clock is behind what it was when the session was last used, seconds.
     ahead_s: f64,
 }
@@ -136,9 +141,8 @@ impl Elsewhere {
         recorder.flush().map_err(recording_failed)?;
         if is_new {
             store.insert(id, made_s, session.setup(), shown, session.events())?;
-            let status = session.status();
             // A list finds it out otherwise.
-            drop(store.note(id, &Summary::of(&session).text(), status.observations - status.excluded.len() as u64));
+            drop(store.note(id, &Summary::of(&session).text(), session.events()));
         }
         let rewrites =
             |event: &&ask_tell::Event| matches!(event.happened, Happened::Excluded { .. } | Happened::Included { .. });
@@ -146,7 +150,7 @@ impl Elsewhere {
         // What has happened was before now, whatever the clock says.
         let last = session.events().iter().filter_map(|event| event.at_s).max_by(f64::total_cmp);
         let ahead_s = last.map_or(0.0, |last| (last - now_s()).max(0.0));
-        shared.hold(session.setup().calibration.to_string().len());
+        let setup = Taken::of(&shared.budget, SETUP_TAKES * session.setup().calibration.to_string().len());
         let (recorded, channels) = (session.latest().step, session.channels().into());
         let mut robot = Self {
             id,
@@ -159,6 +163,7 @@ impl Elsewhere {
             shared,
             is_rewritten: false,
             given_up: CancellationToken::new(),
+            _setup: setup,
             ahead_s,
         };
         robot.show().map_err(recording_failed)?;
@@ -216,7 +221,7 @@ impl Elsewhere {
 
     /// The client's pending suggestions, topped up to as many as it asks for.
     pub(in crate::server) fn suggest(&mut self, ask: &Ask) -> Result<Suggestions, Problem> {
-        self.has_room()?;
+        self.shared.budget.check()?;
         let (stop, given_up) = (&self.shared.stop, &self.given_up);
         let is_wanted = || !stop.is_cancelled() && !given_up.is_cancelled();
         let prepared = self.session.prepare_suggest_while(ask, Some(self.now_s()), &is_wanted)?;
@@ -255,7 +260,7 @@ impl Elsewhere {
             );
             return Err(Problem::new(Kind::KeyTaken, detail).field("Idempotency-Key"));
         }
-        self.has_room()?;
+        self.shared.budget.check()?;
         let prepared = self.session.prepare_observe(told.clone(), Some(self.now_s())).map_err(|refusal| {
             let problem = Problem::from(refusal);
             // It is not the address that is wrong.
@@ -317,16 +322,6 @@ impl Elsewhere {
     fn told(&self, number: u64) -> Option<&Told> {
         let index = usize::try_from(number.checked_sub(1)?).ok()?;
         self.session.observations().get(index).map(AsRef::as_ref)
-    }
-
-    fn has_room(&self) -> Result<(), Problem> {
-        match self.shared.budget.has_room() {
-            true => Ok(()),
-            false => Err(Problem::new(
-                Kind::ServerFull,
-                "the sessions together fill the server's memory, and nothing has happened; delete some and ask again",
-            )),
-        }
     }
 
     /// Writes a prepared change, makes it, and shows it.

@@ -15,9 +15,6 @@ use uuid::Uuid;
 use super::{Budget, Kept, Standing, lock};
 use crate::{recording::LiveLog, server::metrics::Metrics};
 
-/// Bytes that a session takes for each of its setup: the text as it was sent and as it is read, names and places in it.
-const SETUP_TAKES: usize = 4;
-
 /// What an engine leaves for everyone to read.
 pub(super) struct Shared {
     id: Uuid,
@@ -53,10 +50,8 @@ pub(super) struct Shared {
     pub(super) scratch: Option<PathBuf>,
     /// What this session has taken of the budget …
     taken: AtomicUsize,
-    /// … and how much of it for reports …
+    /// … and how much of it for reports.
     reported: AtomicUsize,
-    /// … and for what it is about.
-    held: AtomicUsize,
 }
 
 impl Shared {
@@ -86,23 +81,14 @@ impl Shared {
             scratch,
             taken: AtomicUsize::new(0),
             reported: AtomicUsize::new(0),
-            held: AtomicUsize::new(0),
         }
-    }
-
-    /// Counts what the session is about, of a setup of so many bytes.
-    pub(super) fn hold(&self, bytes: usize) {
-        let bytes = SETUP_TAKES * bytes;
-        self.held.fetch_add(bytes, Ordering::Relaxed);
-        self.taken.fetch_add(bytes, Ordering::Relaxed);
-        self.budget.take(bytes);
     }
 
     pub(super) fn publish(&self, reports: Vec<Kept>, remaining: Option<usize>) {
         // The engine alone publishes, so that nothing comes between these.
         let reported = self.reported.load(Ordering::Relaxed) + reports.iter().map(Kept::bytes).sum::<usize>();
         self.reported.store(reported, Ordering::Relaxed);
-        let taken = reported + self.live.bytes() + self.held.load(Ordering::Relaxed);
+        let taken = reported + self.live.bytes();
         self.budget.take(taken - self.taken.swap(taken, Ordering::Relaxed));
         self.remaining.store(remaining.map_or(u64::MAX, |left| left as u64), Ordering::Relaxed);
         let length = {

@@ -73,6 +73,13 @@ pub struct Stored {
     pub keys: BTreeMap<String, u64>,
 }
 
+impl Stored {
+    /// How many of its observations count.
+    pub fn counted(&self) -> u64 {
+        counted(&self.events).max(0).unsigned_abs()
+    }
+}
+
 /// How a session is shown, which has no bearing on what is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Shown {
@@ -328,15 +335,15 @@ impl Store {
         Ok(found.map(|(summary, counted)| (summary, counted.max(0).unsigned_abs())))
     }
 
-    /// Notes how a list is to show a session.
+    /// Notes how a list is to show a session that has these events.
     ///
     /// # Errors
     ///
     /// [`StoreError`]: nothing is lost then but the time to find it out again.
-    pub fn note(&self, id: Uuid, summary: &str, counted: u64) -> Result<(), StoreError> {
+    pub fn note(&self, id: Uuid, summary: &str, events: &[Event]) -> Result<(), StoreError> {
         let connection = self.connection();
         self.is_there()?;
-        let counted = i64::try_from(counted).unwrap_or(i64::MAX);
+        let counted = counted(events);
         let update = "UPDATE session SET summary = ?1, counted = ?2 WHERE id = ?3";
         let noted = connection.execute(update, params![summary, counted, id.to_string()]);
         self.is_left();
