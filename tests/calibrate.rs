@@ -111,7 +111,7 @@ fn another_library_recomputes_the_held_out_figure() {
     let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
     let files = found.files(&case).expect("written");
     for (name, (report, files), table) in [
-        ("tiago", tiago, &["scenarios/tiago-mocap.csv", "x1", "y1", "z1"][..]),
+        ("tiago", tiago, &["scenarios/tiago-mocap.csv,scenarios/tiago-mocap-1504.csv", "x1", "y1", "z1"][..]),
         ("panda", (found.report, files), &["scenarios/panda-sockets.csv"]),
     ] {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("calibrated").join(name);

@@ -1,6 +1,6 @@
 """The held-out figure of a calibration, by yourdfpy: from the URDFs that it wrote and the table, knowing nothing of this project.
 
-    python held_out.py FOLDER TABLE [COLUMN COLUMN COLUMN]
+    python held_out.py FOLDER TABLE[,TABLE ...] [COLUMN COLUMN COLUMN]
 
 FOLDER is what `calibrate --out` wrote. The three columns are those of the target's measured place (metres); without them a
 target was held in sockets, which the columns `place` and `socket` tell. Writes JSON: the mean of the distances in
@@ -56,11 +56,14 @@ def distances(urdf, chain, base, target, rows, columns):
     return [numpy.linalg.norm(point - numpy.mean(there, axis=0)) for there in held.values() for point in there]
 
 
-def main(folder, table, *columns):
+def main(folder, tables, *columns):
     folder = pathlib.Path(folder)
     report = json.loads((folder / "report.json").read_text())
-    with open(table, newline="") as file:
-        rows = list(csv.DictReader(file))
+    # Rows are numbered on through all tables.
+    rows = []
+    for table in tables.split(","):
+        with open(table, newline="") as file:
+            rows += csv.DictReader(file)
     parts = [
         (folder / "folds" / str(fold["fold"]) / "calibrated.urdf", fold["rows"], fold["base"], fold["targets"][0])
         for fold in report["held_out"]["folds"]
