@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
-use proptest::{prelude::*, test_runner::Config};
+use proptest::{
+    prelude::*,
+    test_runner::{Config, TestCaseError},
+};
 use serde_json::{Value, json};
 
 use super::*;
@@ -215,4 +218,119 @@ proptest! {
             prop_assert_eq!((&before.0, &before.1), (&after.0, &after.1));
         }
     }
+}
+
+/// A session replayed with a checkpoint of each of its steps.
+fn with_checkpoints(session: &Session) -> Vec<Checkpoint> {
+    let mut made = Vec::new();
+    let replayed = Session::replay_from(session.setup().clone(), session.events().to_vec(), None, &mut |step| {
+        let checkpoint = step.checkpoint().expect("a smoother keeps what it has learned");
+        let checkpoint = Checkpoint::from_bytes(&checkpoint.to_bytes()).expect("its own");
+        assert_eq!(checkpoint.step(), step.report.step);
+        made.push(checkpoint);
+        true
+    });
+    replayed.expect("it happened");
+    made
+}
+
+/// The same session from a checkpoint on, and the numbers of the steps that were replayed.
+fn from(session: &Session, checkpoint: &Checkpoint) -> (Session, Vec<u64>) {
+    let mut steps = Vec::new();
+    let (setup, events) = (session.setup().clone(), session.events().to_vec());
+    let replayed = Session::replay_from(setup, events, Some(checkpoint), &mut |step| {
+        steps.push(step.report.step);
+        true
+    });
+    (replayed.expect("it serves"), steps)
+}
+
+/// Whatever has happened, a session from a checkpoint on is the session, and what is excluded from there on is excluded.
+fn goes_on_from(session: &Session, checkpoint: &Checkpoint) -> Result<(), TestCaseError> {
+    let last = session.latest().step;
+    let (replayed, steps) = from(session, checkpoint);
+    prop_assert_eq!(steps, (checkpoint.step() + 1..=last).collect::<Vec<_>>());
+    prop_assert_eq!(standing(&replayed), standing(session));
+    prop_assert_eq!(replayed.latest(), session.latest());
+    prop_assert_eq!(next(&replayed), next(session));
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(Config { cases: 16, failure_persistence: None, ..Config::default() })]
+
+    #[test]
+    fn a_session_goes_on_from_a_checkpoint(calls in calls(), which in any::<prop::sample::Index>()) {
+        let mut session = session(calibration());
+        for (at, wanted) in calls.iter().enumerate() {
+            drop(call(&mut session, wanted, at as f64));
+        }
+        let made = with_checkpoints(&session);
+        let serving: Vec<&Checkpoint> = made.iter().filter(|made| made.serves(session.events())).collect();
+        // All but those that nothing that counts comes after.
+        prop_assert_eq!(serving.len() as u64, session.latest().step);
+        if serving.is_empty() {
+            return Ok(());
+        }
+        let checkpoint = which.get(&serving);
+        goes_on_from(&session, checkpoint)?;
+        // What comes after it can be excluded from there on, what came before cannot.
+        let told = session.observations().len() as u64;
+        let prepared = session.prepare_mark(told, true, None, Some(checkpoint), &mut |_| true);
+        let mut other = session.clone();
+        other.exclude(told, None).expect("there");
+        if let Ok(prepared) = prepared {
+            session.commit(prepared).expect("at once");
+            prop_assert_eq!(standing(&session), standing(&other));
+        } else {
+            // Nothing that counts would be left after it.
+            prop_assert!(!checkpoint.serves(other.events()));
+        }
+        let mut early = session.clone();
+        early.exclude(1, None).expect("there");
+        prop_assert!(made[1..].iter().all(|made| early.events().len() == session.events().len() || !made.serves(early.events())));
+    }
+}
+
+/// Where measurements have settled, noise is learned, readings are outliers and errors run along the chain.
+#[test]
+fn a_long_session_goes_on_from_a_checkpoint() {
+    let mut unknown = calibration();
+    unknown["smoother"]["noise"] = json!("unknown");
+    for (case, calibration) in [calibration(), unknown].into_iter().enumerate() {
+        let mut session = session(calibration);
+        for index in 0..110_u32 {
+            let turn = |joint: u32| 1.3 * (f64::from(index * (joint + 2) + joint) * 0.7).sin();
+            let names = ["pan", "lift", "elbow"];
+            let posture = names.iter().zip(0..).map(|(name, joint)| ((*name).to_owned(), turn(joint))).collect();
+            let off = if index % 17 == 5 { 0.2 } else { 1e-3 * (f64::from(index) * 2.3).sin() };
+            session.observe(seen(&session, None, posture, off), None).expect("observed");
+        }
+        let made = with_checkpoints(&session);
+        for step in [3, 50, 80, 109] {
+            goes_on_from(&session, &made[step]).unwrap_or_else(|error| panic!("case {case}, step {step}: {error}"));
+        }
+        assert!(made[100].to_bytes().len() < 200_000, "{}", made[100].to_bytes().len());
+    }
+}
+
+/// A checkpoint of another session, or of another robot, is refused.
+#[test]
+fn a_foreign_checkpoint_does_not_serve() {
+    let observed = |calibration: Value, count: u32| {
+        let mut session = session(calibration);
+        for index in 0..count {
+            let posture = ["pan", "lift", "elbow"].map(|name| (name.to_owned(), 0.1 * f64::from(index))).into();
+            session.observe(seen(&session, None, posture, 0.0), None).expect("observed");
+        }
+        session
+    };
+    let mut other = calibration();
+    other["base"] = json!("unknown");
+    let (long, short) = (observed(calibration(), 8), observed(other, 8));
+    let foreign = &with_checkpoints(&short)[5];
+    let replayed = Session::replay_from(long.setup().clone(), long.events().to_vec(), Some(foreign), &mut |_| true);
+    assert!(matches!(replayed, Err(ReplayError::Event { index: 5, .. })));
+    assert!(!foreign.serves(&long.events()[..5]), "nothing comes after it");
+    assert!(Checkpoint::from_bytes(&foreign.to_bytes()[..40]).is_none());
 }

@@ -9,6 +9,7 @@ use super::{
     Answer, ChannelShape, Event, Happened, Observation, Outcome, Plan, Setup, SetupError, Suggestion, SuggestionState,
     Why,
     channel::{label, shapes},
+    checkpoint::{Checkpoint, Hear, Replayed, excluded},
 };
 use crate::{
     experiment::{Agent, Event as AgentEvent, Experiment, Proposal, StepReport},
@@ -41,6 +42,15 @@ pub(super) struct Ledger {
     pub counted: Vec<u64>,
 }
 
+/// What becomes of an observation that counts.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Replay {
+    /// It is learned from.
+    Learned,
+    /// What it taught is taken up later.
+    CarriedOut,
+}
+
 impl Ledger {
     /// Before any event.
     pub fn new(setup: &Setup, scenario: Arc<Scenario>) -> Result<Self, SetupError> {
@@ -55,25 +65,47 @@ impl Ledger {
         Ok(Self { scenario, shapes, experiment, suggestions, told, counted })
     }
 
-    /// After all of `events`. Those that are excluded in the end never counted. `tell` hears of every observation that counts.
-    pub fn replayed(mut self, events: &[Event], tell: &mut dyn FnMut(StepReport)) -> Result<Self, (usize, String)> {
-        let mut excluded = BTreeSet::new();
-        for event in events {
-            match event.happened {
-                Happened::Excluded { observation } => drop(excluded.insert(observation)),
-                Happened::Included { observation } => drop(excluded.remove(&observation)),
-                _ => {}
+    /// After all of `events`. Those that are excluded in the end never counted. What was learned up to a checkpoint is not learned
+    /// again. `hear` hears of every observation that counts after that.
+    pub fn replayed(
+        mut self,
+        events: &[Event],
+        from: Option<&Checkpoint>,
+        hear: &mut Hear<'_>,
+    ) -> Result<Self, (usize, String)> {
+        let excluded = excluded(events);
+        let first = from.map_or(0, Checkpoint::events);
+        if let Some(checkpoint) = from.filter(|checkpoint| checkpoint.serves(events)) {
+            for (index, event) in events[..first].iter().enumerate() {
+                self.apply_as(event, &excluded, Replay::CarriedOut).map_err(|what| (index + 1, what))?;
             }
+            if !self.experiment.take_up(checkpoint.experiment().clone()) {
+                return Err((first, "its checkpoint is of another session".to_owned()));
+            }
+        } else if from.is_some() {
+            return Err((first, "its checkpoint does not serve".to_owned()));
         }
-        for (index, event) in events.iter().enumerate() {
+        for (index, event) in events.iter().enumerate().skip(first) {
             let report = self.apply(event, &excluded).map_err(|what| (index + 1, what))?;
-            report.into_iter().for_each(&mut *tell);
+            let Some(report) = report else { continue };
+            if !hear(Replayed { report, events: index + 1, known: events.len(), ledger: &self }) {
+                return Err((index + 1, "nobody waits for it any more".to_owned()));
+            }
         }
         Ok(self)
     }
 
     /// After one more event, where the observations of `skipped` do not count. Tells the report of an observation.
     pub fn apply(&mut self, event: &Event, skipped: &BTreeSet<u64>) -> Result<Option<StepReport>, String> {
+        self.apply_as(event, skipped, Replay::Learned)
+    }
+
+    fn apply_as(
+        &mut self,
+        event: &Event,
+        skipped: &BTreeSet<u64>,
+        replay: Replay,
+    ) -> Result<Option<StepReport>, String> {
         match &event.happened {
             Happened::Suggested { suggestion, choice } => {
                 let id = self.suggestions.len() as u64 + 1;
@@ -122,7 +154,7 @@ impl Ledger {
             Happened::Expired { suggestions } => {
                 suggestions.iter().try_for_each(|id| self.end(*id, SuggestionState::Expired))?;
             }
-            Happened::Observed { told, answer } => return self.observe(told, answer, skipped),
+            Happened::Observed { told, answer } => return self.observe(told, answer, skipped, replay),
             Happened::Excluded { observation } => self.mark(*observation, true)?,
             Happened::Included { observation } => self.mark(*observation, false)?,
         }
@@ -134,6 +166,7 @@ impl Ledger {
         told: &Observation,
         answer: &Answer,
         skipped: &BTreeSet<u64>,
+        replay: Replay,
     ) -> Result<Option<StepReport>, String> {
         let number = self.told.len() as u64 + 1;
         let executed = told.read(&self.scenario, &self.shapes).map_err(|fault| fault.to_string())?;
@@ -147,6 +180,9 @@ impl Ledger {
                 }
                 agent.stand_at(&configuration);
             }
+        } else if replay == Replay::CarriedOut {
+            self.experiment.carry_out(&executed);
+            self.counted.push(number);
         } else {
             report = Some(self.experiment.tell(executed).map_err(|error| error.to_string())?.clone());
             self.counted.push(number);

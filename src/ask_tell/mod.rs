@@ -74,6 +74,7 @@
 //! here. See [`Results`]. A setup whose observations `calibrate` could not read is refused by [`Session::open`].
 
 mod channel;
+mod checkpoint;
 mod draft;
 mod error;
 mod event;
@@ -92,6 +93,7 @@ mod suggestion;
 mod table;
 
 pub use channel::{ChannelShape, Shape};
+pub use checkpoint::{Checkpoint, Hear, Replayed};
 pub use error::{Fault, Refusal, ReplayError, SetupError};
 pub use event::{Choice, Document, Event, Happened, Plan, VERSION, Why};
 pub use ledger::Told;

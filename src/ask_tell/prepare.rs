@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    Answer, Ask, Event, Fault, Happened, Observation, Outcome, Refusal, Session, Suggestion, SuggestionState,
-    Suggestions, Why, draft::Draft, ledger::Ledger, limits::*,
+    Answer, Ask, Checkpoint, Event, Fault, Happened, Observation, Outcome, Refusal, Session, Suggestion,
+    SuggestionState, Suggestions, Why, checkpoint::Hear, draft::Draft, ledger::Ledger, limits::*,
 };
 use crate::{estimation::Belief, experiment::Agent};
 
@@ -166,7 +166,7 @@ impl Session {
     ///
     /// [`Refusal`] where there is no such observation.
     pub fn prepare_exclude(&self, number: u64, now_s: Option<f64>) -> Result<Prepared<()>, Refusal> {
-        self.prepare_mark(number, true, now_s)
+        self.prepare_mark(number, true, now_s, None, &mut |_| true)
     }
 
     /// An excluded observation counts again: the belief is as if it had never been excluded.
@@ -175,10 +175,23 @@ impl Session {
     ///
     /// [`Refusal`] where there is no such observation.
     pub fn prepare_include(&self, number: u64, now_s: Option<f64>) -> Result<Prepared<()>, Refusal> {
-        self.prepare_mark(number, false, now_s)
+        self.prepare_mark(number, false, now_s, None, &mut |_| true)
     }
 
-    fn prepare_mark(&self, number: u64, excluded: bool, now_s: Option<f64>) -> Result<Prepared<()>, Refusal> {
+    /// The one or the other, from a checkpoint of before that observation on, if there is one. `hear` hears of the history from there on
+    /// as it is then, and says whether to go on.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] where there is no such observation, where the checkpoint is of after it, and where it is not to go on.
+    pub fn prepare_mark(
+        &self,
+        number: u64,
+        excluded: bool,
+        now_s: Option<f64>,
+        from: Option<&Checkpoint>,
+        hear: &mut Hear<'_>,
+    ) -> Result<Prepared<()>, Refusal> {
         self.check_room(1)?;
         let count = self.observations().len();
         let told = position(number).and_then(|index| self.observations().get(index));
@@ -192,7 +205,7 @@ impl Session {
             let events: Vec<Event> = self.events().iter().chain(&draft.events).cloned().collect();
             let empty = Ledger::new(self.setup(), self.scenario().clone());
             let empty = empty.map_err(|error| Refusal::Ended(error.to_string()))?;
-            draft.ledger = empty.replayed(&events, &mut |_| ()).map_err(|(_, what)| Refusal::Ended(what))?;
+            draft.ledger = empty.replayed(&events, from, hear).map_err(|(_, what)| Refusal::Ended(what))?;
             draft.drop_infeasible()?;
         }
         Ok(draft.done(()))

@@ -5,8 +5,12 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use super::{
-    Answer, Ask, ChannelShape, Document, Event, Observation, Outcome, Prepared, Refusal, ReplayError, Setup,
-    SetupError, Suggestion, Suggestions, Told, VERSION, ledger::Ledger, limits::Most, setup::check_size,
+    Answer, Ask, ChannelShape, Checkpoint, Document, Event, Observation, Outcome, Prepared, Refusal, ReplayError,
+    Setup, SetupError, Suggestion, Suggestions, Told, VERSION,
+    checkpoint::{Hear, Replayed},
+    ledger::Ledger,
+    limits::Most,
+    setup::check_size,
 };
 use crate::{
     estimation::Belief,
@@ -48,23 +52,35 @@ impl Session {
     ///
     /// [`ReplayError`] names the first event that cannot have happened.
     pub fn replay(setup: Setup, events: Vec<Event>) -> Result<Self, ReplayError> {
-        Self::replay_telling(setup, events, &mut |_| ())
+        Self::replay_from(setup, events, None, &mut |_| true)
     }
 
-    /// The same, and its [history](Self::history) as it goes.
+    /// The same from a checkpoint on, if there is one. `hear` hears of its [history](Self::history) from there on as it goes, and says
+    /// whether to go on.
     ///
     /// # Errors
     ///
-    /// [`ReplayError`] names the first event that cannot have happened.
-    pub fn replay_telling(
+    /// [`ReplayError`] names the first event that cannot have happened, or before which nobody wanted to go on; and the last before a
+    /// checkpoint that does not [serve](Checkpoint::serves).
+    pub fn replay_from(
         setup: Setup,
         events: Vec<Event>,
-        tell: &mut dyn FnMut(StepReport),
+        from: Option<&Checkpoint>,
+        hear: &mut Hear<'_>,
     ) -> Result<Self, ReplayError> {
         let Self { setup, ledger, .. } = Self::begun(setup)?;
-        tell(ledger.experiment.latest().clone());
-        let ledger = ledger.replayed(&events, tell).map_err(|(index, what)| ReplayError::Event { index, what })?;
+        if from.is_none() {
+            let report = ledger.experiment.latest().clone();
+            hear(Replayed { report, events: 0, known: events.len(), ledger: &ledger });
+        }
+        let ledger = ledger.replayed(&events, from, hear);
+        let ledger = ledger.map_err(|(index, what)| ReplayError::Event { index, what })?;
         Ok(Self { setup, ledger, events })
+    }
+
+    /// What was learned so far, for [`replay_from`](Self::replay_from); `None` for a learner that keeps nothing to go on from.
+    pub fn checkpoint(&self) -> Option<Checkpoint> {
+        Checkpoint::of(&self.ledger, self.events.len(), self.events.len())
     }
 
     /// A session as [`to_json`](Self::to_json) wrote it.
@@ -235,7 +251,10 @@ impl Session {
         let Ok(ledger) = Ledger::new(&self.setup, self.scenario().clone()) else { return Vec::new() };
         let mut reports = vec![ledger.experiment.latest().clone()];
         // Whatever has happened can happen again.
-        drop(ledger.replayed(&self.events, &mut |report| reports.push(report)));
+        drop(ledger.replayed(&self.events, None, &mut |step| {
+            reports.push(step.report);
+            true
+        }));
         reports
     }
 

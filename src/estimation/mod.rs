@@ -69,6 +69,17 @@ pub trait Estimator: Send + Sync {
         Vec::new()
     }
 
+    /// All that it has learned, for [`restored`](Self::restored) of the same build; `None` for one that learns it again as fast.
+    fn stored(&self) -> Option<Vec<u8>> {
+        None
+    }
+
+    /// One like this, which has learned nothing yet, where it has learned what is [stored](Self::stored): from there on the two
+    /// are the same to the last bit. `None` where that was stored of another.
+    fn restored(&self, _stored: &[u8]) -> Option<Box<dyn Estimator>> {
+        None
+    }
+
     /// As [`correct`](Self::correct), for observations that nobody has looked at: what does not fit is refused, and
     /// nothing is changed by it.
     fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
@@ -102,7 +113,7 @@ pub struct ReadingReport {
 }
 
 /// That readings are not explained as they should be.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Misfit {
     /// The first movement that speaks of it, counted from 1.
     pub since: u64,
@@ -111,7 +122,7 @@ pub struct Misfit {
 }
 
 /// What explains a misfit best.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum MisfitCause {
     /// The body may have changed: what was measured since does not fit what was measured before.
     ChangedBody,

@@ -8,8 +8,9 @@
 //! keyed by the seed and by its ordinal; what a policy planned with it stands in its event, and nothing is remembered
 //! elsewhere; so a stored list of events is restored without choosing anything again.
 
-use std::sync::Arc;
+use std::{collections::VecDeque, sync::Arc};
 
+use serde::{Deserialize, Serialize};
 use web_time::Instant;
 
 use super::{
@@ -64,6 +65,14 @@ pub struct Executed {
     pub movement: Movement,
     /// What was seen there.
     pub observation: Observation,
+}
+
+/// What an agent has learned from its movements.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Learned {
+    estimator: Vec<u8>,
+    /// Where nothing was seen, or nothing that counted.
+    misses: VecDeque<Vec<f64>>,
 }
 
 /// What happened to an agent.
@@ -372,7 +381,8 @@ impl Agent {
         executed.iter().map(|executed| self.absorb_one(executed)).collect()
     }
 
-    fn absorb_one(&mut self, executed: &Executed) -> Result<Update, AbsorbError> {
+    /// Makes a movement without learning from it: what it has learned it is [told](Self::take_up) later.
+    pub(super) fn carry_out(&mut self, executed: &Executed) {
         let Executed { proposal, movement, observation } = executed;
         if let Some(index) = self.pending.iter().position(|pending| Some(pending.id) == *proposal) {
             let Proposal { id, selection, .. } = self.pending.remove(index);
@@ -383,6 +393,28 @@ impl Agent {
         }
         self.history.moved(movement, &self.actions, observation);
         self.actions.use_up(movement);
+    }
+
+    /// All that it has learned, beside what the list of events tells; `None` where its estimator keeps nothing to go on from, and
+    /// where it has ended.
+    pub(super) fn learned(&self) -> Option<Learned> {
+        let is_going_on = self.failure.is_none();
+        let estimator = is_going_on.then(|| self.estimator.stored()).flatten()?;
+        Some(Learned { estimator, misses: self.history.misses().clone() })
+    }
+
+    /// Knows from now on what was learned from the movements that it has [made](Self::carry_out) and no others; false where that is
+    /// not of an agent like this.
+    pub(super) fn take_up(&mut self, learned: Learned) -> bool {
+        let Some(estimator) = self.estimator.restored(&learned.estimator) else { return false };
+        self.estimator = estimator;
+        self.history.missed(learned.misses);
+        true
+    }
+
+    fn absorb_one(&mut self, executed: &Executed) -> Result<Update, AbsorbError> {
+        self.carry_out(executed);
+        let Executed { movement, observation, .. } = executed;
         // All of the list were accepted before the first of it was absorbed.
         let update = self.estimator.correct(&movement.configuration, observation).map_err(|error| match error {
             EstimationError::Refused(refused) => refused.into(),

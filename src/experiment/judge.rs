@@ -3,6 +3,7 @@
 //! The judge holds what no agent may know. It turns beliefs into [`Metrics`] and runs into verdicts.
 
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 use super::{
     convergence::{Convergence, Thresholds},
@@ -52,6 +53,14 @@ pub struct Verdict {
     pub noticed_at: Option<u64>,
     /// Changes noticed before there was one.
     pub false_alarms: u64,
+}
+
+/// What came of a run of which no truth is known.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Concluded {
+    settled_at: Option<u64>,
+    noticed_at: Option<u64>,
+    false_alarms: u64,
 }
 
 impl Verdict {
@@ -133,6 +142,20 @@ impl Judge {
     /// What came of the learners' runs so far.
     pub fn verdicts(&self) -> &[Verdict] {
         &self.verdicts
+    }
+
+    /// What came of the first learner's run, for one that goes on from there. No truth is known to it.
+    pub(super) fn concluded(&self) -> Option<Concluded> {
+        let Verdict { settled_at, noticed_at, false_alarms, .. } = *self.verdicts.first()?;
+        Some(Concluded { settled_at, noticed_at, false_alarms })
+    }
+
+    /// The first learner's run has come to this after so many steps.
+    pub(super) fn take_up(&mut self, concluded: &Concluded, step: u64) {
+        let Some(verdict) = self.verdicts.first_mut() else { return };
+        let Concluded { settled_at, noticed_at, false_alarms } = *concluded;
+        (verdict.settled_at, verdict.noticed_at, verdict.false_alarms) = (settled_at, noticed_at, false_alarms);
+        verdict.convergence.observe(step, None, None);
     }
 
     /// Completes a report with what the data allow, and draws the conclusions.

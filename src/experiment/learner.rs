@@ -2,8 +2,10 @@
 
 use std::{mem::take, sync::OnceLock};
 
+use serde::{Deserialize, Serialize};
+
 use super::{
-    agent::{AbsorbError, Agent, Executed, Proposal},
+    agent::{AbsorbError, Agent, Executed, Learned, Proposal},
     choice::{AppraisalReport, Choice, ChoiceError},
     head::GazeReport,
     judge::Judge,
@@ -53,8 +55,8 @@ pub struct Learner {
 }
 
 /// Counters of one learner.
-#[derive(Clone, Debug, Default)]
-struct Record {
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Record {
     movements: u64,
     misses: u64,
     steps_below_target: u32,
@@ -249,6 +251,17 @@ impl Learner {
         };
         self.last = proposal;
         Ok((report, update))
+    }
+
+    /// All that it has learned; `None` where nothing can go on from that.
+    pub(super) fn learned(&self) -> Option<(Learned, Record)> {
+        Some((self.agent.learned()?, self.record.clone()))
+    }
+
+    /// Knows from now on what was learned from the movements that its agent has made.
+    pub(super) fn take_up(&mut self, (learned, record): (Learned, Record)) -> bool {
+        self.record = record;
+        self.agent.take_up(learned)
     }
 
     /// How its last movement was chosen: the search by DIRECT that found it, or for a policy that plans, how the criterion

@@ -5,6 +5,7 @@
 //! they believe into metrics. One [`StepReport`] per step is all that the outside reads.
 
 mod agent;
+mod checkpoint;
 mod choice;
 #[cfg(test)]
 mod choices;
@@ -36,6 +37,7 @@ mod told;
 mod world;
 
 pub use agent::{AbsorbError, Agent, Event, Executed, Proposal};
+pub use checkpoint::Checkpoint;
 pub use choice::{
     AppraisalReport, BoxReport, Choice, ChoiceError, ChosenReport, IterationReport, SearchedJoint, ShapeReport,
 };

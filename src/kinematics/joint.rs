@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// Any point of the axis describes the same line; the one written here is its *pivot*, the origin of the line's
 /// chart (see [`chart`](super::chart)). Kinematics do not depend on it, covariances do.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     /// A point on the axis, metres, measurement frame.
     pub point: Point3<f64>,
@@ -39,7 +39,7 @@ pub enum JointKind {
 }
 
 /// A joint of a serial chain, described at θ = 0 in the measurement frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Joint {
     /// Turns about a line: `p ↦ e^{wθ}(p − v) + v`, θ in radians.
     Revolute(Line),

@@ -6,7 +6,7 @@ use super::{Element, Load, Place, Quantity, State};
 use crate::kinematics::JointKind;
 
 /// A group of parameters of a [`State`] that is learned or held as a whole. Indices count from 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Block {
     /// The pose of the base in the frame of the measurements.
     Base,

@@ -50,7 +50,7 @@ pub struct ChainErrors {
 }
 
 /// By how much errors along a chain are larger than stated.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Scales {
     /// s: of how origins are shifted and turned.
     pub origins: f64,

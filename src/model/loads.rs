@@ -19,7 +19,7 @@ use crate::kinematics::{Joint, JointKind};
 pub const GRAVITY: f64 = 9.81;
 
 /// What pulls at the joints.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Load {
     /// A mass at the hand's target.
     Target,

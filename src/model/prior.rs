@@ -33,7 +33,7 @@ use super::{
 use crate::kinematics::{Joint, Line, chart};
 
 /// What is known of the learned blocks of a state before any measurement.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Prior {
     guess: State,
     blocks: Vec<(Block, Range<usize>, Knowledge)>,
@@ -49,7 +49,7 @@ pub struct Prior {
     lines: Vec<Option<Matrix4<f64>>>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 enum Knowledge {
     Around,
     /// Within ± so many metres.
@@ -165,6 +165,11 @@ impl Prior {
     /// The state to start from. Blocks that may be anywhere mean nothing in it.
     pub fn guess(&self) -> &State {
         &self.guess
+    }
+
+    /// The state to start from, to be told what its robot bears.
+    pub(crate) fn guess_mut(&mut self) -> &mut State {
+        &mut self.guess
     }
 
     /// P₀, with the variance of a draw for blocks that may be anywhere.

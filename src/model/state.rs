@@ -12,7 +12,7 @@ use crate::kinematics::Joint;
 /// Axes, and places on links, are written where they are at θ = 0, in the frame of the nominal base; `base` carries that
 /// into the frame of the measurements. Where axes are all free the two frames are taken to be one, and the base is known
 /// to be the identity.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     /// Carries the robot's frame into that of the measurements.
     pub base: Isometry3<f64>,
@@ -20,7 +20,8 @@ pub struct State {
     pub joints: Vec<Joint>,
     /// By joint: what its readings are corrected by.
     pub corrections: Vec<Correction>,
-    /// What joints that give way bear; without it none does.
+    /// What joints that give way bear; without it none does. Not stored with the rest: it belongs to the robot.
+    #[serde(skip)]
     pub loads: Option<Arc<Loads>>,
     /// What is looked at; the first is the marker.
     pub targets: Vec<Target>,
@@ -33,7 +34,7 @@ pub struct State {
 }
 
 /// What of a robot is its hand, so that predictions are of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Hand {
     /// The origin of a target.
     Target(usize),
@@ -61,7 +62,7 @@ impl Hand {
 
 /// What makes a joint's position θ of its reading q:
 /// `θ = offset + ratio q + sine sin q + cosine cos q + compliance·τ`, τ the torques of the [`Loads`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Correction {
     /// Rad or m.
     pub offset: f64,
@@ -123,7 +124,7 @@ impl Thetas<'_> {
 }
 
 /// Something fixed to a link.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Target {
     /// The link: 0 is the base, i what moves with the i-th joint.
     pub link: usize,
@@ -132,7 +133,7 @@ pub struct Target {
 }
 
 /// A point or a rigid body.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Place {
     /// A point, metres.
     Point(Point3<f64>),
@@ -159,7 +160,7 @@ impl Place {
 }
 
 /// A device that measures.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Device {
     /// The link that carries it; `None` for one that stands beside the robot, in the frame of the measurements.
     pub link: Option<usize>,

@@ -79,6 +79,11 @@ impl History {
         }
     }
 
+    /// These are the latest movements after which nothing was seen, or nothing that counted.
+    pub(crate) fn missed(&mut self, misses: VecDeque<Vec<f64>>) {
+        self.misses = misses;
+    }
+
     /// As if a movement to `configuration` had been made already: it is pending.
     pub fn expect(&mut self, configuration: &[f64]) {
         self.has_moved = true;

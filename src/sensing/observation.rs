@@ -6,7 +6,7 @@ use super::{Rig, UnusableNoise};
 use crate::magnitude::is_usable;
 
 /// The readings of one movement, one entry per channel of its [`Rig`]; `None` where the channel had none.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Observation {
     /// In the order of the rig's channels, each in its channel's own units.
     pub readings: Vec<Option<Vec<f64>>>,

@@ -18,8 +18,9 @@ use crate::lanes::GROUP;
 const WIDTH: usize = 4;
 
 /// L, its columns one behind the other; rows and columns beyond the matrix are those of the identity.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Factor {
+    #[serde(skip, default = "Level::new")]
     level: Level,
     /// Rows of the matrix.
     m: usize,

@@ -32,7 +32,7 @@ impl Default for HypothesisSettings {
 }
 
 /// The modes, the heaviest first.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Hypotheses {
     pub modes: Vec<Mode>,
     /// Steps in a row in which no new mode counted for anything.

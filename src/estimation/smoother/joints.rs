@@ -60,7 +60,7 @@ pub(super) struct Joints {
 }
 
 /// What measurements say of t.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Said {
     /// Σ ê_j²/σ_j², of stated σ.
     squares: f64,

@@ -39,6 +39,7 @@ mod posterior;
 mod prior_scale;
 mod robust;
 mod settled;
+mod stored;
 mod wider_prior;
 
 use std::sync::Arc;
@@ -272,6 +273,14 @@ impl Estimator for Smoother {
             }
         }
         update
+    }
+
+    fn stored(&self) -> Option<Vec<u8>> {
+        self.to_stored()
+    }
+
+    fn restored(&self, stored: &[u8]) -> Option<Box<dyn Estimator>> {
+        Some(Box::new(self.from_stored(stored)?))
     }
 
     fn misfit(&self) -> Option<Misfit> {

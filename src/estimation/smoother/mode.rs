@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// A local minimum of the posterior's cost, found by Levenberg–Marquardt, and the Gaussian there (Laplace).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Mode {
     pub state: State,
     pub cost: f64,
@@ -30,7 +30,7 @@ pub(super) struct Mode {
 }
 
 /// Why a search found no mode.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(super) enum NoMode {
     /// The equations are singular, or no equations at all: some direction is left open, or a number is none.
     Singular,

@@ -34,7 +34,7 @@ const VAGUENESS: f64 = 2.0;
 const REMEMBERED: f64 = 100.0;
 
 /// Squared residuals of one kind of noise, in nominal σ, and the equations that no parameter accounts for.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Left {
     pub squared: f64,
     pub free: f64,

@@ -27,7 +27,7 @@ use crate::{
 };
 
 /// A movement and what was seen after it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Measurement {
     pub positions: Vec<f64>,
     pub observation: Observation,

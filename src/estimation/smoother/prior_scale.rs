@@ -34,7 +34,7 @@ use crate::model::{ChainPrior, Inverted, Layout, Scales};
 #[derive(Clone, Debug)]
 pub(super) struct Scaled {
     chain: Arc<ChainPrior>,
-    scales: Scales,
+    pub(super) scales: Scales,
 }
 
 /// How often scales are found where the mode is that the last ones led to, at most.

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::model::{Layout, State};
 
 /// Measurements as a quadratic in the chart at `state`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Settled {
     pub state: State,
     /// By kind of noise, in nominal σ.
@@ -17,7 +17,7 @@ pub(super) struct Settled {
 }
 
 /// Σ w HᵀH and its kin of one kind of noise.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Quadratic {
     /// Λ, m × m.
     pub information: DMatrix<f64>,
