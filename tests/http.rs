@@ -8,6 +8,8 @@ mod support;
 mod alone;
 #[path = "http/bounds.rs"]
 mod bounds;
+#[path = "http/checkpoints.rs"]
+mod checkpoints;
 #[path = "http/choices.rs"]
 mod choices;
 #[path = "http/connections.rs"]

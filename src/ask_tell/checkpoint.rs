@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use super::{Event, Happened, ledger::Ledger};
-use crate::experiment::{self, StepReport};
+use crate::experiment::{self, Description, StepReport};
 
 /// What was learned from the first events of a session, by the same build: replaying goes on from there, to the last bit as if it had
 /// begun at the first event.
@@ -95,11 +95,24 @@ impl Replayed<'_> {
         Checkpoint::of(self.ledger, self.events, self.known)
     }
 
+    /// How many observations had been told, those that do not count among them.
+    pub fn told(&self) -> u64 {
+        self.ledger.told.len() as u64
+    }
+
+    /// What stays the same from step to step.
+    pub fn description(&self) -> &Description {
+        self.ledger.experiment.description()
+    }
+
     /// How many events there are in all.
     pub fn of(&self) -> usize {
         self.known
     }
 }
+
+/// Finds the checkpoint from which replaying these events is to go on.
+pub type Find<'a> = dyn FnMut(&[Event]) -> Option<Checkpoint> + 'a;
 
 /// Hears of every step that is replayed, and says whether it is to go on.
 pub type Hear<'a> = dyn FnMut(Replayed<'_>) -> bool + 'a;

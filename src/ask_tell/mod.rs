@@ -93,7 +93,7 @@ mod suggestion;
 mod table;
 
 pub use channel::{ChannelShape, Shape};
-pub use checkpoint::{Checkpoint, Hear, Replayed};
+pub use checkpoint::{Checkpoint, Find, Hear, Replayed};
 pub use error::{Fault, Refusal, ReplayError, SetupError};
 pub use event::{Choice, Document, Event, Happened, Plan, VERSION, Why};
 pub use ledger::Told;

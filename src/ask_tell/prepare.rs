@@ -3,8 +3,12 @@
 use std::sync::Arc;
 
 use super::{
-    Answer, Ask, Checkpoint, Event, Fault, Happened, Observation, Outcome, Refusal, Session, Suggestion,
-    SuggestionState, Suggestions, Why, checkpoint::Hear, draft::Draft, ledger::Ledger, limits::*,
+    Answer, Ask, Event, Fault, Happened, Observation, Outcome, Refusal, Session, Suggestion, SuggestionState,
+    Suggestions, Why,
+    checkpoint::{Find, Hear, Replayed},
+    draft::Draft,
+    ledger::Ledger,
+    limits::*,
 };
 use crate::{estimation::Belief, experiment::Agent};
 
@@ -166,7 +170,7 @@ impl Session {
     ///
     /// [`Refusal`] where there is no such observation.
     pub fn prepare_exclude(&self, number: u64, now_s: Option<f64>) -> Result<Prepared<()>, Refusal> {
-        self.prepare_mark(number, true, now_s, None, &mut |_| true)
+        self.prepare_mark((number, true), now_s, &mut |_| None, &mut |_| true)
     }
 
     /// An excluded observation counts again: the belief is as if it had never been excluded.
@@ -175,21 +179,20 @@ impl Session {
     ///
     /// [`Refusal`] where there is no such observation.
     pub fn prepare_include(&self, number: u64, now_s: Option<f64>) -> Result<Prepared<()>, Refusal> {
-        self.prepare_mark(number, false, now_s, None, &mut |_| true)
+        self.prepare_mark((number, false), now_s, &mut |_| None, &mut |_| true)
     }
 
-    /// The one or the other, from a checkpoint of before that observation on, if there is one. `hear` hears of the history from there on
-    /// as it is then, and says whether to go on.
+    /// Excludes an observation or includes it again, from the checkpoint on that `find` finds, if it does: one that
+    /// [serves](super::Checkpoint::serves). `hear` hears of the history from there on as it is then, and says whether to go on.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] where there is no such observation, where the checkpoint is of after it, and where it is not to go on.
+    /// [`Refusal`] where there is no such observation, where the checkpoint does not serve, and where it is not to go on.
     pub fn prepare_mark(
         &self,
-        number: u64,
-        excluded: bool,
+        (number, excluded): (u64, bool),
         now_s: Option<f64>,
-        from: Option<&Checkpoint>,
+        find: &mut Find<'_>,
         hear: &mut Hear<'_>,
     ) -> Result<Prepared<()>, Refusal> {
         self.check_room(1)?;
@@ -205,7 +208,12 @@ impl Session {
             let events: Vec<Event> = self.events().iter().chain(&draft.events).cloned().collect();
             let empty = Ledger::new(self.setup(), self.scenario().clone());
             let empty = empty.map_err(|error| Refusal::Ended(error.to_string()))?;
-            draft.ledger = empty.replayed(&events, from, hear).map_err(|(_, what)| Refusal::Ended(what))?;
+            let from = find(&events);
+            if from.is_none() {
+                let (report, known) = (empty.experiment.latest().clone(), events.len());
+                hear(Replayed { report, events: 0, known, ledger: &empty });
+            }
+            draft.ledger = empty.replayed(&events, from.as_ref(), hear).map_err(|(_, what)| Refusal::Ended(what))?;
             draft.drop_infeasible()?;
         }
         Ok(draft.done(()))

@@ -31,6 +31,8 @@ pub(super) struct Metrics {
     pub(super) steps: Counter,
     /// Observations that robots elsewhere told.
     pub(super) observations: Counter,
+    /// Observations of robots elsewhere that were learned from once more: after a while out of memory, or without one of them.
+    pub(super) replayed: Counter,
     /// Sessions whose engine failed.
     pub(super) failed_sessions: Counter,
     /// Connections for which there was no room …
@@ -105,6 +107,7 @@ impl Metrics {
             problems: Family::default(),
             steps: Counter::default(),
             observations: Counter::default(),
+            replayed: Counter::default(),
             failed_sessions: Counter::default(),
             refused_connections: Counter::default(),
             refused_heads: Counter::default(),
@@ -135,6 +138,8 @@ impl Metrics {
         all.register("problems", "Answers that were problem documents, by kind", self.problems.clone());
         all.register("steps", "Steps that sessions made", self.steps.clone());
         all.register("observations", "Observations of robots elsewhere", self.observations.clone());
+        let again = "Observations of robots elsewhere that were learned from once more";
+        all.register("observations_replayed", again, self.replayed.clone());
         all.register("sessions_failed", "Sessions whose engine failed", self.failed_sessions.clone());
         all.register("sessions", "Sessions in memory", self.sessions.clone());
         all.register("sessions_stored", "Sessions with robots elsewhere", self.stored_sessions.clone());

@@ -143,6 +143,8 @@ impl Server {
             Some(directory) => Store::open(directory)?,
             None => Store::in_memory()?,
         };
+        // Sessions that come back ask who can read what they have learned; to find it out takes a moment.
+        std::thread::spawn(|| drop(store::build()));
         let limits = options.limits;
         let damage = store.damage().to_vec();
         let keeping = Keeping {

@@ -144,7 +144,7 @@ pub(super) async fn get(
         (status = 404, description = "There is no such session or observation", body = Problem),
         (status = 409, description = "The session has no robot elsewhere, or is full; nothing has happened", body = Problem),
         (status = 500, description = "The session's engine has failed", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+        (status = 503, description = "The server's memory is full, it is shutting down, or what happened is still being replayed: ask again after `Retry-After`", body = Problem),
         (status = 507, description = "There is no room to keep it; nothing has happened", body = Problem),
     )
 )]
@@ -152,7 +152,7 @@ pub(super) async fn exclude(
     State(app): State<Arc<App>>,
     Path((id, number)): Path<(String, u64)>,
 ) -> Result<Response, Problem> {
-    json(app.sessions.tell(&id, move |robot| robot.mark(number, true)).await?).await
+    json(app.sessions.mark(&id, number, true).await?).await
 }
 
 /// Take an excluded observation back: the belief is as if it had never been excluded.
@@ -168,7 +168,7 @@ pub(super) async fn exclude(
         (status = 404, description = "There is no such session or observation", body = Problem),
         (status = 409, description = "The session has no robot elsewhere, or is full; nothing has happened", body = Problem),
         (status = 500, description = "The session's engine has failed", body = Problem),
-        (status = 503, description = "The server's memory is full, or it is shutting down", body = Problem),
+        (status = 503, description = "The server's memory is full, it is shutting down, or what happened is still being replayed: ask again after `Retry-After`", body = Problem),
         (status = 507, description = "There is no room to keep it; nothing has happened", body = Problem),
     )
 )]
@@ -176,5 +176,5 @@ pub(super) async fn include(
     State(app): State<Arc<App>>,
     Path((id, number)): Path<(String, u64)>,
 ) -> Result<Response, Problem> {
-    json(app.sessions.tell(&id, move |robot| robot.mark(number, false)).await?).await
+    json(app.sessions.mark(&id, number, false).await?).await
 }

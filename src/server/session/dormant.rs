@@ -24,7 +24,7 @@ use super::{
     registry::{END_WITHIN, no_engine, spawn},
 };
 use crate::{
-    ask_tell::{self, ChannelShape, MOST_EVENTS, ReplayError, Setup, VERSION},
+    ask_tell::{self, ChannelShape, MOST_EVENTS, ReplayError, Setup, Status, VERSION},
     experiment::Description,
     scenario::WorldKind,
     server::{
@@ -274,6 +274,25 @@ impl Sessions {
             match session.tell(work.clone()).await {
                 Err(problem) if problem.is(Kind::Dormant) && attempts.next().is_some() => {}
                 outcome => return outcome,
+            }
+        }
+    }
+
+    /// An observation counts for nothing from now on, or counts again, whether or not whoever asked still waits. Tells how the session
+    /// stands then.
+    pub(in crate::server) async fn mark(
+        self: &Arc<Self>,
+        id: &str,
+        number: u64,
+        excluded: bool,
+    ) -> Result<Status, Problem> {
+        let (all, id) = (self.clone(), id.to_owned());
+        let marking = requests::carried(async move { all.tell(&id, move |robot| robot.mark(number, excluded)).await });
+        match timeout(MOVED_WITHIN, tokio::spawn(marking)).await {
+            Ok(marked) => marked.unwrap_or_else(|_| Err(no_engine())),
+            Err(_) => {
+                let detail = "what happened in the session is being replayed, and then it is done; ask again later";
+                Err(Problem::new(Kind::Busy, detail))
             }
         }
     }

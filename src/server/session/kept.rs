@@ -29,6 +29,18 @@ impl Kept {
         Ok(Self { step: report.step, json: json.into(), rows: rows.into() })
     }
 
+    /// As it was kept before, with the report that it is of; `None` for what is none.
+    pub(super) fn read(text: &str, description: &Description) -> Option<Self> {
+        let report: StepReport = serde_json::from_str(text).ok()?;
+        let json = RawValue::from_string(text.to_owned()).ok()?;
+        Some(Self { step: report.step, json: json.into(), rows: rows(&report, description).ok()?.into() })
+    }
+
+    /// The report that it is of.
+    pub(super) fn report(&self) -> Option<StepReport> {
+        serde_json::from_str(self.json.get()).ok()
+    }
+
     /// How much memory it takes.
     pub(super) fn bytes(&self) -> usize {
         size_of::<Self>() + self.json.get().len() + self.rows.len()

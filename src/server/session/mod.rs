@@ -4,6 +4,7 @@
 //! [`Kept`], [`Session`] is the way to both, and [`registry`] keeps them all; those with robots elsewhere are also in the
 //! store, and [`dormant`] ones there alone.
 
+mod checkpoints;
 mod completed;
 mod dormant;
 mod engine;
@@ -20,7 +21,7 @@ mod watching;
 use std::{
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicUsize, Ordering},
+        atomic::{AtomicBool, AtomicUsize, Ordering},
         mpsc,
     },
     time::Instant,
@@ -258,22 +259,41 @@ impl Session {
         work: impl FnOnce(&mut Elsewhere) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         let Engine::Elsewhere(jobs) = &self.engine else { return Err(Problem::not_outside(self.id)) };
-        let (reply, answer) = oneshot::channel();
+        let (reply, mut answer) = oneshot::channel();
         let counted = Job::of(&self.shared);
         let given_up = CancellationToken::new();
         let _waiting = given_up.clone().drop_guard();
+        // Whoever is first: the engine that begins it, or who refuses it.
+        let is_taken = Arc::new(AtomicBool::new(false));
+        let taken = is_taken.clone();
         let job: outside::Job = Box::new(move |robot| {
             let _counted = counted;
+            if taken.swap(true, Ordering::Relaxed) {
+                return Box::new(|| ());
+            }
             let outcome = work(robot.for_whoever_waits(given_up));
             // Nobody may wait for it any longer; what was done stands all the same.
             Box::new(move || drop(reply.send(outcome)))
         });
-        if jobs.send(job).is_ok()
-            && let Ok(outcome) = answer.await
-        {
-            return outcome;
+        if jobs.send(job).is_err() {
+            return Err(self.why_ended().await);
         }
-        Err(self.why_ended().await)
+        let mut replaying = self.shared.replaying.subscribe();
+        let replaying = async { replaying.wait_for(Option::is_some).await.ok().and_then(|replaying| *replaying) };
+        let outcome = tokio::select! {
+            outcome = &mut answer => outcome,
+            Some(replaying) = replaying => {
+                if !is_taken.swap(true, Ordering::Relaxed) {
+                    return Err(Problem::new(Kind::Busy, replaying.told()));
+                }
+                answer.await
+            }
+            else => answer.await,
+        };
+        match outcome {
+            Ok(outcome) => outcome,
+            Err(_) => Err(self.why_ended().await),
+        }
     }
 
     async fn why_ended(&self) -> Problem {

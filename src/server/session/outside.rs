@@ -6,7 +6,7 @@
 use std::{
     collections::BTreeMap,
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::{Arc, Mutex, atomic::Ordering, mpsc},
+    sync::{Arc, Mutex, PoisonError, atomic::Ordering, mpsc},
     time::{Duration, Instant, SystemTime},
 };
 
@@ -16,6 +16,7 @@ use uuid::Uuid;
 
 use super::{
     Kept, Shared, Standing, Taken,
+    checkpoints::{self, GoesOn, Replaying, Since},
     dormant::Summary,
     engine::{COMPLETE_AFTER, panicked, recording_failed},
 };
@@ -27,13 +28,20 @@ use crate::{
     experiment::{Description, Experiment},
     recording::{Recorder, RecordingError, Target},
     server::{
+        metrics::Metrics,
         problem::{Kind, Problem},
-        store::{Shown, Store, Stored},
+        store::{Saved, Shown, Store, StoreError, Stored, build},
     },
 };
 
 /// How soon at least, and how late at most, it is looked again whether the time of a suggestion has run out, seconds.
 const LOOK_AGAIN_S: [f64; 2] = [0.5, 3600.0];
+
+/// Steps that are recorded at a time, before it is looked whether anything is asked for.
+const AT_ONCE: usize = 64;
+
+/// Whoever asks is told that a replay is being made once it has taken so long.
+const TOLD_AFTER: Duration = Duration::from_secs(1);
 
 /// Bytes that a session takes for each of its setup: the text as it was sent and as it is read, names and places in it.
 const SETUP_TAKES: usize = 4;
@@ -96,8 +104,11 @@ pub(in crate::server) struct Elsewhere {
     /// By `Idempotency-Key` the number of its observation.
     keys: BTreeMap<String, u64>,
     recorder: Recorder,
-    /// The latest step that is recorded.
-    recorded: u64,
+    /// The latest step that is recorded; `None` before any. Those of a session that has come back are recorded while nothing else is
+    /// asked for.
+    recorded: Option<u64>,
+    /// The steps since the latest checkpoint.
+    since: Since,
     store: Arc<Store>,
     shared: Arc<Shared>,
     /// What was told counts otherwise than it did: the history has to be made anew.
@@ -122,9 +133,15 @@ impl Elsewhere {
             Origin::New(setup, shown, events) => (true, (setup, shown), events, BTreeMap::new()),
             Origin::Store(Stored { setup, shown, events, keys }) => (false, (setup, shown), events, keys),
         };
-        let mut history = Vec::new();
-        let replayed = ask_tell::Session::replay_telling(setup, events, &mut |report| history.push(report));
-        let session = replayed.map_err(|error| if is_new { unusable(error) } else { error.into() })?;
+        let goes_on = if is_new { None } else { GoesOn::of(&store, id, &events) };
+        let gone_on = goes_on.and_then(|from| Replayed::of(setup.clone(), events.clone(), Some(from), &shared).ok());
+        let replayed = match gone_on {
+            Some(replayed) => Ok(replayed),
+            // One that cannot be gone on from is no reason not to replay it.
+            None => Replayed::of(setup, events, None, &shared),
+        };
+        let Replayed { session, reports, since, saved } =
+            replayed.map_err(|error| if is_new { unusable(error) } else { error.into() })?;
         if is_new {
             session.check_within(most)?;
             session.check_results()?;
@@ -132,18 +149,13 @@ impl Elsewhere {
         // Each life of a session in memory records anew: viewers must not take two recordings for one.
         let target = Target::live(shared.live.clone()).with_recording_id(Uuid::new_v4().to_string());
         let begun = Recorder::new(session.description(), target.with_ellipsoids(shown.ellipsoids));
-        let mut recorder = begun.map_err(recording_failed)?;
-        let mut reports = Vec::with_capacity(history.len());
-        for report in &history {
-            recorder.log(report).map_err(recording_failed)?;
-            reports.push(Kept::of(report, session.description())?);
-        }
-        recorder.flush().map_err(recording_failed)?;
+        let recorder = begun.map_err(recording_failed)?;
         if is_new {
             store.insert(id, made_s, session.setup(), shown, session.events())?;
             // A list finds it out otherwise.
             drop(store.note(id, &Summary::of(&session).text(), session.events()));
         }
+        checkpoints::keep_all((&store, id), &saved);
         let rewrites =
             |event: &&ask_tell::Event| matches!(event.happened, Happened::Excluded { .. } | Happened::Included { .. });
         shared.rewritings.store(session.events().iter().filter(rewrites).count() as u64, Ordering::Relaxed);
@@ -151,14 +163,15 @@ impl Elsewhere {
         let last = session.events().iter().filter_map(|event| event.at_s).max_by(f64::total_cmp);
         let ahead_s = last.map_or(0.0, |last| (last - now_s()).max(0.0));
         let setup = Taken::of(&shared.budget, SETUP_TAKES * session.setup().calibration.to_string().len());
-        let (recorded, channels) = (session.latest().step, session.channels().into());
+        let channels = session.channels().into();
         let mut robot = Self {
             id,
             session,
             channels,
             keys,
             recorder,
-            recorded,
+            recorded: None,
+            since,
             store,
             shared,
             is_rewritten: false,
@@ -166,17 +179,56 @@ impl Elsewhere {
             _setup: setup,
             ahead_s,
         };
-        robot.show().map_err(recording_failed)?;
         robot.publish(reports);
+        robot.catch_up(AT_ONCE).map_err(recording_failed)?;
         Ok(robot)
+    }
+
+    /// Records steps of before it came back to memory, so many at most.
+    fn catch_up(&mut self, most: usize) -> Result<(), RecordingError> {
+        let first = self.recorded.map_or(0, |step| step + 1);
+        let reports: Vec<Kept> = {
+            let history = self.shared.history.read().unwrap_or_else(PoisonError::into_inner);
+            history.iter().skip(first as usize).take(most).cloned().collect()
+        };
+        for kept in reports {
+            let report = kept.report().ok_or_else(|| RecordingError::Encode("a step cannot be read again".into()))?;
+            self.recorder.log(&report)?;
+            self.recorded = Some(kept.step);
+        }
+        if !self.is_behind() {
+            self.recorder.flush()?;
+            self.show()?;
+        }
+        self.shared.publish(Vec::new(), None);
+        Ok(())
+    }
+
+    /// Whether there are steps that are not recorded yet.
+    fn is_behind(&self) -> bool {
+        self.recorded.is_none_or(|step| step < self.session.latest().step)
     }
 
     fn serve(&mut self, jobs: &mpsc::Receiver<Job>) {
         loop {
-            let job = jobs.recv_timeout(COMPLETE_AFTER).or_else(|_| {
-                drop(self.complete());
-                self.idle(jobs)
-            });
+            let job = match jobs.try_recv() {
+                Err(mpsc::TryRecvError::Empty) if self.is_behind() && !self.shared.stop.is_cancelled() => {
+                    match self.catch_up(AT_ONCE) {
+                        Ok(()) => continue,
+                        Err(error) => {
+                            self.shared.note_recording(Some(error.to_string()));
+                            // What cannot be recorded keeps nobody from anything else.
+                            self.recorded = Some(self.session.latest().step);
+                            continue;
+                        }
+                    }
+                }
+                Ok(job) => Ok(job),
+                Err(_) => jobs.recv_timeout(COMPLETE_AFTER).or_else(|_| {
+                    drop(self.complete());
+                    self.idle(jobs)
+                }),
+            };
             let Ok(job) = job else { return };
             if self.shared.stop.is_cancelled() {
                 return;
@@ -278,12 +330,30 @@ impl Elsewhere {
     /// From now on an observation counts for nothing, or counts again. Tells how the session stands then.
     pub(in crate::server) fn mark(&mut self, number: u64, excluded: bool) -> Result<Status, Problem> {
         let now = Some(self.now_s());
-        let prepared = match excluded {
-            true => self.session.prepare_exclude(number, now)?,
-            false => self.session.prepare_include(number, now)?,
-        };
-        self.is_rewritten = !prepared.events().is_empty();
-        self.commit(prepared, None).inspect_err(|_| self.is_rewritten = false)?;
+        let (store, shared, id) = (&self.store, &self.shared, self.id);
+        let mut come_by = ComeBy::default();
+        let begun = Instant::now();
+        let prepared = self.session.prepare_mark(
+            (number, excluded),
+            now,
+            &mut |events| checkpoints::before(store, id, number, events),
+            &mut |step| {
+                if begun.elapsed() > TOLD_AFTER {
+                    shared.replaying.send_replace(Some(Replaying { done: step.events, of: step.of() }));
+                }
+                come_by.hear(&step, &shared.metrics).is_some() && !shared.stop.is_cancelled()
+            },
+        );
+        let marked = prepared.map_err(Problem::from).and_then(|prepared| {
+            self.is_rewritten = !prepared.events().is_empty();
+            let saved = come_by.saved;
+            self.commit_by(prepared, |store, id, revision, events| {
+                store.rewrite(id, revision, events, number, (build().unwrap_or_default(), &saved))
+            })
+            .inspect_err(|_| self.is_rewritten = false)
+        });
+        self.shared.replaying.send_replace(None);
+        marked?;
         Ok(self.session.status())
     }
 
@@ -314,6 +384,9 @@ impl Elsewhere {
 
     /// Completes the recording so far.
     pub(super) fn complete(&mut self) -> Result<(), Problem> {
+        while self.is_behind() && !self.shared.stop.is_cancelled() {
+            self.catch_up(AT_ONCE).map_err(recording_failed)?;
+        }
         let flushed = self.recorder.flush().map_err(recording_failed);
         self.shared.publish(Vec::new(), None);
         flushed
@@ -326,10 +399,19 @@ impl Elsewhere {
 
     /// Writes a prepared change, makes it, and shows it.
     fn commit<A>(&mut self, prepared: Prepared<A>, key: Option<&str>) -> Result<A, Problem> {
+        self.commit_by(prepared, |store, id, revision, events| store.append(id, revision, events, key))
+    }
+
+    /// The same, written in this way.
+    fn commit_by<A>(
+        &mut self,
+        prepared: Prepared<A>,
+        write: impl FnOnce(&Store, Uuid, usize, &[ask_tell::Event]) -> Result<(), StoreError>,
+    ) -> Result<A, Problem> {
         if prepared.events().is_empty() {
             return Ok(self.session.commit(prepared)?);
         }
-        self.store.append(self.id, prepared.revision(), prepared.events(), key).map_err(|error| {
+        write(&self.store, self.id, prepared.revision(), prepared.events()).map_err(|error| {
             match error.is_for_want_of_a_session() {
                 true => Problem::unknown_session(self.id),
                 false => error.into(),
@@ -339,7 +421,13 @@ impl Elsewhere {
         // It has happened, and is answered so, whatever becomes of the picture of it.
         let shown = self.record().map_err(|error| error.to_string());
         match shown {
-            Ok(reports) => self.publish(reports),
+            Ok(reports) => {
+                let told = self.session.observations().len() as u64;
+                for kept in &reports {
+                    self.since.keep((&self.store, self.id), kept, told, || self.session.checkpoint());
+                }
+                self.publish(reports);
+            }
             Err(error) => self.shared.note_recording(Some(error)),
         }
         Ok(answer)
@@ -352,13 +440,17 @@ impl Elsewhere {
         if self.is_rewritten {
             return Ok(reports);
         }
-        if report.step > self.recorded {
-            self.recorded = report.step;
-            self.recorder.log(report)?;
+        if report.step as usize >= *self.shared.reports.borrow() {
             let kept = Kept::of(report, self.session.description());
             reports.push(kept.map_err(|problem| RecordingError::Encode(problem.detail.into()))?);
+            if self.recorded.map_or(0, |step| step + 1) == report.step {
+                self.recorded = Some(report.step);
+                self.recorder.log(report)?;
+            }
         }
-        self.show()?;
+        if !self.is_behind() {
+            self.show()?;
+        }
         Ok(reports)
     }
 
@@ -374,7 +466,7 @@ impl Elsewhere {
             let points = belief.state.measured().skeleton(&posture);
             points.iter().map(|point| [point.x, point.y, point.z]).collect()
         });
-        self.recorder.log_ghost(self.recorded, 0, skeleton.as_deref())
+        self.recorder.log_ghost(self.recorded.unwrap_or(0), 0, skeleton.as_deref())
     }
 
     fn publish(&self, reports: Vec<Kept>) {
@@ -390,6 +482,61 @@ impl Elsewhere {
         };
         self.shared.standing.send_replace(Some(Arc::new(standing)));
         self.shared.publish(reports, None);
+    }
+}
+
+/// The checkpoints that a replay comes by.
+#[derive(Default)]
+struct ComeBy {
+    since: Since,
+    saved: Vec<Saved>,
+}
+
+impl ComeBy {
+    /// Takes in a step, and tells its report; `None` where that cannot be written.
+    fn hear(&mut self, step: &ask_tell::Replayed<'_>, metrics: &Metrics) -> Option<Kept> {
+        if step.report.step > 0 {
+            metrics.replayed.inc();
+        }
+        let kept = Kept::of(&step.report, step.description()).ok()?;
+        self.saved.extend(self.since.step(&kept, step.told(), || step.checkpoint()));
+        Some(kept)
+    }
+}
+
+/// A session that was replayed.
+struct Replayed {
+    session: ask_tell::Session,
+    /// All of its history.
+    reports: Vec<Kept>,
+    since: Since,
+    /// Checkpoints that it has come by.
+    saved: Vec<Saved>,
+}
+
+impl Replayed {
+    fn of(
+        setup: Setup,
+        events: Vec<ask_tell::Event>,
+        from: Option<GoesOn>,
+        shared: &Shared,
+    ) -> Result<Self, ReplayError> {
+        let (mut come_by, mut later) = (ComeBy::default(), Vec::new());
+        let session =
+            ask_tell::Session::replay_from(setup, events, from.as_ref().map(|from| &from.checkpoint), &mut |step| {
+                let kept = come_by.hear(&step, &shared.metrics);
+                let can_go_on = kept.is_some() && !shared.stop.is_cancelled();
+                later.extend(kept);
+                can_go_on
+            })?;
+        let ComeBy { since, saved } = come_by;
+        let mut reports = Vec::new();
+        if let Some(from) = from {
+            let lacking = || ReplayError::NotASession("the reports of its steps are not all of them".to_owned());
+            reports = from.reports(session.description()).ok_or_else(lacking)?;
+        }
+        reports.extend(later);
+        Ok(Self { session, reports, since, saved })
     }
 }
 

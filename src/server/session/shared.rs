@@ -12,7 +12,7 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
-use super::{Budget, Kept, Standing, lock};
+use super::{Budget, Kept, Standing, checkpoints::Replaying, lock};
 use crate::{recording::LiveLog, server::metrics::Metrics};
 
 /// What an engine leaves for everyone to read.
@@ -37,6 +37,8 @@ pub(super) struct Shared {
     pub(super) rewritings: AtomicU64,
     /// What the engine of a robot elsewhere is at, and what waits for it.
     pub(super) jobs: AtomicUsize,
+    /// How far a replay has got that takes long; nothing else can be asked of the engine meanwhile.
+    pub(super) replaying: watch::Sender<Option<Replaying>>,
     /// Asks the engine to leave off the command that it is at.
     pub(super) interrupted: AtomicBool,
     /// Asks the engine to end.
@@ -73,6 +75,7 @@ impl Shared {
             rewritten: AtomicBool::new(false),
             rewritings: AtomicU64::new(0),
             jobs: AtomicUsize::new(0),
+            replaying: watch::Sender::new(None),
             interrupted: AtomicBool::new(false),
             stop,
             ended: CancellationToken::new(),

@@ -4,6 +4,7 @@
 //! disk (rollback journal, full synchronisation); an error means that nothing was written. There is one file to lose: what is written
 //! is in it, and in no log beside it.
 
+mod checkpoints;
 mod checks;
 mod error;
 mod lock;
@@ -24,6 +25,7 @@ use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, 
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
+pub use checkpoints::{EVERY, Saved, build, packed, unpacked};
 use checks::{Place, checksum};
 pub use error::StoreError;
 use lock::Lock;

@@ -10,7 +10,7 @@ use super::StoreError;
 const APPLICATION: u32 = 0x626f_6479;
 
 /// The step from each version to the next. The version is in `user_version`; an empty file is of version 0.
-const MIGRATIONS: [&str; 3] = [
+const MIGRATIONS: [&str; 4] = [
     "
     CREATE TABLE session (
         number INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -38,6 +38,19 @@ const MIGRATIONS: [&str; 3] = [
     ALTER TABLE session ADD COLUMN summary TEXT;     -- how a list shows it, JSON; null where nobody has asked yet
     ALTER TABLE session ADD COLUMN counted INTEGER;  -- how many of its observations count; null where nobody has counted
 ",
+    "
+    -- What sessions have come to after some of their steps, so that they need not be replayed from the beginning; it may be lost.
+    CREATE TABLE checkpoint (
+        session INTEGER NOT NULL REFERENCES session (number) ON DELETE CASCADE,
+        step INTEGER NOT NULL,
+        told INTEGER NOT NULL,     -- observations until then, those that do not count among them
+        build TEXT NOT NULL,       -- who alone can read the state
+        state BLOB NOT NULL,       -- what was learned; empty where that is not kept any more
+        reports BLOB NOT NULL,     -- of the steps since the checkpoint before, JSON by lines, deflated
+        checksum INTEGER NOT NULL,
+        PRIMARY KEY (session, step)
+    ) STRICT;
+",
 ];
 
 /// The version that this program writes.
@@ -46,6 +59,8 @@ pub(super) const KNOWN: u32 = MIGRATIONS.len() as u32;
 pub(super) const CHECKED: u32 = 2;
 /// The first version with what a list shows.
 pub(super) const SUMMED_UP: u32 = 3;
+/// The first version with checkpoints.
+pub(super) const CHECKPOINTS: u32 = 4;
 
 /// Refuses the file of another program, and one of a later version. Tells the version.
 pub(super) fn check(connection: &Connection, path: &Path) -> Result<u32, StoreError> {

@@ -1,0 +1,117 @@
+//! What a session with a robot elsewhere has come to, kept so that nobody need wait until all of it has been replayed.
+
+use uuid::Uuid;
+
+use super::Kept;
+use crate::{
+    ask_tell::{Checkpoint, Event},
+    experiment::Description,
+    server::store::{EVERY, Saved, Store, build, packed, unpacked},
+};
+
+/// The steps since the latest checkpoint, of which there is none in the store yet.
+#[derive(Default)]
+pub(super) struct Since {
+    reports: Vec<Kept>,
+}
+
+impl Since {
+    /// Takes in a step, after so many observations were told; a checkpoint where one is due. `learned` tells what was learned up to it.
+    pub(super) fn step(
+        &mut self,
+        report: &Kept,
+        told: u64,
+        learned: impl FnOnce() -> Option<Checkpoint>,
+    ) -> Option<Saved> {
+        build()?;
+        self.reports.push(report.clone());
+        if report.step == 0 || report.step % EVERY != 0 {
+            return None;
+        }
+        let reports = std::mem::take(&mut self.reports);
+        let state = learned()?.to_bytes();
+        Some(Saved { step: report.step, told, state, reports: packed(reports.iter().map(|kept| kept.json.get())) })
+    }
+
+    /// The same, and the store keeps it, if it can.
+    pub(super) fn keep(
+        &mut self,
+        (store, id): (&Store, Uuid),
+        report: &Kept,
+        told: u64,
+        learned: impl FnOnce() -> Option<Checkpoint>,
+    ) {
+        let saved = self.step(report, told, learned);
+        keep_all((store, id), saved.as_slice());
+    }
+}
+
+/// The store keeps checkpoints, if it can.
+pub(super) fn keep_all((store, id): (&Store, Uuid), saved: &[Saved]) {
+    let Some(build) = build() else { return };
+    for saved in saved {
+        if let Err(error) = store.save(id, build, saved) {
+            // Nothing is lost by it but the time to replay.
+            tracing::debug!(session = %id, %error, "a checkpoint cannot be kept");
+            return;
+        }
+    }
+}
+
+/// From where a stored session goes on.
+pub(super) struct GoesOn {
+    pub(super) checkpoint: Checkpoint,
+    /// The reports of the steps until there, JSON by lines.
+    reports: Vec<String>,
+}
+
+impl GoesOn {
+    /// From the latest checkpoint on that serves these events; `None` where all of them must be replayed.
+    pub(super) fn of(store: &Store, id: Uuid, events: &[Event]) -> Option<Self> {
+        let saved = store.saved(id, build()?).ok()?;
+        let (index, checkpoint) = latest(&saved, events)?;
+        let reports = saved[..=index].iter().map(|saved| unpacked(&saved.reports).ok());
+        Some(Self { checkpoint, reports: reports.collect::<Option<_>>()? })
+    }
+
+    /// The reports of the steps until there; `None` where they are not all of them.
+    pub(super) fn reports(&self, description: &Description) -> Option<Vec<Kept>> {
+        let lines = self.reports.iter().flat_map(|text| text.lines());
+        let kept: Vec<Kept> = lines.map(|line| Kept::read(line, description)).collect::<Option<_>>()?;
+        let are_in_order = (0..).zip(&kept).all(|(step, kept)| kept.step == step);
+        (are_in_order && kept.len() as u64 == self.checkpoint.step() + 1).then_some(kept)
+    }
+}
+
+/// The latest checkpoint of before an observation that serves these events.
+pub(super) fn before(store: &Store, id: Uuid, observation: u64, events: &[Event]) -> Option<Checkpoint> {
+    let mut saved = store.saved(id, build()?).ok()?;
+    saved.retain(|saved| saved.told < observation);
+    latest(&saved, events).map(|(_, checkpoint)| checkpoint)
+}
+
+fn latest(saved: &[Saved], events: &[Event]) -> Option<(usize, Checkpoint)> {
+    saved.iter().enumerate().rev().filter(|(_, saved)| !saved.state.is_empty()).find_map(|(index, saved)| {
+        let checkpoint = Checkpoint::from_bytes(&saved.state)?;
+        (checkpoint.step() == saved.step && checkpoint.serves(events)).then_some((index, checkpoint))
+    })
+}
+
+/// How far a replay has got, for everyone to read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Replaying {
+    /// Events done …
+    pub(super) done: usize,
+    /// … of so many.
+    pub(super) of: usize,
+}
+
+impl Replaying {
+    /// In words.
+    pub(super) fn told(self) -> String {
+        let Self { done, of } = self;
+        format!(
+            "what happened in the session is being replayed without an observation, or with one more: event {done} of {of}; ask again later"
+        )
+    }
+}

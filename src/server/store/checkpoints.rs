@@ -1,0 +1,197 @@
+//! What sessions have come to after some of their steps: what may be lost, since replaying finds it out again.
+
+use std::{
+    fs::File,
+    io::{self, Read, Write},
+    sync::OnceLock,
+};
+
+use fearless_simd::Level;
+use flate2::{Compression, Crc, read::DeflateDecoder, write::DeflateEncoder};
+use rusqlite::{Connection, Transaction, params};
+use sha2::{Digest, Sha256};
+use uuid::Uuid;
+
+use super::{Event, Store, StoreError, TransactionBehavior, counted, insert_events, schema};
+
+/// Steps between one checkpoint and the next.
+pub const EVERY: u64 = 50;
+/// Of the latest steps all checkpoints keep what was learned, and of those before …
+const LATEST: u64 = 4 * EVERY;
+/// … one in so many steps.
+const SPARSE: u64 = 8 * EVERY;
+/// Bytes that the reports of a checkpoint may have, unpacked.
+const MOST_UNPACKED: u64 = 1 << 28;
+
+/// What a session has come to after a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Saved {
+    /// The step.
+    pub step: u64,
+    /// How many observations had been told, those that do not count among them.
+    pub told: u64,
+    /// [What was learned](crate::ask_tell::Checkpoint) up to it; empty where that is not kept any more.
+    pub state: Vec<u8>,
+    /// The reports since the checkpoint before, packed.
+    pub reports: Vec<u8>,
+}
+
+impl Saved {
+    fn checksum(&self) -> u32 {
+        let mut crc = Crc::new();
+        crc.update(&self.state);
+        crc.update(&self.reports);
+        crc.sum()
+    }
+}
+
+/// Texts without line breaks, one after the other in little room.
+pub fn packed<'a>(texts: impl Iterator<Item = &'a str>) -> Vec<u8> {
+    let mut packed = DeflateEncoder::new(Vec::new(), Compression::fast());
+    let written = texts.into_iter().try_for_each(|text| writeln!(packed, "{text}"));
+    // Memory takes all that is written to it.
+    written.and_then(|()| packed.finish()).unwrap_or_default()
+}
+
+/// The lines of what was packed.
+///
+/// # Errors
+///
+/// Where it is not as it was written.
+pub fn unpacked(packed: &[u8]) -> io::Result<String> {
+    let mut text = String::new();
+    DeflateDecoder::new(packed).take(MOST_UNPACKED).read_to_string(&mut text)?;
+    Ok(text)
+}
+
+/// Tells this build on this kind of processor from all others: what one has learned another must learn by itself, to the last bit.
+/// `None` where the program cannot read itself.
+pub fn build() -> Option<&'static str> {
+    static BUILD: OnceLock<Option<String>> = OnceLock::new();
+    let read = || {
+        let mut program = program().ok()?;
+        let mut hash = Sha256::new();
+        io::copy(&mut program, &mut hash).ok()?;
+        let hash: String = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        Some(format!("{hash} {:?}", Level::new()))
+    };
+    BUILD.get_or_init(read).as_deref()
+}
+
+/// The program that runs, though another may have taken its name since.
+fn program() -> io::Result<File> {
+    if cfg!(target_os = "linux") { File::open("/proc/self/exe") } else { File::open(std::env::current_exe()?) }
+}
+
+impl Store {
+    /// Keeps what a session has come to. It is kept by nobody's order: without room for it nothing is lost but time.
+    ///
+    /// # Errors
+    ///
+    /// [`StoreError`]: it is not kept then.
+    pub fn save(&self, id: Uuid, build: &str, saved: &Saved) -> Result<(), StoreError> {
+        let mut connection = self.connection();
+        self.can_grow(&connection)?;
+        let written = (|| {
+            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+            insert(&transaction, id, build, saved)?;
+            transaction.commit()
+        })();
+        self.is_left();
+        written.map_err(self.told())
+    }
+
+    /// What a session had come to, by this build, oldest first: those that are as they were written, up to the first that is not. None
+    /// of a store of an earlier version.
+    ///
+    /// # Errors
+    ///
+    /// [`StoreError`] where they cannot be read.
+    pub fn saved(&self, id: Uuid, build: &str) -> Result<Vec<Saved>, StoreError> {
+        if self.version < schema::CHECKPOINTS {
+            return Ok(Vec::new());
+        }
+        let connection = self.connection();
+        let read = (|| {
+            let mut select = connection.prepare_cached(
+                "SELECT step, told, state, reports, checkpoint.checksum FROM checkpoint
+                 JOIN session ON session.number = checkpoint.session WHERE session.id = ?1 AND build = ?2 ORDER BY step",
+            )?;
+            let rows = select.query_map(params![id.to_string(), build], |row| {
+                let (step, told): (i64, i64) = (row.get(0)?, row.get(1)?);
+                let (step, told) = (step.unsigned_abs(), told.unsigned_abs());
+                let saved = Saved { step, told, state: row.get(2)?, reports: row.get(3)? };
+                Ok((saved, row.get::<_, u32>(4)?))
+            })?;
+            rows.collect::<Result<Vec<_>, _>>()
+        })();
+        let rows = read.map_err(self.told())?.into_iter();
+        // Where what was learned was dropped, its checksum was dropped with it.
+        Ok(rows.take_while(|(saved, sum)| saved.checksum() == *sum).map(|(saved, _)| saved).collect())
+    }
+
+    /// Appends events to a session that has `revision` of them, by which an observation counts otherwise than it did. What the session
+    /// had come to since is forgotten, and what it has come to now is kept.
+    ///
+    /// # Errors
+    ///
+    /// [`StoreError`]: nothing has happened then.
+    pub fn rewrite(
+        &self,
+        id: Uuid,
+        revision: usize,
+        events: &[Event],
+        observation: u64,
+        (build, saved): (&str, &[Saved]),
+    ) -> Result<(), StoreError> {
+        let mut connection = self.connection();
+        self.can_grow(&connection)?;
+        let written = (|| {
+            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+            insert_events(&transaction, id, revision, events, None)?;
+            let name = id.to_string();
+            transaction
+                .execute("UPDATE session SET counted = counted + ?1 WHERE id = ?2", params![counted(events), name])?;
+            transaction.execute(
+                "DELETE FROM checkpoint
+                 WHERE session = (SELECT number FROM session WHERE id = ?1) AND (told >= ?2 OR build != ?3)",
+                params![name, observation as i64, build],
+            )?;
+            saved.iter().try_for_each(|saved| insert(&transaction, id, build, saved))?;
+            transaction.commit()
+        })();
+        self.is_left();
+        written.map_err(self.told())
+    }
+}
+
+/// Writes one, and drops what was learned up to earlier ones but for a few.
+fn insert(transaction: &Transaction<'_>, id: Uuid, build: &str, saved: &Saved) -> rusqlite::Result<()> {
+    let Some(session) = number(transaction, id)? else { return Ok(()) };
+    transaction.execute("DELETE FROM checkpoint WHERE session = ?1 AND build != ?2", params![session, build])?;
+    let Saved { step, told, state, reports } = saved;
+    transaction.execute(
+        "INSERT OR REPLACE INTO checkpoint (session, step, told, build, state, reports, checksum)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+        params![session, *step as i64, *told as i64, build, state, reports, saved.checksum()],
+    )?;
+    let mut old = transaction.prepare_cached(
+        "SELECT step, reports FROM checkpoint WHERE session = ?1 AND step < ?2 AND step % ?3 != 0 AND length(state) > 0",
+    )?;
+    let old = old.query_map(params![session, step.saturating_sub(LATEST) as i64, SPARSE as i64], |row| {
+        Ok((row.get::<_, i64>(0)?, row.get::<_, Vec<u8>>(1)?))
+    })?;
+    for (old, reports) in old.collect::<Result<Vec<_>, _>>()? {
+        let left = Saved { step: 0, told: 0, state: Vec::new(), reports };
+        transaction.execute(
+            "UPDATE checkpoint SET state = x'', checksum = ?1 WHERE session = ?2 AND step = ?3",
+            params![left.checksum(), session, old],
+        )?;
+    }
+    Ok(())
+}
+
+fn number(connection: &Connection, id: Uuid) -> rusqlite::Result<Option<i64>> {
+    use rusqlite::OptionalExtension;
+    connection.query_row("SELECT number FROM session WHERE id = ?1", [id.to_string()], |row| row.get(0)).optional()
+}
