@@ -78,42 +78,65 @@
 //!
 //! *Signs.* A positive angle turns right-handedly about w; w and −w are different robots.
 //!
-//! *Randomness.* One ChaCha stream per purpose and seed ([`experiment::Stream`]). The same seed gives the same numbers on
-//! the same machine, whatever the number of threads.
+//! *Randomness.* One ChaCha stream per purpose and seed ([`experiment::Stream`]).
+//!
+//! *Bits.* The same seed gives the same bits on every machine, whatever its processor and the number of threads: no product is added
+//! without being rounded, sums have one order, and elementary functions and normal draws are our own.
 
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod ask_tell;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod assembly;
 #[cfg(feature = "app")]
 pub mod atomic;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod calibration;
 #[cfg(feature = "app")]
 mod chart;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod design;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod doubts;
+mod elementary;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod estimation;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod experiment;
 #[cfg(feature = "app")]
 pub mod export;
 pub mod json;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod kinematics;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 mod lanes;
 pub mod magnitude;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod model;
 mod most;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
+mod normal;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod optimize;
 #[cfg(feature = "app")]
 pub mod paper;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 mod parallel;
 #[cfg(feature = "app")]
 pub mod recording;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod scenario;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod selection;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod sensing;
 #[cfg(feature = "app")]
 pub mod server;
 mod similar;
+#[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod table;
 mod whole;
+
+pub use lanes::{Instructions, use_at_most};
 
 /// The code in the README, compiled and run.
 #[cfg(doctest)]

@@ -28,7 +28,7 @@
 //! # A session is its list of events
 //!
 //! [`Session`] is a [`Setup`] and a list of [`Event`]s, and nothing else: replaying the list gives it again, to the last bit on
-//! the same build and kind of CPU, and without choosing anything again, since a suggestion's event holds its plan. There are no
+//! the same build, and without choosing anything again, since a suggestion's event holds its plan. There are no
 //! clocks and no random numbers but those keyed by the seed; who calls says what time it is, if that matters.
 //!
 //! Whatever changes a session is done in two phases, so that a store can write in between: `prepare_…` tries it on a copy and

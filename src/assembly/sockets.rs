@@ -1,11 +1,11 @@
 //! What the sockets of a scenario become: actions, what is known beforehand, and what is held out.
 
 use rand::RngExt;
-use rand_distr::StandardNormal;
 
 use crate::{
     experiment::{HeldInSocket, Stream},
     model::{Manifold, Workspace},
+    normal::StandardNormal,
     scenario::{Measurements, Robot, Scenario, SocketSpec},
     selection::{Actions, Sockets},
     sensing::{Observation, Occasion},

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::{CalibrationError, Case, Figures, Fit, Progress, Split};
 use crate::parallel::mapped;
 use crate::{
+    elementary::powf,
     experiment::Stream,
     model::{Layout, State},
     selection::{Criterion, Weights, herd},
@@ -126,7 +127,7 @@ impl Case<'_> {
         if splits.iter().all(|split| split.held_out.is_empty()) || !(3..=POOL).contains(&fewest) {
             return Ok(Vec::new());
         }
-        let ratio = (fewest as f64 / 3.0).powf(1.0 / (SIZES - 1) as f64);
+        let ratio = powf(fewest as f64 / 3.0, 1.0 / (SIZES - 1) as f64);
         let mut sizes: Vec<usize> = (0..SIZES).map(|k| (3.0 * ratio.powi(k as i32)).round() as usize).collect();
         sizes.dedup();
         let random = self.random(splits, &sizes, FEW_ORDERS, progress)?;

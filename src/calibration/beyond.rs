@@ -8,7 +8,10 @@
 use nalgebra::{Cholesky, DMatrix};
 
 use super::{Case, Fit};
-use crate::model::{Block, Layout};
+use crate::{
+    elementary::cbrt,
+    model::{Block, Layout},
+};
 
 /// Deviations from which on a correction is told.
 const TOLD: f64 = 3.0;
@@ -48,7 +51,7 @@ impl Case<'_> {
 fn deviations(chi2: f64, degrees: usize) -> f64 {
     let d = degrees as f64;
     let variance = 2.0 / (9.0 * d);
-    let above = ((chi2 / d).cbrt() - (1.0 - variance)) / variance.sqrt();
+    let above = (cbrt(chi2 / d) - (1.0 - variance)) / variance.sqrt();
     // One-sided to two-sided: near three deviations a probability of one half less is worth 0.22.
     above + 0.22
 }

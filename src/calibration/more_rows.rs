@@ -27,7 +27,10 @@
 use nalgebra::{Cholesky, DMatrix};
 
 use super::{Case, Figures, Fit, MoreRows, Noise};
-use crate::{estimation::NoiseFit, model::Workspace};
+use crate::{
+    elementary::hypot,
+    {estimation::NoiseFit, model::Workspace},
+};
 
 /// So many times the rows that there are is as many as anybody could measure.
 const MOST: f64 = 1e3;
@@ -106,10 +109,10 @@ impl Case<'_> {
             told.held_out_mm = Some(found.sqrt());
             let expected = told.model_error_mm.powi(2) + error * error * falls.at(share);
             let beyond = (rms * rms * (1.0 - spread) - noise - expected).max(0.0);
-            told.model_error_mm = told.model_error_mm.hypot(beyond.sqrt());
+            told.model_error_mm = hypot(told.model_error_mm, beyond.sqrt());
         }
         let floor = told.model_error_mm;
-        told.expected_mm = Some(error.hypot(floor));
+        told.expected_mm = Some(hypot(error, floor));
         told.untold_mm = error * falls.at(MOST).sqrt();
         let least = fit.belief.layout.dimension().div_ceil(self.equations_of_a_row(fit).max(1));
         let needed = |floor: f64| {

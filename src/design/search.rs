@@ -2,7 +2,6 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 
 use super::{
     Problem,
@@ -10,7 +9,10 @@ use super::{
     candidates::{candidates, within},
     sensitivity::Sensitivity,
 };
-use crate::optimize::{Polish, Slopes, descend};
+use crate::{
+    normal::StandardNormal,
+    optimize::{Polish, Slopes, descend},
+};
 
 /// An approximate A-optimal design.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@
 //! Where nothing but points is measured, both run through vector registers (see [`lanes`](crate::lanes)). For other sensors
 //! ∂H/∂θⱼ are central differences of fourth order of the rows.
 
-use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
+use fearless_simd::{Level, Simd, SimdBase, dispatch};
 use nalgebra::DMatrix;
 
 use super::Problem;
@@ -32,7 +32,7 @@ impl<'a> Sensitivity<'a> {
     pub fn new(problem: &'a Problem) -> Self {
         let points = problem.rig.points();
         let points = points.and_then(|points| Points::new(&problem.truth, &problem.layout, &points));
-        Self { problem, points, level: Level::new() }
+        Self { problem, points, level: crate::lanes::level() }
     }
 
     /// φ of every pose (rad or m) for the matrix S; −∞ where nothing is seen.
@@ -120,7 +120,7 @@ fn in_lanes<S: Simd>(
         for lane in (0..GROUP).step_by(Lanes::<S>::LEN) {
             let mut sum = splat(simd, 0.0);
             for first in (lane..rows.len()).step_by(GROUP) {
-                sum = load(simd, &rows, first).mul_add(load(simd, &products, first), sum);
+                sum = load(simd, &rows, first) * load(simd, &products, first) + sum;
             }
             store::<S>(sum, &mut sums, lane);
         }

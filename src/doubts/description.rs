@@ -20,7 +20,7 @@ use super::{
     Base, Subject,
     fit::{Placed, Seen, moved},
 };
-use crate::kinematics::Joint;
+use crate::{elementary::ln, kinematics::Joint};
 
 /// Standard deviation of the zero of a joint's readings, rad; what calibrations correct is less.
 const ZERO_RAD: f64 = 0.02;
@@ -158,7 +158,7 @@ pub fn explain(
             (standing, squares, ended) = (other, left, gain < FOUND * before.max(1.0));
         }
         let learned = (squares / (equations - accounted).max(1.0)).max(least * least);
-        ended &= (learned / variance).ln().abs() < 0.02;
+        ended &= ln(learned / variance).abs() < 0.02;
         variance = learned;
         last = Some(posterior);
         if ended {
@@ -168,10 +168,10 @@ pub fn explain(
     let off = from_prior(&standing);
     // With every σ as it was found: the last information is of one step before.
     let factor = last?.cholesky()?;
-    let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>()
-        + 2.0 * deviations.iter().map(|sd| sd.ln()).sum::<f64>();
+    let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| ln(*x)).sum::<f64>()
+        + 2.0 * deviations.iter().map(|sd| ln(*sd)).sum::<f64>();
     let counted = subject.counted(rows.len() * seen.equations()) / equations;
-    let data = equations * variance.ln() + squares / variance;
+    let data = equations * ln(variance) + squares / variance;
     let log_evidence = -0.5 * (counted * data + cost_of_prior(&off) + log_determinant);
     let (rms, turned) = chain.left(&standing);
     let zeros = (0..subject.joints.len()).map(|joint| standing.errors[6 * joint + 5]).collect();

@@ -2,7 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
 
-use crate::{kinematics::rotation, model::best_motion, most};
+use crate::{
+    elementary::hypot,
+    {kinematics::rotation, model::best_motion, most},
+};
 
 /// What was seen, row by row.
 #[derive(Clone, Debug)]
@@ -112,7 +115,7 @@ impl Seen {
         };
         let rms = mean(&|at, seen| (at.translation.vector - seen.translation.vector).norm_squared());
         let turned = self.arm.map(|_| mean(&|at, seen| at.rotation.angle_to(&seen.rotation).powi(2)));
-        let judged = rms.hypot(self.arm.unwrap_or(0.0) * turned.unwrap_or(0.0));
+        let judged = hypot(rms, self.arm.unwrap_or(0.0) * turned.unwrap_or(0.0));
         Fit { rms, judged, turned, placed: Some((placed, rows)) }
     }
 

@@ -18,6 +18,7 @@ use super::{
     moving,
 };
 use crate::{
+    elementary::{exp, ln},
     kinematics::{Joint, JointKind},
     most::middle,
 };
@@ -236,9 +237,9 @@ impl<'a> Readings<'a> {
         let counted = self.subject.counted(rows.len() * 3);
         // A target is spread as far as its robot reaches, to a factor of two or so.
         let (expected, spread) = self.spreads(seen);
-        let far = (spread / expected).ln() / 2_f64.ln();
+        let far = ln(spread / expected) / ln(2_f64);
         let unlikely = if far.is_finite() { 0.5 * far * far } else { 0.0 };
-        let log_evidence = found.log_evidence + counted * self.size.abs().ln() - unlikely;
+        let log_evidence = found.log_evidence + counted * ln(self.size.abs()) - unlikely;
         Some(Explained { log_evidence, ..found })
     }
 
@@ -318,7 +319,7 @@ impl<'a> Readings<'a> {
             off.iter().fold(self.clone(), |read, (joint, by)| read.applied(Hypothesis::Shifted(*joint, *by))).taken();
         let fit = read.sight.fit(&read.motions(), true);
         let explained = read.explained(&fit, None, Known::DESCRIBED).filter(|left| read.fits(left))?;
-        let doubtful = off.len() as f64 * (2.0 + (self.joints().len() as f64).ln());
+        let doubtful = off.len() as f64 * (2.0 + ln(self.joints().len() as f64));
         let evidence = explained.log_evidence - doubtful;
         let is_told =
             off.len() > 1 && evidence > before.log_evidence + TOLD && other.is_none_or(|other| evidence > other);
@@ -372,8 +373,8 @@ impl<'a> Readings<'a> {
     /// The size with which coordinates fit best.
     fn sized(&self) -> (f64, Fit) {
         let left = |log: f64| {
-            let fit = self.whole(Hypothesis::Size(log.exp())).1;
-            (fit.judged / log.exp(), fit)
+            let fit = self.whole(Hypothesis::Size(exp(log))).1;
+            (fit.judged / exp(log), fit)
         };
         let grid = (-10..=10).map(|k| f64::from(k) * 0.05);
         let mut best =
@@ -388,7 +389,7 @@ impl<'a> Readings<'a> {
             }
             step /= 2.0;
         }
-        (best.0.exp(), best.1.1)
+        (exp(best.0), best.1.1)
     }
 
     fn of_lags(&self) -> Vec<(Hypothesis, Fit)> {

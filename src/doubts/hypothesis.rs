@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::{Doubt, DoubtKind, Subject, doubt::length, fit::Fit, hypotheses::Readings};
-use crate::kinematics::JointKind;
+use crate::{elementary::ln, kinematics::JointKind};
 
 /// A way to read the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,12 +79,12 @@ impl Hypothesis {
         let joints = joints as f64;
         match self {
             Self::Angles(_) | Self::Target(_) | Self::Inverted | Self::RealFirst | Self::RealLast => 0.0,
-            Self::Scaled(_, factor) if factor < 0.0 => -joints.ln(),
+            Self::Scaled(_, factor) if factor < 0.0 => -ln(joints),
             Self::Mirrored | Self::Transposed | Self::RollPitchYaw | Self::RotationVector => -1.0,
             Self::Size(_) => -2.0,
-            Self::Scaled(..) => -1.0 - joints.ln(),
-            Self::Shifted(..) => -2.0 - joints.ln(),
-            Self::Swapped(..) | Self::Lag(_) => -2.0 - 2.0 * joints.ln(),
+            Self::Scaled(..) => -1.0 - ln(joints),
+            Self::Shifted(..) => -2.0 - ln(joints),
+            Self::Swapped(..) | Self::Lag(_) => -2.0 - 2.0 * ln(joints),
         }
     }
 

@@ -12,7 +12,10 @@
 use nalgebra::Point3;
 
 use super::{Doubt, DoubtKind, Line, doubt::length};
-use crate::most::middle;
+use crate::{
+    elementary::{acos, ln, powf},
+    most::middle,
+};
 
 /// A row is off where more is left of it than so many times what is left of the middle one.
 const OFF: f64 = 2.0;
@@ -34,11 +37,11 @@ pub fn doubt(lines: &[Line], places: &[Point3<f64>], seen: &[Point3<f64>], sigma
             |row: usize| Some(places.get(row.checked_add_signed(by)?)? - places[row]).filter(|way| way.norm() > 0.0);
         let cosines: Vec<(usize, f64)> =
             off.iter().filter_map(|row| Some((*row, left[*row].normalize().dot(&way(*row)?.normalize())))).collect();
-        let gain = |c: f64| (0.5 * (NARROW + 1.0) * (0.5 * (1.0 + c)).powf(NARROW) + 0.5).ln();
+        let gain = |c: f64| ln(0.5 * (NARROW + 1.0) * powf(0.5 * (1.0 + c), NARROW) + 0.5);
         let odds: f64 = cosines.iter().map(|(_, c)| gain(*c)).sum();
         let on_way = |(row, c): &(usize, f64)| {
             let share = way(*row).is_some_and(|way| left[*row].norm() < SHARE * way.norm());
-            share && c.acos().to_degrees() < WITHIN
+            share && acos(*c).to_degrees() < WITHIN
         };
         (odds, by, cosines.iter().filter(|it| on_way(it)).map(|it| it.0).collect::<Vec<usize>>())
     };

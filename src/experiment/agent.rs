@@ -4,7 +4,7 @@
 //! proposed, nor have been proposed at all.
 //!
 //! *The belief depends on the executed events alone*, in their order: absorbing them again gives it again, to the last bit
-//! on the same build and kind of CPU. *Proposals depend on the whole list of events.* The random numbers of a proposal are
+//! with the same build. *Proposals depend on the whole list of events.* The random numbers of a proposal are
 //! keyed by the seed and by its ordinal; what a policy planned with it stands in its event, and nothing is remembered
 //! elsewhere; so a stored list of events is restored without choosing anything again.
 

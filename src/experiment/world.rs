@@ -6,12 +6,12 @@ use std::sync::Arc;
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 
 use super::streams::Stream;
 use crate::{
     kinematics::JointBox,
     model::{Manifold, State},
+    normal::StandardNormal,
     selection::Movement,
     sensing::{Head, Observation, Refused, Rig},
 };

@@ -24,6 +24,8 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix4, Point3, UnitVector3, Vector
 
 use super::Line;
 
+use crate::elementary::{atan2, cos, sin};
+
 /// An orthonormal basis [b₁ b₂] of the plane ⟂ `w`, right-handed with it, a function of `w` alone.
 ///
 /// Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017. It jumps where w_z changes sign, which
@@ -46,7 +48,7 @@ pub fn basis(w: &UnitVector3<f64>) -> Matrix3x2<f64> {
 pub fn retract_direction(w: &UnitVector3<f64>, d: &Vector2<f64>) -> UnitVector3<f64> {
     let tangent = basis(w) * d;
     let angle = tangent.norm();
-    UnitVector3::new_normalize(w.into_inner() * angle.cos() + tangent * sinc(angle))
+    UnitVector3::new_normalize(w.into_inner() * cos(angle) + tangent * sinc(angle))
 }
 
 /// The coordinates d (radians) of the direction `other` in the chart at `w`; `None` for the antipode, where they are
@@ -58,7 +60,7 @@ pub fn local_direction(w: &UnitVector3<f64>, other: &UnitVector3<f64>) -> Option
     if sine < 1e-12 {
         return (cosine > 0.0).then(Vector2::zeros);
     }
-    Some(basis(w).transpose() * tangent * (sine.atan2(cosine) / sine))
+    Some(basis(w).transpose() * tangent * (atan2(sine, cosine) / sine))
 }
 
 /// The line at coordinates δ = (a, d) in the chart at `line`.
@@ -97,7 +99,7 @@ pub fn direction_transport(w: &UnitVector3<f64>, d: &Vector2<f64>, w_new: &UnitV
         }
         let u = tangent / angle;
         let radial = u.dot(&e);
-        (u * angle.cos() - w.into_inner() * angle.sin()) * radial + (e - u * radial) * sinc(angle)
+        (u * cos(angle) - w.into_inner() * sin(angle)) * radial + (e - u * radial) * sinc(angle)
     };
     let columns = [differential(frame.column(0).into_owned()), differential(frame.column(1).into_owned())];
     basis(w_new).transpose() * Matrix3x2::from_columns(&columns)
@@ -135,5 +137,5 @@ pub fn line_change(line: &Line, there: &Line) -> Option<Matrix4<f64>> {
 
 /// sin x / x, continuous at 0.
 fn sinc(x: f64) -> f64 {
-    if x.abs() < 1e-6 { 1.0 - x * x / 6.0 } else { x.sin() / x }
+    if x.abs() < 1e-6 { 1.0 - x * x / 6.0 } else { sin(x) / x }
 }

@@ -3,6 +3,8 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3};
 use serde::{Deserialize, Serialize};
 
+use crate::elementary::sin_cos;
+
 /// A directed line in space: the axis of a revolute joint at θ = 0.
 ///
 /// Any point of the axis describes the same line; the one written here is its *pivot*, the origin of the line's
@@ -98,7 +100,7 @@ impl Joint {
         match self {
             Self::Revolute(Line { point, direction }) => {
                 let (w, r) = (direction.as_ref(), x - point);
-                let (sin, cos) = position.sin_cos();
+                let (sin, cos) = sin_cos(position);
                 point + r * cos + w.cross(&r) * sin + w * (w.dot(&r) * (1.0 - cos))
             }
             Self::Prismatic(direction) => x + direction.into_inner() * position,

@@ -11,6 +11,8 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+use crate::elementary::{cos, sin};
+
 /// J(ω).
 pub fn left_jacobian(omega: &Vector3<f64>) -> Matrix3<f64> {
     let squared = omega.norm_squared();
@@ -19,7 +21,7 @@ pub fn left_jacobian(omega: &Vector3<f64>) -> Matrix3<f64> {
         (0.5 - squared / 24.0, 1.0 / 6.0 - squared / 120.0)
     } else {
         let angle = squared.sqrt();
-        ((1.0 - angle.cos()) / squared, (angle - angle.sin()) / (squared * angle))
+        ((1.0 - cos(angle)) / squared, (angle - sin(angle)) / (squared * angle))
     };
     Matrix3::identity() + cross * first + cross * cross * second
 }

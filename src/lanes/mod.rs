@@ -4,12 +4,13 @@
 //! does not depend on which others it is computed with. The widest instructions that the processor has are chosen at run time,
 //! by [`dispatch!`](fearless_simd::dispatch), in safe code. A function is compiled for those instructions only where it is
 //! inlined into the dispatched one: hence `#[inline(always)]` throughout, and loops instead of closures that are handed lanes.
-//! The same kind of processor gives the same bits; with and without fused multiplication they differ by rounding.
+//! Nothing is multiplied and added at once, and no sum is parted by the width of a register: every processor gives the same bits.
 //!
 //! In memory candidates stand in groups of [`GROUP`], whatever the width of a register: of each number of a group one candidate
 //! beside the other.
 
 mod aligned;
+mod level;
 mod rotor;
 mod space;
 mod symmetric;
@@ -19,6 +20,8 @@ use std::ops::Range;
 use fearless_simd::{Level, Simd, SimdBase};
 
 pub use aligned::Aligned;
+pub(crate) use level::level;
+pub use level::{Instructions, use_at_most};
 pub use rotor::sin_cos;
 pub use space::{Frame, Vector};
 pub use symmetric::{add_few_squares, times, times_few, write_times};
@@ -47,25 +50,6 @@ pub fn store<S: Simd>(lanes: Lanes<S>, numbers: &mut [f64], first: usize) {
     lanes.store_slice(&mut numbers[first..first + Lanes::<S>::LEN]);
 }
 
-/// Of each of these registers the sum of its lanes: neighbours are added and two registers put into one, until these hold sums
-/// alone.
-#[inline(always)]
-pub fn sums<S: Simd>(mut of: [Lanes<S>; GROUP]) -> [f64; GROUP] {
-    let (mut count, mut width) = (GROUP, Lanes::<S>::LEN);
-    while width > 1 {
-        (count, width) = (count / 2, width / 2);
-        for index in 0..count {
-            let (even, odd) = of[2 * index].deinterleave(of[2 * index + 1]);
-            of[index] = even + odd;
-        }
-    }
-    let mut found = [0.0; GROUP];
-    for (of, found) in of.into_iter().zip(found.chunks_exact_mut(Lanes::<S>::LEN)) {
-        of.store_slice(found);
-    }
-    found
-}
-
 /// Groups of candidates that are computed alike.
 pub struct Run {
     /// The instructions that serve best.
@@ -85,7 +69,7 @@ pub fn runs(level: Level, candidates: usize) -> impl Iterator<Item = Run> {
     [full_ones, last].into_iter().filter(|run| !run.groups.is_empty())
 }
 
-/// The same instructions, on no more lanes than so many candidates need. Those of SSE alone cannot multiply and add at once.
+/// The same instructions, on no more lanes than so many candidates need.
 #[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables))]
 pub fn narrowed(level: Level, candidates: usize) -> Level {
     #[cfg(target_arch = "x86_64")]

@@ -1,8 +1,9 @@
 //! Sine and cosine.
 
-use fearless_simd::{ExtractToken, Simd, SimdBase, SimdFloat, SimdMask};
+use fearless_simd::{ExtractToken, Simd, SimdBase, SimdMask};
 
 use super::{Lanes, splat};
+use crate::elementary;
 
 /// Sine and cosine of angles, radians, within two units in the last place of 1.
 ///
@@ -15,25 +16,31 @@ use super::{Lanes, splat};
 #[inline(always)]
 pub fn sin_cos<S: Simd>(x: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
     let simd = x.token();
-    if !x.abs().simd_lt(splat(simd, FAR)).all_true() {
-        // Too far for the reduction, or no number.
-        return (one_by_one::<S>(x, f64::sin), one_by_one::<S>(x, f64::cos));
+    let found = reduced::<S>(x);
+    if x.abs().simd_lt(splat(simd, FAR)).all_true() {
+        return found;
     }
+    // Too far for the reduction, or no number: those alone, whatever stands beside them.
+    let (sine, cosine) = found;
+    (one_by_one::<S>(x, sine, elementary::sin), one_by_one::<S>(x, cosine, elementary::cos))
+}
+
+/// The same of angles that are not too far.
+#[inline(always)]
+fn reduced<S: Simd>(x: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
+    let simd = x.token();
     let n = nearest::<S>(x * std::f64::consts::FRAC_2_PI);
     let mut r = x;
     for part in HALF_PI {
-        r = n.mul_add(splat(simd, -part), r);
+        r = n * splat(simd, -part) + r;
     }
     let z = r * r;
-    let sine = (r * z).mul_add(polynomial::<S>(z, &SINE), r);
-    let cosine = (z * z).mul_add(polynomial::<S>(z, &COSINE), z.mul_add(splat(simd, -0.5), splat(simd, 1.0)));
+    let sine = (r * z) * polynomial::<S>(z, &SINE) + r;
+    let cosine = (z * z) * polynomial::<S>(z, &COSINE) + (z * splat(simd, -0.5) + splat(simd, 1.0));
     // n modulo 4 is one of −2 … 2, of which the cosine of a quarter turn each is 1 − |q|.
-    let q = nearest::<S>(n * 0.25).mul_add(splat(simd, -4.0), n);
+    let q = nearest::<S>(n * 0.25) * splat(simd, -4.0) + n;
     let (of_cosine, of_sine) = (splat(simd, 1.0) - q.abs(), q * (splat(simd, 2.0) - q.abs()));
-    (
-        sine.mul_add(of_cosine, cosine * of_sine), //
-        cosine.mul_add(of_cosine, -(sine * of_sine)),
-    )
+    (sine * of_cosine + cosine * of_sine, cosine * of_cosine - sine * of_sine)
 }
 
 /// Of these coefficients, the highest power first.
@@ -42,15 +49,15 @@ fn polynomial<S: Simd>(z: Lanes<S>, coefficients: &[f64; 6]) -> Lanes<S> {
     let simd = z.token();
     let mut sum = splat(simd, coefficients[0]);
     for coefficient in &coefficients[1..] {
-        sum = sum.mul_add(z, splat(simd, *coefficient));
+        sum = sum * z + splat(simd, *coefficient);
     }
     sum
 }
 
 #[cold]
 #[inline(never)]
-fn one_by_one<S: Simd>(x: Lanes<S>, f: impl Fn(f64) -> f64) -> Lanes<S> {
-    Lanes::<S>::from_fn(x.token(), |lane| f(x[lane]))
+fn one_by_one<S: Simd>(x: Lanes<S>, near: Lanes<S>, f: impl Fn(f64) -> f64) -> Lanes<S> {
+    Lanes::<S>::from_fn(x.token(), |lane| if x[lane].abs() < FAR { near[lane] } else { f(x[lane]) })
 }
 
 /// The nearest whole number, for numbers below 2⁵¹: adding 1.5·2⁵² leaves no room for a fraction.

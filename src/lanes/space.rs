@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Neg, Sub};
 
-use fearless_simd::{ExtractToken, Simd, SimdFloat};
+use fearless_simd::{ExtractToken, Simd};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Lanes, load, splat, store};
@@ -44,28 +44,21 @@ impl<S: Simd> Vector<S> {
     #[inline(always)]
     pub fn scaled_onto(self, k: Lanes<S>, other: Self) -> Self {
         let ([x, y, z], [a, b, c]) = (self.0, other.0);
-        Self([x.mul_add(k, a), y.mul_add(k, b), z.mul_add(k, c)])
+        Self([x * k + a, y * k + b, z * k + c])
     }
 
     /// v × other.
     #[inline(always)]
     pub fn cross(self, other: Self) -> Self {
         let ([x, y, z], [a, b, c]) = (self.0, other.0);
-        Self([y.mul_sub(c, z * b), z.mul_sub(a, x * c), x.mul_sub(b, y * a)])
-    }
-
-    /// v × other + sum.
-    #[inline(always)]
-    pub fn cross_onto(self, other: Self, sum: Self) -> Self {
-        let ([x, y, z], [a, b, c], [u, v, w]) = (self.0, other.0, sum.0);
-        Self([y.mul_add(c, (-z).mul_add(b, u)), z.mul_add(a, (-x).mul_add(c, v)), x.mul_add(b, (-y).mul_add(a, w))])
+        Self([y * c - z * b, z * a - x * c, x * b - y * a])
     }
 
     /// v · other.
     #[inline(always)]
     pub fn dot(self, other: Self) -> Lanes<S> {
         let ([x, y, z], [a, b, c]) = (self.0, other.0);
-        x.mul_add(a, y.mul_add(b, z * c))
+        x * a + (y * b + z * c)
     }
 
     /// A v, for the same A in all lanes.
@@ -125,13 +118,6 @@ impl<S: Simd> Frame<S> {
     pub fn times(&self, v: &Vector3<f64>) -> Vector<S> {
         let ([a, b, c], simd) = (self.0, self.0[0].0[0].token());
         a.scaled_onto(splat(simd, v.x), b.scaled_onto(splat(simd, v.y), c.scaled(splat(simd, v.z))))
-    }
-
-    /// R v + sum.
-    #[inline(always)]
-    pub fn times_onto(&self, v: Vector<S>, sum: Vector<S>) -> Vector<S> {
-        let ([a, b, c], [x, y, z]) = (self.0, v.0);
-        a.scaled_onto(x, b.scaled_onto(y, c.scaled_onto(z, sum)))
     }
 
     /// R C, for the same C in all lanes.

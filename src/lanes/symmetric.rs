@@ -1,6 +1,6 @@
 //! A symmetric matrix times the rows of groups.
 
-use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
+use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use super::{Aligned, GROUP, Lanes, Run, load, runs, splat, store};
 
@@ -77,7 +77,7 @@ impl Strip {
             for (sums, p) in sums.iter_mut().zip(column) {
                 let p = splat(simd, *p);
                 for (sum, h) in sums.iter_mut().zip(h) {
-                    *sum = p.mul_add(h, *sum);
+                    *sum = p * h + *sum;
                 }
             }
         }
@@ -115,7 +115,7 @@ fn along<S: Simd, const E: usize>(simd: S, columns: &[f64], p: &[f64], found: &m
     (twos..ones).step_by(width).for_each(|first| sums_from::<S, E, 1>(simd, first, (columns, p), found));
     for (x, found) in columns.chunks_exact(m.max(1)).zip(found.chunks_exact_mut(m.max(1))) {
         for row in ones..m {
-            found[row] = x.iter().zip(&p[row * m..]).map(|(x, p)| x * p).sum();
+            found[row] = x.iter().zip(p.iter().skip(row).step_by(m)).fold(0.0, |sum, (x, p)| x * p + sum);
         }
     }
 }
@@ -135,7 +135,7 @@ fn sums_from<S: Simd, const E: usize, const W: usize>(
         for (e, sums) in sums.iter_mut().enumerate() {
             let x = splat(simd, columns[e * m + k]);
             for (w, sum) in sums.iter_mut().enumerate() {
-                *sum = x.mul_add(load(simd, p, w * Lanes::<S>::LEN), *sum);
+                *sum = x * load(simd, p, w * Lanes::<S>::LEN) + *sum;
             }
         }
     }
@@ -179,7 +179,7 @@ fn add_squares<S: Simd, const E: usize>(simd: S, columns: &[f64], c: f64, p: &mu
         for first in (0..whole).step_by(width) {
             let mut sum = load(simd, p, first);
             for (e, factor) in factors.iter().enumerate() {
-                sum = load(simd, columns, e * m + first).mul_add(*factor, sum);
+                sum = load(simd, columns, e * m + first) * *factor + sum;
             }
             store::<S>(sum, p, first);
         }
@@ -188,7 +188,7 @@ fn add_squares<S: Simd, const E: usize>(simd: S, columns: &[f64], c: f64, p: &mu
             last[..m - whole].copy_from_slice(&p[whole..]);
             let mut sum = load(simd, &last, 0);
             for (rest, factor) in rest.iter().zip(&factors) {
-                sum = load(simd, rest, 0).mul_add(*factor, sum);
+                sum = load(simd, rest, 0) * *factor + sum;
             }
             store::<S>(sum, &mut last, 0);
             p[whole..].copy_from_slice(&last[..m - whole]);

@@ -34,7 +34,10 @@ use std::sync::OnceLock;
 use nalgebra::{Cholesky, DMatrix, DVector, Point3, Vector3};
 
 use super::{Block, Element, Layout, State};
-use crate::kinematics::{Joint, chart};
+use crate::{
+    elementary::{exp, ln},
+    kinematics::{Joint, chart},
+};
 
 /// What is known of errors along a chain, as standard deviations per coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,7 +86,7 @@ pub(crate) struct Inverted {
 impl Inverted {
     fn of(covariance: DMatrix<f64>) -> Option<Self> {
         let factor = Cholesky::new(covariance)?;
-        let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+        let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| ln(*x)).sum::<f64>();
         Some(Self { information: factor.inverse(), log_determinant })
     }
 
@@ -99,7 +102,7 @@ impl Inverted {
         let mut within = columns.tr_mul(&carried);
         (0..off.len()).for_each(|k| within[(k, k)] += 1.0);
         let factor = Cholesky::new(within)?;
-        let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+        let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| ln(*x)).sum::<f64>();
         let information = &self.information - &carried * factor.solve(&carried.transpose());
         Some(Self { information, log_determinant: self.log_determinant + log_determinant })
     }
@@ -269,13 +272,11 @@ impl ChainPrior {
     /// Of origins and of a zero, by place on the [grid](Self::GRID): ln of the probability of a scale before any measurement.
     pub(crate) fn log_probabilities() -> [Vec<f64>; 2] {
         [0, 1].map(|kind| {
-            let slab = |scale: &f64| (-0.5 * (scale.ln() / Self::SPREAD[kind]).powi(2)).exp();
+            let slab = |scale: &f64| exp(-0.5 * (ln(*scale) / Self::SPREAD[kind]).powi(2));
             let rest = &Self::GRID[1..];
             let total: f64 = rest.iter().map(slab).sum();
             let right = Self::RIGHT[kind];
-            std::iter::once(right.ln())
-                .chain(rest.iter().map(|scale| ((1.0 - right) * slab(scale) / total).ln()))
-                .collect()
+            std::iter::once(ln(right)).chain(rest.iter().map(|scale| ln((1.0 - right) * slab(scale) / total))).collect()
         })
     }
 

@@ -21,7 +21,10 @@ use nalgebra::{
     Vector2, Vector3, Vector4,
 };
 
-use crate::kinematics::{Joint, Line, chart, rotation};
+use crate::{
+    elementary::{hypot, sin},
+    kinematics::{Joint, Line, chart, rotation},
+};
 
 /// A value of one block of parameters.
 #[derive(Clone, Debug, PartialEq)]
@@ -222,7 +225,7 @@ pub(super) fn line_displacement(guess: &Line, line: &Line) -> (Vector4<f64>, Mat
     let bases = (chart::basis(&w0), chart::basis(&w));
     let parallel = Parallel::new(&w, &w0);
     let value = displaced_by(guess, line, &parallel);
-    let (carried, exact) = parallel.directions((&bases.0, &bases.1), value[2].hypot(value[3]));
+    let (carried, exact) = parallel.directions((&bases.0, &bases.1), hypot(value[2], value[3]));
     let offset = line.point - guess.point;
     let along = w.dot(&offset);
     let across = offset - w.into_inner() * along;
@@ -302,7 +305,7 @@ impl Parallel {
         // k has the length sin φ.
         let diverging = match angle {
             small if small < 1e-3 => 1.0 / 6.0 + 0.075 * small * small,
-            angle => (angle / angle.sin() - 1.0) / self.cross.norm_squared(),
+            angle => (angle / sin(angle) - 1.0) / self.cross.norm_squared(),
         };
         let exact = carried + basis0.transpose() * self.cross * (self.cross.transpose() * basis) * diverging;
         (carried, if exact.iter().all(|x| x.is_finite()) { exact } else { carried })

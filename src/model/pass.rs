@@ -24,7 +24,10 @@ use nalgebra::{
 };
 
 use super::{Block, Hand, Layout, Load, Loads, State};
-use crate::kinematics::{Joint, chart};
+use crate::{
+    elementary::{cos, sin},
+    kinematics::{Joint, chart},
+};
 
 /// A rigid motion as a matrix and a shift: `x ↦ R x + t`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -220,8 +223,8 @@ impl<'a> Pass<'a> {
             let f = match term {
                 Term::Offset => 1.0,
                 Term::Ratio => reading,
-                Term::Sine => reading.sin(),
-                Term::Cosine => reading.cos(),
+                Term::Sine => sin(reading),
+                Term::Cosine => cos(reading),
                 Term::Torque(load) => torques[load as usize],
             };
             put(coordinate, axis_linear * f, axis_angular * f);

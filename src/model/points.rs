@@ -19,21 +19,19 @@
 mod passed;
 mod posture;
 mod slopes;
-mod star;
 
-use fearless_simd::{ExtractToken, Simd, SimdBase, SimdFloat};
+use fearless_simd::{ExtractToken, Simd, SimdBase};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Block, Correction, Layout, State, pass::Term};
 use crate::{
     kinematics::{JointKind, chart},
-    lanes::{Frame, GROUP, Lanes, Vector, groups, sin_cos, splat},
+    lanes::{Frame, GROUP, Lanes, Vector, sin_cos, splat},
 };
 
 use passed::{Passed, Turned};
 
 pub use posture::Posture;
-pub use star::{Centre, Centres, Passage, Ray, Stage};
 
 /// Points of one state, to be looked up at many postures.
 #[derive(Clone, Debug)]
@@ -93,8 +91,6 @@ enum Wanted<'a> {
     Rows(&'a mut [f64]),
     /// Of what multiplies the rows of each group, the derivatives of the product.
     Slopes(&'a [f64], &'a mut [f64]),
-    /// The rows of each group, and its joints.
-    Centres(&'a mut [f64], &'a mut [f64]),
 }
 
 /// Where the rows of one point at a few postures of a group are put: of each tangent coordinate all equations, of each of them
@@ -203,7 +199,6 @@ impl Points {
     fn pass<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64], mut wanted: Wanted<'_>) {
         let mut passed = Passed::with_room(simd, self.joints.len());
         let (d, width) = (self.equations(), Lanes::<S>::LEN);
-        let groups = groups(candidates.len()).max(1);
         let (of_group, of_slopes) = (self.dimension * d * GROUP, self.joints.len() * GROUP);
         for (index, few) in candidates.chunks(width).enumerate() {
             let first = index * width;
@@ -226,11 +221,6 @@ impl Points {
                             let factors = &factors[group * of_group..][..of_group];
                             let slopes = &mut slopes[group * of_slopes..][..of_slopes];
                             self.slope(place, (&x, &axes), &passed, (first_row, factors), slopes);
-                        }
-                        Wanted::Centres(rows, joints) => {
-                            self.put(place, (&x, &axes), &passed, first_row, &mut rows[group * of_group..][..of_group]);
-                            let of_joints = joints.len() / groups;
-                            star::keep(&passed, &mut joints[group * of_joints..][..of_joints], first % GROUP);
                         }
                     }
                     for (lane, reading) in readings[first * d..].chunks_mut(d).take(few.len()).enumerate() {
@@ -325,12 +315,12 @@ impl Turn {
     fn turn<S: Simd>(&self, reading: Lanes<S>, frame: &mut Frame<S>, pivot: &mut Vector<S>) -> Turned<S> {
         let simd = reading.token();
         let Correction { offset, ratio, sine, cosine, .. } = self.correction;
-        let mut theta = reading.mul_add(splat(simd, ratio), splat(simd, offset));
+        let mut theta = reading * splat(simd, ratio) + splat(simd, offset);
         let mut of_reading = [reading; 3];
         if self.needs_sine() {
             let (sin, cos) = sin_cos::<S>(reading);
             of_reading = [reading, sin, cos];
-            theta = sin.mul_add(splat(simd, sine), cos.mul_add(splat(simd, cosine), theta));
+            theta = sin * splat(simd, sine) + (cos * splat(simd, cosine) + theta);
         }
         let [e1, e2, axis] = frame.0;
         let swept = match self.kind {

@@ -24,13 +24,16 @@ use nalgebra::{
     Vector3,
 };
 use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
 
 use super::{
     Block, Element, Layout, Quantity, State,
     element::{line_displaced, line_displacement},
 };
-use crate::kinematics::{Joint, Line, chart};
+use crate::{
+    elementary::{cos, sin},
+    kinematics::{Joint, Line, chart},
+    normal::StandardNormal,
+};
 
 /// What is known of the learned blocks of a state before any measurement.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -393,7 +396,7 @@ fn uniform_direction(rng: &mut impl Rng) -> UnitVector3<f64> {
     let height: f64 = rng.random_range(-1.0..=1.0);
     let turn: f64 = rng.random_range(0.0..std::f64::consts::TAU);
     let radius = (1.0 - height * height).max(0.0).sqrt();
-    UnitVector3::new_normalize(Vector3::new(radius * turn.cos(), radius * turn.sin(), height))
+    UnitVector3::new_normalize(Vector3::new(radius * cos(turn), radius * sin(turn), height))
 }
 
 fn uniform_point(bound: f64, rng: &mut impl Rng) -> Point3<f64> {

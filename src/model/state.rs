@@ -5,7 +5,7 @@ use std::{borrow::Cow, sync::Arc};
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3};
 
 use super::{Block, Frame, Layout, Load, Loads};
-use crate::kinematics::Joint;
+use crate::{elementary::sin_cos, kinematics::Joint};
 
 /// Everything that can be learned: joints from base to hand, and what is placed on links or beside the robot.
 ///
@@ -89,7 +89,7 @@ impl Correction {
         if self.sine == 0.0 && self.cosine == 0.0 {
             return proportional;
         }
-        let (sin, cos) = reading.sin_cos();
+        let (sin, cos) = sin_cos(reading);
         proportional + self.sine * sin + self.cosine * cos
     }
 
@@ -100,7 +100,7 @@ impl Correction {
 
     /// ∂θ/∂q at a reading without load.
     pub fn slope(&self, reading: f64) -> f64 {
-        let (sin, cos) = reading.sin_cos();
+        let (sin, cos) = sin_cos(reading);
         self.ratio + self.sine * cos - self.cosine * sin
     }
 }

@@ -20,9 +20,13 @@
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 
 use super::{Minimum, least};
+
+use crate::{
+    elementary::{exp, ln},
+    normal::StandardNormal,
+};
 
 /// Candidates among which the next point is chosen.
 const CANDIDATES: usize = 200;
@@ -87,7 +91,7 @@ impl<'a> Process<'a> {
         let cholesky = kernel.cholesky()?;
         let standard = DVector::from_iterator(count, values.iter().map(|value| (value - mean) / variance.sqrt()));
         let weights = cholesky.solve(&standard);
-        let log_determinant: f64 = cholesky.l_dirty().diagonal().iter().map(|l| l.ln()).sum();
+        let log_determinant: f64 = cholesky.l_dirty().diagonal().iter().map(|l| ln(*l)).sum();
         let log_likelihood = -0.5 * standard.dot(&weights) - log_determinant;
         let inverse_root = cholesky.l().solve_lower_triangular(&DMatrix::identity(count, count))?;
         Some(Self { points, length, mean, variance, inverse_root, weights, best, best_value, log_likelihood })
@@ -144,11 +148,11 @@ fn uniform(dimension: usize, rng: &mut ChaCha8Rng) -> DVector<f64> {
 /// The Matérn 5/2 correlation at a distance.
 fn matern(distance: f64, length: f64) -> f64 {
     let r = 5_f64.sqrt() * distance / length;
-    (1.0 + r + r * r / 3.0) * (-r).exp()
+    (1.0 + r + r * r / 3.0) * exp(-r)
 }
 
 fn normal_density(z: f64) -> f64 {
-    (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt()
+    exp(-0.5 * z * z) / (2.0 * std::f64::consts::PI).sqrt()
 }
 
 fn normal_distribution(z: f64) -> f64 {

@@ -3,7 +3,6 @@
 use nalgebra::DVector;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 
 use super::{
     Actions, Appraisal, Criterion, Domain, Policy, Scope, Search, Selection, SelectionError, Sight, Situation, Sockets,
@@ -14,6 +13,7 @@ use super::{
 use crate::{
     estimation::Belief,
     kinematics::JointBox,
+    normal::StandardNormal,
     optimize::{Settings, bayesian, least},
 };
 
@@ -155,7 +155,7 @@ impl Active {
         let criterion = self.criterion(situation.belief, situation, limits)?;
         let Some((scope, searched)) = Scope::around(situation, limits)? else { return Ok(None) };
         let at = |postures: &[Vec<f64>]| scope.evaluate(postures, |feasible| criterion.evaluate_here(feasible));
-        Ok(Some(direct(&scope, &searched, settings, &at, Some(&criterion))?))
+        Ok(Some(direct(&scope, &searched, settings, &at)?))
     }
 
     /// The criterion in one socket.
@@ -214,8 +214,7 @@ impl Active {
                 let here = |candidates: &[Vec<f64>]| {
                     scope.evaluate(candidates, |feasible| mean(feasible, |criterion, all| criterion.evaluate_here(all)))
                 };
-                let alone = if let [criterion] = criteria.as_slice() { Some(criterion) } else { None };
-                let search = direct(scope, searched, settings, &here, alone)?;
+                let search = direct(scope, searched, settings, &here)?;
                 let best = search.best().map(|(point, value)| (searched.from_unit(point), value));
                 (best, search.evaluations(), Some(search))
             }

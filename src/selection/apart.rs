@@ -3,14 +3,14 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use crate::sensing::Rig;
+use crate::{elementary::exp_m1, sensing::Rig};
 
 /// From this distance on, what two hypotheses are confused by is lost in rounding.
 const FAR_APART: f64 = 40.0;
 
 /// 1 − e^{−B}.
 pub(super) fn share(distance: f64) -> f64 {
-    if distance > FAR_APART { 1.0 } else { -(-distance).exp_m1() }
+    if distance > FAR_APART { 1.0 } else { -exp_m1(-distance) }
 }
 
 /// What is made of B = ⅛ δᵀ S̄⁻¹ δ and of u = S̄⁻¹ δ, by the readings that two hypotheses predict, δ apart, and the mean of their

@@ -22,13 +22,9 @@ use std::sync::Arc;
 use fearless_simd::Level;
 use nalgebra::{DMatrix, Matrix3, Point3};
 
-use super::{
-    Optimality, SelectionError, Sight, Weights, optimality,
-    prediction::Predictions,
-    star::{self, AroundCentres},
-    views::Views,
-};
+use super::{Optimality, SelectionError, Sight, Weights, optimality, prediction::Predictions, views::Views};
 use crate::{
+    elementary::ln,
     estimation::Belief,
     model::{Layout, Points, State, Workspace, jacobian},
     parallel::{in_chunks, in_turn},
@@ -112,7 +108,7 @@ impl<'a> Criterion<'a> {
             layout: &belief.layout,
             rig: &belief.rig,
             points,
-            level: Level::new(),
+            level: crate::lanes::level(),
             covariance,
             weights,
             value: weights.trace(covariance),
@@ -188,7 +184,7 @@ impl<'a> Criterion<'a> {
         let s = rows.tr_mul(&gains) + DMatrix::identity(rows.ncols(), rows.ncols());
         let Some(s) = s.cholesky() else { return f64::NAN };
         match (self.optimality, &self.metric) {
-            (Optimality::D, _) => s.l_dirty().diagonal().iter().map(|x| x.ln()).sum(),
+            (Optimality::D, _) => s.l_dirty().diagonal().iter().map(|x| ln(*x)).sum(),
             (Optimality::E, _) => {
                 let update = (gains, s.inverse());
                 self.value - optimality::greatest_eigenvalue(self.covariance, self.weights, Some(&update))
@@ -207,13 +203,6 @@ impl<'a> Criterion<'a> {
     /// The same on this thread alone.
     pub(super) fn evaluate_here<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {
         in_turn(candidates, |chunk| self.evaluate_chunk(chunk))
-    }
-
-    /// What evaluates stars faster than posture by posture; `None` where nothing does.
-    pub(super) fn around_centres(&self) -> Option<AroundCentres<'_>> {
-        let is_plain = self.sees_all() && self.optimality == Optimality::A && self.covariance.nrows() >= star::FEWEST;
-        let points = self.points.as_ref().filter(|_| is_plain)?;
-        AroundCentres::new(self.level, points, self.covariance, self.weights.all(), self.value)
     }
 
     fn evaluate_chunk<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {

@@ -11,6 +11,8 @@
 //! with T what counts, θ₁ … θₙ the movements made, J joints and σⱼ the standard deviation of joint j over T: errors of models are alike
 //! in similar postures, and k says how similar they are.
 
+use crate::elementary::exp;
+
 /// The index of the candidate that makes `made` most like `wanted`; `None` without candidates.
 pub(crate) fn herd<C: AsRef<[f64]>, W: AsRef<[f64]>, M: AsRef<[f64]>>(
     candidates: &[C],
@@ -29,7 +31,7 @@ pub(crate) fn herd<C: AsRef<[f64]>, W: AsRef<[f64]>, M: AsRef<[f64]>>(
         .collect();
     let likeness = |a: &[f64], b: &[f64]| {
         let squares = a.iter().zip(b).zip(&precision).map(|((a, b), precision)| (a - b) * (a - b) * precision);
-        (-0.5 * squares.sum::<f64>()).exp()
+        exp(-0.5 * squares.sum::<f64>())
     };
     let score = |candidate: &[f64]| {
         let attraction: f64 = wanted.iter().map(|of| likeness(candidate, of.as_ref())).sum();

@@ -2,7 +2,7 @@
 //!
 //! Entry (i, j), i ≤ j, of a group stands in one row of lanes, at row `j (j + 1)/2 + i`.
 
-use fearless_simd::{Level, Select, Simd, SimdBase, SimdFloat, dispatch};
+use fearless_simd::{Level, Select, Simd, SimdBase, dispatch};
 
 use crate::lanes::{Aligned, GROUP, Lanes, Run, groups, load, runs, splat, store};
 
@@ -65,7 +65,7 @@ fn three<S: Simd>(simd: S, candidates: usize, (a, b, weights): (&[f64], &[f64], 
             for column in 0..3 {
                 for row in 0..=column {
                     let sum = &mut sums[entry(row, column)];
-                    *sum = a[row].mul_add(b[column], *sum);
+                    *sum = a[row] * b[column] + *sum;
                 }
             }
         }
@@ -91,7 +91,7 @@ fn pairs<S: Simd>(
                 for (k, (a, b)) in a.chunks_exact(d * GROUP).zip(b.chunks_exact(d * GROUP)).enumerate() {
                     let w = splat(simd, weight(weights, k));
                     let (a, b) = (load(simd, a, row * GROUP + first), load(simd, b, column * GROUP + first));
-                    sum = a.mul_add(b * w, sum);
+                    sum = a * (b * w) + sum;
                 }
                 store::<S>(sum, found, first);
             }
@@ -153,15 +153,15 @@ fn eliminate<S: Simd>(simd: S, d: usize, s: &mut [Lanes<S>], l: &mut [Lanes<S>])
         let p = s[entry(pivot, pivot)];
         let inverse = p.simd_gt(0.0).select(splat(simd, 1.0) / p, splat(simd, f64::NAN));
         let own = l[entry(pivot, pivot)];
-        trace = own.mul_add(inverse, trace);
+        trace = own * inverse + trace;
         for column in pivot + 1..d {
             let c = s[entry(pivot, column)] * inverse;
             for row in pivot + 1..=column {
                 let r = s[entry(pivot, row)] * inverse;
                 let place = entry(row, column);
                 s[place] -= r * s[entry(pivot, column)];
-                let crossed = r.mul_add(l[entry(pivot, column)], c * l[entry(pivot, row)]);
-                l[place] = (r * c).mul_add(own, l[place] - crossed);
+                let crossed = r * l[entry(pivot, column)] + c * l[entry(pivot, row)];
+                l[place] = (r * c) * own + (l[place] - crossed);
             }
         }
     }

@@ -36,7 +36,6 @@ mod setting;
 mod sight;
 mod situation;
 mod sockets;
-mod star;
 mod views;
 mod visibility;
 mod weights;

@@ -3,7 +3,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::Weights;
-use crate::model::{Layout, State, Workspace, eigen};
+use crate::{
+    elementary::{ln, sin},
+    model::{Layout, State, Workspace, eigen},
+};
 
 /// What is to become small (Atkinson, Donev, Tobias: *Optimum Experimental Designs*, 2007).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
@@ -23,7 +26,7 @@ pub enum Optimality {
 /// ½ ln det P; infinite if P is not positive.
 pub(super) fn half_log_determinant(covariance: &DMatrix<f64>) -> f64 {
     Cholesky::new(covariance.clone())
-        .map_or(f64::INFINITY, |cholesky| cholesky.l_dirty().diagonal().iter().map(|x| x.ln()).sum())
+        .map_or(f64::INFINITY, |cholesky| cholesky.l_dirty().diagonal().iter().map(|x| ln(*x)).sum())
 }
 
 /// Mean of HᵀH over the workspace, H being the marker's (m).
@@ -48,7 +51,7 @@ pub(super) fn greatest_eigenvalue(
     let mut basis: Vec<DVector<f64>> = Vec::with_capacity(steps);
     let mut projected = DMatrix::zeros(steps, steps);
     // Not a symmetric start, which could be orthogonal to the eigenvector.
-    let mut v = DVector::from_fn(m, |k, _| 1.0 + 0.37 * (k as f64).sin()).normalize();
+    let mut v = DVector::from_fn(m, |k, _| 1.0 + 0.37 * sin(k as f64)).normalize();
     for step in 0..steps {
         let scaled = v.component_mul(&root);
         let mut next = covariance * &scaled;

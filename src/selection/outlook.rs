@@ -31,6 +31,7 @@ use super::{
     views::Views,
 };
 use crate::{
+    elementary::{exp, ln, ln_1p},
     estimation::Belief,
     model::Workspace,
     parallel::{in_chunks, in_turn},
@@ -108,7 +109,7 @@ impl<'a> Outlook<'a> {
     /// The same after movements that will have told the pairs of hypotheses apart by these B.
     pub(super) fn told(mut self, told: &[f64]) -> Self {
         for (pair, told) in self.pairs.iter_mut().zip(told) {
-            let still = pair.2 * (-told).exp();
+            let still = pair.2 * exp(-told);
             self.before -= pair.2 - still;
             pair.2 = still;
         }
@@ -124,14 +125,14 @@ impl<'a> Outlook<'a> {
         let shown = self.hypotheses.iter().map(|(_, criterion)| criterion.shown(candidate));
         if let Some(shown) = shown.collect::<Option<Vec<Shown<'_>>>>() {
             let distance = |&(j, k, _): &(usize, usize, f64)| shown[j].distance(&shown[k], self.rig);
-            let told = self.pairs.iter().map(|pair| distance(pair).min(-CONFUSED.ln())).collect();
+            let told = self.pairs.iter().map(|pair| distance(pair).min(-ln(CONFUSED))).collect();
             return Expected { chances: certain(), told, rows: Some(shown.iter().map(Shown::rows).collect()) };
         }
         let predicted = self.predictions(&[candidate]);
         let told = self.pairs.iter().map(|&(j, k, _)| {
             let chance = 0.5 * (predicted[j].chance(0) + predicted[k].chance(0));
             let told = told_apart(self.rig, &predicted[j], &predicted[k], 0);
-            -(-(chance * told).min(1.0 - CONFUSED)).ln_1p()
+            -ln_1p(-(chance * told).min(1.0 - CONFUSED))
         });
         let chances = predicted.iter().map(|prediction| prediction.chance(0)).collect();
         Expected { chances, told: told.collect(), rows: None }

@@ -109,7 +109,7 @@ impl Plan {
     pub fn trace_without(&self, index: usize, weights: &Weights) -> Option<f64> {
         let estimate = self.after.covariance.iter().map(|covariance| (self.after.weight(), covariance));
         let others = self.after.alternatives.iter().map(|alternative| (alternative.weight, &alternative.covariance));
-        let (level, often) = (Level::new(), counted(&self.chances[index], -1.0));
+        let (level, often) = (crate::lanes::level(), counted(&self.chances[index], -1.0));
         let mut sum = 0.0;
         for (hypothesis, ((share, covariance), rows)) in estimate.chain(others).zip(self.rows[index].iter()).enumerate()
         {
@@ -163,7 +163,7 @@ fn jacobians(belief: &Belief, pose: &[f64]) -> Vec<DMatrix<f64>> {
 fn by_rows(belief: &mut Belief, rows: &[DMatrix<f64>], least: &[f64], weight: impl Fn(usize) -> f64) -> bool {
     let Belief { covariance, alternatives, .. } = belief;
     let others = alternatives.iter_mut().map(|Alternative { covariance, .. }| Some(covariance));
-    let (level, mut sound) = (Level::new(), true);
+    let (level, mut sound) = (crate::lanes::level(), true);
     for (index, (covariance, rows)) in std::iter::once(covariance.as_mut()).chain(others).zip(rows).enumerate() {
         sound &= covariance.is_none_or(|covariance| {
             let least = least.get(index).copied().unwrap_or(SOUND);
@@ -185,7 +185,8 @@ fn sound(before: &Belief, rows: &[DMatrix<f64>]) -> Arc<[f64]> {
     let of = |(covariance, rows): (Option<&DMatrix<f64>>, &DMatrix<f64>)| {
         let Some(covariance) = covariance else { return SOUND };
         let (m, d) = rows.shape();
-        let spread = DMatrix::from_vec(m, d, times_few(Level::new(), rows.as_slice(), covariance.as_slice(), m));
+        let spread =
+            DMatrix::from_vec(m, d, times_few(crate::lanes::level(), rows.as_slice(), covariance.as_slice(), m));
         let largest = rows.component_mul(&spread).row_sum().max();
         SOUND.max(ROUNDINGS * f64::EPSILON * largest)
     };

@@ -15,6 +15,7 @@ use super::{
     views::Views,
 };
 use crate::{
+    elementary::ln,
     lanes::{Aligned, GROUP, Run, groups, runs, times},
     model::{Layout, Pass, Points, State},
     sensing::{JointNoise, Rig},
@@ -211,7 +212,7 @@ impl Predictions {
     /// ½ ln det S of every candidate, the information that it brings, nats; NaN where S is not positive.
     pub fn information(&self) -> Vec<f64> {
         let of = |s: DMatrix<f64>| {
-            Cholesky::new(s).map_or(f64::NAN, |s| s.l_dirty().diagonal().iter().map(|x| x.ln()).sum())
+            Cholesky::new(s).map_or(f64::NAN, |s| s.l_dirty().diagonal().iter().map(|x| ln(*x)).sum())
         };
         (0..self.len()).map(|index| of(self.innovation(index))).collect()
     }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{Optimality, Weights, criterion::points};
 use crate::{
+    elementary::{exp, ln},
     estimation::Belief,
     model::{Block, Element, Layout, Points, State, Workspace},
 };
@@ -34,7 +35,7 @@ impl Setting {
         }
         if optimality == Optimality::D {
             // Which hypothesis holds is worth the entropy of the weights, in shares of the pairs.
-            let entropy: f64 = hypotheses.iter().map(|(weight, _)| -weight * weight.max(f64::MIN_POSITIVE).ln()).sum();
+            let entropy: f64 = hypotheses.iter().map(|(weight, _)| -weight * ln(weight.max(f64::MIN_POSITIVE))).sum();
             let sum: f64 = pairs.iter().map(|pair| pair.2).sum();
             pairs.iter_mut().filter(|_| sum > 0.0).for_each(|pair| pair.2 *= entropy / sum);
         }
@@ -44,7 +45,7 @@ impl Setting {
     /// What is left between all pairs of hypotheses once they are told apart by these B.
     pub fn between(&self, told: &[f64]) -> f64 {
         let told = told.iter().copied().chain(std::iter::repeat(0.0));
-        self.pairs.iter().zip(told).map(|((.., between), told)| between * (-told).exp()).sum()
+        self.pairs.iter().zip(told).map(|((.., between), told)| between * exp(-told)).sum()
     }
 }
 

@@ -22,11 +22,12 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 
 use super::visibility::CAUTION;
 use crate::{
+    elementary::exp,
     model::{Layout, State},
+    normal::StandardNormal,
     sensing::Rig,
 };
 
@@ -130,7 +131,7 @@ impl Views {
 
 /// s of a clearance, radians.
 fn seen(clearance: f64) -> f64 {
-    let tail = 1e-3 * (clearance.min(0.0) / 0.25).exp();
+    let tail = 1e-3 * exp(clearance.min(0.0) / 0.25);
     (0.5 + 0.5 * clearance / RAMP).clamp(tail, 1.0)
 }
 

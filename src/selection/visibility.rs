@@ -5,7 +5,10 @@ use std::collections::VecDeque;
 use nalgebra::{Matrix3, Point3};
 
 use super::{History, Scope, Selection, SelectionError, Sight, Situation};
-use crate::{kinematics::JointBox, sensing::Head};
+use crate::{
+    elementary::exp_m1,
+    {kinematics::JointBox, sensing::Head},
+};
 
 /// What is known of what can be seen; every learner of a scenario is told the same.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,7 +116,7 @@ impl<'a> Visibility<'a> {
     pub fn discount(&self, scaled: &[f64]) -> f64 {
         let discount = self.misses.iter().fold(1.0, |chance, miss| {
             let squared: f64 = scaled.iter().zip(miss).map(|(a, b)| (a - b).powi(2)).sum();
-            chance * -(-0.5 * squared / (self.radius * self.radius)).exp_m1()
+            chance * -exp_m1(-0.5 * squared / (self.radius * self.radius))
         });
         f64::max(discount, HOPE)
     }

@@ -19,6 +19,8 @@
 
 use nalgebra::{Matrix3, Point3, SymmetricEigen, UnitVector3, Vector3};
 
+use crate::elementary::{atan2, cos, hypot, sin};
+
 /// A camera head whose kinematics are known to everybody. Lengths in metres, angles in radians, measurement frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Head {
@@ -67,15 +69,15 @@ impl Head {
     /// The gaze at these angles.
     pub fn gaze(&self, pan: f64, tilt: f64) -> Gaze {
         let (up, left) = self.axes();
-        let level = self.look.into_inner() * pan.cos() + left.into_inner() * pan.sin();
-        let direction = UnitVector3::new_normalize(level * tilt.cos() + up.into_inner() * tilt.sin());
+        let level = self.look.into_inner() * cos(pan) + left.into_inner() * sin(pan);
+        let direction = UnitVector3::new_normalize(level * cos(tilt) + up.into_inner() * sin(tilt));
         Gaze { pan, tilt, direction }
     }
 
     /// Where the eyes are at a gaze: one, or the left one and the right one.
     pub fn eyes(&self, gaze: &Gaze) -> impl Iterator<Item = Point3<f64>> + use<> {
         let (_, left) = self.axes();
-        let left = left.into_inner() * gaze.pan.cos() - self.look.into_inner() * gaze.pan.sin();
+        let left = left.into_inner() * cos(gaze.pan) - self.look.into_inner() * sin(gaze.pan);
         let (position, half) = (self.position, self.baseline.map(|baseline| left * (0.5 * baseline)));
         let sides = half.map_or([Some(Vector3::zeros()), None], |half| [Some(half), Some(-half)]);
         sides.into_iter().flatten().map(move |offset| position + offset)
@@ -143,7 +145,7 @@ impl Head {
         let (up, left) = self.axes();
         let d = point - self.position;
         let (ahead, aside) = (self.look.dot(&d), left.dot(&d));
-        [aside.atan2(ahead), up.dot(&d).atan2(ahead.hypot(aside))]
+        [atan2(aside, ahead), atan2(up.dot(&d), hypot(ahead, aside))]
     }
 }
 
@@ -154,7 +156,7 @@ fn within(angle: f64, limit: f64) -> f64 {
 
 /// The angle between a vector and a direction, exact for small and for large angles.
 fn angle(d: &Vector3<f64>, direction: &UnitVector3<f64>) -> f64 {
-    direction.cross(d).norm().atan2(direction.dot(d))
+    atan2(direction.cross(d).norm(), direction.dot(d))
 }
 
 /// A square root A of a covariance: A Aᵀ = Σ. Cholesky's, or for a singular one from the eigenvectors.

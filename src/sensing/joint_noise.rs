@@ -25,6 +25,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DMatrixView};
 
 use crate::{
+    elementary::ln,
     kinematics::{Joint, JointKind},
     model::{Block, Layout, State},
 };
@@ -151,7 +152,7 @@ impl JointErrors {
                 found = *residual;
             }
             self.learn(weight, row, found);
-            log_determinant += c.ln();
+            log_determinant += ln(c);
         }
         log_determinant
     }

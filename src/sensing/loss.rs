@@ -13,6 +13,8 @@
 //! 1 − q is the probability that a reading is an outlier of either kind, and the constant makes ρ(0) = 0. Huber's k is where 95 % of normal readings lie within. A loss enters a
 //! least squares problem as the weight of the reading's equations (iteratively reweighted least squares), and the answer as ρ.
 
+use crate::elementary::{exp, ln, ln_1p};
+
 /// φ, the share of outliers that may be anywhere.
 const ANYWHERE: f64 = 0.1;
 /// Where these are, in deviations of the others.
@@ -64,7 +66,7 @@ impl Loss {
             Self::Mixture { spread, .. } => {
                 let [near, far] = self.outlying(s, d).unwrap_or([f64::NEG_INFINITY; 2]);
                 let all = log_sum(-0.5 * s, log_sum(near, far));
-                (-0.5 * s - all).exp() + (near - all).exp() / (spread * spread)
+                exp(-0.5 * s - all) + exp(near - all) / (spread * spread)
             }
         }
     }
@@ -73,14 +75,14 @@ impl Loss {
     pub fn outlier(&self, s: f64, d: usize) -> Option<f64> {
         let [near, far] = self.outlying(s, d)?;
         let odds = log_sum(near, far) + 0.5 * s;
-        Some(1.0 / (1.0 + (-odds).exp()))
+        Some(1.0 / (1.0 + exp(-odds)))
     }
 
     /// The logarithms of ε (1 − φ) κ^{−d} e^{−s/2κ²} and of ε φ (100 κ)^{−d}, by 1 − ε.
     fn outlying(&self, s: f64, d: usize) -> Option<[f64; 2]> {
         let Self::Mixture { fraction, spread } = *self else { return None };
-        let near = log_odds(fraction, spread, d) + (-ANYWHERE).ln_1p() - 0.5 * s / (spread * spread);
-        Some([near, log_odds(fraction, FAR * spread, d) + ANYWHERE.ln()])
+        let near = log_odds(fraction, spread, d) + ln_1p(-ANYWHERE) - 0.5 * s / (spread * spread);
+        Some([near, log_odds(fraction, FAR * spread, d) + ln(ANYWHERE)])
     }
 
     /// Whether one reading that fits nothing is taken to be the reading's fault.
@@ -133,12 +135,12 @@ fn huber(d: usize) -> f64 {
 
 /// ln(ε κ^{−d} / (1 − ε)).
 fn log_odds(fraction: f64, spread: f64, d: usize) -> f64 {
-    fraction.ln() - (-fraction).ln_1p() - d as f64 * spread.ln()
+    ln(fraction) - ln_1p(-fraction) - d as f64 * ln(spread)
 }
 
 /// ln(eᵃ + eᵇ), of which one is finite.
 pub(crate) fn log_sum(a: f64, b: f64) -> f64 {
-    a.max(b) + (-(a - b).abs()).exp().ln_1p()
+    a.max(b) + ln_1p(exp(-(a - b).abs()))
 }
 
 #[cfg(test)]

@@ -19,7 +19,10 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
 use super::{Apart, Channel, Equipment, KeyError, Keys};
-use crate::model::{Block, Frame, Pass, State};
+use crate::{
+    elementary::{asin, hypot},
+    model::{Block, Frame, Pass, State},
+};
 
 /// A camera's view of a target.
 #[derive(Clone, Debug, PartialEq)]
@@ -185,7 +188,7 @@ impl Channel for Pixels {
     }
 
     fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
-        let points = y.chunks_exact(2).zip(h.chunks_exact(2)).map(|(y, h)| (y[0] - h[0]).hypot(y[1] - h[1]));
+        let points = y.chunks_exact(2).zip(h.chunks_exact(2)).map(|(y, h)| hypot(y[0] - h[0], y[1] - h[1]));
         Apart { pixels: Some(points.sum::<f64>() / (y.len() / 2).max(1) as f64), ..Apart::default() }
     }
 
@@ -215,7 +218,7 @@ impl Channel for Pixels {
             let at = (place * point).coords;
             let distance = at.norm().max(1e-9);
             for plane in &planes {
-                least = least.min((plane.dot(&at) / distance).clamp(-1.0, 1.0).asin());
+                least = least.min(asin((plane.dot(&at) / distance).clamp(-1.0, 1.0)));
             }
         }
         if let Some(Facing { direction, within }) = &self.facing {

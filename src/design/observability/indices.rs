@@ -3,7 +3,10 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::model::eigen;
+use crate::{
+    elementary::{exp, ln},
+    model::eigen,
+};
 
 /// How well a set of postures conditions an identification, by the singular values σ₁ ≥ … ≥ σₘ of its Jacobian, n postures stacked,
 /// whitened by the noise and with parameters in units of their prior standard deviations. Without a unit; all are better the
@@ -41,9 +44,9 @@ impl Indices {
         if least == 0.0 {
             return Self::default();
         }
-        let logarithms = singular.iter().map(|sigma| sigma.ln()).sum::<f64>();
+        let logarithms = singular.iter().map(|sigma| ln(*sigma)).sum::<f64>();
         Self {
-            o1: (logarithms / singular.len() as f64).exp() / (postures.max(1) as f64).sqrt(),
+            o1: exp(logarithms / singular.len() as f64) / (postures.max(1) as f64).sqrt(),
             o2: least / greatest,
             o3: least,
             o4: least * least / greatest,

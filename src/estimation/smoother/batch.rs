@@ -6,6 +6,7 @@
 
 use super::{EstimationError, Measurement, NoiseFit, Smoother, THOROUGH};
 use crate::{
+    elementary::ln,
     model::State,
     sensing::{Loss, Observation},
 };
@@ -110,7 +111,7 @@ impl Smoother {
         for _ in 0..ROUNDS {
             let before = self.posterior.scales.clone();
             self.learn_noise();
-            let change = before.iter().zip(&self.posterior.scales).map(|(a, b)| (a / b).ln().abs()).fold(0.0, f64::max);
+            let change = before.iter().zip(&self.posterior.scales).map(|(a, b)| ln(a / b).abs()).fold(0.0, f64::max);
             if change < FOUND {
                 return;
             }

@@ -31,7 +31,10 @@ use super::{
     points::Room,
     posterior::{Normal, Posterior},
 };
-use crate::sensing::log_sum;
+use crate::{
+    elementary::{exp, ln, ln_1p},
+    sensing::log_sum,
+};
 
 /// The chance that a body changes at a movement.
 pub(super) const RATE: f64 = 5e-3;
@@ -101,9 +104,9 @@ impl Evidence {
             for jump in jumps {
                 let Some(log_odds) = self.log_odds(jump, &sum, &carried, &pull) else { continue };
                 // What nothing was read of may have changed, for all that is known, and is no news.
-                let excess = log_odds - jump.log_share - RATE.ln();
+                let excess = log_odds - jump.log_share - ln(RATE);
                 if excess > 0.0 {
-                    all = log_sum(all, log_odds + (-(-excess).exp()).ln_1p());
+                    all = log_sum(all, log_odds + ln_1p(-exp(-excess)));
                 }
                 if jump.has_room && best.as_ref().is_none_or(|best| log_odds > best.log_odds) {
                     best = Some(Change { since: place, jump: jump.clone(), log_odds });
@@ -122,7 +125,7 @@ impl Evidence {
         let g = b.tr_mul(pull);
         let lowered = g.dot(&factor.solve(&g));
         let occam = 0.5 * (log_determinant(&factor) + jump.log_determinant);
-        let log_odds = self.noise.gain(lowered) - occam + jump.log_share + RATE.ln();
+        let log_odds = self.noise.gain(lowered) - occam + jump.log_share + ln(RATE);
         log_odds.is_finite().then_some(log_odds)
     }
 }

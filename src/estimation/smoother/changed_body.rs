@@ -23,6 +23,7 @@ use super::{
     posterior::{Measurement, Posterior},
 };
 use crate::{
+    elementary::ln,
     estimation::{Misfit, MisfitCause, ReadingReport, change::quantile},
     model::{Prior, State},
 };
@@ -203,7 +204,7 @@ impl Smoother {
         let found = starts.iter().filter_map(|start| posterior.mode_from_afar(start, layout, THOROUGH).ok());
         let found = found.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
         let occam = root.l_dirty().diagonal().map(f64::ln).sum();
-        let log_odds = known.log_evidence + found.log_evidence - occam - mode.log_evidence + log_share + RATE.ln();
+        let log_odds = known.log_evidence + found.log_evidence - occam - mode.log_evidence + log_share + ln(RATE);
         Some(After { posterior, mode: found, log_odds })
     }
 

@@ -8,11 +8,11 @@
 //! the other in columns, and every number that is read serves several products. Registers hold four numbers, however wide they
 //! could be: a corner of L is then as wide as it is high, and L no larger than it must be.
 
-use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch, f64x4};
+use fearless_simd::{Level, Simd, SimdBase, dispatch, f64x4};
 use nalgebra::{DMatrix, DVector};
 
 use super::gram::squared;
-use crate::lanes::GROUP;
+use crate::{elementary::ln, lanes::GROUP};
 
 /// Columns that are found together, and numbers of a register.
 const WIDTH: usize = 4;
@@ -54,7 +54,7 @@ impl Factor {
 
     /// ln det Λ.
     pub fn log_determinant(&self) -> f64 {
-        2.0 * (0..self.m).map(|k| self.l[k * self.n + k].ln()).sum::<f64>()
+        2.0 * (0..self.m).map(|k| ln(self.l[k * self.n + k])).sum::<f64>()
     }
 
     /// Λ⁻¹ b.
@@ -124,8 +124,8 @@ fn subtract<S: Simd>(simd: S, n: usize, left: &[f64], panel: &mut [f64], start: 
         ];
         for (factor, sums) in column[start..start + WIDTH].iter().zip(&mut sums) {
             let factor = f64x4::splat(simd, *factor);
-            sums[0] = x[0].mul_add(factor, sums[0]);
-            sums[1] = x[1].mul_add(factor, sums[1]);
+            sums[0] = x[0] * factor + sums[0];
+            sums[1] = x[1] * factor + sums[1];
         }
     }
     let distinct = if rows[0] == rows[1] { 1 } else { 2 };
@@ -190,7 +190,7 @@ fn backward<S: Simd>(simd: S, n: usize, l: &[f64], x: &mut [f64]) {
         for (x, column) in x[lanes..].chunks(4 * WIDTH).zip(column[lanes..].chunks(4 * WIDTH)) {
             let pairs = x.chunks_exact(WIDTH).zip(column.chunks_exact(WIDTH));
             for ((x, column), sum) in pairs.zip(&mut sums) {
-                *sum = f64x4::from_slice(simd, column).mul_add(f64x4::from_slice(simd, x), *sum);
+                *sum = f64x4::from_slice(simd, column) * f64x4::from_slice(simd, x) + *sum;
             }
         }
         let sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);

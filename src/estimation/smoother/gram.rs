@@ -1,11 +1,11 @@
 //! Sums of squares: HᵀH and Hᵀr of many rows. They stand in blocks of as many rows each, in a block the columns of H one behind
 //! the other.
 
-use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
+use fearless_simd::{Level, Simd, SimdBase, dispatch, f64x4};
 use nalgebra::{DMatrix, DVector};
 
-use crate::lanes::{self, Lanes, load, splat};
-
+/// Numbers of a register, however wide it could be: by these sums are parted, so that they have the same bits everywhere.
+const WIDTH: usize = 4;
 /// A tile of HᵀH: each number that is read serves several products.
 const DOWN: usize = 4;
 const ACROSS: usize = 2;
@@ -42,27 +42,26 @@ pub(super) fn squared(level: Level, rows: &[f64], m: usize) -> DMatrix<f64> {
 fn squares<S: Simd>(simd: S, rows: &[f64], length: usize, m: usize, sums: &mut [f64]) {
     for right in (0..m).step_by(ACROSS) {
         for left in (right / DOWN * DOWN..m).step_by(DOWN) {
-            let mut tile = [[splat(simd, 0.0); ACROSS]; DOWN];
+            let mut tile = [[f64x4::splat(simd, 0.0); ACROSS]; DOWN];
             for block in rows.chunks_exact((m * length).max(1)) {
                 // Beyond the last column it is taken again, and forgotten.
                 let column = |index: usize| &block[index.min(m - 1) * length..][..length];
                 let b = [column(right), column(right + 1)];
                 let a = [column(left), column(left + 1), column(left + 2), column(left + 3)];
-                for first in (0..length).step_by(Lanes::<S>::LEN) {
+                for first in (0..length).step_by(WIDTH) {
                     let b = [load(simd, b[0], first), load(simd, b[1], first)];
                     for (a, tile) in a.iter().zip(&mut tile) {
                         let a = load(simd, a, first);
-                        tile[0] = a.mul_add(b[0], tile[0]);
-                        tile[1] = a.mul_add(b[1], tile[1]);
+                        tile[0] = a * b[0] + tile[0];
+                        tile[1] = a * b[1] + tile[1];
                     }
                 }
             }
-            let [a, b, c, d] = tile;
-            let found = lanes::sums::<S>([a[0], b[0], c[0], d[0], a[1], b[1], c[1], d[1]]);
             let few = DOWN.min(m - left);
-            for (column, found) in sums.chunks_exact_mut(m).skip(right).zip(found.chunks_exact(DOWN)) {
-                let sums = &mut column[left..left + few];
-                sums.iter_mut().zip(found).for_each(|(sum, found)| *sum += found);
+            for (across, column) in sums.chunks_exact_mut(m).skip(right).take(ACROSS).enumerate() {
+                for (sum, found) in column[left..left + few].iter_mut().zip(&tile) {
+                    *sum += added(found[across]);
+                }
             }
         }
     }
@@ -71,11 +70,23 @@ fn squares<S: Simd>(simd: S, rows: &[f64], length: usize, m: usize, sums: &mut [
 /// Σ aᵢ bᵢ of as many numbers as fill lanes.
 #[inline(always)]
 fn dot<S: Simd>(simd: S, a: &[f64], b: &[f64]) -> f64 {
-    let mut sum = splat(simd, 0.0);
-    for first in (0..a.len()).step_by(Lanes::<S>::LEN) {
-        sum = load(simd, a, first).mul_add(load(simd, b, first), sum);
+    let mut sum = f64x4::splat(simd, 0.0);
+    for first in (0..a.len()).step_by(WIDTH) {
+        sum = load(simd, a, first) * load(simd, b, first) + sum;
     }
-    sum.as_slice().iter().sum()
+    added(sum)
+}
+
+#[inline(always)]
+fn load<S: Simd>(simd: S, numbers: &[f64], first: usize) -> f64x4<S> {
+    f64x4::from_slice(simd, &numbers[first..first + WIDTH])
+}
+
+/// The sum of the numbers of a register.
+#[inline(always)]
+fn added<S: Simd>(of: f64x4<S>) -> f64 {
+    let of = of.as_slice();
+    (of[0] + of[1]) + (of[2] + of[3])
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use super::{
     posterior::Posterior,
 };
 use crate::{
+    elementary::exp,
     kinematics::{Joint, Line},
     model::{Block, Layout, State},
     parallel::mapped,
@@ -114,8 +115,8 @@ impl Hypotheses {
                 distinct.push(mode);
             }
         }
-        let total: f64 = distinct.iter().map(|mode| (mode.log_evidence - best).exp()).sum();
-        distinct.iter_mut().for_each(|mode| mode.weight = (mode.log_evidence - best).exp() / total);
+        let total: f64 = distinct.iter().map(|mode| exp(mode.log_evidence - best)).sum();
+        distinct.iter_mut().for_each(|mode| mode.weight = exp(mode.log_evidence - best) / total);
         distinct.retain(|mode| mode.weight >= NEGLIGIBLE);
         self.modes = distinct;
     }

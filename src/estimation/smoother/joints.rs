@@ -30,6 +30,7 @@ use super::{
     settled::Quadratic,
 };
 use crate::{
+    elementary::ln,
     model::{Layout, Pass, State},
     sensing::{Graduated, JointErrors, JointNoise},
 };
@@ -374,7 +375,7 @@ impl Smoother {
         let square =
             (said.squares + SO_FAR * before * before + weight * likely * likely) / (said.determined + SO_FAR + weight);
         let factor = square.sqrt().clamp(FACTORS[0], FACTORS[1]);
-        let change = (factor / joints.factor).ln().abs();
+        let change = ln(factor / joints.factor).abs();
         if !change.is_finite() {
             return 0.0;
         }

@@ -16,6 +16,7 @@
 use nalgebra::{Cholesky, DMatrix, Dyn, Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::{
+    elementary::ln,
     kinematics::{Joint, Line},
     model::{Block, Layout, Place, Quantity, State},
 };
@@ -93,7 +94,7 @@ pub(super) fn jumps(state: &State, layout: &Layout, prior: &DMatrix<f64>) -> Vec
         }
         spaces.push((directions, covariance, true));
     }
-    let share = ((1.0 - WHOLE) / spaces.len().max(1) as f64).ln();
+    let share = ln((1.0 - WHOLE) / spaces.len().max(1) as f64);
     let mut jumps: Vec<Jump> = Vec::new();
     let mut offer = |directions: &DMatrix<f64>, covariance: &DMatrix<f64>, log_share: f64, is_whole: bool| {
         for factor in SIZES {
@@ -117,7 +118,7 @@ pub(super) fn jumps(state: &State, layout: &Layout, prior: &DMatrix<f64>) -> Vec
     for (directions, covariance, is_whole) in &spaces {
         offer(directions, covariance, share, *is_whole);
     }
-    offer(&identity, &(prior * VARIANCE), WHOLE.ln(), true);
+    offer(&identity, &(prior * VARIANCE), ln(WHOLE), true);
     jumps
 }
 

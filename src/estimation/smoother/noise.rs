@@ -16,7 +16,10 @@ use super::{
     mode::Mode,
     posterior::{Fit, Posterior},
 };
-use crate::sensing::{Noise, Occasion, log_sum};
+use crate::{
+    elementary::{exp, ln},
+    sensing::{Noise, Occasion, log_sum},
+};
 
 /// ν: how many equations the scale of the noise so far counts for.
 const NOISE_WEIGHT: f64 = 3.0;
@@ -53,13 +56,13 @@ impl Left {
 
     /// The logarithm of the evidence that noise is as said, and that it is off.
     fn evidence(self) -> [f64; 2] {
-        [HOLDS.ln() - 0.5 * self.squared, (1.0 - HOLDS).ln() + log_off(self.squared, self.free)]
+        [ln(HOLDS) - 0.5 * self.squared, ln(1.0 - HOLDS) + log_off(self.squared, self.free)]
     }
 
     /// s of noise that is told: 1 as far as that holds, and what the residuals say as far as it is off.
     fn scale(self) -> f64 {
         let [holds, off] = self.evidence();
-        let chance = 1.0 / (1.0 + (off - holds).exp());
+        let chance = 1.0 / (1.0 + exp(off - holds));
         (chance + (1.0 - chance) * (VAGUENESS + self.squared) / (VAGUENESS + self.free)).sqrt()
     }
 }
@@ -67,7 +70,7 @@ impl Left {
 /// The logarithm of the evidence of χ² with ν degrees of freedom and an unknown scale.
 fn log_off(squared: f64, free: f64) -> f64 {
     let (a, sum) = (0.5 * VAGUENESS, 0.5 * (VAGUENESS + free));
-    libm::lgamma(sum) - libm::lgamma(a) + a * a.ln() - sum * (0.5 * (VAGUENESS + squared)).ln()
+    libm::lgamma(sum) - libm::lgamma(a) + a * ln(a) - sum * ln(0.5 * (VAGUENESS + squared))
 }
 
 /// What tells larger noise from another cause of large residuals.
@@ -88,7 +91,7 @@ impl NoiseEvidence {
         let of = |squared: f64| {
             let off = log_off(squared, free);
             let Some((nominal, scales)) = told else { return off };
-            let (a, b) = (HOLDS.ln() - 0.5 * nominal * squared, (1.0 - HOLDS).ln() + off - scales);
+            let (a, b) = (ln(HOLDS) - 0.5 * nominal * squared, ln(1.0 - HOLDS) + off - scales);
             log_sum(a, b)
         };
         of(rest) - of(squared)
@@ -177,7 +180,7 @@ impl Smoother {
         for (of, scale) in lefts.iter().zip(&self.posterior.scales) {
             left = left.and(Left { squared: of.squared / (scale * scale), free: of.free });
             nominal += of.squared;
-            scales += of.free * scale.ln();
+            scales += of.free * ln(*scale);
         }
         let is_told = !lefts.iter().zip(&self.unknown).any(|(of, unknown)| *unknown && of.free > 0.0);
         let by = if left.squared > 0.0 { nominal / left.squared } else { 1.0 };
@@ -218,7 +221,7 @@ impl Smoother {
                 };
                 let scale = scale.max(LEAST_SCALE);
                 if scale.is_finite() {
-                    change = change.max((scale / self.posterior.scales[noise]).ln().abs());
+                    change = change.max(ln(scale / self.posterior.scales[noise]).abs());
                     self.posterior.scales[noise] = scale;
                 }
             }

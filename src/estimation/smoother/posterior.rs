@@ -98,7 +98,7 @@ impl Posterior {
             prior,
             rig,
             targets,
-            level: Level::new(),
+            level: crate::lanes::level(),
             loss: Loss::None,
             scales,
             known: Vec::new(),

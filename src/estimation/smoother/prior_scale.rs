@@ -28,7 +28,10 @@ use std::{collections::HashMap, sync::Arc};
 use nalgebra::{DMatrix, DVector};
 
 use super::{Smoother, factor::Factor, mode::Mode, noise::LEAST_SCALE, posterior::Posterior};
-use crate::model::{ChainPrior, Inverted, Layout, Scales};
+use crate::{
+    elementary::{exp, ln, ln_1p},
+    model::{ChainPrior, Inverted, Layout, Scales},
+};
 
 /// A prior along a chain, and the scales that it has now.
 #[derive(Clone, Debug)]
@@ -83,7 +86,7 @@ impl Smoother {
             self.posterior.prior = prior;
             self.scaled = Some(Scaled { chain, scales: found.scales });
             for (scale, _) in self.posterior.scales.iter_mut().zip(&self.unknown).filter(|(_, unknown)| **unknown) {
-                *scale = (*scale * found.log_noise.exp()).max(LEAST_SCALE);
+                *scale = (*scale * exp(found.log_noise)).max(LEAST_SCALE);
             }
             self.hypotheses.follow(&self.posterior, &layout);
             self.hypotheses.condense(self.settings.kept, &layout);
@@ -141,8 +144,8 @@ impl Data {
             vector: vector + carried,
             information,
             equations: seen.iter().map(|noise| fits[*noise].equations).sum(),
-            sigmas: seen.iter().map(|noise| (posterior.scales[*noise] / LIKELY_SIGMA).ln()).collect(),
-            least_log_noise: (seen.iter().map(|noise| (LEAST_SCALE / posterior.scales[*noise]).ln()))
+            sigmas: seen.iter().map(|noise| ln(posterior.scales[*noise] / LIKELY_SIGMA)).collect(),
+            least_log_noise: (seen.iter().map(|noise| ln(LEAST_SCALE / posterior.scales[*noise])))
                 .fold(f64::NEG_INFINITY, f64::max)
                 .min(0.0),
         };
@@ -164,7 +167,7 @@ struct Found {
 fn changed(before: &Scales, after: &Scales) -> f64 {
     let all =
         |scales: &Scales| std::iter::once(scales.origins).chain(scales.zeros.iter().copied()).collect::<Vec<f64>>();
-    all(before).into_iter().zip(all(after)).map(|(a, b)| ((a + SMALL) / (b + SMALL)).ln().abs()).fold(0.0, f64::max)
+    all(before).into_iter().zip(all(after)).map(|(a, b)| ln((a + SMALL) / (b + SMALL)).abs()).fold(0.0, f64::max)
 }
 
 /// What the evidence makes of them, from some scales on.
@@ -212,7 +215,7 @@ fn suspect(
 ) -> Option<Option<Suspect>> {
     let columns = chain.zeros(scales.origins);
     let [.., probabilities] = ChainPrior::log_probabilities();
-    let beta = (-2.0 * log_noise).exp();
+    let beta = exp(-2.0 * log_noise);
     let (information, vector) = (&data.information * beta, &data.vector * beta);
     let prior = Factor::new(data.level, &chain.covariance(scales), 0.0)?.inverse();
     let factor = Factor::new(data.level, &(&information + prior), 0.0)?;
@@ -224,14 +227,14 @@ fn suspect(
         let q = k.dot(&vector) - turned.dot(&rest);
         let evidence = |(scale, log): (&f64, &f64)| {
             let v = scale * scale;
-            let told = -0.5 * (v * s).ln_1p() + 0.5 * q * q * v / (1.0 + v * s);
+            let told = -0.5 * ln_1p(v * s) + 0.5 * q * q * v / (1.0 + v * s);
             (*scale, told, log + told)
         };
         let off: Vec<(f64, f64, f64)> = ChainPrior::GRID.iter().zip(&probabilities).skip(1).map(evidence).collect();
         let most = off.iter().map(|it| it.2).fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = off.iter().map(|it| (it.2 - most).exp()).sum();
-        let scale = off.iter().map(|it| it.0 * (it.2 - most).exp()).sum::<f64>() / total;
-        let together = most + total.ln();
+        let total: f64 = off.iter().map(|it| exp(it.2 - most)).sum();
+        let scale = off.iter().map(|it| it.0 * exp(it.2 - most)).sum::<f64>() / total;
+        let together = most + ln(total);
         let at_scale = evidence((&scale, &0.0)).1;
         let right = probabilities[0];
         Suspect { zero: *zero, scale, odds: together - at_scale - right, promised: together - right }
@@ -265,7 +268,7 @@ struct Lattice<'a> {
 impl<'a> Lattice<'a> {
     fn new(chain: &'a ChainPrior, data: &'a Data, scales: &Scales) -> Self {
         let nearest = |scale: f64| {
-            let apart = |index: &usize| (ChainPrior::GRID[*index] / scale).ln().abs();
+            let apart = |index: &usize| ln(ChainPrior::GRID[*index] / scale).abs();
             (0..ChainPrior::GRID.len()).min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(0)
         };
         let [probabilities, _] = ChainPrior::log_probabilities();
@@ -300,7 +303,7 @@ impl<'a> Lattice<'a> {
         let (chain, zeros) = (self.chain, &self.zeros);
         let invert = || chain.inverted(origins)?.with(&zeros.0, &zeros.1);
         let prior = self.inverted[origins].get_or_insert_with(invert).as_ref()?;
-        let beta = (-2.0 * log_noise).exp();
+        let beta = exp(-2.0 * log_noise);
         let lambda = &self.data.information * beta + &prior.information;
         let factor = Factor::new(self.data.level, &lambda, 0.0)?;
         let explained = beta * self.data.vector.dot(&factor.solve(&self.data.vector));
@@ -357,11 +360,11 @@ impl<'a> Lattice<'a> {
         places.sort_unstable_by_key(|(place, _)| *place);
         let (mut total, mut sums) = (0.0, [0.0; 2]);
         for ((origins, noise), evidence) in places {
-            let weight = (evidence - best).exp();
+            let weight = exp(evidence - best);
             total += weight;
             sums[0] += weight * ChainPrior::GRID[origins];
             sums[1] += weight * f64::from(noise) * self.step;
         }
-        Some(Mean { origins: sums[0] / total, log_noise: sums[1] / total, log_evidence: best + total.ln() })
+        Some(Mean { origins: sums[0] / total, log_noise: sums[1] / total, log_evidence: best + ln(total) })
     }
 }

@@ -21,6 +21,7 @@ use super::{
     posterior::{Fit, Posterior},
 };
 use crate::{
+    elementary::ln,
     model::{Layout, State},
     most::middle,
     sensing::{Graduated, Loss},
@@ -164,8 +165,7 @@ impl Smoother {
             let before = trial.posterior.scales.clone();
             trial.take_scales(trial.common(&mode, layout));
             state = mode.state;
-            let change =
-                before.iter().zip(&trial.posterior.scales).map(|(a, b)| (a / b).ln().abs()).fold(0.0, f64::max);
+            let change = before.iter().zip(&trial.posterior.scales).map(|(a, b)| ln(a / b).abs()).fold(0.0, f64::max);
             if change < FOUND {
                 break;
             }
@@ -186,7 +186,7 @@ impl Smoother {
         let all = self.posterior.equations_by_noise();
         let of = |((fit, all), (scale, other)): ((&Fit, f64), (&f64, &f64))| {
             let normal = fit.equations;
-            -normal * scale.ln() - (all - normal).max(0.0) * scale.max(*other).ln()
+            -normal * ln(*scale) - (all - normal).max(0.0) * ln(scale.max(*other))
         };
         let scales = self.posterior.scales.iter().zip(&other.posterior.scales);
         mode.log_evidence + fits.iter().zip(all).zip(scales).map(of).sum::<f64>()

@@ -16,7 +16,7 @@
 use nalgebra::DMatrix;
 
 use super::{Smoother, THOROUGH};
-use crate::model::Block;
+use crate::{elementary::ln, model::Block};
 
 /// How many times as far off a description may be.
 const FACTORS: [f64; 3] = [1.0, 3.0, 10.0];
@@ -70,7 +70,7 @@ impl Smoother {
         let start = &self.hypotheses.modes.first()?.state;
         trial.hypotheses.modes = vec![trial.posterior.mode_from_afar(start, &layout, THOROUGH).ok()?];
         let chance = if by > 1.0 { LOG_CHANCE } else { 0.0 };
-        Some((chance - places.len() as f64 * by.ln(), trial))
+        Some((chance - places.len() as f64 * ln(by), trial))
     }
 }
 

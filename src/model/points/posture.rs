@@ -14,7 +14,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Correction, Place, Points, Turn, Whitening};
-use crate::{kinematics::JointKind, model::pass::Term};
+use crate::{
+    elementary::sin_cos,
+    {kinematics::JointKind, model::pass::Term},
+};
 
 /// Points at one posture, with their whitened rows.
 pub struct Posture<'a> {
@@ -179,13 +182,13 @@ impl Turn {
     /// Turns or slides a joint's frame, which is before the joint, to a reading.
     fn still(&self, reading: f64, frame: &mut Matrix3<f64>, pivot: &mut Vector3<f64>) -> Still {
         let Correction { offset, ratio, sine, cosine, .. } = self.correction;
-        let (sin, cos) = if self.needs_sine() { reading.sin_cos() } else { (0.0, 0.0) };
+        let (sin, cos) = if self.needs_sine() { sin_cos(reading) } else { (0.0, 0.0) };
         let theta = ratio * reading + offset + sine * sin + cosine * cos;
         let before = *frame;
         match self.kind {
             JointKind::Revolute => {
                 let [e1, e2, axis] = columns(frame);
-                let (sin, cos) = theta.sin_cos();
+                let (sin, cos) = sin_cos(theta);
                 *frame = Matrix3::from_columns(&[e1 * cos + e2 * sin, e2 * cos - e1 * sin, axis]);
             }
             JointKind::Prismatic => *pivot += frame.column(2) * theta,
@@ -282,7 +285,7 @@ mod tests {
             let theta: Vec<f64> = (0..joints).map(|_| rng.random_range(-3.0..3.0)).collect();
             let posture = points.at(&theta);
             let (mut rows, mut readings) = (vec![0.0; m * d * GROUP], vec![0.0; d]);
-            dispatch!(Level::new(), simd => points.rows(simd, &[&theta], &mut readings, &mut rows));
+            dispatch!(crate::lanes::level(), simd => points.rows(simd, &[&theta], &mut readings, &mut rows));
             for equation in 0..d {
                 prop_assert!((posture.readings()[equation] - readings[equation]).abs() < 1e-10);
                 for k in 0..m {

@@ -10,7 +10,7 @@
 //!
 //! so that one walk along the chain gives all of them.
 
-use fearless_simd::{ExtractToken, Simd, SimdFloat};
+use fearless_simd::{ExtractToken, Simd};
 use nalgebra::Vector3;
 
 use super::{Passed, Place, Points, Term, Turned, Wanted, Whitening};
@@ -105,7 +105,7 @@ impl Points {
                     Term::Offset | Term::Torque(_) => (splat(simd, 1.0), splat(simd, 0.0)),
                 };
                 let g = factors.of(simd, *coordinate);
-                by_reading = growth.mul_add(velocity.dot(g), by_reading);
+                by_reading = growth * velocity.dot(g) + by_reading;
                 let g = g.scaled(factor);
                 turning = turning + velocity.cross(g);
                 if is_revolute {
@@ -142,7 +142,7 @@ impl super::Turn {
             return splat(simd, ratio);
         }
         let [_, sin, cos] = turned.reading;
-        cos.mul_add(splat(simd, sine), sin.mul_add(splat(simd, -cosine), splat(simd, ratio)))
+        cos * splat(simd, sine) + (sin * splat(simd, -cosine) + splat(simd, ratio))
     }
 }
 

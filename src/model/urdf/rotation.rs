@@ -4,6 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Rotation3, UnitQuaternion};
 
+use crate::elementary::{atan2, hypot};
+
 /// Below this cosine of the pitch, roll and yaw turn about the same axis as far as digits tell.
 const LOCKED: f64 = 1e-13;
 
@@ -13,11 +15,11 @@ const LOCKED: f64 = 1e-13;
 pub fn rpy(rotation: &UnitQuaternion<f64>, near: [f64; 3]) -> [f64; 3] {
     let matrix = rotation.to_rotation_matrix();
     let yaw =
-        if matrix[(0, 0)].hypot(matrix[(1, 0)]) < LOCKED { near[2] } else { matrix[(1, 0)].atan2(matrix[(0, 0)]) };
+        if hypot(matrix[(0, 0)], matrix[(1, 0)]) < LOCKED { near[2] } else { atan2(matrix[(1, 0)], matrix[(0, 0)]) };
     // What is left is Ry(pitch) Rx(roll).
     let rest = Rotation3::from_euler_angles(0.0, 0.0, -yaw) * matrix;
-    let pitch = (-rest[(2, 0)]).atan2(rest[(0, 0)]);
-    let roll = (-rest[(1, 2)]).atan2(rest[(1, 1)]);
+    let pitch = atan2(-rest[(2, 0)], rest[(0, 0)]);
+    let roll = atan2(-rest[(1, 2)], rest[(1, 1)]);
     let turned = |angle: f64, near: f64| angle + TAU * ((near - angle) / TAU).round();
     let wound = |angles: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| turned(angles[k], near[k])) };
     let distance = |angles: &[f64; 3]| -> f64 { (0..3).map(|k| (angles[k] - near[k]).abs()).sum() };

@@ -5,6 +5,7 @@ use toml::Spanned;
 
 use super::{Check, raw};
 use crate::{
+    elementary::{cos, sin},
     kinematics::{Joint, Line},
     scenario::{ChangeSpec, Robot, error::similar},
 };
@@ -28,7 +29,7 @@ impl Check<'_> {
                 self.problem(tilt.towards.span(), "change.tilt.towards", "it is along the axis", mend);
                 return None;
             }
-            let tilted = UnitVector3::new_normalize(axis.into_inner() * angle.cos() + across.normalize() * angle.sin());
+            let tilted = UnitVector3::new_normalize(axis.into_inner() * cos(angle) + across.normalize() * sin(angle));
             *joint = match *joint {
                 Joint::Revolute(line) => Joint::Revolute(Line { direction: tilted, ..line }),
                 Joint::Prismatic(_) => Joint::Prismatic(tilted),

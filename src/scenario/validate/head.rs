@@ -2,13 +2,13 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 use toml::Spanned;
 
 use super::{Check, raw};
 use crate::{
     kinematics::JointKind,
     model::State,
+    normal::StandardNormal,
     scenario::{Prior, Robot},
     selection::Watch,
     sensing::{Head, Rig},

@@ -18,6 +18,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::Criterion;
 use crate::{
+    elementary::exp,
     lanes::times_few,
     model::Posture,
     selection::{
@@ -126,7 +127,7 @@ impl Slope<'_> {
     pub fn tell_apart(&mut self, other: &mut Self, rig: &Rig, weight: f64) -> f64 {
         let found = self.shown.apart(&other.shown, rig, |distance, u| (distance, DVector::from_column_slice(u)));
         let Some((distance, u)) = found else { return 0.0 };
-        let weight = weight * (-distance).exp();
+        let weight = weight * exp(-distance);
         for (of, sign) in [(self, 1.0), (other, -1.0)] {
             of.by_readings.axpy(-0.25 * sign * weight, &u, 1.0);
             of.by_gains.ger(0.125 * weight, &u, &u, 1.0);
