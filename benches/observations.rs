@@ -1,5 +1,6 @@
 //! What an observation costs a robot of seven joints that tells it over HTTP: beside a server that keeps nothing, and early and late in
-//! a session. Both servers take turns within one run, so that ratios count.
+//! a session. Both servers take turns within one run, so that ratios count. Then what it takes a long session to come back to memory, and
+//! to leave out an observation, early or late.
 //!
 //! `cargo bench --bench observations`
 
@@ -23,6 +24,8 @@ use tokio_util::sync::CancellationToken;
 
 /// So many are told.
 const TOLD: usize = 1000;
+/// And so many by the one that is kept.
+const LONG: usize = 5000;
 /// Medians are of those before these numbers, so many.
 const AT: [usize; 2] = [200, TOLD];
 const OF: usize = 100;
@@ -31,17 +34,26 @@ const SIGMA_M: f64 = 0.0005;
 /// A session on a server of its own.
 struct Kept {
     client: Client,
+    session: String,
     observations: String,
     times: Vec<Duration>,
+    shutdown: CancellationToken,
+}
+
+/// A server, its address, and what ends it.
+async fn served(data_dir: Option<&Path>) -> (String, CancellationToken) {
+    let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let options = Options { data_dir: data_dir.map(Into::into), ..Options::default() };
+    let shutdown = CancellationToken::new();
+    let serving = serve(listener, options, shutdown.clone());
+    tokio::spawn(async { serving.await.expect("no error") });
+    (address, shutdown)
 }
 
 impl Kept {
     async fn open(data_dir: Option<&Path>) -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
-        let address = listener.local_addr().expect("an address");
-        let options = Options { data_dir: data_dir.map(Into::into), ..Options::default() };
-        let serving = serve(listener, options, CancellationToken::new());
-        tokio::spawn(async { serving.await.expect("no error") });
+        let (address, shutdown) = served(data_dir).await;
         let client = Client::new();
         let calibration = json!({
             "robot": { "urdf": include_str!("../scenarios/panda.urdf"), "base": "panda_link0", "tip": "panda_link8" },
@@ -51,8 +63,22 @@ impl Kept {
         let opened = client.post(format!("http://{address}/v1/sessions")).json(&opening).send().await;
         let session: Value = opened.expect("an answer").json().await.expect("a session");
         let id = session["id"].as_str().expect("an id");
-        let observations = format!("http://{address}/v1/sessions/{id}/observations");
-        Self { client, observations, times: Vec::new() }
+        let session = format!("/v1/sessions/{id}");
+        let observations = format!("http://{address}{session}/observations");
+        Self { client, session, observations, times: Vec::new(), shutdown }
+    }
+
+    /// How long the answer takes to whoever asks for a suggestion, as often as need be.
+    async fn suggested(&self, address: &str) -> Duration {
+        let began = Instant::now();
+        loop {
+            let asking = self.client.post(format!("http://{address}{}/suggestions", self.session)).json(&json!({}));
+            let answer = asking.send().await.expect("an answer");
+            if answer.status() != 503 {
+                assert_eq!(answer.status(), 200);
+                return began.elapsed();
+            }
+        }
     }
 
     async fn tell(&mut self, told: &Value) {
@@ -128,4 +154,28 @@ async fn main() {
     }
     let grown = kept.median(AT[1]).as_secs_f64() / kept.median(AT[0]).as_secs_f64();
     println!("observation {} costs {grown:.2} times observation {}", AT[1], AT[0]);
+    let [_, mut kept] = sessions;
+    while kept.times.len() < LONG {
+        kept.tell(&draw(&robot, &mut rng)).await;
+    }
+    let grown = kept.median(LONG).as_secs_f64() / kept.median(AT[0]).as_secs_f64();
+    println!("observation {LONG} costs {grown:.2} times observation {}", AT[0]);
+    kept.shutdown.cancel();
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    let (address, _shutdown) = served(Some(folder.path())).await;
+    let suggested = kept.suggested(&address).await;
+    let again = kept.suggested(&address).await;
+    println!("a session of {LONG} observations comes back to memory in {:.1?}", suggested.saturating_sub(again));
+    for number in [LONG - 10, LONG / 2, 1] {
+        let began = Instant::now();
+        loop {
+            let excluding = kept.client.delete(format!("http://{address}{}/observations/{number}", kept.session));
+            let answer = excluding.send().await.expect("an answer");
+            if answer.status() != 503 {
+                assert_eq!(answer.status(), 200);
+                break;
+            }
+        }
+        println!("observation {number} of {LONG} is excluded in {:.1?}", began.elapsed());
+    }
 }

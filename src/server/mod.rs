@@ -144,7 +144,7 @@ impl Server {
             None => Store::in_memory()?,
         };
         // Sessions that come back ask who can read what they have learned; to find it out takes a moment.
-        std::thread::spawn(|| drop(store::build()));
+        std::thread::spawn(store::build);
         let limits = options.limits;
         let damage = store.damage().to_vec();
         let keeping = Keeping {

@@ -36,9 +36,11 @@ async fn shown(server: &Server, session: &str) -> Vec<Value> {
     let mut resource = server.get_json(session).await;
     resource["recording"].take();
     let steps = server.get(&format!("{session}/steps.csv")).await.text().await.expect("text");
-    let next = server.post(&format!("{session}/suggestions"), json!({ "count": 1, "replan": true })).await;
+    let next = server.post(&format!("{session}/suggestions"), json!({})).await;
     let mut next: Value = next.json().await.expect("JSON");
-    // It is another each time that it is asked for.
+    // It is another each time that it is asked for, and one that is abandoned was never made.
+    let outcome = format!("{session}/suggestions/{}/outcome", next["suggestions"][0]["id"]);
+    assert!(server.post(&outcome, json!({ "state": "abandoned" })).await.status().is_success());
     for field in ["id", "revision"] {
         next["suggestions"][0][field].take();
     }
@@ -122,8 +124,12 @@ async fn a_long_replay_blocks_nobody() {
     let mut robot = Session::open(Setup::new(calibration.clone())).expect("a session");
     let joints: Vec<String> = robot.description().joints.iter().map(|joint| joint.name.clone()).collect();
     let state = robot.belief().expect("an agent").state.clone();
+    let limits = robot.experiment().agent().expect("an agent").limits().joints().to_vec();
     for number in 0..300_usize {
-        let angle = |joint: usize| -0.8 + 0.6 * ((number * (7 + 4 * joint) + 3 * joint) as f64 * 0.37).sin();
+        let angle = |joint: usize| {
+            let (lower, upper) = limits[joint];
+            0.5 * (lower + upper) + 0.3 * (upper - lower) * ((number * (7 + 4 * joint) + 3 * joint) as f64 * 0.37).sin()
+        };
         let configuration: Value =
             joints.iter().enumerate().map(|(joint, name)| (name.clone(), json!(angle(joint)))).collect();
         let posture: Vec<f64> = (0..joints.len()).map(angle).collect();

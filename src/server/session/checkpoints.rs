@@ -71,7 +71,9 @@ impl GoesOn {
         let saved = store.saved(id, build()?).ok()?;
         let (index, checkpoint) = latest(&saved, events)?;
         let reports = saved[..=index].iter().map(|saved| unpacked(&saved.reports).ok());
-        Some(Self { checkpoint, reports: reports.collect::<Option<_>>()? })
+        let reports: Vec<String> = reports.collect::<Option<_>>()?;
+        let steps: usize = reports.iter().map(|text| text.lines().count()).sum();
+        (steps as u64 == checkpoint.step() + 1).then_some(Self { checkpoint, reports })
     }
 
     /// The reports of the steps until there; `None` where they are not all of them.
