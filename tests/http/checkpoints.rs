@@ -115,7 +115,7 @@ async fn what_is_excluded_is_replayed_from_the_checkpoint_before_it() {
 }
 
 /// While much is replayed the session is read as before, and whoever asks anything of its engine is told to come back, at once.
-#[tokio::test(flavor = "multi_thread")]
+#[tokio::test]
 async fn a_long_replay_blocks_nobody() {
     let calibration = json!({
         "robot": { "urdf": include_str!("../../scenarios/panda.urdf"), "base": "panda_link0", "tip": "panda_link8" },
@@ -125,7 +125,7 @@ async fn a_long_replay_blocks_nobody() {
     let joints: Vec<String> = robot.description().joints.iter().map(|joint| joint.name.clone()).collect();
     let state = robot.belief().expect("an agent").state.clone();
     let limits = robot.experiment().agent().expect("an agent").limits().joints().to_vec();
-    for number in 0..300_usize {
+    for number in 0..600_usize {
         let angle = |joint: usize| {
             let (lower, upper) = limits[joint];
             0.5 * (lower + upper) + 0.3 * (upper - lower) * ((number * (7 + 4 * joint) + 3 * joint) as f64 * 0.37).sin()
@@ -141,27 +141,32 @@ async fn a_long_replay_blocks_nobody() {
     }
     let events: Value = serde_json::from_str(&robot.to_json()).expect("JSON");
     let server = Server::start().await;
+    let is_excluded = std::cell::Cell::new(false);
     let opening = json!({ "world": "outside", "calibration": calibration, "events": events["events"] });
     let session = server.open(opening).await;
-    let excluding = exclude(&server, &session, 1);
+    let excluding = async {
+        exclude(&server, &session, 1).await;
+        is_excluded.set(true);
+    };
     let asking = async {
         let mut refused = 0;
         while refused == 0 {
+            assert!(!is_excluded.get(), "it was over before anybody could be refused");
             tokio::time::sleep(Duration::from_millis(50)).await;
-            assert_eq!(server.get_json(&session).await["status"]["observations"], 300, "it is read meanwhile");
+            assert_eq!(server.get_json(&session).await["status"]["observations"], 600, "it is read meanwhile");
             let asked = server.post(&format!("{session}/suggestions"), json!({})).await;
             if asked.status() == StatusCode::SERVICE_UNAVAILABLE {
                 assert!(asked.headers().contains_key("retry-after"));
                 let told = problem(asked, 503, None).await;
                 let detail = told["detail"].as_str().expect("text");
-                assert!(detail.contains(" of 301"), "{detail}");
+                assert!(detail.contains(" of 601"), "{detail}");
                 refused += 1;
             }
         }
     };
     tokio::join!(excluding, asking);
     let status = &server.get_json(&session).await["status"];
-    assert_eq!((&status["excluded"], &status["observations"]), (&json!([1]), &json!(300)));
+    assert_eq!((&status["excluded"], &status["observations"]), (&json!([1]), &json!(600)));
     let asked = server.post(&format!("{session}/suggestions"), json!({})).await;
     assert_eq!(asked.status(), StatusCode::OK);
     server.stop().await;

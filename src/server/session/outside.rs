@@ -41,7 +41,7 @@ const LOOK_AGAIN_S: [f64; 2] = [0.5, 3600.0];
 const AT_ONCE: usize = 64;
 
 /// Whoever asks is told that a replay is being made once it has taken so long.
-const TOLD_AFTER: Duration = Duration::from_secs(1);
+const TOLD_AFTER: Duration = Duration::from_millis(200);
 
 /// Bytes that a session takes for each of its setup: the text as it was sent and as it is read, names and places in it.
 const SETUP_TAKES: usize = 4;
