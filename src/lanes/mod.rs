@@ -50,6 +50,39 @@ pub fn store<S: Simd>(lanes: Lanes<S>, numbers: &mut [f64], first: usize) {
     lanes.store_slice(&mut numbers[first..first + Lanes::<S>::LEN]);
 }
 
+/// Sums that run along numbers in [groups](GROUP): one for each place in a group, whatever the width of a register.
+#[derive(Clone, Copy)]
+pub struct GroupSum<S: Simd>([Lanes<S>; SLOTS]);
+
+/// Registers of a group at most: those of two numbers.
+const SLOTS: usize = GROUP / 2;
+
+impl<S: Simd> GroupSum<S> {
+    /// Nothing yet.
+    #[inline(always)]
+    pub fn zero(simd: S) -> Self {
+        Self([splat(simd, 0.0); SLOTS])
+    }
+
+    /// Adds a × b of a register that begins at `first`.
+    #[inline(always)]
+    pub fn add_product(&mut self, first: usize, a: Lanes<S>, b: Lanes<S>) {
+        let sum = &mut self.0[first % GROUP / Lanes::<S>::LEN];
+        *sum = a * b + *sum;
+    }
+
+    /// The sum: neighbours first, then neighbouring pairs, then the halves of the group.
+    #[inline(always)]
+    pub fn total(&self) -> f64 {
+        let mut all = [0.0; GROUP];
+        for (sum, all) in self.0.iter().zip(all.chunks_exact_mut(Lanes::<S>::LEN)) {
+            sum.store_slice(all);
+        }
+        let [a, b, c, d, e, f, g, h] = all;
+        ((a + b) + (c + d)) + ((e + f) + (g + h))
+    }
+}
+
 /// Groups of candidates that are computed alike.
 pub struct Run {
     /// The instructions that serve best.

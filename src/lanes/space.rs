@@ -54,6 +54,13 @@ impl<S: Simd> Vector<S> {
         Self([y * c - z * b, z * a - x * c, x * b - y * a])
     }
 
+    /// v × other + sum.
+    #[inline(always)]
+    pub fn cross_onto(self, other: Self, sum: Self) -> Self {
+        let ([x, y, z], [a, b, c], [u, v, w]) = (self.0, other.0, sum.0);
+        Self([y * c + ((-z) * b + u), z * a + ((-x) * c + v), x * b + ((-y) * a + w)])
+    }
+
     /// v · other.
     #[inline(always)]
     pub fn dot(self, other: Self) -> Lanes<S> {
@@ -118,6 +125,13 @@ impl<S: Simd> Frame<S> {
     pub fn times(&self, v: &Vector3<f64>) -> Vector<S> {
         let ([a, b, c], simd) = (self.0, self.0[0].0[0].token());
         a.scaled_onto(splat(simd, v.x), b.scaled_onto(splat(simd, v.y), c.scaled(splat(simd, v.z))))
+    }
+
+    /// R v + sum.
+    #[inline(always)]
+    pub fn times_onto(&self, v: Vector<S>, sum: Vector<S>) -> Vector<S> {
+        let ([a, b, c], [x, y, z]) = (self.0, v.0);
+        a.scaled_onto(x, b.scaled_onto(y, c.scaled_onto(z, sum)))
     }
 
     /// R C, for the same C in all lanes.

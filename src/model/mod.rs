@@ -38,7 +38,7 @@ pub use manifold::Manifold;
 pub use names::{Names, listed};
 pub use pass::{Frame, Motion, Pass, jacobian};
 pub use points::Whitening;
-pub(crate) use points::{Points, Posture};
+pub(crate) use points::{Centre, Centres, Passage, Points, Posture, Ray, Stage};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
 pub use rank::{eigen, null_space, rank, singular};
 pub use state::{Correction, Device, Hand, Place, State, Target, Thetas};

@@ -19,6 +19,7 @@
 mod passed;
 mod posture;
 mod slopes;
+mod star;
 
 use fearless_simd::{ExtractToken, Simd, SimdBase};
 use nalgebra::{Matrix3, Vector3};
@@ -26,12 +27,13 @@ use nalgebra::{Matrix3, Vector3};
 use super::{Block, Correction, Layout, State, pass::Term};
 use crate::{
     kinematics::{JointKind, chart},
-    lanes::{Frame, GROUP, Lanes, Vector, sin_cos, splat},
+    lanes::{Frame, GROUP, Lanes, Vector, groups, sin_cos, splat},
 };
 
 use passed::{Passed, Turned};
 
 pub use posture::Posture;
+pub use star::{Centre, Centres, Passage, Ray, Stage};
 
 /// Points of one state, to be looked up at many postures.
 #[derive(Clone, Debug)]
@@ -91,6 +93,8 @@ enum Wanted<'a> {
     Rows(&'a mut [f64]),
     /// Of what multiplies the rows of each group, the derivatives of the product.
     Slopes(&'a [f64], &'a mut [f64]),
+    /// The rows of each group, and its joints.
+    Centres(&'a mut [f64], &'a mut [f64]),
 }
 
 /// Where the rows of one point at a few postures of a group are put: of each tangent coordinate all equations, of each of them
@@ -199,6 +203,7 @@ impl Points {
     fn pass<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64], mut wanted: Wanted<'_>) {
         let mut passed = Passed::with_room(simd, self.joints.len());
         let (d, width) = (self.equations(), Lanes::<S>::LEN);
+        let groups = groups(candidates.len()).max(1);
         let (of_group, of_slopes) = (self.dimension * d * GROUP, self.joints.len() * GROUP);
         for (index, few) in candidates.chunks(width).enumerate() {
             let first = index * width;
@@ -221,6 +226,11 @@ impl Points {
                             let factors = &factors[group * of_group..][..of_group];
                             let slopes = &mut slopes[group * of_slopes..][..of_slopes];
                             self.slope(place, (&x, &axes), &passed, (first_row, factors), slopes);
+                        }
+                        Wanted::Centres(rows, joints) => {
+                            self.put(place, (&x, &axes), &passed, first_row, &mut rows[group * of_group..][..of_group]);
+                            let of_joints = joints.len() / groups;
+                            star::keep(&passed, &mut joints[group * of_joints..][..of_joints], first % GROUP);
                         }
                     }
                     for (lane, reading) in readings[first * d..].chunks_mut(d).take(few.len()).enumerate() {

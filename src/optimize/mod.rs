@@ -112,5 +112,5 @@ pub use polish::{Polish, polish};
 
 pub use direct::{
     Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Moment, Partition, Plane, Projection, Rectangle,
-    Settings, Shape, Variant, contains, minimize,
+    Settings, Shape, Star, Variant, contains, minimize,
 };

@@ -155,7 +155,7 @@ impl Active {
         let criterion = self.criterion(situation.belief, situation, limits)?;
         let Some((scope, searched)) = Scope::around(situation, limits)? else { return Ok(None) };
         let at = |postures: &[Vec<f64>]| scope.evaluate(postures, |feasible| criterion.evaluate_here(feasible));
-        Ok(Some(direct(&scope, &searched, settings, &at)?))
+        Ok(Some(direct(&scope, &searched, settings, &at, Some(&criterion))?))
     }
 
     /// The criterion in one socket.
@@ -214,7 +214,8 @@ impl Active {
                 let here = |candidates: &[Vec<f64>]| {
                     scope.evaluate(candidates, |feasible| mean(feasible, |criterion, all| criterion.evaluate_here(all)))
                 };
-                let search = direct(scope, searched, settings, &here)?;
+                let alone = if let [criterion] = criteria.as_slice() { Some(criterion) } else { None };
+                let search = direct(scope, searched, settings, &here, alone)?;
                 let best = search.best().map(|(point, value)| (searched.from_unit(point), value));
                 (best, search.evaluations(), Some(search))
             }

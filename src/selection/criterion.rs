@@ -22,10 +22,16 @@ use std::sync::Arc;
 use fearless_simd::Level;
 use nalgebra::{DMatrix, Matrix3, Point3};
 
-use super::{Optimality, SelectionError, Sight, Weights, optimality, prediction::Predictions, views::Views};
+use super::{
+    Optimality, SelectionError, Sight, Weights, optimality,
+    prediction::Predictions,
+    star::{self, AroundCentres},
+    views::Views,
+};
 use crate::{
     elementary::ln,
     estimation::Belief,
+    lanes,
     model::{Layout, Points, State, Workspace, jacobian},
     parallel::{in_chunks, in_turn},
     sensing::Rig,
@@ -108,7 +114,7 @@ impl<'a> Criterion<'a> {
             layout: &belief.layout,
             rig: &belief.rig,
             points,
-            level: crate::lanes::level(),
+            level: lanes::level(),
             covariance,
             weights,
             value: weights.trace(covariance),
@@ -203,6 +209,13 @@ impl<'a> Criterion<'a> {
     /// The same on this thread alone.
     pub(super) fn evaluate_here<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {
         in_turn(candidates, |chunk| self.evaluate_chunk(chunk))
+    }
+
+    /// What evaluates stars faster than posture by posture; `None` where nothing does.
+    pub(super) fn around_centres(&self) -> Option<AroundCentres<'_>> {
+        let is_plain = self.sees_all() && self.optimality == Optimality::A && self.covariance.nrows() >= star::FEWEST;
+        let points = self.points.as_ref().filter(|_| is_plain)?;
+        AroundCentres::new(self.level, points, self.covariance, self.weights.all(), self.value)
     }
 
     fn evaluate_chunk<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Vec<f64> {

@@ -36,6 +36,7 @@ mod setting;
 mod sight;
 mod situation;
 mod sockets;
+mod star;
 mod views;
 mod visibility;
 mod weights;

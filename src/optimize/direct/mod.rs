@@ -13,7 +13,7 @@ mod search;
 mod settings;
 mod ternary;
 
-pub use batch::Batch;
+pub use batch::{Batch, Star};
 pub use history::{History, Moment, Shape};
 pub use hull::HullPoint;
 pub use minimize::minimize;

@@ -102,7 +102,7 @@ impl Direct {
     pub fn ask(&mut self) -> Option<Batch<'_>> {
         let centres = &self.rectangles.centres[self.rectangles.len() * self.rectangles.dimension..];
         self.asked = !centres.is_empty();
-        self.asked.then_some(Batch::new(&self.rectangles, centres))
+        self.asked.then_some(Batch::new(&self.rectangles, &self.chosen[..self.dividing], centres))
     }
 
     /// Takes the values of the points asked, in their order, divides the rectangles and chooses the next ones. A

@@ -78,7 +78,7 @@ impl<'a> Ground<'a> {
         let at = |postures: &[Vec<f64>]| {
             self.scope.evaluate_beside(poses, postures, |feasible| outlook.evaluate_here(feasible))
         };
-        let search = direct(self.scope, self.searched, settings, &at)?;
+        let search = direct(self.scope, self.searched, settings, &at, None)?;
         self.evaluations += search.evaluations();
         Ok(search)
     }
