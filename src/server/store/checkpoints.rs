@@ -6,7 +6,6 @@ use std::{
     sync::OnceLock,
 };
 
-use fearless_simd::Level;
 use flate2::{Compression, Crc, read::DeflateDecoder, write::DeflateEncoder};
 use rusqlite::{Connection, Transaction, params};
 use sha2::{Digest, Sha256};
@@ -64,16 +63,14 @@ pub fn unpacked(packed: &[u8]) -> io::Result<String> {
     Ok(text)
 }
 
-/// Tells this build on this kind of processor from all others: what one has learned another must learn by itself, to the last bit.
-/// `None` where the program cannot read itself.
+/// Tells this build from all others: what one has learned another must learn by itself. `None` where the program cannot read itself.
 pub fn build() -> Option<&'static str> {
     static BUILD: OnceLock<Option<String>> = OnceLock::new();
     let read = || {
         let mut program = program().ok()?;
         let mut hash = Sha256::new();
         io::copy(&mut program, &mut hash).ok()?;
-        let hash: String = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-        Some(format!("{hash} {:?}", Level::new()))
+        Some(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
     };
     BUILD.get_or_init(read).as_deref()
 }
