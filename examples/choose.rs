@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     // The A-criterion, minimised by DIRECT over the joint limits.
     let weights = scenario.weights();
-    let policy = Active::new(weights.clone(), Minimiser::Direct(scenario.selection.direct));
+    let policy = Active::new(weights.clone(), Minimiser::Direct(scenario.selection.search));
     let actions = Actions::Box(scenario.robot.limits.clone());
     let history = History::default();
     let situation = Situation { belief: &belief, actions: &actions, history: &history, constraints: None };

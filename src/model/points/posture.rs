@@ -255,7 +255,7 @@ fn columns(a: &Matrix3<f64>) -> [Vector3<f64>; 3] {
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::dispatch;
     use proptest::prelude::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
