@@ -34,7 +34,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let elbow = rls.belief().state.joints[1].line().ok_or("it turns")?;
         let off_mm = 1e3 * elbow.distance_to(&Point3::new(0.31, 0.0, 0.0));
         let (nis, degrees) = update.nis.ok_or("it was seen")?;
-        println!("{movement:2}: the elbow's axis is {off_mm:6.3} mm off; innovation² {nis:8.2} of {degrees} degrees of freedom");
+        println!(
+            "{movement:2}: the elbow's axis is {off_mm:6.3} mm off; innovation² {nis:8.2} of {degrees} degrees of freedom"
+        );
     }
     Ok(())
 }

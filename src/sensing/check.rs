@@ -9,10 +9,14 @@ use crate::model::{Layout, Pass, State};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ChannelFault {
     /// `rows` and `extended` do not agree whether there is a prediction.
-    #[error("`rows` and `extended` do not agree on whether there is a prediction; both return false where there is none")]
+    #[error(
+        "`rows` and `extended` do not agree on whether there is a prediction; both return false where there is none"
+    )]
     Seen,
     /// `predict` says something else than `extended`.
-    #[error("equation {equation}: `predict` gives {predicted}, `extended` {extended}; where there is a prediction they are equal")]
+    #[error(
+        "equation {equation}: `predict` gives {predicted}, `extended` {extended}; where there is a prediction they are equal"
+    )]
     Continuation {
         /// Counted from 0.
         equation: usize,
