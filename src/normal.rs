@@ -103,7 +103,7 @@ mod tests {
         let n = DRAWS as f64;
         for (power, expected, variance) in [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)] {
             let mean = draws.iter().map(|x| x.powi(power)).sum::<f64>() / n;
-            assert!((mean - expected).abs() < 5.0 * (variance / n as f64).sqrt(), "{power}: {mean}");
+            assert!((mean - expected).abs() < 5.0 * (variance / n).sqrt(), "{power}: {mean}");
         }
         for beyond in [-3.7, -2.5, -1.0, -0.3, 0.0, 0.3, 1.0, 2.5, 3.7] {
             let share = draws.iter().filter(|x| **x < beyond).count() as f64 / n;

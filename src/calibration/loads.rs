@@ -4,6 +4,7 @@ use nalgebra::DVector;
 
 use super::{Case, Compliance, Extra, Fit, GivesWay};
 use crate::{
+    elementary::{cos, sin},
     experiment::Stream,
     kinematics::JointKind,
     model::{Block, Load, Loads, State},
@@ -54,7 +55,7 @@ impl Case<'_> {
                 terms.push(Term { name: "its ratio".to_owned(), values: vec![reading(|q| q)] });
             }
             if extras.contains(&Extra::Eccentricity) {
-                let values = vec![reading(f64::sin), reading(f64::cos)];
+                let values = vec![reading(sin), reading(cos)];
                 terms.push(Term { name: "its eccentricity".to_owned(), values });
             }
             let mut is_pulled = false;

@@ -114,8 +114,8 @@ fn along<S: Simd, const E: usize>(simd: S, columns: &[f64], p: &[f64], found: &m
     (0..twos).step_by(2 * width).for_each(|first| sums_from::<S, E, 2>(simd, first, (columns, p), found));
     (twos..ones).step_by(width).for_each(|first| sums_from::<S, E, 1>(simd, first, (columns, p), found));
     for (x, found) in columns.chunks_exact(m.max(1)).zip(found.chunks_exact_mut(m.max(1))) {
-        for row in ones..m {
-            found[row] = x.iter().zip(p.iter().skip(row).step_by(m)).fold(0.0, |sum, (x, p)| x * p + sum);
+        for (row, found) in found.iter_mut().enumerate().skip(ones) {
+            *found = x.iter().zip(p.iter().skip(row).step_by(m)).fold(0.0, |sum, (x, p)| x * p + sum);
         }
     }
 }

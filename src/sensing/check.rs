@@ -92,8 +92,9 @@ pub fn check_channel(
     }
     let mut strict = vec![0.0; d];
     if channel.predict(state, positions, &mut strict) {
-        let pairs = strict.iter().zip(&extended).enumerate();
-        for (equation, (predicted, extended)) in pairs.filter(|(_, (predicted, extended))| predicted != extended) {
+        let mut pairs = strict.iter().zip(&extended).enumerate();
+        if let Some((equation, (predicted, extended))) = pairs.find(|(_, (predicted, extended))| predicted != extended)
+        {
             return Err(ChannelFault::Continuation { equation, predicted: *predicted, extended: *extended });
         }
     }

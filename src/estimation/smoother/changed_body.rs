@@ -203,7 +203,7 @@ impl Smoother {
         let starts = [&known.state, &mode.state];
         let found = starts.iter().filter_map(|start| posterior.mode_from_afar(start, layout, THOROUGH).ok());
         let found = found.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
-        let occam = root.l_dirty().diagonal().map(f64::ln).sum();
+        let occam = root.l_dirty().diagonal().map(ln).sum();
         let log_odds = known.log_evidence + found.log_evidence - occam - mode.log_evidence + log_share + ln(RATE);
         Some(After { posterior, mode: found, log_odds })
     }

@@ -53,7 +53,7 @@ const STEP: f64 = 1e-5;
 
 /// ln det A of the root of A.
 pub(super) fn log_determinant(root: &Cholesky<f64, Dyn>) -> f64 {
-    2.0 * root.l_dirty().diagonal().map(f64::ln).sum()
+    2.0 * root.l_dirty().diagonal().map(ln).sum()
 }
 
 /// All jumps from `state`; `prior` is the original prior's covariance in the chart there.
