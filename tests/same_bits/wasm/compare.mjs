@@ -19,6 +19,11 @@ names.forEach((name, index) => {
   const expected = readFileSync(`${folder}/${name}.json`);
   const same = found.equals(expected);
   differ += same ? 0 : 1;
-  console.log(`${name}: ${same ? "the same" : "OTHER"} ${length} bytes`);
+  console.log(`${name}: ${same ? "the same" : "OTHER"}, ${length} bytes`);
+  if (!same) {
+    const first = found.findIndex((byte, at) => byte !== expected[at]);
+    const around = (text) => text.subarray(Math.max(0, first - 120), first + 40).toString();
+    console.log(`  here    ${around(found)}\n  native  ${around(expected)}`);
+  }
 });
 process.exit(differ === 0 ? 0 : 1);
