@@ -83,6 +83,7 @@
 //! *Bits.* The same seed gives the same bits on every machine, whatever its processor and the number of threads: no product is added
 //! without being rounded, sums have one order, and elementary functions and normal draws are our own.
 
+mod as_numbers;
 #[cfg_attr(not(test), warn(clippy::disallowed_methods))]
 pub mod ask_tell;
 #[cfg_attr(not(test), warn(clippy::disallowed_methods))]

@@ -12,8 +12,10 @@ use crate::elementary::sin_cos;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     /// A point on the axis, metres, measurement frame.
+    #[serde(with = "crate::as_numbers")]
     pub point: Point3<f64>,
     /// The direction about which a positive angle turns right-handedly; w and −w are different robots.
+    #[serde(with = "crate::as_numbers")]
     pub direction: UnitVector3<f64>,
 }
 
@@ -46,7 +48,7 @@ pub enum Joint {
     /// Turns about a line: `p ↦ e^{wθ}(p − v) + v`, θ in radians.
     Revolute(Line),
     /// Slides along a direction: `p ↦ p + θw`, θ in metres.
-    Prismatic(UnitVector3<f64>),
+    Prismatic(#[serde(with = "crate::as_numbers")] UnitVector3<f64>),
 }
 
 impl Joint {

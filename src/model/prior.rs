@@ -41,14 +41,18 @@ pub struct Prior {
     guess: State,
     blocks: Vec<(Block, Range<usize>, Knowledge)>,
     /// P₀; of blocks that may be anywhere the variance of such a draw, on the diagonal.
+    #[serde(with = "crate::as_numbers")]
     covariance: DMatrix<f64>,
     /// P₀⁻¹ of the blocks around the guess; nothing of the others.
+    #[serde(with = "crate::as_numbers")]
     information: DMatrix<f64>,
     /// L with L Lᵀ = P₀.
+    #[serde(with = "crate::as_numbers")]
     root: DMatrix<f64>,
     /// Pairs of blocks around the guess, by their places, whose information is not zero, but for those of lines alone.
     coupled: Vec<(usize, usize)>,
     /// By block: the information of a line whose errors have nothing to do with those of any other block.
+    #[serde(with = "crate::as_numbers")]
     lines: Vec<Option<Matrix4<f64>>>,
 }
 

@@ -15,6 +15,7 @@ use crate::{elementary::sin_cos, kinematics::Joint};
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     /// Carries the robot's frame into that of the measurements.
+    #[serde(with = "crate::as_numbers")]
     pub base: Isometry3<f64>,
     /// The joints in order, the one nearest the base first.
     pub joints: Vec<Joint>,
@@ -28,6 +29,7 @@ pub struct State {
     /// What looks on: cameras, anchors of cables.
     pub devices: Vec<Device>,
     /// Places beside the robot, in the frame of the measurements, metres.
+    #[serde(with = "crate::as_numbers")]
     pub sockets: Vec<Point3<f64>>,
     /// What the robot is asked to bring somewhere: the marker.
     pub hand: Hand,
@@ -136,9 +138,9 @@ pub struct Target {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Place {
     /// A point, metres.
-    Point(Point3<f64>),
+    Point(#[serde(with = "crate::as_numbers")] Point3<f64>),
     /// A rigid body; its known points are written in its own frame.
-    Pose(Isometry3<f64>),
+    Pose(#[serde(with = "crate::as_numbers")] Isometry3<f64>),
 }
 
 impl Place {
@@ -165,6 +167,7 @@ pub struct Device {
     /// The link that carries it; `None` for one that stands beside the robot, in the frame of the measurements.
     pub link: Option<usize>,
     /// Its frame, at θ = 0 if a link carries it.
+    #[serde(with = "crate::as_numbers")]
     pub pose: Isometry3<f64>,
     /// Of a camera: focal lengths and principal point (fx, fy, cx, cy), pixels.
     pub intrinsics: Option<[f64; 4]>,

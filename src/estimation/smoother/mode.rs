@@ -19,8 +19,10 @@ use crate::{
 pub(super) struct Mode {
     pub state: State,
     pub cost: f64,
+    #[serde(with = "crate::as_numbers")]
     pub information: DMatrix<f64>,
     /// −∂E/∂δ there, which is next to nothing.
+    #[serde(with = "crate::as_numbers")]
     pub descent: DVector<f64>,
     factor: Factor,
     /// −E − ½ ln det Λ: the logarithm of its share of the evidence, but for what all modes have in common.

@@ -20,8 +20,10 @@ pub(super) struct Settled {
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Quadratic {
     /// Λ, m × m.
+    #[serde(with = "crate::as_numbers")]
     pub information: DMatrix<f64>,
     /// Λ δ̂.
+    #[serde(with = "crate::as_numbers")]
     pub vector: DVector<f64>,
     /// ½ Σ w ‖r‖² at δ = 0.
     pub misfit: f64,
