@@ -115,7 +115,7 @@ fn draw(robot: &Robot, rng: &mut ChaCha8Rng) -> Value {
 /// What one synchronised write of as many bytes costs in this folder.
 fn write(folder: &Path, bytes: usize) -> Duration {
     let connection = rusqlite::Connection::open(folder.join("yardstick.sqlite")).expect("a database");
-    connection.pragma_update(None, "journal_mode", "WAL").expect("set");
+    connection.pragma_update(None, "journal_mode", "TRUNCATE").expect("set");
     connection.pragma_update(None, "synchronous", "FULL").expect("set");
     connection.execute("CREATE TABLE event (text TEXT)", []).expect("a table");
     let text = "x".repeat(bytes);

@@ -2,15 +2,14 @@
 
 use std::sync::Arc;
 
-use nalgebra::DVector;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{CHANNELS, Channel, Observation, Position, Rig, Socket, Spacing, examples};
+use super::{CHANNELS, Channel, Observation, Position, Rig, Socket, Spacing, check_channel, examples};
 use crate::model::{
-    Layout, Pass,
+    Layout,
     laws::{all_blocks, random_state},
 };
 
@@ -24,43 +23,10 @@ proptest! {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let state = random_state(&mut rng, joints);
         let layout = Layout::new(&state, all_blocks(&state));
-        let m = layout.dimension();
         let positions: Vec<f64> = (0..joints).map(|_| rng.random_range(-2.0..2.0)).collect();
         for channel in examples(&mut rng, &state) {
-            let d = channel.equations();
-            let (mut reading, mut rows) = (vec![0.0; d], vec![0.0; d * m]);
-            let mut pass = Pass::new(&state, &layout);
-            let seen = channel.rows(pass.at(&positions), &mut reading, &mut rows);
-            let mut predicted = vec![0.0; d];
-            prop_assert_eq!(channel.extended(&state, &positions, &mut predicted), seen);
-            let mut strict = vec![0.0; d];
-            if channel.predict(&state, &positions, &mut strict) {
-                prop_assert_eq!(&strict, &predicted, "a prediction is no other than its continuation");
-            }
-            if !seen {
-                prop_assert!(rows.iter().all(|row| *row == 0.0));
-                continue;
-            }
-            let mut difference = vec![0.0; d];
-            channel.difference(&reading, &predicted, &mut difference);
-            prop_assert!(difference.iter().all(|x| x.abs() < 1e-8 / channel.sigma()));
-            let scale = rows.iter().fold(1.0 / channel.sigma(), |scale: f64, row| scale.max(row.abs()));
-            for k in 0..m {
-                let step = 1e-6;
-                let moved = |sign: f64| {
-                    let mut delta = DVector::zeros(m);
-                    delta[k] = sign * step;
-                    let mut reading = vec![0.0; d];
-                    channel.extended(&state.retract(&layout, &delta), &positions, &mut reading);
-                    reading
-                };
-                let mut slope = vec![0.0; d];
-                channel.difference(&moved(1.0), &moved(-1.0), &mut slope);
-                for (row, slope) in slope.iter().enumerate() {
-                    let (found, wanted) = (rows[row * m + k], slope / (2.0 * step));
-                    prop_assert!((found - wanted).abs() < 1e-5 * scale, "{channel:?} row {row} column {k}: {found} {wanted}");
-                }
-            }
+            let checked = check_channel(channel.as_ref(), &state, &layout, &positions);
+            prop_assert!(checked.is_ok(), "{channel:?}: {checked:?}");
         }
     }
 

@@ -12,6 +12,7 @@
 //! An *equation* is a scalar, a *reading* is one channel at one movement.
 
 mod channel;
+mod check;
 mod head;
 mod joint_noise;
 mod keys;
@@ -24,6 +25,7 @@ mod rig;
 mod visible;
 
 pub use channel::{Apart, Channel, Occasion};
+pub use check::{ChannelFault, check_channel};
 pub use head::{Gaze, Head};
 pub(crate) use joint_noise::JointErrors;
 pub use joint_noise::JointNoise;

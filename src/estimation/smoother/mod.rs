@@ -280,7 +280,7 @@ impl Estimator for Smoother {
     }
 
     fn restored(&self, stored: &[u8]) -> Option<Box<dyn Estimator>> {
-        Some(Box::new(self.from_stored(stored)?))
+        Some(Box::new(self.with_stored(stored)?))
     }
 
     fn misfit(&self) -> Option<Misfit> {

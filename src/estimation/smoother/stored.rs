@@ -94,7 +94,7 @@ impl Smoother {
     }
 
     /// The same smoother where it has learned what is stored; `None` where that is of another.
-    pub(super) fn from_stored(&self, stored: &[u8]) -> Option<Self> {
+    pub(super) fn with_stored(&self, stored: &[u8]) -> Option<Self> {
         let mut stored: Stored = postcard::from_bytes(stored).ok()?;
         if !stored.is_of(self) {
             return None;

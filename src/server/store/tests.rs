@@ -185,7 +185,7 @@ fn a_store_without_checksums_is_taken_up() {
         let id = filled(&store, 3);
         let old = "ALTER TABLE session DROP COLUMN checksum; ALTER TABLE session DROP COLUMN damage;
                    ALTER TABLE session DROP COLUMN summary; ALTER TABLE session DROP COLUMN counted;
-                   ALTER TABLE event DROP COLUMN checksum; PRAGMA user_version = 1;";
+                   ALTER TABLE event DROP COLUMN checksum; DROP TABLE checkpoint; PRAGMA user_version = 1;";
         store.connection().execute_batch(old).expect("as version 1 had it");
         id
     };
