@@ -25,7 +25,7 @@ impl Since {
     ) -> Option<Saved> {
         build()?;
         self.reports.push(report.clone());
-        if report.step == 0 || report.step % EVERY != 0 {
+        if report.step == 0 || !report.step.is_multiple_of(EVERY) {
             return None;
         }
         let reports = std::mem::take(&mut self.reports);
