@@ -17,7 +17,7 @@ use body_schema::{
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use reqwest::Client;
+use reqwest::{Client, RequestBuilder};
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
@@ -51,6 +51,18 @@ async fn served(data_dir: Option<&Path>) -> (String, CancellationToken) {
     (address, shutdown)
 }
 
+/// How long it takes whoever asks as often as the server is busy.
+async fn answered(asking: impl Fn() -> RequestBuilder) -> Duration {
+    let began = Instant::now();
+    loop {
+        let answer = asking().send().await.expect("an answer");
+        if answer.status() != 503 {
+            assert_eq!(answer.status(), 200);
+            return began.elapsed();
+        }
+    }
+}
+
 impl Kept {
     async fn open(data_dir: Option<&Path>) -> Self {
         let (address, shutdown) = served(data_dir).await;
@@ -68,17 +80,10 @@ impl Kept {
         Self { client, session, observations, times: Vec::new(), shutdown }
     }
 
-    /// How long the answer takes to whoever asks for a suggestion, as often as need be.
+    /// How long the answer takes to whoever asks for a suggestion.
     async fn suggested(&self, address: &str) -> Duration {
-        let began = Instant::now();
-        loop {
-            let asking = self.client.post(format!("http://{address}{}/suggestions", self.session)).json(&json!({}));
-            let answer = asking.send().await.expect("an answer");
-            if answer.status() != 503 {
-                assert_eq!(answer.status(), 200);
-                return began.elapsed();
-            }
-        }
+        let suggestions = format!("http://{address}{}/suggestions", self.session);
+        answered(|| self.client.post(&suggestions).json(&json!({}))).await
     }
 
     async fn tell(&mut self, told: &Value) {
@@ -167,15 +172,8 @@ async fn main() {
     let again = kept.suggested(&address).await;
     println!("a session of {LONG} observations comes back to memory in {:.1?}", suggested.saturating_sub(again));
     for number in [LONG - 10, LONG / 2, 1] {
-        let began = Instant::now();
-        loop {
-            let excluding = kept.client.delete(format!("http://{address}{}/observations/{number}", kept.session));
-            let answer = excluding.send().await.expect("an answer");
-            if answer.status() != 503 {
-                assert_eq!(answer.status(), 200);
-                break;
-            }
-        }
-        println!("observation {number} of {LONG} is excluded in {:.1?}", began.elapsed());
+        let observation = format!("http://{address}{}/observations/{number}", kept.session);
+        let excluded = answered(|| kept.client.delete(&observation)).await;
+        println!("observation {number} of {LONG} is excluded in {excluded:.1?}");
     }
 }

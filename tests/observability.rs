@@ -91,7 +91,7 @@ fn a_table_for_people() {
         assert!(said.contains(part), "{part}: {said}");
     }
     for (arguments, wrong) in [
-        (&["arm-6dof", "--accuracy", "0"][..], "write a number above 0, in millimetres"),
+        (&["arm-6dof", "--accuracy", "0"][..], "a number of millimetres above 0 is needed"),
         (&["arm-6dof", "--postures", "0"], "0 is not in 1..=1000"),
         (&["nowhere.toml"], "nowhere.toml cannot be read"),
     ] {

@@ -66,7 +66,7 @@ impl Ledger {
     }
 
     /// After all of `events`. Those that are excluded in the end never counted. What was learned up to a checkpoint is not learned
-    /// again. `hear` hears of every observation that counts after that.
+    /// again. `hear` hears of every observation that counts after that; without a checkpoint first of how it stands before any.
     pub fn replayed(
         mut self,
         events: &[Event],
@@ -75,15 +75,19 @@ impl Ledger {
     ) -> Result<Self, (usize, String)> {
         let excluded = excluded(events);
         let first = from.map_or(0, Checkpoint::events);
-        if let Some(checkpoint) = from.filter(|checkpoint| checkpoint.serves(events)) {
+        if let Some(checkpoint) = from {
+            if !checkpoint.serves(events) {
+                return Err((first, "its checkpoint does not serve".to_owned()));
+            }
             for (index, event) in events[..first].iter().enumerate() {
                 self.apply_as(event, &excluded, Replay::CarriedOut).map_err(|what| (index + 1, what))?;
             }
             if !self.experiment.take_up(checkpoint.experiment().clone()) {
                 return Err((first, "its checkpoint is of another session".to_owned()));
             }
-        } else if from.is_some() {
-            return Err((first, "its checkpoint does not serve".to_owned()));
+        } else {
+            let report = self.experiment.latest().clone();
+            hear(Replayed { report, events: 0, known: events.len(), ledger: &self });
         }
         for (index, event) in events.iter().enumerate().skip(first) {
             let report = self.apply(event, &excluded).map_err(|what| (index + 1, what))?;

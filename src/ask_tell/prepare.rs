@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{
     Answer, Ask, Event, Fault, Happened, Observation, Outcome, Refusal, Session, Suggestion, SuggestionState,
     Suggestions, Why,
-    checkpoint::{Find, Hear, Replayed},
+    checkpoint::{Find, Hear},
     draft::Draft,
     ledger::Ledger,
     limits::*,
@@ -209,10 +209,6 @@ impl Session {
             let empty = Ledger::new(self.setup(), self.scenario().clone());
             let empty = empty.map_err(|error| Refusal::Ended(error.to_string()))?;
             let from = find(&events);
-            if from.is_none() {
-                let (report, known) = (empty.experiment.latest().clone(), events.len());
-                hear(Replayed { report, events: 0, known, ledger: &empty });
-            }
             draft.ledger = empty.replayed(&events, from.as_ref(), hear).map_err(|(_, what)| Refusal::Ended(what))?;
             draft.drop_infeasible()?;
         }

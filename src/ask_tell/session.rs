@@ -6,10 +6,7 @@ use serde::Deserialize;
 
 use super::{
     Answer, Ask, ChannelShape, Checkpoint, Document, Event, Observation, Outcome, Prepared, Refusal, ReplayError,
-    Setup, SetupError, Suggestion, Suggestions, Told, VERSION,
-    checkpoint::{Hear, Replayed},
-    ledger::Ledger,
-    limits::Most,
+    Setup, SetupError, Suggestion, Suggestions, Told, VERSION, checkpoint::Hear, ledger::Ledger, limits::Most,
     setup::check_size,
 };
 use crate::{
@@ -69,10 +66,6 @@ impl Session {
         hear: &mut Hear<'_>,
     ) -> Result<Self, ReplayError> {
         let Self { setup, ledger, .. } = Self::begun(setup)?;
-        if from.is_none() {
-            let report = ledger.experiment.latest().clone();
-            hear(Replayed { report, events: 0, known: events.len(), ledger: &ledger });
-        }
         let ledger = ledger.replayed(&events, from, hear);
         let ledger = ledger.map_err(|(index, what)| ReplayError::Event { index, what })?;
         Ok(Self { setup, ledger, events })
@@ -249,7 +242,7 @@ impl Session {
     /// stored session.
     pub fn history(&self) -> Vec<StepReport> {
         let Ok(ledger) = Ledger::new(&self.setup, self.scenario().clone()) else { return Vec::new() };
-        let mut reports = vec![ledger.experiment.latest().clone()];
+        let mut reports = Vec::new();
         // Whatever has happened can happen again.
         drop(ledger.replayed(&self.events, None, &mut |step| {
             reports.push(step.report);

@@ -115,7 +115,7 @@ impl Smoother {
         if let Some((scaled, scales)) = smoother.scaled.as_mut().zip(stored.chain) {
             scaled.scales = scales;
         }
-        let smoother = Self {
+        let mut smoother = Self {
             hypotheses: stored.hypotheses,
             rng: stored.rng,
             original: stored.original,
@@ -130,14 +130,9 @@ impl Smoother {
             prior_doubted_at: stored.prior_doubted_at,
             ..smoother
         };
-        Some(smoother.published(stored.model_error_m))
-    }
-
-    /// The same with its belief made of what it has learned.
-    fn published(mut self, model_error_m: f64) -> Self {
-        self.publish();
+        smoother.publish();
         // As it was when it was published, before measurements settled.
-        self.belief.model_error_m = model_error_m;
-        self
+        smoother.belief.model_error_m = stored.model_error_m;
+        Some(smoother)
     }
 }

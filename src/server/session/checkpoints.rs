@@ -2,11 +2,14 @@
 
 use uuid::Uuid;
 
-use super::Kept;
+use super::{Kept, Shared};
 use crate::{
-    ask_tell::{Checkpoint, Event},
+    ask_tell::{self, Checkpoint, Event, ReplayError, Setup},
     experiment::Description,
-    server::store::{EVERY, Saved, Store, build, packed, unpacked},
+    server::{
+        metrics::Metrics,
+        store::{EVERY, Saved, Store, build, packed, unpacked},
+    },
 };
 
 /// The steps since the latest checkpoint, of which there is none in the store yet.
@@ -25,7 +28,7 @@ impl Since {
     ) -> Option<Saved> {
         build()?;
         self.reports.push(report.clone());
-        if report.step == 0 || report.step % EVERY != 0 {
+        if report.step == 0 || !report.step.is_multiple_of(EVERY) {
             return None;
         }
         let reports = std::mem::take(&mut self.reports);
@@ -97,6 +100,61 @@ fn latest(saved: &[Saved], events: &[Event]) -> Option<(usize, Checkpoint)> {
         let checkpoint = Checkpoint::from_bytes(&saved.state)?;
         (checkpoint.step() == saved.step && checkpoint.serves(events)).then_some((index, checkpoint))
     })
+}
+
+/// The checkpoints that a replay comes by.
+#[derive(Default)]
+pub(super) struct ComeBy {
+    since: Since,
+    pub(super) saved: Vec<Saved>,
+}
+
+impl ComeBy {
+    /// Takes in a step, and tells its report; `None` where that cannot be written.
+    pub(super) fn hear(&mut self, step: &ask_tell::Replayed<'_>, metrics: &Metrics) -> Option<Kept> {
+        if step.report.step > 0 {
+            metrics.replayed.inc();
+        }
+        let kept = Kept::of(&step.report, step.description()).ok()?;
+        self.saved.extend(self.since.step(&kept, step.told(), || step.checkpoint()));
+        Some(kept)
+    }
+}
+
+/// A session that was replayed.
+pub(super) struct Replayed {
+    pub(super) session: ask_tell::Session,
+    /// All of its history.
+    pub(super) reports: Vec<Kept>,
+    pub(super) since: Since,
+    /// Checkpoints that it has come by.
+    pub(super) saved: Vec<Saved>,
+}
+
+impl Replayed {
+    pub(super) fn of(
+        setup: Setup,
+        events: Vec<Event>,
+        from: Option<GoesOn>,
+        shared: &Shared,
+    ) -> Result<Self, ReplayError> {
+        let (mut come_by, mut later) = (ComeBy::default(), Vec::new());
+        let session =
+            ask_tell::Session::replay_from(setup, events, from.as_ref().map(|from| &from.checkpoint), &mut |step| {
+                let kept = come_by.hear(&step, &shared.metrics);
+                let can_go_on = kept.is_some() && !shared.stop.is_cancelled();
+                later.extend(kept);
+                can_go_on
+            })?;
+        let ComeBy { since, saved } = come_by;
+        let mut reports = Vec::new();
+        if let Some(from) = from {
+            let lacking = || ReplayError::NotASession("the reports of its steps are not all of them".to_owned());
+            reports = from.reports(session.description()).ok_or_else(lacking)?;
+        }
+        reports.extend(later);
+        Ok(Self { session, reports, since, saved })
+    }
 }
 
 /// How far a replay has got, for everyone to read.

@@ -19,8 +19,10 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{
-    DamagedSession, Elsewhere, Engine, NewOutsideSession, Session, SessionResource, Sessions, Standing, lock,
-    outside::{self, Beginning, Origin, now_s},
+    DamagedSession, Elsewhere, Engine, NewOutsideSession, Session, SessionResource, Sessions, Standing,
+    clock::now_s,
+    lock,
+    outside::{self, Beginning, Origin},
     registry::{END_WITHIN, no_engine, spawn},
 };
 use crate::{
@@ -143,14 +145,8 @@ impl Sessions {
     /// Brings a session back to memory, whether or not whoever asked still waits.
     pub(super) async fn wake(self: &Arc<Self>, id: Uuid) -> Result<Arc<Session>, Problem> {
         let all = self.clone();
-        let waking = tokio::spawn(requests::carried(async move { all.bring_back(id).await }));
-        match timeout(MOVED_WITHIN, waking).await {
-            Ok(woken) => woken.unwrap_or_else(|_| Err(no_engine())),
-            Err(_) => {
-                let detail = "what happened in the session is still being replayed; ask again later";
-                Err(Problem::new(Kind::Busy, detail))
-            }
-        }
+        let waking = async move { all.bring_back(id).await };
+        done_anyway(waking, "what happened in the session is still being replayed; ask again later").await
     }
 
     async fn bring_back(&self, id: Uuid) -> Result<Arc<Session>, Problem> {
@@ -287,14 +283,9 @@ impl Sessions {
         excluded: bool,
     ) -> Result<Status, Problem> {
         let (all, id) = (self.clone(), id.to_owned());
-        let marking = requests::carried(async move { all.tell(&id, move |robot| robot.mark(number, excluded)).await });
-        match timeout(MOVED_WITHIN, tokio::spawn(marking)).await {
-            Ok(marked) => marked.unwrap_or_else(|_| Err(no_engine())),
-            Err(_) => {
-                let detail = "what happened in the session is being replayed, and then it is done; ask again later";
-                Err(Problem::new(Kind::Busy, detail))
-            }
-        }
+        let marking = async move { all.tell(&id, move |robot| robot.mark(number, excluded)).await };
+        let later = "what happened in the session is being replayed, and then it is done; ask again later";
+        done_anyway(marking, later).await
     }
 
     /// How a session with a robot elsewhere stands, also while its engine is busy.
@@ -412,6 +403,17 @@ impl Sessions {
     async fn load(&self, id: Uuid) -> Result<Option<Stored>, Problem> {
         let store = self.store.clone();
         aside(move || store.load(id)).await
+    }
+}
+
+/// What is done whether or not whoever asked still waits; who waits too long is told what is to be said then.
+async fn done_anyway<T: Send + 'static>(
+    work: impl Future<Output = Result<T, Problem>> + Send + 'static,
+    later: &'static str,
+) -> Result<T, Problem> {
+    match timeout(MOVED_WITHIN, tokio::spawn(requests::carried(work))).await {
+        Ok(done) => done.unwrap_or_else(|_| Err(no_engine())),
+        Err(_) => Err(Problem::new(Kind::Busy, later)),
     }
 }
 

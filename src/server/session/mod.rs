@@ -5,6 +5,7 @@
 //! store, and [`dormant`] ones there alone.
 
 mod checkpoints;
+mod clock;
 mod completed;
 mod dormant;
 mod engine;
@@ -31,11 +32,12 @@ use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
+pub(super) use clock::now_s;
 pub(super) use dormant::Listed;
 use engine::{Command, recording_failed};
 pub(super) use kept::Kept;
 pub(super) use memory::{Budget, Taken};
-pub(super) use outside::{Elsewhere, now_s};
+pub(super) use outside::Elsewhere;
 pub use registry::NewSession;
 pub(super) use registry::{Keeping, Sessions};
 pub use resource::{DamagedSession, SessionResource};
@@ -106,13 +108,12 @@ impl Session {
 
     /// The latest published step.
     pub(super) fn step(&self) -> u64 {
-        (*self.shared.reports.borrow() as u64).saturating_sub(1)
+        (self.shared.steps() as u64).saturating_sub(1)
     }
 
     /// The reports from step `first` on, at most `count`.
     pub(super) fn reports(&self, first: usize, count: usize) -> Vec<Kept> {
-        let history = self.shared.history.read().unwrap_or_else(PoisonError::into_inner);
-        history.iter().skip(first).take(count).cloned().collect()
+        self.shared.reports_from(first, count)
     }
 
     /// Wakes whenever there are more reports.
@@ -288,7 +289,6 @@ impl Session {
                 }
                 answer.await
             }
-            else => answer.await,
         };
         match outcome {
             Ok(outcome) => outcome,

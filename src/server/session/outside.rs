@@ -6,8 +6,8 @@
 use std::{
     collections::BTreeMap,
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::{Arc, Mutex, PoisonError, atomic::Ordering, mpsc},
-    time::{Duration, Instant, SystemTime},
+    sync::{Arc, atomic::Ordering, mpsc},
+    time::{Duration, Instant},
 };
 
 use tokio::sync::{OwnedSemaphorePermit, oneshot};
@@ -16,7 +16,8 @@ use uuid::Uuid;
 
 use super::{
     Kept, Shared, Standing, Taken,
-    checkpoints::{self, GoesOn, Replaying, Since},
+    checkpoints::{self, ComeBy, GoesOn, Replayed, Replaying, Since},
+    clock::now_s,
     dormant::Summary,
     engine::{COMPLETE_AFTER, panicked, recording_failed},
 };
@@ -28,9 +29,8 @@ use crate::{
     experiment::{Description, Experiment},
     recording::{Recorder, RecordingError, Target},
     server::{
-        metrics::Metrics,
         problem::{Kind, Problem},
-        store::{Saved, Shown, Store, StoreError, Stored, build},
+        store::{Shown, Store, StoreError, Stored, build},
     },
 };
 
@@ -104,9 +104,8 @@ pub(in crate::server) struct Elsewhere {
     /// By `Idempotency-Key` the number of its observation.
     keys: BTreeMap<String, u64>,
     recorder: Recorder,
-    /// The latest step that is recorded; `None` before any. Those of a session that has come back are recorded while nothing else is
-    /// asked for.
-    recorded: Option<u64>,
+    /// So many steps are recorded. Those of a session that has come back are while nothing else is asked for.
+    recorded: usize,
     /// The steps since the latest checkpoint.
     since: Since,
     store: Arc<Store>,
@@ -170,7 +169,7 @@ impl Elsewhere {
             channels,
             keys,
             recorder,
-            recorded: None,
+            recorded: 0,
             since,
             store,
             shared,
@@ -186,15 +185,11 @@ impl Elsewhere {
 
     /// Records steps of before it came back to memory, so many at most.
     fn catch_up(&mut self, most: usize) -> Result<(), RecordingError> {
-        let first = self.recorded.map_or(0, |step| step + 1);
-        let reports: Vec<Kept> = {
-            let history = self.shared.history.read().unwrap_or_else(PoisonError::into_inner);
-            history.iter().skip(first as usize).take(most).cloned().collect()
-        };
-        for kept in reports {
+        for kept in self.shared.reports_from(self.recorded, most) {
+            // Read once more instead of being held in memory until now.
             let report = kept.report().ok_or_else(|| RecordingError::Encode("a step cannot be read again".into()))?;
             self.recorder.log(&report)?;
-            self.recorded = Some(kept.step);
+            self.recorded += 1;
         }
         if !self.is_behind() {
             self.recorder.flush()?;
@@ -206,30 +201,30 @@ impl Elsewhere {
 
     /// Whether there are steps that are not recorded yet.
     fn is_behind(&self) -> bool {
-        self.recorded.is_none_or(|step| step < self.session.latest().step)
+        self.recorded < self.shared.steps()
+    }
+
+    /// The next job; until it comes, what is left to be recorded is.
+    fn next(&mut self, jobs: &mpsc::Receiver<Job>) -> Result<Job, mpsc::RecvError> {
+        while self.is_behind() && !self.shared.stop.is_cancelled() {
+            if let Ok(job) = jobs.try_recv() {
+                return Ok(job);
+            }
+            if let Err(error) = self.catch_up(AT_ONCE) {
+                self.shared.note_recording(Some(error.to_string()));
+                // What cannot be recorded keeps nobody from anything else.
+                self.recorded = self.shared.steps();
+            }
+        }
+        jobs.recv_timeout(COMPLETE_AFTER).or_else(|_| {
+            drop(self.complete());
+            self.idle(jobs)
+        })
     }
 
     fn serve(&mut self, jobs: &mpsc::Receiver<Job>) {
         loop {
-            let job = match jobs.try_recv() {
-                Err(mpsc::TryRecvError::Empty) if self.is_behind() && !self.shared.stop.is_cancelled() => {
-                    match self.catch_up(AT_ONCE) {
-                        Ok(()) => continue,
-                        Err(error) => {
-                            self.shared.note_recording(Some(error.to_string()));
-                            // What cannot be recorded keeps nobody from anything else.
-                            self.recorded = Some(self.session.latest().step);
-                            continue;
-                        }
-                    }
-                }
-                Ok(job) => Ok(job),
-                Err(_) => jobs.recv_timeout(COMPLETE_AFTER).or_else(|_| {
-                    drop(self.complete());
-                    self.idle(jobs)
-                }),
-            };
-            let Ok(job) = job else { return };
+            let Ok(job) = self.next(jobs) else { return };
             if self.shared.stop.is_cancelled() {
                 return;
             }
@@ -440,11 +435,12 @@ impl Elsewhere {
         if self.is_rewritten {
             return Ok(reports);
         }
-        if report.step as usize >= *self.shared.reports.borrow() {
+        let step = report.step as usize;
+        if step >= self.shared.steps() {
             let kept = Kept::of(report, self.session.description());
             reports.push(kept.map_err(|problem| RecordingError::Encode(problem.detail.into()))?);
-            if self.recorded.map_or(0, |step| step + 1) == report.step {
-                self.recorded = Some(report.step);
+            if self.recorded == step {
+                self.recorded += 1;
                 self.recorder.log(report)?;
             }
         }
@@ -466,7 +462,7 @@ impl Elsewhere {
             let points = belief.state.measured().skeleton(&posture);
             points.iter().map(|point| [point.x, point.y, point.z]).collect()
         });
-        self.recorder.log_ghost(self.recorded.unwrap_or(0), 0, skeleton.as_deref())
+        self.recorder.log_ghost(self.recorded.saturating_sub(1) as u64, 0, skeleton.as_deref())
     }
 
     fn publish(&self, reports: Vec<Kept>) {
@@ -485,61 +481,6 @@ impl Elsewhere {
     }
 }
 
-/// The checkpoints that a replay comes by.
-#[derive(Default)]
-struct ComeBy {
-    since: Since,
-    saved: Vec<Saved>,
-}
-
-impl ComeBy {
-    /// Takes in a step, and tells its report; `None` where that cannot be written.
-    fn hear(&mut self, step: &ask_tell::Replayed<'_>, metrics: &Metrics) -> Option<Kept> {
-        if step.report.step > 0 {
-            metrics.replayed.inc();
-        }
-        let kept = Kept::of(&step.report, step.description()).ok()?;
-        self.saved.extend(self.since.step(&kept, step.told(), || step.checkpoint()));
-        Some(kept)
-    }
-}
-
-/// A session that was replayed.
-struct Replayed {
-    session: ask_tell::Session,
-    /// All of its history.
-    reports: Vec<Kept>,
-    since: Since,
-    /// Checkpoints that it has come by.
-    saved: Vec<Saved>,
-}
-
-impl Replayed {
-    fn of(
-        setup: Setup,
-        events: Vec<ask_tell::Event>,
-        from: Option<GoesOn>,
-        shared: &Shared,
-    ) -> Result<Self, ReplayError> {
-        let (mut come_by, mut later) = (ComeBy::default(), Vec::new());
-        let session =
-            ask_tell::Session::replay_from(setup, events, from.as_ref().map(|from| &from.checkpoint), &mut |step| {
-                let kept = come_by.hear(&step, &shared.metrics);
-                let can_go_on = kept.is_some() && !shared.stop.is_cancelled();
-                later.extend(kept);
-                can_go_on
-            })?;
-        let ComeBy { since, saved } = come_by;
-        let mut reports = Vec::new();
-        if let Some(from) = from {
-            let lacking = || ReplayError::NotASession("the reports of its steps are not all of them".to_owned());
-            reports = from.reports(session.description()).ok_or_else(lacking)?;
-        }
-        reports.extend(later);
-        Ok(Self { session, reports, since, saved })
-    }
-}
-
 /// Why a new session cannot be, blamed on what was sent.
 fn unusable(error: ReplayError) -> Problem {
     match error {
@@ -550,38 +491,5 @@ fn unusable(error: ReplayError) -> Problem {
         ReplayError::NotASession(_) | ReplayError::Version { .. } => {
             Problem::new(Kind::InvalidValue, error.to_string()).field("events")
         }
-    }
-}
-
-/// Seconds since 1970, of a clock that goes on where that of the machine is set back.
-pub(in crate::server) fn now_s() -> f64 {
-    let told = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
-    never_before(told)
-}
-
-/// The clock from now on: it has come to this time, if it was behind.
-fn never_before(told: f64) -> f64 {
-    static LATEST: Mutex<Option<(Instant, f64)>> = Mutex::new(None);
-    let mut latest = super::lock(&LATEST);
-    let now = Instant::now();
-    let gone_on = latest.map_or(f64::NEG_INFINITY, |(at, was)| was + (now - at).as_secs_f64());
-    let time = told.max(gone_on);
-    *latest = Some((now, time));
-    time
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_clock_that_is_set_back_goes_on() {
-        let before = now_s();
-        let later = never_before(before + 100.0);
-        assert!(later >= before + 100.0);
-        let set_back = never_before(before - 1000.0);
-        assert!(set_back >= later && set_back < later + 60.0, "{later} {set_back}");
-        std::thread::sleep(Duration::from_millis(20));
-        assert!(never_before(before - 2000.0) >= set_back + 0.02);
     }
 }

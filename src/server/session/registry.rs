@@ -16,7 +16,7 @@ use tokio_util::sync::CancellationToken;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::{Budget, Engine, Session, Shared, dormant::Known, engine, lock, outside::now_s};
+use super::{Budget, Engine, Session, Shared, clock::now_s, dormant::Known, engine, lock};
 use crate::{
     recording::EllipsoidSize,
     scenario::WorldKind,

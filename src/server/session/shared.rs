@@ -87,6 +87,17 @@ impl Shared {
         }
     }
 
+    /// So many steps there are to be read, step 0 among them.
+    pub(super) fn steps(&self) -> usize {
+        *self.reports.borrow()
+    }
+
+    /// The reports from step `first` on, at most `count`.
+    pub(super) fn reports_from(&self, first: usize, count: usize) -> Vec<Kept> {
+        let history = self.history.read().unwrap_or_else(PoisonError::into_inner);
+        history.iter().skip(first).take(count).cloned().collect()
+    }
+
     pub(super) fn publish(&self, reports: Vec<Kept>, remaining: Option<usize>) {
         // The engine alone publishes, so that nothing comes between these.
         let reported = self.reported.load(Ordering::Relaxed) + reports.iter().map(Kept::bytes).sum::<usize>();

@@ -7,11 +7,11 @@ use std::{
 };
 
 use flate2::{Compression, Crc, read::DeflateDecoder, write::DeflateEncoder};
-use rusqlite::{Connection, Transaction, params};
+use rusqlite::{Connection, OptionalExtension, Transaction, params};
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
-use super::{Event, Store, StoreError, TransactionBehavior, counted, insert_events, schema};
+use super::{Event, Store, StoreError, append_events, schema};
 
 /// Steps between one checkpoint and the next.
 pub const EVERY: u64 = 50;
@@ -45,9 +45,9 @@ impl Saved {
 }
 
 /// Texts without line breaks, one after the other in little room.
-pub fn packed<'a>(texts: impl Iterator<Item = &'a str>) -> Vec<u8> {
+pub fn packed<'a>(mut texts: impl Iterator<Item = &'a str>) -> Vec<u8> {
     let mut packed = DeflateEncoder::new(Vec::new(), Compression::fast());
-    let written = texts.into_iter().try_for_each(|text| writeln!(packed, "{text}"));
+    let written = texts.try_for_each(|text| writeln!(packed, "{text}"));
     // Memory takes all that is written to it.
     written.and_then(|()| packed.finish()).unwrap_or_default()
 }
@@ -89,13 +89,7 @@ impl Store {
     pub fn save(&self, id: Uuid, build: &str, saved: &Saved) -> Result<(), StoreError> {
         let mut connection = self.connection();
         self.can_grow(&connection)?;
-        let written = (|| {
-            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-            insert(&transaction, id, build, saved)?;
-            transaction.commit()
-        })();
-        self.is_left();
-        written.map_err(self.told())
+        self.written(&mut connection, |transaction| insert(transaction, id, build, saved))
     }
 
     /// What a session had come to, by this build, oldest first: those that are as they were written, up to the first that is not. None
@@ -143,22 +137,15 @@ impl Store {
     ) -> Result<(), StoreError> {
         let mut connection = self.connection();
         self.can_grow(&connection)?;
-        let written = (|| {
-            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-            insert_events(&transaction, id, revision, events, None)?;
-            let name = id.to_string();
-            transaction
-                .execute("UPDATE session SET counted = counted + ?1 WHERE id = ?2", params![counted(events), name])?;
+        self.written(&mut connection, |transaction| {
+            append_events(transaction, id, revision, events, None)?;
             transaction.execute(
                 "DELETE FROM checkpoint
                  WHERE session = (SELECT number FROM session WHERE id = ?1) AND (told >= ?2 OR build != ?3)",
-                params![name, observation as i64, build],
+                params![id.to_string(), observation as i64, build],
             )?;
-            saved.iter().try_for_each(|saved| insert(&transaction, id, build, saved))?;
-            transaction.commit()
-        })();
-        self.is_left();
-        written.map_err(self.told())
+            saved.iter().try_for_each(|saved| insert(transaction, id, build, saved))
+        })
     }
 }
 
@@ -189,6 +176,5 @@ fn insert(transaction: &Transaction<'_>, id: Uuid, build: &str, saved: &Saved) -
 }
 
 fn number(connection: &Connection, id: Uuid) -> rusqlite::Result<Option<i64>> {
-    use rusqlite::OptionalExtension;
     connection.query_row("SELECT number FROM session WHERE id = ?1", [id.to_string()], |row| row.get(0)).optional()
 }

@@ -196,17 +196,13 @@ impl Store {
         if self.count_in(&connection)? >= self.most {
             return Err(StoreError::Full(self.most));
         }
-        let written = (|| {
-            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+        self.written(&mut connection, |transaction| {
             transaction.execute(
                 "INSERT INTO session (id, made_s, form, setup, shown, checksum, counted) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
                 params![id.to_string(), made_s, VERSION, setup, shown, checksum([&setup, &shown]), counted(events)],
             )?;
-            insert_events(&transaction, id, 0, events, None)?;
-            transaction.commit()
-        })();
-        self.is_left();
-        written.map_err(self.told())
+            insert_events(transaction, id, 0, events, None)
+        })
     }
 
     /// Appends events to a session that has `revision` of them. A `key` is that of the observation among them.
@@ -217,18 +213,7 @@ impl Store {
     pub fn append(&self, id: Uuid, revision: usize, events: &[Event], key: Option<&str>) -> Result<(), StoreError> {
         let mut connection = self.connection();
         self.can_grow(&connection)?;
-        let written = (|| {
-            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-            insert_events(&transaction, id, revision, events, key)?;
-            let more = counted(events);
-            if more != 0 {
-                let id = id.to_string();
-                transaction.execute("UPDATE session SET counted = counted + ?1 WHERE id = ?2", params![more, id])?;
-            }
-            transaction.commit()
-        })();
-        self.is_left();
-        written.map_err(self.told())
+        self.written(&mut connection, |transaction| append_events(transaction, id, revision, events, key))
     }
 
     /// A session as it was kept; `None` if there is none of that id.
@@ -370,6 +355,21 @@ impl Store {
         self.connection.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Does what is to be written, all of it or nothing.
+    fn written(
+        &self,
+        connection: &mut Connection,
+        write: impl FnOnce(&Transaction<'_>) -> Result<(), rusqlite::Error>,
+    ) -> Result<(), StoreError> {
+        let written = (|| {
+            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+            write(&transaction)?;
+            transaction.commit()
+        })();
+        self.is_left();
+        written.map_err(self.told())
+    }
+
     fn told(&self) -> impl Fn(rusqlite::Error) -> StoreError + Copy + use<'_> {
         |source| StoreError::Sqlite { path: self.path.clone(), source }
     }
@@ -467,6 +467,23 @@ fn insert_events(
         let key = key.filter(|_| matches!(event.happened, Happened::Observed { .. }));
         let event = json(event);
         insert.execute(params![id.to_string(), number, event, key, event_checksum(&event, key)])?;
+    }
+    Ok(())
+}
+
+/// The same of a session that is there, which counts its observations.
+fn append_events(
+    transaction: &Transaction<'_>,
+    id: Uuid,
+    revision: usize,
+    events: &[Event],
+    key: Option<&str>,
+) -> Result<(), rusqlite::Error> {
+    insert_events(transaction, id, revision, events, key)?;
+    let more = counted(events);
+    if more != 0 {
+        let id = id.to_string();
+        transaction.execute("UPDATE session SET counted = counted + ?1 WHERE id = ?2", params![more, id])?;
     }
     Ok(())
 }
