@@ -6,7 +6,7 @@ mod simulated;
 use body_schema::{
     calibration::{Calibration, Case, Extra, Figures, Options, Silent, Trial, calibrate},
     experiment::{LearnerReport, ModelReport},
-    model::urdf::{Chain, Urdf},
+    robot::{Chain, Urdf},
     scenario::{Scenario, builtin},
 };
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};

@@ -2,7 +2,6 @@
 //!
 //! Without the two this is skipped, unless the environment has `CI` or `BODY_SCHEMA_REQUIRE_BROWSER=1`. They are looked
 //! for in `PATH`, or where `CHROMEDRIVER` and `CHROMIUM` say.
-#![cfg(feature = "app")]
 
 #[path = "browser/axe.rs"]
 mod axe;

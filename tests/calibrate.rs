@@ -1,5 +1,4 @@
 //! Calibration as a user meets it: files in, files out.
-#![cfg(feature = "app")]
 
 #[path = "calibrate/sentences.rs"]
 mod sentences;
@@ -13,7 +12,7 @@ use std::{
 use body_schema::{
     calibration::{Calibration, Case, File, Options, Report, Silent, calibrate},
     kinematics::Joint,
-    model::urdf::Urdf,
+    robot::Urdf,
     scenario::{Described, Scenario, builtin},
 };
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
@@ -263,7 +262,7 @@ fn a_ball_in_sockets_says_how_large_the_robot_is() {
         let scenario = builtin(name).expect("built in");
         let case = Case::new(&scenario).expect("measured");
         let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
-        let files = body_schema::calibration::report::files(&found, &case);
+        let files = body_schema::report::files(&found, &case);
         (text(&files, "report.md").to_owned(), found.report)
     };
     let (said, report) = calibrated("panda-sockets");
@@ -408,7 +407,7 @@ fn pages_of_robots_tell_what_is_measured() {
         let scenario = builtin(&name).expect("built in");
         let case = Case::new(&scenario).expect("measured");
         let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
-        let said = body_schema::calibration::report::markdown(&found, &case);
+        let said = body_schema::report::markdown(&found, &case);
         let lead = said.lines().find(|line| line.starts_with("**")).expect("a headline");
         let errors =
             said.lines().skip_while(|line| !line.starts_with("| errors")).take_while(|line| line.starts_with('|'));

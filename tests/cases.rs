@@ -4,7 +4,7 @@ use std::path::Path;
 
 use body_schema::{
     calibration::{Calibration, CalibrationError, Case, Options, Silent, Sources, Use, begin, calibrate},
-    doubts::{Doubt, DoubtKind},
+    diagnostics::{Doubt, DoubtKind},
     scenario::{Problem, Scenario, ScenarioError},
 };
 

@@ -1,5 +1,4 @@
 //! The command line as a user meets it.
-#![cfg(feature = "app")]
 
 #[path = "cli/bounds.rs"]
 mod bounds;

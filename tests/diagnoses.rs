@@ -1,7 +1,7 @@
 //! Random robots and tables that are wrong in one way: the fault is named where the data can tell it, and nothing is where there is none.
 
 use body_schema::{
-    doubts::{Base, Doubt, DoubtKind, Evidence, Seen, Subject, examine},
+    diagnostics::{Base, Doubt, DoubtKind, Evidence, Seen, Subject, examine},
     kinematics::{Joint, Line},
     model::best_motion,
 };

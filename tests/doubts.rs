@@ -3,9 +3,9 @@
 use std::{collections::BTreeMap, sync::LazyLock};
 
 use body_schema::{
-    doubts::{Doubt, DoubtKind, Evidence, Examination, Subject, examine},
+    diagnostics::{Doubt, DoubtKind, Evidence, Examination, Subject, examine},
     kinematics::Joint,
-    model::urdf::Urdf,
+    robot::Urdf,
     scenario::Scenario,
     table::{Columns, Quantity, Table},
 };

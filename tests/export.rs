@@ -2,7 +2,6 @@
 //!
 //! Without Chromium and chromedriver this is skipped, unless the environment has `CI` or
 //! `BODY_SCHEMA_REQUIRE_BROWSER=1`.
-#![cfg(feature = "app")]
 
 #[allow(dead_code, reason = "shared with the tests of the page")]
 #[path = "browser/devtools.rs"]

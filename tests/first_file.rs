@@ -6,7 +6,7 @@ use std::{f64::consts::TAU, fs};
 use body_schema::{
     ask_tell::{Ask, Session, Setup},
     calibration::{Sources, begin},
-    model::urdf::Urdf,
+    robot::Urdf,
     scenario::{Scenario, WorldSpec},
 };
 

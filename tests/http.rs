@@ -1,5 +1,4 @@
 //! The server over real connections.
-#![cfg(feature = "app")]
 
 #[path = "http/support.rs"]
 mod support;

@@ -4,7 +4,8 @@ use std::{collections::BTreeMap, fmt::Write as _};
 
 use body_schema::{
     experiment::{Metrics, RunResult},
-    model::{Block, urdf::Urdf},
+    model::Block,
+    robot::Urdf,
     scenario::{HeldOutRule, Measurements, Problem, Scenario, ScenarioError, WorldSpec, builtin},
     sensing::Rig,
 };

@@ -1,5 +1,4 @@
 //! What can be determined before any measurement, as a user asks for it.
-#![cfg(feature = "app")]
 
 use std::process::{Command, Output};
 

@@ -1,5 +1,4 @@
 //! `paper`: its files, that it continues where it was interrupted, and what it says when it cannot.
-#![cfg(feature = "app")]
 
 use std::{
     path::Path,

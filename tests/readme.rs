@@ -1,5 +1,4 @@
 //! The README's table of movements: every figure in it is measured, and is the same on every machine.
-#![cfg(feature = "app")]
 
 use std::process::Command;
 

@@ -1,7 +1,5 @@
 //! Recordings, read back with Rerun's own decoder, hold what the reports said.
 
-#![cfg(feature = "app")]
-
 #[path = "recording/calibrations.rs"]
 mod calibrations;
 #[path = "recording/channels.rs"]

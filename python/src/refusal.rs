@@ -1,9 +1,7 @@
 //! What is refused, as an exception of the package's own.
 
-use body_schema::{
-    ask_tell::{Fault, Refusal, ReplayError, ResultsError, SetupError},
-    scenario::ScenarioError,
-};
+use body_schema_ask_tell::{Fault, Refusal, ReplayError, ResultsError, SetupError};
+use body_schema_scenario::ScenarioError;
 use pyo3::prelude::*;
 
 /// Which exception, and what it says.

@@ -2,10 +2,8 @@
 
 use std::path::Path;
 
-use body_schema::{
-    experiment::{Comparison, RunResult, StepReport, Trace},
-    scenario::{Scenario, ScenarioError, builtin},
-};
+use body_schema_experiment::{Comparison, RunResult, StepReport, Trace};
+use body_schema_scenario::{Scenario, ScenarioError, builtin};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -75,7 +73,7 @@ pub fn compare(
 
 /// The metrics that are numbers, by learner.
 fn rows(report: &StepReport) -> Vec<Value> {
-    let row = |learner: &body_schema::experiment::LearnerReport| {
+    let row = |learner: &body_schema_experiment::LearnerReport| {
         let metrics = serde_json::to_value(&learner.metrics).unwrap_or_default();
         let mut row = Map::from_iter([
             ("step".to_owned(), report.step.into()),

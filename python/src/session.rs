@@ -5,11 +5,11 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
-use body_schema::{
-    ask_tell::{Ask, Fault, Observation, Outcome, Session, Setup},
-    calibration::Silent,
+use body_schema_ask_tell::{
+    Ask, Fault, Observation, Outcome, Session, Setup,
     json::{self, Unreadable},
 };
+use body_schema_calibration::Silent;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 

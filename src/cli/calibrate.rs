@@ -6,12 +6,11 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use body_schema::{
-    atomic::AtomicFolder,
-    calibration::{self, Calibration, Case, Figures, File, Options, Outlier, Progress, Report, Unit, report},
-    doubts::{Line, listed},
-    recording,
-};
+use body_schema_calibration as calibration;
+use body_schema_calibration::{Calibration, Case, Figures, File, Options, Outlier, Progress, Report, Unit, report};
+use body_schema_diagnostics::{Line, listed};
+use body_schema_files::AtomicFolder;
+use body_schema_recording as recording;
 use clap::builder::RangedU64ValueParser;
 use indicatif::ProgressBar;
 
@@ -42,7 +41,7 @@ pub struct Arguments {
 }
 
 /// No table has more rows.
-const MOST_ROWS: u64 = body_schema::table::MOST_ROWS as u64;
+const MOST_ROWS: u64 = body_schema_table::MOST_ROWS as u64;
 
 /// One bar for each stage.
 #[derive(Default)]

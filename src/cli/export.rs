@@ -4,11 +4,11 @@ use std::{collections::BTreeSet, path::PathBuf, str::FromStr};
 
 use anyhow::{Context, Result};
 use body_schema::{
-    ask_tell::Session,
     export::{Export, Plan, Written},
-    scenario::Scenario,
     server::{Store, Stored},
 };
+use body_schema_ask_tell::Session;
+use body_schema_scenario::Scenario;
 use uuid::Uuid;
 
 use super::{

@@ -3,10 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use body_schema::{
-    atomic,
-    calibration::{Sources, begin},
-};
+use body_schema_calibration::{Sources, begin};
+use body_schema_files as atomic;
 
 use super::{
     BadInput,

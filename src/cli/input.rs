@@ -7,10 +7,8 @@ use std::{
 };
 
 use anyhow::Result;
-use body_schema::{
-    scenario::{BUILTIN, Scenario, ScenarioError, builtin},
-    table::{Guard, MOST_BYTES},
-};
+use body_schema_scenario::{BUILTIN, Scenario, ScenarioError, builtin};
+use body_schema_table::{Guard, MOST_BYTES};
 
 use super::BadInput;
 

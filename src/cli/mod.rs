@@ -26,13 +26,11 @@ mod until;
 use std::{path::PathBuf, sync::LazyLock};
 
 use anyhow::{Context, Result};
-use body_schema::{
-    calibration::CalibrationError,
-    export::ExportError,
-    paper::PaperError,
-    recording::rerun_version,
-    scenario::{LearnerSpec, PolicyKind, Scenario, ScenarioError},
-};
+use body_schema::export::ExportError;
+use body_schema_calibration::CalibrationError;
+use body_schema_paper::PaperError;
+use body_schema_recording::rerun_version;
+use body_schema_scenario::{LearnerSpec, PolicyKind, Scenario, ScenarioError};
 use clap::{Parser, Subcommand};
 
 use input::{files_of, load_scenario};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use body_schema::design::observability::{ErrorPoint, IndexTable, Observability};
+use body_schema_engine::design::observability::{ErrorPoint, IndexTable, Observability};
 
 use super::{
     input::{files_of, load_robot},

@@ -7,7 +7,8 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use body_schema::atomic::{self, AtomicFile};
+use body_schema_files as atomic;
+use body_schema_files::AtomicFile;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use serde::Serialize;
 

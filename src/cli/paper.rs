@@ -3,7 +3,8 @@
 use std::{path::PathBuf, sync::Mutex};
 
 use anyhow::Result;
-use body_schema::paper::{self, Agreement, EXPERIMENTS, Ending, PaperExperiment, Plan, Progress};
+use body_schema_paper as paper;
+use body_schema_paper::{Agreement, EXPERIMENTS, Ending, PaperExperiment, Plan, Progress};
 use indicatif::ProgressBar;
 
 use super::{

@@ -7,10 +7,8 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail};
-use body_schema::{
-    recording::{examine, restore},
-    server::{Finding, Held, State},
-};
+use body_schema::server::{Finding, Held, State};
+use body_schema_recording::{examine, restore};
 
 use super::{
     BadInput,

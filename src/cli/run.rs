@@ -7,12 +7,10 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use body_schema::{
-    atomic::AtomicFile,
-    design::{BestDesign, best_designs},
-    experiment::{Experiment, RunResult},
-    recording::{EllipsoidSize, Recorder, StepsCsv, Target},
-};
+use body_schema_engine::design::{BestDesign, best_designs};
+use body_schema_experiment::{Experiment, RunResult};
+use body_schema_files::AtomicFile;
+use body_schema_recording::{EllipsoidSize, Recorder, StepsCsv, Target};
 
 use super::{
     ScenarioArguments, designs,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use body_schema::scenario::{BUILTIN, ScenarioSummary, builtin};
+use body_schema_scenario::{BUILTIN, ScenarioSummary, builtin};
 
 use super::{
     BadInput, load_scenario,

@@ -14,7 +14,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use body_schema::atomic;
+use body_schema_files as atomic;
 
 /// A signal that asks to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,10 +1,8 @@
 //! What ends a run early.
 
 use anyhow::Result;
-use body_schema::{
-    experiment::{SETTLING_STEPS, StepReport},
-    scenario::{LearnerSpec, Scenario},
-};
+use body_schema_experiment::{SETTLING_STEPS, StepReport};
+use body_schema_scenario::{LearnerSpec, Scenario};
 
 use super::BadInput;
 

@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{experiment::ExperimentError, recording::RecordingError, scenario::ScenarioError, server::ServerError};
+use crate::server::ServerError;
+use body_schema_experiment::ExperimentError;
+use body_schema_recording::RecordingError;
+use body_schema_scenario::ScenarioError;
 
 /// Why a folder could not be written.
 #[derive(Debug, thiserror::Error)]

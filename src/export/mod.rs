@@ -25,11 +25,9 @@ use serde::{Deserialize, Serialize};
 
 pub use error::ExportError;
 
-use crate::{
-    ask_tell::Session,
-    atomic::{AtomicFolder, undisturbed},
-    scenario::{Scenario, ScenarioSummary, WorldSpec},
-};
+use body_schema_ask_tell::Session;
+use body_schema_files::{AtomicFolder, undisturbed};
+use body_schema_scenario::{Scenario, ScenarioSummary, WorldSpec};
 use error::Doing;
 use run::Recorded;
 

@@ -98,7 +98,7 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::builtin;
+    use body_schema_scenario::builtin;
 
     #[test]
     fn the_page_names_only_what_lies_beside_it() {

@@ -15,11 +15,9 @@ use flate2::{Compression, write::GzEncoder};
 use serde::{Deserialize, Serialize};
 
 use super::{ExportError, Plan, error::Doing, write, write_json};
-use crate::{
-    ask_tell::Session,
-    experiment::Experiment,
-    recording::{LiveLog, Recorder, StepsCsv, Target, Theme},
-};
+use body_schema_ask_tell::Session;
+use body_schema_experiment::Experiment;
+use body_schema_recording::{LiveLog, Recorder, StepsCsv, Target, Theme};
 
 /// Postures on the way from each step to the next, in which the page moves while it plays slowly.
 const FRAMES: u64 = 6;

@@ -12,7 +12,7 @@ use tokio::{sync::Semaphore, task::spawn_blocking};
 use tokio_util::sync::CancellationToken;
 
 use super::problem::{Kind, Problem};
-use crate::calibration::Progress;
+use body_schema_calibration::Progress;
 
 /// How many may wait for a core.
 const MOST_WAITING: usize = 64;

@@ -16,7 +16,7 @@ use super::{
     App, Limits,
     problem::{Kind, Problem},
 };
-use crate::{
+use body_schema_ask_tell::{
     json::{self, Unreadable},
     whole::MOST as MOST_WHOLE,
 };

@@ -5,7 +5,7 @@ use std::time::Duration;
 use axum::http::{HeaderMap, Method, Uri};
 use tokio::sync::Semaphore;
 
-use crate::ask_tell::{MOST_EVALUATIONS, MOST_JOINTS, MOST_SETUP_BYTES, MOST_TARGETS, Most};
+use body_schema_ask_tell::{MOST_EVALUATIONS, MOST_JOINTS, MOST_SETUP_BYTES, MOST_TARGETS, Most};
 
 /// How much a server takes on, all in one place. `docs/trust.md` has the same as a table, with what is answered beyond each.
 #[derive(Clone, Debug, PartialEq, Eq)]

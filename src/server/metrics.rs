@@ -10,7 +10,8 @@ use prometheus_client::{
 };
 
 use super::session::now_s;
-use crate::{recording::rerun_version, scenario::WorldKind};
+use body_schema_recording::rerun_version;
+use body_schema_scenario::WorldKind;
 
 /// The media type of the figures.
 pub(super) const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";

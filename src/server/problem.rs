@@ -8,11 +8,9 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::{requests, store::StoreError};
-use crate::{
-    ask_tell::{Refusal, ReplayError, ResultsError, SetupError},
-    experiment::ChoiceError,
-    scenario::ScenarioError,
-};
+use body_schema_ask_tell::{Refusal, ReplayError, ResultsError, SetupError};
+use body_schema_experiment::ChoiceError;
+use body_schema_scenario::ScenarioError;
 
 /// Media type of every error.
 pub const PROBLEM_JSON: &str = "application/problem+json";

@@ -234,7 +234,7 @@ fn offsets_of_readings() {
     keys["robot"]["hold"] = json!(["pan", "lift", "elbow"]);
     keys["robot"]["offsets"] = json!(["lift", "elbow"]);
     let (session, _) = told(json!({ "robot": keys["robot"] }), 8, |robot, theta| {
-        let nominal = body_schema::model::urdf::Urdf::parse(keys["robot"]["urdf"].as_str().expect("a text"));
+        let nominal = body_schema::robot::Urdf::parse(keys["robot"]["urdf"].as_str().expect("a text"));
         let mut state = nominal.and_then(|urdf| urdf.chain("base", "tip")).expect("a chain").state();
         state.targets[0] = robot.truth.targets[0].clone();
         let at = state.marker_at(&[theta[0], theta[1] + 0.04, theta[2] - 0.03]);

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use body_schema::{
     ask_tell::{Observation, Session, Setup, Suggestion},
     kinematics::{Joint, JointBox},
-    model::{State, urdf::Urdf},
+    model::State,
+    robot::Urdf,
 };
 use nalgebra::{Point3, Rotation3, UnitVector3, Vector3};
 use rand::{RngExt, SeedableRng};

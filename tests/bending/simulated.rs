@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use body_schema::{
-    model::{Block, Layout, Loads, State, urdf::Urdf},
+    model::{Block, Layout, Loads, State},
+    robot::Urdf,
     scenario::Scenario,
 };
 use nalgebra::{DVector, Isometry3, Vector3};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use body_schema::{
     ask_tell::{Ask, Observation, Outcome, Session, Setup},
-    model::urdf::Urdf,
+    robot::Urdf,
     scenario::Scenario,
     table::{Columns, Layout, Quantity, Table},
 };

@@ -9,7 +9,7 @@
 
 use std::path::Path;
 
-use body_schema::model::urdf::Urdf;
+use body_schema::robot::Urdf;
 use nalgebra::Matrix4;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -2,10 +2,7 @@
 
 use std::fmt::Write;
 
-use body_schema::{
-    kinematics::Joint,
-    model::{State, urdf::Chain},
-};
+use body_schema::{kinematics::Joint, model::State, robot::Chain};
 use nalgebra::{UnitQuaternion, UnitVector3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

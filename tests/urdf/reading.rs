@@ -2,7 +2,7 @@
 
 use body_schema::{
     kinematics::JointKind,
-    model::urdf::{Follows, SegmentKind, Urdf, UrdfError},
+    robot::{Follows, SegmentKind, Urdf, UrdfError},
 };
 use nalgebra::{UnitQuaternion, Vector3};
 

@@ -2,10 +2,8 @@
 
 use body_schema::{
     kinematics::Joint,
-    model::{
-        Frame, State,
-        urdf::{Chain, Fitted, Unwritable, Urdf},
-    },
+    model::{Frame, State},
+    robot::{Chain, Fitted, Unwritable, Urdf},
 };
 use nalgebra::{Isometry3, UnitVector3};
 use proptest::prelude::*;

@@ -3,7 +3,7 @@
 #[path = "../../src/recording/palette.rs"]
 mod palette;
 
-use body_schema::experiment::Description;
+use body_schema_experiment::Description;
 use egui::Color32;
 use egui_plot::{LineStyle, MarkerShape};
 

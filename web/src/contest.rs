@@ -1,6 +1,6 @@
 //! Playing the game: the visitor's movements against those of the learners that choose by themselves.
 
-use body_schema::experiment::AppraisalReport;
+use body_schema_experiment::AppraisalReport;
 
 use crate::{
     game::{Due, Game, ROUNDS},
@@ -23,7 +23,7 @@ impl Panel {
     /// Whether a game can be played on the chosen scenario.
     pub fn can_play(&self) -> bool {
         let offers =
-            |scenario: &body_schema::scenario::ScenarioSummary| scenario.offered().any(|learner| learner.name == HUMAN);
+            |scenario: &body_schema_scenario::ScenarioSummary| scenario.offered().any(|learner| learner.name == HUMAN);
         self.server && self.scenario().is_some_and(offers)
     }
 

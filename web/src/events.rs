@@ -1,9 +1,7 @@
 //! What events do to the panel's state.
 
-use body_schema::{
-    experiment::StepReport,
-    scenario::{ScenarioSummary, WorldKind},
-};
+use body_schema_experiment::StepReport;
+use body_schema_scenario::{ScenarioSummary, WorldKind};
 
 use crate::{
     history::History,

@@ -5,11 +5,9 @@
 
 use std::collections::BTreeMap;
 
-use body_schema::{
-    ask_tell::Outcome,
-    experiment::{AppraisalReport, Choice, StepReport},
-    scenario::ScenarioSummary,
-};
+use body_schema_ask_tell::Outcome;
+use body_schema_experiment::{AppraisalReport, Choice, StepReport};
+use body_schema_scenario::ScenarioSummary;
 use serde::{Deserialize, Serialize};
 
 use crate::wire::{Problem, Session, Standing};

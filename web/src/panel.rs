@@ -1,6 +1,7 @@
 //! The panel's state.
 
-use body_schema::{experiment::Description, scenario::ScenarioSummary};
+use body_schema_experiment::Description;
+use body_schema_scenario::ScenarioSummary;
 
 use crate::{
     game::Game,

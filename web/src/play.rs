@@ -1,6 +1,6 @@
 //! Making steps and going through those that were made.
 
-use body_schema::experiment::CONFIRMATION;
+use body_schema_experiment::CONFIRMATION;
 
 use crate::{
     history::Row,

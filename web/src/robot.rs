@@ -1,11 +1,9 @@
 //! A robot elsewhere: what it is asked to do, how the session with it stands, and what the visitor says of a suggestion.
 
-use body_schema::{
-    ask_tell::{Answer, Outcome, Status, Suggestion},
-    experiment::{ChannelReading, Description},
-    kinematics::JointKind,
-    scenario::WorldKind,
-};
+use body_schema_ask_tell::{Answer, Outcome, Status, Suggestion};
+use body_schema_engine::kinematics::JointKind;
+use body_schema_experiment::{ChannelReading, Description};
+use body_schema_scenario::WorldKind;
 
 use crate::{host::Command, panel::Panel, wire::Standing};
 

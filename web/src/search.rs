@@ -1,9 +1,7 @@
 //! DIRECT's search for a movement, ready to be drawn.
 
-use body_schema::{
-    experiment::{BoxReport, Choice, ShapeReport},
-    optimize::{MAX_LEVEL, Plane, Projection, Variant},
-};
+use body_schema_engine::optimize::{MAX_LEVEL, Plane, Projection, Variant};
+use body_schema_experiment::{BoxReport, Choice, ShapeReport};
 
 /// A search in which everything is there that it refers to, so that drawing it needs no further care.
 #[derive(Clone, Debug)]
@@ -150,10 +148,8 @@ impl Search {
 
 #[cfg(test)]
 mod tests {
-    use body_schema::{
-        optimize::{History, Settings},
-        scenario::builtin,
-    };
+    use body_schema_engine::optimize::{History, Settings};
+    use body_schema_scenario::builtin;
 
     use super::*;
 

@@ -1,6 +1,6 @@
 //! What the visitor chose.
 
-use body_schema::scenario::ScenarioSummary;
+use body_schema_scenario::ScenarioSummary;
 
 /// The fastest playing, steps a second.
 pub const MAX_SPEED: f64 = 100.0;

@@ -305,7 +305,7 @@ pub const STORIES: [Story; 6] = [
 
 #[cfg(test)]
 mod tests {
-    use body_schema::scenario::builtin;
+    use body_schema_scenario::builtin;
 
     use super::*;
 

@@ -1,11 +1,9 @@
 //! What the server itself says, as far as the panel reads it. What it passes on from the engine (scenarios,
 //! descriptions, reports, choices) are the engine's own types.
 
-use body_schema::{
-    ask_tell::{Answer, Status, Suggestion},
-    experiment::Description,
-    scenario::WorldKind,
-};
+use body_schema_ask_tell::{Answer, Status, Suggestion};
+use body_schema_experiment::Description;
+use body_schema_scenario::WorldKind;
 use serde::Deserialize;
 
 /// A session.

@@ -1,10 +1,8 @@
 //! What the panel says of a run, held against what the engine says of it.
 
-use body_schema::{
-    experiment::{CONFIRMATION, Experiment, StepReport},
-    scenario::builtin,
-};
+use body_schema_experiment::{CONFIRMATION, Experiment, StepReport};
 use body_schema_panel::history::{History, Verdict};
+use body_schema_scenario::builtin;
 
 fn begin(scenario: &str, learners: &[&str]) -> Experiment {
     let learners: Vec<String> = learners.iter().map(|name| (*name).to_owned()).collect();

@@ -2,7 +2,7 @@
 
 mod support;
 
-use body_schema::ask_tell::Outcome;
+use body_schema_ask_tell::Outcome;
 use body_schema_panel::{Link, host::Command, settings::Tab};
 use egui::Key;
 use serde_json::json;

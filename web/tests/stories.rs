@@ -1,10 +1,8 @@
 //! What the cards of the stories say, held against what the engine does.
 
-use body_schema::{
-    experiment::{Experiment, LearnerResult, StepReport},
-    scenario::builtin,
-};
+use body_schema_experiment::{Experiment, LearnerResult, StepReport};
 use body_schema_panel::stories::{STORIES, Story};
+use body_schema_scenario::builtin;
 
 /// A story's own run.
 struct Run {

@@ -10,10 +10,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::{json, refusals::OfBodies};
-use crate::{
-    experiment::{AppraisalReport, Choice},
-    server::{App, extract::JsonBody, problem::Problem},
-};
+use crate::server::{App, extract::JsonBody, problem::Problem};
+use body_schema_experiment::{AppraisalReport, Choice};
 
 /// A posture to be appraised.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]

@@ -11,15 +11,13 @@ use axum::{
 use futures_util::stream;
 
 use super::{attachment, json};
-use crate::{
-    experiment::RunResult,
-    recording::{RecordingError, StepsCsv},
-    server::{
-        App,
-        problem::{Kind, Problem},
-        session::Session,
-    },
+use crate::server::{
+    App,
+    problem::{Kind, Problem},
+    session::Session,
 };
+use body_schema_experiment::RunResult;
+use body_schema_recording::{RecordingError, StepsCsv};
 
 /// The recording so far, complete: an .rrd file for Rerun's viewer.
 #[utoipa::path(get, path = "/v1/sessions/{id}/recording.rrd", tag = "results", operation_id = "getRecording",

@@ -14,14 +14,12 @@ use super::{
     json,
     refusals::{OfBodies, OfEngines, OfRobots},
 };
-use crate::{
-    ask_tell::{Answer, Observation, Status, Told},
-    server::{
-        App,
-        extract::{self, JsonBody},
-        problem::{Kind, Problem},
-    },
+use crate::server::{
+    App,
+    extract::{self, JsonBody},
+    problem::{Kind, Problem},
 };
+use body_schema_ask_tell::{Answer, Observation, Status, Told};
 
 /// All observations of a session.
 #[derive(Debug, Serialize, ToSchema)]

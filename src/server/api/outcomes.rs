@@ -12,15 +12,14 @@ use axum::{
 };
 
 use super::{attachment, refusals::OfEngines};
-use crate::{
-    ask_tell::Session,
-    calibration::{self, File, Progress},
-    server::{
-        App,
-        problem::{Kind, Problem},
-        session::ReportFiles,
-    },
+use crate::server::{
+    App,
+    problem::{Kind, Problem},
+    session::ReportFiles,
 };
+use body_schema_ask_tell::Session;
+use body_schema_calibration as calibration;
+use body_schema_calibration::{File, Progress};
 
 /// The robot's URDF with what was learned.
 #[utoipa::path(get, path = "/v1/sessions/{id}/model.urdf", tag = "results", operation_id = "getUrdf",

@@ -6,10 +6,8 @@ use std::sync::Arc;
 use axum::body::Bytes;
 use tokio::sync::watch;
 
-use crate::{
-    recording::LiveLog,
-    server::session::{Kept, Session, Together, Watching},
-};
+use crate::server::session::{Kept, Session, Together, Watching};
+use body_schema_recording::LiveLog;
 
 /// How many reports are taken from the history, and parts from the recording, at a time.
 const BATCH: usize = 64;

@@ -6,13 +6,11 @@ use axum::{Json, extract::Path};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::{
-    scenario::{BUILTIN, Scenario, ScenarioError, ScenarioSummary, builtin},
-    server::{
-        aside::aside,
-        problem::{Kind, Problem},
-    },
+use crate::server::{
+    aside::aside,
+    problem::{Kind, Problem},
 };
+use body_schema_scenario::{BUILTIN, Scenario, ScenarioError, ScenarioSummary, builtin};
 
 /// The built-in scenarios.
 #[derive(Clone, Debug, Serialize, ToSchema)]

@@ -14,18 +14,16 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::{json, refusals::OfBodies};
-use crate::{
-    experiment::StepReport,
-    recording::MOST_FRAMES,
-    server::{
-        App, Limits,
-        extract::{self, FromJson, JsonBody, parse},
-        problem::{Kind, Problem},
-        requests,
-        session::{DamagedSession, Listed, NewOutsideSession, NewSession, SessionResource},
-    },
-    whole::{whole, whole_or_none},
+use crate::server::{
+    App, Limits,
+    extract::{self, FromJson, JsonBody, parse},
+    problem::{Kind, Problem},
+    requests,
+    session::{DamagedSession, Listed, NewOutsideSession, NewSession, SessionResource},
 };
+use body_schema_ask_tell::whole::{whole, whole_or_none};
+use body_schema_experiment::StepReport;
+use body_schema_recording::MOST_FRAMES;
 
 /// A request draws at most so many postures on the way: each takes some kilobytes of the session's memory.
 const MAX_FRAMES_PER_REQUEST: u64 = 1000;

@@ -27,15 +27,13 @@ use super::{
     readers::{Parts, Reports},
     refusals::OfStreams,
 };
-use crate::{
-    experiment::{Description, StepReport},
-    recording::LiveLog,
-    server::{
-        App, extract,
-        problem::Problem,
-        session::{Following, Kept, Standing},
-    },
+use crate::server::{
+    App, extract,
+    problem::Problem,
+    session::{Following, Kept, Standing},
 };
+use body_schema_experiment::{Description, StepReport};
+use body_schema_recording::LiveLog;
 
 /// Silence after which a comment or a ping shows that the connection still stands.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);

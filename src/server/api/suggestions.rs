@@ -13,15 +13,13 @@ use super::{
     json,
     refusals::{OfBodies, OfEngines, OfRobots},
 };
-use crate::{
-    ask_tell::{Ask, Enough, Outcome, Suggestion, Suggestions},
-    server::{
-        App,
-        extract::JsonBody,
-        problem::Problem,
-        session::{Standing, now_s},
-    },
+use crate::server::{
+    App,
+    extract::JsonBody,
+    problem::Problem,
+    session::{Standing, now_s},
 };
+use body_schema_ask_tell::{Ask, Enough, Outcome, Suggestion, Suggestions};
 
 /// All suggestions of a session.
 #[derive(Debug, Serialize, ToSchema)]

@@ -8,13 +8,11 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use crate::{
-    recording::{Shape, Theme},
-    server::{
-        App, extract,
-        problem::{Kind, Problem},
-    },
+use crate::server::{
+    App, extract,
+    problem::{Kind, Problem},
 };
+use body_schema_recording::{Shape, Theme};
 
 /// An arrangement of the viewer for a page that has controls and curves of its own: the scene alone.
 ///

@@ -3,14 +3,13 @@
 use uuid::Uuid;
 
 use super::{Kept, Shared};
-use crate::{
-    ask_tell::{self, Checkpoint, Event, ReplayError, Setup},
-    experiment::Description,
-    server::{
-        metrics::Metrics,
-        store::{EVERY, Saved, Store, build, packed, unpacked},
-    },
+use crate::server::{
+    metrics::Metrics,
+    store::{EVERY, Saved, Store, build, packed, unpacked},
 };
+use body_schema_ask_tell as ask_tell;
+use body_schema_ask_tell::{Checkpoint, Event, ReplayError, Setup};
+use body_schema_experiment::Description;
 
 /// The steps since the latest checkpoint, of which there is none in the store yet.
 #[derive(Default)]

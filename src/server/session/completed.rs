@@ -13,13 +13,11 @@ use futures_util::stream::unfold;
 use tokio::{sync::Mutex as AsyncMutex, task::spawn_blocking};
 
 use super::{Session, lock};
-use crate::{
-    recording::{LiveLog, RecordingError},
-    server::{
-        aside::{Jobs, Wanted},
-        problem::{Kind, Problem},
-    },
+use crate::server::{
+    aside::{Jobs, Wanted},
+    problem::{Kind, Problem},
 };
+use body_schema_recording::{LiveLog, RecordingError};
 
 /// So much of it is read at a time.
 const PIECE_BYTES: usize = 256 << 10;

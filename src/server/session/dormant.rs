@@ -25,17 +25,16 @@ use super::{
     outside::{self, Beginning, Origin},
     registry::{END_WITHIN, no_engine, spawn},
 };
-use crate::{
-    ask_tell::{self, ChannelShape, MOST_EVENTS, ReplayError, Setup, Status, VERSION},
-    experiment::Description,
-    scenario::WorldKind,
-    server::{
-        aside::aside,
-        problem::{Kind, Problem},
-        requests,
-        store::{Shown, Store, StoreError, Stored},
-    },
+use crate::server::{
+    aside::aside,
+    problem::{Kind, Problem},
+    requests,
+    store::{Shown, Store, StoreError, Stored},
 };
+use body_schema_ask_tell as ask_tell;
+use body_schema_ask_tell::{ChannelShape, MOST_EVENTS, ReplayError, Setup, Status, VERSION};
+use body_schema_experiment::Description;
+use body_schema_scenario::WorldKind;
 
 /// So often a request is tried again whose session left memory just before it came.
 const ATTEMPTS: usize = 3;

@@ -15,12 +15,10 @@ use tokio::sync::{OwnedSemaphorePermit, oneshot};
 use uuid::Uuid;
 
 use super::{Kept, Shared};
-use crate::{
-    experiment::{AppraisalReport, Choice, Description, Experiment, RunResult},
-    recording::{EllipsoidSize, Recorder, RecordingError, Target},
-    scenario::builtin,
-    server::problem::{Kind, Problem},
-};
+use crate::server::problem::{Kind, Problem};
+use body_schema_experiment::{AppraisalReport, Choice, Description, Experiment, RunResult};
+use body_schema_recording::{EllipsoidSize, Recorder, RecordingError, Target};
+use body_schema_scenario::builtin;
 
 /// Within a long command, what was made is published this often.
 const PUBLISH_EVERY: Duration = Duration::from_millis(200);

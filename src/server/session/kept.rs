@@ -4,11 +4,9 @@ use std::{mem::size_of, sync::Arc};
 
 use serde_json::value::{RawValue, to_raw_value};
 
-use crate::{
-    experiment::{Description, StepReport},
-    recording::{RecordingError, StepsCsv},
-    server::problem::{Kind, Problem},
-};
+use crate::server::problem::{Kind, Problem};
+use body_schema_experiment::{Description, StepReport};
+use body_schema_recording::{RecordingError, StepsCsv};
 
 /// A report as its readers get it. Clones share the text.
 #[derive(Clone, Debug)]

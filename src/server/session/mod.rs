@@ -48,11 +48,9 @@ pub(super) use together::Together;
 pub(super) use watching::{Following, Watching};
 
 use super::problem::{Kind, Problem};
-use crate::{
-    calibration::File,
-    experiment::{AppraisalReport, Choice, Description, RunResult},
-    recording::LiveLog,
-};
+use body_schema_calibration::File;
+use body_schema_experiment::{AppraisalReport, Choice, Description, RunResult};
+use body_schema_recording::LiveLog;
 
 /// A session: its engine's command line, and all that it has left to read.
 pub(super) struct Session {

@@ -21,18 +21,17 @@ use super::{
     dormant::Summary,
     engine::{COMPLETE_AFTER, panicked, recording_failed},
 };
-use crate::{
-    ask_tell::{
-        self, Answer, Ask, ChannelShape, Happened, Most, Observation, Outcome, Prepared, ReplayError, Setup, Status,
-        Suggestion, Suggestions, Told,
-    },
-    experiment::{Description, Experiment},
-    recording::{Recorder, RecordingError, Target},
-    server::{
-        problem::{Kind, Problem},
-        store::{Shown, Store, StoreError, Stored, build},
-    },
+use crate::server::{
+    problem::{Kind, Problem},
+    store::{Shown, Store, StoreError, Stored, build},
 };
+use body_schema_ask_tell as ask_tell;
+use body_schema_ask_tell::{
+    Answer, Ask, ChannelShape, Happened, Most, Observation, Outcome, Prepared, ReplayError, Setup, Status, Suggestion,
+    Suggestions, Told,
+};
+use body_schema_experiment::{Description, Experiment};
+use body_schema_recording::{Recorder, RecordingError, Target};
 
 /// How soon at least, and how late at most, it is looked again whether the time of a suggestion has run out, seconds.
 const LOOK_AGAIN_S: [f64; 2] = [0.5, 3600.0];

@@ -17,18 +17,16 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::{Budget, Engine, Session, Shared, clock::now_s, dormant::Known, engine, lock};
-use crate::{
-    recording::EllipsoidSize,
-    scenario::WorldKind,
-    server::{
-        Limits,
-        aside::aside,
-        metrics::{Metrics, Present},
-        problem::{Kind, Problem},
-        requests,
-        store::{Store, StoreError},
-    },
+use crate::server::{
+    Limits,
+    aside::aside,
+    metrics::{Metrics, Present},
+    problem::{Kind, Problem},
+    requests,
+    store::{Store, StoreError},
 };
+use body_schema_recording::EllipsoidSize;
+use body_schema_scenario::WorldKind;
 
 /// How long a session may take to end after it was told to …
 pub(super) const END_WITHIN: Duration = Duration::from_secs(10);
@@ -43,7 +41,7 @@ pub struct NewSession {
     #[schema(example = "arm-6dof")]
     pub scenario: String,
     /// Seed of all random streams.
-    #[serde(default = "first_seed", deserialize_with = "crate::whole::whole")]
+    #[serde(default = "first_seed", deserialize_with = "body_schema_ask_tell::whole::whole")]
     #[schema(default = 1)]
     pub seed: u64,
     /// The learners to compare, by their names in the scenario; all of the scenario's if absent or null.

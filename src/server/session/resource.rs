@@ -4,11 +4,9 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::{Session, lock};
-use crate::{
-    ask_tell::{ChannelShape, Status},
-    experiment::Description,
-    scenario::WorldKind,
-};
+use body_schema_ask_tell::{ChannelShape, Status};
+use body_schema_experiment::Description;
+use body_schema_scenario::WorldKind;
 
 /// A session as its resource shows it.
 #[derive(Clone, Debug, Serialize, ToSchema)]

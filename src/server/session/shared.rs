@@ -13,7 +13,8 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{Budget, Kept, Standing, checkpoints::Replaying, lock};
-use crate::{recording::LiveLog, server::metrics::Metrics};
+use crate::server::metrics::Metrics;
+use body_schema_recording::LiveLog;
 
 /// What an engine leaves for everyone to read.
 pub(super) struct Shared {

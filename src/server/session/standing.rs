@@ -6,10 +6,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::{
-    ask_tell::{Answer, ChannelShape, Event, Status, Suggestion, Told},
-    recording::EllipsoidSize,
-};
+use body_schema_ask_tell::{Answer, ChannelShape, Event, Status, Suggestion, Told};
+use body_schema_recording::EllipsoidSize;
 
 /// What a session with a robot elsewhere is made from.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
@@ -31,7 +29,7 @@ pub struct NewOutsideSession {
     #[serde(default)]
     pub agent: Option<String>,
     /// Seed of all that is drawn.
-    #[serde(default, deserialize_with = "crate::whole::whole")]
+    #[serde(default, deserialize_with = "body_schema_ask_tell::whole::whole")]
     pub seed: u64,
     /// How large the ellipsoids of its recording are.
     #[serde(default)]

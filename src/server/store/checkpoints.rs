@@ -29,7 +29,7 @@ pub struct Saved {
     pub step: u64,
     /// How many observations had been told, those that do not count among them.
     pub told: u64,
-    /// [What was learned](crate::ask_tell::Checkpoint) up to it; empty where that is not kept any more.
+    /// [What was learned](body_schema_ask_tell::Checkpoint) up to it; empty where that is not kept any more.
     pub state: Vec<u8>,
     /// The reports since the checkpoint before, packed.
     pub reports: Vec<u8>,

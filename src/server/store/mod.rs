@@ -31,10 +31,8 @@ pub use error::StoreError;
 use lock::Lock;
 pub use repair::{Finding, Held, State};
 
-use crate::{
-    ask_tell::{Event, Happened, Setup, VERSION},
-    recording::EllipsoidSize,
-};
+use body_schema_ask_tell::{Event, Happened, Setup, VERSION};
+use body_schema_recording::EllipsoidSize;
 
 /// The file within the data directory.
 const FILE: &str = "sessions.sqlite";

@@ -7,7 +7,7 @@ use serde::Serialize;
 use uuid::Uuid;
 
 use super::{FILE, Store, StoreError, lock::Lock, salvage};
-use crate::ask_tell::{ReplayError, Session};
+use body_schema_ask_tell::{ReplayError, Session};
 
 /// A data directory that no server uses while this lives.
 pub struct Held {

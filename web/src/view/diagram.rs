@@ -1,6 +1,6 @@
 //! The boxes of DIRECT by size and value, and the hull from which it takes those to divide: Fig. 3c of the paper.
 
-use body_schema::optimize::{MAX_LEVEL, Variant};
+use body_schema_engine::optimize::{MAX_LEVEL, Variant};
 use egui::{RichText, Sense, Ui, Vec2b, vec2};
 use egui_plot::{GridInput, GridMark, HoverPosition, Line, MarkerShape, Plot, PlotPoints, Points};
 

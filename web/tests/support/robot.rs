@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use body_schema::ask_tell::{Ask, Observation, Outcome, Session, Setup, Suggestion};
+use body_schema_ask_tell::{Ask, Observation, Outcome, Session, Setup, Suggestion};
 use body_schema_panel::host::Command;
 use serde_json::{Value, json};
 

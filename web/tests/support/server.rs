@@ -1,9 +1,7 @@
 //! The server's part, played by the engine itself: what it reports is what visitors get.
 
-use body_schema::{
-    experiment::{Choice, Experiment, StepReport},
-    scenario::{Scenario, builtin, edited},
-};
+use body_schema_experiment::{Choice, Experiment, StepReport};
+use body_schema_scenario::{Scenario, builtin, edited};
 use serde_json::{Value, json};
 
 /// How long every choice is said to have taken, ms: the one number that is another in each run.

@@ -1,0 +1,150 @@
+//! The channels of a session: their names, and the shapes in which their readings are told.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::Fault;
+use body_schema_engine::{
+    magnitude::is_usable,
+    sensing::{Channel, Occasion, Rig},
+};
+use body_schema_scenario::{Robot, SocketSpec};
+use body_schema_table::Rotation;
+
+/// What a channel is called, and how its readings are told.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct ChannelShape {
+    /// Its key among the measurements.
+    pub name: String,
+    /// The shape of its readings.
+    #[serde(flatten)]
+    pub shape: Shape,
+}
+
+/// The shape of a reading; see the table of the [module](super).
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(tag = "channel", rename_all = "snake_case")]
+pub enum Shape {
+    /// `[x, y, z]`, metres.
+    Position,
+    /// `{"position": [x, y, z], "quaternion": [x, y, z, w]}`.
+    Pose,
+    /// `[[u, v], …]`, pixels.
+    Pixels {
+        /// How many pairs.
+        points: usize,
+    },
+    /// Metres.
+    Distance,
+    /// `{"socket": "PLACE/NAME"}`.
+    Sockets {
+        /// What may stand there.
+        sockets: Vec<String>,
+    },
+}
+
+/// The key of all sockets together.
+pub(super) const SOCKET: &str = "socket";
+
+/// The channels that a robot's readings are told by: those that always read in the order of the rig, then that of the sockets.
+pub(super) fn shapes(robot: &Robot, rig: &Rig) -> Vec<ChannelShape> {
+    let mut shapes: Vec<ChannelShape> = Vec::new();
+    let always = rig.channels().iter().filter(|channel| channel.occasion() == Occasion::Always);
+    for (wanted, shape) in always.map(|channel| named(robot, &**channel)) {
+        let is_taken = |name: &String| name == SOCKET || shapes.iter().any(|other| other.name == *name);
+        let numbered = (2..).map(|number| format!("{wanted}_{number}"));
+        let name = std::iter::once(wanted.clone()).chain(numbered).find(|name| !is_taken(name)).unwrap_or_default();
+        shapes.push(ChannelShape { name, shape });
+    }
+    if !robot.sockets.is_empty() {
+        let sockets = robot.sockets.iter().map(label).collect();
+        shapes.push(ChannelShape { name: SOCKET.to_owned(), shape: Shape::Sockets { sockets } });
+    }
+    shapes
+}
+
+fn named(robot: &Robot, channel: &dyn Channel) -> (String, Shape) {
+    let equipment = &robot.equipment;
+    let target = channel.subject().and_then(|target| equipment.targets.get(target));
+    let name = target.map_or_else(|| "marker".to_owned(), |target| target.name.clone());
+    match (channel.sight(), channel.equations()) {
+        (Some((camera, _)), equations) => {
+            let camera = equipment.cameras.get(camera).map_or("camera", |camera| camera.name.as_str());
+            (format!("{camera}_{name}"), Shape::Pixels { points: equations / 2 })
+        }
+        (None, 1) => (format!("{name}_distance"), Shape::Distance),
+        (None, 6) => (name, Shape::Pose),
+        (None, _) => (name, Shape::Position),
+    }
+}
+
+/// A socket by its place, if it has one, and its name.
+pub(super) fn label(socket: &SocketSpec) -> String {
+    socket.place.as_ref().map_or_else(|| socket.name.clone(), |place| format!("{place}/{}", socket.name))
+}
+
+impl Shape {
+    /// The channel's own numbers of a reading as it was told.
+    pub(super) fn read(&self, field: &str, told: &Value) -> Result<Vec<f64>, Fault> {
+        let refuse = |mend: &str| Err(Fault::new(field, format!("{} is no reading of it", shown(told)), mend));
+        match self {
+            Self::Position => numbers(told, 3).map_or_else(|| refuse("write [x, y, z] in metres"), Ok),
+            Self::Distance => match told.as_f64().filter(|x| is_usable(*x)) {
+                Some(x) if x >= 0.0 => Ok(vec![x]),
+                _ => refuse("write a length in metres"),
+            },
+            Self::Pixels { points } => {
+                let pairs = || told.as_array()?.iter().map(|pair| numbers(pair, 2)).collect::<Option<Vec<_>>>();
+                let single = || (*points == 1).then(|| numbers(told, 2)).flatten();
+                match pairs().filter(|pairs| pairs.len() == *points) {
+                    Some(pairs) => Ok(pairs.concat()),
+                    None => single().map_or_else(
+                        || refuse(&format!("write [[u, v], …] in pixels, {points} of them, one for each point")),
+                        Ok,
+                    ),
+                }
+            }
+            Self::Pose => {
+                let only = told.as_object().is_some_and(|told| told.len() == 2);
+                let parts = told.get("position").and_then(|it| numbers(it, 3)).zip(told.get("quaternion"));
+                let Some((mut reading, rotation)) = parts.filter(|_| only) else {
+                    return refuse("write {\"position\": [x, y, z], \"quaternion\": [x, y, z, w]}, in metres");
+                };
+                let Some(vector) = numbers(rotation, 4).and_then(|numbers| Rotation::Quaternion.read(&numbers)) else {
+                    let what = format!("{} is no unit quaternion", shown(rotation));
+                    return Err(Fault::new(format!("{field}.quaternion"), what, "write x, y, z, w of length 1"));
+                };
+                reading.extend_from_slice(vector.as_slice());
+                Ok(reading)
+            }
+            Self::Sockets { .. } => self.socket(field, told).map(|_| vec![0.0; 3]),
+        }
+    }
+
+    /// The number of the socket that was told.
+    pub(super) fn socket(&self, field: &str, told: &Value) -> Result<usize, Fault> {
+        let Self::Sockets { sockets } = self else {
+            return Err(Fault::new(field, "this channel knows no sockets", "remove it"));
+        };
+        let alone = || told.as_object().filter(|told| told.len() == 1)?.get(SOCKET)?.as_str();
+        let name = told.as_str().or_else(alone);
+        let found = name.and_then(|name| sockets.iter().position(|socket| socket == name));
+        let mend = || format!("write {{\"socket\": \"{}\"}}, or another of {}", sockets[0], sockets.join(", "));
+        found.ok_or_else(|| Fault::new(field, format!("{} is no socket of this session", shown(told)), mend()))
+    }
+}
+
+/// A list of so many numbers that can be a reading.
+fn numbers(told: &Value, count: usize) -> Option<Vec<f64>> {
+    let list = told.as_array().filter(|list| list.len() == count)?;
+    list.iter().map(|x| x.as_f64().filter(|x| is_usable(*x))).collect()
+}
+
+/// A value in an error.
+fn shown(told: &Value) -> String {
+    const MOST: usize = 80;
+    let text = told.to_string();
+    if text.chars().count() > MOST { format!("{}…", text.chars().take(MOST).collect::<String>()) } else { text }
+}

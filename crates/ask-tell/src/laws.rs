@@ -1,0 +1,336 @@
+//! What sessions promise, whatever is asked and told in whatever order.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Point3, Vector3};
+use proptest::{
+    prelude::*,
+    test_runner::{Config, TestCaseError},
+};
+use serde_json::{Value, json};
+
+use super::*;
+use body_schema_engine::{estimation::Belief, kinematics::Joint, model::State};
+
+/// Three joints, short searches, few hypotheses.
+pub(super) fn calibration() -> Value {
+    let joint = |name: &str, parent: &str, child: &str, xyz: &str, axis: &str| {
+        format!(
+            "<joint name=\"{name}\" type=\"revolute\"><origin xyz=\"{xyz}\"/><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+             <axis xyz=\"{axis}\"/><limit lower=\"-1.5\" upper=\"1.5\" effort=\"1\" velocity=\"1\"/></joint>"
+        )
+    };
+    let urdf = format!(
+        "<robot name=\"three\"><link name=\"base\"/><link name=\"a\"/><link name=\"b\"/><link name=\"tip\"/>{}{}{}</robot>",
+        joint("pan", "base", "a", "0 0 0.3", "0 0 1"),
+        joint("lift", "a", "b", "0.05 0 0.1", "0 1 0"),
+        joint("elbow", "b", "tip", "0.4 0 0", "0 1 0"),
+    );
+    json!({
+        "name": "three",
+        "robot": { "urdf": urdf },
+        "target": [{ "name": "marker", "at_m": [0.3, 0.0, 0.05], "known": { "to_m": 0.02 } }],
+        "base": { "at_m": [0, 0, 0], "rpy_deg": [0, 0, 0] },
+        "sensor": { "channel": "position", "target": "marker", "sigma_m": 0.001 },
+        "prior": { "direction_rad": 0.05, "point_m": 0.01 },
+        "smoother": { "hypotheses": 2, "spawned": 1 },
+        "selection": { "evaluations": 30, "ahead": 2 },
+        "settled": { "expected_prediction_m": 0.002 },
+    })
+}
+
+pub(super) fn session(calibration: Value) -> Session {
+    Session::open(Setup::new(calibration)).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The described robot with its axes shifted and its marker elsewhere.
+pub(super) fn truth(session: &Session) -> State {
+    let mut state = session.scenario().robot.state.clone();
+    for (index, joint) in state.joints.iter_mut().enumerate() {
+        if let Joint::Revolute(line) = joint {
+            line.point += Vector3::new(0.004, -0.003, 0.002) * (index as f64 - 0.7);
+        }
+    }
+    let marker = state.marker();
+    state.with_marker(marker + Vector3::new(0.006, 0.004, -0.005))
+}
+
+pub(super) fn marker(truth: &State, posture: &BTreeMap<String, f64>, names: &[String]) -> Point3<f64> {
+    truth.target_at(0, &names.iter().map(|name| posture[name]).collect::<Vec<_>>())
+}
+
+/// An observation of the truth, off by `off` along x.
+pub(super) fn seen(session: &Session, id: Option<u64>, posture: BTreeMap<String, f64>, off: f64) -> Observation {
+    let at = marker(&truth(session), &posture, &session.scenario().robot.names);
+    let measurements = BTreeMap::from([("marker".to_owned(), json!([at.x + off, at.y, at.z]))]);
+    Observation { suggestion_id: id, configuration: posture, measurements }
+}
+
+/// What can be asked or told.
+#[derive(Clone, Debug)]
+enum Call {
+    Suggest {
+        count: u64,
+        client: usize,
+        replan: bool,
+        expires: bool,
+    },
+    /// Of one of the suggestions, where there is one; as executed, which is not quite as suggested.
+    Observe {
+        which: Option<usize>,
+        moved: f64,
+        off: f64,
+        sees: bool,
+    },
+    Outcome {
+        which: usize,
+        infeasible: bool,
+    },
+    Exclude(usize),
+    Include(usize),
+    Wrong(usize),
+}
+
+fn calls() -> impl Strategy<Value = Vec<Call>> {
+    let call = prop_oneof![
+        4 => (1..3_u64, 0..3_usize, prop::bool::weighted(0.2), prop::bool::weighted(0.2))
+            .prop_map(|(count, client, replan, expires)| Call::Suggest { count, client, replan, expires }),
+        6 => (prop::option::weighted(0.8, 0..8_usize), -0.1..0.1, prop_oneof![5 => -1e-3..1e-3, 1 => 0.1..0.2], prop::bool::weighted(0.85))
+            .prop_map(|(which, moved, off, sees)| Call::Observe { which, moved, off, sees }),
+        2 => (0..8_usize, any::<bool>()).prop_map(|(which, infeasible)| Call::Outcome { which, infeasible }),
+        1 => (0..8_usize).prop_map(Call::Exclude),
+        1 => (0..8_usize).prop_map(Call::Include),
+        1 => (0..8_usize).prop_map(Call::Wrong),
+    ];
+    prop::collection::vec(call, 4..16)
+}
+
+const CLIENTS: [Option<&str>; 3] = [None, Some("left"), Some("right")];
+
+fn call(session: &mut Session, call: &Call, now: f64) -> Result<(), Refusal> {
+    let count = session.suggestions().len();
+    let told = session.observations().len() as u64;
+    match *call {
+        Call::Suggest { count, client, replan, expires } => {
+            let client = CLIENTS[client].map(str::to_owned);
+            let ask = Ask { count: Some(count), client, replan, expires_s: expires.then_some(2.5) };
+            session.suggest(&ask, Some(now)).map(drop)
+        }
+        Call::Observe { which, moved, off, sees } => {
+            let which = which.filter(|_| count > 0).map(|which| which % count);
+            let mut posture = match which {
+                Some(index) => session.suggestions()[index].configuration.clone(),
+                None => ["pan", "lift", "elbow"].map(|name| (name.to_owned(), moved)).into(),
+            };
+            posture.values_mut().for_each(|q| *q = (*q + moved).clamp(-1.5, 1.5));
+            let id = which.map(|index| session.suggestions()[index].id);
+            let mut observation = seen(session, id, posture, off);
+            if !sees {
+                observation.measurements.values_mut().for_each(|reading| *reading = Value::Null);
+            }
+            session.observe(observation, Some(now)).map(drop)
+        }
+        Call::Outcome { which, infeasible } => {
+            let state = if infeasible { Outcome::Infeasible } else { Outcome::Abandoned };
+            session.outcome((which % count.max(1)) as u64 + 1, state, Some("cable"), Some(now)).map(drop)
+        }
+        Call::Exclude(which) => session.exclude(which as u64 % told.max(1) + 1, Some(now)),
+        Call::Include(which) => session.include(which as u64 % told.max(1) + 1, Some(now)),
+        Call::Wrong(which) => wrong(session, which).map(|()| panic!("{which} was accepted")),
+    }
+}
+
+/// Calls that are refused whatever has happened.
+fn wrong(session: &mut Session, which: usize) -> Result<(), Refusal> {
+    let posture = || ["pan", "lift", "elbow"].map(|name| (name.to_owned(), 0.1)).into();
+    let observation = seen(session, None, posture(), 0.0);
+    let with = |name: &str, reading: Value| Observation {
+        measurements: BTreeMap::from([(name.to_owned(), reading)]),
+        ..observation.clone()
+    };
+    match which {
+        0 => session.suggest(&Ask { count: Some(0), ..Ask::default() }, None).map(drop),
+        1 => session.suggest(&Ask { expires_s: Some(1.0), ..Ask::default() }, None).map(drop),
+        2 => session.observe(with("markr", json!([0, 0, 0])), None).map(drop),
+        3 => session.observe(with("marker", json!([0, 0])), None).map(drop),
+        4 => session.observe(Observation { suggestion_id: Some(999), ..observation }, None).map(drop),
+        5 => {
+            let configuration = BTreeMap::from([("pan".to_owned(), 0.0)]);
+            session.observe(Observation { configuration, ..observation }, None).map(drop)
+        }
+        6 => session.outcome(0, Outcome::Abandoned, None, None).map(drop),
+        _ => session.exclude(0, None),
+    }
+}
+
+/// Everything that may not differ between a session and the same replayed.
+fn standing(session: &Session) -> (State, Option<nalgebra::DMatrix<f64>>, Status, Vec<Suggestion>) {
+    let Belief { state, covariance, .. } = session.belief().expect("an agent");
+    let suggestions = session.suggestions().iter().map(|it| (**it).clone()).collect();
+    (state.clone(), covariance.clone(), session.status(), suggestions)
+}
+
+fn next(session: &Session) -> Result<Vec<Suggestion>, String> {
+    let ask = Ask { count: Some(2), client: Some("next".to_owned()), ..Ask::default() };
+    let prepared = session.prepare_suggest(&ask, None).map_err(|refused| refused.to_string())?;
+    Ok(prepared.answer().suggestions.clone())
+}
+
+proptest! {
+    #![proptest_config(Config { cases: 24, failure_persistence: None, ..Config::default() })]
+
+    /// A session replayed from its JSON stands where it stood, chooses as it would have, and what is refused has changed nothing.
+    #[test]
+    fn replaying_gives_the_session_again(calls in calls()) {
+        let mut session = session(calibration());
+        for (at, wanted) in calls.iter().enumerate() {
+            let before = (session.events().len(), standing(&session));
+            if call(&mut session, wanted, at as f64).is_err() {
+                prop_assert_eq!(&before, &(session.events().len(), standing(&session)), "{:?}", wanted);
+            }
+        }
+        let replayed = Session::from_json(&session.to_json()).expect("its own");
+        prop_assert_eq!(replayed.events(), session.events());
+        prop_assert_eq!(standing(&replayed), standing(&session));
+        prop_assert_eq!(replayed.latest(), session.latest());
+        let history = replayed.history();
+        prop_assert_eq!(history.last(), Some(session.latest()));
+        prop_assert_eq!(next(&replayed), next(&session));
+    }
+
+    /// What was excluded and is included again was never excluded, as far as is believed.
+    #[test]
+    fn what_is_included_again_was_never_excluded(calls in calls(), which in 0..16_u64) {
+        let mut session = session(calibration());
+        for (at, wanted) in calls.iter().enumerate() {
+            if !matches!(wanted, Call::Exclude(_) | Call::Include(_)) {
+                drop(call(&mut session, wanted, at as f64));
+            }
+        }
+        let count = session.observations().len() as u64;
+        if count > 0 {
+            let number = which % count + 1;
+            let before = standing(&session);
+            session.exclude(number, None).expect("there");
+            prop_assert_eq!(&session.status().excluded, &vec![number]);
+            session.include(number, None).expect("there");
+            let after = standing(&session);
+            prop_assert_eq!((&before.0, &before.1), (&after.0, &after.1));
+        }
+    }
+}
+
+/// A session replayed with a checkpoint of each of its steps.
+fn with_checkpoints(session: &Session) -> Vec<Checkpoint> {
+    let mut made = Vec::new();
+    let replayed = Session::replay_from(session.setup().clone(), session.events().to_vec(), None, &mut |step| {
+        let checkpoint = step.checkpoint().expect("a smoother keeps what it has learned");
+        let checkpoint = Checkpoint::from_bytes(&checkpoint.to_bytes()).expect("its own");
+        assert_eq!(checkpoint.step(), step.report.step);
+        made.push(checkpoint);
+        true
+    });
+    replayed.expect("it happened");
+    made
+}
+
+/// The same session from a checkpoint on, and the numbers of the steps that were replayed.
+fn from(session: &Session, checkpoint: &Checkpoint) -> (Session, Vec<u64>) {
+    let mut steps = Vec::new();
+    let (setup, events) = (session.setup().clone(), session.events().to_vec());
+    let replayed = Session::replay_from(setup, events, Some(checkpoint), &mut |step| {
+        steps.push(step.report.step);
+        true
+    });
+    (replayed.expect("it serves"), steps)
+}
+
+/// Whatever has happened, a session from a checkpoint on is the session, and what is excluded from there on is excluded.
+fn goes_on_from(session: &Session, checkpoint: &Checkpoint) -> Result<(), TestCaseError> {
+    let last = session.latest().step;
+    let (replayed, steps) = from(session, checkpoint);
+    prop_assert_eq!(steps, (checkpoint.step() + 1..=last).collect::<Vec<_>>());
+    prop_assert_eq!(standing(&replayed), standing(session));
+    prop_assert_eq!(replayed.latest(), session.latest());
+    prop_assert_eq!(next(&replayed), next(session));
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(Config { cases: 16, failure_persistence: None, ..Config::default() })]
+
+    #[test]
+    fn a_session_goes_on_from_a_checkpoint(calls in calls(), which in any::<prop::sample::Index>()) {
+        let mut session = session(calibration());
+        for (at, wanted) in calls.iter().enumerate() {
+            drop(call(&mut session, wanted, at as f64));
+        }
+        let made = with_checkpoints(&session);
+        let serving: Vec<&Checkpoint> = made.iter().filter(|made| made.serves(session.events())).collect();
+        // All but those that nothing that counts comes after.
+        prop_assert_eq!(serving.len() as u64, session.latest().step);
+        if serving.is_empty() {
+            return Ok(());
+        }
+        let checkpoint = which.get(&serving);
+        goes_on_from(&session, checkpoint)?;
+        // What comes after it can be excluded from there on, what came before cannot.
+        let told = session.observations().len() as u64;
+        let prepared = session.prepare_mark((told, true), None, &mut |_| Some((*checkpoint).clone()), &mut |_| true);
+        let mut other = session.clone();
+        other.exclude(told, None).expect("there");
+        if let Ok(prepared) = prepared {
+            session.commit(prepared).expect("at once");
+            prop_assert_eq!(standing(&session), standing(&other));
+        } else {
+            // Nothing that counts would be left after it.
+            prop_assert!(!checkpoint.serves(other.events()));
+        }
+        let mut early = session.clone();
+        early.exclude(1, None).expect("there");
+        prop_assert!(made[1..].iter().all(|made| early.events().len() == session.events().len() || !made.serves(early.events())));
+    }
+}
+
+/// Where measurements have settled, noise is learned, readings are outliers and errors run along the chain.
+#[test]
+fn a_long_session_goes_on_from_a_checkpoint() {
+    let mut unknown = calibration();
+    unknown["smoother"]["noise"] = json!("unknown");
+    for (case, calibration) in [calibration(), unknown].into_iter().enumerate() {
+        let mut session = session(calibration);
+        for index in 0..110_u32 {
+            let turn = |joint: u32| 1.3 * (f64::from(index * (joint + 2) + joint) * 0.7).sin();
+            let names = ["pan", "lift", "elbow"];
+            let posture = names.iter().zip(0..).map(|(name, joint)| ((*name).to_owned(), turn(joint))).collect();
+            let off = if index % 17 == 5 { 0.2 } else { 1e-3 * (f64::from(index) * 2.3).sin() };
+            session.observe(seen(&session, None, posture, off), None).expect("observed");
+        }
+        let made = with_checkpoints(&session);
+        for step in [3, 50, 80, 109] {
+            goes_on_from(&session, &made[step]).unwrap_or_else(|error| panic!("case {case}, step {step}: {error}"));
+        }
+        assert!(made[100].to_bytes().len() < 200_000, "{}", made[100].to_bytes().len());
+    }
+}
+
+/// A checkpoint of another session, or of another robot, is refused.
+#[test]
+fn a_foreign_checkpoint_does_not_serve() {
+    let observed = |calibration: Value, count: u32| {
+        let mut session = session(calibration);
+        for index in 0..count {
+            let posture = ["pan", "lift", "elbow"].map(|name| (name.to_owned(), 0.1 * f64::from(index))).into();
+            session.observe(seen(&session, None, posture, 0.0), None).expect("observed");
+        }
+        session
+    };
+    let mut other = calibration();
+    other.as_object_mut().expect("keys").remove("base");
+    let (long, short) = (observed(calibration(), 8), observed(other, 8));
+    let foreign = &with_checkpoints(&short)[5];
+    let replayed = Session::replay_from(long.setup().clone(), long.events().to_vec(), Some(foreign), &mut |_| true);
+    assert!(matches!(replayed, Err(ReplayError::Event { index: 5, .. })));
+    assert!(!foreign.serves(&long.events()[..5]), "nothing comes after it");
+    assert!(Checkpoint::from_bytes(&foreign.to_bytes()[..40]).is_none());
+}

@@ -1,0 +1,262 @@
+//! What the events of a session come to.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
+
+use super::{
+    Answer, ChannelShape, Event, Happened, Observation, Outcome, Plan, Setup, SetupError, Suggestion, SuggestionState,
+    Why,
+    channel::{label, shapes},
+    checkpoint::{Checkpoint, Hear, Replayed, excluded},
+};
+use body_schema_engine::selection::{Movement, Planned, Selection};
+use body_schema_experiment::{Agent, Event as AgentEvent, Experiment, Proposal, StepReport};
+use body_schema_scenario::Scenario;
+
+/// An observation that was told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Told {
+    /// As it was told.
+    pub observation: Observation,
+    /// What was answered.
+    pub answer: Answer,
+    /// Whether it counts for nothing.
+    pub excluded: bool,
+}
+
+/// The state after some events.
+#[derive(Clone)]
+pub(super) struct Ledger {
+    pub scenario: Arc<Scenario>,
+    pub shapes: Arc<[ChannelShape]>,
+    pub experiment: Experiment,
+    /// All that were ever made, by id.
+    pub suggestions: Vec<Arc<Suggestion>>,
+    /// All that were ever told, by number.
+    pub told: Vec<Arc<Told>>,
+    /// By what happened to the agent: the number of its observation. Excluded ones are not among them.
+    pub counted: Vec<u64>,
+}
+
+/// What becomes of an observation that counts.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Replay {
+    /// It is learned from.
+    Learned,
+    /// What it taught is taken up later.
+    CarriedOut,
+}
+
+impl Ledger {
+    /// Before any event.
+    pub fn new(setup: &Setup, scenario: Arc<Scenario>) -> Result<Self, SetupError> {
+        let agent = match &setup.agent {
+            Some(agent) => scenario.chosen(Some(std::slice::from_ref(agent))),
+            None => scenario.chosen(None),
+        };
+        let agent = agent.map_err(SetupError::Agent)?.swap_remove(0).name;
+        let experiment = scenario.experiment(setup.seed, Some(&[agent])).map_err(SetupError::Agent)?;
+        let shapes = shapes(&scenario.robot, &scenario.rig).into();
+        let (suggestions, told, counted) = Default::default();
+        Ok(Self { scenario, shapes, experiment, suggestions, told, counted })
+    }
+
+    /// After all of `events`. Those that are excluded in the end never counted. What was learned up to a checkpoint is not learned
+    /// again. `hear` hears of every observation that counts after that; without a checkpoint first of how it stands before any.
+    pub fn replayed(
+        mut self,
+        events: &[Event],
+        from: Option<&Checkpoint>,
+        hear: &mut Hear<'_>,
+    ) -> Result<Self, (usize, String)> {
+        let excluded = excluded(events);
+        let first = from.map_or(0, Checkpoint::events);
+        if let Some(checkpoint) = from {
+            if !checkpoint.serves(events) {
+                return Err((first, "its checkpoint does not serve".to_owned()));
+            }
+            for (index, event) in events[..first].iter().enumerate() {
+                self.apply_as(event, &excluded, Replay::CarriedOut).map_err(|what| (index + 1, what))?;
+            }
+            if !self.experiment.take_up(checkpoint.experiment().clone()) {
+                return Err((first, "its checkpoint is of another session".to_owned()));
+            }
+        } else {
+            let report = self.experiment.latest().clone();
+            hear(Replayed { report, events: 0, known: events.len(), ledger: &self });
+        }
+        for (index, event) in events.iter().enumerate().skip(first) {
+            let report = self.apply(event, &excluded).map_err(|what| (index + 1, what))?;
+            let Some(report) = report else { continue };
+            if !hear(Replayed { report, events: index + 1, known: events.len(), ledger: &self }) {
+                return Err((index + 1, "nobody waits for it any more".to_owned()));
+            }
+        }
+        Ok(self)
+    }
+
+    /// After one more event, where the observations of `skipped` do not count. Tells the report of an observation.
+    pub fn apply(&mut self, event: &Event, skipped: &BTreeSet<u64>) -> Result<Option<StepReport>, String> {
+        self.apply_as(event, skipped, Replay::Learned)
+    }
+
+    fn apply_as(
+        &mut self,
+        event: &Event,
+        skipped: &BTreeSet<u64>,
+        replay: Replay,
+    ) -> Result<Option<StepReport>, String> {
+        match &event.happened {
+            Happened::Suggested { suggestion, choice } => {
+                let id = self.suggestions.len() as u64 + 1;
+                if suggestion.id != id {
+                    return Err(format!("it suggests number {}, and {id} comes next", suggestion.id));
+                }
+                let movement = self.movement(suggestion)?;
+                let joints = movement.configuration.len();
+                let is_posture = |one: &Vec<f64>| one.len() == joints && one.iter().all(|q| q.is_finite());
+                if choice.plan.as_ref().is_some_and(|plan| !plan.postures.iter().all(is_posture)) {
+                    return Err(format!("its plan has a posture that is none of {joints} joints"));
+                }
+                let plan =
+                    choice.plan.clone().map(|Plan { postures, committed }| Planned { poses: postures, committed });
+                let proposal = Proposal {
+                    id: id - 1,
+                    selection: Selection {
+                        movement,
+                        criterion: choice.criterion,
+                        gain: suggestion.expected_gain,
+                        evaluations: choice.evaluations,
+                        search: None,
+                        plan,
+                    },
+                    selection_ms: choice.selection_ms,
+                };
+                self.agent(AgentEvent::Proposed(proposal))?;
+                // Those of older sessions do not say it.
+                let joints = self.scenario.robot.names.clone();
+                self.suggestions.push(Arc::new(Suggestion { joints, ..suggestion.clone() }));
+            }
+            Happened::Outcome { suggestion, state, .. } => {
+                self.end(*suggestion, (*state).into())?;
+                if *state == Outcome::Infeasible {
+                    let refused = self.movement(&self.suggestions[*suggestion as usize - 1])?;
+                    let agent = self.experiment.agent_mut();
+                    agent.into_iter().for_each(|agent| agent.forbid(&refused.configuration));
+                }
+            }
+            Happened::Superseded { suggestions, why } => {
+                suggestions.iter().try_for_each(|id| self.end(*id, SuggestionState::Superseded))?;
+                // What is planned goes on where nothing is wrong with it.
+                let agent = self.experiment.agent_mut().filter(|_| *why != Why::Constraints);
+                agent.into_iter().for_each(Agent::forget_plan);
+            }
+            Happened::Expired { suggestions } => {
+                suggestions.iter().try_for_each(|id| self.end(*id, SuggestionState::Expired))?;
+            }
+            Happened::Observed { told, answer } => return self.observe(told, answer, skipped, replay),
+            Happened::Excluded { observation } => self.mark(*observation, true)?,
+            Happened::Included { observation } => self.mark(*observation, false)?,
+        }
+        Ok(None)
+    }
+
+    fn observe(
+        &mut self,
+        told: &Observation,
+        answer: &Answer,
+        skipped: &BTreeSet<u64>,
+        replay: Replay,
+    ) -> Result<Option<StepReport>, String> {
+        let number = self.told.len() as u64 + 1;
+        let executed = told.read(&self.scenario, &self.shapes).map_err(|fault| fault.to_string())?;
+        let (seen, configuration) = (!executed.observation.is_miss(), executed.movement.configuration.clone());
+        let mut report = None;
+        if skipped.contains(&number) {
+            let agent = self.experiment.agent_mut();
+            if let Some(agent) = agent {
+                if let Some(id) = executed.proposal {
+                    agent.withdraw(id);
+                }
+                agent.stand_at(&configuration);
+            }
+        } else if replay == Replay::CarriedOut {
+            self.experiment.carry_out(&executed);
+            self.counted.push(number);
+        } else {
+            report = Some(self.experiment.tell(executed).map_err(|error| error.to_string())?.clone());
+            self.counted.push(number);
+        }
+        if let Some(id) = told.suggestion_id {
+            let state = if seen { SuggestionState::Observed } else { SuggestionState::NotSeen };
+            self.suggestion_mut(id)?.state = state;
+        }
+        let excluded = skipped.contains(&number);
+        self.told.push(Arc::new(Told { observation: told.clone(), answer: answer.clone(), excluded }));
+        Ok(report)
+    }
+
+    /// The observations that do not count.
+    pub fn excluded(&self) -> BTreeSet<u64> {
+        let numbered = (1..).zip(&self.told);
+        numbered.filter(|(_, told)| told.excluded).map(|(number, _)| number).collect()
+    }
+
+    fn mark(&mut self, observation: u64, excluded: bool) -> Result<(), String> {
+        let index = observation.checked_sub(1).and_then(|index| usize::try_from(index).ok());
+        let told = index.and_then(|index| self.told.get_mut(index));
+        Arc::make_mut(told.ok_or_else(|| format!("there is no observation {observation}"))?).excluded = excluded;
+        Ok(())
+    }
+
+    fn end(&mut self, id: u64, state: SuggestionState) -> Result<(), String> {
+        let suggestion = self.suggestion_mut(id)?;
+        if suggestion.state != SuggestionState::Pending {
+            return Err(format!("suggestion {id} is {} and not pending", suggestion.state));
+        }
+        suggestion.state = state;
+        if let Some(agent) = self.experiment.agent_mut() {
+            let leaves_no_trace = matches!(state, SuggestionState::Abandoned | SuggestionState::Expired);
+            if leaves_no_trace {
+                agent.abandon(id - 1)
+            } else {
+                agent.withdraw(id - 1)
+            };
+        }
+        Ok(())
+    }
+
+    fn suggestion_mut(&mut self, id: u64) -> Result<&mut Suggestion, String> {
+        let index = id.checked_sub(1).and_then(|index| usize::try_from(index).ok());
+        let found = index.and_then(|index| self.suggestions.get_mut(index));
+        found.map(Arc::make_mut).ok_or_else(|| format!("there is no suggestion {id}"))
+    }
+
+    fn agent(&mut self, event: AgentEvent) -> Result<(), String> {
+        let agent = self.experiment.agent_mut();
+        agent.map_or(Ok(()), |agent| agent.restore(&event)).map_err(|error| error.to_string())
+    }
+
+    fn movement(&self, suggestion: &Suggestion) -> Result<Movement, String> {
+        let robot = &self.scenario.robot;
+        let positions = robot.names.iter().map(|name| suggestion.configuration.get(name).copied());
+        let configuration = positions.collect::<Option<Vec<f64>>>().ok_or("it is about another robot")?;
+        let known = |wanted: &String| {
+            let found = robot.sockets.iter().position(|socket| label(socket) == *wanted);
+            found.ok_or_else(|| format!("there is no socket `{wanted}`"))
+        };
+        Ok(Movement { configuration, row: None, socket: suggestion.socket.as_ref().map(known).transpose()? })
+    }
+
+    /// A posture by joint name.
+    pub fn named(&self, posture: &[f64]) -> BTreeMap<String, f64> {
+        self.scenario.robot.names.iter().cloned().zip(posture.iter().copied()).collect()
+    }
+
+    /// The pending suggestions, in the order in which they were chosen.
+    pub fn pending(&self) -> impl Iterator<Item = &Arc<Suggestion>> {
+        self.suggestions.iter().filter(|suggestion| suggestion.state == SuggestionState::Pending)
+    }
+}

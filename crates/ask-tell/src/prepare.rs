@@ -1,0 +1,305 @@
+//! Changes of a session, tried on a copy: what a store writes before they are made.
+
+use std::sync::Arc;
+
+use super::{
+    Answer, Ask, Event, Fault, Happened, Observation, Outcome, Refusal, Session, Suggestion, SuggestionState,
+    Suggestions, Why,
+    checkpoint::{Find, Hear},
+    draft::Draft,
+    ledger::Ledger,
+    limits::*,
+};
+use body_schema_engine::estimation::Belief;
+use body_schema_experiment::Agent;
+
+/// A change that was tried, with what is answered once it is made.
+#[must_use = "nothing has happened until it is committed"]
+pub struct Prepared<A> {
+    /// How many events the session had.
+    pub(super) revision: usize,
+    /// What is appended.
+    pub(super) events: Vec<Event>,
+    /// The answer.
+    pub(super) answer: A,
+    /// The session after it; `None` where nothing changes.
+    pub(super) ledger: Option<Ledger>,
+}
+
+impl<A> Prepared<A> {
+    /// The events that will be appended, to be written first; none where nothing changes.
+    pub fn events(&self) -> &[Event] {
+        &self.events
+    }
+
+    /// How many events come before these.
+    pub fn revision(&self) -> usize {
+        self.revision
+    }
+
+    /// What will be answered.
+    pub fn answer(&self) -> &A {
+        &self.answer
+    }
+}
+
+impl Session {
+    /// The client's pending suggestions, topped up to as many as it asks for. They are chosen one after the other, each given
+    /// everybody's pending ones. `now_s` is the time, seconds since 1970: without it nothing expires.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] of a wrong field, of more than fit, and where nothing can be chosen.
+    pub fn prepare_suggest(&self, ask: &Ask, now_s: Option<f64>) -> Result<Prepared<Suggestions>, Refusal> {
+        self.prepare_suggest_while(ask, now_s, &|| true)
+    }
+
+    /// The same as long as somebody waits for it, which is asked before each suggestion.
+    ///
+    /// # Errors
+    ///
+    /// The same, and [`Refusal::GivenUp`].
+    pub fn prepare_suggest_while(
+        &self,
+        ask: &Ask,
+        now_s: Option<f64>,
+        is_wanted: &dyn Fn() -> bool,
+    ) -> Result<Prepared<Suggestions>, Refusal> {
+        let count = ask.check(now_s)?;
+        let mut draft = Draft::of(self, now_s)?;
+        draft.drop_infeasible()?;
+        let of_client = |draft: &Draft| -> Vec<u64> {
+            draft.ledger.pending().filter(|it| it.client == ask.client).map(|it| it.id).collect()
+        };
+        if ask.replan {
+            let own = of_client(&draft);
+            draft.supersede(own, Why::Replan)?;
+        }
+        while of_client(&draft).len() < count {
+            if draft.ledger.pending().count() >= MOST_PENDING {
+                let mend = "carry some out, or abandon them";
+                return Err(Refusal::Full { what: "pending suggestions", most: MOST_PENDING, mend });
+            }
+            self.check_room(draft.events.len() + 1)?;
+            if !is_wanted() {
+                return Err(Refusal::GivenUp);
+            }
+            draft.suggest(ask)?;
+        }
+        let own = draft.ledger.pending().filter(|it| it.client == ask.client);
+        let suggestions = own.map(|it| (**it).clone()).collect();
+        let answer = Suggestions { suggestions, enough: self.enough() };
+        Ok(draft.done(answer))
+    }
+
+    /// A pending suggestion is not carried out.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] where there is no such suggestion, or it is not pending.
+    pub fn prepare_outcome(
+        &self,
+        id: u64,
+        state: Outcome,
+        reason: Option<&str>,
+        now_s: Option<f64>,
+    ) -> Result<Prepared<Suggestion>, Refusal> {
+        if reason.is_some_and(|reason| reason.chars().count() > MOST_REASON_CHARACTERS) {
+            let what = format!("it has more than {MOST_REASON_CHARACTERS} characters");
+            return Err(Fault::new("reason", what, "say it shorter").into());
+        }
+        self.check_room(1)?;
+        let mut draft = Draft::of(self, now_s)?;
+        let found = position(id).and_then(|index| draft.ledger.suggestions.get(index));
+        let count = draft.ledger.suggestions.len();
+        let found = found.ok_or(Refusal::UnknownSuggestion { id, count })?;
+        if found.state != SuggestionState::Pending {
+            return Err(Refusal::NotPending { id, state: found.state });
+        }
+        draft.append(Happened::Outcome { suggestion: id, state, reason: reason.map(str::to_owned) })?;
+        draft.drop_infeasible()?;
+        let ended = position(id).map(|index| (*draft.ledger.suggestions[index]).clone());
+        let answer = ended.ok_or(Refusal::UnknownSuggestion { id, count })?;
+        Ok(draft.done(answer))
+    }
+
+    /// Takes in an observation, whether it was suggested or not.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] of a wrong field, of a suggestion that there is not, and once the estimate has diverged.
+    pub fn prepare_observe(&self, told: Observation, now_s: Option<f64>) -> Result<Prepared<Answer>, Refusal> {
+        self.check_room(1)?;
+        let mut draft = Draft::of(self, now_s)?;
+        let count = draft.ledger.suggestions.len();
+        if let Some(id) = told.suggestion_id
+            && position(id).is_none_or(|index| index >= count)
+        {
+            return Err(Refusal::UnknownSuggestion { id, count });
+        }
+        let executed = told.read(&draft.ledger.scenario, &draft.ledger.shapes)?;
+        told.check_reach(self.scenario(), self.channels(), &executed)?;
+        let experiment = &draft.ledger.experiment;
+        if let Some(failure) = experiment.agent().and_then(Agent::failure) {
+            return Err(Refusal::Ended(failure.to_owned()));
+        }
+        let accepts = |belief: &Belief| belief.accepts(&executed.movement.configuration, &executed.observation);
+        experiment.belief().map_or(Ok(()), accepts).map_err(|refused| {
+            Fault::new("measurements", refused.to_string(), "correct them; lengths are metres, angles radians")
+        })?;
+        let noticed = |ledger: &Ledger| ledger.experiment.latest().learners[0].metrics.changes_noticed;
+        let before = noticed(&draft.ledger);
+        // The answer is part of the event, and nothing that happens depends on it.
+        let answer = Answer::unknown(draft.ledger.told.len() as u64 + 1);
+        draft.append(Happened::Observed { told, answer })?;
+        let answer = draft.ledger.answer(noticed(&draft.ledger) > before);
+        draft.ledger.replace_answer(&answer);
+        if let Some(Event { happened: Happened::Observed { answer: unanswered, .. }, .. }) = draft.events.last_mut() {
+            unanswered.clone_from(&answer);
+        }
+        if answer.body_seems_changed {
+            let pending = draft.ledger.pending().map(|it| it.id).collect();
+            draft.supersede(pending, Why::ChangedBody)?;
+        }
+        draft.drop_infeasible()?;
+        Ok(draft.done(answer))
+    }
+
+    /// An observation counts for nothing from now on: the belief is what replaying the rest gives.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] where there is no such observation.
+    pub fn prepare_exclude(&self, number: u64, now_s: Option<f64>) -> Result<Prepared<()>, Refusal> {
+        self.prepare_mark((number, true), now_s, &mut |_| None, &mut |_| true)
+    }
+
+    /// An excluded observation counts again: the belief is as if it had never been excluded.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] where there is no such observation.
+    pub fn prepare_include(&self, number: u64, now_s: Option<f64>) -> Result<Prepared<()>, Refusal> {
+        self.prepare_mark((number, false), now_s, &mut |_| None, &mut |_| true)
+    }
+
+    /// Excludes an observation or includes it again, from the checkpoint on that `find` finds, if it does: one that
+    /// [serves](super::Checkpoint::serves). `hear` hears of the history from there on as it is then, and says whether to go on.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] where there is no such observation, where the checkpoint does not serve, and where it is not to go on.
+    pub fn prepare_mark(
+        &self,
+        (number, excluded): (u64, bool),
+        now_s: Option<f64>,
+        find: &mut Find<'_>,
+        hear: &mut Hear<'_>,
+    ) -> Result<Prepared<()>, Refusal> {
+        self.check_room(1)?;
+        let count = self.observations().len();
+        let told = position(number).and_then(|index| self.observations().get(index));
+        let told = told.ok_or(Refusal::UnknownObservation { number, count })?;
+        let mut draft = Draft::of(self, now_s)?;
+        if told.excluded != excluded {
+            let observation = number;
+            let happened =
+                if excluded { Happened::Excluded { observation } } else { Happened::Included { observation } };
+            draft.events.push(Event { at_s: now_s, happened });
+            let events: Vec<Event> = self.events().iter().chain(&draft.events).cloned().collect();
+            let empty = Ledger::new(self.setup(), self.scenario().clone());
+            let empty = empty.map_err(|error| Refusal::Ended(error.to_string()))?;
+            let from = find(&events);
+            draft.ledger = empty.replayed(&events, from.as_ref(), hear).map_err(|(_, what)| Refusal::Ended(what))?;
+            draft.drop_infeasible()?;
+        }
+        Ok(draft.done(()))
+    }
+
+    /// Ends the pending suggestions whose time has run out.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] of what is no time.
+    pub fn prepare_expire(&self, now_s: f64) -> Result<Prepared<()>, Refusal> {
+        Ok(Draft::of(self, Some(now_s))?.done(()))
+    }
+
+    fn check_room(&self, wanted: usize) -> Result<(), Refusal> {
+        if self.events().len() + wanted <= MOST_EVENTS {
+            return Ok(());
+        }
+        Err(Refusal::Full { what: "events", most: MOST_EVENTS, mend: "go on in a new one" })
+    }
+}
+
+impl Ask {
+    /// How many suggestions are asked for.
+    fn check(&self, now_s: Option<f64>) -> Result<usize, Fault> {
+        let most = MOST_SUGGESTIONS as u64;
+        let count = self.count.unwrap_or(1);
+        if !(1..=most).contains(&count) {
+            return Err(Fault::new(
+                "count",
+                format!("{count} is out of range"),
+                format!("write a number from 1 to {most}"),
+            ));
+        }
+        let is_name = |client: &String| !client.is_empty() && client.chars().count() <= MOST_CLIENT_CHARACTERS;
+        if self.client.as_ref().is_some_and(|client| !is_name(client)) {
+            let mend = format!("write a name of 1 to {MOST_CLIENT_CHARACTERS} characters, or leave it out");
+            return Err(Fault::new("client", "this is no name", mend));
+        }
+        match (self.expires_s, now_s) {
+            (Some(seconds), _) if !(seconds > 0.0 && seconds.is_finite()) => {
+                Err(Fault::new("expires_s", format!("{seconds} is out of range"), "write a number of seconds above 0"))
+            }
+            (Some(_), None) => {
+                Err(Fault::new("expires_s", "nobody says what time it is", "tell it, or leave this out"))
+            }
+            _ => Ok(count as usize),
+        }
+    }
+}
+
+impl Ledger {
+    /// What is answered to the latest observation.
+    fn answer(&self, body_seems_changed: bool) -> Answer {
+        let learner = &self.experiment.latest().learners[0];
+        let readings = learner.movement.iter().flat_map(|movement| &movement.readings);
+        let finite = |number: Option<f64>| number.filter(|number| number.is_finite());
+        let metrics = &learner.metrics;
+        let innovation = metrics.nis.zip(metrics.nis_dof).filter(|(_, degrees)| *degrees > 0);
+        Answer {
+            observation: self.told.len() as u64,
+            seen: learner.movement.as_ref().is_some_and(|movement| movement.seen),
+            innovation_sigmas: finite(innovation.map(|(nis, degrees)| (nis / degrees as f64).sqrt())),
+            outlier_probability: finite(readings.filter_map(|it| it.outlier_probability).reduce(f64::max)),
+            expected_error_mm: finite(metrics.expected_prediction_m.map(|metres| metres * 1e3)),
+            body_seems_changed,
+        }
+    }
+
+    fn replace_answer(&mut self, answer: &Answer) {
+        let latest = self.told.last_mut();
+        latest.into_iter().for_each(|told| Arc::make_mut(told).answer = answer.clone());
+    }
+}
+
+impl Answer {
+    fn unknown(observation: u64) -> Self {
+        Self {
+            observation,
+            seen: false,
+            innovation_sigmas: None,
+            outlier_probability: None,
+            expected_error_mm: None,
+            body_seems_changed: false,
+        }
+    }
+}
+
+/// The place of what is counted from 1.
+fn position(number: u64) -> Option<usize> {
+    usize::try_from(number.checked_sub(1)?).ok()
+}

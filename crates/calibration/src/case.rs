@@ -1,0 +1,162 @@
+//! What is to be calibrated, and by what.
+
+use std::sync::{Arc, Mutex};
+
+use body_schema_diagnostics::Line;
+use body_schema_engine::{model::{Block, ChainPrior, Layout, Names, State}, sensing::{Loss, Observation, Occasion, Rig}};
+use body_schema_scenario::{Described, HeldOutRule, Scenario, WorldSpec};
+
+use super::{CalibrationError, Extra, Split};
+
+/// A row of the table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Where it stands.
+    pub line: Line,
+    /// Joint positions, rad or m.
+    pub positions: Vec<f64>,
+    /// What was measured.
+    pub observation: Observation,
+    /// The socket in which a target was held: its number among the robot's, those that are held out after the others.
+    pub socket: Option<usize>,
+}
+
+/// A robot as it is described, and what was measured of it.
+#[derive(Clone, Debug)]
+pub struct Case<'a> {
+    pub(crate) scenario: &'a Scenario,
+    /// The robot as it is described, with what its joints bear.
+    guess: State,
+    /// The rows, in the order of the table.
+    pub rows: Vec<Row>,
+    /// By row, its [posture](fn@body_schema_diagnostics::postures).
+    pub(super) postures: Vec<usize>,
+    /// What everything is called.
+    pub names: Names,
+    /// The URDF, where the robot comes from one.
+    pub described: Option<&'a Described>,
+    /// What is known before any row, as the distance between two sockets.
+    pub(super) known: Option<&'a Observation>,
+    pub(super) rig: Arc<Rig>,
+    pub(super) loss: Loss,
+    /// By layout: what is known of the chain, shared by all fits.
+    pub(super) chains: Chains,
+}
+
+/// What is known of a chain, by layout.
+type Chains = Arc<Mutex<Vec<(Layout, Option<Arc<ChainPrior>>)>>>;
+
+/// Rows held out under this seed, where the scenario draws them by one.
+const SEED: u64 = 1;
+
+impl<'a> Case<'a> {
+    /// The case of a scenario that replays a table.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Simulated`] where it simulates its world.
+    pub fn new(scenario: &'a Scenario) -> Result<Self, CalibrationError> {
+        let WorldSpec::Measured { measurements, held_out } = &scenario.world else {
+            return Err(CalibrationError::Simulated { scenario: scenario.name.clone() });
+        };
+        let row = |index: usize| Row {
+            line: Line { file: measurements.files.get(index).cloned(), number: measurements.lines[index] },
+            positions: measurements.configurations[index].clone(),
+            observation: measurements.observations[index].clone(),
+            socket: measurements.sockets.get(index).copied().flatten(),
+        };
+        let mut guess = scenario.robot.state.clone();
+        guess.loads = Some(scenario.robot.loads(&guess));
+        Ok(Self {
+            scenario,
+            guess,
+            rows: (0..measurements.rows()).map(row).collect(),
+            postures: held_out.postures.clone(),
+            names: scenario.robot.called(),
+            described: scenario.robot.described.as_deref(),
+            known: measurements.beforehand.as_ref(),
+            rig: Arc::new(scenario.smoother_rig(scenario.smoother.sigma)),
+            chains: Chains::default(),
+            loss: if scenario.smoother.loss == Loss::None { Loss::MIXTURE } else { scenario.smoother.loss },
+        })
+    }
+
+    /// The robot as it is described.
+    pub fn guess(&self) -> &State {
+        &self.guess
+    }
+
+    /// The sensors with their nominal noise.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// What a URDF can hold, and where base, targets, cameras and sockets are: no ratios, no eccentricity and no
+    /// compliance.
+    pub fn writable(&self) -> Layout {
+        let holds = |block: &Block| !matches!(block, Block::Ratio(_) | Block::Eccentricity(_) | Block::Compliance(..));
+        self.layout(|block| holds(&block))
+    }
+
+    /// Where base, targets, cameras and sockets are, with the chain as described.
+    pub fn placing(&self) -> Layout {
+        let is_of_chain = |block: &Block| matches!(block, Block::Axis(_) | Block::Offset(_));
+        let learned = self.writable();
+        let places = learned.blocks().map(|(block, _)| block).filter(|block| !is_of_chain(block));
+        Layout::new(self.guess(), places)
+    }
+
+    /// What a URDF can hold, and more, of a robot that bears what `near` does.
+    pub fn extended(&self, extras: &[Extra], near: &State) -> Layout {
+        let learned = self.writable();
+        let blocks: Vec<Block> = learned.blocks().map(|(block, _)| block).collect();
+        Layout::new(
+            self.guess(),
+            blocks.into_iter().chain(extras.iter().flat_map(|extra| extra.blocks(self, extras, near))),
+        )
+    }
+
+    fn layout(&self, wanted: impl Fn(Block) -> bool) -> Layout {
+        let learned = self.scenario.robot.layout.blocks().map(|(block, _)| block);
+        Layout::new(self.guess(), learned.filter(|block| wanted(*block)))
+    }
+
+    /// Rows to learn from and rows to judge by, as the scenario says, or by `folds`: fold f holds out postures f, f + K, …, each
+    /// with all its rows. There are no more folds than postures.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Folds`] where there are fewer rows than folds, or fewer than two folds;
+    /// [`CalibrationError::OnePosture`] where all rows repeat each other.
+    pub fn splits(&self, folds: Option<usize>) -> Result<Vec<Split>, CalibrationError> {
+        let Some(folds) = folds else {
+            let WorldSpec::Measured { held_out, .. } = &self.scenario.world else { return Ok(Vec::new()) };
+            let splits = match held_out.rule {
+                HeldOutRule::Folds(_) => held_out.folds(),
+                _ => vec![held_out.split(SEED)],
+            };
+            return Ok(splits.into_iter().map(|(training, held_out)| Split { training, held_out }).collect());
+        };
+        // Of sockets that the file holds out there is nothing to learn.
+        let rows: Vec<usize> = (0..self.rows.len()).filter(|row| !self.rows[*row].observation.is_miss()).collect();
+        if folds < 2 || folds > rows.len() {
+            return Err(CalibrationError::Folds { folds, rows: rows.len() });
+        }
+        if Split::numbered(&rows, &self.postures).1 < 2 {
+            return Err(CalibrationError::OnePosture { rows: rows.len() });
+        }
+        Ok(Split::folds(&rows, folds, &self.postures))
+    }
+
+    /// Whether nothing is measured but that targets are where they were before.
+    pub fn meets_itself(&self) -> bool {
+        self.rig.channels().iter().all(|channel| channel.occasion() != Occasion::Always)
+    }
+
+    /// The target that a row held in a socket.
+    pub(super) fn held(&self, row: &Row) -> Option<(usize, usize)> {
+        let robot = &self.scenario.robot;
+        let number = row.socket?;
+        robot.sockets.iter().chain(&robot.held_out_sockets).nth(number).map(|socket| (number, socket.target))
+    }
+}

@@ -1,0 +1,71 @@
+//! Why there is no calibration.
+
+use body_schema_engine::{estimation::EstimationError, model::PriorError, selection::SelectionError};
+use body_schema_robot::Unwritable;
+
+/// Why there is no calibration.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CalibrationError {
+    /// The scenario has no table.
+    #[error(
+        "scenario `{scenario}` simulates its world: there is no table to calibrate by; add [measurements] in place of [sensor] and [initial_error]"
+    )]
+    Simulated {
+        /// Its name.
+        scenario: String,
+    },
+    /// Folds that cannot be.
+    #[error("{rows} rows cannot be held out in {folds} folds; write a number of folds from 2 to the number of rows")]
+    Folds {
+        /// What was asked.
+        folds: usize,
+        /// The rows there are.
+        rows: usize,
+    },
+    /// Nothing can be held out.
+    #[error(
+        "all {rows} rows are one posture, and its rows stay together: nothing can be held out; measure more postures"
+    )]
+    OnePosture {
+        /// The rows there are.
+        rows: usize,
+    },
+    /// Rows cannot be chosen.
+    #[error("{asked} rows cannot be chosen from {rows} training rows; write a number from 1 to that")]
+    Active {
+        /// What was asked.
+        asked: usize,
+        /// The rows there are.
+        rows: usize,
+    },
+    /// Nothing to judge by.
+    #[error(
+        "chosen rows are judged by rows that are held out, and none are; hold some out by --folds K, or in the file"
+    )]
+    NothingHeldOut,
+    /// Nothing to learn from.
+    #[error("the table has no row to learn from; add rows, or hold fewer out")]
+    NoRows,
+    /// The prior is none.
+    #[error("the prior cannot be used: {0}; correct [prior]")]
+    Prior(#[from] PriorError),
+    /// The search for what explains the rows failed.
+    #[error("{0}; look at the doubts about the table first")]
+    Estimation(#[from] EstimationError),
+    /// No row could be chosen.
+    #[error("no row could be chosen: {0}")]
+    Selection(#[from] SelectionError),
+    /// Whoever asked waits no longer.
+    #[error("nobody waits for it any longer; ask again")]
+    GivenUp,
+    /// What was learned does not fit into a URDF.
+    #[error("what was learned cannot be written as a URDF: {0}")]
+    Unwritable(#[from] Unwritable),
+}
+
+impl CalibrationError {
+    /// Whether the error lies in what was asked, and not in carrying it out.
+    pub fn is_bad_input(&self) -> bool {
+        !matches!(self, Self::Estimation(_) | Self::Selection(_) | Self::GivenUp)
+    }
+}

@@ -1,0 +1,140 @@
+//! What is written: URDF, YAML and JSON.
+
+use std::fmt::Write;
+
+use super::{Calibration, CalibrationError, Case, Extra, Fit, Progress, learned::axis};
+use body_schema_engine::model::{Correction, State};
+
+/// A file of the output, by its path below the folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct File {
+    /// Its path, with `/`.
+    pub path: String,
+    /// Its text.
+    pub text: String,
+}
+
+impl File {
+    /// A file.
+    pub fn new(path: impl Into<String>, text: String) -> Self {
+        Self { path: path.into(), text }
+    }
+}
+
+impl Calibration {
+    /// All files but those for readers: `calibrated.urdf` and `kinematics.yaml` where there is a URDF, those of the folds,
+    /// `readings.yaml` and `report.json`.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Unwritable`] where an axis is farther from the description than a URDF's gauge reaches.
+    pub fn files(&self, case: &Case<'_>) -> Result<Vec<File>, CalibrationError> {
+        let mut files = described("", case, &self.fit)?;
+        for (fold, fit) in self.folds.iter().enumerate() {
+            files.extend(described(&format!("folds/{fold}/"), case, fit)?);
+        }
+        files.push(File::new("readings.yaml", self.readings_yaml(case)?));
+        // What is serialised holds numbers, names and lists alone.
+        let json = serde_json::to_string_pretty(&self.report).unwrap_or_default();
+        files.push(File::new("report.json", json + "\n"));
+        Ok(files)
+    }
+
+    /// `calibrated.urdf` and `kinematics.yaml` alone, the same as those of [`files`](Self::files), without what judges them: no
+    /// folds, and nothing beyond what a URDF can hold. None without a URDF.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError`] as of [`calibrate`](super::calibrate()).
+    pub fn description(case: &Case<'_>, progress: &dyn Progress) -> Result<Vec<File>, CalibrationError> {
+        let splits = case.splits(None)?;
+        let Some(first) = splits.first() else { return Err(CalibrationError::NoRows) };
+        let mut training = first.training.clone();
+        if splits.len() > 1 {
+            training.extend(&first.held_out);
+            training.sort_unstable();
+        }
+        if training.is_empty() {
+            return Err(CalibrationError::NoRows);
+        }
+        progress.stage("all training rows", 2);
+        let nominal = case.nominal(&training)?;
+        progress.advance()?;
+        let fit = case.fit(&case.writable(), &training, Some(nominal.state()))?;
+        progress.advance()?;
+        described("", case, &fit)
+    }
+
+    /// The fuller model: what corrects readings, and the axes that belong to it.
+    fn readings_yaml(&self, case: &Case<'_>) -> Result<String, CalibrationError> {
+        let loads = self.fuller.state().loads.as_deref().filter(|_| self.extras.contains(&Extra::Compliance));
+        let bent = if loads.is_some() { " + compliance·τ" } else { "" };
+        let mut text = format!(
+            "# What a URDF cannot hold: θ = offset + ratio q + sine sin q + cosine cos q{bent}, with q what a joint reports \
+             (rad, m).\n# These axes and corrections belong together: they are not those of calibrated.urdf.\n"
+        );
+        if loads.is_some() {
+            text.push_str(
+                "# τ are the torques about the joint of the loads at the target and at the elbow; compliance is in rad per N·m of 1 kg.\n",
+            );
+        }
+        if self.extras.is_empty() {
+            text.push_str("# Nothing was kept: with ratios, eccentricity or compliance the training rows did not predict each other better.\n");
+        }
+        text.push_str("readings:\n");
+        for (name, correction) in case.names.joints.iter().zip(&self.fuller.state().corrections) {
+            let Correction { offset, ratio, sine, cosine, compliance: [target, elbow] } = correction;
+            // Writing to a string does not fail.
+            let _ = writeln!(text, "  {}:\n    offset: {offset:?}\n    ratio: {ratio:?}", quoted(name));
+            let _ = writeln!(text, "    sine: {sine:?}\n    cosine: {cosine:?}");
+            if loads.is_some() {
+                let _ = writeln!(text, "    compliance: [{target:?}, {elbow:?}]");
+            }
+        }
+        if let Some(loads) = loads {
+            text.push_str(&case.loads_yaml(loads));
+        }
+        match &case.described {
+            Some(description) => {
+                let chain = description.chain.fitted(&without_corrections(self.fuller.state()))?.chain;
+                text.push_str(&chain.kinematics_yaml());
+            }
+            None => text.push_str(&axes_yaml(case, self.fuller.state())),
+        }
+        Ok(text)
+    }
+}
+
+fn described(folder: &str, case: &Case<'_>, fit: &Fit) -> Result<Vec<File>, CalibrationError> {
+    let Some(description) = &case.described else { return Ok(Vec::new()) };
+    let chain = description.chain.fitted(&fit.fitted_part())?.chain;
+    Ok(vec![
+        File::new(format!("{folder}calibrated.urdf"), description.urdf.written(&chain)),
+        File::new(format!("{folder}kinematics.yaml"), chain.kinematics_yaml()),
+    ])
+}
+
+/// Axes at θ = 0 in the base's frame, metres.
+fn axes_yaml(case: &Case<'_>, state: &State) -> String {
+    let mut text = "axes:\n".to_owned();
+    let list = |numbers: nalgebra::Vector3<f64>| format!("[{:?}, {:?}, {:?}]", numbers.x, numbers.y, numbers.z);
+    for (name, joint) in case.names.joints.iter().zip(&state.slid_towards(case.guess()).joints) {
+        let (direction, point) = axis(joint);
+        let _ = writeln!(text, "  {}:\n    axis: {}", quoted(name), list(direction));
+        if let Some(point) = point {
+            let _ = writeln!(text, "    point_m: {}", list(point));
+        }
+    }
+    text
+}
+
+/// A name as a key of YAML; JSON's strings are YAML's.
+fn quoted(name: &str) -> String {
+    serde_json::Value::from(name).to_string()
+}
+
+fn without_corrections(state: &State) -> State {
+    let mut state = state.clone();
+    state.corrections.fill(Correction::default());
+    state
+}

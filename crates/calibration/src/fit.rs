@@ -1,0 +1,188 @@
+//! One fit: a layout and the rows that it is learned from.
+
+use std::sync::{Arc, PoisonError};
+
+use nalgebra::{DMatrix, DVector, Isometry3, Point3};
+
+use super::{CalibrationError, Case, figures::mean};
+use body_schema_engine::{most, estimation::{Belief, Estimator, HypothesisSettings, NoiseFit, ReadingReport, Smoother}, model::{Block, ChainPrior, Layout, Prior, Scales, State, best_motion}, sensing::{Noise, Occasion}};
+use body_schema_experiment::Stream;
+use body_schema_scenario::Known;
+
+/// What explains some rows.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The state, with its covariance.
+    pub belief: Belief,
+    /// What is made of every reading: `movement` counts the rows that it was learned from, from 1.
+    pub readings: Vec<ReadingReport>,
+    /// How well they are fitted, by kind of noise.
+    pub noise: Vec<NoiseFit>,
+    /// How far joints stand beside what they read, where that was learned: one standard deviation each, rad or m.
+    pub reading_sigmas: Vec<f64>,
+    /// The rows that it was learned from.
+    pub rows: Vec<usize>,
+    /// By how much errors along the chain were found to be larger than the prior states, where the robot is described.
+    pub scales: Option<Scales>,
+}
+
+impl Fit {
+    /// What was learned.
+    pub fn state(&self) -> &State {
+        &self.belief.state
+    }
+
+    /// By row that it was learned from: the probability that one of its readings is an outlier; empty where outliers are
+    /// not looked for.
+    pub fn outliers(&self) -> Vec<(usize, f64)> {
+        if self.readings.is_empty() {
+            return Vec::new();
+        }
+        let mut by_row: Vec<(usize, f64)> = self.rows.iter().map(|row| (*row, 0.0)).collect();
+        for reading in &self.readings {
+            let index = usize::try_from(reading.movement).ok().and_then(|movement| movement.checked_sub(1));
+            if let (Some((_, most)), Some(probability)) =
+                (index.and_then(|index| by_row.get_mut(index)), reading.outlier_probability)
+            {
+                *most = most.max(probability);
+            }
+        }
+        by_row
+    }
+
+    /// Those of them that are likelier outliers than not.
+    pub fn suspected(&self) -> Vec<(usize, f64)> {
+        self.outliers().into_iter().filter(|(_, probability)| *probability > 0.5).collect()
+    }
+}
+
+/// Random numbers of the search; fits of one table differ by nothing else than rows and layout.
+const SEED: u64 = 1;
+
+impl Case<'_> {
+    /// What explains `rows`, as far as `layout` can, from a start near which it is to be found; without one it is searched for
+    /// wherever the prior allows.
+    pub fn fit(&self, layout: &Layout, rows: &[usize], near: Option<&State>) -> Result<Fit, CalibrationError> {
+        let mut smoother = self.smoother(layout, near)?;
+        let movements: Vec<_> = rows.iter().map(|row| &self.rows[*row]).collect();
+        let movements: Vec<_> = movements.iter().map(|row| (row.positions.as_slice(), &row.observation)).collect();
+        let starts = match near {
+            Some(state) => vec![state.clone()],
+            None => vec![self.guess().clone(), self.placed(rows)],
+        };
+        if !movements.is_empty() {
+            smoother.absorb_all(&movements, &starts)?;
+        }
+        Ok(Fit {
+            belief: smoother.belief().clone(),
+            readings: smoother.readings(),
+            noise: smoother.fits(),
+            reading_sigmas: smoother.reading_sigmas(),
+            rows: rows.to_vec(),
+            scales: smoother.scales().cloned(),
+        })
+    }
+
+    /// The chain as described with base, targets, cameras and sockets where `rows` put them. So its joints bear what they do with
+    /// the target there, and what is fitted near to it takes that over.
+    pub fn nominal(&self, rows: &[usize]) -> Result<Fit, CalibrationError> {
+        let mut fit = self.fit(&self.placing(), rows, None)?;
+        fit.belief.state.loads = Some(self.scenario.robot.loads(fit.state()));
+        Ok(fit)
+    }
+
+    fn smoother(&self, layout: &Layout, near: Option<&State>) -> Result<Smoother, CalibrationError> {
+        let chain = self.chain(layout);
+        let covariance = match &chain {
+            Some(chain) => chain.covariance(&chain.stated()),
+            None => DMatrix::from_diagonal(&self.deviations(layout).map(|sd| sd * sd)),
+        };
+        let within = |block: Block| match self.scenario.prior.of(block) {
+            Some(Known::Anywhere { within_m }) => Some(within_m),
+            _ => None,
+        };
+        let mut guess = self.guess().clone();
+        if let Some(near) = near {
+            guess.loads.clone_from(&near.loads);
+        }
+        let prior = Prior::new(guess, layout, covariance, within)?;
+        let given = self.scenario.smoother.hypotheses;
+        let settings = HypothesisSettings { spawned: if near.is_none() { given.spawned } else { 0 }, ..given };
+        // What is known of the equipment is known as well as the file says: there is one reading of it.
+        let is_unknown = |noise: &Noise| {
+            self.scenario.smoother.noise_unknown
+                && self.rig.channels()[noise.channel].occasion() != Occasion::Beforehand
+        };
+        let unknown = self.rig.noises().iter().map(is_unknown).collect();
+        let rng = Stream::Hypotheses.rng(SEED);
+        let smoother = Smoother::new(prior, Arc::new(layout.clone()), self.rig.clone(), settings, rng)
+            .with_loss(self.loss)
+            .with_unknown_noise(unknown)
+            .with_unknown_joint_noise(self.scenario.smoother.joints_unknown)
+            .never_forgetting();
+        let smoother = match chain {
+            Some(chain) => smoother.with_chain(chain),
+            None => smoother,
+        };
+        Ok(match self.known {
+            Some(known) => smoother.knowing(known.clone()),
+            None => smoother,
+        })
+    }
+
+    /// The prior's standard deviations, as stated.
+    pub(super) fn deviations(&self, layout: &Layout) -> DVector<f64> {
+        self.chain(layout).map_or_else(|| self.scenario.prior.standard_deviations(layout), |chain| chain.deviations())
+    }
+
+    /// The prior along the chain of a described robot, the same for all fits of a layout.
+    pub(super) fn chain(&self, layout: &Layout) -> Option<Arc<ChainPrior>> {
+        let mut known = self.chains.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, chain)) = known.iter().find(|(of, _)| of == layout) {
+            return chain.clone();
+        }
+        let chain = self.scenario.chain_prior(self.guess(), layout).map(Arc::new);
+        known.push((layout.clone(), chain.clone()));
+        chain
+    }
+
+    /// The guess with its base where the rigid motion that fits best puts it, by the targets that were seen in `rows`, and
+    /// with sockets where they held their targets in the mean.
+    fn placed(&self, rows: &[usize]) -> State {
+        let mut state = self.guess().clone();
+        let (mut predicted, mut seen) = (Vec::new(), Vec::new());
+        for row in rows.iter().map(|row| &self.rows[*row]) {
+            for (channel, reading) in self.rig.channels().iter().zip(&row.observation.readings) {
+                if let Some((target, place)) = reading.as_ref().and_then(|reading| channel.position(reading)) {
+                    predicted.push(state.target_at(target, &row.positions));
+                    seen.push(place);
+                }
+            }
+        }
+        if self.placing().block(Block::Base).is_some() && predicted.len() > 2 {
+            state.base = motion_of_most(&predicted, &seen) * state.base;
+        }
+        for (channel, sensor) in self.rig.channels().iter().enumerate() {
+            let Occasion::Held { socket, target } = sensor.occasion() else { continue };
+            let held =
+                rows.iter().map(|row| &self.rows[*row]).filter(|row| row.observation.readings[channel].is_some());
+            if let Some(mean) = mean(held.map(|row| state.target_at(target, &row.positions))) {
+                state.sockets[socket] = mean;
+            }
+        }
+        state
+    }
+}
+
+/// How often places are left out, at most.
+const ROUNDS: usize = 10;
+
+/// The rigid motion that fits best to most of the places, whatever the others say.
+fn motion_of_most(from: &[Point3<f64>], to: &[Point3<f64>]) -> Isometry3<f64> {
+    let fit = |rows: &[usize]| {
+        let (from, to): (Vec<_>, Vec<_>) = rows.iter().map(|row| (from[*row], to[*row])).unzip();
+        best_motion(&from, &to)
+    };
+    let away = |motion: &Isometry3<f64>, row: usize| (motion * from[row] - to[row]).norm();
+    most::fitted(from.len(), from.len().saturating_sub(3), ROUNDS, fit, away)
+}

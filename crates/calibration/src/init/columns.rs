@@ -1,0 +1,188 @@
+//! What the columns of a table are, by their titles.
+
+use body_schema_engine::kinematics::JointKind;
+use body_schema_table::{Component, Layout, Quantity, Rotation, Title, split};
+
+/// What is measured beside the joints.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Measured {
+    /// Targets of which something is.
+    pub sensors: Vec<Sensor>,
+    /// The columns of place and socket.
+    pub sockets: Option<(String, String)>,
+    /// Columns that are nothing of this.
+    pub others: Vec<String>,
+}
+
+/// One sensor.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sensor {
+    /// The target's name.
+    pub name: String,
+    /// Its channel.
+    pub channel: &'static str,
+    /// The camera in whose picture it is, if it is in one.
+    pub camera: Option<String>,
+    /// The titles of its columns.
+    pub columns: Vec<String>,
+    /// The lines of its σ.
+    pub sigmas: &'static str,
+}
+
+impl Sensor {
+    /// What its readings look like in a table.
+    pub fn layout(&self) -> Layout {
+        match self.channel {
+            "pose" => Layout::Pose,
+            "pixels" => Layout::Pixels(1),
+            "distance" => Layout::Distance,
+            _ => Layout::Position,
+        }
+    }
+}
+
+/// The first title that says this component of what another says one of.
+fn find(titles: &[String], of: &Title<'_>, component: Component) -> Option<String> {
+    let is_it = |it: &Title<'_>| it.component == component && it.is_of(of.before) && it.number == of.number;
+    titles.iter().find(|title| Title::parse(title).is_some_and(|it| is_it(&it))).cloned()
+}
+
+/// The column of a joint: that with its name alone, or else with a unit of its kind behind it.
+pub fn of_joint<'t>(titles: &'t [String], joint: &str, kind: JointKind) -> Option<&'t String> {
+    let quantity = Quantity::of(kind);
+    let exact = titles.iter().find(|title| *title == joint);
+    exact.or_else(|| titles.iter().find(|title| split(title).0 == joint && quantity.is_in(title)))
+}
+
+/// What the columns that belong to no joint are. `joints` are the titles of those that do.
+pub fn measured(titles: &[String], joints: &[String]) -> Measured {
+    let is_joint = |title: &&String| joints.contains(title);
+    let mut others: Vec<String> =
+        titles.iter().filter(|title| !is_joint(title) && !title.is_empty()).cloned().collect();
+    let mut measured = Measured::default();
+    if let Some(socket) = others.iter().find(|title| title.as_str() == "socket").cloned() {
+        let place = others.iter().find(|title| title.as_str() == "place").cloned();
+        if let Some(place) = place {
+            others.retain(|title| *title != place && *title != socket);
+            measured.sockets = Some((place, socket));
+        }
+    }
+    while let Some(sensor) = first_picture(&others).or_else(|| first_distance(&others)).or_else(|| first_place(&others))
+    {
+        others.retain(|title| !sensor.columns.contains(title));
+        measured.sensors.push(sensor);
+    }
+    measured.others = others;
+    measured
+}
+
+/// The first columns that are called u and v alike: a point in a picture. What stands before them is the camera and the target, as in
+/// `cam_tag_u`; of points with numbers, as in `cam_tag_u1`, each is a target of its own.
+fn first_picture(titles: &[String]) -> Option<Sensor> {
+    titles.iter().find_map(|title| {
+        let it = Title::parse(title).filter(|it| it.component == Component::U)?;
+        let columns = vec![title.clone(), find(titles, &it, Component::V)?];
+        let (camera, target) = it.before.rsplit_once('_').unwrap_or(("camera", it.before));
+        let target = if target.is_empty() { "marker" } else { target };
+        Some(Sensor {
+            name: format!("{target}{}", it.number),
+            channel: "pixels",
+            camera: Some(camera.to_owned()),
+            columns,
+            sigmas: "sigma_px = 0.5\n",
+        })
+    })
+}
+
+/// The first column that is called a distance.
+fn first_distance(titles: &[String]) -> Option<Sensor> {
+    titles.iter().find_map(|title| {
+        let it = Title::parse(title).filter(|it| it.component == Component::Distance && it.number.is_empty())?;
+        Some(Sensor {
+            name: if it.before.is_empty() { "marker" } else { it.before }.to_owned(),
+            channel: "distance",
+            camera: None,
+            columns: vec![title.clone()],
+            sigmas: "sigma_m = 0.0005\n",
+        })
+    })
+}
+
+/// The first columns that are called x, y and z alike, with those of a rotation that begin alike.
+fn first_place(titles: &[String]) -> Option<Sensor> {
+    titles.iter().find_map(|title| {
+        let it = Title::parse(title).filter(|it| it.component == Component::X)?;
+        let named = |components: &[Component]| -> Option<Vec<String>> {
+            components.iter().map(|component| find(titles, &it, *component)).collect()
+        };
+        let mut columns = named(&Component::PLACE)?;
+        let rotation = Rotation::ALL.iter().find_map(|rotation| named(rotation.components()));
+        let name = match (it.before, it.number) {
+            ("", "") => "marker".to_owned(),
+            ("", number) => format!("marker{number}"),
+            (before, number) => format!("{before}{number}"),
+        };
+        let (channel, sigmas) = match rotation {
+            None => ("position", "sigma_m = 0.0005\n"),
+            Some(rotation) => {
+                columns.extend(rotation);
+                ("pose", "sigma_m = 0.0005\nsigma_deg = 0.1\n")
+            }
+        };
+        Some(Sensor { name, channel, camera: None, columns, sigmas })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn titles(line: &str) -> Vec<String> {
+        line.split(',').map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn joints_targets_and_the_rest_are_told_apart() {
+        let titles = titles("x1,y1,z1,x2_mm,y2_mm,z2_mm,hand_x,hand_y,hand_z,hand_rx,hand_ry,hand_rz,time,elbow_deg");
+        let elbow = of_joint(&titles, "elbow", JointKind::Revolute).expect("a column").clone();
+        let found = measured(&titles, &[elbow]);
+        let told: Vec<_> = found.sensors.iter().map(|it| (it.name.as_str(), it.channel, it.columns.len())).collect();
+        assert_eq!(told, [("marker1", "position", 3), ("marker2", "position", 3), ("hand", "pose", 6)]);
+        assert_eq!((found.others, found.sockets), (vec!["time".to_owned()], None));
+        assert_eq!(of_joint(&titles, "elbo", JointKind::Revolute), None);
+        assert_eq!(of_joint(&titles, "elbow", JointKind::Prismatic), None, "it does not slide by degrees");
+    }
+
+    #[test]
+    fn a_title_that_is_a_joints_name_is_its_column() {
+        let all = titles("y_mm,x,y,x_mm,z_mm,lift_mm");
+        let joints = ["x", "y", "lift"].map(|joint| of_joint(&all, joint, JointKind::Prismatic).expect(joint).clone());
+        assert_eq!(joints, ["x", "y", "lift_mm"]);
+        assert_eq!(measured(&all, &joints).sensors[0].columns, ["x_mm", "y_mm", "z_mm"]);
+    }
+
+    #[test]
+    fn pictures_and_distances_are_told_by_their_titles() {
+        let found = measured(&titles("cam_tag_u1,cam_tag_v1,cam_tag_u2_px,cam_tag_v2_px,u,v,hand_distance_mm,q"), &[]);
+        let told = |it: &Sensor| (it.name.clone(), it.channel, it.camera.clone().unwrap_or_default(), it.columns.len());
+        let expected = [
+            ("tag1", "pixels", "cam", 2),
+            ("tag2", "pixels", "cam", 2),
+            ("marker", "pixels", "camera", 2),
+            ("hand", "distance", "", 1),
+        ];
+        let expected =
+            expected.map(|(name, channel, camera, count)| (name.to_owned(), channel, camera.to_owned(), count));
+        assert_eq!(found.sensors.iter().map(told).collect::<Vec<_>>(), expected);
+        assert_eq!(found.others, ["q"]);
+        assert_eq!(measured(&titles("menu,nonsense_distances,u3"), &[]).sensors, []);
+    }
+
+    #[test]
+    fn sockets_take_two_columns() {
+        let found = measured(&titles("place,socket,a"), &["a".to_owned()]);
+        assert_eq!(found.sockets, Some(("place".to_owned(), "socket".to_owned())));
+        assert!(found.sensors.is_empty() && found.others.is_empty());
+        assert_eq!(measured(&titles("xylophone,y,z"), &[]).sensors, []);
+    }
+}

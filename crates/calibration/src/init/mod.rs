@@ -1,0 +1,173 @@
+//! A first calibration file, from a URDF and the titles of a table.
+//!
+//! What the two say is matched: columns that are called as joints are, and what the other columns measure. Everything that
+//! had to be guessed is said, in the file and to whoever asked.
+
+mod chain;
+mod columns;
+mod pictures;
+mod places;
+#[cfg(test)]
+mod tests;
+mod written;
+
+use body_schema_robot::{Urdf, UrdfError};
+use body_schema_scenario::Scenario;
+use body_schema_table::{Table, TableError};
+use chain::Search;
+use columns::Measured;
+use places::Held;
+use written::{Sockets, written};
+
+/// Two files, as the calibration file is to name them, and what they hold.
+#[derive(Clone, Copy, Debug)]
+pub struct Sources<'a> {
+    /// The name of the calibration.
+    pub name: &'a str,
+    /// How the calibration file names the URDF.
+    pub urdf_file: &'a str,
+    /// The URDF.
+    pub urdf: &'a str,
+    /// How it names the table.
+    pub table_file: &'a str,
+    /// The table.
+    pub table: &'a str,
+    /// The link that stands still, if it is known.
+    pub base: Option<&'a str>,
+    /// The link that carries the targets, if it is known.
+    pub tip: Option<&'a str>,
+    /// How far the two sockets of every place are apart, if it is known, metres.
+    pub socket_distance_m: Option<f64>,
+}
+
+/// A calibration file, and what was guessed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Begun {
+    /// The file, TOML with comments.
+    pub text: String,
+    /// Every guess, as a sentence without a full stop.
+    pub guesses: Vec<String>,
+}
+
+/// Why no file can be begun.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum InitError {
+    /// The description cannot be used.
+    #[error("{file}, {source}")]
+    Urdf {
+        /// Its file.
+        file: String,
+        /// Why.
+        source: UrdfError,
+    },
+    /// The table cannot be used.
+    #[error("{file}: {source}")]
+    Table {
+        /// Its file.
+        file: String,
+        /// Why.
+        source: TableError,
+    },
+    /// The two do not fit.
+    #[error("{what}; {mend}")]
+    Misfit {
+        /// What does not.
+        what: String,
+        /// How to mend it.
+        mend: String,
+    },
+}
+
+/// Begins a calibration file.
+///
+/// # Errors
+///
+/// [`InitError`] where a file cannot be read, no chain moves by joints that the table has columns for, several do that are as
+/// long, or its other columns measure nothing.
+pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
+    let of_urdf = |source| InitError::Urdf { file: sources.urdf_file.to_owned(), source };
+    let of_table = |source| InitError::Table { file: sources.table_file.to_owned(), source };
+    let urdf = Urdf::parse(sources.urdf).map_err(of_urdf)?;
+    let table = Table::open(sources.table.as_bytes()).map_err(of_table)?;
+    let titles = table.titles().clone();
+    let mut guesses = Vec::new();
+    if let Some(error) = titles.separated() {
+        return Err(of_table(error));
+    }
+    let chain = Search { sources, urdf: &urdf, titles: titles.all() }.chain(&mut guesses)?;
+    let joints: Vec<String> = chain.readings.iter().map(|reading| reading.name.clone()).collect();
+    guesses.push(format!("joints: {}, by the titles of columns", joints.join(", ")));
+    let of_joints = chain.readings.iter();
+    let of_joints =
+        of_joints.filter_map(|reading| columns::of_joint(titles.all(), &reading.name, reading.kind).cloned());
+    let of_joints: Vec<String> = of_joints.collect();
+    let Measured { sensors, sockets, others } = columns::measured(titles.all(), &of_joints);
+    if sensors.is_empty() && sockets.is_none() {
+        return Err(InitError::Misfit {
+            what: format!(
+                "nothing is measured in {}: of its columns, {}, those beside the joints' are {}",
+                sources.table_file,
+                titles.all().join(", "),
+                listed(&others)
+            ),
+            mend:
+                "title what was measured x, y, z (with the target's name before it, as in hand_x), cam_hand_u and cam_hand_v, \
+                 hand_distance, or place and socket"
+                    .to_owned(),
+        });
+    }
+    for sensor in &sensors {
+        titles.reading_titled(sensor.layout(), &sensor.columns).map_err(of_table)?;
+    }
+    let mut held = None;
+    if let Some((place, socket)) = &sockets {
+        guesses.push(format!("sockets: a target is held in one, which the columns `{place}` and `{socket}` tell"));
+        held = Some(Held::read(table, [place, socket]).map_err(of_table)?);
+    }
+    for sensor in &sensors {
+        guesses.push(format!(
+            "`{}`: a {}, from the columns {}",
+            sensor.name,
+            if sensor.channel == "pixels" { "point in a picture" } else { sensor.channel },
+            sensor.columns.join(", ")
+        ));
+    }
+    let pictures = pictures::sizes(&sensors, sources.table).map_err(of_table)?;
+    for (camera, [width, height]) in &pictures {
+        guesses.push(format!(
+            "camera `{camera}`: a picture of {width} × {height}, as its points lie in it; its focal lengths and where it stands the \
+             table does not say: write them before you calibrate"
+        ));
+    }
+    for sensor in sensors.iter().filter(|sensor| sensor.channel == "distance") {
+        guesses.push(format!(
+            "`{}`: the fixed point of its distance is taken for the origin in which the base is found; write `to_m` where there are \
+             several such points, or other sensors",
+            sensor.name
+        ));
+    }
+    if !others.is_empty() {
+        guesses.push(format!("passed over: {}", others.join(", ")));
+    }
+    let write = |trained: Option<&str>, distance_m: Option<f64>, guesses: &[String]| {
+        let sockets = sockets.as_ref().map(|columns| Sockets { columns, trained, distance_m });
+        written(sources, &chain, (&sensors, &pictures), sockets.as_ref(), guesses)
+    };
+    let mut trained = None;
+    if let Some(held) = &held {
+        let scenario = |place: Option<&str>, distance_m: Option<f64>| {
+            let open =
+                |file: &str| Ok(if file == sources.table_file { sources.table } else { sources.urdf }.to_owned());
+            Scenario::parse("init.toml", &write(place, distance_m, &[]), &open).ok()
+        };
+        trained = held.choose(sources.socket_distance_m, &scenario, &mut guesses);
+    } else {
+        guesses.push("held out: every row once, in five folds".to_owned());
+    }
+    let text = write(trained.as_deref(), sources.socket_distance_m, &guesses);
+    Ok(Begun { text, guesses })
+}
+
+fn listed(names: &[String]) -> String {
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}

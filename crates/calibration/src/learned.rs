@@ -1,0 +1,199 @@
+//! What a fit says of joints, base and targets, with standard deviations.
+
+use nalgebra::{DMatrix, Isometry3, Matrix3, Vector3};
+
+use super::{CalibrationError, Case, Correction, Correlation, Fit, Joint, Noise, Placement, Sensed, Target};
+use body_schema_engine::{kinematics::{self, JointKind, chart}, model::{Block, Place, State}, sensing::Occasion};
+
+/// Correlations above this are told, and so many at most.
+const TOLD: f64 = 0.9;
+const MOST: usize = 30;
+
+impl Case<'_> {
+    /// How every joint was corrected.
+    pub(super) fn joints(&self, fit: &Fit) -> Vec<Joint> {
+        let guess = self.guess();
+        let state = fit.state().slid_towards(guess);
+        (0..state.joints.len()).map(|index| self.joint(index, fit, guess, &state)).collect()
+    }
+
+    fn joint(&self, index: usize, fit: &Fit, guess: &State, state: &State) -> Joint {
+        let layout = &fit.belief.layout;
+        let (described, learned) = (&guess.joints[index], &state.joints[index]);
+        let (from, to) = (described.direction(), learned.direction());
+        let axis = from.cross(&to);
+        let turn = axis.try_normalize(0.0).unwrap_or_default() * from.angle(&to);
+        let shift = match (described.line(), learned.line()) {
+            (Some(described), Some(learned)) => learned.point - described.point,
+            _ => Vector3::zeros(),
+        };
+        let basis = chart::basis(&to);
+        let block = |range: Option<std::ops::Range<usize>>| {
+            let (range, covariance) = (range?, fit.belief.covariance.as_ref()?);
+            Some(basis * covariance.view((range.start, range.start), (2, 2)) * basis.transpose())
+        };
+        let across = to.cross_matrix();
+        let turned = block(layout.direction(index)).map(|spread| across * spread * across.transpose());
+        let kind = learned.kind();
+        let unit = if kind == JointKind::Revolute { 1_f64.to_degrees() } else { 1e3 };
+        Joint {
+            name: self.names.joints[index].clone(),
+            kind: match kind {
+                JointKind::Revolute => "revolute",
+                JointKind::Prismatic => "prismatic",
+            }
+            .to_owned(),
+            learned: layout.is_learned(index),
+            shift_mm: (shift * 1e3).into(),
+            shift_sd_mm: deviations(block(layout.point(index)).as_ref(), 1e3),
+            turn_deg: turn.map(f64::to_degrees).into(),
+            turn_sd_deg: deviations(turned.as_ref(), 1_f64.to_degrees()),
+            offset: self.number(fit, Block::Offset(index), state.corrections[index].offset, unit),
+        }
+    }
+
+    fn number(&self, fit: &Fit, block: Block, value: f64, unit: f64) -> Option<Correction> {
+        let at = fit.belief.layout.block(block)?.start;
+        let sd = fit.belief.covariance.as_ref()?[(at, at)].sqrt();
+        Some(Correction { value: value * unit, sd: sd * unit })
+    }
+
+    /// Where the base link is in the frame of the measurements.
+    pub(super) fn base(&self, fit: &Fit) -> Placement {
+        placement(&fit.state().base, self.spread(fit, Block::Base).as_ref())
+    }
+
+    /// Where the targets are: in the frames of their links where there is a URDF.
+    pub(super) fn targets(&self, fit: &Fit) -> Result<Vec<Target>, CalibrationError> {
+        let frames = match &self.described {
+            Some(description) => Some(description.chain.fitted(&fit.fitted_part())?.frames),
+            None => None,
+        };
+        let of = |(index, target): (usize, &body_schema_engine::model::Target)| {
+            let into = frames.as_ref().map_or_else(Isometry3::identity, |frames| frames[target.link].inverse());
+            let place = placement(&(into * target.place.frame()), None);
+            let spread = self.spread(fit, Block::Target(index));
+            Target {
+                name: self.names.targets.get(index).cloned().unwrap_or_else(|| format!("target {}", index + 1)),
+                link: self.link(target.link),
+                xyz_m: place.xyz_m,
+                rpy_rad: matches!(target.place, Place::Pose(_)).then_some(place.rpy_rad),
+                xyz_sd_m: spread.map(|spread| deviations(Some(&spread.fixed_view::<3, 3>(0, 0).into_owned()), 1.0)),
+            }
+        };
+        Ok(fit.state().targets.iter().enumerate().map(of).collect())
+    }
+
+    /// The name of what moves with the joint of this number, counted from 1; 0 is the base.
+    pub(super) fn link(&self, link: usize) -> String {
+        match &self.described {
+            Some(description) => {
+                let chain = &description.chain;
+                let is_last = link == chain.moving().count();
+                let of_joint = || chain.moving().nth(link.wrapping_sub(1)).map(|segment| segment.link.clone());
+                if link == 0 {
+                    chain.base.clone()
+                } else if is_last {
+                    chain.tip().to_owned()
+                } else {
+                    of_joint().unwrap_or_default()
+                }
+            }
+            None if link == 0 => "base".to_owned(),
+            None => self.names.joints.get(link - 1).cloned().unwrap_or_default(),
+        }
+    }
+
+    fn spread(&self, fit: &Fit, block: Block) -> Option<DMatrix<f64>> {
+        let range = fit.belief.layout.block(block)?;
+        let size = range.len();
+        Some(fit.belief.covariance.as_ref()?.view((range.start, range.start), (size, size)).into_owned())
+    }
+
+    /// Pairs of parameters with correlations above 0.9.
+    pub(super) fn correlations(&self, fit: &Fit) -> Vec<Correlation> {
+        let Some(covariance) = &fit.belief.covariance else { return Vec::new() };
+        let names = self.names.coordinates(&fit.belief.layout, fit.state());
+        let of = |(i, j): (usize, usize)| covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+        let pairs = (0..names.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
+        let mut found: Vec<((usize, usize), f64)> =
+            pairs.map(|pair| (pair, of(pair))).filter(|it| it.1.abs() > TOLD).collect();
+        found.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+        let told = |((i, j), correlation): ((usize, usize), f64)| Correlation {
+            first: names[i].clone(),
+            second: names[j].clone(),
+            correlation,
+        };
+        found.into_iter().take(MOST).map(told).collect()
+    }
+
+    /// What the residuals say of the noise.
+    pub(super) fn noise(&self, fit: &Fit) -> Vec<Noise> {
+        let of = |noise: &body_schema_engine::estimation::NoiseFit| {
+            let sensor = &self.rig.channels()[noise.channel];
+            let degrees = (noise.equations - noise.absorbed).max(0.0);
+            let (sigma, unit) = sensor.nominal(noise.first);
+            Noise {
+                sensor: self.sensor(Sensed::Channel(noise.channel)),
+                unit: unit.to_owned(),
+                sigma,
+                chi2: noise.squared,
+                degrees,
+                explaining_sigma: (degrees > 1.0).then(|| (noise.squared / degrees).sqrt() * sigma),
+            }
+        };
+        fit.noise.iter().filter(|noise| noise.equations > 0.0).map(of).collect()
+    }
+
+    /// What was sensed, in words.
+    pub(super) fn sensor(&self, sensed: Sensed) -> String {
+        let (name, number) = match sensed {
+            Sensed::Socket(socket) => (self.names.sockets.get(socket), socket),
+            Sensed::Channel(channel) => {
+                let sensor = &self.rig.channels()[channel];
+                let name = match (sensor.occasion(), sensor.target(), self.names.targets.as_slice()) {
+                    (Occasion::Held { socket, .. }, ..) => self.names.sockets.get(socket),
+                    (_, Some(target), targets) => targets.get(target),
+                    (_, None, [target]) => Some(target),
+                    _ => None,
+                };
+                (name, channel)
+            }
+        };
+        name.cloned().unwrap_or_else(|| format!("sensor {}", number + 1))
+    }
+}
+
+impl Fit {
+    /// The state without what a URDF cannot hold.
+    pub(super) fn fitted_part(&self) -> State {
+        let mut state = self.state().clone();
+        for correction in &mut state.corrections {
+            *correction = body_schema_engine::model::Correction { offset: correction.offset, ..Default::default() };
+        }
+        state
+    }
+}
+
+fn placement(pose: &Isometry3<f64>, spread: Option<&DMatrix<f64>>) -> Placement {
+    let (roll, pitch, yaw) = pose.rotation.euler_angles();
+    let of = |start: usize| {
+        let spread = spread.filter(|spread| spread.nrows() >= start + 3)?;
+        Some(deviations(Some(&spread.fixed_view::<3, 3>(start, start).into_owned()), 1.0))
+    };
+    Placement {
+        xyz_m: pose.translation.vector.into(),
+        rpy_rad: [roll, pitch, yaw],
+        xyz_sd_m: of(0),
+        rotation_sd_rad: of(3),
+    }
+}
+
+fn deviations(spread: Option<&Matrix3<f64>>, unit: f64) -> [f64; 3] {
+    spread.map_or([0.0; 3], |spread| spread.diagonal().map(|variance| variance.max(0.0).sqrt() * unit).into())
+}
+
+/// Where an axis is: a direction, and of a revolute joint the point nearest to where the description has it.
+pub fn axis(joint: &kinematics::Joint) -> (Vector3<f64>, Option<Vector3<f64>>) {
+    (joint.direction().into_inner(), joint.line().map(|line| line.point.coords))
+}

@@ -1,0 +1,70 @@
+//! Calibration of a robot by a table of what was measured of it.
+//!
+//! ```text
+//! Scenario ─► Case ─► calibrate() ─► Calibration ─► files: calibrated.urdf, kinematics.yaml, readings.yaml, report.json
+//!                                         └───────► report::markdown, report::html
+//! ```
+//!
+//! * [`Case`]: the robot as it is described, its sensors, its prior, the rows.
+//! * [`Fit`]: what explains some rows by some layout; all rows at once, robustly, with the noise unknown.
+//! * [`Split`]: rows to learn from and rows to judge by.
+//! * [`Extra`]: what axes cannot explain, kept where folds within the training rows say that it predicts better.
+//! * [`ActivePoint`]: few rows that are chosen, beside random ones.
+//! * [`begin`]: a first calibration file from a URDF and a table, with what was guessed.
+//! * [`Report`]: everything that was found, as JSON; `report` writes it for readers.
+//!
+//! # What is fitted
+//!
+//! The headline is what a URDF can hold: axes, and reading offsets where they are asked for, with base, targets, cameras
+//! and sockets. *Before* is the chain as it is described, with base, targets, cameras and sockets fitted to the same
+//! training rows: what can be done without touching the URDF. Beside both stands the fuller model.
+//!
+//! # Where errors are taken
+//!
+//! An error is the distance between what was measured and what is predicted, reading by reading, on rows that were learned
+//! from and on rows that were not. With folds every row is judged by the fold that holds it out, and the calibrated model
+//! comes from all rows; otherwise it comes from the training rows alone.
+//!
+//! This module does no input or output.
+
+mod active;
+mod asked;
+mod beyond;
+mod calibrate;
+mod case;
+mod coverage;
+mod design;
+mod error;
+mod extras;
+mod figures;
+mod files;
+mod fit;
+mod init;
+#[cfg(test)]
+mod laws;
+mod learned;
+mod loads;
+mod more_rows;
+mod outcome;
+mod progress;
+#[cfg(feature = "openapi")]
+pub mod report;
+mod span;
+mod split;
+mod undetermined;
+mod verdict;
+
+pub use active::{ActivePoint, ORDERS};
+pub use calibrate::{Calibration, Options, calibrate};
+pub use case::{Case, Row};
+pub use coverage::Coverage;
+pub use error::CalibrationError;
+pub use extras::{Extra, Trial};
+pub use figures::{Figures, Residual, Sensed, SocketDistance, Unit};
+pub use files::File;
+pub use fit::Fit;
+pub use init::{Begun, InitError, Sources, begin};
+pub use outcome::*;
+pub use progress::{Progress, Silent};
+pub use split::Split;
+pub use verdict::{Use, Verdict};

@@ -1,0 +1,122 @@
+//! What a column shows by itself.
+
+use super::{Doubt, DoubtKind, Evidence, Line, Subject};
+use body_schema_engine::kinematics::{Joint, JointKind};
+
+/// What is forgiven to limits, rad or m: rounding, and where a robot comes to rest.
+const SLACK: f64 = 1e-3;
+
+/// How far an axis may well be off, rad, and what of it at the target no sensor tells, metres.
+const AXIS: f64 = 0.01;
+const SEEN: f64 = 2e-5;
+/// How far a target is from an axis at least, metres: it can be moved away from it.
+const ARM: f64 = 0.5;
+
+pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
+    let mut doubts = Vec::new();
+    for (joint, column) in subject.columns.iter().enumerate() {
+        doubts.extend(constant(joint, column, subject, evidence));
+        doubts.extend(outside(joint, column, subject, evidence));
+    }
+    doubts.extend(repeated(evidence));
+    doubts.extend(too_few(subject, evidence));
+    doubts
+}
+
+/// A joint that moves too little for its axis to be told.
+fn constant(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
+    let count = evidence.configurations.len();
+    if count < 2 || !subject.learned.get(joint).copied().unwrap_or(true) {
+        return None;
+    }
+    let values = evidence.configurations.iter().map(|row| row[joint]);
+    let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(x), most.max(x)));
+    let range = most - least;
+    let (unit, arm) = match &subject.joints[joint] {
+        Joint::Revolute(axis) => ("rad", (subject.target - axis.point).norm().max(ARM)),
+        Joint::Prismatic(_) => ("m", 1.0),
+    };
+    let is_still = range <= 1e-9;
+    if !is_still && range * arm * AXIS >= SEEN {
+        return None;
+    }
+    Some(Doubt {
+        kind: DoubtKind::Constant,
+        column: Some(column.to_owned()),
+        lines: Vec::new(),
+        what: if is_still { "this joint never moves" } else { "this joint hardly moves" }.to_owned(),
+        evidence: if is_still {
+            format!("{least} in all {count} rows")
+        } else {
+            format!(
+                "between {least:.6} and {most:.6} {unit}, a range of {range:.2e}, in all {count} rows: an axis that is off by \
+                 {AXIS} rad moves the target by {:.4} mm",
+                range * arm * AXIS * 1e3
+            )
+        },
+        mend: "its axis cannot be told from such data: add rows in which it moves, or hold it".to_owned(),
+    })
+}
+
+fn outside(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
+    let (lower, upper) = subject.limits[joint]?;
+    let beyond = |row: &[f64]| (lower - row[joint]).max(row[joint] - upper);
+    let rows = (0..).zip(evidence.configurations).filter(|(_, row)| beyond(row) > SLACK);
+    let lines: Vec<Line> = rows.map(|(row, _)| evidence.line(row)).collect();
+    let worst = evidence.configurations.iter().map(|row| beyond(row)).fold(0.0, f64::max);
+    let unit = match subject.joints[joint].kind() {
+        JointKind::Revolute => "rad",
+        JointKind::Prismatic => "m",
+    };
+    (!lines.is_empty()).then(|| Doubt {
+        kind: DoubtKind::Limits,
+        column: Some(column.to_owned()),
+        lines,
+        what: "outside the joint's limits".to_owned(),
+        evidence: format!("by up to {worst:.4} {unit}; the limits are {lower:.4} and {upper:.4} {unit}"),
+        mend: "correct the rows, their unit or the limits".to_owned(),
+    })
+}
+
+/// Neighbouring columns that repeat neighbours are told together.
+fn repeated(evidence: &Evidence) -> Option<Doubt> {
+    if evidence.repeated.is_empty() {
+        return None;
+    }
+    let list =
+        |of: &dyn Fn(&(String, String)) -> String| evidence.repeated.iter().map(of).collect::<Vec<_>>().join(", ");
+    let (repeating, original) = (list(&|pair| pair.0.clone()), list(&|pair| pair.1.clone()));
+    Some(Doubt {
+        kind: DoubtKind::RepeatedColumn,
+        column: Some(repeating),
+        lines: Vec::new(),
+        what: format!("a copy of `{original}`"),
+        evidence: "the same in every row".to_owned(),
+        mend: "leave it out: it brings nothing new, and counts what it copies twice".to_owned(),
+    })
+}
+
+fn too_few(subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
+    let rows = evidence.configurations.len();
+    let equations = evidence.equations.unwrap_or_else(|| match &evidence.sockets {
+        // The first row in a socket says where that is.
+        Some(sockets) => {
+            let places: std::collections::BTreeSet<&usize> = sockets.iter().collect();
+            3 * rows.saturating_sub(places.len())
+        }
+        None => 3 * evidence.targets.iter().map(|seen| seen.points.iter().flatten().count()).sum::<usize>(),
+    });
+    // What one more row brings, as rows bring so far.
+    let each = if equations > 0 { equations as f64 / rows.max(1) as f64 } else { 3.0 };
+    (equations < subject.unknowns).then(|| Doubt {
+        kind: DoubtKind::TooFewRows,
+        column: None,
+        lines: Vec::new(),
+        what: format!("{rows} rows are too few"),
+        evidence: format!("{equations} equations for {} unknowns", subject.unknowns),
+        mend: format!(
+            "measure some {} rows more, or learn less: what rows do not tell stays as described",
+            ((subject.unknowns - equations) as f64 / each).ceil()
+        ),
+    })
+}

@@ -1,0 +1,550 @@
+//! Other ways to read a table, compared by how well the description explains them.
+//!
+//! A way is first tried with the chain as it is described, base and target free. Those few that fit best are then compared by the
+//! evidence of the description with its own errors ([`description`](super::description)): what calibration would mend is no fault
+//! of the table. A table of sockets, whose evidence nothing gives a scale, and that of a very long chain are judged by what is left
+//! alone.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+
+use super::{
+    Doubt, DoubtKind, Evidence, Line, Subject,
+    description::{Explained, Known, explain},
+    doubt::length,
+    fit::{self, Fit, Placed, Sight},
+    hypothesis::{Hypothesis, zeros_doubt},
+    moving,
+};
+use body_schema_engine::{
+    elementary::{exp, ln},
+    kinematics::{Joint, JointKind},
+    most::middle,
+};
+
+/// Where nothing gives evidence a scale a way to read the table must bring the residual below this share of what it was.
+const CONVINCING: f64 = 0.5;
+/// The logarithm of the odds from which on a way to read the table is told.
+const TOLD: f64 = 15.0;
+/// Zeros that are off by less are what calibration is for, radians; and so are sizes, by less than this share.
+const OFF: f64 = 0.1;
+const ANOTHER_SIZE: f64 = 0.03;
+/// Faults that are looked for one after the other.
+const ROUNDS: usize = 5;
+/// Rows of fits, and the joints above which fits take fewer.
+const ROWS: usize = 100;
+const MANY_JOINTS: usize = 40;
+/// Up to so many joints any two columns are tried in each other's place, and beyond it neighbours.
+const SWAPS: usize = 12;
+/// Ways to read the table of which the evidence is asked.
+const ASKED: usize = 8;
+/// Rows that lag by less are told by what moves, if by anything.
+const LAGGING: f64 = 0.02;
+/// A description does not fit where more is left of its readings, once calibrated: a share of how far they are spread, and radians.
+const MISFIT: (f64, f64) = (0.05, 0.09);
+
+/// A robot that reaches farther is described in another unit, metres.
+const LARGE: f64 = 30.0;
+
+pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
+    let Some(mut readings) = Readings::new(subject, evidence) else { return Vec::new() };
+    let mut doubts: Vec<Doubt> = Vec::new();
+    let mut standing = readings.judged();
+    for _ in 0..ROUNDS {
+        if readings.is_explained(&standing.fit) {
+            break;
+        }
+        let best = readings.best(&mut standing);
+        let evidence = best.as_ref().and_then(|(_, found)| found.explained.as_ref()).map(|it| it.log_evidence);
+        if let Some((shifts, found)) = readings.of_zeros(&standing, evidence) {
+            doubts.push(zeros_doubt(subject, &shifts, &standing.fit, &found.fit));
+            readings = shifts
+                .iter()
+                .fold(readings, |readings, (joint, by)| readings.applied(Hypothesis::Shifted(*joint, *by)));
+            standing = found;
+            continue;
+        }
+        let Some((hypothesis, found)) = best else { break };
+        doubts.push(hypothesis.doubt(subject, &readings, &standing.fit, &found.fit));
+        readings = readings.applied(hypothesis);
+        standing = found;
+    }
+    doubts.extend(readings.elsewhere(&standing));
+    doubts.extend(readings.moving(&standing));
+    if let Some(misfit) = readings.misfit(&standing) {
+        doubts.insert(0, misfit);
+    }
+    doubts
+}
+
+/// The table as it is read at present.
+#[derive(Clone)]
+pub struct Readings<'a> {
+    subject: Subject<'a>,
+    /// By row that was seen: where the joints were.
+    configurations: Vec<Vec<f64>>,
+    /// Where they stand.
+    lines: Vec<Line>,
+    sight: Sight,
+    /// The name of the target.
+    target: String,
+    /// By how much the target's coordinates have been scaled.
+    size: f64,
+}
+
+/// What the description makes of a table.
+struct Judged {
+    fit: Fit,
+    /// `None` where evidence has no scale.
+    explained: Option<Explained>,
+}
+
+impl<'a> Readings<'a> {
+    fn new(subject: &Subject<'a>, evidence: &Evidence) -> Option<Self> {
+        let seen = evidence.targets.first();
+        let usable: Vec<usize> = match (&evidence.sockets, seen) {
+            (Some(sockets), _) => (0..sockets.len()).collect(),
+            (None, Some(seen)) => (0..seen.points.len()).filter(|row| seen.points[*row].is_some()).collect(),
+            (None, None) => return None,
+        };
+        // Fewer rows than these fit under too many hypotheses.
+        if usable.len() < 6 {
+            return None;
+        }
+        let sight = match (&evidence.sockets, seen) {
+            (Some(sockets), _) => Sight::Sockets(usable.iter().map(|row| sockets[*row]).collect()),
+            (None, seen) => {
+                let seen = seen?;
+                let turn = |row: &usize| seen.turns.get(*row).copied().unwrap_or_default();
+                let turned = |row: &usize| UnitQuaternion::from_scaled_axis(turn(row));
+                let pose = |row: &usize| Some(Isometry3::from_parts(seen.points[*row]?.coords.into(), turned(row)));
+                let (poses, turns) = (usable.iter().filter_map(pose).collect(), usable.iter().map(turn).collect());
+                Sight::Target(fit::Seen {
+                    guess: subject.target,
+                    poses,
+                    turns,
+                    arm: seen.arm_m.filter(|_| !seen.turns.is_empty()),
+                })
+            }
+        };
+        let configurations = usable.iter().map(|row| evidence.configurations[*row].clone()).collect();
+        let target = seen.map(|seen| seen.name.clone()).unwrap_or_default();
+        let lines = usable.iter().map(|row| evidence.line(*row)).collect();
+        Some(Self { subject: *subject, configurations, lines, sight, target, size: 1.0 })
+    }
+
+    /// What its target is called.
+    pub fn name(&self) -> &str {
+        &self.target
+    }
+
+    fn joints(&self) -> &'a [Joint] {
+        self.subject.joints
+    }
+
+    /// The rows that fits take, spread evenly over the table.
+    fn taken(&self) -> Self {
+        let joints = self.joints().len();
+        let most = if joints > MANY_JOINTS { ROWS / 2 } else { ROWS };
+        let all = self.configurations.len();
+        let count = all.min(most);
+        let rows: Vec<usize> = (0..count).map(|k| k * all / count).collect();
+        let sight = match &self.sight {
+            Sight::Target(seen) => Sight::Target(seen.of(&rows)),
+            Sight::Sockets(sockets) => Sight::Sockets(rows.iter().map(|row| sockets[*row]).collect()),
+        };
+        let configurations = rows.iter().map(|row| self.configurations[*row].clone()).collect();
+        let lines = rows.iter().map(|row| self.lines[*row].clone()).collect();
+        Self { configurations, lines, sight, target: self.target.clone(), ..*self }
+    }
+
+    /// By row: what the joints do to the last link.
+    fn motions(&self) -> Vec<Isometry3<f64>> {
+        let motion = |row: &Vec<f64>| {
+            self.joints().iter().zip(row).fold(Isometry3::identity(), |motion, (joint, q)| motion * joint.exp(*q))
+        };
+        self.configurations.iter().map(motion).collect()
+    }
+
+    /// The table as a hypothesis reads it.
+    fn applied(&self, hypothesis: Hypothesis) -> Self {
+        let mut read = self.clone();
+        if let Sight::Target(seen) = &mut read.sight {
+            seen.poses.iter_mut().for_each(|pose| *pose = hypothesis.of_pose(pose));
+            if hypothesis == Hypothesis::RollPitchYaw {
+                let numbers = seen.poses.iter_mut().zip(&seen.turns);
+                numbers.for_each(|(pose, it)| pose.rotation = UnitQuaternion::from_euler_angles(it.x, it.y, it.z));
+            }
+        }
+        let kinds: Vec<JointKind> = self.joints().iter().map(Joint::kind).collect();
+        match hypothesis {
+            Hypothesis::Target(factor) | Hypothesis::Size(factor) => read.size *= factor,
+            Hypothesis::Lag(rows) => read.lag(rows),
+            _ => {}
+        }
+        for row in &mut read.configurations {
+            match hypothesis {
+                Hypothesis::Scaled(joint, factor) => row[joint] *= factor,
+                Hypothesis::Shifted(joint, by) => row[joint] += by,
+                Hypothesis::Swapped(one, other) => row.swap(one, other),
+                Hypothesis::Angles(factor) => {
+                    let angles = row.iter_mut().zip(&kinds).filter(|(_, kind)| **kind == JointKind::Revolute);
+                    angles.for_each(|(angle, _)| *angle *= factor);
+                }
+                _ => {}
+            }
+        }
+        read
+    }
+
+    /// What was seen beside the joints of so many rows later.
+    fn lag(&mut self, rows: f64) {
+        let all = self.configurations.len();
+        let (whole, part) = (rows.floor() as isize, rows - rows.floor());
+        let later = |row: usize, by: isize| self.configurations.get(row.checked_add_signed(by)?);
+        let between = |row: usize| {
+            let before = later(row, whole)?;
+            let after = if part > 0.0 { later(row, whole + 1)? } else { before };
+            Some((row, before.iter().zip(after).map(|(a, b)| a + part * (b - a)).collect()))
+        };
+        let (kept, configurations): (Vec<usize>, Vec<Vec<f64>>) = (0..all).filter_map(between).unzip();
+        self.configurations = configurations;
+        self.lines = kept.iter().map(|row| self.lines[*row].clone()).collect();
+        self.sight = match &self.sight {
+            Sight::Target(seen) => Sight::Target(seen.of(&kept)),
+            Sight::Sockets(sockets) => Sight::Sockets(kept.iter().map(|row| sockets[*row]).collect()),
+        };
+    }
+
+    fn judged(&self) -> Judged {
+        let taken = self.taken();
+        let fit = taken.sight.fit(&taken.motions(), true);
+        let explained = taken.explained(&fit, None, Known::DESCRIBED);
+        Judged { fit, explained }
+    }
+
+    /// What the description makes of the rows of a fit, its own errors included.
+    fn explained(&self, fit: &Fit, from: Option<Placed>, known: Known<'_>) -> Option<Explained> {
+        let (Sight::Target(seen), Some((placed, rows))) = (&self.sight, &fit.placed) else { return None };
+        if self.joints().len() > MANY_JOINTS {
+            return None;
+        }
+        let configurations: Vec<Vec<f64>> = rows.iter().map(|row| self.configurations[*row].clone()).collect();
+        let subject = Subject { sigma_m: self.subject.sigma_m * self.size, ..self.subject };
+        let found = explain(&subject, &configurations, &seen.of(rows), from.unwrap_or(*placed), known)?;
+        // Readings of another unit are as likely as those that they stand for, per unit of their own.
+        let counted = self.subject.counted(rows.len() * 3);
+        // A target is spread as far as its robot reaches, to a factor of two or so.
+        let (expected, spread) = self.spreads(seen);
+        let far = ln(spread / expected) / ln(2_f64);
+        let unlikely = if far.is_finite() { 0.5 * far * far } else { 0.0 };
+        let log_evidence = found.log_evidence + counted * ln(self.size.abs()) - unlikely;
+        Some(Explained { log_evidence, ..found })
+    }
+
+    /// Whether the description explains everything by itself.
+    fn is_explained(&self, fit: &Fit) -> bool {
+        fit.placed.is_some() && fit.judged <= 2.0 * self.subject.sigma_m * self.size
+    }
+
+    /// Whether what is left of a table, with the errors of the description, is no more than what calibration leaves.
+    fn fits(&self, left: &Explained) -> bool {
+        let Sight::Target(seen) = &self.sight else { return true };
+        let most = (MISFIT.0 * self.spreads(seen).1).max(10.0 * self.subject.sigma_m * self.size);
+        left.rms <= most && left.turned.is_none_or(|turned| turned <= MISFIT.1)
+    }
+
+    /// The hypothesis that is told, if any is, and what it makes of the table; `standing` is found anew where the hypothesis leads to a
+    /// better place.
+    fn best(&self, standing: &mut Judged) -> Option<(Hypothesis, Judged)> {
+        let taken = self.taken();
+        let mut tried = taken.of_target();
+        tried.extend(taken.of_order());
+        tried.extend(taken.of_joints());
+        tried.extend(self.of_lags());
+        let left = |(hypothesis, fit): &(Hypothesis, Fit)| fit.judged / hypothesis.size();
+        tried.retain(|it| left(it).is_finite());
+        tried.sort_by(|a, b| left(a).total_cmp(&left(b)));
+        let Some(before) = standing.explained.clone() else {
+            let first = tried.into_iter().next().filter(|it| left(it) < CONVINCING * standing.fit.judged);
+            return first.map(|(hypothesis, fit)| (hypothesis, Judged { fit, explained: None }));
+        };
+        // Another unit may be right and leave much, as long as something else is wrong too.
+        let is_unit = |it: &(Hypothesis, Fit)| matches!(it.0, Hypothesis::Target(_) | Hypothesis::Inverted);
+        tried.retain(|it| is_unit(it) || left(it) < 0.95 * standing.fit.judged);
+        tried.sort_by_key(|it| !is_unit(it));
+        let asked = tried.into_iter().take(ASKED).filter_map(|(hypothesis, _)| {
+            let read = self.applied(hypothesis).taken();
+            let fit = read.sight.fit(&read.motions(), true);
+            let explained = read.explained(&fit, None, Known::DESCRIBED).filter(|it| {
+                hypothesis.may_leave_much()
+                    || read.fits(it)
+                    || left(&(hypothesis, fit.clone())) < CONVINCING * standing.fit.judged
+            })?;
+            Some((
+                hypothesis,
+                explained.log_evidence + hypothesis.log_prior(self.joints().len()),
+                Judged { fit, explained: Some(explained) },
+            ))
+        });
+        let (hypothesis, evidence, found) = asked.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        if evidence - before.log_evidence < TOLD {
+            return None;
+        }
+        // The description as it is read may explain everything where it was not looked for.
+        let there = found
+            .fit
+            .placed
+            .as_ref()
+            .and_then(|(placed, _)| taken.explained(&standing.fit, Some(*placed), Known::DESCRIBED));
+        if let Some(there) = there.filter(|there| there.log_evidence > before.log_evidence) {
+            let odds = evidence - there.log_evidence;
+            standing.explained = Some(there);
+            if odds < TOLD {
+                return None;
+            }
+        }
+        Some((hypothesis, found))
+    }
+
+    /// The zeros of several joints that are off at once, as where a robot was assembled or homed otherwise than it is described, where
+    /// that explains more than anything else does, of which the evidence is given.
+    fn of_zeros(&self, standing: &Judged, other: Option<f64>) -> Option<(Vec<(usize, f64)>, Judged)> {
+        let before = standing.explained.as_ref().filter(|left| !self.fits(left))?;
+        let taken = self.taken();
+        let free = taken.explained(&standing.fit, None, Known::ZEROS_ANYWHERE)?;
+        let off: Vec<(usize, f64)> = free.zeros.iter().copied().enumerate().filter(|(_, by)| by.abs() > OFF).collect();
+        let read =
+            off.iter().fold(self.clone(), |read, (joint, by)| read.applied(Hypothesis::Shifted(*joint, *by))).taken();
+        let fit = read.sight.fit(&read.motions(), true);
+        let explained = read.explained(&fit, None, Known::DESCRIBED).filter(|left| read.fits(left))?;
+        let doubtful = off.len() as f64 * (2.0 + ln(self.joints().len() as f64));
+        let evidence = explained.log_evidence - doubtful;
+        let is_told =
+            off.len() > 1 && evidence > before.log_evidence + TOLD && other.is_none_or(|other| evidence > other);
+        is_told.then_some((off, Judged { fit, explained: Some(explained) }))
+    }
+
+    fn whole(&self, hypothesis: Hypothesis) -> (Hypothesis, Fit) {
+        let read = self.applied(hypothesis);
+        (hypothesis, read.sight.fit(&read.motions(), false))
+    }
+
+    fn of_target(&self) -> Vec<(Hypothesis, Fit)> {
+        let mut tried = vec![self.whole(Hypothesis::Angles(PI / 180.0)), self.whole(Hypothesis::Angles(180.0 / PI))];
+        let Sight::Target(seen) = &self.sight else { return tried };
+        let (expected, spread) = self.spreads(seen);
+        for hypothesis in [Hypothesis::Target(1e-3), Hypothesis::Target(1e3), Hypothesis::Mirrored] {
+            // Points that shrink come nearer to anything: they must be spread as the robot's are.
+            let is_likely = (0.2..5.0).contains(&(hypothesis.size() * spread / expected));
+            tried.extend(is_likely.then(|| self.whole(hypothesis)));
+        }
+        if (0.3..3.0).contains(&(spread / expected)) {
+            let (size, fit) = self.sized();
+            tried.extend(((size - 1.0).abs() > ANOTHER_SIZE).then_some((Hypothesis::Size(size), fit)));
+        }
+        if seen.arm.is_some() {
+            let of_poses = [
+                Hypothesis::Inverted,
+                Hypothesis::Transposed,
+                Hypothesis::RealFirst,
+                Hypothesis::RealLast,
+                Hypothesis::RollPitchYaw,
+                Hypothesis::RotationVector,
+            ];
+            tried.extend(of_poses.map(|hypothesis| self.whole(hypothesis)));
+        }
+        tried
+    }
+
+    /// Whether the robot as it is described is as large as no robot is.
+    pub fn is_too_large(&self) -> bool {
+        matches!(&self.sight, Sight::Target(seen) if self.spreads(seen).0 > LARGE)
+    }
+
+    /// How far the target would be spread, and how far it was seen to be, metres.
+    fn spreads(&self, seen: &fit::Seen) -> (f64, f64) {
+        let at: Vec<Point3<f64>> = self.motions().iter().map(|motion| motion * seen.guess).collect();
+        let points: Vec<Point3<f64>> = seen.poses.iter().map(|pose| pose.translation.vector.into()).collect();
+        (spread(&at), spread(&points))
+    }
+
+    /// The size with which coordinates fit best.
+    fn sized(&self) -> (f64, Fit) {
+        let left = |log: f64| {
+            let fit = self.whole(Hypothesis::Size(exp(log))).1;
+            (fit.judged / exp(log), fit)
+        };
+        let grid = (-10..=10).map(|k| f64::from(k) * 0.05);
+        let mut best =
+            grid.map(|log| (log, left(log))).min_by(|a, b| a.1.0.total_cmp(&b.1.0)).unwrap_or((0.0, left(0.0)));
+        let mut step = 0.025;
+        while step > 5e-4 {
+            for log in [best.0 - step, best.0 + step] {
+                let there = left(log);
+                if there.0 < best.1.0 {
+                    best = (log, there);
+                }
+            }
+            step /= 2.0;
+        }
+        (exp(best.0), best.1.1)
+    }
+
+    fn of_lags(&self) -> Vec<(Hypothesis, Fit)> {
+        if self.configurations.len() < 10 {
+            return Vec::new();
+        }
+        let of = |rows: f64| {
+            let read = self.applied(Hypothesis::Lag(rows)).taken();
+            (Hypothesis::Lag(rows), read.sight.fit(&read.motions(), false))
+        };
+        let mut tried = [-2.0, -1.0, 1.0, 2.0].map(of).to_vec();
+        // A robot that was followed while it moved may lag by less than a row.
+        let parts = [-1.5, -0.5, -0.2, 0.2, 0.5, 1.5].map(of);
+        if let Some((Hypothesis::Lag(mut by), mut best)) =
+            parts.into_iter().min_by(|a, b| a.1.judged.total_cmp(&b.1.judged))
+        {
+            let mut step = 0.16;
+            while step > 0.005 {
+                for (hypothesis, there) in [of(by - step), of(by + step)] {
+                    if let (true, Hypothesis::Lag(rows)) = (there.judged < best.judged, hypothesis) {
+                        (by, best) = (rows, there);
+                    }
+                }
+                step /= 2.0;
+            }
+            tried.extend((by.abs() > LAGGING).then_some((Hypothesis::Lag(by), best)));
+        }
+        tried
+    }
+
+    fn of_order(&self) -> Vec<(Hypothesis, Fit)> {
+        let joints = self.joints().len();
+        let reach = if joints > SWAPS { 1 } else { joints };
+        let pairs = (0..joints).flat_map(|one| (one + 1..joints.min(one + 1 + reach)).map(move |other| (one, other)));
+        if joints > MANY_JOINTS {
+            return Vec::new();
+        }
+        pairs
+            .filter(|(one, other)| self.joints()[*one].kind() == self.joints()[*other].kind() || joints <= SWAPS)
+            .map(|(one, other)| self.whole(Hypothesis::Swapped(one, other)))
+            .collect()
+    }
+
+    /// Each joint by itself; what stands before and behind it is computed once, so that a joint costs the same however many
+    /// there are.
+    fn of_joints(&self) -> Vec<(Hypothesis, Fit)> {
+        let mut tried = Vec::new();
+        let mut before: Vec<Isometry3<f64>> = vec![Isometry3::identity(); self.configurations.len()];
+        let mut behind = self.motions();
+        for (index, joint) in self.joints().iter().enumerate() {
+            for (row, behind) in self.configurations.iter().zip(&mut behind) {
+                *behind = joint.exp(-row[index]) * *behind;
+            }
+            let read = |of: &dyn Fn(f64) -> f64| {
+                let rows = self.configurations.iter().zip(before.iter().zip(&behind));
+                let motions = rows.map(|(row, (before, behind))| before * joint.exp(of(row[index])) * behind);
+                self.sight.fit(&motions.collect::<Vec<_>>(), false)
+            };
+            let factors: &[f64] = match joint.kind() {
+                JointKind::Revolute => &[-1.0, PI / 180.0, 180.0 / PI],
+                JointKind::Prismatic => &[-1.0, 1e-3, 1e3],
+            };
+            tried.extend(factors.iter().map(|&factor| (Hypothesis::Scaled(index, factor), read(&|q| factor * q))));
+            if joint.kind() == JointKind::Revolute {
+                let (by, left) = shift(&|by| read(&|q| q + by), self.joints().len() <= MANY_JOINTS);
+                tried.extend((by.abs() > OFF).then_some((Hypothesis::Shifted(index, by), left)));
+            }
+            for (row, before) in self.configurations.iter().zip(&mut before) {
+                *before *= joint.exp(row[index]);
+            }
+        }
+        tried
+    }
+
+    /// The doubt that the base is where the file says.
+    fn elsewhere(&self, standing: &Judged) -> Option<Doubt> {
+        let base = self.subject.base?;
+        let (placed, _) = standing.fit.placed.as_ref()?;
+        let free = standing.explained.as_ref()?;
+        let said = Known { base: Some(&base), ..Known::DESCRIBED };
+        let known = self.taken().explained(&standing.fit, None, said)?;
+        let odds = free.log_evidence - known.log_evidence;
+        let is_better = free.rms.max(self.subject.sigma_m) < CONVINCING * known.rms;
+        if odds < TOLD || !is_better {
+            return None;
+        }
+        let shift = (placed.base.translation.vector - base.at.translation.vector).norm();
+        let turn = placed.base.rotation.angle_to(&base.at.rotation).to_degrees();
+        Some(Doubt {
+            kind: DoubtKind::Base,
+            column: None,
+            lines: Vec::new(),
+            what: format!("the base stands elsewhere than [base] says, by {} and {turn:.0} deg", length(shift)),
+            evidence: format!(
+                "free, the description fits to {} instead of {} rms",
+                length(standing.fit.rms),
+                length(known.rms)
+            ),
+            mend: "correct [base], or leave it out: then it is found from the rows".to_owned(),
+        })
+    }
+
+    /// The doubt that the robot stood still at every row.
+    fn moving(&self, standing: &Judged) -> Option<Doubt> {
+        let (Sight::Target(seen), Some(explained)) = (&self.sight, &standing.explained) else { return None };
+        let places = explained.places(&self.subject, &self.configurations, seen);
+        let seen: Vec<Point3<f64>> = seen.poses.iter().map(|pose| pose.translation.vector.into()).collect();
+        moving::doubt(&self.lines, &places, &seen, self.subject.sigma_m * self.size)
+    }
+
+    /// The doubt that anything explains the table.
+    fn misfit(&self, standing: &Judged) -> Option<Doubt> {
+        let left = standing.explained.as_ref()?;
+        if self.fits(left) {
+            return None;
+        }
+        let turned = left.turned.map(|turned| format!(" and {:.1} deg", turned.to_degrees())).unwrap_or_default();
+        Some(Doubt {
+            kind: DoubtKind::Misfit,
+            column: None,
+            lines: Vec::new(),
+            what: "the description does not fit these rows".to_owned(),
+            evidence: format!(
+                "{}{turned} rms are left of `{}` where base, target and all axes are fitted, and no other unit, sign, zero, order or frame \
+                 of a column explains them",
+                length(left.rms),
+                self.target
+            ),
+            mend: "is this the robot, and is its target on the link that is named? No calibration of it can be trusted"
+                .to_owned(),
+        })
+    }
+}
+
+/// The shift within half a turn that leaves least: on a grid of 30 deg, then between its neighbours if `fine`.
+fn shift(left: &dyn Fn(f64) -> Fit, fine: bool) -> (f64, Fit) {
+    const STEP: f64 = PI / 6.0;
+    let grid = (-5..=6).map(|k| f64::from(k) * STEP).map(|by| (by, left(by)));
+    let Some(mut best) = grid.min_by(|a, b| a.1.judged.total_cmp(&b.1.judged)) else { return (0.0, left(0.0)) };
+    let mut step = STEP / 2.0;
+    while fine && step > 0.002 {
+        for by in [best.0 - step, best.0 + step] {
+            let there = left(by);
+            if there.judged < best.1.judged {
+                best = (by, there);
+            }
+        }
+        step /= 2.0;
+    }
+    best
+}
+
+/// How far most points are from where most are.
+fn spread(points: &[Point3<f64>]) -> f64 {
+    let middle = |values: Vec<f64>| middle(values).unwrap_or(f64::NAN);
+    let centre = Point3::from(Vector3::from_fn(|k, _| middle(points.iter().map(|point| point[k]).collect())));
+    middle(points.iter().map(|point| (point - centre).norm()).collect())
+}

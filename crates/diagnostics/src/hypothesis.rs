@@ -1,0 +1,261 @@
+//! A way to read a table, and how it is told.
+
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
+
+use super::{Doubt, DoubtKind, Subject, doubt::length, fit::Fit, hypotheses::Readings};
+use body_schema_engine::{elementary::ln, kinematics::JointKind};
+
+/// A way to read the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Hypothesis {
+    /// A joint's readings times a factor: −1 turns the sign round, others change units.
+    Scaled(usize, f64),
+    /// All angles times a factor.
+    Angles(f64),
+    /// A joint's readings plus an angle.
+    Shifted(usize, f64),
+    /// Two joints' columns in each other's place.
+    Swapped(usize, usize),
+    /// The target's coordinates times a factor: another unit.
+    Target(f64),
+    /// The same, where it is no unit.
+    Size(f64),
+    /// The target's coordinates in a left-handed frame.
+    Mirrored,
+    /// The pose of the measurements' frame in the target's.
+    Inverted,
+    /// Rotations the other way round, positions as they are.
+    Transposed,
+    /// The real part of quaternions in the other place: first for last, or last for first.
+    RealFirst,
+    RealLast,
+    /// Rotation vectors that are roll, pitch and yaw; and the other way round.
+    RollPitchYaw,
+    RotationVector,
+    /// Joints as they were so many rows later; between two rows on the straight way from one to the other.
+    Lag(f64),
+}
+
+impl Hypothesis {
+    pub fn of_pose(self, pose: &Isometry3<f64>) -> Isometry3<f64> {
+        let at = |translation: Vector3<f64>, rotation: UnitQuaternion<f64>| {
+            Isometry3::from_parts(translation.into(), rotation)
+        };
+        let (place, turn) = (pose.translation.vector, pose.rotation);
+        let quaternion = |q: [f64; 4]| UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
+        match self {
+            Self::Target(factor) | Self::Size(factor) => at(place * factor, turn),
+            Self::Mirrored => at(Vector3::new(place.y, place.x, place.z), turn),
+            Self::Inverted => pose.inverse(),
+            Self::Transposed => at(place, turn.inverse()),
+            // Read as x, y, z, w, written as w, x, y, z; and the other way round.
+            Self::RealFirst => at(place, quaternion([turn.i, turn.j, turn.k, turn.w])),
+            Self::RealLast => at(place, quaternion([turn.k, turn.w, turn.i, turn.j])),
+            Self::RotationVector => {
+                let (roll, pitch, yaw) = turn.euler_angles();
+                at(place, UnitQuaternion::from_scaled_axis(Vector3::new(roll, pitch, yaw)))
+            }
+            _ => *pose,
+        }
+    }
+
+    /// By how much coordinates are scaled.
+    pub fn size(self) -> f64 {
+        match self {
+            Self::Target(factor) | Self::Size(factor) => factor,
+            _ => 1.0,
+        }
+    }
+
+    /// Whether it may be right and leave much, since something else is wrong too. What changes all readings by as much as fits best is
+    /// found for anything.
+    pub fn may_leave_much(self) -> bool {
+        !matches!(self, Self::Size(_) | Self::Lag(_) | Self::RollPitchYaw | Self::RotationVector | Self::Transposed)
+    }
+
+    /// The logarithm of how likely such a fault is beside others, before the table is looked at: where two ways explain it alike, the
+    /// plainer one is told.
+    pub fn log_prior(self, joints: usize) -> f64 {
+        let joints = joints as f64;
+        match self {
+            Self::Angles(_) | Self::Target(_) | Self::Inverted | Self::RealFirst | Self::RealLast => 0.0,
+            Self::Scaled(_, factor) if factor < 0.0 => -ln(joints),
+            Self::Mirrored | Self::Transposed | Self::RollPitchYaw | Self::RotationVector => -1.0,
+            Self::Size(_) => -2.0,
+            Self::Scaled(..) => -1.0 - ln(joints),
+            Self::Shifted(..) => -2.0 - ln(joints),
+            Self::Swapped(..) | Self::Lag(_) => -2.0 - 2.0 * ln(joints),
+        }
+    }
+
+    pub fn doubt(self, subject: &Subject, readings: &Readings, residual: &Fit, left: &Fit) -> Doubt {
+        let target = || Some(readings.name().to_owned());
+        let column = |joint: usize| subject.columns[joint].clone();
+        let turns = |joint: usize| subject.joints[joint].kind() == JointKind::Revolute;
+        let small = |factor: f64| factor.abs() < 1.0;
+        let (kind, column, what, mend) = match self {
+            Self::Scaled(joint, -1.0) => (
+                DoubtKind::Sign,
+                Some(column(joint)),
+                "its sign is reversed against the description".to_owned(),
+                "turn the sign of the column round, or the joint's <axis>",
+            ),
+            Self::Scaled(joint, factor) if turns(joint) && small(factor) => (
+                DoubtKind::Unit,
+                Some(column(joint)),
+                "degrees, read as radians".to_owned(),
+                "end its title with `_deg`",
+            ),
+            Self::Scaled(joint, _) if turns(joint) => (
+                DoubtKind::Unit,
+                Some(column(joint)),
+                "radians, read as degrees".to_owned(),
+                "end its title with `_rad`",
+            ),
+            Self::Scaled(joint, factor) if small(factor) => (
+                DoubtKind::Unit,
+                Some(column(joint)),
+                "millimetres, read as metres".to_owned(),
+                "end its title with `_mm`",
+            ),
+            Self::Scaled(joint, _) => (
+                DoubtKind::Unit,
+                Some(column(joint)),
+                "metres, read as millimetres".to_owned(),
+                "end its title with `_m`",
+            ),
+            Self::Angles(factor) if small(factor) => (
+                DoubtKind::Unit,
+                None,
+                "all joint angles are degrees, read as radians".to_owned(),
+                "end their titles with `_deg`",
+            ),
+            Self::Angles(_) => (
+                DoubtKind::Unit,
+                None,
+                "all joint angles are radians, read as degrees".to_owned(),
+                "end their titles with `_rad`",
+            ),
+            Self::Shifted(joint, by) => (
+                DoubtKind::Zero,
+                Some(column(joint)),
+                format!("its zero is {:.1} deg from the description's", -by.to_degrees()),
+                "correct the column or the joint's <origin>, or learn an offset that wide",
+            ),
+            Self::Swapped(one, other) => (
+                DoubtKind::Order,
+                Some(column(one)),
+                format!("in the place of column `{}`, and that in its", column(other)),
+                "exchange the two titles",
+            ),
+            Self::Target(_) if readings.is_too_large() => (
+                DoubtKind::Unit,
+                None,
+                "the description is in millimetres: it should be in metres".to_owned(),
+                "divide the lengths of the URDF by 1000",
+            ),
+            Self::Target(factor) if small(factor) => (
+                DoubtKind::Unit,
+                target(),
+                "positions are millimetres, read as metres".to_owned(),
+                "end their titles with `_mm`",
+            ),
+            Self::Target(_) => (
+                DoubtKind::Unit,
+                target(),
+                "positions are metres, read as millimetres".to_owned(),
+                "end their titles with `_m`",
+            ),
+            Self::Size(factor) => (
+                DoubtKind::Size,
+                target(),
+                format!("everything is seen {:.3} times as large as it is described", factor.recip()),
+                "look over the size of the tag or board that was told to what sees it, the unit, and the description's lengths",
+            ),
+            Self::Mirrored => (
+                DoubtKind::Mirror,
+                target(),
+                "positions are in a left-handed frame".to_owned(),
+                "exchange two coordinates' titles, or turn one's sign round",
+            ),
+            Self::Inverted => (
+                DoubtKind::Pose,
+                target(),
+                "poses are inverted: they are those of the sensor as the target sees it".to_owned(),
+                "invert them: as for a camera that is given where a board stands before it",
+            ),
+            Self::Transposed => (
+                DoubtKind::Pose,
+                target(),
+                "rotations are inverted, positions are not".to_owned(),
+                "transpose the rotations: they take the measurements' frame to the target's",
+            ),
+            Self::RealFirst => (
+                DoubtKind::Pose,
+                target(),
+                "quaternions begin with their real part, which is read as the last".to_owned(),
+                "title the columns in the order qw, qx, qy, qz",
+            ),
+            Self::RealLast => (
+                DoubtKind::Pose,
+                target(),
+                "quaternions end with their real part, which is read as the first".to_owned(),
+                "title the columns in the order qx, qy, qz, qw",
+            ),
+            Self::RollPitchYaw => (
+                DoubtKind::Pose,
+                target(),
+                "rotations are roll, pitch and yaw, read as rotation vectors".to_owned(),
+                "title their columns roll, pitch and yaw",
+            ),
+            Self::RotationVector => (
+                DoubtKind::Pose,
+                target(),
+                "rotations are rotation vectors, read as roll, pitch and yaw".to_owned(),
+                "title their columns rx, ry and rz",
+            ),
+            Self::Lag(rows) => {
+                let which = if rows > 0.0 { "below" } else { "above" };
+                let count = if rows.fract() == 0.0 { format!("{}", rows.abs()) } else { format!("{:.2}", rows.abs()) };
+                (
+                    DoubtKind::Lag,
+                    None,
+                    format!(
+                        "what was measured belongs to the joints {count} line{} {which}",
+                        if rows.abs() == 1.0 { "" } else { "s" }
+                    ),
+                    "pair joints and measurements by their times anew",
+                )
+            }
+        };
+        let evidence = read_so(residual, left);
+        Doubt { kind, column, lines: Vec::new(), what, evidence, mend: mend.to_owned() }
+    }
+}
+
+/// The doubt about the zeros of several joints.
+pub fn zeros_doubt(subject: &Subject, shifts: &[(usize, f64)], residual: &Fit, left: &Fit) -> Doubt {
+    let columns: Vec<&str> = shifts.iter().map(|(joint, _)| subject.columns[*joint].as_str()).collect();
+    let angles: Vec<String> = shifts.iter().map(|(_, by)| format!("{:.0}", -by.to_degrees())).collect();
+    Doubt {
+        kind: DoubtKind::Zero,
+        column: Some(columns.join(", ")),
+        lines: Vec::new(),
+        what: format!("their zeros are {} deg from the description's", angles.join(", ")),
+        evidence: read_so(residual, left),
+        mend: "correct the columns or the joints' <origin>, or learn offsets that wide".to_owned(),
+    }
+}
+
+/// By how much better the description fits.
+fn read_so(residual: &Fit, left: &Fit) -> String {
+    let turned =
+        |fit: &Fit| fit.turned.map(|turned| format!(" and {:.2} deg", turned.to_degrees())).unwrap_or_default();
+    format!(
+        "read so, the description fits to {}{} instead of {}{} rms",
+        length(left.rms),
+        turned(left),
+        length(residual.rms),
+        turned(residual)
+    )
+}

@@ -1,0 +1,176 @@
+//! Counting equations and unknowns.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::{
+    kinematics::JointBox,
+    model::{Layout, Manifold, State, rank},
+    sensing::{InView, Occasion, Rig},
+};
+
+/// A movement in general position.
+#[derive(Clone, Debug)]
+pub struct General {
+    /// The channels that read there.
+    pub rig: Rig,
+    /// Joint positions, rad or m.
+    pub posture: Vec<f64>,
+}
+
+/// Movements that stand for all, twice as many as there can be need of: to postures anywhere in the joint box; where targets are
+/// held in sockets, anywhere on their manifolds in turn. Where not everything is in `view`, to postures at
+/// which something is, and of every camera to as many that it sees. What is known before any movement comes first, as if it were one.
+pub fn general_movements(
+    state: &State,
+    layout: &Layout,
+    rig: &Rig,
+    view: InView<'_>,
+    limits: &JointBox,
+) -> Vec<General> {
+    // A fixed stream of its own: what is general needs no seed.
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    // The rig of each socket that a channel reads, and the manifold on which the target is in it.
+    let held: Vec<(Rig, Option<Manifold<'_>>)> = match state.sockets.len() {
+        0 => vec![(rig.held_in(None), None)],
+        count => {
+            let manifold = |socket: usize| {
+                let (_, target) = rig.holds(socket)?;
+                let manifold = Manifold::new(state, target, state.sockets[socket], limits);
+                Some((rig.held_in(Some(socket)), Some(manifold)))
+            };
+            (0..count).filter_map(manifold).collect()
+        }
+    };
+    let equations = held.iter().map(|(rig, _)| rig.equations()).min().unwrap_or_default();
+    if layout.dimension() == 0 || equations == 0 {
+        return Vec::new();
+    }
+    let count = (2 * layout.dimension().div_ceil(equations) + 8) * held.len();
+    let known = rig.known_beforehand().map(|rig| General { rig, posture: vec![0.0; state.joints.len()] });
+    let mut draw = |index: usize, is_wanted: &dyn Fn(&[bool]) -> bool| {
+        let (rig, manifold) = &held[index % held.len()];
+        let posture = match manifold {
+            None => Some(limits.draw(&mut rng)),
+            Some(manifold) => manifold.draw(&mut rng),
+        };
+        let posture = posture?;
+        if !view.is_limited(rig) {
+            return Some(General { rig: rig.clone(), posture });
+        }
+        let visible = view.visible(rig, state, &posture);
+        is_wanted(&visible).then(|| General { rig: rig.limited_to(&visible), posture })
+    };
+    let mut movements: Vec<General> = known.into_iter().collect();
+    let mut patience = PATIENCE;
+    for index in 0..count {
+        let mut found = draw(index, &|visible| visible.contains(&true));
+        while found.is_none() && patience > 0 && view.is_limited(rig) {
+            found = draw(index, &|visible| visible.contains(&true));
+            patience -= 1;
+        }
+        movements.extend(found);
+    }
+    // Those so far may be in view of one camera alone, though others see something elsewhere.
+    for (socket, (rig, _)) in held.iter().enumerate() {
+        let with_view =
+            rig.channels().iter().enumerate().filter(|(_, sensor)| sensor.has_view() && view.is_limited(rig));
+        for (channel, sensor) in with_view {
+            let wanted = 2 * layout.dimension().div_ceil(sensor.equations().max(1)) + 8;
+            let sees = |general: &&General| general.rig.channels().iter().any(|other| Arc::ptr_eq(other, sensor));
+            let missing = wanted.saturating_sub(movements.iter().filter(sees).count());
+            let further = std::iter::repeat_with(|| draw(socket, &|visible| visible[channel]));
+            movements.extend(further.take(FURTHER).flatten().take(missing));
+        }
+    }
+    movements
+}
+
+/// Draws before it is given up to find postures in view of anything; and of one more camera.
+const PATIENCE: usize = 20_000;
+const FURTHER: usize = 2_000;
+
+/// Movements in general position after which there are as many independent equations as there can be: the least N for
+/// which the Jacobian of N of them has the rank that it has for many. It is the rank that counts, not the number of
+/// parameters: what cannot be determined needs no equation.
+///
+/// A yardstick to draw beside curves, not a bound: a prior or loose thresholds can beat it.
+pub fn movements_by_counting(state: &State, layout: &Layout, rig: &Rig, view: InView<'_>, limits: &JointBox) -> usize {
+    let movements = general_movements(state, layout, rig, view, limits);
+    let is_made = |movement: &&General| movement.rig.channels().iter().all(|it| it.occasion() != Occasion::Beforehand);
+    let Some(most) = movements.iter().filter(is_made).map(|movement| movement.rig.equations()).max() else { return 0 };
+    let equations: usize = movements.iter().map(|movement| movement.rig.equations()).sum();
+    let mut stacked = DMatrix::zeros(equations, layout.dimension());
+    // By number of movements: how many equations there are.
+    let (mut ends, mut end) = (Vec::new(), 0);
+    for General { rig, posture } in &movements {
+        let rows = rig.jacobian(state, layout, posture);
+        stacked.rows_mut(end, rows.ncols()).copy_from(&rows.transpose());
+        end += rows.ncols();
+        ends.push(end);
+    }
+    // What is known before any movement is none.
+    if rig.known_beforehand().is_none() {
+        ends.insert(0, 0);
+    }
+    let greatest = rank(&stacked);
+    let least = greatest.div_ceil(most.max(1)).saturating_sub(1).max(1);
+    let reaches =
+        |count: &usize| ends[*count] >= greatest && rank(&stacked.rows(0, ends[*count]).into_owned()) >= greatest;
+    (least..ends.len()).find(reaches).unwrap_or(ends.len() - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Block, laws::random_arm};
+    use body_schema_scenario::builtin;
+
+    /// A socket that no channel reads is no place to hold anything, and shifts no other.
+    #[test]
+    fn sockets_that_nothing_reads_count_for_nothing() {
+        let scenario = builtin("arm-7dof-socket").expect("built in");
+        let (robot, rig) = (&scenario.robot, &scenario.rig);
+        let channels =
+            rig.channels().iter().filter(|channel| !matches!(channel.occasion(), Occasion::Held { socket: 0, .. }));
+        let rig = Rig::new(channels.cloned().collect());
+        for General { rig, posture } in
+            general_movements(&robot.state, &robot.layout, &rig, InView::Unknown, &robot.limits)
+        {
+            for channel in rig.channels() {
+                let Occasion::Held { socket, target } = channel.occasion() else { continue };
+                let away = robot.state.target_at(target, &posture) - robot.state.sockets[socket];
+                assert!(away.norm() < 1e-6, "socket {socket}: {away}");
+            }
+        }
+    }
+
+    /// As PAPER.md's counting has it where every parameter can be determined; and by rank where some cannot.
+    #[test]
+    fn equations_are_counted_by_rank() {
+        for (name, expected) in [("arm-6dof", 8), ("arm-12dof", 16), ("head-fov", 6)] {
+            let scenario = builtin(name).expect("built in");
+            let (robot, rig) = (&scenario.robot, Rig::tracker(0.01));
+            assert_eq!(
+                movements_by_counting(&robot.state, &robot.layout, &rig, InView::Unknown, &robot.limits),
+                expected,
+                "{name}"
+            );
+        }
+        let arm = random_arm(&mut ChaCha8Rng::seed_from_u64(2), 4);
+        let limits = JointBox::new(vec![(-1.0, 1.0); 4]).expect("limits");
+        let rig = Rig::tracker(0.01);
+        let axes = Layout::of_arm(&arm, &[], true);
+        let with_base = Layout::new(&arm, (0..4).map(Block::Axis).chain([Block::Base, Block::Target(0)]));
+        assert_eq!(with_base.dimension(), axes.dimension() + 6);
+        let alone = movements_by_counting(&arm, &axes, &rig, InView::Unknown, &limits);
+        assert_eq!(
+            movements_by_counting(&arm, &with_base, &rig, InView::Unknown, &limits),
+            alone,
+            "the base adds nothing"
+        );
+    }
+}

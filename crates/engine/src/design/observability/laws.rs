@@ -1,0 +1,128 @@
+//! What holds of every robot.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::*;
+use crate::{
+    model::{Block, laws::random_arm},
+    sensing::{Position, Rig},
+};
+use body_schema_scenario::{Scenario, builtin};
+
+/// An arm of which the axes and the marker are learned, and more where `blocks` says so.
+fn prospect(seed: u64, blocks: &[Block]) -> Prospect {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let state = random_arm(&mut rng, 4);
+    let learned = (0..4).map(Block::Axis).chain([Block::Target(0)]).chain(blocks.iter().copied());
+    let layout = Layout::new(&state, learned);
+    let limits = JointBox::new((0..4).map(|_| (-rng.random_range(0.8..2.0), 1.5)).collect()).expect("limits");
+    Prospect {
+        scenario: "arm".to_owned(),
+        title: String::new(),
+        names: Names { joints: ["a", "b", "c", "d"].map(str::to_owned).to_vec(), ..Names::default() },
+        deviations: DVector::from_element(layout.dimension(), 0.05),
+        known: DMatrix::identity(layout.dimension(), layout.dimension()),
+        rig: Arc::new(Rig::tracker(0.001)),
+        actions: Actions::Box(limits.clone()),
+        constraints: None,
+        watch: None,
+        units: CriterionUnits::Prior,
+        search: Settings { max_evaluations: 60, ..Settings::default() },
+        planning: Planning { optimality: crate::selection::Optimality::I, ..Planning::default() },
+        up_to_motion: false,
+        layout: Arc::new(layout),
+        limits,
+        state,
+    }
+}
+
+fn found(prospect: &Prospect, postures: usize) -> Observability {
+    prospect.observability(postures, 1e-3, &|| {}).expect("movements")
+}
+
+/// A base beside axes that are all free moves with them: six directions that nothing tells, and they are named.
+#[test]
+fn a_gauge_is_counted_and_named() {
+    let whole = found(&prospect(1, &[]), 3).parameters;
+    let with_base = found(&prospect(1, &[Block::Base]), 3).parameters;
+    assert_eq!((with_base.learned, with_base.rank), (whole.learned + 6, whole.rank));
+    assert_eq!(whole.undetermined.is_empty(), whole.rank == whole.learned);
+    let said = &with_base.undetermined[0];
+    assert!(said.contains("by any movement") && said.contains("the base") && said.contains("the axis of a"), "{said}");
+}
+
+/// Of the last joint's offset and the marker behind it nothing but their sum is told.
+#[test]
+fn the_zero_of_the_last_joint_is_the_markers_turn() {
+    let whole = found(&prospect(2, &[]), 3).parameters;
+    let offset = found(&prospect(2, &[Block::Offset(3)]), 3).parameters;
+    assert_eq!((offset.learned, offset.rank), (whole.learned + 1, whole.rank));
+    let said = &offset.undetermined[0];
+    assert!(said.contains("the offset of d") && said.contains("target 1") && !said.contains("axis of a"), "{said}");
+}
+
+/// More movements leave no parameter and no prediction less known; chosen ones predict better than random ones.
+#[test]
+fn more_movements_are_never_worse() {
+    for seed in 0..3 {
+        let prospect = prospect(seed, &[]);
+        let (few, many) = (found(&prospect, 8), found(&prospect, 14));
+        for (few, many) in few.deviations.iter().zip(&many.deviations) {
+            assert!(
+                many.best <= few.best * (1.0 + 1e-9) && few.best <= few.prior * (1.0 + 1e-9),
+                "seed {seed}: {few:?}"
+            );
+            assert!(many.random_median <= few.random_median * (1.0 + 1e-9), "seed {seed}: {few:?}");
+        }
+        assert!(many.errors.is_sorted_by(|a, b| a.best_mm >= b.best_mm && a.random_median_mm >= b.random_median_mm));
+        assert_eq!(few.errors, many.errors[..8], "one is the beginning of the other");
+        let last = many.errors[13];
+        assert!(last.best_mm < last.random_median_mm, "seed {seed}: {last:?}");
+        assert!(many.indices.best.o1 > 0.0 && many.indices.best.o2 <= 1.0);
+    }
+}
+
+/// Another sensor never lowers the rank, and never leaves a deviation greater where movements are the same.
+#[test]
+fn another_sensor_takes_nothing_away() {
+    for seed in 0..4 {
+        let one = prospect(seed, &[Block::Base, Block::Offset(1)]);
+        let mut two = one.clone();
+        two.rig = Arc::new(Rig::new([0.001, 0.002].map(|sigma| Arc::new(Position::of_marker(sigma)) as _).to_vec()));
+        let (one, two) = (found(&one, 4), found(&two, 4));
+        assert!(two.parameters.rank >= one.parameters.rank, "seed {seed}");
+        for (one, two) in one.deviations.iter().zip(&two.deviations) {
+            assert!(two.random_median <= one.random_median * (1.0 + 1e-9), "seed {seed}: {one:?} {two:?}");
+        }
+    }
+}
+
+/// What constraints exclude is not proposed, and a joint that may hardly move tells little of its axis.
+#[test]
+fn constraints_are_kept_and_tell_less() {
+    let scenario = builtin("arm-6dof-table").expect("built in");
+    let bound = scenario.prospect();
+    let report = found(&bound, 6);
+    let constraints = bound.constraints.as_ref().expect("bound");
+    let mut from = constraints.start.clone();
+    for posture in &report.best {
+        let posture: Vec<f64> = posture.joints.iter().map(|degrees| degrees.to_radians()).collect();
+        assert_eq!(constraints.violation(from.as_deref(), &posture), None);
+        from = Some(posture);
+    }
+    let held = "[constraints]\nlimits_deg = { elbow = [-10.1, -10.0] }\n";
+    let text = builtin("arm-6dof").expect("built in").source + "\n" + held;
+    let stiff = Scenario::parse("stiff.toml", &text, &|_| Err(String::new())).expect("valid");
+    let free = found(&builtin("arm-6dof").expect("built in").prospect(), 20);
+    let stiff = found(&stiff.prospect(), 20);
+    assert!(
+        free.weak.is_empty() && stiff.weak[0].said.contains("the axis of elbow"),
+        "{:?} {:?}",
+        free.weak,
+        stiff.weak
+    );
+    let of_elbow = stiff.deviations.iter().zip(&free.deviations).find(|(it, _)| it.parameter.contains("elbow"));
+    let (stiff, free) = of_elbow.expect("learned");
+    assert!(stiff.best > 3.0 * free.best, "{stiff:?} {free:?}");
+}

@@ -1,0 +1,47 @@
+//! What can be learned of a robot: its parameters in blocks, and how they move its links.
+//!
+//! * [`State`]: base, joints, corrections of readings, targets, devices, sockets; forward kinematics.
+//! * [`Block`]: parameters that belong together; [`Element`]: their values, with chart and transport.
+//! * [`Layout`]: which blocks are learned, and where each stands in the tangent vector.
+//! * [`ChainPrior`]: what is known of a described robot, whose errors are local: a covariance for the prior.
+//! * [`Prior`]: what is known before any measurement, with a full covariance, or anywhere within bounds.
+//! * [`Loads`]: what gravity does to joints that give way.
+//! * [`Pass`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
+//!   and not among the kinematics since it is the layout that says which parameters there are.
+//! * [`Workspace`]: where predictions of the hand count.
+//! * [`urdf`]: robot descriptions, read into a chain and written with the axes that were learned.
+//! * [`Names`]: what blocks are called, and what is said of those that nothing determines.
+//! * [`Manifold`]: the postures in which a target is at a given place.
+
+mod block;
+mod chain_prior;
+mod element;
+mod layout;
+mod loads;
+mod manifold;
+mod names;
+mod pass;
+mod points;
+mod prior;
+mod rank;
+mod state;
+mod workspace;
+
+pub use block::Block;
+pub(crate) use chain_prior::Inverted;
+pub use chain_prior::{ChainErrors, ChainPrior, Scales};
+pub use element::{Displacement, Element};
+pub use layout::{Layout, Quantity};
+pub use loads::{GRAVITY, Load, Loads, Mass};
+pub use manifold::Manifold;
+pub use names::{Names, listed};
+pub use pass::{Frame, Motion, Pass, jacobian};
+pub use points::Whitening;
+pub(crate) use points::{Centre, Centres, Passage, Points, Posture, Ray, Stage};
+pub use prior::{Derivatives, Prior, PriorError, anywhere};
+pub use rank::{eigen, null_space, rank, singular};
+pub use state::{Correction, Device, Hand, Place, State, Target, Thetas};
+pub use workspace::{Workspace, best_motion};
+
+#[cfg(test)]
+pub(crate) mod laws;

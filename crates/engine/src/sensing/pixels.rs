@@ -1,0 +1,302 @@
+//! The known points of a target in the picture of a calibrated camera, two equations each.
+//!
+//! The camera looks along its own z, x to the right of the picture and y down. A point at (x, y, z) in its frame is at
+//!
+//! ```text
+//! u = fx x/z + cx,   v = fy y/z + cy        (pixels)
+//! ```
+//!
+//! The camera stands beside the robot or is carried by a link, and so does the target: of both the twists of all parameters
+//! are known, so that hand–eye and a fixed camera are one channel. Poses and lenses are blocks of the model.
+//!
+//! *Out of view.* A target is seen whole or not at all: in front of the camera, inside its picture, and facing it. An estimate
+//! that has a point behind the camera which was seen must find its way to the front, so for searches and filters the depth goes on
+//! below [`NEAR`] as `z̄ = z₀²/(2 z₀ − z)`: positive everywhere, with a continuous slope. It is no prediction: there is none of a point
+//! behind the camera.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+
+use super::{Apart, Channel, Equipment, KeyError, Keys};
+use crate::{elementary::{asin, hypot}, model::{Block, Frame, Pass, State}};
+
+/// A camera's view of a target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pixels {
+    /// Which camera, by its number among the devices.
+    pub camera: usize,
+    /// Which target.
+    pub target: usize,
+    /// The known points in the target's frame, metres.
+    pub points: Arc<[Point3<f64>]>,
+    /// Width and height of the picture, pixels.
+    pub size_px: [f64; 2],
+    /// From where the target can be seen.
+    pub facing: Option<Facing>,
+    /// Standard deviation of the noise per coordinate, pixels.
+    pub sigma_px: f64,
+}
+
+/// From where a target can be seen: within an angle of a direction that it faces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facing {
+    /// The direction, in the target's frame.
+    pub direction: UnitVector3<f64>,
+    /// The angle, radians.
+    pub within: f64,
+}
+
+/// z₀, the depth below which the projection is continued, metres.
+pub const NEAR: f64 = 0.05;
+
+/// A point of the target in a camera's frame, and its picture.
+struct Seen {
+    /// (x, y, z̄).
+    at: Vector3<f64>,
+    /// ∂z̄/∂z.
+    slope: f64,
+    /// (u, v), pixels.
+    picture: [f64; 2],
+}
+
+impl Pixels {
+    pub(super) fn from_keys(keys: &Keys, equipment: &Equipment) -> Result<Self, KeyError> {
+        keys.only(&["camera", "target", "sigma_px"])?;
+        let ((camera, lens), (target, body)) = (keys.camera(equipment)?, keys.target(equipment)?);
+        let (points, size_px, facing) = (body.points.clone().into(), lens.size_px, body.facing);
+        Ok(Self { camera, target, points, size_px, facing, sigma_px: keys.sigma_px()? })
+    }
+
+    /// fx, fy, cx, cy.
+    fn lens(&self, state: &State) -> [f64; 4] {
+        state.devices[self.camera].intrinsics.unwrap_or_default()
+    }
+
+    fn see(lens: &[f64; 4], at: &Vector3<f64>) -> Seen {
+        let [fx, fy, cx, cy] = *lens;
+        let (depth, slope) = if at.z >= NEAR {
+            (at.z, 1.0)
+        } else {
+            let depth = NEAR * NEAR / (2.0 * NEAR - at.z);
+            (depth, (depth / NEAR).powi(2))
+        };
+        let picture = [fx * at.x / depth + cx, fy * at.y / depth + cy];
+        Seen { at: Vector3::new(at.x, at.y, depth), slope, picture }
+    }
+
+    /// Writes the picture, continued behind the camera, and tells how far the nearest point is in front of it, metres.
+    fn project(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> f64 {
+        let (camera, target) = self.frames(state, positions);
+        let (lens, place) = (self.lens(state), camera.inverse() * target);
+        let mut nearest = f64::INFINITY;
+        for (point, picture) in self.points.iter().zip(reading.chunks_exact_mut(2)) {
+            let at = (place * point).coords;
+            nearest = nearest.min(at.z);
+            picture.copy_from_slice(&Self::see(&lens, &at).picture);
+        }
+        nearest
+    }
+
+    fn frames(&self, state: &State, positions: &[f64]) -> (Isometry3<f64>, Isometry3<f64>) {
+        (state.frame_at(Frame::Device(self.camera), positions), state.frame_at(Frame::Target(self.target), positions))
+    }
+
+    #[cfg(test)]
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Self {
+        use rand::RngExt;
+        let lenses = (0..state.devices.len()).filter(|device| state.devices[*device].intrinsics.is_some());
+        let lenses: Vec<usize> = lenses.collect();
+        let camera = lenses[rng.random_range(0..lenses.len())];
+        let target = rng.random_range(0..state.targets.len());
+        let points = (0..rng.random_range(1..=4)).map(|_| Point3::from(Vector3::from_fn(|_, _| rng.random_range(-0.2..0.2))));
+        let facing = Facing { direction: Vector3::z_axis(), within: 1.4 };
+        let (points, sigma_px) = (points.collect(), rng.random_range(0.3..3.0));
+        Self { camera, target, points, size_px: [640.0, 480.0], facing: Some(facing), sigma_px }
+    }
+}
+
+impl Channel for Pixels {
+    fn equations(&self) -> usize {
+        2 * self.points.len()
+    }
+
+    fn sigma(&self) -> f64 {
+        self.sigma_px
+    }
+
+    fn with_sigma(&self, sigma_px: f64) -> Arc<dyn Channel> {
+        Arc::new(Self { sigma_px, ..self.clone() })
+    }
+
+    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
+        self.project(state, positions, reading) > 0.0
+    }
+
+    fn extended(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
+        self.project(state, positions, reading);
+        true
+    }
+
+    fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
+        let weight = self.sigma_px.recip();
+        whitened.iter_mut().zip(y).zip(h).for_each(|((whitened, y), h)| *whitened = (y - h) * weight);
+    }
+
+    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+        let (camera, target) = (Frame::Device(self.camera), Frame::Target(self.target));
+        let (eye, body) = (pass.pose(camera), pass.pose(target));
+        let (of_eye, of_body) = (pass.frame_twists(camera), pass.frame_twists(target));
+        let lens = self.lens(pass.state());
+        let [fx, fy, ..] = lens;
+        let into_eye = eye.rotation.inverse().to_rotation_matrix();
+        let own = pass.layout().block(Block::Intrinsics(self.camera));
+        let (m, weight) = (of_eye.ncols(), self.sigma_px.recip());
+        // Nothing may be learned: then there are no rows to cut into pieces.
+        for (k, (point, picture)) in self.points.iter().zip(reading.chunks_exact_mut(2)).enumerate() {
+            let rows = &mut rows[2 * m * k..2 * m * (k + 1)];
+            let x = body * point;
+            let from_eye = x.coords - eye.translation.vector;
+            let Seen { at, slope, picture: found } = Self::see(&lens, &(into_eye * from_eye));
+            picture.copy_from_slice(&found);
+            let lever = x.coords - body.translation.vector;
+            let (across, down) = rows.split_at_mut(m);
+            for k in 0..m {
+                let (eye, body) = (of_eye.column(k), of_body.column(k));
+                let twist = |column: &nalgebra::MatrixView6x1<'_, f64>, lever: &Vector3<f64>| {
+                    column.fixed_rows::<3>(0) + column.fixed_rows::<3>(3).cross(lever)
+                };
+                let moved = into_eye * (twist(&body.as_view(), &lever) - twist(&eye.as_view(), &from_eye));
+                across[k] = fx * (moved.x - at.x / at.z * slope * moved.z) / at.z * weight;
+                down[k] = fy * (moved.y - at.y / at.z * slope * moved.z) / at.z * weight;
+            }
+            if let Some(own) = &own {
+                across[own.start] += at.x / at.z * weight;
+                down[own.start + 1] += at.y / at.z * weight;
+                across[own.start + 2] += weight;
+                down[own.start + 3] += weight;
+            }
+        }
+        true
+    }
+
+    fn nominal(&self, _: usize) -> (f64, &'static str) {
+        (self.sigma_px, "px")
+    }
+
+    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
+        let points = y.chunks_exact(2).zip(h.chunks_exact(2)).map(|(y, h)| hypot(y[0] - h[0], y[1] - h[1]));
+        Apart { pixels: Some(points.sum::<f64>() / (y.len() / 2).max(1) as f64), ..Apart::default() }
+    }
+
+    fn has_view(&self) -> bool {
+        true
+    }
+
+    fn sight(&self) -> Option<(usize, usize)> {
+        Some((self.camera, self.target))
+    }
+
+    /// The least angle between a point and the four planes that bound the picture, and that by which the target still faces
+    /// the camera. All four are positive in front of the camera alone.
+    fn clearance(&self, state: &State, positions: &[f64]) -> Option<f64> {
+        let (camera, target) = self.frames(state, positions);
+        let ([fx, fy, cx, cy], [width, height]) = (self.lens(state), self.size_px);
+        let place = camera.inverse() * target;
+        let planes = [
+            Vector3::new(fx, 0.0, cx),
+            Vector3::new(-fx, 0.0, width - cx),
+            Vector3::new(0.0, fy, cy),
+            Vector3::new(0.0, -fy, height - cy),
+        ]
+        .map(|plane| plane.normalize());
+        let mut least = f64::INFINITY;
+        for point in self.points.iter() {
+            let at = (place * point).coords;
+            let distance = at.norm().max(1e-9);
+            for plane in &planes {
+                least = least.min(asin((plane.dot(&at) / distance).clamp(-1.0, 1.0)));
+            }
+        }
+        if let Some(Facing { direction, within }) = &self.facing {
+            let towards_camera = -place.translation.vector;
+            least = least.min(within - (place.rotation * direction.into_inner()).angle(&towards_camera));
+        }
+        Some(least)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Translation3, UnitQuaternion};
+
+    use super::*;
+    use crate::model::{Device, Place, Target, laws::random_arm};
+
+    /// A camera at the origin that looks along z, and a tag of two points 0.1 m apart that is carried by nothing.
+    fn tag(at: Isometry3<f64>) -> (State, Pixels) {
+        use rand::SeedableRng;
+        let mut state = random_arm(&mut rand_chacha::ChaCha8Rng::seed_from_u64(1), 1);
+        state.targets.push(Target { link: 0, place: Place::Pose(at) });
+        let intrinsics = Some([500.0, 500.0, 320.0, 240.0]);
+        state.devices.push(Device { link: None, pose: Isometry3::identity(), intrinsics });
+        let points = [Point3::new(0.05, 0.0, 0.0), Point3::new(-0.05, 0.0, 0.0)].into();
+        let facing = Some(Facing { direction: -Vector3::z_axis(), within: 80_f64.to_radians() });
+        (state, Pixels { camera: 0, target: 1, points, size_px: [640.0, 480.0], facing, sigma_px: 1.0 })
+    }
+
+    #[test]
+    fn a_picture_worked_by_hand() {
+        let (state, view) = tag(Translation3::new(0.1, -0.2, 0.5).into());
+        let mut picture = [0.0; 4];
+        assert!(view.predict(&state, &[0.0], &mut picture));
+        // 500 · 0.15/0.5 + 320, 500 · −0.2/0.5 + 240.
+        let expected = [470.0, 40.0, 370.0, 40.0];
+        assert!(picture.iter().zip(expected).all(|(found, wanted)| (found - wanted).abs() < 1e-9), "{picture:?}");
+        assert!(view.clearance(&state, &[0.0]).expect("a view") > 0.0);
+    }
+
+    #[test]
+    fn a_tag_is_seen_whole_in_front_inside_and_facing_or_not_at_all() {
+        let clearance = |pose: Isometry3<f64>| {
+            let (state, view) = tag(pose);
+            view.clearance(&state, &[0.0]).expect("a view")
+        };
+        let at = |x, y, z| Translation3::new(x, y, z).into();
+        // The half picture is 320/500 of the depth wide: at 0.5 m one of two points leaves at 0.27 m.
+        assert!(clearance(at(0.26, 0.0, 0.5)) > 0.0 && clearance(at(0.28, 0.0, 0.5)) < 0.0);
+        assert!(clearance(at(0.0, 0.23, 0.5)) > 0.0 && clearance(at(0.0, -0.25, 0.5)) < 0.0);
+        assert!(clearance(at(0.0, 0.0, -0.5)) < 0.0, "behind the camera");
+        let turned = |degrees: f64| {
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), degrees.to_radians());
+            clearance(Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.5), turn))
+        };
+        assert!(turned(79.0) > 0.0 && turned(81.0) < 0.0 && turned(180.0) < 0.0);
+    }
+
+    /// There is no picture of what is behind a camera, wholly or in part, though a search is led to the front.
+    #[test]
+    fn behind_the_camera_there_is_no_prediction() {
+        for (turn, z, is_predicted) in [(0.0, 0.5, true), (0.0, -0.5, false), (90_f64, 0.04, false), (90.0, 0.06, true)] {
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn.to_radians());
+            let (state, view) = tag(Isometry3::from_parts(Translation3::new(0.0, 0.0, z), turn));
+            let mut picture = [0.0; 4];
+            assert_eq!(view.predict(&state, &[0.0], &mut picture), is_predicted, "{z}");
+            assert!(view.extended(&state, &[0.0], &mut picture) && picture.iter().all(|x| x.is_finite()));
+            let rig = crate::sensing::Rig::new(vec![Arc::new(view)]);
+            let observation = crate::sensing::Observation::of([300.0, 200.0, 310.0, 220.0]);
+            assert_eq!(rig.residual(&state, &[0.0], &observation).len(), 4, "an estimate that is wrong is told so");
+        }
+    }
+
+    /// Behind the camera the projection goes on without a break, and its slope leads to the front.
+    #[test]
+    fn the_projection_is_continued_behind_the_camera() {
+        let lens = [500.0, 500.0, 320.0, 240.0];
+        let across = |z: f64| Pixels::see(&lens, &Vector3::new(0.1, 0.0, z)).picture[0];
+        let slope = |z: f64| (across(z + 1e-7) - across(z - 1e-7)) / 2e-7;
+        assert!((across(NEAR + 1e-9) - across(NEAR - 1e-9)).abs() < 1e-3);
+        assert!((slope(NEAR + 1e-6) / slope(NEAR - 1e-6) - 1.0).abs() < 1e-3);
+        assert!((-40..40).all(|z| slope(0.05 * f64::from(z)) < 0.0));
+    }
+}

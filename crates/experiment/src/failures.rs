@@ -1,0 +1,184 @@
+//! A step that cannot be made leaves the experiment as it was.
+
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
+};
+
+use nalgebra::{DMatrix, DVector, Point3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::{
+    Agent, Change, Description, Evaluation, Experiment, ExperimentError, Learner, LearnerDescription, StepReport,
+    Thresholds, World,
+};
+use body_schema_engine::{
+    estimation::{Belief, Rls, StabilisingNoise},
+    kinematics::JointBox,
+    model::{Layout, State, laws::random_arm},
+    selection::{
+        Actions, Active, Appraisal, CriterionUnits, Minimiser, Policy, Random, Selection, SelectionError, Situation,
+        Weights,
+    },
+    sensing::Rig,
+};
+
+const JOINTS: usize = 3;
+
+/// Cannot choose the next time that it is asked, if that is told.
+struct Faltering {
+    policy: Box<dyn Policy>,
+    falters: Arc<AtomicBool>,
+}
+
+impl Policy for Faltering {
+    fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError> {
+        if self.falters.swap(false, Ordering::Relaxed) {
+            return Err(SelectionError::NoCovariance);
+        }
+        self.policy.select(situation, rng)
+    }
+
+    fn appraise(
+        &self,
+        situation: &Situation<'_>,
+        limits: &JointBox,
+        configuration: &[f64],
+    ) -> Result<Appraisal, SelectionError> {
+        self.policy.appraise(situation, limits, configuration)
+    }
+}
+
+fn truth() -> State {
+    random_arm(&mut ChaCha8Rng::seed_from_u64(8), JOINTS)
+}
+
+fn limits() -> JointBox {
+    JointBox::new(vec![(-1.0, 1.0); JOINTS]).expect("limits")
+}
+
+/// The truth with its marker at a distance that is no number.
+fn beyond_all_numbers() -> State {
+    truth().with_marker(Point3::new(f64::INFINITY, 0.0, 0.0))
+}
+
+fn world(change: Option<Change>) -> World {
+    let rig = Arc::new(Rig::tracker(0.01));
+    let (truth, limits) = (Box::new(truth()), limits());
+    World::Simulated { truth, rig, limits, head: None, change: change.map(Box::new), outliers: None }
+}
+
+/// Two learners, the first active and the other random; the flag makes the second falter.
+fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
+    let layout = Arc::new(Layout::of_arm(&truth(), &[], false));
+    let deviations = DVector::from_element(layout.dimension(), 0.3);
+    let weights = Weights::new(CriterionUnits::CharacteristicLength(1.0), &layout, &deviations);
+    let initial = truth().retract(&layout, &DVector::from_element(layout.dimension(), 0.1));
+    let limits = limits();
+    let falters = Arc::new(AtomicBool::new(false));
+    let learner = |name: &str, policy: Box<dyn Policy>| {
+        let belief = Belief::new(initial.clone(), layout.clone(), Arc::new(Rig::tracker(0.02)));
+        let noise = StabilisingNoise { variance: 1e-4, first_step: 1, every: 2 };
+        let covariance = DMatrix::from_diagonal(&deviations.map(|sd| sd * sd));
+        let estimator = Box::new(Rls::new(belief, covariance, Some(noise)));
+        let agent = Agent::new(estimator, policy, Actions::Box(limits.clone()), limits.clone(), 5);
+        let (name, estimator, policy) = (name.to_owned(), "rls".to_owned(), name.to_owned());
+        let description = LearnerDescription { name, estimator, policy, stabilised: true, robust: false };
+        Learner::new(description, agent, weights.clone(), vec![vec![0.5; JOINTS]], 0.01)
+    };
+    let active = Active::new(weights.clone(), Minimiser::Random { evaluations: 20 });
+    let random = Box::new(Random::new(weights.clone(), None));
+    let learners = vec![
+        learner("active", Box::new(active)),
+        learner("faltering", Box::new(Faltering { policy: random, falters: falters.clone() })),
+    ];
+    let description = Description {
+        scenario: "two-learners".to_owned(),
+        title: String::new(),
+        seed: 5,
+        version: String::new(),
+        joints: Vec::new(),
+        parameters: layout.dimension(),
+        movements_by_counting: 1,
+        learners: learners.iter().map(|learner| learner.description.clone()).collect(),
+        thresholds: Thresholds { orientation_deg: 5.0, location_m: 0.02 },
+        movements_available: None,
+        truth: None,
+        change_at: world.change().map(|change| change.step),
+        head: None,
+        channels: Vec::new(),
+        cameras: Vec::new(),
+        targets: Vec::new(),
+        base_learned: false,
+        sockets: Vec::new(),
+        body: None,
+    };
+    let evaluation = Evaluation::of_truth(vec![vec![0.2; JOINTS], vec![-0.4; JOINTS]], &truth(), 0.01);
+    (Experiment::new(description, world, learners, evaluation, Vec::new()), falters)
+}
+
+/// The report of the next step, but for how long the choices took.
+fn step(experiment: &mut Experiment) -> StepReport {
+    timeless(experiment.step().expect("a step"))
+}
+
+fn timeless(report: &StepReport) -> StepReport {
+    let mut report = report.clone();
+    report.learners.iter_mut().filter_map(|learner| learner.movement.as_mut()).for_each(|it| it.selection_ms = 0.0);
+    report
+}
+
+/// The first learner has proposed by then.
+#[test]
+fn a_learner_that_cannot_choose_changes_nothing() {
+    let (mut steady, _) = experiment(world(None));
+    let (mut faltering, falters) = experiment(world(None));
+    for number in 0..6 {
+        if number % 2 == 0 {
+            falters.store(true, Ordering::Relaxed);
+            let before = timeless(faltering.latest());
+            let found = faltering.step().map(|report| report.step);
+            let (learner, source) = ("faltering".to_owned(), SelectionError::NoCovariance);
+            assert_eq!(found, Err(ExperimentError::Selection { learner, source }));
+            assert_eq!(timeless(faltering.latest()), before);
+        }
+        let report = step(&mut steady);
+        assert!(report.learners.iter().all(|learner| learner.movement.is_some() && learner.failure.is_none()));
+        assert_eq!(step(&mut faltering), report);
+    }
+}
+
+/// The measurement cannot be made, also not when it is tried again; once it can, all is as if it always could.
+#[test]
+fn a_world_that_has_nothing_to_show_changes_nothing() {
+    let (mut steady, _) = experiment(world(None));
+    let (mut broken, _) = experiment(world(None));
+    (0..2).for_each(|_| assert_eq!(step(&mut steady), step(&mut broken)));
+    let mut nowhere = world(None);
+    let World::Simulated { truth, .. } = &mut nowhere else { unreachable!("simulated") };
+    **truth = beyond_all_numbers();
+    let whole = std::mem::replace(&mut broken.world, nowhere);
+    for _ in 0..2 {
+        let before = timeless(broken.latest());
+        let found = broken.step().map(|report| report.step);
+        assert!(matches!(&found, Err(ExperimentError::World { learner, .. }) if learner == "active"), "{found:?}");
+        assert_eq!(timeless(broken.latest()), before);
+    }
+    broken.world = whole;
+    (0..4).for_each(|_| assert_eq!(step(&mut broken), step(&mut steady)));
+}
+
+/// A change of the body that leaves nothing to be measured has not happened: the truth is the one before.
+#[test]
+fn a_change_that_cannot_be_shown_has_not_happened() {
+    let (mut experiment, _) = experiment(world(Some(Change { step: 2, truth: beyond_all_numbers() })));
+    (0..2).for_each(|_| drop(step(&mut experiment)));
+    for _ in 0..2 {
+        let before = timeless(experiment.latest());
+        let found = experiment.step().map(|report| report.step);
+        assert!(matches!(found, Err(ExperimentError::World { .. })), "{found:?}");
+        assert_eq!((timeless(experiment.latest()), experiment.world().truth()), (before, Some(&truth())));
+        assert!(experiment.world().change().is_some(), "still to come");
+    }
+}

@@ -1,0 +1,275 @@
+//! The outcome of a run: the metrics at its end and the learned models, to take away and use.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Experiment, convergence::Thresholds, metrics::Metrics, remarks::remarks, report::array};
+use body_schema_engine::{
+    design::BestDesign,
+    estimation::{Belief, NoiseReport, ReadingReport},
+    kinematics::{JointKind, chart},
+    model::Block,
+};
+
+/// The outcome of one run: `result.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct RunResult {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Version of body-schema that computed this.
+    pub version: String,
+    /// Steps made.
+    pub steps: u64,
+    /// The thresholds of `converged_at`.
+    pub thresholds: Thresholds,
+    /// See [`Description::movements_by_counting`](super::Description::movements_by_counting).
+    #[serde(default)]
+    pub movements_by_counting: usize,
+    /// The best designs of several lengths up to this run's, by step; empty unless they were asked for, and where no
+    /// truth is known.
+    #[serde(default)]
+    pub best_designs: Vec<BestDesign>,
+    /// The readings that had nothing to do with the robot, where the world is simulated and has such.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outliers: Vec<OutlierReading>,
+    /// The learners.
+    pub learners: Vec<LearnerResult>,
+}
+
+/// A reading that had nothing to do with the robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct OutlierReading {
+    /// The movement, counted from 1.
+    pub movement: u64,
+    /// The channel, counted from 0.
+    pub channel: usize,
+}
+
+/// The outcome of one learner.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct LearnerResult {
+    /// Its name.
+    pub name: String,
+    /// Its estimator.
+    pub estimator: String,
+    /// Its policy.
+    pub policy: String,
+    /// First movement of the final stretch within the thresholds, confirmed by 20 more; null if there is none.
+    pub converged_at: Option<u64>,
+    /// After a change of the body: the first movement, counted from the change, of the final stretch within the
+    /// thresholds, confirmed by 20 more; null if there is none or no change. `converged_at` is judged up to the change.
+    pub recovered_at: Option<u64>,
+    /// The movement, counted from the change, at which the learner itself noticed it; null for a learner that does not
+    /// look for changes.
+    pub change_detected_at: Option<u64>,
+    /// How often the learner noticed a change of the body before there was one.
+    #[serde(default)]
+    pub false_alarms: u64,
+    /// First movement at which the learner called itself settled; null if it did not.
+    pub settled_at: Option<u64>,
+    /// Why the learner stopped learning, if it did.
+    pub failure: Option<String>,
+    /// The A-efficiency of the data collected: the trace of the last of `best_designs` as a fraction of `bound_trace` at
+    /// the end; null without one of them.
+    #[serde(default)]
+    pub efficiency: Option<f64>,
+    /// How many parameters it learns.
+    #[serde(default)]
+    pub parameters: usize,
+    /// The metrics at the end.
+    pub metrics: Metrics,
+    /// What it makes of every reading, for a learner with a robust loss.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub readings: Vec<ReadingReport>,
+    /// The scales of noise that it learned.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub noise: Vec<NoiseReport>,
+    /// How far the joints' readings are off as it learned it: one standard deviation for each joint, rad or m.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reading_sigmas: Vec<f64>,
+    /// What is to be said of it in words: what no movement can tell, noise other than promised, outliers, alarms.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
+    /// The learned model.
+    pub model: Model,
+}
+
+/// A learned chain with its covariance, at θ = 0, in the frame of the measurements.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct Model {
+    /// The joints, base first.
+    pub joints: Vec<JointModel>,
+    /// The marker on the hand.
+    pub marker: MarkerModel,
+    /// What else is learned: base, ratios, offsets, other targets, cameras.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<OtherModel>,
+    /// Covariance of all learned parameters in tangent coordinates, row by row; null if the estimator keeps none. Every part
+    /// of the model lists its own under `coordinates`.
+    pub covariance: Option<Vec<Vec<f64>>>,
+}
+
+/// A learned joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct JointModel {
+    /// Its name.
+    pub name: String,
+    /// Revolute or prismatic.
+    pub kind: JointKind,
+    /// Whether it was learned, or known and held fixed.
+    pub learned: bool,
+    /// Unit direction of the axis.
+    pub axis: [f64; 3],
+    /// A point on the axis, metres; null for a prismatic joint.
+    pub point_m: Option<[f64; 3]>,
+    /// The chart's basis: two unit vectors ⟂ axis along which point (m) and direction (rad) move.
+    pub basis: [[f64; 3]; 2],
+    /// What its readings are multiplied by; 1 unless it is learned.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub ratio: f64,
+    /// What is added to its readings, rad or m; 0 unless it is learned.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub offset: f64,
+    /// Indices of this joint's coordinates in the covariance: two of the point (revolute only), two of the direction.
+    pub coordinates: Vec<usize>,
+}
+
+/// Something learned besides axes and marker.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct OtherModel {
+    /// What it is, by its name in the engine and its number from 0: `Base`, `Ratio(3)`.
+    pub what: String,
+    /// Indices of its coordinates in the covariance.
+    pub coordinates: Vec<usize>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it")]
+fn is_one(x: &f64) -> bool {
+    *x == 1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it")]
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
+/// The marker on the hand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct MarkerModel {
+    /// Its position at θ = 0, metres.
+    pub position_m: [f64; 3],
+    /// Whether it was learned.
+    pub learned: bool,
+    /// Indices of its coordinates in the covariance: x, y, z (m).
+    pub coordinates: Vec<usize>,
+}
+
+impl Model {
+    fn new(belief: &Belief, names: &[String]) -> Self {
+        let layout = &belief.layout;
+        // With a base of its own the basis turns with it, as the axis does.
+        let state = belief.state.measured();
+        let rotation = belief.state.base.rotation;
+        let joints = belief
+            .state
+            .joints
+            .iter()
+            .enumerate()
+            .zip(&state.joints)
+            .map(|((index, own), joint)| {
+                let basis = rotation.to_rotation_matrix().matrix() * chart::basis(&own.direction());
+                let coordinates = [layout.point(index), layout.direction(index)];
+                JointModel {
+                    name: names.get(index).cloned().unwrap_or_default(),
+                    kind: joint.kind(),
+                    learned: layout.is_learned(index),
+                    axis: array(&joint.direction()),
+                    point_m: joint.line().map(|line| array(&line.point.coords)),
+                    basis: [array(&basis.column(0).into_owned()), array(&basis.column(1).into_owned())],
+                    ratio: belief.state.corrections[index].ratio,
+                    offset: belief.state.corrections[index].offset,
+                    coordinates: coordinates.into_iter().flatten().flatten().collect(),
+                }
+            })
+            .collect();
+        let marker = MarkerModel {
+            position_m: array(&state.marker().coords),
+            learned: layout.marker().is_some(),
+            coordinates: layout.marker().into_iter().flatten().collect(),
+        };
+        let others = layout.blocks().filter(|(block, _)| !matches!(block, Block::Axis(_)));
+        let others = others.filter(|(_, range)| Some(range.start) != layout.marker().map(|marker| marker.start));
+        let others =
+            others.map(|(block, range)| OtherModel { what: format!("{block:?}"), coordinates: range.collect() });
+        let others = others.collect();
+        let covariance =
+            belief.covariance.as_ref().map(|p| p.row_iter().map(|row| row.iter().copied().collect()).collect());
+        Self { joints, marker, others, covariance }
+    }
+}
+
+impl RunResult {
+    /// The same beside the best designs of the scenario.
+    pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
+        for learner in &mut self.learners {
+            learner.efficiency = BestDesign::efficiency(&best_designs, learner.metrics.bound_trace, learner.parameters);
+        }
+        Self { best_designs, ..self }
+    }
+}
+
+impl Experiment {
+    /// The outcome so far.
+    pub fn result(&self) -> RunResult {
+        let description = self.description();
+        let names: Vec<String> = description.joints.iter().map(|joint| joint.name.clone()).collect();
+        let learners = self
+            .learners
+            .iter()
+            .zip(&self.latest.learners)
+            .zip(self.judge.verdicts())
+            .map(|((learner, report), verdict)| LearnerResult {
+                name: report.name.clone(),
+                estimator: learner.description.estimator.clone(),
+                policy: learner.description.policy.clone(),
+                converged_at: verdict.convergence.converged_at(),
+                recovered_at: verdict.recovery.converged_at(),
+                change_detected_at: verdict.noticed_at,
+                false_alarms: verdict.false_alarms,
+                settled_at: verdict.settled_at,
+                failure: report.failure.clone(),
+                efficiency: None,
+                parameters: learner.belief().layout.dimension(),
+                metrics: report.metrics.clone(),
+                readings: learner.readings(),
+                noise: learner.noise(),
+                reading_sigmas: learner.reading_sigmas(),
+                remarks: remarks(learner, &report.metrics, description, &self.world),
+                model: Model::new(learner.belief(), &names),
+            })
+            .collect();
+        RunResult {
+            scenario: description.scenario.clone(),
+            seed: description.seed,
+            version: description.version.clone(),
+            steps: self.latest.step,
+            thresholds: description.thresholds,
+            movements_by_counting: description.movements_by_counting,
+            best_designs: Vec::new(),
+            outliers: self.outliers.clone(),
+            learners,
+        }
+    }
+}

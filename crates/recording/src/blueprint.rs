@@ -1,0 +1,211 @@
+//! How a viewer arranges a recording when it opens it.
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    RecordingError,
+    charts::{BEST_DESIGN, CHARTS, CHARTS_WITHOUT_TRUTH, TRACE},
+    layout::{Container, Part, Time, View},
+    rerun::{
+        ApplicationId, EntityPath, LogMsg, Range2D,
+        blueprint::{
+            archetypes::{
+                Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, VisualBounds2D as Bounds,
+            },
+            components::{BackgroundKind, Corner2D, VisualBounds2D},
+        },
+    },
+    solid::single,
+    stage::{GROUNDS, Stage},
+};
+use body_schema_calibration::Unit;
+use body_schema_experiment::{Description, LearnerDescription};
+
+/// The colours around a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Theme {
+    /// Dark on light ground.
+    #[default]
+    Light,
+    /// Light on dark ground.
+    Dark,
+}
+
+/// The shape of the view in which a scene is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Shape {
+    /// Rather wide than high: the learners stand beside one another.
+    #[default]
+    Wide,
+    /// Rather high than wide: they stand behind one another, seen from above.
+    Tall,
+}
+
+impl Shape {
+    /// A view's width in heights.
+    pub fn aspect(self) -> f64 {
+        match self {
+            Self::Wide => 1.4,
+            Self::Tall => 0.7,
+        }
+    }
+}
+
+impl Theme {
+    /// The background.
+    fn background(self) -> [u8; 3] {
+        match self {
+            Self::Light => [0xF4, 0xF5, 0xF7],
+            Self::Dark => [0x1B, 0x1C, 0x1F],
+        }
+    }
+
+    /// The lines of the ground.
+    pub(super) fn lines(self) -> [u8; 3] {
+        match self {
+            Self::Light => [0xC6, 0xCA, 0xD2],
+            Self::Dark => [0x3E, 0x42, 0x4A],
+        }
+    }
+}
+
+/// Arranges the views of one recording.
+pub(super) struct Arranger {
+    pub(super) description: Description,
+    /// The roots of the learners.
+    pub(super) roots: Vec<EntityPath>,
+    pub(super) stage: Stage,
+    /// That of the recording.
+    pub(super) application: ApplicationId,
+}
+
+impl Arranger {
+    /// For a file: the scene above; below, the curves, DIRECT's partition and the note.
+    pub(super) fn whole(&self) -> Result<Vec<LogMsg>, RecordingError> {
+        let scene = self.view(Theme::default(), Shape::default().aspect(), true).into();
+        let mut below = self.charts();
+        let note = View::new("TextDocument", "Note", &EntityPath::from("note")).into();
+        let tabs = self.partitions().into_iter().chain(self.limits()).chain(self.readings()).chain([note]);
+        below.push(Container::tabs(tabs).into());
+        let root = Container::vertical([scene, Container::horizontal(below).into()], [3.0, 1.0]);
+        root.messages(self.application.clone(), Time::Shown)
+    }
+
+    /// For a page that has controls and curves of its own: the scene alone, to look at and to turn.
+    pub(super) fn scene(&self, theme: Theme, aspect: f64) -> Result<Vec<LogMsg>, RecordingError> {
+        let scene: Part = self.view(theme, aspect, false).into();
+        Container::tabs([scene]).messages(self.application.clone(), Time::Led)
+    }
+
+    /// All learners in one view. With `details` it can be asked what is what, there is a key to the colours, and the arms
+    /// at θ = 0 can be switched on.
+    fn view(&self, theme: Theme, aspect: f64, details: bool) -> View {
+        let [target, eye] = self.stage.camera(aspect).map(|point| single(point.coords.into()));
+        let (ground, labels): (_, &[&str]) = match theme {
+            Theme::Light => (GROUNDS[0], &["on_dark/**"]),
+            Theme::Dark => (GROUNDS[1], &["name", "marker/error", "marker/missed"]),
+        };
+        let mut contents = vec![format!("+ /{ground}")];
+        for root in &self.roots {
+            contents.push(format!("+ {root}/**"));
+            let hidden = ["direct/**", "metrics/**", "readings/**", "failure/**"];
+            contents.extend(hidden.iter().chain(labels).map(|hidden| format!("- {root}/{hidden}")));
+            contents.extend((!details).then(|| format!("- {root}/zero/**")));
+        }
+        contents.extend(details.then(|| "+ /key".to_owned()));
+        let mut view = View::new("3D", "Scene", &EntityPath::root())
+            .with_contents(contents)
+            .with(&EyeControls3D::new().with_position(eye).with_look_target(target).with_eye_up([0.0, 0.0, 1.0]))
+            .with(&Background::new(BackgroundKind::SolidColor).with_color(theme.background()))
+            // The lines of the ground are an entity: the viewer's own grid costs a tenth of a frame where software draws.
+            .with(&LineGrid3D::new().with_visible(false));
+        if !details {
+            let ground = EntityPath::from(ground);
+            view = view.with_behavior(&ground, &EntityBehavior::new().with_interactive(false));
+        }
+        for root in &self.roots {
+            if details {
+                let zero = root.join(&EntityPath::from("zero"));
+                view = view.with_behavior(&zero, &EntityBehavior::new().with_visible(false));
+            } else {
+                view = view.with_behavior(root, &EntityBehavior::new().with_interactive(false));
+            }
+        }
+        view
+    }
+
+    /// The curves of all learners, metric by metric.
+    fn charts(&self) -> Vec<Part> {
+        let charts: &[(&str, &str)] = if self.description.truth.is_some() { &CHARTS } else { &CHARTS_WITHOUT_TRUTH };
+        let views = charts.iter().map(|(title, metric)| {
+            chart(title, self.roots.iter().map(|root| format!("+ {root}/metrics/{metric}")), None)
+        });
+        views.collect()
+    }
+
+    /// The traces of all learners beside their limits, where the truth is known.
+    fn limits(&self) -> Option<Part> {
+        self.description.truth.as_ref()?;
+        let of_learner = |root: &EntityPath| TRACE.1.map(|metric| format!("+ {root}/metrics/{metric}"));
+        Some(chart(TRACE.0, self.roots.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")]), None))
+    }
+
+    /// How far readings are from the estimates, and where a learner weighs them, how likely they are outliers.
+    fn readings(&self) -> Vec<Part> {
+        let series = |kind: &'static str| self.roots.iter().map(move |root| format!("+ {root}/readings/{kind}/**"));
+        let mut views = vec![chart("Residual per reading (σ)", series("residuals"), None)];
+        if self.description.learners.iter().any(|learner| learner.robust) {
+            views.push(chart("Probability of an outlier", series("outliers"), Some([-0.05, 1.05])));
+        }
+        views
+    }
+
+    /// The partitions of those who have any: the joint box is divided by DIRECT, recorded movements are tried one by one.
+    fn partitions(&self) -> Vec<Part> {
+        let is_box = self.description.movements_available.is_none();
+        let divides = |learner: &LearnerDescription| is_box && learner.policy.starts_with("active");
+        let views = self.roots.iter().zip(&self.description.learners).filter(|(_, learner)| divides(learner));
+        let views = views.map(|(root, LearnerDescription { name, .. })| {
+            let bounds = Range2D { x_range: [-0.08, 1.08].into(), y_range: [-0.16, 1.16].into() };
+            View::new("2D", &format!("DIRECT, {name}"), &root.join(&EntityPath::from("direct")))
+                .with(&Bounds::new(VisualBounds2D(bounds)))
+                .into()
+        });
+        views.collect()
+    }
+}
+
+/// For a calibration: the robot beside the report, the residuals of all rows below.
+pub(super) fn calibration(
+    stage: &Stage,
+    application: ApplicationId,
+    unit: Unit,
+) -> Result<Vec<LogMsg>, RecordingError> {
+    let [target, eye] = stage.camera(Shape::default().aspect()).map(|point| single(point.coords.into()));
+    let contents = ["robot/**", "body/**", GROUNDS[0], "key"].map(|entity| format!("+ /{entity}"));
+    let scene = View::new("3D", "The calibrated robot, row by row", &EntityPath::root())
+        .with_contents(contents)
+        .with(&EyeControls3D::new().with_position(eye).with_look_target(target).with_eye_up([0.0, 0.0, 1.0]))
+        .with(&Background::new(BackgroundKind::SolidColor).with_color(Theme::Light.background()))
+        .with(&LineGrid3D::new().with_visible(false));
+    let report = View::new("TextDocument", "Report", &EntityPath::from("report"));
+    let title = format!("Distance from what was measured, by row ({unit})");
+    let residuals = chart(&title, ["+ /residuals/**".to_owned()], None);
+    let outliers = chart("Probability of an outlier, by row", ["+ /outliers".to_owned()], Some([-0.05, 1.05]));
+    let above = Container::horizontal([scene.into(), report.into()]);
+    let below = Container::horizontal([residuals, outliers]);
+    Container::vertical([above.into(), below.into()], [2.0, 1.0]).messages(application, Time::Shown)
+}
+
+/// Curves; the vertical axis shows `range`, or what it takes.
+fn chart(title: &str, contents: impl IntoIterator<Item = String>, range: Option<[f64; 2]>) -> Part {
+    let view = View::new("TimeSeries", title, &EntityPath::root())
+        .with_contents(contents)
+        .with(&PlotLegend::new().with_corner(Corner2D::RightTop));
+    match range {
+        Some(range) => view.with(&ScalarAxis::new().with_range(range)).into(),
+        None => view.into(),
+    }
+}

@@ -1,0 +1,256 @@
+//! A calibration as a recording: row by row the robot as it was calibrated, and by how much it misses what was measured,
+//! beside the robot as it was described.
+//!
+//! On the timeline `step`: step k is row k of the table, counted from 1. Positions are in metres (f32), below `/robot` in
+//! the frame of the measurements, which stands so that the calibrated base is at the origin.
+//!
+//! | entity | archetype | content |
+//! |---|---|---|
+//! | `/robot` | Transform3D, static | from the frame of the measurements into that of the calibrated base |
+//! | `/robot/arm` | Capsules3D | the calibrated arm in the posture of the row |
+//! | `/robot/uncertainty` | Ellipsoids3D | covariances of the axis points, 1σ, magnified as errors are |
+//! | `/robot/measured` | Points3D | where targets were measured, or the sockets that held them |
+//! | `/robot/errors/described`, `…/calibrated` | LineStrips3D | from there towards what is predicted, magnified |
+//! | `/residuals/described`, `…/learned_from`, `…/held_out` | Scalars, SeriesPoints | how far each prediction is from what was measured, mean over the readings of the row, in mm (px or deg where no length was measured) |
+//! | `/outliers` | Scalars, SeriesPoints | the probability that a row is an outlier, of rows that were learned from |
+//! | `/report` | TextDocument, static | the report |
+//!
+//! As described is the chain of the URDF with base, targets, cameras and sockets fitted to all rows that are learned from.
+//! Of more than [`MOST_ROWS`] rows so many are recorded, spread evenly.
+
+use std::{collections::BTreeMap, path::Path};
+
+use nalgebra::{Isometry3, Point3};
+
+use super::{
+    EllipsoidSize, RecordingError, TRUTH_COLOR,
+    blueprint::calibration as arrangement,
+    body::Figure,
+    colours::{label_on_light, learner_color},
+    file::RrdFile,
+    learner::TRUE_ARM,
+    message,
+    movement::MEASURED,
+    posture::{ArmLook, Posture},
+    rerun::{
+        ApplicationId, Color, EntityPath, LineStrips3D, MediaType, Points3D, Radius, RecordingInfo, SeriesPoints,
+        StoreId, TextDocument, Transform3D, ViewCoordinates,
+    },
+    room::Room,
+    rows::Rows,
+    solid::{drum, quaternion, single, solid},
+    stage::{GROUNDS, Stage},
+    uncertainty::{Uncertainty, drawn},
+};
+use body_schema_calibration::{Calibration, Case, Reading, Residual, Unit};
+use body_schema_engine::model::State;
+use body_schema_experiment::ModelReport;
+
+/// Rows that are recorded at most.
+pub const MOST_ROWS: usize = 2000;
+/// How long the usual error of the description is drawn, as a part of the arm's reach.
+const ERROR: f64 = 0.15;
+/// Radii of a measured point and of the line of an error, as parts of the arm's reach.
+const POINT: f64 = 0.022;
+const LINE: f64 = 0.009;
+/// Opacity of the clouds.
+const CLOUD: u8 = 70;
+
+/// Writes a calibration to a file, by convention `.rrd`; `report` in Markdown goes with it.
+///
+/// # Errors
+///
+/// [`RecordingError`] where the file cannot be written.
+pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &str) -> Result<(), RecordingError> {
+    let name = &found.report.scenario;
+    let application = ApplicationId::new_or_unknown(format!("body-schema-calibration-{name}"));
+    let store = StoreId::recording(application.clone(), format!("{name}-calibration"));
+    let scene = Scene::of(found, case);
+    let mut rows = Rows::default();
+    let title = RecordingInfo::new().with_name(format!("{name}, calibration"));
+    rows.always(&EntityPath::properties(), &[&title]);
+    rows.always(&EntityPath::root(), &[&ViewCoordinates::RIGHT_HAND_Z_UP()]);
+    let document = TextDocument::new(report).with_media_type(MediaType::markdown());
+    rows.always(&EntityPath::from("report"), &[&document]);
+    scene.begin(&mut rows);
+    series(&mut rows);
+    let mut described: BTreeMap<usize, Vec<Residual>> = BTreeMap::new();
+    let all: Vec<usize> = (0..case.rows.len()).collect();
+    for residual in case.residuals(&found.nominal, &all) {
+        described.entry(residual.row).or_default().push(residual);
+    }
+    let mut readings: BTreeMap<usize, Vec<&Reading>> = BTreeMap::new();
+    for reading in &found.report.residuals {
+        readings.entry(reading.row - 1).or_default().push(reading);
+    }
+    let mut uncertainty =
+        Uncertainty::new(case.names.joints.len(), EllipsoidSize::OneSigma).magnified(scene.magnified.unwrap_or(1.0));
+    let kept = all.len().clamp(1, MOST_ROWS);
+    for row in (0..kept).map(|index| index * all.len() / kept).filter(|row| *row < all.len()) {
+        let described = described.get(&row).map_or(&[][..], Vec::as_slice);
+        let readings = readings.get(&row).map_or(&[][..], Vec::as_slice);
+        scene.log(&mut rows, row, case, &mut uncertainty, (described, readings));
+        log_residuals(&mut rows, row, found.report.unit, described, readings);
+    }
+    let mut file = RrdFile::create(path)?;
+    file.append(&[message::store_info(&store)])?;
+    file.append(&arrangement(&scene.stage, application, found.report.unit)?)?;
+    let messages: Vec<_> =
+        rows.steps(|_| true)?.iter().map(|chunk| message::data(&store, chunk)).collect::<Result<_, _>>()?;
+    file.append(&messages)?;
+    file.finish()
+}
+
+/// The three clouds of points in the chart of residuals, and that of outliers.
+const SERIES: [(&str, &str, [u8; 3]); 4] = [
+    ("residuals/described", "as described", TRUTH_COLOR),
+    ("residuals/learned_from", "calibrated, row learned from", [0x56, 0xB4, 0xE9]),
+    ("residuals/held_out", "calibrated, row held out", [0xD5, 0x5E, 0x00]),
+    ("outliers", "probability that the row is an outlier", [0xD6, 0x3B, 0x3B]),
+];
+
+fn series(rows: &mut Rows) {
+    for (path, name, colour) in SERIES {
+        let look = SeriesPoints::new().with_colors([Color::from(colour)]).with_names([name]).with_marker_sizes([3.0]);
+        rows.always(&EntityPath::from(path), &[&look]);
+    }
+}
+
+/// A row's residuals, and whether it is an outlier.
+fn log_residuals(rows: &mut Rows, row: usize, unit: Unit, described: &[Residual], readings: &[&Reading]) {
+    let step = row as u64 + 1;
+    let mean = |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
+    let of = |held_out: bool| {
+        let wanted = readings.iter().filter(|reading| reading.held_out == held_out);
+        mean(wanted.filter_map(|reading| unit.of_reading(reading)).collect())
+    };
+    let outlier = readings.iter().filter_map(|reading| reading.outlier_probability).reduce(f64::max);
+    let values = [
+        mean(described.iter().filter_map(|residual| unit.of(&residual.apart)).collect()),
+        of(false),
+        of(true),
+        outlier,
+    ];
+    for ((path, ..), value) in SERIES.iter().zip(values) {
+        if let Some(value) = value {
+            rows.number(step, &EntityPath::from(*path), value);
+        }
+    }
+}
+
+/// The robot that is drawn.
+struct Scene {
+    /// The calibrated robot, as it is drawn.
+    arm: State,
+    model: ModelReport,
+    /// Where its base is, in the frame of the measurements.
+    base: Isometry3<f64>,
+    stage: Stage,
+    /// So many times as long errors are drawn as they are; `None` where no place was measured.
+    magnified: Option<f64>,
+}
+
+impl Scene {
+    fn of(found: &Calibration, case: &Case<'_>) -> Self {
+        let state = found.fit.state();
+        let model = ModelReport::of_belief(&found.fit.belief, None);
+        let arm = model.state().unwrap_or_else(|| state.clone());
+        let at_origin = State { base: Isometry3::identity(), ..state.clone() };
+        let figure = Figure::on_pedestal(&case.scenario.robot.joint_descriptions(), &at_origin);
+        let postures = case.rows.iter().step_by(case.rows.len().div_ceil(200).max(1));
+        let postures = postures.map(|row| Posture::of(&at_origin, &row.positions).points()).collect();
+        let stage = Stage::new(figure.clone(), Room::of_postures(&figure, postures), 1);
+        let usual = found.report.training.before.rms_mm.filter(|rms| *rms > 0.0);
+        let is_place = found.report.residuals.iter().any(|reading| place(&reading.measured).is_some());
+        let magnified =
+            usual.filter(|_| is_place).map(|rms_mm| round_number(ERROR * stage.figure.reach_m / (rms_mm * 1e-3)));
+        Self { arm, model, base: state.base, stage, magnified }
+    }
+
+    /// What stays the same.
+    fn begin(&self, rows: &mut Rows) {
+        let place = self.base.inverse();
+        let transform = Transform3D::from_translation(single(place.translation.vector.into()))
+            .with_quaternion(quaternion(&place.rotation));
+        rows.always(&EntityPath::from("robot"), &[&transform]);
+        rows.always(&EntityPath::from("body"), &[&solid(&self.stage.figure.fixed)]);
+        if let Some(base) = &self.stage.figure.base {
+            rows.always(&EntityPath::from("body/base"), &[&drum(base)]);
+        }
+        if !self.stage.figure.trunk.is_empty() {
+            rows.always(&EntityPath::from("body/trunk"), &[&solid(&self.stage.figure.trunk)]);
+        }
+        let ground = super::Theme::Light.lines();
+        rows.always(&EntityPath::from(GROUNDS[0]), &[&self.stage.ground(ground)]);
+        let errors = self.magnified.map(|times| format!("errors × {times}: grey as described, blue calibrated"));
+        let key = errors.into_iter().chain(["yellow: measured".to_owned()]).collect::<Vec<_>>().join("  ·  ");
+        let label = Points3D::new([single(self.stage.key().coords.into())])
+            .with_colors([Color::from(TRUTH_COLOR)])
+            .with_radii([Radius::new_scene_units(1e-3)])
+            .with_labels([key])
+            .with_show_labels(true);
+        rows.always(&EntityPath::from("key"), &[&label]);
+    }
+
+    /// The robot in the posture of a row, and how far predictions are from what was measured there.
+    fn log(
+        &self,
+        rows: &mut Rows,
+        row: usize,
+        case: &Case<'_>,
+        uncertainty: &mut Uncertainty,
+        (described, readings): (&[Residual], &[&Reading]),
+    ) {
+        let (step, reach_m) = (row as u64 + 1, self.stage.figure.reach_m);
+        let entity = |path: &str| EntityPath::from("robot").join(&EntityPath::from(path));
+        let posture = Posture::of(&self.arm, &case.rows[row].positions);
+        rows.at(step, &entity("arm"), &[&solid(&posture.capsules(reach_m, look()))]);
+        let joints = case.scenario.robot.joint_descriptions();
+        let clouds = uncertainty.of_points(&self.model).unwrap_or_default();
+        let clouds_look = uncertainty.look(&clouds, &joints, "", (learner_color(0), CLOUD));
+        rows.drawn(step, &entity("uncertainty"), drawn(&clouds, &posture.links), clouds_look);
+        let measured: Vec<Point3<f64>> = readings.iter().filter_map(|reading| place(&reading.measured)).collect();
+        let points = Points3D::new(measured.iter().map(|point| single(point.coords.into())))
+            .with_colors([Color::from(MEASURED)])
+            .with_radii([Radius::new_scene_units((POINT * reach_m) as f32)]);
+        rows.at(step, &entity("measured"), &[&points]);
+        let Some(times) = self.magnified else { return };
+        let lines = |ends: Vec<[Point3<f64>; 2]>, colour: [u8; 3]| {
+            let strips =
+                ends.iter().map(|[from, to]| [*from, from + (to - from) * times].map(|it| single(it.coords.into())));
+            LineStrips3D::new(strips)
+                .with_colors([Color::from(colour)])
+                .with_radii([Radius::new_scene_units((LINE * reach_m) as f32)])
+        };
+        let before = described.iter().filter_map(|it| Some([place(&it.measured)?, place(&it.predicted)?])).collect();
+        let after = readings.iter().filter_map(|it| Some([place(&it.measured)?, place(&it.predicted)?])).collect();
+        rows.at(step, &entity("errors/described"), &[&lines(before, label_on_light(TRUTH_COLOR))]);
+        rows.at(step, &entity("errors/calibrated"), &[&lines(after, label_on_light(learner_color(0)))]);
+    }
+}
+
+fn look() -> ArmLook {
+    let [red, green, blue] = learner_color(0);
+    ArmLook { links: [red, green, blue, 150], pins: [red, green, blue, 255], girth: TRUE_ARM.girth }
+}
+
+/// The place that a reading tells, of a position or a pose.
+fn place(reading: &[f64]) -> Option<Point3<f64>> {
+    matches!(reading.len(), 3 | 6).then(|| Point3::from_slice(&reading[..3]))
+}
+
+/// The nearest of 1, 2, 5, 10, 20, … below a number; 1 at least.
+fn round_number(x: f64) -> f64 {
+    let power = 10_f64.powf(x.max(1.0).log10().floor());
+    [5.0, 2.0, 1.0].into_iter().map(|digit| digit * power).find(|round| *round <= x.max(1.0)).unwrap_or(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn errors_are_drawn_so_many_times_as_long_as_one_can_say() {
+        for (x, round) in [(0.3, 1.0), (1.0, 1.0), (3.9, 2.0), (5.0, 5.0), (99.0, 50.0), (100.0, 100.0)] {
+            assert_eq!(super::round_number(x), round, "{x}");
+        }
+    }
+}

@@ -1,0 +1,359 @@
+//! What one learner's reports become.
+
+use std::{cell::RefCell, collections::HashMap};
+
+use nalgebra::{Isometry3, Translation3};
+
+use super::{
+    EllipsoidSize, charts,
+    colours::{label_on_dark, label_on_light},
+    frames::Shown,
+    head, metrics, model,
+    movement::{ERROR, MEASURED, Movement, NOT_SEEN, PREDICTED, SEEN, error_look, marker_look},
+    partition::{self, Slice},
+    posture::{ArmLook, Posture, bare},
+    readings::Readings,
+    rerun::{Color, EntityPath, EntityPathPart, Points3D, Radius, TextLog, Transform3D},
+    rows::Rows,
+    sight, sockets,
+    solid::{self, Capsule, drum, quaternion, single, solid},
+    stage::Stage,
+    uncertainty::{Uncertainty, drawn},
+    values::Cell,
+};
+use body_schema_engine::{model::State, optimize::Plane};
+use body_schema_experiment::{ChannelReading, Description, LearnerReport, MovementReport};
+
+/// The true arm: grey.
+pub(super) const TRUE_ARM: ArmLook =
+    ArmLook { links: [0x84, 0x88, 0x90, 255], pins: [0x5C, 0x60, 0x68, 255], girth: 1.0 };
+/// A posture that is tried out: amber.
+const GHOST: [u8; 4] = [0xE6, 0xA1, 0x22, 110];
+/// How much thicker the estimated arm is than the true one, which is to be seen within it, and its opacity.
+const ESTIMATE: (f64, u8) = (1.22, 150);
+/// Opacity of what a learner believes of its uncertainty, for an arm of six joints: those of more lie more densely.
+const CLOUD: f64 = 48.0;
+/// Opacity of what its data allow.
+const ALLOWED: u8 = 150;
+
+/// What all learners are drawn with.
+pub(super) struct Scenery<'a> {
+    pub(super) description: &'a Description,
+    pub(super) stage: &'a Stage,
+    /// The true arm, where it is known.
+    pub(super) truth: Option<&'a State>,
+    /// Length of the arrows at θ = 0.
+    pub(super) arrow_m: f64,
+    /// So many postures between two steps.
+    pub(super) frames: u64,
+}
+
+/// The entities of one learner, and what they carry from step to step.
+pub(super) struct LearnerEntities {
+    pub(super) colour: [u8; 3],
+    pub(super) root: EntityPath,
+    pub(super) metrics: Vec<EntityPath>,
+    /// Those below the root that were asked for: making a path takes longer than to log what stands there.
+    paths: RefCell<HashMap<&'static str, EntityPath>>,
+    uncertainty: Uncertainty,
+    readings: Readings,
+    /// Its place in the row.
+    index: usize,
+    /// Where the robot's base was thought to be at first, if it is learned: there bodies are drawn.
+    base: Option<Isometry3<f64>>,
+    /// What has moved it since.
+    moved: Isometry3<f64>,
+    /// What slices show: chosen at the first partition and kept, so that the picture does not jump from step to step.
+    plane: Option<Plane>,
+    /// What the last step left to see.
+    shown: Option<Shown>,
+    /// Whether a posture that was tried out is drawn.
+    has_ghost: bool,
+    /// What its name says.
+    label: String,
+    stopped: bool,
+    failed: bool,
+}
+
+impl LearnerEntities {
+    /// Those of a learner, in its colour.
+    pub(super) fn new(
+        (index, colour, name): (usize, [u8; 3], &str),
+        description: &Description,
+        ellipsoids: EllipsoidSize,
+    ) -> Self {
+        let root = EntityPath::new(vec![EntityPathPart::new(name)]);
+        let metrics = root.join(&EntityPath::from("metrics"));
+        Self {
+            colour,
+            metrics: metrics::NAMES.iter().map(|name| metrics.join(&EntityPath::from(*name))).collect(),
+            readings: Readings::new(&root, description),
+            root,
+            paths: RefCell::default(),
+            uncertainty: Uncertainty::new(description.joints.len(), ellipsoids),
+            index,
+            base: None,
+            moved: Isometry3::identity(),
+            plane: None,
+            shown: None,
+            has_ghost: false,
+            label: String::new(),
+            stopped: false,
+            failed: false,
+        }
+    }
+
+    /// What no view of the arrangement shows, and the series behind the tabs.
+    pub(super) fn hidden(&self) -> impl Iterator<Item = EntityPath> {
+        let series = self.metrics.iter().zip(metrics::NAMES).filter(|(_, name)| !charts::shows(name));
+        let others = ["direct/leaves", "zero/links", "zero/axes", "zero/directions"];
+        let readings = self.readings.series().cloned();
+        series.map(|(series, _)| series.clone()).chain(others.map(|path| self.entity(path))).chain(readings)
+    }
+
+    pub(super) fn entity(&self, path: &'static str) -> EntityPath {
+        let mut paths = self.paths.borrow_mut();
+        paths.entry(path).or_insert_with(|| self.root.join(&EntityPath::from(path))).clone()
+    }
+
+    pub(super) fn arm_look(&self) -> ArmLook {
+        let ([red, green, blue], (girth, alpha)) = (self.colour, ESTIMATE);
+        ArmLook { links: [red, green, blue, alpha], pins: [red, green, blue, 255], girth }
+    }
+
+    /// Logs what stays: the place of the learner in the row, and its body. With a base that is learned, `base`, the place is
+    /// that of the first step.
+    pub(super) fn begin(
+        &mut self,
+        rows: &mut Rows,
+        stage: &Stage,
+        description: &Description,
+        base: Option<Isometry3<f64>>,
+    ) {
+        self.base = base;
+        if base.is_none() {
+            let place = Transform3D::from_translation(single(stage.place(self.index).into()));
+            rows.always(&self.root, &[&place]);
+        }
+        rows.always(&self.entity("body"), &[&solid(&stage.figure.fixed)]);
+        if let Some(base) = &stage.figure.base {
+            rows.always(&self.entity("body/base"), &[&drum(base)]);
+        }
+        if !stage.figure.trunk.is_empty() {
+            rows.always(&self.entity("body/trunk"), &[&solid(&stage.figure.trunk)]);
+        }
+        for (path, colour) in [("name", label_on_light(self.colour)), ("on_dark/name", label_on_dark(self.colour))] {
+            let name = Points3D::new([single(stage.figure.name.coords.into())])
+                .with_colors([Color::from(colour)])
+                .with_radii([Radius::new_scene_units(1e-3)])
+                .with_show_labels(true);
+            rows.always(&self.entity(path), &[&name]);
+        }
+        if let Some(points) = sockets::known(&description.sockets, stage.figure.reach_m) {
+            rows.always(&self.entity("sockets"), &[&points]);
+        }
+        let name = description.learners.get(self.index).map_or("", |learner| learner.name.as_str());
+        self.readings.begin(rows, name, self.colour, description);
+        if let Some(head) = &description.head {
+            rows.always(&self.entity("head/frustum"), &[&head::frustum(head)]);
+        }
+    }
+
+    /// Logs what a report says of the learner.
+    pub(super) fn log(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
+        if std::mem::take(&mut self.has_ghost) {
+            rows.after(step - 1, 1, &self.entity("arm/ghost"), &[&solid(&[])]);
+        }
+        self.log_between(rows, step, report.movement.as_ref(), scenery);
+        self.log_base(rows, step, report, scenery);
+        self.log_at_zero(rows, step, report, scenery);
+        self.log_arms(rows, step, report, scenery);
+        self.log_movement(rows, step, report, scenery);
+        for (series, value) in self.metrics.iter().zip(metrics::values(report)) {
+            if let Some(value) = value {
+                rows.number(step, series, value);
+            }
+        }
+        if let (Some(failure), false) = (&report.failure, self.failed) {
+            self.failed = true;
+            rows.at(step, &self.entity("failure"), &[&TextLog::new(failure.as_str()).with_level("ERROR")]);
+        }
+    }
+
+    /// Where the robot stands, if that is learned: it stays in its place in the row, and the frame of the measurements moves.
+    fn log_base(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
+        let Some(first) = self.base else { return };
+        let Some(base) = report.estimate.base_frame() else { return };
+        let moved = base * first.inverse();
+        self.moved = moved;
+        let place = Translation3::from(scenery.stage.place(self.index)) * moved.inverse();
+        for (entity, pose) in [(self.root.clone(), place), (self.entity("body"), moved)] {
+            rows.at(step, &entity, &[&transform(&pose)]);
+        }
+        for path in ["name", "on_dark/name"] {
+            rows.at(step, &self.entity(path), &[&transform(&moved)]);
+        }
+    }
+
+    /// The way from the last step to this one, as it was believed and as it was.
+    fn log_between(&self, rows: &mut Rows, step: u64, movement: Option<&MovementReport>, scenery: &Scenery<'_>) {
+        let (Some(shown), Some(movement)) = (&self.shown, movement) else { return };
+        shown.log_way(rows, step, &movement.configuration, scenery, self);
+    }
+
+    /// The arm at θ = 0.
+    fn log_at_zero(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
+        let (colour, joints, arrow_m) = (self.colour, scenery.description.joints.as_slice(), scenery.arrow_m);
+        let model = &report.estimate;
+        let links_look = || model::links_look(colour);
+        rows.drawn(step, &self.entity("zero/links"), model::links(&model.skeleton_m()), (0, links_look));
+        let axes_look = || model::axes_look(joints, colour);
+        rows.drawn(step, &self.entity("zero/axes"), model::axes(model, arrow_m), (0, axes_look));
+        if let Some(directions) = self.uncertainty.of_directions(model, arrow_m) {
+            let look = self.uncertainty.look(&directions, joints, "", (colour, opacity(joints.len())));
+            rows.drawn(step, &self.entity("zero/directions"), drawn(&directions, &[]), look);
+        }
+    }
+
+    /// The true and the estimated arm in the configuration of the movement, and how uncertain the estimate is there.
+    fn log_arms(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
+        let (joints, reach_m) = (scenery.description.joints.as_slice(), scenery.stage.figure.reach_m);
+        let model = &report.estimate;
+        let configuration = match (&report.movement, &self.shown) {
+            (Some(movement), _) => movement.configuration.clone(),
+            (None, Some(shown)) => shown.configuration.clone(),
+            // Before the first movement: as near to θ = 0 as the limits allow.
+            (None, None) => joints.iter().map(|joint| 0_f64.clamp(joint.limits[0], joint.limits[1])).collect(),
+        };
+        let estimate = model.state();
+        let links = estimate.as_ref().map(|arm| Posture::of(arm, &configuration));
+        let estimated = links.as_ref().map(|posture| posture.capsules(reach_m, self.arm_look())).unwrap_or_default();
+        let log_arm = |rows: &mut Rows, path, capsules: &[Capsule]| {
+            let look = (capsules.len() as u64, || solid::look(capsules));
+            rows.drawn(step, &self.entity(path), solid::shapes(capsules), look);
+        };
+        log_arm(rows, "arm/estimate", &estimated);
+        let truth = scenery.truth.map(|truth| Posture::of(truth, &configuration));
+        if let Some(truth) = &truth {
+            log_arm(rows, "arm/truth", &truth.capsules(reach_m, TRUE_ARM));
+        }
+        if let Some(posture) = truth.as_ref().or(links.as_ref()) {
+            self.log_trunk(rows, step, 0, posture, scenery.stage);
+        }
+        if sight::is_drawn(scenery) {
+            let arms = [scenery.truth.zip(truth.as_ref()), estimate.as_ref().zip(links.as_ref())];
+            sight::log(rows, (step, 0), self, arms, report.movement.as_ref(), scenery);
+        }
+        if scenery.truth.is_none() && !model.sockets_m.is_empty() {
+            let points = sockets::believed(&scenery.description.sockets, &model.sockets_m, reach_m);
+            rows.at(step, &self.entity("sockets"), &[&points]);
+        }
+        let links = links.map(|posture| posture.links).unwrap_or_default();
+        let cloud = opacity(joints.len());
+        let points = self.uncertainty.of_points(model);
+        let allowed = self.uncertainty.of_allowed(model);
+        let (had_points, had_allowed) = match &self.shown {
+            Some(shown) => (shown.points.is_some(), shown.allowed.is_some()),
+            None => (false, false),
+        };
+        for (clouds, had, name, what, alpha) in [
+            (&points, had_points, "point_ellipsoids", "", cloud),
+            (&allowed, had_allowed, "allowed_ellipsoids", ", what data allow", ALLOWED),
+        ] {
+            // Those that are no more must not stay with a later arm.
+            if clouds.is_some() || had {
+                let clouds = clouds.as_deref().unwrap_or_default();
+                let look = self.uncertainty.look(clouds, joints, what, (self.colour, alpha));
+                rows.drawn(step, &self.entity(name), drawn(clouds, &links), look);
+            }
+        }
+        let mut readings = report.movement.iter().flat_map(|movement| &movement.readings);
+        let has_outlier = readings.any(ChannelReading::is_outlier);
+        self.shown = Some(Shown { step, configuration, estimate, points, allowed, has_outlier });
+    }
+
+    /// The trunk, if joints of the chain carry it; so many ticks after the step.
+    pub(super) fn log_trunk(&self, rows: &mut Rows, step: u64, ticks: u64, posture: &Posture, stage: &Stage) {
+        let Some(link) = posture.links.get(stage.figure.carried_by).filter(|_| !stage.figure.trunk.is_empty()) else {
+            return;
+        };
+        // Bodies stand where the base was at first, and so does what the links carry.
+        let pose = transform(&(self.moved.inverse() * link * self.moved));
+        if ticks == 0 {
+            rows.at(step, &self.entity("body/trunk"), &[&pose]);
+        } else {
+            rows.after(step, ticks, &self.entity("body/trunk"), &[&pose]);
+        }
+    }
+
+    /// Draws a posture that is tried out, or nothing.
+    pub(super) fn log_ghost(&mut self, rows: &mut Rows, step: u64, skeleton_m: Option<&[[f64; 3]]>, reach_m: f64) {
+        let capsules = skeleton_m.map(|points| bare(points, reach_m, GHOST)).unwrap_or_default();
+        rows.after(step, 0, &self.entity("arm/ghost"), &[&solid(&capsules)]);
+        self.has_ghost = skeleton_m.is_some();
+    }
+
+    fn log_movement(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
+        let Scenery { description, stage, .. } = scenery;
+        let joints = description.joints.as_slice();
+        let (name, failure, report) = (&report.name, &report.failure, report.movement.as_ref());
+        if self.stopped {
+            return;
+        }
+        self.stopped = failure.is_some() && report.is_none();
+        let label = if self.stopped { format!("{name} · has stopped") } else { name.clone() };
+        if label != self.label {
+            for path in ["name", "on_dark/name"] {
+                rows.at(step, &self.entity(path), &[&Points3D::update_fields().with_labels([label.as_str()])]);
+            }
+            self.label = label;
+        }
+        // Of a learner that has stopped they are cleared.
+        let reach_m = stage.figure.reach_m;
+        let movement = Movement::of(report, reach_m);
+        let log_marker = |rows: &mut Rows, path, marker: &[Cell], label, colour| {
+            let look = || marker_look(colour, label, reach_m);
+            rows.drawn(step, &self.entity(path), marker.to_vec(), (0, look));
+        };
+        let [on_light, on_dark] = [label_on_light(ERROR), label_on_dark(ERROR)];
+        log_marker(rows, "marker/predicted", &movement.predicted, PREDICTED, self.colour);
+        log_marker(rows, "marker/measured", &movement.measured, SEEN, MEASURED);
+        for (path, colour) in [("marker/error", on_light), ("on_dark/error", on_dark)] {
+            rows.drawn(step, &self.entity(path), movement.error.to_vec(), (0, || error_look(colour, reach_m)));
+        }
+        if let Some(outlier) = &movement.outlier {
+            rows.at(step, &self.entity("marker/outlier"), &[outlier]);
+        }
+        self.readings.log(rows, step, report.map_or(&[], |report| report.readings.as_slice()));
+        if let Some(head) = &description.head {
+            let gaze = report.and_then(|report| report.gaze.as_ref());
+            rows.at(step, &self.entity("head/gaze"), &[&head::gaze(head, gaze, self.colour)]);
+            log_marker(rows, "marker/missed", &movement.missed, NOT_SEEN, on_light);
+            log_marker(rows, "on_dark/missed", &movement.missed, NOT_SEEN, on_dark);
+        }
+        let Some(partition) = report.and_then(|report| report.partition.as_ref()) else { return };
+        if self.plane.is_none()
+            && let Some(plane) = Plane::most_divided(partition.leaves.iter().map(|leaf| leaf.levels.as_slice()))
+        {
+            self.plane = Some(plane);
+            let [square, labels] = partition::frame(plane, joints);
+            rows.always(&self.entity("direct/axes"), &[square.as_ref(), labels.as_ref()]);
+            rows.always(&self.entity("direct/criterion"), &[&partition::fill_transform()]);
+        }
+        if let Some(slice) = self.plane.and_then(|plane| Slice::of(partition, plane, joints)) {
+            slice.log(rows, step, |path| self.entity(path));
+        }
+        rows.plain(step, &self.entity("direct/leaves"), partition::data(partition));
+    }
+}
+
+fn transform(pose: &Isometry3<f64>) -> Transform3D {
+    Transform3D::update_fields()
+        .with_translation(single(pose.translation.vector.into()))
+        .with_quaternion(quaternion(&pose.rotation))
+}
+
+/// Opacity of the clouds of an arm of so many joints.
+fn opacity(joints: usize) -> u8 {
+    (CLOUD * (6.0 / joints.max(6) as f64).powf(0.7)) as u8
+}

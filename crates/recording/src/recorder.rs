@@ -1,0 +1,410 @@
+//! The observer that records.
+
+use std::{
+    collections::HashSet,
+    time::{Duration, Instant},
+};
+
+use super::{
+    EllipsoidSize, LiveLog, MOST_FRAMES, RecordingError, TRUTH_COLOR, Target, Theme,
+    blueprint::Arranger,
+    body::Figure,
+    charts::BEST_DESIGN,
+    colours::{learner_color, learner_slots, tint},
+    file::RrdFile,
+    learner::{LearnerEntities, Scenery},
+    message, metrics, model,
+    note::{key, note},
+    rerun::{ApplicationId, Chunk, Color, EntityPath, LogMsg, RecordingInfo, SeriesLines, StoreId, ViewCoordinates},
+    room::Room,
+    rows::{Rows, complete},
+    stage::{GROUNDS, Stage},
+    values::cells,
+};
+use body_schema_engine::{design::BestDesign, model::State};
+use body_schema_experiment::{Description, LearnerDescription, ModelReport, StepReport};
+
+/// So many steps are written at once unless somebody flushes earlier: a message costs more than the rows in it …
+const BATCH_STEPS: usize = 256;
+
+/// … or so many rectangles of partitions, some tens of megabytes, …
+const BATCH_RECTANGLES: usize = 200_000;
+
+/// … or steps take so long that a process that is killed would lose a while.
+const BATCH_TIME: Duration = Duration::from_secs(2);
+
+/// Of an entity with large rows, as pictures are, so many bytes are written at once: the memory is used again while the
+/// processor's cache still holds it, and a server has many recorders.
+const LARGE_BYTES: usize = 1 << 18;
+
+/// Length of the arrows at θ = 0, as a part of the reach of the arm.
+const ARROW: f64 = 0.22;
+/// By how much farther out than believed a hand that nobody knows has room, as a part of the reach.
+const FARTHER: f64 = 0.6;
+
+/// Records an experiment, as the module's documentation lists it.
+///
+/// Steps are gathered and written 256 at a time, at least every other second, or when [`flush`](Self::flush) is called. A live
+/// view that wants to be up to date calls [`flush_shown`](Self::flush_shown). [`finish`](Self::finish) writes what is left and
+/// the file's footer (its index); dropping the recorder does the same, but has nobody to tell of errors.
+///
+/// If the process is killed, the file holds everything up to the last batch. Viewers open it; `rerun rrd verify`
+/// complains of the missing footer, which `rerun rrd optimize` adds.
+///
+/// # The partition
+///
+/// `/{learner}/direct/leaves` holds all rectangles of a step as components of plain numbers: `dimension` n, then for
+/// each rectangle `centres` (n f64 in the unit cube), `levels` (n u8, side i is 3^−levelᵢ long), `values` (f64, NaN if
+/// the criterion was not finite), `generations` (u32), `potentially_optimal` (bool); `chosen` is the index of the
+/// rectangle whose centre is the chosen configuration.
+///
+/// The slice in `direct/boxes` is the plane through the chosen configuration along two joints, in units of their
+/// limits: x = centre of the one, y = 1 − centre of the other, because Rerun draws y downwards and upper limits belong
+/// on top. The two are the joints that the first partition divides most, and stay the same over the recording.
+pub struct Recorder {
+    description: Description,
+    store: StoreId,
+    rows: Rows,
+    /// What the arrangement of views does not show at first.
+    hidden: HashSet<EntityPath>,
+    file: Option<RrdFile>,
+    /// Why the file lacks what the log has.
+    file_failure: Option<String>,
+    live: Option<LiveLog>,
+    learners: Vec<LearnerEntities>,
+    /// Where all stand; known from the first report on.
+    stage: Option<Stage>,
+    /// The true arm, where it is known.
+    truth: Option<State>,
+    /// The last step, if the live log does not yet say that it is complete.
+    incomplete: Option<u64>,
+    waiting_steps: usize,
+    waiting_rectangles: usize,
+    flushed: Instant,
+    finished: bool,
+}
+
+impl Recorder {
+    /// Opens the target and records what stays the same.
+    pub fn new(description: &Description, target: Target) -> Result<Self, RecordingError> {
+        let Target { file, grows, live, recording_id, ellipsoids } = target;
+        let create = if grows { RrdFile::create_growing } else { RrdFile::create };
+        let names: Vec<&str> = description.learners.iter().map(|learner| learner.name.as_str()).collect();
+        // Viewers keep one arrangement per application: those of different learners must not meet.
+        let application = format!("body-schema-{}-{}", description.scenario, names.join("-"));
+        let recording = recording_id.unwrap_or_else(|| format!("{}-seed-{}", description.scenario, description.seed));
+        let learners: Vec<LearnerEntities> = (names.iter().zip(learner_slots(names.iter().copied())).enumerate())
+            .map(|(index, (name, slot))| {
+                LearnerEntities::new((index, learner_color(slot), name), description, ellipsoids)
+            })
+            .collect();
+        let mut recorder = Self {
+            description: description.clone(),
+            store: StoreId::recording(ApplicationId::new_or_unknown(application), recording),
+            rows: Rows::default(),
+            file: file.as_deref().map(create).transpose()?,
+            file_failure: None,
+            live,
+            hidden: learners.iter().flat_map(LearnerEntities::hidden).collect(),
+            learners,
+            stage: None,
+            truth: description.truth.as_ref().and_then(ModelReport::state),
+            incomplete: None,
+            waiting_steps: 0,
+            waiting_rectangles: 0,
+            flushed: Instant::now(),
+            finished: false,
+        };
+        match recorder.begin(ellipsoids) {
+            Ok(()) => Ok(recorder),
+            Err(error) => {
+                recorder.discard();
+                Err(error)
+            }
+        }
+    }
+
+    /// The id of the recording.
+    pub fn recording_id(&self) -> &str {
+        self.store.recording_id().as_str()
+    }
+
+    /// The id of the application, by which viewers keep arrangements of views.
+    pub fn application_id(&self) -> &str {
+        self.store.application_id().as_str()
+    }
+
+    /// Records a step. Steps come in order; the first one is step 0.
+    pub fn log(&mut self, report: &StepReport) -> Result<(), RecordingError> {
+        self.log_moving(report, 0)
+    }
+
+    /// Records a step, and for those who watch live so many postures on the way to it (at most [`MOST_FRAMES`]).
+    pub fn log_moving(&mut self, report: &StepReport, frames: u64) -> Result<(), RecordingError> {
+        let stage = match self.stage.take() {
+            Some(stage) => stage,
+            None => self.arrange(report)?,
+        };
+        let arrow_m = ARROW * stage.figure.reach_m;
+        if let Some(truth) = &report.truth {
+            self.truth = truth.state();
+            self.log_truth(Some(report.step), truth, arrow_m);
+        }
+        let Self { description, learners, rows, live, truth, .. } = self;
+        let frames = if live.is_some() { frames.min(MOST_FRAMES) } else { 0 };
+        let scenery = Scenery { description, stage: &stage, truth: truth.as_ref(), arrow_m, frames };
+        for (entities, learner) in learners.iter_mut().zip(&report.learners) {
+            entities.log(rows, report.step, learner, &scenery);
+            let partition = learner.movement.as_ref().and_then(|movement| movement.partition.as_ref());
+            self.waiting_rectangles += partition.map_or(0, |partition| partition.leaves.len());
+        }
+        self.stage = Some(stage);
+        self.incomplete = Some(report.step);
+        self.waiting_steps += 1;
+        let is_full = self.waiting_steps >= BATCH_STEPS || self.waiting_rectangles >= BATCH_RECTANGLES;
+        if is_full || self.flushed.elapsed() >= BATCH_TIME { self.flush() } else { self.write_large() }
+    }
+
+    /// Writes the rows of entities of which much waits.
+    fn write_large(&mut self) -> Result<(), RecordingError> {
+        if !self.rows.has_large(LARGE_BYTES) {
+            return Ok(());
+        }
+        let Self { rows, store, live, file, .. } = self;
+        let kept = file.is_some();
+        let live = live.as_ref().map_or(Ok(()), |live| {
+            live.append(&messages(store, &rows.news(|sheet| sheet.bytes() >= LARGE_BYTES, kept)?)?)
+        });
+        let file = file
+            .as_mut()
+            .map_or(Ok(()), |file| file.append(&messages(store, &rows.steps(|sheet| sheet.bytes() >= LARGE_BYTES)?)?));
+        // To both targets, whatever happens to the other.
+        self.settle(file).and(live)
+    }
+
+    /// Draws an arm through these points (axis points in order, then the marker, metres) beside the learner's, for those
+    /// who watch live: a posture that is tried out after `step`. `None` clears it, and so does the learner's next step.
+    pub fn log_ghost(
+        &mut self,
+        step: u64,
+        learner: usize,
+        skeleton_m: Option<&[[f64; 3]]>,
+    ) -> Result<(), RecordingError> {
+        if let (Some(entities), Some(stage), Some(_)) = (self.learners.get_mut(learner), &self.stage, &self.live) {
+            entities.log_ghost(&mut self.rows, step, skeleton_m, stage.figure.reach_m);
+        }
+        self.flush_shown()
+    }
+
+    /// Records the best designs of several lengths, each at the step at which as many movements are made. At any time
+    /// before the end.
+    pub fn log_best_designs(&mut self, designs: &[BestDesign]) -> Result<(), RecordingError> {
+        if designs.is_empty() {
+            return Ok(());
+        }
+        let series = EntityPath::from(BEST_DESIGN);
+        let line =
+            SeriesLines::new().with_colors([Color::from(TRUTH_COLOR)]).with_names(["best design"]).with_widths([1.5]);
+        self.rows.always(&series, &[&line]);
+        for design in designs {
+            self.rows.number(design.step, &series, design.best_design_trace);
+        }
+        self.flush()
+    }
+
+    /// Writes the steps that wait. When this returns they are in the log, and with the operating system.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        (self.waiting_steps, self.waiting_rectangles, self.flushed) = (0, 0, Instant::now());
+        let live = self.publish(&HashSet::new());
+        let file = match &mut self.file {
+            Some(file) => {
+                let steps = self.rows.steps(|_| true)?;
+                file.append(&messages(&self.store, &steps)?)
+            }
+            None => Ok(()),
+        };
+        // To both targets, whatever happens to the other.
+        self.settle(file).and(live)
+    }
+
+    /// Brings those who watch live up to date with what the arrangement of views shows at first; the rest, and the file, wait
+    /// for the next [`flush`](Self::flush), at most 256 steps or two seconds of them. Every message costs about a kilobyte, and
+    /// most entities are series that no view shows: a live view that is up to date at every step needs half the messages
+    /// this way, and the file has few large ones.
+    pub fn flush_shown(&mut self) -> Result<(), RecordingError> {
+        let hidden = std::mem::take(&mut self.hidden);
+        let published = self.publish(&hidden);
+        self.hidden = hidden;
+        published
+    }
+
+    /// Writes to the log what it does not have yet, but for what is hidden.
+    fn publish(&mut self, hidden: &HashSet<EntityPath>) -> Result<(), RecordingError> {
+        let Self { rows, incomplete, store, file, live, .. } = self;
+        let Some(live) = live else { return Ok(()) };
+        let news = rows.news(|sheet| !hidden.contains(sheet.entity()), file.is_some()).and_then(|mut news| {
+            news.extend(incomplete.take().map(complete).transpose()?);
+            live.append(&messages(store, &news)?)
+        });
+        live.catch_up();
+        news
+    }
+
+    /// Why the file lacks steps that the log has: it could not be written. [`seal`](Self::seal) writes it anew.
+    pub fn file_failure(&self) -> Option<&str> {
+        self.file_failure.as_deref()
+    }
+
+    /// Whether a file was written. Beside a log one that was not costs no step: it is remembered, and all is in the log.
+    fn settle(&mut self, written: Result<(), RecordingError>) -> Result<(), RecordingError> {
+        match written {
+            Err(error) if self.live.is_some() => {
+                self.file_failure.get_or_insert_with(|| error.to_string());
+                Ok(())
+            }
+            written => written,
+        }
+    }
+
+    /// Writes what is left, ends the file with its footer, and closes the log.
+    pub fn finish(mut self) -> Result<(), RecordingError> {
+        self.end()
+    }
+
+    /// Gives the recording up: no file is left of it, and the log is closed.
+    pub fn discard(mut self) {
+        self.rows = Rows::default();
+        (self.finished, self.incomplete) = (true, None);
+        if let Some(file) = self.file.take() {
+            file.discard();
+        }
+    }
+
+    /// Writes what is left and ends the file with its footer: nothing is recorded after it. A file that could not be written
+    /// as it grew is written anew from the log. After an error it may be tried again, and steps may be recorded.
+    pub fn seal(&mut self) -> Result<(), RecordingError> {
+        if self.finished {
+            return Ok(());
+        }
+        self.flush()?;
+        if let Some(file) = &mut self.file
+            && let Err(error) = file.finish()
+        {
+            let written = match &self.live {
+                Some(live) => file.replace(&live.complete()?),
+                None => Err(error),
+            };
+            written.inspect_err(|error| {
+                self.file_failure.get_or_insert_with(|| error.to_string());
+            })?;
+        }
+        (self.finished, self.file_failure) = (true, None);
+        Ok(())
+    }
+
+    fn end(&mut self) -> Result<(), RecordingError> {
+        let sealed = self.seal();
+        self.finished = true;
+        if let Some(live) = &self.live {
+            live.close();
+        }
+        sealed
+    }
+
+    /// To both targets, whatever happens to the other.
+    fn send(&mut self, messages: &[LogMsg]) -> Result<(), RecordingError> {
+        let live = self.live.as_ref().map_or(Ok(()), |live| live.append(messages));
+        let file = self.file.as_mut().map_or(Ok(()), |file| file.append(messages));
+        self.settle(file).and(live)
+    }
+
+    fn begin(&mut self, ellipsoids: EllipsoidSize) -> Result<(), RecordingError> {
+        self.send(&[message::store_info(&self.store)])?;
+        let Self { description, rows, .. } = self;
+        let name = format!("{}, seed {}", description.scenario, description.seed);
+        rows.always(&EntityPath::properties(), &[&RecordingInfo::new().with_name(name)]);
+        rows.always(&EntityPath::root(), &[&ViewCoordinates::RIGHT_HAND_Z_UP()]);
+        rows.always(&EntityPath::from("note"), &[&note(description, ellipsoids)]);
+        for (learner, LearnerDescription { name, .. }) in self.learners.iter().zip(&description.learners) {
+            let colour = learner.colour;
+            for (series, metric) in learner.metrics.iter().zip(metrics::NAMES) {
+                // Beside the trace itself, and paler.
+                let (name, colour, width) = match metric {
+                    "bound_trace" => (format!("{name}: what its data allow"), tint(colour, 0.45), 1.2),
+                    _ => (name.clone(), colour, 2.0),
+                };
+                let line =
+                    SeriesLines::new().with_colors([Color::from(colour)]).with_names([name]).with_widths([width]);
+                rows.always(series, &[&line]);
+            }
+        }
+        Ok(())
+    }
+
+    /// The true arm at θ = 0 from a step on; at all times without a step.
+    fn log_truth(&mut self, step: Option<u64>, truth: &ModelReport, arrow_m: f64) {
+        let axes_look = model::axes_look(&self.description.joints, TRUTH_COLOR);
+        let links = [model::links(&truth.skeleton_m()), cells([&model::links_look(TRUTH_COLOR) as _])].concat();
+        let axes = [model::axes(truth, arrow_m), cells([&axes_look as _])].concat();
+        for learner in &self.learners {
+            for (path, what) in [("zero/truth/links", &links), ("zero/truth/axes", &axes)] {
+                let (entity, what) = (learner.entity(path), what.clone());
+                match step {
+                    Some(step) => self.rows.plain(step, &entity, what),
+                    None => self.rows.always_plain(&entity, what),
+                }
+            }
+        }
+    }
+
+    /// What needs the size of the arm: places, bodies, the truth's arrows and the cameras.
+    fn arrange(&mut self, first: &StepReport) -> Result<Stage, RecordingError> {
+        let first_estimate = first.learners.first().map(|learner| &learner.estimate);
+        let believed = || first_estimate.and_then(ModelReport::state);
+        let arm = self.truth.clone().or_else(believed);
+        let figure = arm.as_ref().map(|arm| Figure::of(&self.description, arm)).unwrap_or_default();
+        let room = arm.map_or_else(|| Room::around(&figure), |arm| Room::of(&arm, &figure, &self.description));
+        // Where nobody knows where the hand is on its link, it is drawn where it is believed to be, and found farther out.
+        let spread = first_estimate.filter(|_| self.truth.is_none()).and_then(|estimate| estimate.marker_covariance_m2);
+        let spread_m = spread.map_or(0.0, |covariance| (0..3).map(|k| covariance[k][k]).sum::<f64>().sqrt());
+        let room = room.with_hand(spread_m.min(FARTHER * figure.reach_m));
+        let stage = Stage::new(figure, room, self.learners.len());
+        let base = first_estimate.filter(|_| self.description.base_learned).and_then(ModelReport::base_frame);
+        for learner in &mut self.learners {
+            learner.begin(&mut self.rows, &stage, &self.description, base);
+        }
+        for (path, colour) in GROUNDS.into_iter().zip([Theme::Light, Theme::Dark].map(Theme::lines)) {
+            self.rows.always(&EntityPath::from(path), &[&stage.ground(colour)]);
+        }
+        self.rows.always(&EntityPath::from("key"), &[&key(&self.description, stage.key())]);
+        if let Some(truth) = self.description.truth.clone() {
+            // What is static cannot change later.
+            let step = self.description.change_at.map(|_| first.step);
+            self.log_truth(step, &truth, ARROW * stage.figure.reach_m);
+        }
+        let arranger = Arranger {
+            description: self.description.clone(),
+            roots: self.learners.iter().map(|learner| learner.root.clone()).collect(),
+            stage: stage.clone(),
+            application: self.store.application_id().clone(),
+        };
+        let whole = arranger.whole()?;
+        // To both targets, whatever happens to the other.
+        let live = self.live.as_ref().map_or(Ok(()), |live| live.append_arrangement(&whole, arranger));
+        let file = self.file.as_mut().map_or(Ok(()), |file| file.append(&whole));
+        self.settle(file).and(live)?;
+        Ok(stage)
+    }
+}
+
+fn messages(store: &StoreId, chunks: &[Chunk]) -> Result<Vec<LogMsg>, RecordingError> {
+    chunks.iter().map(|chunk| message::data(store, chunk)).collect()
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        if let Err(error) = self.end() {
+            tracing::error!("{error}");
+        }
+    }
+}

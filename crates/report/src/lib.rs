@@ -1,0 +1,31 @@
+//! The report for readers: Markdown, and one HTML file that prints well.
+
+mod contents;
+mod document;
+mod extras;
+mod html;
+mod markdown;
+mod plots;
+
+use body_schema_calibration::{Calibration, Case, File};
+use document::Part;
+
+/// The report in Markdown without drawings: for where there are others beside it.
+pub fn markdown(calibration: &Calibration, case: &Case<'_>) -> String {
+    let mut document = contents::document(&calibration.report, case);
+    document.parts.retain(|part| !matches!(part, Part::Figure { .. }));
+    markdown::text(&document)
+}
+
+/// `report.md`, its drawings, and `report.html`.
+pub fn files(calibration: &Calibration, case: &Case<'_>) -> Vec<File> {
+    let document = contents::document(&calibration.report, case);
+    let mut files =
+        vec![File::new("report.md", markdown::text(&document)), File::new("report.html", html::page(&document))];
+    for part in document.parts {
+        if let Part::Figure { name, svg, .. } = part {
+            files.push(File::new(format!("{name}.svg"), svg));
+        }
+    }
+    files
+}

@@ -1,0 +1,93 @@
+//! A chain with the axes that were learned.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+
+use super::{Chain, Segment, Unwritable};
+use body_schema_engine::{
+    kinematics::Joint,
+    model::{Correction, State},
+};
+
+/// What differs by less (metres, radians) is the same: what rounding does to products of frames.
+const SAME: f64 = 1e-12;
+
+/// What a state makes of a description.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fitted {
+    /// The chain with the state's axes and offsets. With the state's joints, `e^{ξ₁θ₁} … e^{ξₙθₙ} frames[n]` is the tip's
+    /// pose at readings q, the same as [`Chain::tip_at`] of it at q, where θ = q + offset.
+    pub chain: Chain,
+    /// By link of the state, 0 the base: the frame that is fixed to it, at θ = 0 in the base link's frame. The frame of
+    /// the base is the identity, that of the last link the tip's.
+    pub frames: Vec<Isometry3<f64>>,
+}
+
+impl Chain {
+    /// The chain of which `state`, whose joints are this chain's moving ones, is the model, in the gauge that the
+    /// [module](super) describes. [`State::base`] and targets are not part of it: a target's place on link i is
+    /// `frames[i]⁻¹ place` in the frame that is fixed to that link.
+    ///
+    /// # Errors
+    ///
+    /// [`Unwritable`] where the state has other joints, a reading that is corrected by more than an offset, or an axis
+    /// more than a right angle from the description's.
+    pub fn fitted(&self, state: &State) -> Result<Fitted, Unwritable> {
+        let nominal = self.state();
+        let (wanted, found) = (nominal.joints.len(), state.joints.len());
+        let is_same_kind = |(one, other): (&Joint, &Joint)| one.kind() == other.kind();
+        if wanted != found || !nominal.joints.iter().zip(&state.joints).all(is_same_kind) {
+            return Err(Unwritable::Joints { found, wanted });
+        }
+        let mut learned = nominal.joints.iter().zip(&state.joints).zip(&state.corrections);
+        let mut chain = self.clone();
+        let mut frames = vec![Isometry3::identity()];
+        // The link's frame at θ = 0, as described and as learned.
+        let (mut described, mut frame) = (Isometry3::identity(), Isometry3::identity());
+        for segment in &mut chain.segments {
+            described *= segment.origin;
+            let Some(((nominal, joint), correction)) = segment.kind.moves().and_then(|_| learned.next()) else {
+                frame *= segment.origin;
+                continue;
+            };
+            let moved = moved(segment, nominal, joint)? * described;
+            let origin = frame.inverse() * moved * segment.motion(offset(segment, correction)?);
+            if (origin.translation.vector - segment.origin.translation.vector).norm() > SAME {
+                segment.origin.translation = origin.translation;
+            }
+            if origin.rotation.angle_to(&segment.origin.rotation) > SAME {
+                segment.origin.rotation = origin.rotation;
+            }
+            frame = moved;
+            frames.push(frame);
+        }
+        // Fixed joints at the end carry the tip.
+        frames.pop();
+        frames.push(frame);
+        Ok(Fitted { chain, frames })
+    }
+}
+
+/// The smallest motion that takes the described axis to the learned one.
+fn moved(segment: &Segment, described: &Joint, learned: &Joint) -> Result<Isometry3<f64>, Unwritable> {
+    let (from, to) = (described.direction(), learned.direction());
+    let turned = from.angle(&to);
+    if turned > std::f64::consts::FRAC_PI_2 {
+        return Err(Unwritable::Turned { joint: segment.name.clone(), turned_deg: turned.to_degrees() });
+    }
+    let rotation = UnitQuaternion::rotation_between_axis(&from, &to).unwrap_or_default();
+    let (Some(from), Some(to)) = (described.line(), learned.line()) else {
+        return Ok(Isometry3::from_parts(Translation3::identity(), rotation));
+    };
+    let nearest = to.slid(to.direction.dot(&(from.point - to.point))).point;
+    Ok(Translation3::from(nearest - from.point) * Isometry3::rotation_wrt_point(rotation, from.point))
+}
+
+/// The offset of a reading, rad or m, if that is all that corrects it.
+fn offset(segment: &Segment, correction: &Correction) -> Result<f64, Unwritable> {
+    let Correction { offset, .. } = *correction;
+    if *correction == (Correction { offset, ..Correction::default() }) {
+        Ok(offset)
+    } else {
+        Err(Unwritable::Correction { joint: segment.name.clone() })
+    }
+}

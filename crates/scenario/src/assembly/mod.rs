@@ -1,0 +1,387 @@
+//! From a scenario and a seed to an experiment: everything that is drawn is drawn here.
+
+mod guess;
+mod learners;
+mod observability;
+mod sockets;
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use crate::{HeldOut, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec};
+use body_schema_engine::{design::{Problem, Stretch, movements_by_counting}, kinematics::JointBox, model::{Block, Layout, State, Workspace}, selection::{Actions, Movement, Watch, Weights}, sensing::{InView, Observation}};
+use body_schema_experiment::{Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World, channels, described};
+
+/// Configurations over which the prediction error is judged in a simulated world.
+const EVALUATION_SIZE: usize = 200;
+/// Configurations over which a learner judges itself, and by which criterion I chooses. Over few it learns what predicts these few
+/// best: with 32 a Panda of 31 parameters ends with errors a twentieth greater than with 64, and with more than that no smaller ones.
+const WORKSPACE_SIZE: usize = 64;
+
+/// What learners are told at the start. Nothing in it comes from the truth but through the drawn initial estimate.
+struct Briefing {
+    initial: State,
+    /// What is learned.
+    layout: Arc<Layout>,
+    /// W.
+    weights: Weights,
+    /// P₀ of recursive least squares and of a smoother with a guess.
+    covariance: DMatrix<f64>,
+    actions: Actions,
+    workspace: Workspace,
+    watch: Option<Watch>,
+    /// What is known before any movement, with its error.
+    beforehand: Option<Observation>,
+}
+
+impl Briefing {
+    /// The same for a learner that takes the axes for what the description says.
+    fn holding_axes(&self, scenario: &Scenario) -> Self {
+        let others = self.layout.blocks().map(|(block, _)| block).filter(|block| !matches!(block, Block::Axis(_)));
+        let layout = Layout::new(&self.initial, others);
+        Self {
+            initial: self.initial.clone(),
+            weights: scenario.weights_of(&layout),
+            covariance: scenario.prior_covariance(&layout),
+            layout: Arc::new(layout),
+            actions: self.actions.clone(),
+            workspace: self.workspace.clone(),
+            watch: self.watch.clone(),
+            beforehand: self.beforehand.clone(),
+        }
+    }
+}
+
+impl Scenario {
+    /// The experiment of a seed with the named learners; with all of the scenario's if none are named.
+    pub fn experiment(&self, seed: u64, learners: Option<&[String]>) -> Result<Experiment, ScenarioError> {
+        let (world, evaluation, briefing) = self.draw(seed);
+        self.assemble(seed, &self.chosen(learners)?, world, evaluation, &briefing)
+    }
+
+    /// The agent of a learner, told what the learners of this seed are told: what has no world to live in, but a robot of
+    /// its own.
+    pub fn agent(&self, learner: &LearnerSpec, seed: u64) -> Result<Agent, ScenarioError> {
+        let (.., briefing) = self.draw(seed);
+        self.agent_of(learner, seed, &briefing)
+    }
+
+    /// What designs are sought for here; `None` where no truth is known, a sensor has no noise or targets are held in
+    /// sockets.
+    pub fn design_problem(&self) -> Option<Problem> {
+        self.design_problem_of(self.robot.layout.clone())
+    }
+
+    /// The same for one who learns these parameters and knows all others.
+    fn design_problem_of(&self, layout: Layout) -> Option<Problem> {
+        let WorldSpec::Simulated { watch, .. } = &self.world else { return None };
+        // Designs are sought for in the joint box, of which sockets leave a part without a volume.
+        if !self.robot.sockets.is_empty() || self.rig.channels().iter().any(|channel| channel.sigma() <= 0.0) {
+            return None;
+        }
+        let watch = watch.as_ref();
+        Some(Problem {
+            truth: self.robot.state.clone(),
+            rig: self.rig.clone(),
+            limits: self.robot.limits.clone(),
+            head: watch.and_then(|watch| watch.head),
+            visible_pose: watch.map(|watch| watch.visible_pose.clone()),
+            prior: self.information(&layout),
+            weights: self.weights_of(&layout),
+            layout,
+        })
+    }
+
+    /// Λ₀ of these parameters.
+    fn information(&self, layout: &Layout) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&self.prior.standard_deviations(layout).map(|sd| sd.powi(-2)))
+    }
+
+    /// W of these parameters.
+    fn weights_of(&self, layout: &Layout) -> Weights {
+        Weights::new(self.selection.units, layout, &self.prior.standard_deviations(layout))
+    }
+
+    /// The same along a run of so many steps, one stretch before a change of the body and one after it; empty where no
+    /// truth is known or a sensor has no noise.
+    pub fn design_stretches(&self, steps: u64) -> Vec<Stretch> {
+        let Some(problem) = self.design_problem() else { return Vec::new() };
+        let change = match &self.world {
+            WorldSpec::Simulated { change: Some(change), .. } if change.step < steps => change,
+            _ => return vec![Stretch { problem, from: 0, to: steps }],
+        };
+        let changed = Problem { truth: change.truth.clone(), ..problem.clone() };
+        vec![Stretch { problem, from: 0, to: change.step }, Stretch { problem: changed, from: change.step, to: steps }]
+    }
+
+    fn draw(&self, seed: u64) -> (World, Evaluation, Briefing) {
+        match &self.world {
+            WorldSpec::Simulated { initial_error, watch, change, outliers } => {
+                let truth = self.robot.state.clone();
+                let limits = &self.robot.limits;
+                let briefing = Briefing {
+                    layout: Arc::new(self.robot.layout.clone()),
+                    weights: self.weights(),
+                    initial: self.perturbed(initial_error, &mut Stream::InitialEstimate.rng(seed)),
+                    covariance: self.prior_covariance(&self.robot.layout),
+                    actions: self.actions(),
+                    // Uniform in the joint box, seen or not: what a head can see depends on the truth.
+                    workspace: self.workspace(drawn(limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true)),
+                    watch: watch.clone(),
+                    beforehand: self.beforehand(seed),
+                };
+                let head = watch.as_ref().and_then(|watch| watch.head);
+                let seen = |theta: &[f64]| head.is_none_or(|head| head.sees(&truth.marker_at(theta)));
+                let mut configurations = drawn(limits, EVALUATION_SIZE, Stream::Evaluation, seed, seen);
+                if configurations.is_empty() {
+                    configurations.extend(watch.as_ref().map(|watch| watch.visible_pose.clone()));
+                }
+                let evaluation = Evaluation::of_truth(self.workspace(configurations), &truth, self.marker_sigma())
+                    .with_sockets(self.held_out(seed));
+                let change = change.as_ref();
+                let change = change.map(|change| Box::new(Change { step: change.step, truth: change.truth.clone() }));
+                let (truth, rig, outliers) = (Box::new(truth), self.rig.clone(), *outliers);
+                let limits = limits.clone();
+                (World::Simulated { truth, rig, limits, head, change, outliers }, evaluation, briefing)
+            }
+            WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, held_out),
+            WorldSpec::Outside { watch, beforehand } => {
+                let briefing = Briefing {
+                    layout: Arc::new(self.robot.layout.clone()),
+                    weights: self.weights(),
+                    initial: self.robot.state.clone(),
+                    covariance: self.prior_covariance(&self.robot.layout),
+                    actions: self.actions(),
+                    workspace: self.workspace(drawn(
+                        &self.robot.limits,
+                        WORKSPACE_SIZE,
+                        Stream::Workspace,
+                        seed,
+                        |_| true,
+                    )),
+                    watch: watch.clone(),
+                    beforehand: beforehand.clone(),
+                };
+                let nothing = Evaluation::of_measurements(self.workspace(Vec::new()), Vec::new());
+                (World::Outside, nothing, briefing)
+            }
+        }
+    }
+
+    fn prior_covariance(&self, layout: &Layout) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&self.prior.standard_deviations(layout).map(|sd| sd * sd))
+    }
+
+    fn workspace(&self, configurations: Vec<Vec<f64>>) -> Workspace {
+        Workspace { configurations, up_to_motion: self.robot.up_to_motion, ..Workspace::default() }
+    }
+
+    /// What one measurement of the marker is worth, metres: of the tracker, or where none sees it of the first sensor.
+    fn marker_sigma(&self) -> f64 {
+        self.rig.marker_channel().map_or(self.rig.sigma(), |_| self.rig.marker_sigma())
+    }
+
+    /// Holds rows out; learners begin with the robot's description, and find where it stands from the rows that they choose.
+    fn draw_measured(
+        &self,
+        seed: u64,
+        measurements: &Measurements,
+        held_out: &HeldOut,
+    ) -> (World, Evaluation, Briefing) {
+        let (training, test) = held_out.split(seed);
+        let configurations =
+            |rows: &[usize]| rows.iter().map(|row| measurements.configurations[*row].clone()).collect::<Vec<_>>();
+        let movement = |row: &usize| Movement {
+            configuration: measurements.configurations[*row].clone(),
+            row: Some(*row),
+            socket: measurements.sockets.get(*row).copied().flatten(),
+        };
+        let mut pool: Vec<Movement> = training.iter().map(movement).collect();
+        if let Some(constraints) = &self.constraints {
+            // What no movement can reach does not count as left. Where that is all, whoever chooses names the constraint.
+            let feasible = constraints.of(None, pool.clone(), |movement| &movement.configuration);
+            pool = feasible.unwrap_or(pool);
+        }
+        let briefing = Briefing {
+            initial: self.robot.state.clone(),
+            weights: self.weights(),
+            layout: Arc::new(self.robot.layout.clone()),
+            covariance: self.prior_covariance(&self.robot.layout),
+            actions: Actions::Pool(pool),
+            workspace: self
+                .asked_about(measurements, &test)
+                .unwrap_or_else(|| self.workspace(configurations(&training))),
+            watch: None,
+            beforehand: measurements.beforehand.clone(),
+        };
+        let seen = test.iter().map(|row| measurements.observations[*row].clone()).collect();
+        let evaluation = Evaluation::of_measurements(self.workspace(configurations(&test)), seen)
+            .with_sockets(self.held_out_rows(measurements, &test));
+        (World::Measured { observations: measurements.observations.clone() }, evaluation, briefing)
+    }
+
+    fn assemble(
+        &self,
+        seed: u64,
+        specs: &[LearnerSpec],
+        world: World,
+        evaluation: Evaluation,
+        briefing: &Briefing,
+    ) -> Result<Experiment, ScenarioError> {
+        let robot = &self.robot;
+        let layout = &briefing.layout;
+        let learners =
+            specs.iter().map(|spec| self.learner(spec, seed, briefing)).collect::<Result<Vec<_>, ScenarioError>>()?;
+        let (cameras, targets) = described(&robot.equipment);
+        let description = Description {
+            scenario: self.name.clone(),
+            title: self.title.clone(),
+            seed,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            joints: robot.joint_descriptions(),
+            parameters: layout.dimension(),
+            movements_by_counting: movements_by_counting(
+                &robot.state,
+                layout,
+                &self.rig.assuming(1.0),
+                world.truth().map_or(InView::Unknown, |_| InView::By(world.head())),
+                &robot.limits,
+            ),
+            learners: specs.iter().map(|spec| self.learner_description(spec)).collect(),
+            thresholds: self.thresholds,
+            movements_available: briefing.actions.remaining(),
+            truth: world.truth().map(ModelReport::of_state),
+            change_at: world.change().map(|change| change.step),
+            head: briefing.watch.as_ref().and_then(|watch| watch.head.as_ref().map(HeadDescription::of)),
+            channels: channels(&self.rig, &robot.equipment),
+            cameras,
+            targets,
+            base_learned: layout.block(Block::Base).is_some(),
+            sockets: robot.socket_descriptions(world.truth().is_some()),
+            body: robot.body,
+        };
+        // Of what each learns itself; all or none.
+        let problems = learners.iter().map(|learner| self.design_problem_of((*learner.belief().layout).clone()));
+        let problems = problems.collect::<Option<_>>().unwrap_or_default();
+        Ok(Experiment::new(description, world, learners, evaluation, problems))
+    }
+}
+
+/// Draws before giving up on finding more configurations that are wanted.
+const PATIENCE: usize = 100_000;
+
+/// Up to `count` configurations, uniform among those in the box that are `wanted`.
+fn drawn(limits: &JointBox, count: usize, stream: Stream, seed: u64, wanted: impl Fn(&[f64]) -> bool) -> Vec<Vec<f64>> {
+    let mut rng = stream.rng(seed);
+    let draws = std::iter::repeat_with(|| limits.draw(&mut rng)).take(PATIENCE);
+    draws.filter(|theta| wanted(theta)).take(count).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ErrorDraw, InitialError, builtin};
+    use body_schema_engine::kinematics::Joint;
+    use body_schema_experiment::{Draw, Executed};
+
+    /// Judges look only where the head can see, by the truth.
+    #[test]
+    fn the_evaluation_set_lies_in_view() {
+        let scenario = builtin("head-fov").expect("a built-in scenario");
+        let (world, evaluation, briefing) = scenario.draw(5);
+        let head = world.head().expect("a head");
+        assert_eq!(evaluation.targets().len(), EVALUATION_SIZE);
+        assert!(evaluation.targets().all(|(_, marker)| head.sees(marker)));
+        let truth = world.truth().expect("simulated");
+        assert!(
+            briefing.workspace.configurations.iter().any(|theta| !head.sees(&truth.marker_at(theta))),
+            "without truth"
+        );
+    }
+
+    /// What of an axis is held is known: in a simulated world the guess has it from the truth.
+    #[test]
+    fn what_is_held_of_an_axis_is_not_guessed() {
+        let plain = builtin("arm-6dof").expect("built in");
+        let names = &plain.robot.names;
+        let hold = format!("[robot]\nhold = [\"{}.direction\", \"{}.point\"]", names[1], names[2]);
+        let text = plain.source.replacen("[robot]", &hold, 1);
+        let scenario = Scenario::parse("held.toml", &text, &|_| Err("no data".to_owned())).expect("valid");
+        let (world, _, briefing) = scenario.draw(1003);
+        let truth = world.truth().expect("simulated");
+        let lines = |joint: usize| match (&truth.joints[joint], &briefing.initial.joints[joint]) {
+            (Joint::Revolute(truth), Joint::Revolute(guess)) => {
+                ((truth.point - guess.point).norm(), truth.direction.angle(&guess.direction))
+            }
+            _ => unreachable!("revolute"),
+        };
+        let is_off = |x: f64| x > 0.01;
+        for (joint, point, direction) in [(0, true, true), (1, true, false), (2, false, true), (3, true, true)] {
+            let (apart, angle) = lines(joint);
+            assert_eq!((is_off(apart), is_off(angle)), (point, direction), "joint {joint}: {apart} m, {angle} rad");
+        }
+    }
+
+    /// No truth leaks: with the truth swapped behind the learners' backs, their first choices stay as they were, and
+    /// the choices after the first measurement do not.
+    #[test]
+    fn swapping_the_truth_changes_no_first_selection() {
+        for (name, learner) in [
+            ("arm-6dof", None),
+            ("arm-12dof", None),
+            ("head-fov", None),
+            ("arm-6dof", Some("global")),
+            ("arm-6dof-no-prior", Some("global")),
+            ("head-fov", Some("global")),
+        ] {
+            let scenario = builtin(name).expect("a built-in scenario");
+            let selections = |swap: bool| {
+                let (mut world, mut evaluation, briefing) = scenario.draw(11);
+                if let (true, World::Simulated { truth, .. }) = (swap, &mut world) {
+                    **truth = scenario.perturbed(
+                        &InitialError { draw: ErrorDraw::Exactly, angle_rad: 0.7, point_m: 0.3, marker_m: 0.1 },
+                        &mut Stream::InitialEstimate.rng(99),
+                    );
+                    evaluation.follow(truth);
+                }
+                let names = learner.map(|learner| [learner.to_owned()]);
+                let specs = scenario.chosen(names.as_ref().map(<[_; 1]>::as_slice)).expect("learners");
+                let mut experiment =
+                    scenario.assemble(11, &specs, world, evaluation, &briefing).expect("an experiment");
+                [(); 3].map(|()| {
+                    let report = experiment.step().expect("a step");
+                    let chosen = |learner: &body_schema_experiment::LearnerReport| {
+                        learner.movement.as_ref().expect("a movement").configuration.clone()
+                    };
+                    report.learners.iter().map(chosen).collect::<Vec<_>>()
+                })
+            };
+            let ([first, .., last], [first_swapped, .., last_swapped]) = (selections(false), selections(true));
+            assert_eq!(first, first_swapped, "{name}");
+            assert_ne!(last[0], last_swapped[0], "{name}: the active learner must have seen another marker");
+        }
+    }
+
+    /// A marker that is known stays where it is told to be on the hand, while base and axes are learned; one that is not is
+    /// found.
+    #[test]
+    fn a_known_marker_stays_and_an_unknown_one_is_found() {
+        let nominal = builtin("tiago-mocap").expect("built in");
+        for is_known in [true, false] {
+            let learned = format!("learn_marker = {}", !is_known);
+            let text = nominal.source.replacen("learn_marker = true", &learned, 1);
+            let scenario = Scenario::parse("marker.toml", &text, &|file| nominal.data_file(file)).expect("still valid");
+            let spec = scenario.chosen(Some(&["global".to_owned()])).expect("offered").remove(0);
+            let (mut agent, world) = (scenario.agent(&spec, 3).expect("an agent"), scenario.draw(3).0);
+            for _ in 0..8 {
+                let movement = agent.propose(1).expect("a proposal")[0].selection.movement.clone();
+                let observation = world.observe(&movement, &Draw::default()).expect("a row");
+                agent.absorb(&[Executed { proposal: None, movement, observation }]).expect("absorbed");
+            }
+            let found = &agent.belief().state;
+            assert_eq!(found.marker() == scenario.robot.state.marker(), is_known);
+            assert!(found.base != scenario.robot.state.base);
+        }
+    }
+}

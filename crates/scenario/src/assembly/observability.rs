@@ -1,0 +1,92 @@
+//! What there is to know of a scenario's robot before anything is measured.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::{Known, Scenario, WorldSpec};
+use body_schema_engine::{design::observability::Prospect, model::{Block, Place, State}, selection::Watch};
+
+/// Postures drawn before it is given up to find one in which something is in view.
+const PATIENCE: usize = 20_000;
+
+impl Scenario {
+    /// The robot as the file describes it, with its sensors, limits and constraints: what was recorded does not count.
+    pub fn prospect(&self) -> Prospect {
+        let layout = self.robot.layout.clone();
+        let mut state = self.robot.state.clone();
+        if !matches!(self.world, WorldSpec::Simulated { .. }) {
+            self.unline(&mut state);
+        }
+        let watch = self.watch(&state);
+        let chain = self.chain_prior(&self.robot.state, &layout);
+        let deviations =
+            chain.as_ref().map_or_else(|| self.prior.standard_deviations(&layout), |chain| chain.deviations());
+        let m = layout.dimension();
+        let known = chain.and_then(|chain| {
+            let inverse = deviations.map(f64::recip);
+            let correlations = chain.covariance(&chain.stated()).component_mul(&(&inverse * inverse.transpose()));
+            Some(correlations.cholesky()?.inverse())
+        });
+        Prospect {
+            scenario: self.name.clone(),
+            title: self.title.clone(),
+            names: self.robot.called(),
+            state,
+            rig: Arc::new(self.rig.assuming(self.smoother.sigma)),
+            limits: self.robot.limits.clone(),
+            actions: self.actions(),
+            constraints: self.constraints.clone(),
+            watch,
+            known: known.unwrap_or_else(|| DMatrix::identity(m, m)),
+            deviations,
+            units: self.selection.units,
+            search: self.selection.search,
+            planning: self.selection.planning,
+            up_to_motion: self.robot.up_to_motion,
+            layout: Arc::new(layout),
+        }
+    }
+
+    /// Moves targets of unknown places off where the file happens to put them, often the origin of the flange and so the axis of the
+    /// last joint, which could then not be told: by half of what they are known to, in no direction that an axis is likely to have.
+    /// Sockets that nobody has guessed follow.
+    fn unline(&self, state: &mut State) {
+        for (block, _) in self.robot.layout.blocks() {
+            let (Block::Target(index), Some(Known::Within { length_m, .. })) = (block, self.prior.of(block)) else {
+                continue;
+            };
+            let shift = Vector3::new(0.36, 0.48, 0.8) * (0.5 * length_m);
+            match &mut state.targets[index].place {
+                Place::Point(point) => *point += shift,
+                Place::Pose(pose) => pose.translation.vector += shift,
+            }
+        }
+        for (index, socket) in self.robot.sockets.iter().enumerate().filter(|(_, socket)| !socket.is_guessed) {
+            state.sockets[index] = state.target_at(socket.target, &socket.posture);
+        }
+    }
+
+    /// Who watches; where sensors see some postures only and the file names none in view, one in which something is.
+    fn watch(&self, state: &State) -> Option<Watch> {
+        if let WorldSpec::Simulated { watch: Some(watch), .. } | WorldSpec::Outside { watch: Some(watch), .. } =
+            &self.world
+        {
+            return Some(watch.clone());
+        }
+        let noise = vec![0.0; self.rig.equations()];
+        let is_seen = |posture: &Vec<f64>| !self.rig.observe(state, posture, &noise).is_miss();
+        let is_feasible = |posture: &Vec<f64>| {
+            self.constraints.as_ref().is_none_or(|constraints| constraints.allow(constraints.start.as_deref(), posture))
+        };
+        // Whatever is drawn, it is always the same.
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let patience = if self.rig.has_view() { PATIENCE } else { 0 };
+        let mut draws = std::iter::repeat_with(|| self.robot.limits.draw(&mut rng)).take(patience);
+        draws
+            .find(|posture| is_feasible(posture) && is_seen(posture))
+            .map(|visible_pose| Watch { head: None, visible_pose })
+    }
+}

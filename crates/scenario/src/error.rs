@@ -1,0 +1,115 @@
+//! What can be wrong with a scenario, said so that it can be mended.
+
+use std::fmt;
+
+pub(super) use body_schema_engine::similar::similar;
+use body_schema_engine::{estimation::EstimationError, model::PriorError};
+use body_schema_experiment::ExperimentError;
+
+/// One thing that is wrong in a scenario file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// Line in the file, counted from 1.
+    pub line: usize,
+    /// The key, with its path.
+    pub key: String,
+    /// What is wrong.
+    pub what: String,
+    /// How to mend it.
+    pub mend: String,
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}: `{}`: {}; {}", self.line, self.key, self.what, self.mend)
+    }
+}
+
+/// Why a scenario cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ScenarioError {
+    /// The file has problems.
+    #[error("{file} is not a valid scenario\n{}", list(file, problems))]
+    Invalid {
+        /// The file, as it was named.
+        file: String,
+        /// All problems found.
+        problems: Vec<Problem>,
+    },
+    /// There is no such built-in scenario.
+    #[error("there is no scenario `{name}`{}; built in are: {}", suggestion(suggested), known.join(", "))]
+    UnknownScenario {
+        /// The name asked for.
+        name: String,
+        /// A similar name.
+        suggested: Option<String>,
+        /// All names.
+        known: Vec<String>,
+    },
+    /// The scenario offers no such learner.
+    #[error(
+        "scenario `{scenario}` has no learner `{name}`{}; it offers: {}; or write estimator:policy, as in smoother:random",
+        suggestion(suggested),
+        known.join(", ")
+    )]
+    UnknownLearner {
+        /// The scenario.
+        scenario: String,
+        /// The name asked for.
+        name: String,
+        /// What was probably meant.
+        suggested: Option<String>,
+        /// All names.
+        known: Vec<String>,
+    },
+    /// The parts of a composed learner do not fit.
+    #[error("there is no learner `{name}`: {what}; write `{fitting}`")]
+    Misfit {
+        /// The name asked for.
+        name: String,
+        /// Why not.
+        what: String,
+        /// The nearest that there is.
+        fitting: String,
+    },
+    /// A learner is named twice.
+    #[error("learner `{0}` is named twice; name each learner once")]
+    RepeatedLearner(String),
+    /// No learner is named.
+    #[error("no learner is named; leave the list out to take the scenario's own")]
+    NoLearner,
+    /// The prior is none.
+    #[error("scenario `{scenario}`: {source}")]
+    Prior {
+        /// The scenario.
+        scenario: String,
+        /// Why.
+        source: PriorError,
+    },
+    /// A learner cannot take in what is known before any movement.
+    #[error("scenario `{scenario}`: what is known before any movement: {source}")]
+    Beforehand {
+        /// The scenario.
+        scenario: String,
+        /// Why.
+        source: EstimationError,
+    },
+    /// A run failed.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
+}
+
+fn list(file: &str, problems: &[Problem]) -> String {
+    let lines: Vec<String> = problems
+        .iter()
+        .map(|problem| {
+            let Problem { line, key, what, mend } = problem;
+            format!("  {file}:{line}: `{key}`: {what}\n    to mend it: {mend}")
+        })
+        .collect();
+    lines.join("\n")
+}
+
+fn suggestion(name: &Option<String>) -> String {
+    name.as_ref().map(|name| format!(" (did you mean `{name}`?)")).unwrap_or_default()
+}

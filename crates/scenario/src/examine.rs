@@ -1,0 +1,128 @@
+//! What is doubtful in a scenario's data, and in its prior.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
+
+use super::{HeldOutRule, Known, Measurements, Scenario, ScenarioError, WorldSpec};
+use body_schema_diagnostics::{Base, Evidence, Examination, Seen, Subject, examine, few_folds};
+use body_schema_engine::{
+    model::{Block, PriorError},
+    sensing::{Observation, Occasion},
+};
+
+/// How far a target may be from where the file has it, and a base of which the file says no more than that, for all that is known before any row is looked at, metres.
+const TARGET_M: f64 = 0.3;
+
+impl Scenario {
+    /// Examines recorded measurements; `None` where the world is simulated.
+    pub fn examine(&self) -> Option<Examination> {
+        let WorldSpec::Measured { measurements, held_out } = &self.world else { return None };
+        let robot = &self.robot;
+        let limits = match &robot.described {
+            Some(described) => described.chain.moving().map(|segment| segment.limits).collect(),
+            None => robot.limits.joints().iter().copied().map(Some).collect::<Vec<_>>(),
+        };
+        let held_in: Option<Vec<usize>> = measurements.sockets.iter().copied().collect();
+        let subject = Subject {
+            columns: &measurements.columns,
+            joints: &robot.state.joints,
+            limits: &limits,
+            target: robot.state.marker(),
+            target_sd_m: TARGET_M,
+            learned: &(0..robot.state.joints.len()).map(|joint| robot.layout.is_learned(joint)).collect::<Vec<_>>(),
+            unknowns: robot.layout.dimension(),
+            sigma_m: self.smoother.sigma,
+            direction_rad: self.prior.direction_rad,
+            point_m: self.prior.point_m,
+            base: self.base_said(),
+        };
+        let listed = match &held_out.rule {
+            HeldOutRule::Rows(rows) => rows.as_slice(),
+            _ => &[],
+        };
+        let evidence = Evidence {
+            lines: &measurements.lines,
+            files: &measurements.files,
+            configurations: &measurements.configurations,
+            targets: self.seen(measurements),
+            sockets: held_in.filter(|sockets| !sockets.is_empty()),
+            equations: Some(self.equations(measurements)),
+            held_out: listed,
+            repeated: &measurements.repeated,
+        };
+        let mut found = examine(&subject, &evidence);
+        if let HeldOutRule::Folds(folds) = held_out.rule {
+            found.doubts.extend(few_folds(folds, held_out.count_postures(), held_out.rows));
+        }
+        Some(found)
+    }
+
+    /// Equations of all that was measured. The first row in a socket says where that is, and no more.
+    fn equations(&self, measurements: &Measurements) -> usize {
+        let channels = self.rig.channels();
+        let always = |observation: &Observation| -> usize {
+            let read = channels.iter().zip(&observation.readings).filter(|(_, reading)| reading.is_some());
+            read.filter(|(channel, _)| channel.occasion() == Occasion::Always)
+                .map(|(channel, _)| channel.equations())
+                .sum()
+        };
+        let measured: usize = measurements.observations.iter().map(always).sum();
+        let held: Vec<usize> = measurements.sockets.iter().copied().flatten().collect();
+        let places: BTreeSet<usize> = held.iter().copied().collect();
+        let beforehand = measurements.beforehand.iter().flat_map(|known| known.readings.iter().flatten());
+        measured + 3 * (held.len() - places.len()) + beforehand.map(Vec::len).sum::<usize>()
+    }
+
+    /// Where the base is said to be, and how well.
+    fn base_said(&self) -> Option<Base> {
+        let at = self.robot.state.base;
+        match (self.robot.layout.block(Block::Base), self.prior.of(Block::Base)) {
+            (None, _) => Some(Base { at, sd_m: Known::EXACTLY, sd_rad: Known::EXACTLY }),
+            (_, Some(Known::Within { length_m, angle_rad, .. })) if length_m < TARGET_M => {
+                Some(Base { at, sd_m: length_m, sd_rad: angle_rad })
+            }
+            _ => None,
+        }
+    }
+
+    /// Where targets on the last link were seen.
+    fn seen(&self, measurements: &Measurements) -> Vec<Seen> {
+        let state = &self.robot.state;
+        let channels = self.rig.channels().iter().zip(&measurements.readings).enumerate();
+        let seen = channels.filter_map(|(index, (channel, name))| {
+            let position = |observation: &Observation| channel.position(observation.readings.get(index)?.as_ref()?);
+            let (target, _) = measurements.observations.iter().find_map(position)?;
+            let points = measurements.observations.iter().map(|observation| position(observation).map(|seen| seen.1));
+            // A pose: its rotation follows as a rotation vector.
+            let is_pose = channel.equations() == 6;
+            let turn = |observation: &Observation| {
+                let turn =
+                    observation.readings.get(index).and_then(Option::as_ref).and_then(|reading| reading.get(3..6));
+                turn.map_or_else(Vector3::zeros, Vector3::from_column_slice)
+            };
+            let turns = measurements.observations.iter().filter(|_| is_pose).map(turn).collect();
+            let arm_m = is_pose
+                .then(|| channel.nominal(0).0 / channel.nominal(3).0)
+                .filter(|arm| arm.is_finite() && *arm > 0.0);
+            (state.targets[target].link == state.joints.len()).then(|| Seen {
+                name: name.clone(),
+                points: points.collect(),
+                turns,
+                arm_m,
+            })
+        });
+        seen.collect()
+    }
+
+    /// Whether learners can begin from the prior, without building any: the standard deviations may be so small or so
+    /// large that their squares are none.
+    pub fn check_prior(&self) -> Result<(), ScenarioError> {
+        let deviations = self.prior.standard_deviations(&self.robot.layout);
+        if deviations.iter().all(|sd| (sd * sd).is_normal() && (sd * sd).recip().is_normal()) {
+            return Ok(());
+        }
+        let source = PriorError::NotPositive(deviations.len());
+        Err(ScenarioError::Prior { scenario: self.name.clone(), source })
+    }
+}

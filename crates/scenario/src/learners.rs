@@ -1,0 +1,365 @@
+//! The learners of a scenario: those that its file names, and any estimator with any policy.
+
+use super::{
+    Scenario, ScenarioError,
+    error::similar,
+    misfit::{Misfit, Setting, misfit},
+};
+use body_schema_engine::sensing::Loss;
+use body_schema_experiment::LearnerDescription;
+
+/// A learner that a scenario offers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LearnerSpec {
+    /// Its name.
+    pub name: String,
+    /// Its estimator.
+    pub estimator: EstimatorKind,
+    /// Its policy.
+    pub policy: PolicyKind,
+    /// Whether its filter adds the scenario's stabilising noise.
+    pub stabilising: bool,
+    /// Whether its smoother takes the scenario's loss; otherwise least squares.
+    pub robust: bool,
+    /// Whether it takes the axes for what the description says, and learns the rest.
+    pub holds_axes: bool,
+    /// Whether it runs when no learner is named.
+    pub by_default: bool,
+}
+
+impl LearnerSpec {
+    /// A pair that no file names: with all the settings of the scenario.
+    fn composed(name: &str, estimator: EstimatorKind, policy: PolicyKind) -> Self {
+        Self {
+            name: name.to_owned(),
+            estimator,
+            policy,
+            stabilising: true,
+            robust: true,
+            holds_axes: false,
+            by_default: false,
+        }
+    }
+}
+
+/// The estimators that a scenario can name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EstimatorKind {
+    /// Recursive least squares.
+    Rls,
+    /// Recursive least squares by the unscented transform.
+    Unscented,
+    /// Recursive least squares in the paper's six numbers per joint: a comparison, which shows no covariance.
+    RlsSixNumbers,
+    /// Stochastic gradient.
+    Gradient,
+    /// Maximum a posteriori over all measurements, with several hypotheses.
+    Smoother,
+}
+
+impl EstimatorKind {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Rls, Self::Unscented, Self::RlsSixNumbers, Self::Gradient, Self::Smoother];
+
+    /// Its name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rls => "rls",
+            Self::Unscented => "unscented",
+            Self::RlsSixNumbers => "rls-six-numbers",
+            Self::Gradient => "gradient",
+            Self::Smoother => "smoother",
+        }
+    }
+
+    /// Whether it knows how sure it is: what active selection chooses by, and a learner calls itself settled by.
+    pub fn keeps_covariance(self) -> bool {
+        matches!(self, Self::Rls | Self::Unscented | Self::Smoother)
+    }
+}
+
+/// The policies that a scenario can name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PolicyKind {
+    /// Minimises the A-criterion; where a head watches, weighed by the chance of being seen.
+    Active,
+    /// The same, but where a head watches with blind faith in the predicted marker: a comparison.
+    ActiveNaive,
+    /// Plans the movements that are still needed together; what `active` is for a smoother.
+    ActivePlanned,
+    /// As `active`, but by original DIRECT, whatever the scenario's variant.
+    ActiveDirect,
+    /// As `active`, but the best of as many random configurations: the floor of every search.
+    ActiveRandomSearch,
+    /// As `active`, but by Bayesian optimisation with as many evaluations.
+    ActiveBayesian,
+    /// As `active`, but with the expectation of (7) by Monte Carlo over the posterior.
+    ActiveMonteCarlo,
+    /// Draws uniformly.
+    Random,
+    /// Waits for a person to choose. No file names it: it is offered in every simulated scenario.
+    Human,
+}
+
+impl PolicyKind {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Active,
+        Self::ActiveNaive,
+        Self::ActivePlanned,
+        Self::ActiveDirect,
+        Self::ActiveRandomSearch,
+        Self::ActiveBayesian,
+        Self::ActiveMonteCarlo,
+        Self::Random,
+        Self::Human,
+    ];
+
+    /// Its name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Active => "active",
+            Self::ActiveNaive => "active-naive",
+            Self::ActivePlanned => "active-planned",
+            Self::ActiveDirect => "active-direct",
+            Self::ActiveRandomSearch => "active-random-search",
+            Self::ActiveBayesian => "active-bayesian",
+            Self::ActiveMonteCarlo => "active-monte-carlo",
+            Self::Random => "random",
+            Self::Human => "human",
+        }
+    }
+
+    /// Whether it is `Active` but for how a box of joint limits is searched; over recorded rows they are all the same.
+    pub(super) fn varies_the_search(self) -> bool {
+        matches!(
+            self,
+            Self::ActiveNaive
+                | Self::ActiveDirect
+                | Self::ActiveRandomSearch
+                | Self::ActiveBayesian
+                | Self::ActiveMonteCarlo
+        )
+    }
+}
+
+/// Stands between estimator and policy in the name of a composed learner.
+const SEPARATOR: char = ':';
+
+/// The learner for which a person chooses, unless another estimator is named.
+pub(super) const HUMAN: &str = "human";
+
+impl Scenario {
+    /// The learners of these names, in this order; without names those that run by default.
+    ///
+    /// A name is one of the scenario's, or an estimator and a policy, as in `smoother:random`: with the settings of the
+    /// scenario, and the stabilising noise if it has any. `human` is `rls:human`.
+    pub fn chosen(&self, names: Option<&[String]>) -> Result<Vec<LearnerSpec>, ScenarioError> {
+        let Some(names) = names else {
+            return Ok(self.learners.iter().filter(|spec| spec.by_default).cloned().collect());
+        };
+        if names.is_empty() {
+            return Err(ScenarioError::NoLearner);
+        }
+        let mut chosen: Vec<LearnerSpec> = Vec::new();
+        for name in names {
+            let spec = match self.learners.iter().find(|spec| spec.name == *name) {
+                Some(spec) => spec.clone(),
+                None => self.compose(name)?,
+            };
+            if chosen.contains(&spec) {
+                return Err(ScenarioError::RepeatedLearner(name.clone()));
+            }
+            chosen.push(spec);
+        }
+        Ok(chosen)
+    }
+
+    /// What else can be compared here: every estimator with every policy that fits it, but for what the scenario names.
+    pub fn compositions(&self) -> Vec<LearnerSpec> {
+        let pairs =
+            EstimatorKind::ALL.into_iter().flat_map(|estimator| PolicyKind::ALL.map(|policy| (estimator, policy)));
+        let named = |(estimator, policy): &(EstimatorKind, PolicyKind)| {
+            let composed = LearnerSpec::composed("", *estimator, *policy);
+            self.learners
+                .iter()
+                .any(|spec| LearnerSpec { name: String::new(), by_default: false, ..spec.clone() } == composed)
+        };
+        pairs
+            .filter(|pair| !named(pair))
+            .filter_map(|(estimator, policy)| self.compose(&composed(estimator, policy)).ok())
+            .collect()
+    }
+
+    /// A learner as reports describe it.
+    pub(crate) fn learner_description(&self, spec: &LearnerSpec) -> LearnerDescription {
+        let noise = match spec.estimator {
+            EstimatorKind::Rls => self.filter.stabilising,
+            EstimatorKind::Unscented => self.unscented.stabilising,
+            // They show no covariance, or add nothing to it.
+            EstimatorKind::RlsSixNumbers | EstimatorKind::Smoother | EstimatorKind::Gradient => None,
+        };
+        let robust = spec.estimator == EstimatorKind::Smoother
+            && spec.robust
+            && matches!(self.smoother.loss, Loss::Mixture { .. });
+        LearnerDescription {
+            name: spec.name.clone(),
+            estimator: spec.estimator.name().to_owned(),
+            policy: spec.policy.name().to_owned(),
+            stabilised: spec.stabilising && noise.is_some(),
+            robust,
+        }
+    }
+
+    fn compose(&self, name: &str) -> Result<LearnerSpec, ScenarioError> {
+        let unknown = || ScenarioError::UnknownLearner {
+            scenario: self.name.clone(),
+            name: name.to_owned(),
+            suggested: self.similar_learner(name),
+            known: self.learners.iter().map(|spec| spec.name.clone()).collect(),
+        };
+        let pair = if name == HUMAN { "rls:human" } else { name };
+        let (estimator, policy) = pair.split_once(SEPARATOR).ok_or_else(unknown)?;
+        let estimator = EstimatorKind::ALL.into_iter().find(|kind| kind.name() == estimator).ok_or_else(unknown)?;
+        let policy = PolicyKind::ALL.into_iter().find(|kind| kind.name() == policy).ok_or_else(unknown)?;
+        match misfit(estimator, policy, self.setting()) {
+            None => Ok(LearnerSpec::composed(name, estimator, policy)),
+            Some(Misfit { what, .. }) => {
+                Err(ScenarioError::Misfit { name: name.to_owned(), what, fitting: self.fitting(estimator, policy) })
+            }
+        }
+    }
+
+    fn setting(&self) -> Setting {
+        Setting::of(&self.robot, Some(&self.rig), self.world.kind())
+    }
+
+    /// The name of the pair nearest to these two that fits.
+    fn fitting(&self, mut estimator: EstimatorKind, mut policy: PolicyKind) -> String {
+        while let Some(misfit) = misfit(estimator, policy, self.setting()) {
+            (estimator, policy) = misfit.instead;
+        }
+        composed(estimator, policy)
+    }
+
+    /// What was probably meant by the name of a learner that is not there: one of the scenario's, or two halves.
+    fn similar_learner(&self, name: &str) -> Option<String> {
+        let Some((estimator, policy)) = name.split_once(SEPARATOR) else {
+            return similar(name, self.learners.iter().map(|spec| spec.name.as_str())).map(str::to_owned);
+        };
+        let estimator = similar(estimator, EstimatorKind::ALL.map(EstimatorKind::name))?;
+        let policy = similar(policy, PolicyKind::ALL.map(PolicyKind::name))?;
+        let estimator = EstimatorKind::ALL.into_iter().find(|kind| kind.name() == estimator)?;
+        let policy = PolicyKind::ALL.into_iter().find(|kind| kind.name() == policy)?;
+        Some(self.fitting(estimator, policy))
+    }
+}
+
+fn composed(estimator: EstimatorKind, policy: PolicyKind) -> String {
+    if (estimator, policy) == (EstimatorKind::Rls, PolicyKind::Human) {
+        return HUMAN.to_owned();
+    }
+    format!("{}{SEPARATOR}{}", estimator.name(), policy.name())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BUILTIN, WorldSpec, builtin};
+
+    #[test]
+    fn any_estimator_learns_by_any_policy_that_fits() {
+        for known in BUILTIN {
+            let scenario = builtin(known.name).unwrap();
+            let offered = scenario.compositions();
+            assert!(offered.iter().all(|spec| scenario.learners.iter().all(|other| other.name != spec.name)));
+            // A fast one of each estimator makes steps.
+            let names: Vec<String> = (offered.iter())
+                .filter(|spec| matches!(spec.policy, PolicyKind::Active | PolicyKind::Random))
+                .map(|spec| spec.name.clone())
+                .collect();
+            if known.name == "arm-20dof" || names.is_empty() {
+                continue;
+            }
+            let mut experiment = scenario.experiment(3, Some(&names)).unwrap();
+            for _ in 0..2 {
+                experiment.step().unwrap();
+            }
+            for (learner, name) in experiment.latest().learners.iter().zip(&names) {
+                assert_eq!((&learner.name, &learner.failure), (name, &None), "{}", known.name);
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let scenario = builtin("arm-6dof").unwrap();
+        let chosen = |name: &str| scenario.chosen(Some(&[name.to_owned()]));
+        assert!(matches!(chosen("gradient:active"), Err(ScenarioError::Misfit { .. })));
+        for name in ["rls", "rls:", ":random", "rls:rls", "rls:random:random", "RLS:random", ""] {
+            assert!(matches!(chosen(name), Err(ScenarioError::UnknownLearner { .. })), "{name}");
+        }
+        assert_eq!(chosen("smoother:random").unwrap()[0].estimator, EstimatorKind::Smoother);
+    }
+
+    #[test]
+    fn over_recorded_rows_there_is_nothing_to_search() {
+        let (simulated, measured) = (builtin("arm-6dof").unwrap(), builtin("tiago-mocap").unwrap());
+        let chosen = |scenario: &Scenario, name: &str| scenario.chosen(Some(&[name.to_owned()]));
+        for search in ["direct", "random-search", "bayesian", "monte-carlo", "naive"] {
+            let name = format!("rls:active-{search}");
+            chosen(&simulated, &name).unwrap();
+            let message = chosen(&measured, &name).unwrap_err().to_string();
+            assert!(message.contains("every row is tried") && message.ends_with("write `rls:active`"), "{message}");
+            assert!(measured.compositions().iter().all(|spec| !spec.name.ends_with(search)), "{search} is offered");
+        }
+        for name in ["rls:active", "smoother:active", "smoother:active-planned", "unscented:random"] {
+            chosen(&measured, name).unwrap();
+        }
+        // What is suggested fits in every respect.
+        let message = chosen(&measured, "rls-six-numbers:active-direct").unwrap_err().to_string();
+        assert!(message.ends_with("write `rls:random`"), "{message}");
+    }
+
+    #[test]
+    fn a_person_is_offered_where_a_robot_can_be_moved_and_never_by_default() {
+        for known in BUILTIN {
+            let scenario = builtin(known.name).unwrap();
+            let is_simulated = matches!(scenario.world, WorldSpec::Simulated { .. });
+            let offered: Vec<String> = scenario.compositions().into_iter().map(|spec| spec.name).collect();
+            for name in ["human", "smoother:human"] {
+                assert_eq!(offered.iter().any(|known| known == name), is_simulated, "{name} in {}", known.name);
+                assert_eq!(scenario.chosen(Some(&[name.to_owned()])).is_ok(), is_simulated);
+            }
+            let by_default = scenario.chosen(None).unwrap();
+            assert!(by_default.iter().all(|spec| spec.policy != PolicyKind::Human));
+        }
+        let human = &builtin("arm-6dof").unwrap().chosen(Some(&["human".to_owned()])).unwrap()[0];
+        assert_eq!(
+            (human.name.as_str(), human.estimator, human.policy),
+            ("human", EstimatorKind::Rls, PolicyKind::Human)
+        );
+    }
+
+    #[test]
+    fn a_misspelt_name_gets_a_suggestion() {
+        let scenario = builtin("arm-6dof").unwrap();
+        for (name, meant) in [
+            ("actve", "active"),
+            ("gobal", "global"),
+            ("smother:random", "smoother:random"),
+            ("smoother:randon", "smoother:random"),
+            ("smother:activ", "smoother:active"),
+            ("gradiant:active", "gradient:random"),
+        ] {
+            let message = scenario.chosen(Some(&[name.to_owned()])).unwrap_err().to_string();
+            assert!(message.contains(&format!("did you mean `{meant}`?")), "{message}");
+        }
+        for name in ["xyz", "xyz:random", "rls:xyz"] {
+            let message = scenario.chosen(Some(&[name.to_owned()])).unwrap_err().to_string();
+            assert!(!message.contains("did you mean") && message.contains("active, random"), "{message}");
+        }
+    }
+}

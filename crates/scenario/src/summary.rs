@@ -1,0 +1,153 @@
+//! What a scenario tells of itself to those who choose among scenarios.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Scenario, WorldSpec};
+use body_schema_experiment::{JointDescription, LearnerDescription, SocketDescription, Thresholds};
+
+/// A scenario in brief.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct ScenarioSummary {
+    /// Its name.
+    pub name: String,
+    /// One line about it.
+    pub title: String,
+    /// Simulated or measured.
+    pub world: WorldKind,
+    /// The joints, base first.
+    pub joints: Vec<JointDescription>,
+    /// Number of learned parameters in tangent coordinates.
+    pub parameters: usize,
+    /// Steps of a run unless told otherwise.
+    pub steps: u64,
+    /// The learners it offers.
+    pub learners: Vec<LearnerDescription>,
+    /// What else can be compared: every estimator with every policy that fits it, by names such as `smoother:random`.
+    pub compositions: Vec<LearnerDescription>,
+    /// The learners that a page compares unless told otherwise: those of `active`, `random` and `global` that it has, or where
+    /// it has none of them its defaults.
+    pub explorer: Vec<String>,
+    /// The thresholds of `converged_at`.
+    pub thresholds: Thresholds,
+}
+
+/// Where movements are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub enum WorldKind {
+    /// A simulated arm whose truth is known to the judges.
+    Simulated,
+    /// A recorded data set without a known truth.
+    Measured,
+    /// A robot of one's own, which is asked to move and tells what was observed.
+    Outside,
+}
+
+impl WorldSpec {
+    /// What kind it is.
+    pub fn kind(&self) -> WorldKind {
+        match self {
+            Self::Simulated { .. } => WorldKind::Simulated,
+            Self::Measured { .. } => WorldKind::Measured,
+            Self::Outside { .. } => WorldKind::Outside,
+        }
+    }
+}
+
+/// The learners that tell most beside each other, in the order in which a page shows them.
+const SHOWN: [&str; 3] = ["active", "random", "global"];
+
+impl ScenarioSummary {
+    /// Every learner that can be compared, the scenario's own first.
+    pub fn offered(&self) -> impl Iterator<Item = &LearnerDescription> {
+        self.learners.iter().chain(&self.compositions)
+    }
+}
+
+impl Scenario {
+    /// The scenario in brief.
+    pub fn summary(&self) -> ScenarioSummary {
+        ScenarioSummary {
+            name: self.name.clone(),
+            title: self.title.clone(),
+            world: self.world.kind(),
+            joints: self.robot.joint_descriptions(),
+            parameters: self.robot.layout.dimension(),
+            steps: self.steps,
+            learners: self.learners.iter().map(|spec| self.learner_description(spec)).collect(),
+            compositions: self.compositions().iter().map(|spec| self.learner_description(spec)).collect(),
+            explorer: self.explorer(),
+            thresholds: self.thresholds,
+        }
+    }
+
+    /// See [`ScenarioSummary::explorer`].
+    fn explorer(&self) -> Vec<String> {
+        let named = |name: &&str| self.learners.iter().any(|spec| spec.name == **name);
+        let shown: Vec<String> = SHOWN.iter().filter(|name| named(name)).map(|name| (*name).to_owned()).collect();
+        if !shown.is_empty() {
+            return shown;
+        }
+        self.learners.iter().filter(|spec| spec.by_default).map(|spec| spec.name.clone()).collect()
+    }
+}
+
+impl super::Robot {
+    /// The sockets, and where a known truth has them.
+    pub(crate) fn socket_descriptions(&self, is_true: bool) -> Vec<SocketDescription> {
+        let of = |socket: &super::SocketSpec, held_out| SocketDescription {
+            name: socket.name.clone(),
+            place: socket.place.clone(),
+            at_m: is_true.then(|| socket.at.into()),
+            held_out,
+        };
+        let learned = self.sockets.iter().map(|socket| of(socket, false));
+        learned.chain(self.held_out_sockets.iter().map(|socket| of(socket, true))).collect()
+    }
+
+    pub(crate) fn joint_descriptions(&self) -> Vec<JointDescription> {
+        (self.names.iter().zip(&self.state.joints).zip(self.limits.joints()).enumerate())
+            .map(|(index, ((name, joint), &(lower, upper)))| JointDescription {
+                name: name.clone(),
+                kind: joint.kind(),
+                learned: self.layout.is_learned(index),
+                limits: [lower, upper],
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Scenario, builtin};
+
+    /// As a session of theirs describes them.
+    #[test]
+    fn learners_are_described_as_they_learn() {
+        let outliers = builtin("arm-6dof-outliers").unwrap().summary();
+        let of = |name: &str| outliers.offered().find(|learner| learner.name == name).expect("offered");
+        assert!(of("global").robust && !of("global").stabilised);
+        let (plain, stabilised) = (builtin("tiago-mocap").unwrap(), builtin("arm-6dof").unwrap());
+        assert_eq!(plain.summary().learners[0].stabilised, plain.filter.stabilising.is_some());
+        assert_eq!(stabilised.summary().learners[0].stabilised, stabilised.filter.stabilising.is_some());
+    }
+
+    #[test]
+    fn a_page_compares_what_tells_most() {
+        for (name, shown) in
+            [("arm-6dof", &["active", "random", "global"][..]), ("arm-6dof-selectors", &["active", "random"])]
+        {
+            assert_eq!(builtin(name).unwrap().summary().explorer, shown, "{name}");
+        }
+        // Under other names the defaults are all there is to go by.
+        let renamed = builtin("arm-6dof").unwrap();
+        let text = ["active", "random", "global"].iter().fold(renamed.source, |text, name| {
+            text.replace(&format!("name = \"{name}\""), &format!("name = \"my-{name}\""))
+        });
+        let text = text.split("[promises]").next().unwrap();
+        let scenario = Scenario::parse("renamed.toml", text, &|_| Err("has no data".to_owned())).unwrap();
+        assert_eq!(scenario.summary().explorer, ["my-active", "my-random", "gradient"]);
+    }
+}

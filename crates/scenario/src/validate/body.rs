@@ -1,0 +1,248 @@
+//! The robot of a scenario, joint by joint.
+
+use std::ops::Range;
+
+use nalgebra::Point3;
+use toml::Spanned;
+
+use super::{Check, described::Links, equipment::Outfit, raw};
+use crate::Robot;
+use body_schema_engine::{
+    kinematics::{Joint, JointBox, JointKind, Line},
+    magnitude::are_usable,
+    model::{Block, Correction, Layout, Load, Loads, State},
+    sensing::TargetKind,
+};
+
+impl Check<'_> {
+    pub(super) fn robot(&mut self, scenario: &raw::Scenario) -> Option<Robot> {
+        let raw = &scenario.robot;
+        let described = self.described(scenario);
+        if raw.urdf.is_some() && described.is_none() {
+            return None;
+        }
+        let place = raw.urdf.as_ref().map_or_else(|| raw.joints.span(), Spanned::span);
+        let marker = match (&raw.marker_m, scenario.targets.first()) {
+            (Some(marker), None) => self.point("robot.marker_m", marker),
+            (None, Some(_)) if !raw.learn_marker => Point3::origin(),
+            (None, Some(target)) => {
+                let mend = "remove `learn_marker`; say `known = { to_m = … }` of the target instead";
+                self.problem(target.span(), "robot.learn_marker", "targets take the marker's place", mend);
+                Point3::origin()
+            }
+            (Some(marker), Some(_)) => {
+                let mend = "remove it, or the [[target]]s";
+                self.problem(marker.span(), "robot.marker_m", "targets take the marker's place", mend);
+                Point3::origin()
+            }
+            (None, None) => {
+                let mend = "add `marker_m = [x, y, z]`, where the marker on the hand is at θ = 0, or a [[target]]";
+                self.problem(place.clone(), "robot.marker_m", "missing", mend);
+                Point3::origin()
+            }
+        };
+        let mut names: Vec<String> = Vec::new();
+        let (mut joints, mut limits, mut learned) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, spanned) in raw.joints.get_ref().iter().enumerate() {
+            let joint = spanned.get_ref();
+            let name = joint.name.get_ref();
+            let key = |field: &str| format!("robot.joint[{index}].{field}");
+            if name.is_empty() || names.contains(name) {
+                let mend = "give each joint a name of its own";
+                self.problem(joint.name.span(), key("name"), format!("{name:?} is empty or taken"), mend);
+            }
+            names.push(name.clone());
+            learned.push(joint.learned);
+            joints.extend(self.joint(joint, spanned.span(), &key));
+            limits.extend(self.limits(joint, spanned.span(), &key));
+        }
+        if let Some(described) = &described {
+            let chain = &described.chain;
+            names = chain.names();
+            joints = chain.state().joints;
+            match chain.limits() {
+                Ok(within) => limits.extend_from_slice(within.joints()),
+                Err(error) => {
+                    let what = format!("{}: {error}", described.file);
+                    self.problem(place.clone(), "robot.urdf", what, "correct its <limit>s");
+                    return None;
+                }
+            }
+        }
+        let (held, partly) = self.learned(scenario, &names);
+        let offsets = self.offsets(scenario, &names, &joints);
+        learned.resize(names.len(), true);
+        learned.iter_mut().zip(held).for_each(|(learned, held)| *learned &= held);
+        if names.is_empty() {
+            self.problem(place.clone(), "robot.joint", "there is no joint", "add a [[robot.joint]]");
+        }
+        let outfit = self.outfit(scenario, Links { joints: &names, described: described.as_deref() });
+        let mut state = State::arm(joints, marker);
+        let is_whole = state.joints.len() == names.len();
+        let mut blocks: Vec<Block> = (0..names.len()).filter(|joint| learned[*joint]).map(Block::Axis).collect();
+        for (index, spanned) in raw.joints.get_ref().iter().enumerate().filter(|_| is_whole) {
+            state.corrections[index] = self.correction(index, spanned.get_ref());
+            blocks.extend(spanned.get_ref().learn_ratio.then_some(Block::Ratio(index)));
+            blocks.extend(spanned.get_ref().learn_offset.then_some(Block::Offset(index)));
+            blocks.extend(spanned.get_ref().learn_eccentricity.then_some(Block::Eccentricity(index)));
+            let compliance = Load::ALL.map(|load| Block::Compliance(index, load));
+            blocks.extend(compliance.into_iter().filter(|_| spanned.get_ref().learn_compliance));
+        }
+        outfit.equip(&mut state);
+        blocks.extend(offsets.iter().chain(&outfit.known).map(|(block, _)| *block));
+        blocks.extend(raw.learn_marker.then_some(Block::Target(0)));
+        let Outfit { mut equipment, mut known, .. } = outfit;
+        known.extend(partly.into_iter().chain(offsets));
+        if equipment.targets.is_empty() {
+            let (name, points) = ("marker".to_owned(), vec![Point3::origin()]);
+            equipment.targets.push(TargetKind { name, points, facing: None });
+        }
+        let mut up_to_motion = false;
+        if let Some(prediction) = &scenario.prediction {
+            let prediction = prediction.get_ref();
+            up_to_motion = prediction.up_to_motion;
+            if let Some(hand) = self.hand("prediction.of", &prediction.of, &equipment) {
+                state.hand = hand;
+            }
+        }
+        let gravity = self.gravity(raw, &names, &state.joints);
+        if blocks.iter().any(|block| matches!(block, Block::Compliance(..))) || gives_way(&state) {
+            state.loads = Some(Loads::new(&state, gravity.up, gravity.elbow).into());
+        }
+        let layout = Layout::new(&state, blocks.iter().copied());
+        if layout.dimension() == 0 {
+            let mend = "set `learned = true` on a joint, or `learn_marker = true`";
+            self.problem(place.clone(), "robot.joint", "nothing is to be learned", mend);
+        }
+        let complete = state.joints.len() == names.len() && limits.len() == names.len() && !names.is_empty();
+        let limits = JointBox::new(limits).map_err(|error| {
+            self.problem(place.clone(), "robot.joint", error.to_string(), "write limits that a robot can have");
+        });
+        let limits = limits.ok().filter(|_| complete)?;
+        let (sockets, held_out_sockets, spacings) = Default::default();
+        let mut robot = Robot {
+            names,
+            state,
+            layout,
+            limits,
+            body: raw.body,
+            known,
+            equipment,
+            sockets,
+            held_out_sockets,
+            spacings,
+            up_to_motion,
+            gravity,
+            described,
+        };
+        self.sockets(scenario, &mut robot);
+        blocks.extend((0..robot.sockets.len()).map(Block::Socket));
+        robot.layout = Layout::new(&robot.state, blocks);
+        Some(robot)
+    }
+
+    /// What a joint's readings are truly corrected by.
+    fn correction(&mut self, index: usize, raw: &raw::Joint) -> Correction {
+        let key = |field: &str| format!("robot.joint[{index}].{field}");
+        let mut correction = Correction { compliance: self.compliance(index, raw), ..Correction::default() };
+        if let Some(ratio) = &raw.ratio {
+            correction.ratio = self.number(&key("ratio"), ratio, |ratio| ratio != 0.0, "a number other than 0");
+        }
+        let (wanted, given, other) = match raw.kind {
+            JointKind::Revolute => ("offset_deg", &raw.offset_deg, &raw.offset_m),
+            JointKind::Prismatic => ("offset_m", &raw.offset_m, &raw.offset_deg),
+        };
+        if let Some(other) = other {
+            self.problem(
+                other.span(),
+                key("offset"),
+                "this unit does not fit the kind of joint",
+                format!("write `{wanted}`"),
+            );
+        }
+        if let Some(offset) = given {
+            let offset = self.number(&key(wanted), offset, |_| true, "a number");
+            correction.offset = if raw.kind == JointKind::Revolute { offset.to_radians() } else { offset };
+        }
+        if raw.kind == JointKind::Prismatic
+            && let Some(span) =
+                raw.eccentricity_deg.as_ref().map(|given| given.span()).or(raw.learn_eccentricity.then_some(0..0))
+        {
+            let what = "an encoder off its centre misreads a joint that turns, not one that slides";
+            self.problem(span, key("eccentricity"), what, "remove it");
+        } else if let Some(given) = &raw.eccentricity_deg {
+            let [sine, cosine] = given.get_ref().0;
+            if !are_usable(&[sine, cosine]) {
+                self.problem(
+                    given.span(),
+                    key("eccentricity_deg"),
+                    "it is out of range",
+                    "write `[sine, cosine]`, in degrees",
+                );
+            }
+            (correction.sine, correction.cosine) = (sine.to_radians(), cosine.to_radians());
+        }
+        correction
+    }
+
+    fn joint(&mut self, raw: &raw::Joint, span: Range<usize>, key: &dyn Fn(&str) -> String) -> Option<Joint> {
+        let direction = self.unit(&key("axis"), &raw.axis);
+        match (raw.kind, &raw.point_m) {
+            (JointKind::Revolute, Some(point)) => {
+                let point = self.point(&key("point_m"), point);
+                direction.map(|direction| Joint::Revolute(Line { point, direction }))
+            }
+            (JointKind::Revolute, None) => {
+                let mend = "add `point_m = [x, y, z]`, any point on the axis at θ = 0, in metres";
+                self.problem(span, key("point_m"), "a revolute joint needs it", mend);
+                None
+            }
+            (JointKind::Prismatic, None) => direction.map(Joint::Prismatic),
+            (JointKind::Prismatic, Some(point)) => {
+                self.problem(point.span(), key("point_m"), "a prismatic joint has only a direction", "remove it");
+                None
+            }
+        }
+    }
+
+    fn limits(&mut self, raw: &raw::Joint, span: Range<usize>, key: &dyn Fn(&str) -> String) -> Option<(f64, f64)> {
+        let (wanted, given, other, unit) = match raw.kind {
+            JointKind::Revolute => ("limits_deg", &raw.limits_deg, &raw.limits_m, "degrees"),
+            JointKind::Prismatic => ("limits_m", &raw.limits_m, &raw.limits_deg, "metres"),
+        };
+        if let Some(other) = other {
+            let mend = format!("write `{wanted}`, in {unit}");
+            self.problem(other.span(), key("limits"), "this unit does not fit the kind of joint", mend);
+            return None;
+        }
+        let Some(given) = given else {
+            let mend = format!("add `{wanted} = [lower, upper]`, in {unit}");
+            self.problem(span, key(wanted), "missing", mend);
+            return None;
+        };
+        let raw::Exactly([lower, upper]) = *given.get_ref();
+        if !are_usable(&[lower, upper]) {
+            self.problem(given.span(), key(wanted), "a limit is out of range", format!("write two numbers, in {unit}"));
+            return None;
+        }
+        if lower >= upper {
+            let what = format!("the lower limit {lower} is not below the upper {upper}");
+            let mend = if lower > upper {
+                format!("write [{upper:?}, {lower:?}]")
+            } else {
+                "give the joint a range; a joint that cannot move teaches nothing".to_owned()
+            };
+            self.problem(given.span(), key(wanted), what, mend);
+            return None;
+        }
+        Some(match raw.kind {
+            JointKind::Revolute => (lower.to_radians(), upper.to_radians()),
+            JointKind::Prismatic => (lower, upper),
+        })
+    }
+}
+
+/// Whether joints of it truly do.
+fn gives_way(state: &State) -> bool {
+    state.corrections.iter().any(|correction| correction.compliance != [0.0; 2])
+}

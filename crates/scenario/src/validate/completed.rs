@@ -1,0 +1,140 @@
+//! What a table's titles say by themselves, where a scenario with a URDF says nothing: which targets there are, what measures
+//! them, and what is known of their places.
+
+use std::ops::Range;
+
+use toml::Spanned;
+
+use super::raw;
+use body_schema_engine::sensing::Keys;
+use body_schema_table::Titles;
+
+/// What nothing is known of where the robot stands.
+const BASE_M: f64 = 1.0;
+/// The same of angles: a radian.
+const RADIAN_DEG: f64 = 57.3;
+/// Where a target may be, from the frame of its link.
+const TARGET_M: f64 = 0.3;
+/// Units of noise, where it is learned: of lengths, of rotations and of pictures.
+const SIGMA_M: f64 = 0.001;
+const SIGMA_DEG: f64 = 0.1;
+const SIGMA_PX: f64 = 1.0;
+
+/// Completes a scenario whose robot is a URDF and whose measurements are a table with these titles; or one of a robot
+/// elsewhere, where there are no titles, whose targets' positions are measured unless it says otherwise.
+pub(super) fn complete(raw: &mut raw::Scenario, titles: Option<&Titles>) {
+    let span = raw.measurements.as_ref().map_or(0..0, Spanned::span);
+    let has_sockets = titles.map_or(!raw.sockets.is_empty(), |titles| titles.label("socket").is_ok());
+    if (raw.sensor.is_none() || titles.is_none()) && raw.held.is_none() && has_sockets {
+        raw.held = Some(Spanned::new(span.clone(), raw::Sockets::default()));
+    }
+    if raw.sensor.is_none() && raw.held.is_none() {
+        let named: Vec<String> = raw.targets.iter().map(|target| target.get_ref().name.get_ref().clone()).collect();
+        let titled = || titles.map_or_else(|| vec!["marker".to_owned()], prefixes);
+        let seen = if named.is_empty() { titled() } else { named };
+        let keys = seen.into_iter().map(|name| Spanned::new(span.clone(), keys_of(name, titles)));
+        raw.sensor = Some(Spanned::new(span.clone(), raw::Sensors(keys.collect())));
+    }
+    for keys in raw.sensor.iter_mut().flat_map(|sensors| &mut sensors.get_mut().0) {
+        sigmas(keys.get_mut());
+    }
+    targets(raw, &span);
+    let is_absolute = |keys: &Spanned<Keys>| keys.get_ref().channel.as_deref() != Some("pixels");
+    let sees_absolutely = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0).any(is_absolute);
+    if raw.base.is_none() && sees_absolutely {
+        let nowhere = || Spanned::new(span.clone(), raw::Exactly([0.0; 3]));
+        let known = within(&span, BASE_M, true);
+        raw.base = Some(Spanned::new(span.clone(), raw::Base { at_m: nowhere(), rpy_deg: nowhere(), known }));
+    }
+    let name = raw.targets.first().map(|target| target.get_ref().name.get_ref().clone());
+    if let (None, None, Some(name)) = (&raw.prediction, &raw.sensor, name) {
+        // Nothing tells where the whole stands.
+        let of = Spanned::new(span.clone(), name);
+        raw.prediction = Some(Spanned::new(span, raw::Prediction { of, up_to_motion: true }));
+    }
+}
+
+/// The targets that titles name: what stands before x, y and z.
+fn prefixes(titles: &Titles) -> Vec<String> {
+    let mut found: Vec<String> = Vec::new();
+    for prefix in titles.prefixes() {
+        let is_place = titles.has_position(prefix);
+        let name = if prefix.is_empty() { "marker" } else { prefix };
+        if is_place && !found.iter().any(|known| known.eq_ignore_ascii_case(name)) {
+            found.push(name.to_owned());
+        }
+    }
+    found
+}
+
+/// A sensor of a target's pose where its titles have a rotation, or else of its position.
+fn keys_of(target: String, titles: Option<&Titles>) -> Keys {
+    let has_pose = |prefix: &&str| titles.is_some_and(|titles| titles.has_pose(prefix));
+    let is_pose = ["", &target].iter().any(has_pose);
+    let channel = if is_pose { "pose" } else { "position" };
+    Keys { channel: Some(channel.to_owned()), target: Some(target), ..Keys::default() }
+}
+
+fn sigmas(keys: &mut Keys) {
+    match keys.channel.as_deref() {
+        Some("pixels") => drop(keys.sigma_px.get_or_insert(SIGMA_PX)),
+        Some("pose") => {
+            keys.sigma_m.get_or_insert(SIGMA_M);
+            keys.sigma_deg.get_or_insert(SIGMA_DEG);
+        }
+        _ if keys.covariance_m2.is_none() => drop(keys.sigma_m.get_or_insert(SIGMA_M)),
+        _ => {}
+    }
+}
+
+/// The targets that sensors and sockets name, on the tip; and of those that are nowhere said to be, that little is known.
+fn targets(raw: &mut raw::Scenario, span: &Range<usize>) {
+    let sensors: Vec<Keys> =
+        raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0).map(|keys| keys.get_ref().clone()).collect();
+    if raw.targets.is_empty() {
+        let named = sensors.iter().map(|keys| keys.target.clone().unwrap_or_else(|| "marker".to_owned()));
+        let held =
+            raw.held.iter().map(|held| held.get_ref().target.as_ref().map_or("ball", |name| name.get_ref()).to_owned());
+        let mut names: Vec<String> = Vec::new();
+        for name in named.chain(held) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        raw.targets = names.into_iter().map(|name| Spanned::new(span.clone(), target(name, span))).collect();
+    }
+    for (index, target) in raw.targets.iter_mut().enumerate() {
+        let target = target.get_mut();
+        let is_meant = |keys: &&Keys| keys.target.as_ref().map_or(index == 0, |name| name == target.name.get_ref());
+        let is_pose = sensors.iter().filter(is_meant).any(|keys| keys.channel.as_deref() == Some("pose"));
+        let nothing = || Spanned::new(span.clone(), raw::Exactly([0.0; 3]));
+        if is_pose && target.rpy_deg.is_none() {
+            target.rpy_deg = Some(nothing());
+        }
+        if target.at_m.is_none() {
+            target.at_m = Some(nothing());
+            let raw::Known { known_to_m, known_to_deg, anywhere_m } = &target.known;
+            if known_to_m.is_none() && known_to_deg.is_none() && anywhere_m.is_none() {
+                target.known = within(span, TARGET_M, target.rpy_deg.is_some());
+            }
+        }
+    }
+}
+
+fn target(name: String, span: &Range<usize>) -> raw::Target {
+    raw::Target {
+        name: Spanned::new(span.clone(), name),
+        link: None,
+        at_m: None,
+        rpy_deg: None,
+        points_m: None,
+        facing: None,
+        facing_within_deg: None,
+        known: raw::Known::default(),
+    }
+}
+
+fn within(span: &Range<usize>, to_m: f64, is_turned: bool) -> raw::Known {
+    let known = |size: f64| Spanned::new(span.clone(), size);
+    raw::Known { known_to_m: Some(known(to_m)), known_to_deg: is_turned.then(|| known(RADIAN_DEG)), anywhere_m: None }
+}

@@ -1,0 +1,259 @@
+//! What a robot carries and what stands beside it: targets and cameras.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use toml::Spanned;
+
+use super::{Check, described::Links, raw};
+use crate::Known;
+use body_schema_engine::{
+    magnitude::{are_usable, is_positive},
+    model::{Block, Device, Hand, Place, State, Target},
+    sensing::{CameraKind, Equipment, Facing, TargetKind},
+};
+
+/// How far from the direction that it faces a target is seen, unless the file says otherwise, degrees.
+const FACING_WITHIN_DEG: f64 = 80.0;
+
+/// Base, targets, cameras, and how well their places are known where they are learned.
+#[derive(Default)]
+pub(super) struct Outfit {
+    pub base: Isometry3<f64>,
+    pub targets: Vec<Target>,
+    pub devices: Vec<Device>,
+    pub equipment: Equipment,
+    pub known: Vec<(Block, Known)>,
+}
+
+impl Check<'_> {
+    /// The targets and cameras of a file, on these links.
+    pub(super) fn outfit(&mut self, raw: &raw::Scenario, links: Links<'_>) -> Outfit {
+        let mut outfit = Outfit::default();
+        if let Some(spanned) = &raw.base {
+            let base = spanned.get_ref();
+            let at = self.point("base.at_m", &base.at_m);
+            let rotation = self.rotation("base.rpy_deg", &base.rpy_deg);
+            outfit.base = Isometry3::from_parts(Translation3::from(at.coords), rotation);
+            outfit.known.extend(self.known("base", &base.known, spanned).map(|known| (Block::Base, known)));
+        }
+        for (index, target) in raw.targets.iter().enumerate() {
+            self.target(&format!("target[{index}]"), target, links, &mut outfit);
+        }
+        for (index, camera) in raw.cameras.iter().enumerate() {
+            self.camera(&format!("camera[{index}]"), camera, links, &mut outfit);
+        }
+        outfit
+    }
+
+    fn target(&mut self, key: &str, spanned: &Spanned<raw::Target>, links: Links<'_>, outfit: &mut Outfit) {
+        let raw = spanned.get_ref();
+        let field = |field: &str| format!("{key}.{field}");
+        let kinds = &outfit.equipment.targets;
+        self.free_name(&field("name"), &raw.name, kinds.iter().map(|kind| kind.name.as_str()));
+        let link = raw.link.as_ref().map_or(Some(links.last()), |link| self.link(&field("link"), link, links));
+        let (link, frame) = link.unwrap_or_default();
+        let at = match &raw.at_m {
+            Some(at) => self.point(&field("at_m"), at),
+            None => {
+                let mend = "add `at_m = [x, y, z]`, where it is at θ = 0, in metres";
+                self.problem(spanned.span(), field("at_m"), "missing", mend);
+                Point3::origin()
+            }
+        };
+        let is_body = raw.rpy_deg.is_some() || raw.points_m.is_some();
+        let rotation =
+            raw.rpy_deg.as_ref().map_or(UnitQuaternion::identity(), |rpy| self.rotation(&field("rpy_deg"), rpy));
+        let points = raw.points_m.as_ref().map_or_else(
+            || vec![Point3::origin()],
+            |points| points.get_ref().iter().map(|raw::Exactly(point)| Point3::from(*point)).collect(),
+        );
+        if let Some(given) = &raw.points_m
+            && (points.is_empty() || points.iter().any(|point| !are_usable(&point.coords)))
+        {
+            let mend = "write at least one point, three finite numbers each, in metres";
+            self.problem(given.span(), field("points_m"), "these are no points", mend);
+        }
+        let facing = raw.facing.as_ref().and_then(|direction| {
+            let direction = self.unit(&field("facing"), direction)?;
+            let within = raw.facing_within_deg.as_ref().map_or(FACING_WITHIN_DEG, |within| {
+                self.number(
+                    &field("facing_within_deg"),
+                    within,
+                    |x| x > 0.0 && x <= 180.0,
+                    "an angle from 0 to 180 degrees",
+                )
+            });
+            Some(Facing { direction, within: within.to_radians() })
+        });
+        if let (Some(facing), false) = (&raw.facing, is_body) {
+            let mend = "add `rpy_deg = [0.0, 0.0, 0.0]`: a body is turned with its link, a point has no direction";
+            self.problem(facing.span(), field("facing"), "a point faces nothing", mend);
+        }
+        let place = if is_body {
+            Place::Pose(frame * Isometry3::from_parts(Translation3::from(at.coords), rotation))
+        } else {
+            Place::Point(frame * at)
+        };
+        if let Some(known) = self.known(key, &raw.known, spanned) {
+            outfit.known.push((Block::Target(outfit.targets.len()), known));
+        }
+        outfit.targets.push(Target { link, place });
+        outfit.equipment.targets.push(TargetKind { name: raw.name.get_ref().clone(), points, facing });
+    }
+
+    fn camera(&mut self, key: &str, spanned: &Spanned<raw::Camera>, links: Links<'_>, outfit: &mut Outfit) {
+        let raw = spanned.get_ref();
+        let field = |field: &str| format!("{key}.{field}");
+        let kinds = &outfit.equipment.cameras;
+        self.free_name(&field("name"), &raw.name, kinds.iter().map(|kind| kind.name.as_str()));
+        let carried = raw.link.as_ref().map(|link| self.link(&field("link"), link, links).unwrap_or_default());
+        let (link, frame) = carried.map_or((None, Isometry3::identity()), |(link, frame)| (Some(link), frame));
+        let at = self.point(&field("at_m"), &raw.at_m);
+        let rotation = match (&raw.rpy_deg, &raw.looks_at_m) {
+            (Some(rpy), None) => self.rotation(&field("rpy_deg"), rpy),
+            (None, Some(point)) => {
+                let towards = self.point(&field("looks_at_m"), point) - at;
+                looking(&towards).unwrap_or_else(|| {
+                    let mend = "name another point, not straight above or below the camera";
+                    self.problem(point.span(), field("looks_at_m"), "upright is undefined there", mend);
+                    UnitQuaternion::identity()
+                })
+            }
+            _ => {
+                let mend = "write either `looks_at_m = [x, y, z]`, the picture then being upright, or `rpy_deg = […]`";
+                self.problem(spanned.span(), field("rpy_deg, looks_at_m"), "one of the two must be given", mend);
+                UnitQuaternion::identity()
+            }
+        };
+        let mut pair = |name: &str, value: &Spanned<raw::Exactly<f64, 2>>| {
+            let raw::Exactly(pair) = *value.get_ref();
+            if !pair.iter().all(|x| is_positive(*x)) {
+                self.problem(
+                    value.span(),
+                    field(name),
+                    format!("{pair:?} is out of range"),
+                    "write two numbers above 0, in pixels",
+                );
+            }
+            pair
+        };
+        let (size_px, focal) = (pair("size_px", &raw.size_px), pair("focal_px", &raw.focal_px));
+        let centre =
+            raw.centre_px.as_ref().map_or([0.5 * size_px[0], 0.5 * size_px[1]], |centre| pair("centre_px", centre));
+        let number = outfit.devices.len();
+        if let Some(known) = self.known(key, &raw.known, spanned) {
+            outfit.known.push((Block::Device(number), known));
+        }
+        if let Some(px) = &raw.known_to_px {
+            let px = self.positive(&field("known_to_px"), px);
+            outfit.known.push((
+                Block::Intrinsics(number),
+                Known::Within { length_m: Known::EXACTLY, angle_rad: Known::EXACTLY, other: px },
+            ));
+        }
+        let pose = frame * Isometry3::from_parts(Translation3::from(at.coords), rotation);
+        let intrinsics = Some([focal[0], focal[1], centre[0], centre[1]]);
+        outfit.devices.push(Device { link, pose, intrinsics });
+        outfit.equipment.cameras.push(CameraKind { name: raw.name.get_ref().clone(), size_px });
+    }
+
+    /// How well a place is known; `None` if it is known exactly, so that it is not learned.
+    pub(super) fn known<T>(&mut self, key: &str, raw: &raw::Known, spanned: &Spanned<T>) -> Option<Known> {
+        let field = |field: &str| format!("{key}.{field}");
+        if let Some(within) = &raw.anywhere_m {
+            if raw.known_to_m.is_some() || raw.known_to_deg.is_some() {
+                let mend = "remove `anywhere_m`, or `known_to_m` and `known_to_deg`";
+                self.problem(spanned.span(), field("anywhere_m"), "of what may be anywhere nothing is known", mend);
+            }
+            return Some(Known::Anywhere { within_m: self.positive(&field("anywhere_m"), within) });
+        }
+        if raw.known_to_m.is_none() && raw.known_to_deg.is_none() {
+            return None;
+        }
+        let length_m = raw.known_to_m.as_ref().map_or(Known::EXACTLY, |x| self.positive(&field("known_to_m"), x));
+        let angle = raw.known_to_deg.as_ref().map(|x| self.positive(&field("known_to_deg"), x).to_radians());
+        Some(Known::Within { length_m, angle_rad: angle.unwrap_or(Known::EXACTLY), other: Known::EXACTLY })
+    }
+
+    pub(super) fn free_name<'a>(
+        &mut self,
+        key: &str,
+        name: &Spanned<String>,
+        mut taken: impl Iterator<Item = &'a str>,
+    ) {
+        if name.get_ref().is_empty() || taken.any(|other| other == name.get_ref()) {
+            let what = format!("{:?} is empty or taken", name.get_ref());
+            self.problem(name.span(), key, what, "give each a name of its own");
+        }
+    }
+
+    /// The link of a name, with the frame in which places on it are written.
+    fn link(&mut self, key: &str, name: &Spanned<String>, links: Links<'_>) -> Option<(usize, Isometry3<f64>)> {
+        let found = links.find(name.get_ref());
+        if found.is_none() {
+            let (what, write) = match links.described {
+                Some(_) => ("link", "one of the links"),
+                None => ("joint", "`base`, or the joint that moves it"),
+            };
+            let what = format!("there is no {what} `{}`", name.get_ref());
+            self.problem(name.span(), key, what, format!("write {write}: {}", links.names().join(", ")));
+        }
+        found
+    }
+
+    fn rotation(&mut self, key: &str, value: &Spanned<raw::Exactly<f64, 3>>) -> UnitQuaternion<f64> {
+        let raw::Exactly(angles) = *value.get_ref();
+        if !are_usable(&angles) {
+            self.problem(value.span(), key, "an angle is out of range", "write roll, pitch and yaw, in degrees");
+            return UnitQuaternion::identity();
+        }
+        let [roll, pitch, yaw] = angles.map(f64::to_radians);
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw)
+    }
+
+    /// What the hand is: the target or camera of a name.
+    pub(super) fn hand(&mut self, key: &str, name: &Spanned<String>, equipment: &Equipment) -> Option<Hand> {
+        let target = equipment.targets.iter().position(|kind| kind.name == *name.get_ref()).map(Hand::Target);
+        let camera = || equipment.cameras.iter().position(|kind| kind.name == *name.get_ref()).map(Hand::Device);
+        let found = target.or_else(camera);
+        if found.is_none() {
+            let targets = equipment.targets.iter().map(|kind| kind.name.as_str());
+            let names: Vec<&str> = targets.chain(equipment.cameras.iter().map(|kind| kind.name.as_str())).collect();
+            let what = format!("there is no target or camera `{}`", name.get_ref());
+            self.problem(name.span(), key, what, format!("write one of {}", names.join(", ")));
+        }
+        found
+    }
+}
+
+impl Outfit {
+    /// Hands its things to a robot.
+    pub fn equip(&self, state: &mut State) {
+        if !self.targets.is_empty() {
+            state.targets.clone_from(&self.targets);
+        }
+        state.devices.clone_from(&self.devices);
+        state.base = self.base;
+    }
+}
+
+/// A camera that looks along `towards`, x to the right of an upright picture and y down.
+fn looking(towards: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
+    let z = UnitVector3::try_new(*towards, 1e-9)?;
+    let x = UnitVector3::try_new(z.cross(&Vector3::z()), 1e-9)?;
+    let matrix = Matrix3::from_columns(&[x.into_inner(), z.cross(&x), z.into_inner()]);
+    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_that_looks_along_x_has_y_at_its_left() {
+        let camera = looking(&Vector3::x()).expect("level");
+        assert!((camera * Vector3::z() - Vector3::x()).norm() < 1e-12, "it looks along x");
+        assert!((camera * Vector3::x() + Vector3::y()).norm() < 1e-12, "−y is at its right");
+        assert!((camera * Vector3::y() + Vector3::z()).norm() < 1e-12, "down is down");
+        assert!(looking(&Vector3::z()).is_none());
+    }
+}

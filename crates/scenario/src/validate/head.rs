@@ -1,0 +1,145 @@
+//! The head that watches.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use toml::Spanned;
+
+use super::{Check, raw};
+use crate::{Prior, Robot};
+use body_schema_engine::{
+    kinematics::JointKind,
+    model::State,
+    normal::StandardNormal,
+    selection::Watch,
+    sensing::{Head, Rig},
+};
+
+/// The limits of pan and tilt unless told otherwise, degrees.
+const SERVO_DEG: f64 = 15.0;
+/// So many robots are drawn to judge whether a pose may be in view, and one in so many has to be seen.
+const DRAWS: usize = 2000;
+const LEAST_SEEN: usize = 200;
+/// The half-angle of the lens unless told otherwise, degrees.
+const LENS_DEG: f64 = 20.0;
+
+impl Check<'_> {
+    pub(super) fn head(&mut self, spanned: &Spanned<raw::Head>, robot: &Robot) -> Option<Watch> {
+        let raw = spanned.get_ref();
+        let problems = self.problems.len();
+        let position = self.point("head.position_m", &raw.position_m);
+        let mut angle = |key: &str, value: &Option<Spanned<f64>>, default: f64, lowest: f64| {
+            let mend = format!("an angle from {lowest} up to 89 degrees");
+            let given = value.as_ref().map(|angle| {
+                self.number(&format!("head.{key}"), angle, |angle| (lowest..=89.0).contains(&angle), &mend)
+            });
+            given.unwrap_or(default).to_radians()
+        };
+        let pan_limit = angle("pan_limit_deg", &raw.pan_limit_deg, SERVO_DEG, 0.0);
+        let tilt_limit = angle("tilt_limit_deg", &raw.tilt_limit_deg, SERVO_DEG, 0.0);
+        let lens_half_angle = angle("lens_half_angle_deg", &raw.lens_half_angle_deg, LENS_DEG, 1.0);
+        let baseline = raw.eye_baseline_m.as_ref().map(|length| self.positive("head.eye_baseline_m", length));
+        let look = self.unit("head.look", &raw.look)?;
+        if look.z.abs() > 0.999 {
+            let mend = "look aside a little: z tells the head what upright is";
+            self.problem(raw.look.span(), "head.look", "it is along z", mend);
+            return None;
+        }
+        let head = Head { position, look, pan_limit, tilt_limit, lens_half_angle, baseline };
+        let visible_pose = self.pose("head.visible_pose_deg", &raw.visible_pose_deg, robot)?;
+        let marker = robot.state.marker_at(&visible_pose);
+        if self.problems.len() > problems {
+            return None;
+        }
+        if !head.sees(&marker) {
+            let beyond = -head.clearance(&marker).to_degrees();
+            let what = format!("the marker is not in view there: it is {beyond:.1} degrees outside");
+            let mend = format!(
+                "name a pose in view, or look towards this one with `look = [{:.6}, {:.6}, {:.6}]`",
+                (marker - position).normalize().x,
+                (marker - position).normalize().y,
+                (marker - position).normalize().z
+            );
+            self.problem(raw.visible_pose_deg.span(), "head.visible_pose_deg", what, mend);
+            return None;
+        }
+        Some(Watch { head: Some(head), visible_pose })
+    }
+
+    /// What is known to be seen without a head: a posture in view of a sensor that sees some postures only. Of a robot elsewhere nobody
+    /// knows exactly where things are; `prior` says how well.
+    pub(super) fn view(
+        &mut self,
+        spanned: &Spanned<raw::View>,
+        robot: &Robot,
+        rig: &Rig,
+        prior: Option<&Prior>,
+    ) -> Option<Watch> {
+        let raw = &spanned.get_ref().visible_pose_deg;
+        let key = "view.visible_pose_deg";
+        let visible_pose = self.pose(key, raw, robot)?;
+        let within = clearance(rig, &robot.state, &visible_pose);
+        if within < 0.0 && !prior.is_some_and(|prior| may_be_seen(rig, robot, prior, &visible_pose)) {
+            let (what, mend) = match prior {
+                Some(_) => (
+                    "whatever is known of where things are allows",
+                    "name a pose in view, or say how wrong `base`, `camera` and `target` may be: `known = { to_m = …, to_deg = … }`",
+                ),
+                None => ("as described", "name a pose in view"),
+            };
+            let what = format!("nothing is in view there, {what}: it is {:.1} degrees outside", -within.to_degrees());
+            self.problem(raw.span(), key, what, mend);
+            return None;
+        }
+        if !rig.has_view() {
+            let mend = "remove it; only cameras see some postures and others not";
+            self.problem(spanned.span(), "view", "these sensors see everything", mend);
+        }
+        Some(Watch { head: None, visible_pose })
+    }
+
+    /// The positions of a pose (degrees or metres as the kind of each joint says), within the limits.
+    pub(super) fn pose(&mut self, key: &str, raw: &Spanned<Vec<f64>>, robot: &Robot) -> Option<Vec<f64>> {
+        let (given, wanted) = (raw.get_ref(), robot.state.joints.len());
+        if given.len() != wanted {
+            let what = format!("it has {} positions, the robot {wanted} joints", given.len());
+            self.problem(raw.span(), key, what, "write one position per joint, base first");
+            return None;
+        }
+        let mut pose = Vec::new();
+        for ((&value, name), (joint, &(lower, upper))) in
+            given.iter().zip(&robot.names).zip(robot.state.joints.iter().zip(robot.limits.joints()))
+        {
+            let revolute = joint.kind() == JointKind::Revolute;
+            let position = if revolute { value.to_radians() } else { value };
+            // A NaN is not within; a pose on a limit may miss it by a rounding error.
+            if !(position >= lower - 1e-9 && position <= upper + 1e-9) {
+                let shown = |limit: f64| if revolute { limit.to_degrees() } else { limit };
+                let mend = format!("write a number from {:.4} to {:.4} for this joint", shown(lower), shown(upper));
+                self.problem(raw.span(), key, format!("{value} is outside the limits of `{name}`"), mend);
+                return None;
+            }
+            pose.push(position.clamp(lower, upper));
+        }
+        Some(pose)
+    }
+}
+
+/// How far the channel that sees most is inside what it can see, radians.
+fn clearance(rig: &Rig, state: &State, pose: &[f64]) -> f64 {
+    let mut clearances = vec![0.0; rig.channels().len()];
+    rig.clearances(None, state, pose, &mut clearances);
+    clearances.into_iter().fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Whether something may be in view at a pose of a robot that is known as `prior` says: whether it is of one robot in [`LEAST_SEEN`]
+/// that are drawn from the prior.
+fn may_be_seen(rig: &Rig, robot: &Robot, prior: &Prior, pose: &[f64]) -> bool {
+    let layout = &robot.layout;
+    let deviations = prior.standard_deviations(layout);
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let seen = (0..DRAWS).filter(|_| {
+        let delta = deviations.map(|deviation| deviation * rng.sample::<f64, _>(StandardNormal));
+        clearance(rig, &robot.state.retract(layout, &delta), pose) >= 0.0
+    });
+    seen.take(DRAWS / LEAST_SEEN).count() == DRAWS / LEAST_SEEN
+}

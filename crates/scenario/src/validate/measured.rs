@@ -1,0 +1,229 @@
+//! The table of a measured world.
+
+use std::{collections::BTreeSet, ops::Range};
+
+use toml::Spanned;
+
+use super::{Check, raw};
+use crate::{Described, HeldOut, Measurements, Robot};
+use body_schema_engine::{kinematics::JointKind, sensing::Keys};
+use body_schema_robot::Urdf;
+use body_schema_table::{Column, Columns, Layout, Quantity, Reading, Table, TableError, Titles};
+
+/// Titles of the columns of sockets, unless a scenario says others.
+const PLACE: &str = "place";
+const SOCKET: &str = "socket";
+
+/// The columns of text that tell which socket held a target.
+pub(super) struct SocketColumns {
+    /// None, where all sockets stand at one place.
+    pub place: Option<String>,
+    pub socket: String,
+}
+
+impl Check<'_> {
+    /// The titles of the table of a scenario whose robot is a URDF; `None` has left a problem behind.
+    pub(super) fn titles(&mut self, measurements: &raw::Measurements) -> Option<Titles> {
+        let text = self.table_text(&measurements.file)?;
+        let titles = Table::open(text.as_bytes()).map(|table| table.titles().clone());
+        titles.map_err(|error| self.refuse_table(&measurements.file, error)).ok()
+    }
+
+    fn table_text(&mut self, file: &Spanned<String>) -> Option<String> {
+        let text = self.opened(file.get_ref());
+        text.map_err(|error| {
+            let mend = "name a file beside the scenario that can be read, CSV as text in UTF-8";
+            self.problem(file.span(), "measurements.file", format!("{} {error}", file.get_ref()), mend);
+        })
+        .ok()
+    }
+
+    fn refuse_table(&mut self, file: &Spanned<String>, TableError { what, mend }: TableError) {
+        self.problem(file.span(), "measurements.file", format!("{} {what}", file.get_ref()), mend);
+    }
+
+    /// The rows of a table and which of them are held out; the sockets that they name become the robot's.
+    pub(super) fn recorded(&mut self, raw: &raw::Scenario, robot: &mut Robot) -> Option<(Measurements, HeldOut)> {
+        let measurements = raw.measurements.as_ref()?;
+        let (span, measurements) = (measurements.span(), measurements.get_ref());
+        let columns = self.joint_columns(raw, robot);
+        self.one_way_of_reading(raw, measurements, span)?;
+        let text = self.table_text(&measurements.file)?;
+        let columns = columns?;
+        let sockets = Table::open(text.as_bytes()).ok().and_then(|table| socket_columns(raw, table.titles()));
+        let taken = taken(raw);
+        let by = raw.held_out.as_ref().and_then(|held_out| held_out.get_ref().by.as_ref());
+        let wanted = |titles: &Titles| {
+            let labels =
+                sockets.iter().flat_map(|it| it.place.iter().chain([&it.socket])).chain(by.map(Spanned::get_ref));
+            let labels: BTreeSet<&String> = labels.collect();
+            let joints =
+                columns.iter().map(|column| column.find(titles, &taken)).collect::<Result<Vec<_>, TableError>>()?;
+            // What is a joint's is not measured, unless its column is named.
+            let of_joints: Vec<&String> = match robot.described {
+                Some(_) => joints.iter().map(|column| &titles.all()[column.index]).collect(),
+                None => Vec::new(),
+            };
+            let readings = readings(raw, robot, titles, &titles.besides(&of_joints))?;
+            let mut measured = readings.iter().flat_map(|reading| &reading.columns);
+            if let Some(both) = measured.find(|column| joints.iter().any(|joint| joint.index == column.index)) {
+                let what = format!(
+                    "line 1: `{}` is the column of a joint, and read as measured too",
+                    titles.all()[both.index]
+                );
+                return Err(TableError::new(
+                    what,
+                    "name the columns of what was measured: `columns = […]` of the [[sensor]]",
+                ));
+            }
+            Ok(Columns {
+                joints,
+                readings,
+                labels: labels.into_iter().map(|title| titles.label(title)).collect::<Result<_, _>>()?,
+            })
+        };
+        let read = |text: &str| Measurements::from_csv(text, wanted).map(|rows| moved(rows, robot));
+        let mut rows = read(&text).map_err(|error| self.refuse_table(&measurements.file, error)).ok()?;
+        let held_out = self.held_out(raw, &mut rows, &read)?;
+        if let Some(columns) = sockets {
+            self.recorded_sockets(raw, &columns, &mut rows, &held_out, robot)?;
+        }
+        Some((rows, held_out))
+    }
+
+    /// The titles without those of the joints' columns, as far as the description tells which these are.
+    pub(super) fn beside_joints(&mut self, raw: &raw::Scenario, titles: &Titles) -> Titles {
+        let (urdf, base, tip) = (&raw.robot.urdf, &raw.robot.base, &raw.robot.tip);
+        let (Some(urdf), Some(base), Some(tip)) = (urdf, base, tip) else { return titles.clone() };
+        let text = self.opened(urdf.get_ref()).unwrap_or_default();
+        // What is wrong with it is told where it is needed.
+        let Ok(chain) = Urdf::parse(&text).and_then(|urdf| urdf.chain(base.get_ref(), tip.get_ref())) else {
+            return titles.clone();
+        };
+        let taken = taken(raw);
+        let joints = chain.readings.into_iter().map(|reading| JointColumn::Named(reading.name, reading.kind));
+        let found = joints.filter_map(|joint| joint.find(titles, &taken).ok());
+        titles.besides(&found.map(|column| &titles.all()[column.index]).collect::<Vec<_>>())
+    }
+
+    /// The columns of the joints; `None` has left a problem behind.
+    fn joint_columns(&mut self, raw: &raw::Scenario, robot: &Robot) -> Option<Vec<JointColumn>> {
+        if let Some(Described { chain, .. }) = robot.described.as_deref() {
+            let named = chain.readings.iter().map(|reading| JointColumn::Named(reading.name.clone(), reading.kind));
+            return Some(named.collect());
+        }
+        let mut columns = Vec::new();
+        for (index, joint) in raw.robot.joints.get_ref().iter().enumerate() {
+            let kind = joint.get_ref().kind;
+            match &joint.get_ref().column {
+                Some(column) => columns.push(JointColumn::Titled(column.get_ref().clone(), kind)),
+                None => {
+                    let mend = "add `column = \"…\"`, the column of the data file with this joint's position";
+                    self.problem(joint.span(), format!("robot.joint[{index}].column"), "missing", mend);
+                }
+            }
+        }
+        (columns.len() == raw.robot.joints.get_ref().len()).then_some(columns)
+    }
+
+    /// That either sensors say what was measured or `marker_columns_m` does.
+    fn one_way_of_reading(
+        &mut self,
+        raw: &raw::Scenario,
+        measurements: &raw::Measurements,
+        span: Range<usize>,
+    ) -> Option<()> {
+        match (&measurements.marker_columns_m, &raw.sensor, &raw.held) {
+            (Some(columns), Some(_), _) | (Some(columns), _, Some(_)) => {
+                let mend = "remove it, and write `columns = [\"x\", \"y\", \"z\"]` of the [[sensor]]";
+                self.problem(columns.span(), "measurements.marker_columns_m", "sensors say what was measured", mend);
+                None
+            }
+            (None, None, None) => {
+                let mend = "add `marker_columns_m = [\"x\", \"y\", \"z\"]`, or a [[sensor]]";
+                self.problem(span, "measurements.marker_columns_m", "missing", mend);
+                None
+            }
+            _ => Some(()),
+        }
+    }
+}
+
+/// How the column of a joint is found.
+enum JointColumn {
+    /// By exactly this title, whose end says the unit; without one it is rad or m.
+    Titled(String, JointKind),
+    /// By the joint's name, with its unit or without.
+    Named(String, JointKind),
+}
+
+impl JointColumn {
+    /// The column; of several that a joint's name fits that which no sensor `taken` has.
+    fn find(&self, titles: &Titles, taken: &[&String]) -> Result<Column, TableError> {
+        match self {
+            Self::Titled(title, kind) => titles.titled(title, Quantity::of(*kind)),
+            Self::Named(name, kind) => {
+                let found = titles.find(name, Quantity::of(*kind));
+                found.or_else(|error| titles.besides(taken).find(name, Quantity::of(*kind)).map_err(|_| error))
+            }
+        }
+    }
+}
+
+/// The titles that sensors name.
+fn taken(raw: &raw::Scenario) -> Vec<&String> {
+    let sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0);
+    sensors.flat_map(|keys| keys.get_ref().columns.iter().flatten()).collect()
+}
+
+/// The columns of every sensor, by titles that it names, or else of those that are `beside` the joints'.
+fn readings(raw: &raw::Scenario, robot: &Robot, titles: &Titles, beside: &Titles) -> Result<Vec<Reading>, TableError> {
+    let marker = raw.measurements.as_ref().and_then(|given| given.get_ref().marker_columns_m.as_ref());
+    if let Some(columns) = marker {
+        return Ok(vec![titles.reading_titled(Layout::Position, &columns.get_ref().0)?]);
+    }
+    let sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0);
+    sensors.map(|keys| reading(keys.get_ref(), robot, titles, beside)).collect()
+}
+
+fn reading(keys: &Keys, robot: &Robot, titles: &Titles, beside: &Titles) -> Result<Reading, TableError> {
+    let (layout, prefix) = told(keys, robot);
+    if let Some(columns) = &keys.columns {
+        return titles.reading_titled(layout, columns);
+    }
+    // With nothing before them where there is no doubt; all titles are told where there is none.
+    beside.reading_of(layout, &prefix).or_else(|_| titles.reading_of(layout, &prefix))
+}
+
+/// What a sensor's reading looks like in a table, and what its titles begin with.
+pub(super) fn told(keys: &Keys, robot: &Robot) -> (Layout, String) {
+    let equipment = &robot.equipment;
+    let named = |name: &Option<String>| name.clone();
+    let target = named(&keys.target).or_else(|| Some(equipment.targets.first()?.name.clone())).unwrap_or_default();
+    let camera = named(&keys.camera).or_else(|| Some(equipment.cameras.first()?.name.clone())).unwrap_or_default();
+    let points = equipment.targets.iter().find(|kind| kind.name == target).map_or(1, |kind| kind.points.len());
+    match keys.channel.as_deref() {
+        Some("pose") => (Layout::Pose, target),
+        Some("distance") => (Layout::Distance, target),
+        Some("pixels") => (Layout::Pixels(points), format!("{camera}_{target}")),
+        _ => (Layout::Position, target),
+    }
+}
+
+fn socket_columns(raw: &raw::Scenario, titles: &Titles) -> Option<SocketColumns> {
+    let held = raw.held.as_ref()?.get_ref();
+    let given = |name: &Option<Spanned<String>>| name.as_ref().map(|name| name.get_ref().clone());
+    let usual = || titles.label(PLACE).is_ok().then(|| PLACE.to_owned());
+    let socket = given(&held.socket_column).unwrap_or_else(|| SOCKET.to_owned());
+    Some(SocketColumns { place: given(&held.place_column).or_else(usual), socket })
+}
+
+/// Rows by the joints that move, of rows by the readings that move them.
+fn moved(mut rows: Measurements, robot: &Robot) -> Measurements {
+    if let Some(Described { chain, .. }) = robot.described.as_deref() {
+        rows.configurations.iter_mut().for_each(|readings| *readings = chain.positions(readings));
+        let follows = chain.moving().filter_map(|segment| segment.follows);
+        rows.columns = follows.map(|follows| rows.columns[follows.reading].clone()).collect();
+    }
+    rows
+}

@@ -1,0 +1,174 @@
+//! The world of a scenario: simulated or measured.
+
+use toml::Spanned;
+
+use super::{Check, raw};
+use std::sync::Arc;
+
+use crate::{HeldOut, InitialError, Measurements, Prior, Robot, WorldSpec};
+use body_schema_engine::sensing::{Channel, Rig, Socket};
+use body_schema_experiment::Outliers;
+
+impl Check<'_> {
+    pub(super) fn world(
+        &mut self,
+        raw: &raw::Scenario,
+        robot: &Robot,
+        rig: Option<&Rig>,
+        prior: &Prior,
+        recorded: Option<(Measurements, HeldOut)>,
+    ) -> Option<WorldSpec> {
+        if self.is_outside {
+            return Some(self.outside(raw, robot, rig, prior));
+        }
+        let socket = raw.sockets.first().map(Spanned::span);
+        let is_replayed = raw.measurements.is_some();
+        let senses = raw.sensor.is_some() || (socket.is_some() && !is_replayed);
+        let of_tables =
+            [("sockets", raw.held.as_ref().map(Spanned::span)), ("held_out", raw.held_out.as_ref().map(Spanned::span))];
+        for (key, span) in of_tables.into_iter().filter_map(|(key, span)| Some((key, span?))).filter(|_| !is_replayed) {
+            let mend = "remove it, or add [measurements] with a file";
+            self.problem(span, key, "it tells of a table, and there is none", mend);
+        }
+        match (senses, &raw.initial_error, &raw.measurements) {
+            (true, Some(error), None) => {
+                let marker_m = error.get_ref().marker_m.as_ref();
+                if raw.robot.learn_marker && marker_m.is_none() {
+                    let mend = "add `marker_m = …`, or set `learn_marker = false`";
+                    self.problem(error.span(), "initial_error.marker_m", "the marker is learned", mend);
+                }
+                let error = error.get_ref();
+                let angle = self.number(
+                    "initial_error.angle_deg",
+                    &error.angle_deg,
+                    |angle| (0.0..=180.0).contains(&angle),
+                    "an angle from 0 to 180 degrees",
+                );
+                let watch = match (&raw.head, &raw.view, rig) {
+                    (Some(head), None, _) => self.head(head, robot),
+                    (None, Some(view), Some(rig)) => self.view(view, robot, rig, None),
+                    (Some(_), Some(view), _) => {
+                        let mend = "remove [view]: the head says which pose is in view";
+                        self.problem(view.span(), "view", "there is a head that watches", mend);
+                        None
+                    }
+                    _ => None,
+                };
+                let change = raw.change.as_ref().map(|change| self.change(change.get_ref(), robot));
+                Some(WorldSpec::Simulated {
+                    initial_error: InitialError {
+                        draw: error.draw,
+                        angle_rad: angle.to_radians(),
+                        point_m: self.not_negative("initial_error.point_m", &error.point_m),
+                        marker_m: marker_m.map_or(0.0, |size| self.not_negative("initial_error.marker_m", size)),
+                    },
+                    watch,
+                    change: change.flatten().map(Box::new),
+                    outliers: raw.outliers.as_ref().map(|outliers| self.outliers(outliers.get_ref())),
+                })
+            }
+            (_, None, Some(_)) => {
+                let head = raw.head.as_ref().map(|head| ("head", head.span()));
+                let change = raw.change.as_ref().map(|change| ("change", change.span()));
+                let outliers = raw.outliers.as_ref().map(|outliers| ("outliers", outliers.span()));
+                let sockets = socket.map(|span| ("socket", span));
+                for (key, span) in head.into_iter().chain(change).chain(outliers).chain(sockets) {
+                    let mend = "remove it; it belongs to a simulated world";
+                    self.problem(
+                        span,
+                        key,
+                        "recorded measurements cannot be watched, changed, spoilt or held in sockets",
+                        mend,
+                    );
+                }
+                recorded.map(|(measurements, held_out)| WorldSpec::Measured { measurements, held_out })
+            }
+            (_, error, measurements) => {
+                let span = [raw.sensor.as_ref().map(Spanned::span), error.as_ref().map(Spanned::span)]
+                    .into_iter()
+                    .chain([measurements.as_ref().map(Spanned::span)])
+                    .flatten()
+                    .next();
+                let what = "a scenario is either simulated or measured";
+                let mend = "write [sensor] (or [[socket]]s) and [initial_error] for a simulated world, or [measurements] without \
+                            [initial_error] for a measured one";
+                self.problem(span.unwrap_or(0..0), "sensor, initial_error, measurements", what, mend);
+                None
+            }
+        }
+    }
+
+    fn outliers(&mut self, raw: &raw::Outliers) -> Outliers {
+        let mend = "a share of readings, from 0 to 1";
+        Outliers {
+            fraction: self.number("outliers.fraction", &raw.fraction, |share| (0.0..=1.0).contains(&share), mend),
+            box_m: self.positive("outliers.box_m", &raw.box_m),
+        }
+    }
+
+    /// What is measured: the sensors of a simulated world; where measurements are replayed a tracker with the noise that
+    /// the filter assumes.
+    pub(super) fn rig(&mut self, raw: &raw::Scenario, robot: &Robot) -> Option<Arc<Rig>> {
+        let equipment = &robot.equipment;
+        let held = socket_channels(robot);
+        let Some(sensors) = &raw.sensor else {
+            if !held.is_empty() {
+                return Some(Arc::new(Rig::new(held)));
+            }
+            let variance = raw.filter.get_ref().measurement_variance_m2.as_ref().map(|variance| *variance.get_ref());
+            return variance.map(|variance| Arc::new(Rig::tracker(variance.sqrt())));
+        };
+        let given = sensors.get_ref();
+        let mut channels = Vec::new();
+        for (index, keys) in given.0.iter().enumerate() {
+            if let (Some(_), None, false) = (&keys.get_ref().columns, &raw.measurements, self.is_outside) {
+                let mend = "remove it, or add [measurements] with a file";
+                self.problem(keys.span(), format!("sensor[{index}].columns"), "there is no table", mend);
+            }
+            let section = if given.0.len() > 1 { format!("sensor[{index}]") } else { "sensor".to_owned() };
+            let span = if given.0.len() > 1 { keys.span() } else { sensors.span() };
+            match keys.get_ref().channel(equipment) {
+                Ok(channel) if given.0.len() + held.len() > 1 && channel.sigma() == 0.0 => {
+                    let what = "several sensors are weighed by their noise, and this one has none";
+                    self.problem(span, format!("{section}.sigma_m"), what, "write a number above 0");
+                }
+                Ok(channel) => channels.push(channel),
+                Err(error) => {
+                    let place = raw::key_in(self.text, span, &error.key);
+                    self.problem(place, format!("{section}.{}", error.key), error.what, error.mend);
+                }
+            }
+        }
+        if given.0.is_empty() {
+            self.problem(sensors.span(), "sensor", "there is no sensor", "add `sigma_m = 0.01`, say");
+        }
+        if let Some(head) =
+            raw.head.as_ref().filter(|_| channels.iter().any(|channel| channel.target() != Some(0)) || !held.is_empty())
+        {
+            let mend = "leave [head] out, or use sensors of the marker's position alone";
+            self.problem(head.span(), "head", "a head watches the marker, and not what another sensor measures", mend);
+        }
+        if let Some(outliers) =
+            raw.outliers.as_ref().filter(|_| channels.iter().any(|channel| channel.target().is_none()))
+        {
+            let mend = "leave [outliers] out, or use sensors of positions alone";
+            self.problem(
+                outliers.span(),
+                "outliers",
+                "they replace positions, and another sensor measures something else",
+                mend,
+            );
+        }
+        let complete = channels.len() == given.0.len() && !channels.is_empty();
+        channels.extend(held);
+        complete.then(|| Arc::new(Rig::new(channels)))
+    }
+}
+
+/// The channels that come with the sockets of a robot.
+fn socket_channels(robot: &Robot) -> Vec<Arc<dyn Channel>> {
+    let held = robot.sockets.iter().enumerate().map(|(socket, spec)| {
+        Arc::new(Socket { target: spec.target, socket, sigma_m: spec.sigma_m }) as Arc<dyn Channel>
+    });
+    held.chain(robot.spacings.iter().map(|spacing| Arc::new(*spacing) as _)).collect()
+}

@@ -1,0 +1,196 @@
+//! The rows of a table, one after the other.
+
+use std::{
+    collections::HashMap,
+    hash::{DefaultHasher, Hash, Hasher},
+    io::Read,
+};
+
+use super::{
+    Column, Guard, MOST_BYTES, Reading, TableError, Titles,
+    absent::is_absent,
+    lines::Lines,
+    titles::{JOINT, READING, number},
+    writer::unguarded,
+};
+use body_schema_engine::sensing::Observation;
+
+/// The most rows that are read of a table.
+pub const MOST_ROWS: usize = 1_000_000;
+
+/// A table whose titles have been read.
+#[derive(Debug)]
+pub struct Table<R> {
+    reader: csv::Reader<Lines<Guard<R>>>,
+    titles: Titles,
+}
+
+/// What is wanted of every row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Columns {
+    /// By joint.
+    pub joints: Vec<Column>,
+    /// By channel, in the order of a [`Rig`](body_schema_engine::sensing::Rig).
+    pub readings: Vec<Reading>,
+    /// Columns of text, as `place` and `socket`, by index.
+    pub labels: Vec<usize>,
+}
+
+/// A row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// The line of the file that it begins on, counted from 1.
+    pub line: usize,
+    /// By joint, rad or m.
+    pub positions: Vec<f64>,
+    /// What was measured.
+    pub observation: Observation,
+    /// By column of text.
+    pub labels: Vec<String>,
+}
+
+impl<R: Read> Table<R> {
+    /// Reads the titles. White space around cells counts for nothing.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`] if there are none, or one of them twice.
+    pub fn open(source: R) -> Result<Self, TableError> {
+        // Lengths of rows are checked here, where their lines are known.
+        let mut builder = csv::ReaderBuilder::new();
+        let mut reader =
+            builder.trim(csv::Trim::All).flexible(true).from_reader(Lines::new(Guard::new(source, MOST_BYTES)));
+        let titles = Titles::new(reader.headers().map_err(|error| TableError::unreadable(&error, 1))?)?;
+        Ok(Self { reader, titles })
+    }
+
+    /// The titles.
+    pub fn titles(&self) -> &Titles {
+        &self.titles
+    }
+
+    /// The rows. After the first error there are no more.
+    pub fn rows(self, columns: Columns) -> Rows<R> {
+        let traces = vec![Trace::default(); self.titles.all().len()];
+        let Self { reader, titles } = self;
+        Rows { reader, titles, columns, record: csv::StringRecord::new(), traces, rows: 0, failed: false }
+    }
+}
+
+/// Reads rows; see [`Table::rows`].
+#[derive(Debug)]
+pub struct Rows<R> {
+    reader: csv::Reader<Lines<Guard<R>>>,
+    titles: Titles,
+    columns: Columns,
+    record: csv::StringRecord,
+    /// By column.
+    traces: Vec<Trace>,
+    rows: usize,
+    failed: bool,
+}
+
+/// What is left of a column that has streamed by.
+#[derive(Clone, Debug, Default)]
+struct Trace {
+    /// Of all its cells so far.
+    hash: u64,
+    /// Of its last cell.
+    last: u64,
+    rows: u64,
+    varies: bool,
+}
+
+impl Trace {
+    fn add(&mut self, cell: &str) {
+        let mut hasher = DefaultHasher::new();
+        cell.hash(&mut hasher);
+        let cell = hasher.finish();
+        self.varies |= self.rows > 0 && cell != self.last;
+        (self.last, self.rows) = (cell, self.rows + 1);
+        (self.hash, cell).hash(&mut hasher);
+        self.hash = hasher.finish();
+    }
+}
+
+impl<R: Read> Rows<R> {
+    /// Pairs of columns whose cells have been the same in every row so far, and not always the same cell: the later one
+    /// first, then that which it repeats.
+    pub fn repeated_columns(&self) -> Vec<(String, String)> {
+        let mut first: HashMap<u64, usize> = HashMap::new();
+        let mut repeated = Vec::new();
+        for (index, trace) in self.traces.iter().enumerate().filter(|(_, trace)| trace.varies) {
+            match first.get(&trace.hash) {
+                Some(&other) => repeated.push((self.titles.all()[index].clone(), self.titles.all()[other].clone())),
+                None => drop(first.insert(trace.hash, index)),
+            }
+        }
+        repeated
+    }
+
+    /// The line that the last record begins on. The reader's own account begins with the empty lines before it.
+    fn line(&self) -> usize {
+        let within: usize = self.record.iter().map(|cell| cell.matches('\n').count()).sum();
+        (self.reader.position().line() as usize).saturating_sub(1 + within)
+    }
+
+    fn row(&self) -> Result<Row, TableError> {
+        let (line, wanted, found) = (self.line(), self.titles.all().len(), self.record.len());
+        if found != wanted {
+            let what = format!("line {line} has {found} values, line 1 names {wanted} columns");
+            let mend = "give it one value per column, with a decimal point in numbers: 1.5, not 1,5";
+            return Err(TableError::new(what, mend));
+        }
+        let cell = |column: &Column| self.record.get(column.index).unwrap_or_default();
+        let value = |column: &Column, absent: &str| {
+            let place = || format!("line {line}, column `{}`", self.titles.all()[column.index]);
+            Ok(number(cell(column), absent, &place)? * column.factor)
+        };
+        let reading = |reading: &Reading| -> Result<Option<Vec<f64>>, TableError> {
+            if reading.columns.iter().all(|column| is_absent(cell(column))) {
+                return Ok(None);
+            }
+            let numbers = reading.columns.iter().map(|column| value(column, READING)).collect::<Result<Vec<_>, _>>()?;
+            reading.of(numbers).map(Some).ok_or_else(|| {
+                let title = reading.columns.get(3).map_or("", |column| &self.titles.all()[column.index]);
+                let what = format!("line {line}, column `{title}`: the quaternion's length is not 1");
+                TableError::new(what, "write x, y, z and w of a unit quaternion")
+            })
+        };
+        let Columns { joints, readings, labels } = &self.columns;
+        Ok(Row {
+            line,
+            positions: joints.iter().map(|column| value(column, JOINT)).collect::<Result<_, TableError>>()?,
+            observation: Observation { readings: readings.iter().map(reading).collect::<Result<_, _>>()? },
+            labels: labels
+                .iter()
+                .map(|index| unguarded(self.record.get(*index).unwrap_or_default()).to_owned())
+                .collect(),
+        })
+    }
+}
+
+impl<R: Read> Iterator for Rows<R> {
+    type Item = Result<Row, TableError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.failed {
+            return None;
+        }
+        let row = match self.reader.read_record(&mut self.record) {
+            Ok(false) => return None,
+            Ok(true) if self.rows == MOST_ROWS => {
+                let what = format!("has more than {MOST_ROWS} rows, the most that are read");
+                Err(TableError::new(what, "take fewer, as every tenth: rows that are alike teach little"))
+            }
+            Ok(true) => {
+                self.rows += 1;
+                self.record.iter().zip(&mut self.traces).for_each(|(cell, trace)| trace.add(cell));
+                self.row()
+            }
+            Err(error) => Err(TableError::unreadable(&error, self.line())),
+        };
+        self.failed = row.is_err();
+        Some(row)
+    }
+}

@@ -1,0 +1,257 @@
+//! The titles of a table, and the columns that are found by them.
+
+use std::collections::HashMap;
+
+use super::{
+    Component, TableError, Title,
+    absent::is_absent,
+    error::AS_TEXT,
+    names::{NAME, split},
+    writer::unguarded,
+};
+use body_schema_engine::{
+    kinematics::JointKind,
+    magnitude::{is_usable, what_is_wrong},
+    similar::similar,
+};
+
+/// What a column's numbers measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Radians inside.
+    Angle,
+    /// Metres inside.
+    Length,
+    /// Pixels.
+    Pixels,
+    /// Without a unit.
+    Number,
+}
+
+impl Quantity {
+    /// What the readings of a joint measure.
+    pub(crate) fn of(kind: JointKind) -> Self {
+        match kind {
+            JointKind::Revolute => Self::Angle,
+            JointKind::Prismatic => Self::Length,
+        }
+    }
+
+    fn called(self) -> &'static str {
+        match self {
+            Self::Angle => "an angle",
+            Self::Length => "a length",
+            Self::Pixels => "a point in a picture",
+            Self::Number => "a number without a unit",
+        }
+    }
+}
+
+/// A column of numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// Counted from 0.
+    pub index: usize,
+    /// What its numbers are multiplied by to be metres or radians.
+    pub factor: f64,
+}
+
+/// The line of titles.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Titles {
+    titles: Vec<String>,
+}
+
+impl Titles {
+    pub(super) fn new(record: &csv::StringRecord) -> Result<Self, TableError> {
+        Self::listed(record.iter().map(|title| unguarded(title).to_owned()).collect())
+    }
+
+    /// Of a list of titles.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`] if there are none, or one of them twice.
+    pub fn listed(titles: Vec<String>) -> Result<Self, TableError> {
+        let mut seen = HashMap::new();
+        // Spreadsheets leave columns without a title at the end.
+        for (index, title) in titles.iter().enumerate().filter(|(_, title)| !title.is_empty()) {
+            if let Some(first) = seen.insert(title.as_str(), index) {
+                let what = format!("line 1: columns {} and {} are both called `{title}`", first + 1, index + 1);
+                return Err(TableError::new(what, "give each column a title of its own"));
+            }
+        }
+        if titles.iter().all(String::is_empty) {
+            return Err(TableError::new("is empty", "begin it with a line of titles, one per column"));
+        }
+        if titles.len() > 1 && titles.iter().all(|title| title.parse::<f64>().is_ok()) {
+            let mend = "begin the table with a line of titles: the names of the joints, and of what is measured";
+            return Err(TableError::new("line 1 holds numbers, no titles", mend));
+        }
+        Ok(Self { titles })
+    }
+
+    /// All titles, in order.
+    pub fn all(&self) -> &[String] {
+        &self.titles
+    }
+
+    /// The column of `name`, alone or with the unit at its end.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`] where there is none, or more than one, or where its unit is not known.
+    pub fn find(&self, name: &str, quantity: Quantity) -> Result<Column, TableError> {
+        let is_named = |title: &&String| *title == name || split(title).0 == name;
+        let named: Vec<&String> = self.titles.iter().filter(is_named).collect();
+        // Beside a column of this very name another that ends with a unit of something else has a name of its own.
+        let has_exact = named.iter().any(|title| *title == name);
+        let says_it = |title: &&String| {
+            let word = split(title).1;
+            !has_exact || *title == name || word != NAME && quantity.factor(word).is_some()
+        };
+        let found: Vec<&String> = named.into_iter().filter(says_it).collect();
+        match found.as_slice() {
+            [one] if *one == name => Ok(Column { index: self.label(one)?, factor: 1.0 }),
+            [one] => self.in_unit(one, quantity),
+            [one, other, ..] => Err(TableError::new(
+                format!("line 1: `{one}` and `{other}` say the same"),
+                "leave one of the two columns",
+            )),
+            [] => Err(self.unknown(name)),
+        }
+    }
+
+    /// The column of a component of what is called `before`, with `number` behind it.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`] where there is none, or more than one, or where its unit is not known.
+    pub(super) fn component(&self, before: &str, component: Component, number: &str) -> Result<Column, TableError> {
+        let of = |title: &&String| {
+            let is_it = |it: &Title<'_>| it.component == component && it.number == number && it.is_of(before);
+            Title::parse(title).is_some_and(|it| is_it(&it))
+        };
+        let mut found: Vec<&String> = self.titles.iter().filter(of).collect();
+        // Titles that differ in nothing but capitals: what is spelt as it is asked for.
+        let written = Title { before, component, number, unit: "" }.to_string();
+        let is_spelt = |title: &&&String| split(title).0 == written;
+        if found.len() > 1 && found.iter().any(|title| is_spelt(&title)) {
+            found.retain(|title| is_spelt(&title));
+        }
+        match found.as_slice() {
+            [one] => self.in_unit(one, component.quantity()),
+            [one, other, ..] => Err(TableError::new(
+                format!("line 1: `{one}` and `{other}` say the same"),
+                "leave one of the two columns, or list those that are meant as `columns` of the sensor",
+            )),
+            [] => Err(self.unknown(&written)),
+        }
+    }
+
+    /// The column with exactly this title, whose end says the unit.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`] where there is none, or where its unit is not known.
+    pub fn titled(&self, title: &str, quantity: Quantity) -> Result<Column, TableError> {
+        if split(title).1 == NAME && quantity != Quantity::Length && Title::parse(title).is_none() {
+            return Ok(Column { index: self.label(title)?, factor: 1.0 });
+        }
+        self.in_unit(title, quantity)
+    }
+
+    fn in_unit(&self, title: &str, quantity: Quantity) -> Result<Column, TableError> {
+        let (index, word) = (self.label(title)?, split(title).1);
+        let factor = quantity.factor(word).ok_or_else(|| {
+            let what = format!("line 1, column `{title}`: `{word}` is no unit in which {} is read", quantity.called());
+            TableError::new(what, format!("convert the numbers and title them so: {}", quantity.ends()))
+        })?;
+        Ok(Column { index, factor })
+    }
+
+    /// The same; where no title is spelt so, that which differs in capitals alone.
+    pub(super) fn titled_in_any_case(&self, title: &str, quantity: Quantity) -> Result<Column, TableError> {
+        let mut alike = self.titles.iter().filter(|given| given.eq_ignore_ascii_case(title));
+        match (self.titles.iter().any(|given| given == title), alike.next(), alike.next()) {
+            (false, Some(only), None) => self.titled(only, quantity),
+            _ => self.titled(title, quantity),
+        }
+    }
+
+    /// What stands before the titles that end with x, alone or with a unit: targets whose positions may be there.
+    pub(crate) fn prefixes(&self) -> Vec<&str> {
+        let found = self.titles.iter().filter_map(|title| Title::parse(title));
+        found.filter(|it| it.component == Component::X && it.number.is_empty()).map(|it| it.before).collect()
+    }
+
+    /// The index of the column with exactly this title, of any text.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`] where there is none.
+    pub fn label(&self, title: &str) -> Result<usize, TableError> {
+        self.titles.iter().position(|given| given == title).ok_or_else(|| self.unknown(title))
+    }
+
+    /// What is wrong where columns are separated by something else than commas.
+    pub(crate) fn separated(&self) -> Option<TableError> {
+        let filled: Vec<&String> = self.titles.iter().filter(|title| !title.is_empty()).collect();
+        // Words may well stand in one title among several.
+        let is_alone =
+            |title: &str| filled.len() == 1 && self.titles.len() == 1 && title.split_whitespace().count() > 2;
+        let plural = match () {
+            () if filled.iter().any(|title| title.contains(';')) => "semicolons",
+            () if filled.iter().any(|title| title.contains('\t')) => "tabs",
+            () if filled.len() == 1 && filled.iter().any(|title| title.contains('|')) => "bars",
+            () if filled.iter().any(|title| is_alone(title)) => "blanks",
+            () => return None,
+        };
+        let what = format!("line 1: the columns are separated by {plural}");
+        Some(TableError::new(what, "write commas between columns, and a decimal point in numbers: 1.5, not 1,5"))
+    }
+
+    /// These titles without some, so that what is found is another column.
+    pub(crate) fn besides(&self, taken: &[&String]) -> Self {
+        let kept = |title: &String| if taken.contains(&title) { String::new() } else { title.clone() };
+        Self { titles: self.titles.iter().map(kept).collect() }
+    }
+
+    fn unknown(&self, name: &str) -> TableError {
+        let line = self.titles.join(", ");
+        if let Some(error) = self.separated() {
+            return error;
+        }
+        let mend = match similar(name, self.titles.iter().map(String::as_str)) {
+            Some(known) => format!("did you mean `{known}`?"),
+            None => "correct the name of the column, here or in the scenario".to_owned(),
+        };
+        TableError::new(format!("has no column `{name}`; its columns are {line}"), mend)
+    }
+}
+
+/// What to do about a joint's cell that holds nothing.
+pub(super) const JOINT: &str = "write where the joint was, as 0.03, or remove the line";
+/// What to do where some cells of a reading hold nothing and others do not.
+pub(super) const READING: &str =
+    "write a number such as 0.03, or leave all cells of this reading empty, or remove the line";
+
+/// A finite number; `absent` says what to do where there is none. A comma in it is refused: it may separate decimals or thousands.
+pub(super) fn number(text: &str, absent: &str, place: &dyn Fn() -> String) -> Result<f64, TableError> {
+    match text.parse::<f64>() {
+        Ok(value) if is_usable(value) => Ok(value),
+        _ if text.is_empty() => Err(TableError::new(format!("{} is empty", place()), absent)),
+        _ if text.len() > 1000 => Err(TableError::new(format!("{} holds no number", place()), AS_TEXT)),
+        _ => {
+            let with_point = text.replacen(',', ".", 1);
+            let mend = if with_point != text && with_point.parse::<f64>().is_ok() {
+                format!("write a decimal point: {with_point}")
+            } else if is_absent(text) {
+                absent.to_owned()
+            } else {
+                "write a number such as 0.03, or remove the line".to_owned()
+            };
+            Err(TableError::new(format!("{}: `{text}` {}", place(), what_is_wrong(text)), mend))
+        }
+    }
+}
