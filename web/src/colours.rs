@@ -1,9 +1,7 @@
 //! Colours and marks that keep their meaning everywhere. They are those of the recordings.
 
-#[path = "../../src/recording/palette.rs"]
-mod palette;
-
 use body_schema_experiment::Description;
+use body_schema_palette as palette;
 use egui::Color32;
 use egui_plot::{LineStyle, MarkerShape};
 

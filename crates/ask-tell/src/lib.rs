@@ -78,6 +78,7 @@ mod checkpoint;
 mod draft;
 mod error;
 mod event;
+pub mod json;
 #[cfg(test)]
 mod laws;
 mod ledger;
@@ -91,6 +92,7 @@ mod setup;
 mod status;
 mod suggestion;
 mod table;
+pub mod whole;
 
 pub use channel::{ChannelShape, Shape};
 pub use checkpoint::{Checkpoint, Find, Hear, Replayed};

@@ -249,7 +249,7 @@ impl Session {
         reports
     }
 
-    pub(crate) fn scenario(&self) -> &Arc<Scenario> {
+    pub fn scenario(&self) -> &Arc<Scenario> {
         &self.ledger.scenario
     }
 

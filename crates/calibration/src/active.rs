@@ -11,7 +11,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{CalibrationError, Case, Figures, Fit, Progress, Split};
 use body_schema_engine::parallel::mapped;
-use body_schema_engine::{elementary::powf, model::{Layout, State}, selection::{Criterion, Weights, herd}};
+use body_schema_engine::{
+    elementary::powf,
+    model::{Layout, State},
+    selection::{Criterion, Weights, herd},
+};
 use body_schema_experiment::Stream;
 
 /// Held-out error after so many rows.
@@ -210,7 +214,10 @@ fn point(rows: usize, active_mm: Option<f64>, random: &[f64]) -> ActivePoint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Silent, laws::{REAL, learned_at}};
+    use crate::{
+        Silent,
+        laws::{REAL, learned_at},
+    };
 
     #[test]
     fn quartiles_lie_between_neighbours() {

@@ -76,7 +76,10 @@ fn spread(rows: &[usize]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Figures, laws::{REAL, learned_at}};
+    use crate::{
+        Figures,
+        laws::{REAL, learned_at},
+    };
     use body_schema_scenario::builtin;
 
     /// Of two real robots, learned at each of their places: at all others the ball scatters as is expected, to a factor of two or so, though

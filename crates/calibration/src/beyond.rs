@@ -8,7 +8,10 @@
 use nalgebra::{Cholesky, DMatrix};
 
 use super::{Case, Fit};
-use body_schema_engine::{elementary::cbrt, model::{Block, Layout}};
+use body_schema_engine::{
+    elementary::cbrt,
+    model::{Block, Layout},
+};
 
 /// Deviations from which on a correction is told.
 const TOLD: f64 = 3.0;

@@ -3,7 +3,10 @@
 use std::sync::{Arc, Mutex};
 
 use body_schema_diagnostics::Line;
-use body_schema_engine::{model::{Block, ChainPrior, Layout, Names, State}, sensing::{Loss, Observation, Occasion, Rig}};
+use body_schema_engine::{
+    model::{Block, ChainPrior, Layout, Names, State},
+    sensing::{Loss, Observation, Occasion, Rig},
+};
 use body_schema_scenario::{Described, HeldOutRule, Scenario, WorldSpec};
 
 use super::{CalibrationError, Extra, Split};
@@ -24,7 +27,8 @@ pub struct Row {
 /// A robot as it is described, and what was measured of it.
 #[derive(Clone, Debug)]
 pub struct Case<'a> {
-    pub(crate) scenario: &'a Scenario,
+    /// What the calibration file says.
+    pub scenario: &'a Scenario,
     /// The robot as it is described, with what its joints bear.
     guess: State,
     /// The rows, in the order of the table.

@@ -20,7 +20,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{CalibrationError, Case, Figures, Fit, Residual, Split, Unit, coverage::widening};
 use body_schema_engine::parallel::mapped;
-use body_schema_engine::{kinematics::JointKind, model::{Block, Layout, State, Workspace, listed}};
+use body_schema_engine::{
+    kinematics::JointKind,
+    model::{Block, Layout, State, Workspace, listed},
+};
 
 /// What can be added to axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -5,7 +5,12 @@ use std::sync::{Arc, PoisonError};
 use nalgebra::{DMatrix, DVector, Isometry3, Point3};
 
 use super::{CalibrationError, Case, figures::mean};
-use body_schema_engine::{most, estimation::{Belief, Estimator, HypothesisSettings, NoiseFit, ReadingReport, Smoother}, model::{Block, ChainPrior, Layout, Prior, Scales, State, best_motion}, sensing::{Noise, Occasion}};
+use body_schema_engine::{
+    estimation::{Belief, Estimator, HypothesisSettings, NoiseFit, ReadingReport, Smoother},
+    model::{Block, ChainPrior, Layout, Prior, Scales, State, best_motion},
+    most,
+    sensing::{Noise, Occasion},
+};
 use body_schema_experiment::Stream;
 use body_schema_scenario::Known;
 

@@ -11,7 +11,7 @@ use super::{Calibration, Case, Figures, Options, Report, Silent, Unit, calibrate
 use body_schema_robot::{Chain, Urdf};
 use body_schema_scenario::{Scenario, builtin};
 
-const UR10: &str = include_str!("../../scenarios/ur10.urdf");
+const UR10: &str = include_str!("../../../scenarios/ur10.urdf");
 
 /// Real robots with a ball in sockets, by scenario, and the places where they were measured.
 pub(super) const REAL: [(&str, &[&str]); 2] = [

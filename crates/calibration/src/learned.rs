@@ -3,7 +3,11 @@
 use nalgebra::{DMatrix, Isometry3, Matrix3, Vector3};
 
 use super::{CalibrationError, Case, Correction, Correlation, Fit, Joint, Noise, Placement, Sensed, Target};
-use body_schema_engine::{kinematics::{self, JointKind, chart}, model::{Block, Place, State}, sensing::Occasion};
+use body_schema_engine::{
+    kinematics::{self, JointKind, chart},
+    model::{Block, Place, State},
+    sensing::Occasion,
+};
 
 /// Correlations above this are told, and so many at most.
 const TOLD: f64 = 0.9;
@@ -85,7 +89,7 @@ impl Case<'_> {
     }
 
     /// The name of what moves with the joint of this number, counted from 1; 0 is the base.
-    pub(super) fn link(&self, link: usize) -> String {
+    pub fn link(&self, link: usize) -> String {
         match &self.described {
             Some(description) => {
                 let chain = &description.chain;

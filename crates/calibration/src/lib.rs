@@ -47,8 +47,6 @@ mod loads;
 mod more_rows;
 mod outcome;
 mod progress;
-#[cfg(feature = "openapi")]
-pub mod report;
 mod span;
 mod split;
 mod undetermined;

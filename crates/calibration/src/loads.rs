@@ -3,7 +3,11 @@
 use nalgebra::DVector;
 
 use super::{Case, Compliance, Extra, Fit, GivesWay};
-use body_schema_engine::{elementary::{cos, sin}, kinematics::JointKind, model::{Block, Load, Loads, State}};
+use body_schema_engine::{
+    elementary::{cos, sin},
+    kinematics::JointKind,
+    model::{Block, Load, Loads, State},
+};
 use body_schema_experiment::Stream;
 
 /// Postures within the limits, over which corrections are compared, and the seed of their draw.

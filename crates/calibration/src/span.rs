@@ -77,7 +77,9 @@ mod tests {
         let mut larger = state.clone();
         for (block, _) in layout.blocks() {
             let grown = match block.of(&state) {
-                body_schema_engine::model::Element::Point(point) => body_schema_engine::model::Element::Point(point * (1.0 + 1e-6)),
+                body_schema_engine::model::Element::Point(point) => {
+                    body_schema_engine::model::Element::Point(point * (1.0 + 1e-6))
+                }
                 body_schema_engine::model::Element::Axis(body_schema_engine::kinematics::Joint::Revolute(mut line)) => {
                     line.point *= 1.0 + 1e-6;
                     body_schema_engine::model::Element::Axis(body_schema_engine::kinematics::Joint::Revolute(line))

@@ -7,7 +7,10 @@
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 
 use super::{Case, Fit, Parameters};
-use body_schema_engine::{kinematics::Joint, model::{Block, Layout, Place, State, listed, null_space}};
+use body_schema_engine::{
+    kinematics::Joint,
+    model::{Block, Layout, Place, State, listed, null_space},
+};
 
 /// The share of a parameter that undetermined directions must hold for it to be named.
 const NAMED: f64 = 0.05;

@@ -10,7 +10,7 @@ use resvg::{
     usvg::{Options, Tree, fontdb},
 };
 
-use body_schema_recording::hex;
+use body_schema_palette::hex;
 
 /// An sRGB colour.
 pub type Colour = [u8; 3];

@@ -12,7 +12,7 @@ pub fn is_usable(x: f64) -> bool {
 }
 
 /// What is wrong with a text that says no [usable](is_usable) number.
-pub(crate) fn what_is_wrong(text: &str) -> &'static str {
+pub fn what_is_wrong(text: &str) -> &'static str {
     match text.parse::<f64>() {
         Ok(x) if x.is_finite() => "is beyond ±1e12",
         _ => "is not a finite number",

@@ -197,7 +197,7 @@ fn an_absurd_reading_ends_nobody() {
 
 /// `arm-6dof` with one thing changed.
 fn changed_arm(from: &str, to: &str) -> Scenario {
-    let text = include_str!("../../scenarios/arm-6dof.toml");
+    let text = include_str!("../../../scenarios/arm-6dof.toml");
     let changed = text.replacen(from, to, 1);
     assert_ne!(changed, text);
     Scenario::parse("arm.toml", &changed, &|_| Err("no data".into())).expect("a scenario")

@@ -61,7 +61,7 @@ pub use result::{JointModel, LearnerResult, MarkerModel, Model, OutlierReading, 
 pub use sight::{
     CameraDescription, ChannelDescription, ChannelReading, CorrectionReport, PlaceReport, TargetDescription,
 };
-pub(crate) use sight::{channels, described};
+pub use sight::{channels, described};
 pub use standpoint::{OwnedStandpoint, Standpoint};
 pub use streams::Stream;
 pub use told::Prospect;

@@ -109,7 +109,7 @@ impl ChannelReading {
 }
 
 /// What there is to see with, and what is seen.
-pub(crate) fn described(equipment: &Equipment) -> (Vec<CameraDescription>, Vec<TargetDescription>) {
+pub fn described(equipment: &Equipment) -> (Vec<CameraDescription>, Vec<TargetDescription>) {
     let cameras = equipment.cameras.iter();
     let cameras = cameras.map(|camera| CameraDescription { name: camera.name.clone(), size_px: camera.size_px });
     let targets = equipment.targets.iter().map(|target| TargetDescription {
@@ -120,7 +120,7 @@ pub(crate) fn described(equipment: &Equipment) -> (Vec<CameraDescription>, Vec<T
 }
 
 /// The channels of a rig, with the names of what they see.
-pub(crate) fn channels(rig: &Rig, equipment: &Equipment) -> Vec<ChannelDescription> {
+pub fn channels(rig: &Rig, equipment: &Equipment) -> Vec<ChannelDescription> {
     let describe = |(index, channel): (usize, &std::sync::Arc<dyn body_schema_engine::sensing::Channel>)| {
         let target = |target: usize| equipment.targets.get(target).map_or("marker", |target| target.name.as_str());
         let sight = channel.sight();

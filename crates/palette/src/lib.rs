@@ -1,7 +1,10 @@
-//! The palette of recordings and page: the panel's crate takes this file in as it is.
+//! The palette of recordings, figures and page: colours by learner, and a map for values.
 
 /// The learners that scenarios have in common: each has the slot of its place here, in every comparison.
 const KNOWN: [&str; 7] = ["active", "random", "global", "gradient", "human", "unscented", "nominal"];
+
+/// The colour of the truth: grey.
+pub const TRUTH_COLOR: [u8; 3] = [0x80, 0x80, 0x80];
 
 /// The colours by slot: those of the known learners, then those that all others share. After Okabe and Ito, for the
 /// colour-blind, darkened or lightened until each has a contrast of 3:1 both on the light and on the dark ground.
@@ -75,6 +78,11 @@ pub fn viridis(value: f64) -> [u8; 3] {
 /// The colour between two, `amount` in 0..=1 of the way.
 pub fn mix(from: [u8; 3], to: [u8; 3], amount: f64) -> [u8; 3] {
     std::array::from_fn(|i| (f64::from(from[i]) + amount * (f64::from(to[i]) - f64::from(from[i]))).round() as u8)
+}
+
+/// A colour as `#rrggbb`.
+pub fn hex([red, green, blue]: [u8; 3]) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
 /// The contrast of two colours by WCAG 2.1, from 1 to 21.

@@ -18,6 +18,7 @@
 //! As described is the chain of the URDF with base, targets, cameras and sockets fitted to all rows that are learned from.
 //! Of more than [`MOST_ROWS`] rows so many are recorded, spread evenly.
 
+use body_schema_palette::learner_color;
 use std::{collections::BTreeMap, path::Path};
 
 use nalgebra::{Isometry3, Point3};
@@ -26,7 +27,7 @@ use super::{
     EllipsoidSize, RecordingError, TRUTH_COLOR,
     blueprint::calibration as arrangement,
     body::Figure,
-    colours::{label_on_light, learner_color},
+    colours::label_on_light,
     file::RrdFile,
     learner::TRUE_ARM,
     message,

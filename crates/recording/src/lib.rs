@@ -107,7 +107,6 @@ mod values;
 pub use self::{
     blueprint::{Shape, Theme},
     calibration::calibration,
-    colours::{TRUTH_COLOR, hex, learner_color, learner_slots},
     csv::{StepsCsv, comparison_csv},
     ellipsoid::EllipsoidSize,
     error::RecordingError,
@@ -116,6 +115,7 @@ pub use self::{
     repair::{Condition, examine, restore},
     target::Target,
 };
+pub use body_schema_palette::{TRUTH_COLOR, hex, learner_color, learner_slots};
 
 /// The version of Rerun whose recordings are written, and whose viewer opens them.
 pub fn rerun_version() -> String {

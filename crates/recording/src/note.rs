@@ -1,5 +1,6 @@
 //! The note that goes with a recording: what it shows, and how to make it again.
 
+use body_schema_palette::{hex, learner_color, learner_slots};
 use std::fmt::Write as _;
 
 use clap::ValueEnum;
@@ -7,7 +8,6 @@ use nalgebra::Point3;
 
 use super::{
     EllipsoidSize, TRUTH_COLOR,
-    colours::{hex, learner_color, learner_slots},
     rerun::{Color, MediaType, Points3D, Radius, TextDocument},
     solid::single,
 };

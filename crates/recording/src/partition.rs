@@ -1,7 +1,6 @@
 //! DIRECT's partition of the joint box: a slice to look at, and all of it as data.
 
 use super::{
-    colours::viridis,
     rerun::{
         AsComponents, Boxes2D, ChannelDatatype, Color, ColorModel, ComponentDescriptor, EntityPath, Image, ImageFormat,
         LineStrips2D, Points2D, Radius, Transform3D,
@@ -9,8 +8,13 @@ use super::{
     rows::Rows,
     values::{Cell, Values},
 };
-use body_schema_engine::{kinematics::JointKind, optimize::{Plane, Projection}, selection::{Leaf, Partition}};
+use body_schema_engine::{
+    kinematics::JointKind,
+    optimize::{Plane, Projection},
+    selection::{Leaf, Partition},
+};
 use body_schema_experiment::JointDescription;
+use body_schema_palette::viridis;
 
 const NO_VALUE: [u8; 3] = [0x60, 0x60, 0x60];
 const FRAME: [u8; 3] = [0x90, 0x90, 0x90];

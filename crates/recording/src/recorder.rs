@@ -1,5 +1,6 @@
 //! The observer that records.
 
+use body_schema_palette::{learner_color, learner_slots};
 use std::{
     collections::HashSet,
     time::{Duration, Instant},
@@ -10,7 +11,7 @@ use super::{
     blueprint::Arranger,
     body::Figure,
     charts::BEST_DESIGN,
-    colours::{learner_color, learner_slots, tint},
+    colours::tint,
     file::RrdFile,
     learner::{LearnerEntities, Scenery},
     message, metrics, model,

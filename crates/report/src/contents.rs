@@ -173,7 +173,7 @@ fn outliers(document: &mut Document, report: &Report) {
     document.text(
         "Rows that are likelier outliers than not, by the residuals of their readings. They hardly count in the fit; what is off by more than ten times the median counts in no figure of errors either:",
     );
-    let row = |outlier: &crate::Outlier| {
+    let row = |outlier: &body_schema_calibration::Outlier| {
         [outlier.row.to_string(), line(outlier.line, outlier.file.as_deref()), format!("{:.3}", outlier.probability)]
     };
     document.table(0, ["row", "line of the file", "probability"], report.outliers.iter().map(row));
@@ -219,7 +219,7 @@ fn noise(document: &mut Document, report: &Report) {
     }
 }
 
-fn reading(joint: &crate::Joint, sigma: f64) -> Option<String> {
+fn reading(joint: &body_schema_calibration::Joint, sigma: f64) -> Option<String> {
     let said = match joint.kind.as_str() {
         "prismatic" => format!("{} {:.3} mm", joint.name, sigma * 1e3),
         _ => format!("{} {:.3} deg", joint.name, sigma.to_degrees()),
@@ -234,7 +234,7 @@ fn placements(document: &mut Document, report: &Report, case: &Case<'_>) {
     let sd = |xyz: &Option<[f64; 3]>| xyz.as_ref().map_or_else(|| "known".to_owned(), |xyz| format!("± {}", mm(xyz)));
     let Placement { xyz_m, rpy_rad, xyz_sd_m, .. } = &report.base;
     let base = [format!("{frame} in the frame of the measurements"), mm(xyz_m), sd(xyz_sd_m), deg(rpy_rad)];
-    let target = |target: &crate::Target| {
+    let target = |target: &body_schema_calibration::Target| {
         let rpy = target.rpy_rad.as_ref().map_or_else(|| "–".to_owned(), deg);
         let place = if case.described.is_some() { "in the frame of" } else { "behind" };
         [format!("{} {place} {}", target.name, target.link), mm(&target.xyz_m), sd(&target.xyz_sd_m), rpy]
@@ -253,7 +253,7 @@ fn corrections(document: &mut Document, report: &Report, case: &Case<'_>) {
         let cell = |k: usize| format!("{:+.decimals$} ± {:.decimals$}", values[k], deviations[k]);
         [cell(0), cell(1), cell(2)].join(", ")
     };
-    let row = |(index, joint): (usize, &crate::Joint)| {
+    let row = |(index, joint): (usize, &body_schema_calibration::Joint)| {
         let name = format!("{}. {}", index + 1, joint.name);
         if !joint.learned {
             return [name, "held".to_owned(), "held".to_owned()];
@@ -271,8 +271,8 @@ fn corrections(document: &mut Document, report: &Report, case: &Case<'_>) {
     );
     let offsets: Vec<_> = report.joints.iter().filter_map(|joint| Some((joint, joint.offset?))).collect();
     if !offsets.is_empty() {
-        let unit = |joint: &crate::Joint| if joint.kind == "prismatic" { "mm" } else { "deg" };
-        let row = |(joint, offset): (&crate::Joint, crate::Correction)| {
+        let unit = |joint: &body_schema_calibration::Joint| if joint.kind == "prismatic" { "mm" } else { "deg" };
+        let row = |(joint, offset): (&body_schema_calibration::Joint, body_schema_calibration::Correction)| {
             [joint.name.clone(), format!("{:+.3} ± {:.3} {}", offset.value, offset.sd, unit(joint))]
         };
         document.table(1, ["joint", "offset of its reading"], offsets.into_iter().map(row));
@@ -293,7 +293,9 @@ fn undetermined(document: &mut Document, report: &Report) {
         return;
     }
     document.text("Pairs of parameters that the rows hardly tell apart; what is known is their sum or difference. b₁ and b₂ are the two directions across an axis.");
-    let row = |it: &crate::Correlation| [it.first.clone(), it.second.clone(), format!("{:+.3}", it.correlation)];
+    let row = |it: &body_schema_calibration::Correlation| {
+        [it.first.clone(), it.second.clone(), format!("{:+.3}", it.correlation)]
+    };
     document.table(2, ["one", "other", "correlation"], report.correlations.iter().map(row));
 }
 
@@ -312,7 +314,7 @@ fn by_number(document: &mut Document, report: &Report) {
     let unit = report.unit;
     let step = points.len().div_ceil(SHOWN);
     let shown = points.iter().enumerate().filter(|(index, _)| (points.len() - 1 - index).is_multiple_of(step));
-    let row = |(_, point): (usize, &crate::ActivePoint)| {
+    let row = |(_, point): (usize, &body_schema_calibration::ActivePoint)| {
         let [active, median, low, high] =
             [point.active_mm, point.random_median_mm, point.random_q25_mm, point.random_q75_mm].map(number);
         [point.rows.to_string(), active, median, low, high]
@@ -329,7 +331,7 @@ fn folds(document: &mut Document, report: &Report) {
     };
     document.heading("Fold by fold");
     let unit = report.unit;
-    let row = |fold: &crate::Fold| {
+    let row = |fold: &body_schema_calibration::Fold| {
         let mean = |figures: &Figures| number(figures.mean());
         let figures = [&fold.before, &fold.after, &fold.full_model].map(mean);
         let [before, after, full] = figures;

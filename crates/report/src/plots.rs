@@ -3,7 +3,7 @@
 use super::document::Part;
 use body_schema_calibration::{ActivePoint, Reading, Report, Unit};
 use body_schema_chart::{Axis, Chart, Colour, Layer, Marker, Panel, Style};
-use body_schema_recording::learner_color;
+use body_schema_palette::learner_color;
 
 /// Points of one plot at most: of more, the greatest in every stretch of rows is drawn.
 const POINTS: usize = 1200;
@@ -139,7 +139,7 @@ fn by_number(report: &Report, unit: Unit) -> Option<Panel> {
 }
 
 /// A joint's correction and its standard deviation, by coordinate.
-type Correction = fn(&crate::Joint) -> ([f64; 3], [f64; 3]);
+type Correction = fn(&body_schema_calibration::Joint) -> ([f64; 3], [f64; 3]);
 
 fn corrections(report: &Report) -> Option<Part> {
     if !report.joints.iter().any(|joint| joint.learned) {

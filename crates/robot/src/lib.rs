@@ -59,5 +59,5 @@ mod write;
 pub use chain::{Chain, Follows, Reading, Segment, SegmentKind};
 pub use error::{Unwritable, UrdfError};
 pub use fitted::Fitted;
-pub(crate) use read::JointEnds;
+pub use read::JointEnds;
 pub use read::Urdf;

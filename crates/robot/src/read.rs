@@ -52,7 +52,7 @@ pub(super) struct JointElement {
 
 /// A joint for those who look for a chain.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct JointEnds<'a> {
+pub struct JointEnds<'a> {
     /// Its name.
     pub name: &'a str,
     /// The link that carries it.
@@ -162,12 +162,12 @@ impl Urdf {
     }
 
     /// Its joints, in the file's order.
-    pub(crate) fn joints(&self) -> impl Iterator<Item = JointEnds<'_>> {
+    pub fn joints(&self) -> impl Iterator<Item = JointEnds<'_>> {
         (0..self.joints.len()).map(|joint| self.joint_ends(joint))
     }
 
     /// The joints on which a link hangs, the one that carries it first.
-    pub(crate) fn carriers<'a>(&'a self, link: &str) -> Vec<JointEnds<'a>> {
+    pub fn carriers<'a>(&'a self, link: &str) -> Vec<JointEnds<'a>> {
         let mut carriers = Vec::new();
         let mut link = self.links.iter().position(|known| known == link);
         while let Some(joint) =

@@ -13,7 +13,7 @@ pub struct Builtin {
 
 macro_rules! builtins {
     ($($name:literal),* $(,)?) => {
-        &[$(Builtin { name: $name, text: include_str!(concat!("../../scenarios/", $name, ".toml")) }),*]
+        &[$(Builtin { name: $name, text: include_str!(concat!("../../../scenarios/", $name, ".toml")) }),*]
     };
 }
 
@@ -51,7 +51,7 @@ pub const BUILTIN: &[Builtin] = builtins![
 
 macro_rules! files {
     ($($name:literal),* $(,)?) => {
-        &[$(($name, include_str!(concat!("../../scenarios/", $name)))),*]
+        &[$(($name, include_str!(concat!("../../../scenarios/", $name)))),*]
     };
 }
 

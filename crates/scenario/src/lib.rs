@@ -7,6 +7,7 @@
 //! The robot is written joint by joint, or is that of a URDF; the world is simulated, or a table of measurements. Where both are
 //! files, whatever a scenario leaves out is taken from `measured.toml`, and from the table's titles.
 
+pub mod assembly;
 mod builtin;
 mod chain;
 mod data;

@@ -13,7 +13,7 @@ pub struct TableError {
 pub(super) const AS_TEXT: &str = "export the table as CSV, text in UTF-8";
 
 impl TableError {
-    pub(crate) fn new(what: impl Into<String>, mend: impl Into<String>) -> Self {
+    pub fn new(what: impl Into<String>, mend: impl Into<String>) -> Self {
         Self { what: what.into(), mend: mend.into() }
     }
 

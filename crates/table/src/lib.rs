@@ -62,10 +62,10 @@ mod rows;
 mod titles;
 mod writer;
 
-pub(crate) use absent::is_absent;
+pub use absent::is_absent;
 pub use error::TableError;
 pub use guard::{Guard, MOST_BYTES};
-pub(crate) use names::split;
+pub use names::split;
 pub use names::{Component, Title};
 pub use reading::{Layout, Reading, Rotation};
 pub use rows::{Columns, MOST_ROWS, Row, Rows, Table};

@@ -314,7 +314,7 @@ impl Quantity {
     }
 
     /// Whether a title ends with a unit of it.
-    pub(crate) fn is_in(self, title: &str) -> bool {
+    pub fn is_in(self, title: &str) -> bool {
         self.factor(split(title).1).is_some()
     }
 

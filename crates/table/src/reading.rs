@@ -147,7 +147,7 @@ impl Titles {
     /// # Errors
     ///
     /// [`TableError`] as there.
-    pub(crate) fn reading_of(&self, layout: Layout, prefix: &str) -> Result<Reading, TableError> {
+    pub fn reading_of(&self, layout: Layout, prefix: &str) -> Result<Reading, TableError> {
         let named = self.reading(layout, prefix);
         let Err(error) = named else { return named };
         let first = match layout {
@@ -164,12 +164,12 @@ impl Titles {
     }
 
     /// Whether the titles that begin with `prefix` say a position, in whatever unit.
-    pub(crate) fn has_position(&self, prefix: &str) -> bool {
+    pub fn has_position(&self, prefix: &str) -> bool {
         Component::PLACE.iter().all(|component| self.has(prefix, *component, ""))
     }
 
     /// Whether they say a rotation too.
-    pub(crate) fn has_pose(&self, prefix: &str) -> bool {
+    pub fn has_pose(&self, prefix: &str) -> bool {
         let has = |kind: &Rotation| kind.components().iter().all(|component| self.has(prefix, *component, ""));
         self.has_position(prefix) && Rotation::ALL.iter().any(has)
     }

@@ -30,7 +30,7 @@ pub enum Quantity {
 
 impl Quantity {
     /// What the readings of a joint measure.
-    pub(crate) fn of(kind: JointKind) -> Self {
+    pub fn of(kind: JointKind) -> Self {
         match kind {
             JointKind::Revolute => Self::Angle,
             JointKind::Prismatic => Self::Length,
@@ -180,7 +180,7 @@ impl Titles {
     }
 
     /// What stands before the titles that end with x, alone or with a unit: targets whose positions may be there.
-    pub(crate) fn prefixes(&self) -> Vec<&str> {
+    pub fn prefixes(&self) -> Vec<&str> {
         let found = self.titles.iter().filter_map(|title| Title::parse(title));
         found.filter(|it| it.component == Component::X && it.number.is_empty()).map(|it| it.before).collect()
     }
@@ -195,7 +195,7 @@ impl Titles {
     }
 
     /// What is wrong where columns are separated by something else than commas.
-    pub(crate) fn separated(&self) -> Option<TableError> {
+    pub fn separated(&self) -> Option<TableError> {
         let filled: Vec<&String> = self.titles.iter().filter(|title| !title.is_empty()).collect();
         // Words may well stand in one title among several.
         let is_alone =
@@ -212,7 +212,7 @@ impl Titles {
     }
 
     /// These titles without some, so that what is found is another column.
-    pub(crate) fn besides(&self, taken: &[&String]) -> Self {
+    pub fn besides(&self, taken: &[&String]) -> Self {
         let kept = |title: &String| if taken.contains(&title) { String::new() } else { title.clone() };
         Self { titles: self.titles.iter().map(kept).collect() }
     }

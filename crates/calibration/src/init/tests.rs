@@ -214,12 +214,12 @@ fn a_title_that_is_a_joints_name_is_no_measurement() {
 }
 
 const PANDA: [&str; 2] = [
-    include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/panda.urdf")),
-    include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/panda-sockets.csv")),
+    include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/panda.urdf")),
+    include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/panda-sockets.csv")),
 ];
 const KINOVA: [&str; 2] = [
-    include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/gen3lite.urdf")),
-    include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/kinova-sockets.csv")),
+    include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/gen3lite.urdf")),
+    include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/kinova-sockets.csv")),
 ];
 
 fn of_sockets([urdf, table]: [&str; 2], base: &str, tip: &str, socket_distance_m: Option<f64>) -> Begun {

@@ -12,11 +12,11 @@ use crate::{Case, Figures, Fit, MoreRows};
 use body_schema_robot::{Chain, Urdf};
 use body_schema_scenario::Scenario;
 
-const UR10: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/ur10.urdf"));
-const PANDA: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/panda.urdf"));
-const GEN3LITE: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/gen3lite.urdf"));
-const TIAGO: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/tiago.urdf"));
-const TALOS: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/talos.urdf"));
+const UR10: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/ur10.urdf"));
+const PANDA: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/panda.urdf"));
+const GEN3LITE: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/gen3lite.urdf"));
+const TIAGO: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/tiago.urdf"));
+const TALOS: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/talos.urdf"));
 
 /// Ten arms: a URDF, from where to where.
 const ARMS: [(&str, &str, &str); 10] = [

@@ -263,7 +263,7 @@ impl State {
     }
 
     /// The loads, where a joint gives way to them.
-    pub(crate) fn bending(&self) -> Option<&Loads> {
+    pub fn bending(&self) -> Option<&Loads> {
         let loads = self.loads.as_deref()?;
         let gives_way = |correction: &Correction| correction.compliance != [0.0; Load::ALL.len()];
         self.corrections.iter().any(gives_way).then_some(loads)

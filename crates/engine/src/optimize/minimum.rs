@@ -15,7 +15,7 @@ pub struct Minimum {
 
 /// The candidate of the least value, with it; of equals the first. Candidates whose value is not finite do not count:
 /// `f64::total_cmp` alone orders a NaN with a negative sign below every number, and would prefer it to all of them.
-pub(crate) fn least<T>(candidates: impl IntoIterator<Item = (T, f64)>) -> Option<(T, f64)> {
+pub fn least<T>(candidates: impl IntoIterator<Item = (T, f64)>) -> Option<(T, f64)> {
     candidates.into_iter().filter(|(_, value)| value.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 

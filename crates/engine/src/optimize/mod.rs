@@ -107,7 +107,7 @@ mod quasi_newton;
 pub use bayesian::bayesian;
 pub use descent::{Slopes, descend};
 pub use minimum::Minimum;
-pub(crate) use minimum::least;
+pub use minimum::least;
 pub use polish::{Polish, polish};
 
 pub use direct::{

@@ -14,7 +14,7 @@
 use crate::elementary::exp;
 
 /// The index of the candidate that makes `made` most like `wanted`; `None` without candidates.
-pub(crate) fn herd<C: AsRef<[f64]>, W: AsRef<[f64]>, M: AsRef<[f64]>>(
+pub fn herd<C: AsRef<[f64]>, W: AsRef<[f64]>, M: AsRef<[f64]>>(
     candidates: &[C],
     wanted: &[W],
     made: &[M],

@@ -46,7 +46,7 @@ use rand_chacha::ChaCha8Rng;
 pub use active::{Active, Minimiser};
 pub use criterion::{Appraisal, Criterion};
 pub use feasible::{Constraints, Domain, Infeasible, Obstacle, Outline, Scope, Tally, Vetoes, Violation, travel};
-pub(crate) use herding::herd;
+pub use herding::herd;
 pub use human::Human;
 pub use optimality::Optimality;
 pub use outlook::Outlook;
@@ -150,7 +150,7 @@ pub struct Selection {
 
 impl Selection {
     /// A movement chosen without a criterion.
-    pub(crate) fn of(movement: Movement) -> Self {
+    pub fn of(movement: Movement) -> Self {
         Self { movement, criterion: None, gain: None, evaluations: 0, search: None, plan: None }
     }
 

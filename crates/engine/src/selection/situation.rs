@@ -80,7 +80,7 @@ impl History {
     }
 
     /// These are the latest movements after which nothing was seen, or nothing that counted.
-    pub(crate) fn missed(&mut self, misses: VecDeque<Vec<f64>>) {
+    pub fn missed(&mut self, misses: VecDeque<Vec<f64>>) {
         self.misses = misses;
     }
 

@@ -3,7 +3,7 @@
 use super::{Figure, Source, designs};
 use body_schema_chart::{Axis, Chart, Layer, Panel, Style};
 use body_schema_experiment::{Curve, LearnerComparison, Quantiles};
-use body_schema_recording::{TRUTH_COLOR, learner_color, learner_slots};
+use body_schema_palette::{TRUTH_COLOR, learner_color, learner_slots};
 use body_schema_scenario::WorldSpec;
 
 /// One error, in the unit of its axis.

@@ -7,7 +7,7 @@ use body_schema_engine::{
     optimize::{Plane, Projection},
     selection::Leaf,
 };
-use body_schema_recording::learner_color;
+use body_schema_palette::learner_color;
 
 const RECTANGLES: Colour = [0x88; 3];
 

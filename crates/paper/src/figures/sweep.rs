@@ -3,7 +3,7 @@
 use super::{Figure, Source};
 use crate::experiments::Kind;
 use body_schema_chart::{Axis, Chart, Layer, Panel, Scale, Style};
-use body_schema_recording::{learner_color, learner_slots};
+use body_schema_palette::{learner_color, learner_slots};
 
 pub fn figure(source: Source<'_>) -> Option<Figure> {
     let Kind::Sweep { label, steps, quick_steps, .. } = source.experiment.kind else { return None };

@@ -5,7 +5,10 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::{ErrorDraw, InitialError, Known, Scenario};
-use body_schema_engine::{kinematics::Joint, model::{Block, Correction, Element, State, anywhere}};
+use body_schema_engine::{
+    kinematics::Joint,
+    model::{Block, Correction, Element, State, anywhere},
+};
 
 impl Scenario {
     /// The true state with the error of the initial estimate: for each learned joint three Euler angles, then for a

@@ -3,8 +3,17 @@
 use std::sync::Arc;
 
 use super::Briefing;
-use crate::{ErrorDraw, EstimatorKind, Filter, InitialError, Known, LearnerSpec, PolicyKind, Scenario, ScenarioError, SmootherSpec, WorldSpec};
-use body_schema_engine::{estimation::{Begin, Begun, Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls}, model::{Block, Layout, Prior}, optimize::{Settings, Variant}, selection::{Active, Human, Minimiser, Planner, Policy, Random}, sensing::{JointNoise, Loss, Noise, Occasion, Rig}};
+use crate::{
+    ErrorDraw, EstimatorKind, Filter, InitialError, Known, LearnerSpec, PolicyKind, Scenario, ScenarioError,
+    SmootherSpec, WorldSpec,
+};
+use body_schema_engine::{
+    estimation::{Begin, Begun, Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls},
+    model::{Block, Layout, Prior},
+    optimize::{Settings, Variant},
+    selection::{Active, Human, Minimiser, Planner, Policy, Random},
+    sensing::{JointNoise, Loss, Noise, Occasion, Rig},
+};
 use body_schema_experiment::{Agent, Learner, Stream};
 
 /// States drawn from the posterior for one Monte Carlo evaluation of (7).
@@ -146,7 +155,7 @@ impl Scenario {
 
     /// The sensors as the smoother takes them to be, with σ of the first as `sigma`: where it learns how far joints' readings are
     /// off, it begins with what is usual.
-    pub(crate) fn smoother_rig(&self, sigma: f64) -> Rig {
+    pub fn smoother_rig(&self, sigma: f64) -> Rig {
         let rig = self.rig.assuming(sigma);
         if !self.smoother.joints_unknown {
             return rig;

@@ -10,8 +10,17 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use crate::{HeldOut, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec};
-use body_schema_engine::{design::{Problem, Stretch, movements_by_counting}, kinematics::JointBox, model::{Block, Layout, State, Workspace}, selection::{Actions, Movement, Watch, Weights}, sensing::{InView, Observation}};
-use body_schema_experiment::{Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World, channels, described};
+use body_schema_engine::{
+    design::{Problem, Stretch, movements_by_counting},
+    kinematics::JointBox,
+    model::{Block, Layout, State, Workspace},
+    selection::{Actions, Movement, Watch, Weights},
+    sensing::{InView, Observation},
+};
+use body_schema_experiment::{
+    Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World, channels,
+    described,
+};
 
 /// Configurations over which the prediction error is judged in a simulated world.
 const EVALUATION_SIZE: usize = 200;

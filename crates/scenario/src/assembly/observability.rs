@@ -7,7 +7,11 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::{Known, Scenario, WorldSpec};
-use body_schema_engine::{design::observability::Prospect, model::{Block, Place, State}, selection::Watch};
+use body_schema_engine::{
+    design::observability::Prospect,
+    model::{Block, Place, State},
+    selection::Watch,
+};
 
 /// Postures drawn before it is given up to find one in which something is in view.
 const PATIENCE: usize = 20_000;

@@ -3,7 +3,12 @@
 use rand::RngExt;
 
 use crate::{Measurements, Robot, Scenario, SocketSpec};
-use body_schema_engine::{model::{Manifold, Workspace}, normal::StandardNormal, selection::{Actions, Sockets}, sensing::{Observation, Occasion}};
+use body_schema_engine::{
+    model::{Manifold, Workspace},
+    normal::StandardNormal,
+    selection::{Actions, Sockets},
+    sensing::{Observation, Occasion},
+};
 use body_schema_experiment::{HeldInSocket, Stream};
 
 /// Postures of every held-out socket.
@@ -69,7 +74,12 @@ mod tests {
     use nalgebra::{Isometry3, Vector3};
 
     use crate::{Robot, Scenario, builtin};
-    use body_schema_engine::{design::movements_by_counting, model::State, selection::Movement, sensing::{InView, Occasion, Rig}};
+    use body_schema_engine::{
+        design::movements_by_counting,
+        model::State,
+        selection::Movement,
+        sensing::{InView, Occasion, Rig},
+    };
     use body_schema_experiment::{Agent, Event, Executed, Gauge, NoiseSequence, World, location_m};
 
     fn scenario() -> Scenario {
