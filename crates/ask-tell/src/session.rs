@@ -249,6 +249,7 @@ impl Session {
         reports
     }
 
+    /// What the session was set up with, read.
     pub fn scenario(&self) -> &Arc<Scenario> {
         &self.ledger.scenario
     }

@@ -56,7 +56,7 @@ mod tests {
     use rand::RngExt;
 
     use super::*;
-    use body_schema_engine::model::{Block, laws::random_arm};
+    use body_schema_engine::model::{Block, random::random_arm};
 
     fn case() -> (State, Layout, Workspace) {
         let mut rng = ChaCha8Rng::seed_from_u64(3);

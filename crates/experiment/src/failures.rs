@@ -16,7 +16,7 @@ use super::{
 use body_schema_engine::{
     estimation::{Belief, Rls, StabilisingNoise},
     kinematics::JointBox,
-    model::{Layout, State, laws::random_arm},
+    model::{Layout, State, random::random_arm},
     selection::{
         Actions, Active, Appraisal, CriterionUnits, Minimiser, Policy, Random, Selection, SelectionError, Situation,
         Weights,

@@ -160,7 +160,7 @@ mod tests {
     use crate::metrics::{location_m, orientation_deg};
     use body_schema_engine::{
         estimation::{Estimator, HypothesisSettings, Smoother},
-        model::{Block, Prior, laws::random_arm},
+        model::{Block, Prior, random::random_arm},
     };
 
     fn postures(rng: &mut ChaCha8Rng, joints: usize, count: usize) -> Vec<Vec<f64>> {

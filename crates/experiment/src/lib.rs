@@ -7,26 +7,16 @@
 mod agent;
 mod checkpoint;
 mod choice;
-#[cfg(test)]
-mod choices;
 mod comparison;
-#[cfg(test)]
-mod constrained;
 mod convergence;
 #[cfg(test)]
 mod failures;
 mod gauge;
 mod head;
-#[cfg(test)]
-mod holders;
 mod judge;
-#[cfg(test)]
-mod laws;
 mod learner;
 mod loads;
 mod metrics;
-#[cfg(test)]
-mod noises;
 mod remarks;
 mod report;
 mod result;
@@ -67,7 +57,11 @@ pub use streams::Stream;
 pub use told::Prospect;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};
 
-use body_schema_engine::{design::Problem, estimation::Update, selection::SelectionError};
+use body_schema_engine::{
+    design::Problem,
+    estimation::{Belief, Update},
+    selection::SelectionError,
+};
 
 /// A running comparison of learners. A copy of it goes its own way.
 #[derive(Clone)]
@@ -153,6 +147,11 @@ impl Experiment {
     /// The truth, for those who judge: reports, recordings, bounds.
     pub fn world(&self) -> &World {
         &self.world
+    }
+
+    /// What a learner believes, by its place among those of the [description](Self::description).
+    pub fn belief(&self, learner: usize) -> Option<&Belief> {
+        self.learners.get(learner).map(Learner::belief)
     }
 
     /// One movement of every learner.

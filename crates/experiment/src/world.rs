@@ -231,7 +231,7 @@ mod tests {
 
     use super::*;
     use body_schema_engine::{
-        model::laws::random_arm,
+        model::random::random_arm,
         sensing::{Channel, JointNoise, Socket},
     };
 

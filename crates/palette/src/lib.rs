@@ -86,7 +86,6 @@ pub fn hex([red, green, blue]: [u8; 3]) -> String {
 }
 
 /// The contrast of two colours by WCAG 2.1, from 1 to 21.
-#[cfg(test)]
 pub fn contrast(one: [u8; 3], other: [u8; 3]) -> f64 {
     let luminance = |colour: [u8; 3]| {
         let linear = colour.map(|channel| {

@@ -23,6 +23,8 @@ pub(super) fn label_on_dark(colour: [u8; 3]) -> [u8; 3] {
 
 #[cfg(test)]
 mod tests {
+    use body_schema_palette::{contrast, hex, learner_color};
+
     use super::*;
 
     /// What is behind labels before the scene's background, as measured in screenshots: the viewer lays a veil of its own
@@ -34,7 +36,7 @@ mod tests {
         for colour in (0..12).map(learner_color).chain([super::super::movement::ERROR]) {
             let labels = [label_on_light(colour), label_on_dark(colour)];
             for (label, ground) in labels.into_iter().zip(LABEL_GROUNDS) {
-                let contrast = palette::contrast(label, ground);
+                let contrast = contrast(label, ground);
                 assert!(contrast >= 4.5, "{colour:02X?} on {ground:02X?}: {contrast:.2}");
             }
         }

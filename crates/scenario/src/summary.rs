@@ -107,6 +107,7 @@ impl super::Robot {
         learned.chain(self.held_out_sockets.iter().map(|socket| of(socket, true))).collect()
     }
 
+    /// The joints as the page and recordings are told of them.
     pub fn joint_descriptions(&self) -> Vec<JointDescription> {
         (self.names.iter().zip(&self.state.joints).zip(self.limits.joints()).enumerate())
             .map(|(index, ((name, joint), &(lower, upper)))| JointDescription {

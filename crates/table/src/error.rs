@@ -13,6 +13,7 @@ pub struct TableError {
 pub(super) const AS_TEXT: &str = "export the table as CSV, text in UTF-8";
 
 impl TableError {
+    /// An error by what is wrong and what to do; where it is, who reads the table adds.
     pub fn new(what: impl Into<String>, mend: impl Into<String>) -> Self {
         Self { what: what.into(), mend: mend.into() }
     }

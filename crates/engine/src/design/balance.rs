@@ -26,7 +26,7 @@ pub(super) struct Shares<'a> {
 }
 
 /// What shares come to.
-pub(super) struct Standing {
+pub struct Standing {
     /// tr(W M⁻¹).
     pub trace: f64,
     /// S = N M⁻¹ W M⁻¹.

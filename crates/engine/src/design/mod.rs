@@ -37,6 +37,9 @@ mod sensitivity;
 pub use best::{BestDesign, Stretch, best_designs};
 pub use counting::{General, general_movements, movements_by_counting};
 pub use search::Design;
+#[cfg(feature = "testing")]
+#[doc(hidden)]
+pub use search::Search;
 
 use std::sync::Arc;
 

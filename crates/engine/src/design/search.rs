@@ -99,17 +99,18 @@ fn excess(found: &[(Vec<f64>, f64)], standing: &Standing) -> f64 {
 }
 
 /// A design on its way.
-pub(super) struct Search<'a> {
+pub struct Search<'a> {
     problem: &'a Problem,
     sensitivity: Sensitivity<'a>,
     /// Poses, rad or m, all of which are seen.
-    pub(super) candidates: Vec<Vec<f64>>,
+    pub candidates: Vec<Vec<f64>>,
     poses: Vec<Vec<f64>>,
     shares: Shares<'a>,
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(problem: &'a Problem, movements: usize, start: Option<&Design>) -> Self {
+    /// Begins with a design, or with one of candidates.
+    pub fn new(problem: &'a Problem, movements: usize, start: Option<&Design>) -> Self {
         let candidates = candidates(problem);
         let (poses, shares) = match start {
             Some(design) => (design.poses.clone(), design.shares.clone()),
@@ -124,7 +125,8 @@ impl<'a> Search<'a> {
         Self { problem, sensitivity: Sensitivity::new(problem), candidates, poses, shares }
     }
 
-    pub(super) fn balance(&mut self, tolerance: f64) -> Option<Standing> {
+    /// Balances the shares to so much of the trace; `None` if the information is singular.
+    pub fn balance(&mut self, tolerance: f64) -> Option<Standing> {
         let (kept, standing) = self.shares.balance(tolerance)?;
         let mut keep = kept.into_iter();
         self.poses.retain(|_| keep.next().unwrap_or(true));
@@ -133,7 +135,7 @@ impl<'a> Search<'a> {
 
     /// The `count` candidates of the greatest sensitivity and the poses of the design, all polished, with their sensitivity: the
     /// greatest first.
-    pub(super) fn favoured(&self, standing: &Standing, count: usize) -> Vec<(Vec<f64>, f64)> {
+    pub fn favoured(&self, standing: &Standing, count: usize) -> Vec<(Vec<f64>, f64)> {
         let limits = &self.problem.limits;
         let values = self.sensitivity.values(&standing.sensitivity, &self.candidates);
         let mut values: Vec<(f64, usize)> = values.into_iter().zip(0..).collect();
@@ -204,23 +206,5 @@ impl<'a> Search<'a> {
     fn design(self, standing: &Standing, excess: f64) -> Design {
         let (shares, trace) = (self.shares.shares().to_vec(), standing.trace);
         Design { poses: self.poses, shares, trace, gap: (excess / trace).max(0.0) }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use body_schema_scenario::builtin;
-
-    use super::*;
-
-    #[test]
-    fn a_sensitivity_that_is_no_number_is_nobodys_favourite() {
-        let problem = builtin("arm-6dof").expect("built in").design_problem().expect("simulated");
-        let mut search = Search::new(&problem, 20, None);
-        let standing = search.balance(1e-6).expect("informative");
-        let wanted = search.favoured(&standing, 6);
-        let n = problem.limits.dimension();
-        search.candidates.splice(0..0, [vec![f64::NAN; n], vec![-f64::NAN; n]]);
-        assert_eq!(search.favoured(&standing, 6), wanted);
     }
 }

@@ -93,7 +93,7 @@ mod tests {
     use super::*;
     use crate::{
         estimation::{HypothesisSettings, Rls},
-        model::{Layout, Prior, laws::random_arm},
+        model::{Layout, Prior, random::random_arm},
     };
 
     /// A second sensor that never reads brings no equation.

@@ -226,7 +226,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::model::laws::{random_arm, random_state};
+    use crate::model::random::{random_arm, random_state};
 
     fn random_belief(seed: u64) -> (Belief, DMatrix<f64>, ChaCha8Rng) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -64,7 +64,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        model::{Layout, laws::random_arm},
+        model::{Layout, random::random_arm},
         sensing::Rig,
     };
 

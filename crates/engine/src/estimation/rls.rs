@@ -177,7 +177,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        model::{jacobian, laws::random_arm},
+        model::{jacobian, random::random_arm},
         sensing::Rig,
     };
 

@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use crate::{
         estimation::Rls,
-        model::{Layout, laws::random_arm},
+        model::{Layout, random::random_arm},
         sensing::Rig,
     };
 

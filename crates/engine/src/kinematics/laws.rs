@@ -6,7 +6,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Line, chart, rotation};
-use crate::model::laws::{random_arm, random_direction};
+use crate::model::random::{random_arm, random_direction};
 
 fn close(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
     (a.to_homogeneous() - b.to_homogeneous()).amax() < 1e-12

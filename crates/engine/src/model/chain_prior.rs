@@ -335,7 +335,7 @@ mod tests {
     use super::*;
     use crate::{
         kinematics::Line,
-        model::{Place, Target, laws::random_direction},
+        model::{Place, Target, random::random_direction},
     };
 
     /// A chain as a description has it: by joint its frame in the one before, and its axis there.

@@ -1,105 +1,13 @@
 //! Laws of states and their coordinates, over random robots.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix6xX, Point3, UnitVector3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix6xX, Point3, Vector3};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{
-    Block, Correction, Device, Element, Frame, Layout, Load, Loads, Pass, Place, Prior, State, Target, anywhere,
-    jacobian,
-};
+use super::random::{all_blocks, random_arm, random_direction, random_point, random_state};
+use super::{Block, Element, Frame, Layout, Pass, Prior, State, anywhere, jacobian};
 use crate::kinematics::{Joint, Line, chart};
-
-pub(crate) fn random_direction(rng: &mut ChaCha8Rng) -> UnitVector3<f64> {
-    loop {
-        let v = Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));
-        if (0.1..1.0).contains(&v.norm()) {
-            return UnitVector3::new_normalize(v);
-        }
-    }
-}
-
-fn random_point(rng: &mut ChaCha8Rng) -> Point3<f64> {
-    Point3::from(Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0)))
-}
-
-pub(crate) fn random_pose(rng: &mut ChaCha8Rng) -> Isometry3<f64> {
-    Isometry3::new(random_point(rng).coords, Vector3::from_fn(|_, _| rng.random_range(-1.5..1.5)))
-}
-
-/// An arm of `joints` joints, about one in four prismatic, with its marker.
-pub(crate) fn random_arm(rng: &mut ChaCha8Rng, joints: usize) -> State {
-    let joints = (0..joints)
-        .map(|_| {
-            let direction = random_direction(rng);
-            if rng.random_range(0..4) == 0 {
-                Joint::Prismatic(direction)
-            } else {
-                Joint::Revolute(Line { point: random_point(rng), direction })
-            }
-        })
-        .collect();
-    State::arm(joints, random_point(rng))
-}
-
-/// An arm with everything that there is: a base, corrections, targets and devices on any link, sockets.
-pub(crate) fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
-    let mut state = random_arm(rng, joints);
-    state.base = random_pose(rng);
-    state.corrections = (0..joints)
-        .map(|_| Correction {
-            offset: rng.random_range(-0.3..0.3),
-            ratio: rng.random_range(0.9..1.1),
-            sine: rng.random_range(-0.1..0.1),
-            cosine: rng.random_range(-0.1..0.1),
-            compliance: [0.0; 2],
-        })
-        .collect();
-    state.targets.push(Target { link: rng.random_range(0..=joints), place: Place::Pose(random_pose(rng)) });
-    state.targets.push(Target { link: rng.random_range(0..=joints), place: Place::Point(random_point(rng)) });
-    state.devices.push(Device {
-        link: Some(rng.random_range(0..=joints)),
-        pose: random_pose(rng),
-        intrinsics: Some([500.0, 510.0, 320.0, 240.0]),
-    });
-    state.devices.push(Device { link: None, pose: random_pose(rng), intrinsics: None });
-    state.sockets.extend([random_point(rng), random_point(rng)]);
-    let turning: Vec<usize> = (0..joints).filter(|joint| state.joints[*joint].line().is_some()).collect();
-    let elbow = (!turning.is_empty()).then(|| turning[rng.random_range(0..turning.len())]);
-    state.loads = Some(Loads::new(&state, random_direction(rng), elbow).into());
-    for correction in &mut state.corrections {
-        correction.compliance = [(); 2].map(|()| rng.random_range(-0.01..0.01));
-    }
-    state
-}
-
-/// The same where no joint gives way to loads, and all its blocks but those of loads.
-pub(crate) fn random_stiff_state(rng: &mut ChaCha8Rng, joints: usize) -> (State, Vec<Block>) {
-    stiff(random_state(rng, joints))
-}
-
-/// A state whose joints no longer give way to loads, and all its blocks but those of loads.
-pub(crate) fn stiff(mut state: State) -> (State, Vec<Block>) {
-    state.corrections.iter_mut().for_each(|correction| correction.compliance = [0.0; 2]);
-    let mut blocks = all_blocks(&state);
-    blocks.retain(|block| !matches!(block, Block::Compliance(..)));
-    (state, blocks)
-}
-
-/// All blocks of a state.
-pub(crate) fn all_blocks(state: &State) -> Vec<Block> {
-    let mut blocks = vec![Block::Base];
-    for joint in 0..state.joints.len() {
-        blocks.extend([Block::Axis(joint), Block::Offset(joint), Block::Ratio(joint), Block::Eccentricity(joint)]);
-        blocks.extend(Load::ALL.map(|load| Block::Compliance(joint, load)));
-    }
-    blocks.extend((0..state.targets.len()).map(Block::Target));
-    blocks.extend((0..state.devices.len()).flat_map(|device| [Block::Device(device), Block::Intrinsics(device)]));
-    blocks.extend((0..state.sockets.len()).map(Block::Socket));
-    blocks.retain(|block| block.is_in(state));
-    blocks
-}
 
 /// A random robot with everything, of which about four blocks in five are learned, and readings.
 fn random_case(seed: u64, joints: usize) -> (State, Layout, Vec<f64>, ChaCha8Rng) {

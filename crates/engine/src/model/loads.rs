@@ -146,7 +146,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::{kinematics::Line, model::laws::random_state};
+    use crate::{kinematics::Line, model::random::random_state};
 
     fn revolute(point: [f64; 3], direction: Vector3<f64>) -> Joint {
         Joint::Revolute(Line { point: point.into(), direction: UnitVector3::new_normalize(direction) })

@@ -255,7 +255,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::model::laws::random_state;
+    use crate::model::random::random_state;
 
     /// A robot of seven joints with everything, its limits, and a place that its marker can reach.
     fn case(seed: u64) -> (State, JointBox, Point3<f64>, ChaCha8Rng) {

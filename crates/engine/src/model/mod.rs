@@ -44,4 +44,7 @@ pub use state::{Correction, Device, Hand, Place, State, Target, Thetas};
 pub use workspace::{Workspace, best_motion};
 
 #[cfg(test)]
-pub(crate) mod laws;
+mod laws;
+#[cfg(any(test, feature = "testing"))]
+#[doc(hidden)]
+pub mod random;

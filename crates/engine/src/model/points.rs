@@ -359,7 +359,7 @@ mod tests {
     use super::*;
     use crate::{
         lanes::{groups, levels},
-        model::{Pass, laws::random_stiff_state},
+        model::{Pass, random::random_stiff_state},
     };
 
     proptest! {

@@ -150,7 +150,7 @@ mod tests {
         kinematics::JointBox,
         model::{
             Block, Manifold,
-            laws::{random_arm, random_pose},
+            random::{random_arm, random_pose},
         },
     };
 

@@ -302,7 +302,7 @@ mod tests {
     use super::*;
     use crate::{
         lanes::levels,
-        model::laws::random_arm,
+        model::random::random_arm,
         selection::CriterionUnits,
         sensing::{JointNoise, Position, Rig},
     };

@@ -246,7 +246,7 @@ mod tests {
     use super::*;
     use crate::{
         estimation::Alternative,
-        model::{Layout, laws::random_arm},
+        model::{Layout, random::random_arm},
         selection::{CriterionUnits, plan::Plan},
     };
 

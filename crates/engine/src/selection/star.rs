@@ -286,7 +286,7 @@ mod tests {
     use crate::{
         estimation::Belief,
         lanes::levels,
-        model::{Layout, laws::random_stiff_state},
+        model::{Layout, random::random_stiff_state},
         selection::{Criterion, CriterionUnits, Weights, criterion::points},
         sensing::{Position, Rig},
     };

@@ -143,7 +143,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        model::{Block, Device, laws::random_arm},
+        model::{Block, Device, random::random_arm},
         sensing::{Pixels, Position},
     };
 

@@ -58,7 +58,7 @@ impl Weights {
     }
 
     /// W M, for a matrix of m rows.
-    pub(crate) fn scale(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn scale(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let mut scaled = matrix.clone();
         scaled.column_iter_mut().for_each(|mut column| column.component_mul_assign(&self.0));
         scaled
@@ -71,7 +71,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::model::laws::random_arm;
+    use crate::model::random::random_arm;
 
     #[test]
     fn weights_follow_the_units() {

@@ -138,7 +138,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::{model::laws::random_arm, sensing::Distance};
+    use crate::{model::random::random_arm, sensing::Distance};
 
     /// A distance with a fault.
     #[derive(Clone, Copy, Debug)]

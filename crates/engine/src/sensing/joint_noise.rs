@@ -235,7 +235,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        model::laws::random_stiff_state,
+        model::random::random_stiff_state,
         sensing::{Observation, Rig, examples},
     };
 

@@ -10,7 +10,7 @@ use rand_distr::StandardNormal;
 use super::{CHANNELS, Channel, Observation, Position, Rig, Socket, Spacing, check_channel, examples};
 use crate::model::{
     Layout,
-    laws::{all_blocks, random_state},
+    random::{all_blocks, random_state},
 };
 
 proptest! {

@@ -84,7 +84,7 @@ mod tests {
         estimation::{Belief, EstimationError, Estimator, HypothesisSettings, Rls, Smoother, UnscentedRls},
         model::{
             Layout, Prior,
-            laws::{all_blocks, random_state},
+            random::{all_blocks, random_state},
         },
         sensing::{Loss, Observation, Pose, Position, Refused, examples},
     };

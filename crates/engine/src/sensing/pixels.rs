@@ -231,7 +231,7 @@ mod tests {
     use nalgebra::{Translation3, UnitQuaternion};
 
     use super::*;
-    use crate::model::{Device, Place, Target, laws::random_arm};
+    use crate::model::{Device, Place, Target, random::random_arm};
 
     /// A camera at the origin that looks along z, and a tag of two points 0.1 m apart that is carried by nothing.
     fn tag(at: Isometry3<f64>) -> (State, Pixels) {

@@ -131,7 +131,7 @@ mod tests {
     use crate::{
         model::{
             Block, Device, Frame,
-            laws::{random_arm, random_pose},
+            random::{random_arm, random_pose},
         },
         sensing::{Channel, Facing, Pixels, Position},
     };

@@ -5,10 +5,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::{
-    model::{Block, laws::random_arm},
+    model::{Block, random::random_arm},
     sensing::{Position, Rig},
 };
-use body_schema_scenario::{Scenario, builtin};
 
 /// An arm of which the axes and the marker are learned, and more where `blocks` says so.
 fn prospect(seed: u64, blocks: &[Block]) -> Prospect {
@@ -96,33 +95,4 @@ fn another_sensor_takes_nothing_away() {
             assert!(two.random_median <= one.random_median * (1.0 + 1e-9), "seed {seed}: {one:?} {two:?}");
         }
     }
-}
-
-/// What constraints exclude is not proposed, and a joint that may hardly move tells little of its axis.
-#[test]
-fn constraints_are_kept_and_tell_less() {
-    let scenario = builtin("arm-6dof-table").expect("built in");
-    let bound = scenario.prospect();
-    let report = found(&bound, 6);
-    let constraints = bound.constraints.as_ref().expect("bound");
-    let mut from = constraints.start.clone();
-    for posture in &report.best {
-        let posture: Vec<f64> = posture.joints.iter().map(|degrees| degrees.to_radians()).collect();
-        assert_eq!(constraints.violation(from.as_deref(), &posture), None);
-        from = Some(posture);
-    }
-    let held = "[constraints]\nlimits_deg = { elbow = [-10.1, -10.0] }\n";
-    let text = builtin("arm-6dof").expect("built in").source + "\n" + held;
-    let stiff = Scenario::parse("stiff.toml", &text, &|_| Err(String::new())).expect("valid");
-    let free = found(&builtin("arm-6dof").expect("built in").prospect(), 20);
-    let stiff = found(&stiff.prospect(), 20);
-    assert!(
-        free.weak.is_empty() && stiff.weak[0].said.contains("the axis of elbow"),
-        "{:?} {:?}",
-        free.weak,
-        stiff.weak
-    );
-    let of_elbow = stiff.deviations.iter().zip(&free.deviations).find(|(it, _)| it.parameter.contains("elbow"));
-    let (stiff, free) = of_elbow.expect("learned");
-    assert!(stiff.best > 3.0 * free.best, "{stiff:?} {free:?}");
 }

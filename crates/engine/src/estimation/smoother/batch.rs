@@ -149,7 +149,7 @@ mod tests {
     use super::*;
     use crate::{
         estimation::{Estimator, HypothesisSettings},
-        model::{Block, Layout, Prior, laws::random_arm},
+        model::{Block, Layout, Prior, random::random_arm},
         sensing::{Loss, Rig},
     };
 

@@ -12,7 +12,7 @@ use super::{CALM, HypothesisSettings, KEPT, Smoother, mode::Effort};
 use crate::{
     estimation::{Belief, Estimator, Update},
     kinematics::{Joint, Line},
-    model::{Layout, Prior, State, laws::random_arm},
+    model::{Layout, Prior, State, random::random_arm},
     sensing::{Loss, Observation, Rig},
 };
 

@@ -163,7 +163,7 @@ mod tests {
         *,
     };
     use crate::{
-        model::{Prior, laws::random_arm},
+        model::{Prior, random::random_arm},
         sensing::{Observation, Rig},
     };
 

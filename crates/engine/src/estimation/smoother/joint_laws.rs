@@ -11,7 +11,7 @@ use rand_distr::StandardNormal;
 use super::{HypothesisSettings, Smoother};
 use crate::{
     estimation::{Estimator, Rls, SixNumbers, UnscentedRls},
-    model::{Layout, Place, Prior, State, Target, laws::random_arm},
+    model::{Layout, Place, Prior, State, Target, random::random_arm},
     sensing::{Channel, JointNoise, Loss, Observation, Position, Rig},
 };
 

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     estimation::Estimator,
-    model::{Block, Layout, Pass, Prior, State, jacobian, laws::random_arm},
+    model::{Block, Layout, Pass, Prior, State, jacobian, random::random_arm},
     sensing::{Channel, Distance, Loss, Observation, Position, Rig},
 };
 

@@ -204,7 +204,7 @@ mod tests {
     use super::*;
     use crate::{
         estimation::{Estimator, HypothesisSettings},
-        model::{Block, Prior, laws::random_arm},
+        model::{Block, Prior, random::random_arm},
         sensing::{Observation, Rig},
     };
 

@@ -85,7 +85,7 @@ mod tests {
     use super::*;
     use crate::{
         estimation::{Estimator, HypothesisSettings},
-        model::{Layout, Prior, State, laws::random_arm},
+        model::{Layout, Prior, State, random::random_arm},
         sensing::{Loss, Rig},
     };
 

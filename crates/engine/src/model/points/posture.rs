@@ -260,7 +260,7 @@ mod tests {
     use super::*;
     use crate::{
         lanes::GROUP,
-        model::{Layout, laws::random_stiff_state},
+        model::{Layout, random::random_stiff_state},
     };
 
     proptest! {

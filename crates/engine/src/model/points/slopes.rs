@@ -162,7 +162,7 @@ mod tests {
 
     use crate::{
         lanes::{GROUP, groups, levels},
-        model::{Layout, Points, Whitening, laws::random_stiff_state},
+        model::{Layout, Points, Whitening, random::random_stiff_state},
     };
 
     proptest! {

@@ -101,7 +101,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::{model::laws::random_arm, sensing::TargetKind};
+    use crate::{model::random::random_arm, sensing::TargetKind};
 
     #[test]
     fn joints_and_targets_are_where_the_nominal_robot_has_them() {

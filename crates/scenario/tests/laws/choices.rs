@@ -1,10 +1,10 @@
 //! How choices are told, and what other movements would have taught.
 
-use crate::{ChoiceError, Experiment, MovementReport};
 use body_schema_engine::{
     estimation::HypothesisSettings,
     selection::{Criterion, Planning},
 };
+use body_schema_experiment::{ChoiceError, Experiment, MovementReport};
 use body_schema_scenario::builtin;
 
 /// A learner that plans, with short searches, and takes directions for unknown above this deviation.
@@ -85,7 +85,7 @@ fn a_planner_appraises_by_its_own_criterion() {
     let mut experiment = planning("arm-6dof-no-prior", 0.1);
     let weights = builtin("arm-6dof-no-prior").expect("built in").weights();
     for _ in 0..2 {
-        let belief = experiment.learners[0].belief().clone();
+        let belief = experiment.belief(0).expect("a learner").clone();
         assert!(belief.weight() < 0.9, "rivals");
         let learner = &experiment.step().expect("a step").learners[0];
         let movement = learner.movement.clone().expect("a movement");

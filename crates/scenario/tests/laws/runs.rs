@@ -4,10 +4,10 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{AbsorbError, Agent, Event, Executed};
 use body_schema_engine::{
     estimation::HypothesisSettings, kinematics::JointBox, selection::Movement, sensing::Observation,
 };
+use body_schema_experiment::{AbsorbError, Agent, Event, Executed};
 use body_schema_scenario::{EstimatorKind, PolicyKind, Scenario, builtin};
 
 /// Every estimator with every policy that fits it.
@@ -197,7 +197,7 @@ fn an_absurd_reading_ends_nobody() {
 
 /// `arm-6dof` with one thing changed.
 fn changed_arm(from: &str, to: &str) -> Scenario {
-    let text = include_str!("../../../scenarios/arm-6dof.toml");
+    let text = include_str!("../../../../scenarios/arm-6dof.toml");
     let changed = text.replacen(from, to, 1);
     assert_ne!(changed, text);
     Scenario::parse("arm.toml", &changed, &|_| Err("no data".into())).expect("a scenario")

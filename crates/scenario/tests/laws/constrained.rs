@@ -1,10 +1,10 @@
 //! What experiments and agents promise where movements are bound.
 
-use super::{Agent, ChoiceError, Event, Executed, Experiment, NoiseSequence};
 use body_schema_engine::{
     estimation::HypothesisSettings,
     selection::{Movement, SelectionError, travel},
 };
+use body_schema_experiment::{Agent, ChoiceError, Event, Executed, Experiment, NoiseSequence};
 use body_schema_scenario::{Scenario, builtin};
 
 /// A built-in scenario with `[constraints]`, and searches short enough for a test.

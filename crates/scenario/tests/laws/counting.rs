@@ -1,0 +1,51 @@
+//! How many movements are counted for shipped scenarios.
+
+use body_schema_engine::{
+    design::{General, general_movements, movements_by_counting},
+    kinematics::JointBox,
+    model::{Block, Layout, random::random_arm},
+    sensing::{InView, Occasion, Rig},
+};
+use body_schema_scenario::builtin;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// A socket that no channel reads is no place to hold anything, and shifts no other.
+#[test]
+fn sockets_that_nothing_reads_count_for_nothing() {
+    let scenario = builtin("arm-7dof-socket").expect("built in");
+    let (robot, rig) = (&scenario.robot, &scenario.rig);
+    let channels =
+        rig.channels().iter().filter(|channel| !matches!(channel.occasion(), Occasion::Held { socket: 0, .. }));
+    let rig = Rig::new(channels.cloned().collect());
+    for General { rig, posture } in general_movements(&robot.state, &robot.layout, &rig, InView::Unknown, &robot.limits)
+    {
+        for channel in rig.channels() {
+            let Occasion::Held { socket, target } = channel.occasion() else { continue };
+            let away = robot.state.target_at(target, &posture) - robot.state.sockets[socket];
+            assert!(away.norm() < 1e-6, "socket {socket}: {away}");
+        }
+    }
+}
+
+/// As PAPER.md's counting has it where every parameter can be determined; and by rank where some cannot.
+#[test]
+fn equations_are_counted_by_rank() {
+    for (name, expected) in [("arm-6dof", 8), ("arm-12dof", 16), ("head-fov", 6)] {
+        let scenario = builtin(name).expect("built in");
+        let (robot, rig) = (&scenario.robot, Rig::tracker(0.01));
+        assert_eq!(
+            movements_by_counting(&robot.state, &robot.layout, &rig, InView::Unknown, &robot.limits),
+            expected,
+            "{name}"
+        );
+    }
+    let arm = random_arm(&mut ChaCha8Rng::seed_from_u64(2), 4);
+    let limits = JointBox::new(vec![(-1.0, 1.0); 4]).expect("limits");
+    let rig = Rig::tracker(0.01);
+    let axes = Layout::of_arm(&arm, &[], true);
+    let with_base = Layout::new(&arm, (0..4).map(Block::Axis).chain([Block::Base, Block::Target(0)]));
+    assert_eq!(with_base.dimension(), axes.dimension() + 6);
+    let alone = movements_by_counting(&arm, &axes, &rig, InView::Unknown, &limits);
+    assert_eq!(movements_by_counting(&arm, &with_base, &rig, InView::Unknown, &limits), alone, "the base adds nothing");
+}

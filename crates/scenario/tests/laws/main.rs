@@ -1,0 +1,10 @@
+//! Laws of the experiments that shipped scenarios describe.
+
+mod choices;
+mod constrained;
+mod counting;
+mod designs;
+mod holders;
+mod noises;
+mod observability;
+mod runs;
