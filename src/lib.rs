@@ -52,6 +52,7 @@
 //! the crate `body-schema-engine`.
 
 pub mod export;
+pub mod page;
 
 pub mod server;
 

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::server::ServerError;
+use crate::page::PageError;
 use body_schema_experiment::ExperimentError;
 use body_schema_recording::RecordingError;
 use body_schema_scenario::ScenarioError;
@@ -46,7 +46,7 @@ pub enum ExportError {
     Recording(#[from] RecordingError),
     /// The page's files are not there.
     #[error(transparent)]
-    Page(#[from] ServerError),
+    Page(#[from] PageError),
     /// A value could not be written as JSON.
     #[error("cannot write JSON: {0}; please report this as a bug, with the scenario and the seed")]
     Json(#[from] serde_json::Error),

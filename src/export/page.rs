@@ -3,14 +3,14 @@
 use std::{collections::BTreeMap, path::Path};
 
 use super::{ExportError, Plan, write};
-use crate::server::{CONTENT_SECURITY_POLICY, INDEX, PageFile, page_files};
+use crate::page::{self, CONTENT_SECURITY_POLICY, INDEX, PageFile};
 
 /// All files of the page but the page itself.
 pub(super) struct Files(Vec<PageFile>);
 
 impl Files {
     pub(super) fn load(panel: Option<&Path>) -> Result<Self, ExportError> {
-        Ok(Self(page_files(panel)?))
+        Ok(Self(page::files(panel)?))
     }
 
     /// Sizes of the compressed ones once they are unpacked, bytes.
@@ -20,7 +20,8 @@ impl Files {
 
     pub(super) fn write(&self, out: &Path, plans: &[Plan<'_>], base: Option<&str>) -> Result<(), ExportError> {
         for file in &self.0 {
-            write(&out.join(address(file)), if is_packed(file) { &file.packed } else { &file.bytes })?;
+            let packed = if is_packed(file) { file.compressed.of(&file.bytes) } else { None };
+            write(&out.join(address(file)), packed.as_ref().unwrap_or(&file.bytes))?;
         }
         // Hosts that make pages of their own from what they are given leave these alone.
         write(&out.join(".nojekyll"), b"")?;

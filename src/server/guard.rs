@@ -11,6 +11,8 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
+use crate::page::CONTENT_SECURITY_POLICY;
+
 use super::{
     App, FrameAncestor,
     holding::Holding,
@@ -19,11 +21,6 @@ use super::{
     session::Taken,
     strangers::Reached,
 };
-
-/// Scripts, styles, images and connections from here and from nowhere else; the viewer is WebAssembly. It also keeps
-/// the viewer from calling its makers' telemetry and from loading fonts.
-pub(crate) const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
-     style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'";
 
 /// Answers from so many bytes on are counted.
 const LARGE_BYTES: usize = 64 << 10;

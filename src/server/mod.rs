@@ -6,8 +6,8 @@
 //! store/    the sessions of robots elsewhere on the disk
 //! extract   requests, read        problem  errors, as RFC 9457 problem details
 //! guard     foreign pages, headers, stray errors        assets   the page and Rerun's viewer
-//! aside     work that holds up nobody                    gzip     answers, compressed
-//! strangers who may ask at all                           frame    who may embed the page
+//! aside     work that holds up nobody                    frame    who may embed the page
+//! strangers who may ask at all
 //! connections  how long each may keep us waiting          limits   how much is taken on
 //! holding   what an answer holds until it is sent
 //! requests  their ids and lines in the log                metrics  figures for Prometheus
@@ -23,7 +23,6 @@ mod connections;
 mod extract;
 mod frame;
 mod guard;
-mod gzip;
 mod holding;
 mod limits;
 mod metrics;
@@ -36,16 +35,15 @@ mod strangers;
 
 use std::{io, net::SocketAddr, path::PathBuf, sync::Arc};
 
+use crate::page::PageError;
 use aside::Jobs;
 use axum::{Router, middleware::from_fn_with_state};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
 pub use api::{Health, Liveness, MadeSteps, ScenarioList, ScenarioResource, SessionList, StepRequest};
-pub(crate) use assets::{INDEX, PageFile, page_files};
 use connections::Connections;
 pub use frame::{FrameAncestor, NoOrigin};
-pub(crate) use guard::CONTENT_SECURITY_POLICY;
 pub use limits::{Limits, raise_descriptors};
 use metrics::{Metrics, Most};
 pub use problem::{Beside, PROBLEM_JSON, Problem};
@@ -87,17 +85,9 @@ pub enum ServerError {
     /// The server has ended, and files lack their end.
     #[error("these recordings lack their end: {}", .0.join("; "))]
     Incomplete(Vec<String>),
-    /// Rerun's viewer is not part of this program.
-    #[error("the viewer cannot be loaded: {0}")]
-    Viewer(#[from] re_web_viewer_server::WebViewerDataError),
-    /// Another build of the panel was asked for and is not there.
-    #[error("the panel's file {} cannot be read: {source}", file.display())]
-    Panel {
-        /// The file.
-        file: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    /// The page is incomplete.
+    #[error(transparent)]
+    Page(#[from] PageError),
     /// The socket failed.
     #[error("the socket failed: {0}")]
     Socket(#[from] io::Error),

@@ -57,11 +57,7 @@ pub use streams::Stream;
 pub use told::Prospect;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};
 
-use body_schema_engine::{
-    design::Problem,
-    estimation::{Belief, Update},
-    selection::SelectionError,
-};
+use body_schema_engine::{design::Problem, estimation::Update, selection::SelectionError};
 
 /// A running comparison of learners. A copy of it goes its own way.
 #[derive(Clone)]
@@ -147,11 +143,6 @@ impl Experiment {
     /// The truth, for those who judge: reports, recordings, bounds.
     pub fn world(&self) -> &World {
         &self.world
-    }
-
-    /// What a learner believes, by its place among those of the [description](Self::description).
-    pub fn belief(&self, learner: usize) -> Option<&Belief> {
-        self.learners.get(learner).map(Learner::belief)
     }
 
     /// One movement of every learner.

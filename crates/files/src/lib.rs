@@ -39,7 +39,7 @@ pub fn exit(code: i32) -> ! {
 }
 
 /// Does what no signal may end half-way. It begins no file or folder, and gives none its name.
-pub(crate) fn undisturbed<T>(work: impl FnOnce() -> T) -> T {
+pub fn undisturbed<T>(work: impl FnOnce() -> T) -> T {
     let _list = unfinished();
     work()
 }

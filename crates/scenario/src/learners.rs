@@ -194,7 +194,7 @@ impl Scenario {
     }
 
     /// A learner as reports describe it.
-    pub(crate) fn learner_description(&self, spec: &LearnerSpec) -> LearnerDescription {
+    pub fn learner_description(&self, spec: &LearnerSpec) -> LearnerDescription {
         let noise = match spec.estimator {
             EstimatorKind::Rls => self.filter.stabilising,
             EstimatorKind::Unscented => self.unscented.stabilising,

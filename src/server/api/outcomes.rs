@@ -18,8 +18,8 @@ use crate::server::{
     session::ReportFiles,
 };
 use body_schema_ask_tell::Session;
-use body_schema_calibration as calibration;
 use body_schema_calibration::{File, Progress};
+use body_schema_report as report;
 
 /// The robot's URDF with what was learned.
 #[utoipa::path(get, path = "/v1/sessions/{id}/model.urdf", tag = "results", operation_id = "getUrdf",
@@ -170,7 +170,7 @@ async fn report(app: &App, id: &str) -> Result<Arc<[File]>, Problem> {
 fn report_files(session: &Session, wanted: &dyn Progress) -> Result<Vec<File>, Problem> {
     let (calibration, mut files) = session.calibrate(wanted)?;
     let results = session.results()?;
-    files.extend(calibration::report::files(&calibration, &results.case()?));
+    files.extend(report::files(&calibration, &results.case()?));
     files.retain(|file| file.path.starts_with("report."));
     Ok(files)
 }

@@ -85,7 +85,7 @@ fn a_planner_appraises_by_its_own_criterion() {
     let mut experiment = planning("arm-6dof-no-prior", 0.1);
     let weights = builtin("arm-6dof-no-prior").expect("built in").weights();
     for _ in 0..2 {
-        let belief = experiment.belief(0).expect("a learner").clone();
+        let belief = experiment.belief().expect("a learner").clone();
         assert!(belief.weight() < 0.9, "rivals");
         let learner = &experiment.step().expect("a step").learners[0];
         let movement = learner.movement.clone().expect("a movement");

@@ -5,26 +5,26 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
-use axum::body::Bytes;
+use bytes::Bytes;
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 
 /// The compressed form of a file, made when it is first wanted; those who ask meanwhile wait for it.
 #[derive(Clone, Default)]
-pub(super) struct Compressed(Arc<OnceLock<Option<Bytes>>>);
+pub(crate) struct Compressed(Arc<OnceLock<Option<Bytes>>>);
 
 impl Compressed {
     /// One that was made when the program was built.
-    pub(super) fn ready(bytes: Bytes) -> Self {
+    pub(crate) fn ready(bytes: Bytes) -> Self {
         Self(Arc::new(OnceLock::from(Some(bytes))))
     }
 
     /// The compressed form of these bytes; `None` if they cannot be compressed.
-    pub(super) fn of(&self, bytes: &[u8]) -> Option<Bytes> {
+    pub(crate) fn of(&self, bytes: &[u8]) -> Option<Bytes> {
         self.0.get_or_init(|| gzip(bytes)).clone()
     }
 
     /// The same without blocking the thread that asks.
-    pub(super) async fn of_large(&self, bytes: Bytes) -> Option<Bytes> {
+    pub(crate) async fn of_large(&self, bytes: Bytes) -> Option<Bytes> {
         if let Some(done) = self.0.get() {
             return done.clone();
         }
@@ -33,7 +33,7 @@ impl Compressed {
     }
 
     /// Begins in the background, so that it is ready when it is asked for.
-    pub(super) fn begin(&self, bytes: Bytes) {
+    pub(crate) fn begin(&self, bytes: Bytes) {
         if self.0.get().is_none() {
             let compressed = self.clone();
             let work = move || drop(compressed.of(&bytes));
@@ -50,14 +50,14 @@ fn gzip(bytes: &[u8]) -> Option<Bytes> {
 }
 
 /// What was compressed; empty if it does not unpack, and the browser says so.
-pub(super) fn unpack(compressed: &[u8]) -> Bytes {
+pub(crate) fn unpack(compressed: &[u8]) -> Bytes {
     let mut plain = Vec::new();
     drop(GzDecoder::new(compressed).read_to_end(&mut plain));
     plain.into()
 }
 
 /// Whether `Accept-Encoding` names gzip and does not refuse it.
-pub(super) fn is_accepted(accepted: &str) -> bool {
+pub(crate) fn is_accepted(accepted: &str) -> bool {
     accepted.split(',').any(|coding| {
         let mut parts = coding.split(';').map(str::trim);
         let is_gzip = parts.next().is_some_and(|name| name.eq_ignore_ascii_case("gzip"));
