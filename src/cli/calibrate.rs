@@ -7,10 +7,11 @@ use std::{
 
 use anyhow::{Context, Result};
 use body_schema_calibration as calibration;
-use body_schema_calibration::{Calibration, Case, Figures, File, Options, Outlier, Progress, Report, Unit, report};
+use body_schema_calibration::{Calibration, Case, Figures, File, Options, Outlier, Progress, Report, Unit};
 use body_schema_diagnostics::{Line, listed};
 use body_schema_files::AtomicFolder;
 use body_schema_recording as recording;
+use body_schema_report as report;
 use clap::builder::RangedU64ValueParser;
 use indicatif::ProgressBar;
 
