@@ -253,7 +253,6 @@ fn a_real_panda_tells_down_from_sideways() {
 }
 
 /// As a user meets it: the report says by how much joints give way.
-#[cfg(feature = "app")]
 #[test]
 fn the_report_says_by_how_much_joints_give_way() {
     let folder = tempfile::tempdir().expect("a folder");

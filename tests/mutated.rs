@@ -117,7 +117,6 @@ fn events() {
 }
 
 /// Recordings are read back by `repair` and by pages that follow late.
-#[cfg(feature = "app")]
 #[test]
 fn recordings() {
     use body_schema::{

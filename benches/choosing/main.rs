@@ -239,7 +239,6 @@ fn least() {
 }
 
 /// One choice on a single thread and on two: of what is believed, and of samples of it, which cost as many times as much.
-#[cfg(feature = "parallel")]
 fn threads() {
     println!(
         "microseconds for a choice by 600 evaluations on one thread and on two, and times faster: median (quartiles)"
@@ -271,7 +270,6 @@ fn main() {
     if arguments.iter().any(|argument| argument == "--once") {
         return once();
     }
-    #[cfg(feature = "parallel")]
     if arguments.iter().any(|argument| argument == "--threads") {
         return threads();
     }

@@ -1,7 +1,8 @@
 //! Whether what a report says in words is what it says in numbers.
 
 use body_schema::{
-    calibration::{Calibration, Case, Figures, Options, Silent, Unit, Use, calibrate, report},
+    calibration::{Calibration, Case, Figures, Options, Silent, Unit, Use, calibrate},
+    report,
     scenario::builtin,
 };
 

@@ -113,7 +113,6 @@ pub fn events(bytes: &[u8]) {
 }
 
 /// A recording, mended as `repair` does, and read by a page that follows late: what is kept of it is whole.
-#[cfg(feature = "app")]
 pub fn recording(bytes: &[u8]) {
     use std::fs;
 

@@ -3,8 +3,8 @@
 use std::fs;
 
 use body_schema::{
-    calibration::{Calibration, Case, Options, Silent, calibrate, report},
-    recording,
+    calibration::{Calibration, Case, Options, Silent, calibrate},
+    recording, report,
     scenario::builtin,
 };
 
