@@ -1,7 +1,7 @@
 //! What the best design of 40 movements costs, with its certificate. Ratios within one run are what counts, and those
 //! against an older commit.
 //!
-//! `cargo bench --no-default-features --bench design`
+//! `RAYON_NUM_THREADS=1 cargo bench --bench design`
 //!
 //! `best_design` is certified to within 1 %, `rough_design` to within 8 %, which commit ca1285b reaches too. A design's trace, its gap
 //! and how many poses it has go to the standard error: time means nothing without them.

@@ -1,10 +1,10 @@
 //! How soon `global` notices that an arm's elbow has tilted by 10 degrees, and how well it predicts later.
 //!
 //! ```sh
-//! cargo run --release --no-default-features --example changes -- 20 80 1001 1100    # change after 20 of 80 movements, seeds
-//! cargo run --release --no-default-features --example changes -- 0 200 1001 1100    # no change: false alarms
-//! cargo run --release --no-default-features --example changes -- 0 200 1001 1100 2  # the same, with noise twice as large as stated
-//! cargo run --release --no-default-features --example changes -- 60 308 1001 1100 1 5    # the fifth of five changes
+//! cargo run --release --example changes -- 20 80 1001 1100    # change after 20 of 80 movements, seeds
+//! cargo run --release --example changes -- 0 200 1001 1100    # no change: false alarms
+//! cargo run --release --example changes -- 0 200 1001 1100 2  # the same, with noise twice as large as stated
+//! cargo run --release --example changes -- 60 308 1001 1100 1 5    # the fifth of five changes
 //! ```
 
 use body_schema::{

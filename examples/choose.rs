@@ -1,7 +1,7 @@
 //! A choice alone: of all postures of an arm the one that is expected to teach most, beside one that is drawn.
 //!
 //! ```sh
-//! cargo run --release --no-default-features --example choose
+//! cargo run --release --example choose
 //! ```
 
 use body_schema::{

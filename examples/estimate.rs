@@ -1,7 +1,7 @@
 //! An estimator alone: two axes of an arm are learned from where its marker was seen.
 //!
 //! ```sh
-//! cargo run --release --no-default-features --example estimate
+//! cargo run --release --example estimate
 //! ```
 
 use body_schema::{

@@ -1,7 +1,7 @@
 //! A channel of one's own: a gauge that reads how high a target is above the table, and nothing else.
 //!
 //! ```sh
-//! cargo run --release --no-default-features --example own_channel
+//! cargo run --release --example own_channel
 //! ```
 
 use std::sync::Arc;

@@ -2,8 +2,9 @@
 //! every round, so that whatever else the machine does meets them all. Ratios of one round are what counts.
 //!
 //! ```text
-//! cargo bench --no-default-features --bench choosing
-//! cargo bench --no-default-features --features nlopt --bench choosing     # wants CMake and a C compiler
+//! export RAYON_NUM_THREADS=1
+//! cargo bench --bench choosing
+//! cargo bench --features nlopt --bench choosing     # wants CMake and a C compiler
 //! ```
 //!
 //! | contestant | what it does |
@@ -14,8 +15,8 @@
 //! | product | P (m × m) times m × 96 for every 32 candidates: the floor of any method that multiplies by P for each |
 //! | NLopt | `GN_DIRECT_L` with the same budget and the posterior's trace by the textbook's formula, with our Jacobian |
 //!
-//! Which of the two finds the lower value is a matter of the problem: `-- --least` compares them over 40 of each size. With
-//! `--features parallel`, `-- --threads` lets a choice on two threads take turns with one on a single thread.
+//! Which of the two finds the lower value is a matter of the problem: `-- --least` compares them over 40 of each size.
+//! `-- --threads` lets a choice on two threads take turns with one on a single thread.
 //!
 //! SciPy's `direct` takes its turn in a script, `benches/choosing/scipy_direct.py`; `-- --write FILE` writes it the problems, `-- --once`
 //! prints what each costs us.

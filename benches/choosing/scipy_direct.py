@@ -9,6 +9,7 @@ Every problem carries postures with their criterion; the script's own must agree
 """
 
 import json
+import os
 import statistics
 import subprocess
 import sys
@@ -73,9 +74,10 @@ class Problem:
 
 def benchmark(*arguments):
     """Runs the benchmark; what it prints."""
-    command = ["cargo", "bench", "--locked", "--no-default-features", "--bench", "choosing", "--", *arguments]
+    command = ["cargo", "bench", "--locked", "--bench", "choosing", "--", *arguments]
     root = Path(__file__).resolve().parents[2]
-    return subprocess.run(command, cwd=root, check=True, text=True, stdout=subprocess.PIPE).stdout
+    environment = {**os.environ, "RAYON_NUM_THREADS": "1"}
+    return subprocess.run(command, cwd=root, env=environment, check=True, text=True, stdout=subprocess.PIPE).stdout
 
 
 def main():
