@@ -5,7 +5,7 @@
 //! that plans by the predicted error over the workspace.
 //!
 //! ```
-//! use body_schema::ask_tell::{Ask, Observation, Session, Setup};
+//! use body_schema_ask_tell::{Ask, Observation, Session, Setup};
 //! use serde_json::json;
 //!
 //! let urdf = r#"<robot name="pendulum"><link name="wall"/><link name="rod"/>

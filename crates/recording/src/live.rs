@@ -30,7 +30,7 @@ const TAKEN_APART_BYTES: usize = 4 << 20;
 /// reader that takes single parts puts the header before each. Reader loops hold the index of their next part:
 ///
 /// ```
-/// # use body_schema::recording::LiveLog;
+/// # use body_schema_recording::LiveLog;
 /// # async fn follow(log: LiveLog) {
 /// let mut length = log.subscribe();
 /// let mut next = 0;

@@ -1,7 +1,8 @@
 //! Robot descriptions in URDF: read into a chain, and written with the axes that were learned.
 //!
 //! ```
-//! use body_schema::{kinematics::Joint, model::urdf::Urdf};
+//! use body_schema_engine::kinematics::Joint;
+//! use body_schema_robot::Urdf;
 //!
 //! let text = r#"<robot name="pendulum">
 //!   <link name="wall"/>

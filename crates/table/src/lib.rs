@@ -4,7 +4,7 @@
 //! movement. Columns stand in any order and are found by title; those that nobody asks for are passed over.
 //!
 //! ```
-//! use body_schema::table::{Columns, Layout, Quantity, Table};
+//! use body_schema_table::{Columns, Layout, Quantity, Table};
 //!
 //! let text = "shoulder_deg,lift,hand_x_mm,hand_y_mm,hand_z_mm\n90,0.2,100,0,1500\n45,0.1,,,\n";
 //! let table = Table::open(text.as_bytes())?;
@@ -18,7 +18,7 @@
 //! assert_eq!(rows[0].positions, [std::f64::consts::FRAC_PI_2, 0.2]);
 //! assert_eq!(rows[0].observation.readings, [Some(vec![0.1, 0.0, 1.5])]);
 //! assert_eq!((rows[1].line, rows[1].observation.is_miss()), (3, true));
-//! # Ok::<(), body_schema::table::TableError>(())
+//! # Ok::<(), body_schema_table::TableError>(())
 //! ```
 //!
 //! # Units

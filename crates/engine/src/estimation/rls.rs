@@ -40,7 +40,7 @@ impl StabilisingNoise {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use body_schema::{
+/// use body_schema_engine::{
 ///     estimation::{Belief, Estimator, Rls},
 ///     kinematics::{Joint, Line},
 ///     model::{Layout, State},

@@ -14,13 +14,13 @@ use crate::magnitude::is_usable;
 /// whose limits are equal does not move: its xᵢ is 0, and every xᵢ means its only position.
 ///
 /// ```
-/// use body_schema::kinematics::JointBox;
+/// use body_schema_engine::kinematics::JointBox;
 ///
 /// let limits = JointBox::new(vec![(-1.0, 3.0), (0.2, 0.4)])?;
 /// assert_eq!(limits.to_unit(&[0.0, 0.2]), [0.25, 0.0]);
 /// assert_eq!(limits.from_unit(&[0.5, 1.0]), [1.0, 0.4]);
 /// assert!(!limits.contains(&[0.0, 0.5]));
-/// # Ok::<(), body_schema::kinematics::JointBoxError>(())
+/// # Ok::<(), body_schema_engine::kinematics::JointBoxError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointBox {

@@ -25,7 +25,7 @@ use crate::{
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use body_schema::{
+/// use body_schema_engine::{
 ///     estimation::Belief,
 ///     kinematics::{Joint, JointBox, Line},
 ///     model::{Layout, State},

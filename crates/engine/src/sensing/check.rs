@@ -60,7 +60,7 @@ const TOLERANCE: f64 = 1e-5;
 /// derivative of its whitened prediction, `L⁻¹ ∂h/∂δ`, in all coordinates of `layout`, and that all its ways to predict agree.
 ///
 /// ```
-/// use body_schema::{
+/// use body_schema_engine::{
 ///     kinematics::{Joint, Line},
 ///     model::{Layout, State},
 ///     sensing::{Distance, check_channel},

@@ -15,7 +15,7 @@ use super::settings::{DirectError, Settings, Variant};
 /// that the caller decides how to evaluate them, when to stop, and what to look at in between:
 ///
 /// ```
-/// use body_schema::optimize::{Direct, Settings};
+/// use body_schema_engine::optimize::{Direct, Settings};
 ///
 /// let mut direct = Direct::new(2, Settings { max_evaluations: 100, ..Settings::default() })?;
 /// while let Some(batch) = direct.ask() {
@@ -25,7 +25,7 @@ use super::settings::{DirectError, Settings, Variant};
 /// let (point, value) = direct.best().expect("the objective is finite everywhere");
 /// assert!(value < 1e-4 && (point[0] - 0.3).abs() < 0.01);
 /// assert!(direct.evaluations() <= 100);
-/// # Ok::<(), body_schema::optimize::DirectError>(())
+/// # Ok::<(), body_schema_engine::optimize::DirectError>(())
 /// ```
 ///
 /// The first batch is the centre of the cube. Every later one belongs to an iteration: for each
