@@ -1,5 +1,5 @@
 //! Sums of squares: HᵀH and Hᵀr of many rows. They stand in blocks of as many rows each, in a block the columns of H one behind
-//! the other.
+//! the other; or [row by row](add_row_squares).
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f64x4};
 use nalgebra::{DMatrix, DVector};
@@ -35,6 +35,64 @@ pub(super) fn squared(level: Level, rows: &[f64], m: usize) -> DMatrix<f64> {
     dispatch!(level, simd => squares(simd, rows, rows.len() / m.max(1), m, product.as_mut_slice()));
     product.fill_upper_triangle_with_lower_triangle();
     product
+}
+
+/// Adds HᵀH to the lower triangle of `information` (m × m), of which what is above the diagonal means nothing from then on; the rows of H,
+/// m numbers each, stand one behind the other.
+pub(super) fn add_row_squares(level: Level, rows: &[f64], information: &mut DMatrix<f64>) {
+    let m = information.nrows();
+    if m == 0 {
+        return;
+    }
+    dispatch!(level, simd => row_squares(simd, rows, m, information.as_mut_slice()));
+}
+
+/// The same, by tiles of 4 columns and 8, 4 or 1 coordinates: every sum runs over the rows in their order.
+#[inline(always)]
+fn row_squares<S: Simd>(simd: S, rows: &[f64], m: usize, sums: &mut [f64]) {
+    for right in (0..m).step_by(DOWN) {
+        let mut left = right;
+        while left + 2 * WIDTH <= m {
+            row_tile::<S, 2>(simd, rows, [m, left, right], sums);
+            left += 2 * WIDTH;
+        }
+        while left + WIDTH <= m {
+            row_tile::<S, 1>(simd, rows, [m, left, right], sums);
+            left += WIDTH;
+        }
+        for (left, right) in (left..m).flat_map(|left| (right..m.min(right + DOWN)).map(move |right| (left, right))) {
+            let sum: f64 = rows.chunks_exact(m).fold(0.0, |sum, row| sum + row[left] * row[right]);
+            sums[right * m + left] += sum;
+        }
+    }
+}
+
+/// REGISTERS registers of coordinates from `left` on, of 4 columns from `right` on.
+#[inline(always)]
+fn row_tile<S: Simd, const REGISTERS: usize>(simd: S, rows: &[f64], [m, left, right]: [usize; 3], sums: &mut [f64]) {
+    let mut tile = [[f64x4::splat(simd, 0.0); REGISTERS]; DOWN];
+    // Beyond the last column it is taken again, and forgotten.
+    let columns: [usize; DOWN] = std::array::from_fn(|k| (right + k).min(m - 1));
+    for row in rows.chunks_exact(m) {
+        let mut a = [f64x4::splat(simd, 0.0); REGISTERS];
+        for (k, a) in a.iter_mut().enumerate() {
+            *a = load(simd, row, left + k * WIDTH);
+        }
+        for (tile, column) in tile.iter_mut().zip(columns) {
+            let b = f64x4::splat(simd, row[column]);
+            for (sum, a) in tile.iter_mut().zip(a) {
+                *sum = a * b + *sum;
+            }
+        }
+    }
+    for (found, column) in tile.iter().zip(right..m) {
+        for (k, found) in found.iter().enumerate() {
+            let first = column * m + left + k * WIDTH;
+            for (sum, found) in sums[first..first + WIDTH].iter_mut().zip(found.as_slice()) {
+                *sum += found;
+            }
+        }
+    }
 }
 
 /// Adds HᵀH to the lower triangle of `sums` (m × m), by tiles; what is above the diagonal means nothing.
@@ -96,6 +154,21 @@ mod tests {
 
     use super::*;
     use crate::lanes::levels;
+
+    #[test]
+    fn squares_row_by_row_are_those_of_linear_algebra_whatever_the_instructions() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1004);
+        for (m, count) in [(1, 1), (3, 7), (4, 4), (5, 30), (8, 3), (11, 20), (13, 9), (27, 64), (41, 50)] {
+            let h = DMatrix::from_fn(m, count, |_, _| rng.random_range(-1.0..1.0));
+            let start = DMatrix::from_fn(m, m, |_, _| rng.random_range(-1.0..1.0));
+            let expected = (&start + &h * h.transpose()).lower_triangle();
+            for level in levels() {
+                let mut found = start.clone();
+                add_row_squares(level, h.as_slice(), &mut found);
+                assert_eq!(found.lower_triangle(), expected, "{level:?} {m} {count}");
+            }
+        }
+    }
 
     #[test]
     fn squares_are_those_of_linear_algebra() {

@@ -15,6 +15,7 @@ use fearless_simd::Level;
 use nalgebra::{DMatrix, DVector};
 
 use super::{
+    gram::add_row_squares,
     joints::Joints,
     mode::Mode,
     points::Room,
@@ -22,6 +23,7 @@ use super::{
 };
 use crate::{
     estimation::ReadingReport,
+    lanes::level,
     model::{Layout, Pass, Points, Prior, State, Whitening, rank},
     sensing::{Graduated, Loss, Observation, Rig},
 };
@@ -98,7 +100,7 @@ impl Posterior {
             prior,
             rig,
             targets,
-            level: crate::lanes::level(),
+            level: level(),
             loss: Loss::None,
             scales,
             known: Vec::new(),
@@ -302,13 +304,13 @@ impl Posterior {
         Some(normal)
     }
 
-    /// The same by another loss.
+    /// The same by another loss; what is above the diagonal of the information means nothing.
     pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout, room: &mut Room) -> Option<Normal> {
         let (mut information, mut descent) = room.derivatives(layout.dimension());
         let mut cost = 0.0;
         if !self.known.is_empty() {
             let (stacked, residuals, errors) = self.stacked(loss, state, layout, &self.known);
-            information += &stacked * stacked.transpose();
+            add_row_squares(level(), stacked.as_slice(), &mut information);
             descent += stacked * residuals;
             cost += errors;
         }
@@ -319,7 +321,7 @@ impl Posterior {
             for (measurements, by_joints) in self.measurements.chunks(STACKED).zip(by_joints.chunks(STACKED)) {
                 let (stacked, residuals, errors) =
                     self.stacked_jointly((&joints.noise, loss), state, layout, measurements, Some(by_joints));
-                information += &stacked * stacked.transpose();
+                add_row_squares(level(), stacked.as_slice(), &mut information);
                 descent += stacked * residuals;
                 cost += errors;
             }
@@ -327,7 +329,7 @@ impl Posterior {
         } else {
             for measurements in self.measurements.chunks(STACKED) {
                 let (stacked, residuals, errors) = self.stacked(loss, state, layout, measurements);
-                information += &stacked * stacked.transpose();
+                add_row_squares(level(), stacked.as_slice(), &mut information);
                 descent += stacked * residuals;
                 cost += errors;
             }
