@@ -61,7 +61,7 @@ impl Correction {
         if !self.needs_sine() {
             return proportional;
         }
-        proportional + sin * numbers.number(self.sine) + cos * numbers.number(self.cosine)
+        N::sum([proportional, sin * numbers.number(self.sine), cos * numbers.number(self.cosine)])
     }
 
     /// ∂θ/∂q at a reading without load.
@@ -70,7 +70,8 @@ impl Correction {
         if !self.needs_sine() {
             return numbers.number(self.ratio);
         }
-        numbers.number(self.ratio) + cos * numbers.number(self.sine) + sin * numbers.number(-self.cosine)
+        let terms = [numbers.number(self.ratio), cos * numbers.number(self.sine), sin * numbers.number(-self.cosine)];
+        N::sum(terms)
     }
 
     /// θ at a reading without load, rad or m.

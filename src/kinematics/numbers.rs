@@ -35,6 +35,8 @@ pub trait Numbers: Copy {
     fn join(components: [Self::Number; 3]) -> Self::Vector;
     /// The components of a vector.
     fn components(v: Self::Vector) -> [Self::Number; 3];
+    /// The sum of three. Each kind of numbers has its own order, and always the same one: results depend on it to the last bit.
+    fn sum(terms: [Self::Number; 3]) -> Self::Number;
     /// Sine and cosine of angles, radians.
     fn sin_cos(angle: Self::Number) -> (Self::Number, Self::Number);
     /// k v.
@@ -94,6 +96,11 @@ impl Numbers for Plain {
     #[inline(always)]
     fn components(v: Vector3<f64>) -> [f64; 3] {
         v.into()
+    }
+
+    #[inline(always)]
+    fn sum([a, b, c]: [f64; 3]) -> f64 {
+        a + b + c
     }
 
     #[inline(always)]
@@ -172,6 +179,11 @@ impl<S: Simd> Numbers for S {
     #[inline(always)]
     fn components(v: Vector<S>) -> [Lanes<S>; 3] {
         v.0
+    }
+
+    #[inline(always)]
+    fn sum([a, b, c]: [Lanes<S>; 3]) -> Lanes<S> {
+        b + (c + a)
     }
 
     #[inline(always)]

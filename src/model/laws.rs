@@ -9,7 +9,7 @@ use super::{
     Block, Correction, Device, Element, Frame, Layout, Load, Loads, Pass, Place, Prior, State, Target, anywhere,
     jacobian,
 };
-use crate::kinematics::{Joint, Line, chart};
+use crate::kinematics::{Joint, Line, Tree, chart};
 
 pub(crate) fn random_direction(rng: &mut ChaCha8Rng) -> UnitVector3<f64> {
     loop {
@@ -74,6 +74,18 @@ pub(crate) fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
     state
 }
 
+/// The same robot with its joints on branches.
+pub(crate) fn branched(state: State, rng: &mut ChaCha8Rng) -> State {
+    let parent = |joint: usize| match rng.random_range(0..4) {
+        0 => None,
+        1 if joint > 0 => Some(rng.random_range(0..joint)),
+        _ => joint.checked_sub(1),
+    };
+    let tree = Tree::new((0..state.joints.len()).map(parent).collect()).expect("parents before children");
+    let loads = state.loads.as_deref().map(|loads| Loads { tree: tree.clone(), ..loads.clone() }.into());
+    State { tree, loads, ..state }
+}
+
 /// The same where no joint gives way to loads, and all its blocks but those of loads.
 pub(crate) fn random_stiff_state(rng: &mut ChaCha8Rng, joints: usize) -> (State, Vec<Block>) {
     stiff(random_state(rng, joints))
@@ -101,21 +113,22 @@ pub(crate) fn all_blocks(state: &State) -> Vec<Block> {
     blocks
 }
 
-/// A random robot with everything, of which about four blocks in five are learned, and readings.
-fn random_case(seed: u64, joints: usize) -> (State, Layout, Vec<f64>, ChaCha8Rng) {
+/// A random robot with everything, every second one with branches, of which about four blocks in five are learned, and readings.
+pub(super) fn random_case(seed: u64, joints: usize) -> (State, Layout, Vec<f64>, ChaCha8Rng) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let state = random_state(&mut rng, joints);
+    let state = if rng.random_bool(0.5) { branched(state, &mut rng) } else { state };
     let learned: Vec<Block> = all_blocks(&state).into_iter().filter(|_| rng.random_range(0..5) > 0).collect();
     let layout = Layout::new(&state, learned);
     let readings = (0..joints).map(|_| rng.random_range(-3.0..3.0)).collect();
     (state, layout, readings, rng)
 }
 
-fn random_delta(rng: &mut ChaCha8Rng, dimension: usize, size: f64) -> DVector<f64> {
+pub(super) fn random_delta(rng: &mut ChaCha8Rng, dimension: usize, size: f64) -> DVector<f64> {
     DVector::from_fn(dimension, |_, _| rng.random_range(-size..size))
 }
 
-fn unit(dimension: usize, k: usize, size: f64) -> DVector<f64> {
+pub(super) fn unit(dimension: usize, k: usize, size: f64) -> DVector<f64> {
     let mut delta = DVector::zeros(dimension);
     delta[k] = size;
     delta

@@ -48,3 +48,5 @@ pub use workspace::{Workspace, best_motion};
 
 #[cfg(test)]
 pub(crate) mod laws;
+#[cfg(test)]
+mod tree_laws;

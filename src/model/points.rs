@@ -267,7 +267,10 @@ mod tests {
     use super::*;
     use crate::{
         lanes::{groups, levels},
-        model::{Pass, laws::random_stiff_state},
+        model::{
+            Pass,
+            laws::{branched, random_stiff_state},
+        },
     };
 
     proptest! {
@@ -278,6 +281,7 @@ mod tests {
         fn points_are_those_of_the_pass(seed: u64, joints in 1_usize..=12, count in 1_usize..=9) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let (state, blocks) = random_stiff_state(&mut rng, joints);
+            let state = if seed % 2 == 0 { branched(state, &mut rng) } else { state };
             let layout = Layout::new(&state, blocks);
             let m = layout.dimension();
             let full = Matrix3::from_fn(|_, _| rng.random_range(-5.0..5.0));

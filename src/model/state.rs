@@ -19,8 +19,8 @@ pub struct State {
     pub base: Isometry3<f64>,
     /// The joints in order, those nearer to the base first.
     pub joints: Vec<Joint>,
-    /// Which joint carries which; of an arm each the next, which is not stored.
-    #[serde(rename = "parents", default, skip_serializing_if = "Tree::is_serial")]
+    /// Which joint carries which; of an arm each the next, which is stored as no parents at all.
+    #[serde(rename = "parents", default)]
     pub tree: Tree,
     /// By joint: what its readings are corrected by.
     pub corrections: Vec<Correction>,
@@ -277,19 +277,27 @@ impl State {
         if self.base == Isometry3::identity() {
             return Cow::Borrowed(self);
         }
+        Cow::Owned(Self { base: Isometry3::identity(), ..self.carried(&self.base, |_| true) })
+    }
+
+    /// The robot with what hangs on some links carried by a motion of its own frame, as everything is placed at θ = 0.
+    pub(crate) fn carried(&self, motion: &Isometry3<f64>, is_moved: impl Fn(usize) -> bool) -> Self {
         let mut state = self.clone();
-        state.base = Isometry3::identity();
-        state.joints.iter_mut().for_each(|joint| *joint = joint.transformed(&self.base));
-        for target in &mut state.targets {
+        for (index, joint) in
+            state.joints.iter_mut().enumerate().filter(|(index, _)| is_moved(self.tree.link_before(*index)))
+        {
+            *joint = self.joints[index].transformed(motion);
+        }
+        for target in state.targets.iter_mut().filter(|target| is_moved(target.link)) {
             target.place = match &target.place {
-                Place::Point(point) => Place::Point(self.base * point),
-                Place::Pose(pose) => Place::Pose(self.base * pose),
+                Place::Point(point) => Place::Point(motion * point),
+                Place::Pose(pose) => Place::Pose(motion * pose),
             };
         }
-        state.devices.iter_mut().filter(|device| device.link.is_some()).for_each(|device| {
-            device.pose = self.base * device.pose;
-        });
-        Cow::Owned(state)
+        for device in state.devices.iter_mut().filter(|device| device.link.is_some_and(&is_moved)) {
+            device.pose = motion * device.pose;
+        }
+        state
     }
 
     /// The same robot with the point of every axis slid to where it is nearest to the axis point of `reference`: the

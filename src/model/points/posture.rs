@@ -217,7 +217,10 @@ mod tests {
     use super::*;
     use crate::{
         lanes::GROUP,
-        model::{Layout, laws::random_stiff_state},
+        model::{
+            Layout,
+            laws::{branched, random_stiff_state},
+        },
     };
 
     proptest! {
@@ -229,6 +232,7 @@ mod tests {
         fn slopes_are_those_of_central_differences(seed: u64, joints in 1_usize..=8) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let (state, blocks) = random_stiff_state(&mut rng, joints);
+            let state = if seed % 2 == 0 { branched(state, &mut rng) } else { state };
             let layout = Layout::new(&state, blocks);
             let full = Matrix3::from_fn(|_, _| rng.random_range(-2.0..2.0));
             let whitenings = [Whitening::Full(full), Whitening::Even(rng.random_range(1.0..3.0))];

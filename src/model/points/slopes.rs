@@ -150,7 +150,10 @@ mod tests {
 
     use crate::{
         lanes::{GROUP, groups, levels},
-        model::{Layout, Points, Whitening, laws::random_stiff_state},
+        model::{
+            Layout, Points, Whitening,
+            laws::{branched, random_stiff_state},
+        },
     };
 
     proptest! {
@@ -161,6 +164,7 @@ mod tests {
         fn slopes_are_those_of_the_rows(seed: u64, joints in 1_usize..=12, count in 1_usize..=9) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let (state, blocks) = random_stiff_state(&mut rng, joints);
+            let state = if seed % 2 == 0 { branched(state, &mut rng) } else { state };
             let layout = Layout::new(&state, blocks);
             let full = Matrix3::from_fn(|_, _| rng.random_range(-5.0..5.0));
             let whitenings = [Whitening::Full(full), Whitening::Even(rng.random_range(1.0..9.0))];
