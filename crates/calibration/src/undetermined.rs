@@ -168,22 +168,6 @@ fn without(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
     basis * reflection.columns(0, k - 1)
 }
 
-/// The state with what hangs on links from one on carried by a motion, in the frame of the base at θ = 0.
-fn carried(state: &State, from: usize, motion: &Isometry3<f64>) -> State {
-    let mut moved = state.clone();
-    moved.joints.iter_mut().skip(from).for_each(|joint| *joint = joint.transformed(motion));
-    for target in moved.targets.iter_mut().filter(|target| target.link >= from) {
-        target.place = match &target.place {
-            Place::Point(point) => Place::Point(motion * point),
-            Place::Pose(pose) => Place::Pose(motion * pose),
-        };
-    }
-    for device in moved.devices.iter_mut().filter(|device| device.link.is_some_and(|link| link >= from)) {
-        device.pose = motion * device.pose;
-    }
-    moved
-}
-
 /// A base that moves one way, and all that it carries the other.
 fn moved_with_base(state: &State) -> Vec<State> {
     let motions = (0..6).map(|k| {
@@ -191,7 +175,7 @@ fn moved_with_base(state: &State) -> Vec<State> {
         if k < 3 { Isometry3::translation(unit.x, unit.y, unit.z) } else { Isometry3::rotation(unit) }
     });
     let moved = |motion: Isometry3<f64>| {
-        let mut moved = carried(state, 0, &motion.inverse());
+        let mut moved = state.carried(&motion.inverse(), |_| true);
         moved.base *= motion;
         moved
     };
@@ -200,7 +184,7 @@ fn moved_with_base(state: &State) -> Vec<State> {
 
 /// A zero that is off, and all that is behind it turned or shifted the other way.
 fn moved_behind(state: &State, joint: usize) -> State {
-    let mut moved = carried(state, joint + 1, &state.joints[joint].exp(-STEP));
+    let mut moved = state.carried(&state.joints[joint].exp(-STEP), |link| state.tree.moves(joint, link));
     moved.corrections[joint].offset += STEP;
     moved
 }

@@ -19,7 +19,7 @@ use super::{
 };
 use body_schema_engine::{
     elementary::{exp, ln},
-    kinematics::{Joint, JointKind},
+    kinematics::{Joint, JointKind, Tree},
     most::middle,
 };
 
@@ -162,7 +162,7 @@ impl<'a> Readings<'a> {
     /// By row: what the joints do to the last link.
     fn motions(&self) -> Vec<Isometry3<f64>> {
         let motion = |row: &Vec<f64>| {
-            self.joints().iter().zip(row).fold(Isometry3::identity(), |motion, (joint, q)| motion * joint.exp(*q))
+            Tree::default().links(Isometry3::identity(), self.joints(), |joint| row[joint]).pop().unwrap_or_default()
         };
         self.configurations.iter().map(motion).collect()
     }

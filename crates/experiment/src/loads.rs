@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::report::array;
 use body_schema_engine::{
-    kinematics::{Joint, Line},
+    kinematics::{Joint, Line, Tree},
     model::{Load, Loads, Mass},
 };
 
@@ -72,6 +72,7 @@ impl LoadsReport {
             Some(Mass { link: report.link, place: vector(report.position_m)?.into() })
         };
         let axes = self.axes.iter().map(joint).collect::<Option<Vec<_>>>().filter(|axes| axes.len() == joints)?;
-        Some(Loads { joints: axes, up: unit(self.up)?, masses: [mass(Load::Target)?, mass(Load::Elbow)?] })
+        let masses = [mass(Load::Target)?, mass(Load::Elbow)?];
+        Some(Loads { joints: axes, tree: Tree::default(), up: unit(self.up)?, masses })
     }
 }

@@ -56,7 +56,7 @@ impl SixNumbers {
         let mut rows = DMatrix::zeros(self.covariance.nrows(), 3);
         let mut number = 0;
         for (index, joint) in state.joints.iter().enumerate().filter(|(index, _)| layout.is_learned(*index)) {
-            let (before, after) = (pass.link(index), pass.link(index + 1));
+            let (before, after) = (pass.link(state.tree.link_before(index)), pass.link(index + 1));
             let w = joint.direction().into_inner();
             let mut put = |column: Vector3<f64>| {
                 rows.row_mut(number).copy_from(&column.transpose());

@@ -5,25 +5,26 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::random::{all_blocks, random_arm, random_direction, random_point, random_state};
+use super::random::{all_blocks, branched, random_arm, random_direction, random_point, random_state};
 use super::{Block, Element, Frame, Layout, Pass, Prior, State, anywhere, jacobian};
 use crate::kinematics::{Joint, Line, chart};
 
-/// A random robot with everything, of which about four blocks in five are learned, and readings.
-fn random_case(seed: u64, joints: usize) -> (State, Layout, Vec<f64>, ChaCha8Rng) {
+/// A random robot with everything, every second one with branches, of which about four blocks in five are learned, and readings.
+pub(super) fn random_case(seed: u64, joints: usize) -> (State, Layout, Vec<f64>, ChaCha8Rng) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let state = random_state(&mut rng, joints);
+    let state = if rng.random_bool(0.5) { branched(state, &mut rng) } else { state };
     let learned: Vec<Block> = all_blocks(&state).into_iter().filter(|_| rng.random_range(0..5) > 0).collect();
     let layout = Layout::new(&state, learned);
     let readings = (0..joints).map(|_| rng.random_range(-3.0..3.0)).collect();
     (state, layout, readings, rng)
 }
 
-fn random_delta(rng: &mut ChaCha8Rng, dimension: usize, size: f64) -> DVector<f64> {
+pub(super) fn random_delta(rng: &mut ChaCha8Rng, dimension: usize, size: f64) -> DVector<f64> {
     DVector::from_fn(dimension, |_, _| rng.random_range(-size..size))
 }
 
-fn unit(dimension: usize, k: usize, size: f64) -> DVector<f64> {
+pub(super) fn unit(dimension: usize, k: usize, size: f64) -> DVector<f64> {
     let mut delta = DVector::zeros(dimension);
     delta[k] = size;
     delta

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::{Block, State};
+use crate::kinematics::Term;
 
 /// The order of the learned parameters in the tangent vector δ and in every covariance.
 ///
@@ -66,6 +67,27 @@ impl Layout {
         let is_learned = |joint: &usize| learned.get(*joint).copied().unwrap_or(true);
         let axes = (0..state.joints.len()).filter(is_learned).map(Block::Axis);
         Self::new(state, axes.chain(learn_marker.then_some(Block::Target(0))))
+    }
+
+    /// By joint, what corrects its readings and is learned: the places of the coordinates, and what they multiply.
+    pub(crate) fn corrections(&self) -> Vec<Vec<(usize, Term)>> {
+        let mut corrections = vec![Vec::new(); self.joints()];
+        for (block, range) in self.blocks() {
+            let (joint, terms) = match block {
+                Block::Offset(joint) => (joint, [Some(Term::Offset), None]),
+                Block::Ratio(joint) => (joint, [Some(Term::Ratio), None]),
+                Block::Eccentricity(joint) => (joint, [Some(Term::Sine), Some(Term::Cosine)]),
+                Block::Compliance(joint, load) => (joint, [Some(Term::Torque(load as usize)), None]),
+                _ => continue,
+            };
+            corrections[joint].extend(range.zip(terms.into_iter().flatten()));
+        }
+        corrections
+    }
+
+    /// Whether by how much a joint gives way to a load is learned.
+    pub(crate) fn has_compliance(&self) -> bool {
+        self.entries.iter().any(|(block, _)| matches!(block, Block::Compliance(..)))
     }
 
     /// Number of learned parameters, m.

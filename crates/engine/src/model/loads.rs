@@ -13,7 +13,7 @@
 use nalgebra::{DMatrix, Isometry3, Matrix3xX, Point3, UnitVector3, Vector3};
 
 use super::State;
-use crate::kinematics::{Joint, JointKind};
+use crate::kinematics::{Joint, JointKind, Tree, correction::LOADS};
 
 /// g, m/s².
 pub const GRAVITY: f64 = 9.81;
@@ -29,7 +29,7 @@ pub enum Load {
 
 impl Load {
     /// Both, in the order of [`Correction::compliance`](super::Correction).
-    pub const ALL: [Self; 2] = [Self::Target, Self::Elbow];
+    pub const ALL: [Self; LOADS] = [Self::Target, Self::Elbow];
 
     /// Its name.
     pub fn name(self) -> &'static str {
@@ -60,10 +60,12 @@ struct Placed {
 pub struct Loads {
     /// The axes at θ = 0, in the frame of the base.
     pub joints: Vec<Joint>,
+    /// Which joint carries which.
+    pub tree: Tree,
     /// Away from the ground, in the frame of the base.
     pub up: UnitVector3<f64>,
     /// By load.
-    pub masses: [Mass; 2],
+    pub masses: [Mass; LOADS],
 }
 
 impl Loads {
@@ -74,7 +76,7 @@ impl Loads {
         let elbow = elbow.or_else(|| middle(&described.joints)).unwrap_or(0);
         let origin = described.joints.get(elbow).and_then(Joint::line).map_or(Point3::origin(), |line| line.point);
         let masses = [Mass { link, place: described.marker() }, Mass { link: elbow, place: origin }];
-        Self { joints: described.joints.clone(), up, masses }
+        Self { joints: described.joints.clone(), tree: described.tree.clone(), up, masses }
     }
 
     /// The mass of a load.
@@ -84,7 +86,7 @@ impl Loads {
 
     /// Whether a joint can bear a load.
     pub fn bears(&self, joint: usize, load: Load) -> bool {
-        joint < self.mass(load).link && self.joints[joint].kind() == JointKind::Revolute
+        self.tree.moves(joint, self.mass(load).link) && self.joints[joint].kind() == JointKind::Revolute
     }
 
     /// By joint, the torque of every load at readings (rad or m), N·m per kg.
@@ -112,25 +114,23 @@ impl Loads {
         }
         DMatrix::from_fn(count, count, |i, j| {
             let (near, far) = (i.min(j), i.max(j));
-            let moves = self.bears(i, load) && j < self.mass(load).link && turns(near);
+            let moves = self.bears(i, load) && self.tree.moves(j, self.mass(load).link) && turns(near);
             if moves { -GRAVITY * self.up.dot(&axes[near].w.cross(&moved.column(far))) } else { 0.0 }
         })
     }
 
     /// Where the axes and the masses are.
-    fn posture(&self, readings: &[f64]) -> (Vec<Placed>, [Point3<f64>; 2]) {
-        let mut link = Isometry3::identity();
-        let mut axes = Vec::with_capacity(self.joints.len());
-        let mut places = self.masses.map(|mass| mass.place);
-        for (index, (joint, reading)) in self.joints.iter().zip(readings).enumerate() {
+    fn posture(&self, readings: &[f64]) -> (Vec<Placed>, [Point3<f64>; LOADS]) {
+        let links = self
+            .tree
+            .links(Isometry3::identity(), &self.joints, |joint| readings.get(joint).copied().unwrap_or_default());
+        let placed = |(index, joint): (usize, &Joint)| {
+            let link = links[self.tree.link_before(index)];
             let pivot = link * joint.line().map_or(Point3::origin(), |line| line.point);
-            axes.push(Placed { pivot, w: link * joint.direction().into_inner() });
-            link *= joint.exp(*reading);
-            for (place, mass) in places.iter_mut().zip(&self.masses).filter(|(_, mass)| mass.link == index + 1) {
-                *place = link * mass.place;
-            }
-        }
-        (axes, places)
+            Placed { pivot, w: link * joint.direction().into_inner() }
+        };
+        let axes = self.joints.iter().enumerate().map(placed).collect();
+        (axes, [0, 1].map(|load| links[self.masses[load].link] * self.masses[load].place))
     }
 }
 
@@ -189,7 +189,7 @@ mod tests {
         for seed in 0..20 {
             let state = random_state(&mut ChaCha8Rng::seed_from_u64(seed), 6);
             let loads = state.loads.as_deref().expect("loads");
-            let described = State::arm(loads.joints.clone(), Point3::origin());
+            let described = State { tree: loads.tree.clone(), ..State::arm(loads.joints.clone(), Point3::origin()) };
             let readings = [0.3, -0.4, 0.5, 0.1, -0.7, 0.2];
             let moved = |joint: usize, step: f64| {
                 let mut moved = readings;

@@ -11,8 +11,8 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Vector3};
 use rand::Rng;
 
-use super::{Load, State, eigen};
-use crate::kinematics::{Joint, JointBox};
+use super::{State, eigen};
+use crate::kinematics::JointBox;
 
 /// The postures within joint limits in which a target of a robot is at a place.
 #[derive(Clone, Copy, Debug)]
@@ -208,44 +208,6 @@ fn masked(jacobian: &Matrix3xX<f64>, free: &[bool]) -> Matrix3xX<f64> {
         masked.column_mut(joint).fill(0.0);
     }
     masked
-}
-
-impl State {
-    /// J = ∂p/∂q of a target by the readings of all joints (3 × n), m per rad or m; frame of the measurements.
-    pub fn target_jacobian(&self, target: usize, positions: &[f64]) -> Matrix3xX<f64> {
-        let links = self.links(positions);
-        let link = self.targets[target].link;
-        let p = links[link] * self.targets[target].place.origin();
-        let mut jacobian = Matrix3xX::zeros(positions.len());
-        for (index, (joint, before)) in self.joints.iter().zip(&links).enumerate().take(link) {
-            let along = before.rotation * joint.direction().into_inner();
-            let column = match joint {
-                Joint::Revolute(line) => along.cross(&(p - before * line.point)),
-                Joint::Prismatic(_) => along,
-            };
-            jacobian.set_column(index, &column);
-        }
-        self.by_readings(&jacobian, positions)
-    }
-
-    /// The same derivative by the readings, of one by the joints' positions: `J ∂θ/∂q`.
-    fn by_readings(&self, jacobian: &Matrix3xX<f64>, positions: &[f64]) -> Matrix3xX<f64> {
-        let mut by_readings = jacobian.clone();
-        for (mut column, (correction, reading)) in
-            by_readings.column_iter_mut().zip(self.corrections.iter().zip(positions))
-        {
-            column *= correction.slope(*reading);
-        }
-        // A joint gives way to what all joints do.
-        for (loads, load) in self.bending().into_iter().flat_map(|loads| Load::ALL.map(|load| (loads, load))) {
-            let mut slopes = loads.slopes(load, positions);
-            for (mut row, correction) in slopes.row_iter_mut().zip(&self.corrections) {
-                row *= correction.compliance[load as usize];
-            }
-            by_readings += jacobian * slopes;
-        }
-        by_readings
-    }
 }
 
 #[cfg(test)]

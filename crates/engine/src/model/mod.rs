@@ -16,6 +16,7 @@
 mod block;
 mod chain_prior;
 mod element;
+mod jacobian;
 mod layout;
 mod loads;
 mod manifold;
@@ -27,6 +28,7 @@ mod rank;
 mod state;
 mod workspace;
 
+pub use crate::kinematics::{Correction, Motion};
 pub use block::Block;
 pub(crate) use chain_prior::Inverted;
 pub use chain_prior::{ChainErrors, ChainPrior, Scales};
@@ -35,12 +37,12 @@ pub use layout::{Layout, Quantity};
 pub use loads::{GRAVITY, Load, Loads, Mass};
 pub use manifold::Manifold;
 pub use names::{Names, listed};
-pub use pass::{Frame, Motion, Pass, jacobian};
+pub use pass::{Frame, Pass, jacobian};
 pub use points::Whitening;
 pub(crate) use points::{Centre, Centres, Passage, Points, Posture, Ray, Stage};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
 pub use rank::{eigen, null_space, rank, singular};
-pub use state::{Correction, Device, Hand, Place, State, Target, Thetas};
+pub use state::{Device, Hand, Place, State, Target, Thetas};
 pub use workspace::{Workspace, best_motion};
 
 #[cfg(test)]
@@ -48,3 +50,5 @@ mod laws;
 #[cfg(any(test, feature = "testing"))]
 #[doc(hidden)]
 pub mod random;
+#[cfg(test)]
+mod tree_laws;

@@ -1,7 +1,7 @@
-//! One pass over the chain: where every link is, and how every learned parameter moves it.
+//! One pass along the tree: where every link is, and how every learned parameter moves it.
 //!
 //! A parameter moves all that is behind it by a twist, whatever is measured there. In the frame of the measurements, with
-//! A_{i−1} the motion of base and joints before joint i, and A_i = A_{i−1} e^{ξθ}:
+//! A_{i−1} the motion of the link that carries joint i, and A_i = A_{i−1} e^{ξθ}:
 //!
 //! | parameter | twist (linear, angular) |
 //! |---|---|
@@ -9,63 +9,22 @@
 //! | what makes θ of the reading q, c·f(q) | `f(q) Ad_{A_{i-1}} ξ`: f = 1 for the offset, q for the ratio, sin q, cos q, the torque of a load |
 //! | base (t + ν, exp(\[ω\]×) R) | `(ν − ω × t, ω)` |
 //!
-//! The linear part is the velocity of the point that is at the origin, so that a point at x moves by `linear + angular × x`.
-//! For an axis (v, w) with the basis b₁, b₂ = w × b₁ the first row is, with D = (R_{i−1} − R_i)\[b₁ b₂\] = \[d₁ d₂\] and the
-//! pivot at q = A_{i−1} v = A_i v,
-//!
-//! ```text
-//! point        (d₁, 0), (d₂, 0)
-//! direction    (q × d₂, d₂), (−q × d₁, −d₁)       revolute
-//!              (θ R_{i−1} b₁, 0), (θ R_{i−1} b₂, 0)   prismatic
-//! ```
+//! for all links that the joint moves (see [`Tree`](crate::kinematics::Tree)); the twists of an axis are written out in
+//! [`Motion::axis_twists`]. What is measured between two frames moves by the difference of their twists.
 
-use nalgebra::{
-    Isometry3, Matrix3, Matrix3x2, Matrix3xX, Matrix6xX, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
-};
+use nalgebra::{DVector, Isometry3, Matrix3, Matrix3x2, Matrix3xX, Matrix6xX, Point3, Vector3, Vector6};
 
-use super::{Block, Hand, Layout, Load, Loads, State};
-use crate::{
-    elementary::{cos, sin},
-    kinematics::{Joint, chart},
-};
+use super::{Block, Hand, Layout, Loads, State};
+use crate::kinematics::{Motion, Plain, Term, Twist, chart, correction::read};
 
-/// A rigid motion as a matrix and a shift: `x ↦ R x + t`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
-    /// R.
-    pub rotation: Matrix3<f64>,
-    /// t, metres.
-    pub translation: Vector3<f64>,
-}
-
-impl Motion {
-    fn of(pose: &Isometry3<f64>) -> Self {
-        Self { rotation: *pose.rotation.to_rotation_matrix().matrix(), translation: pose.translation.vector }
-    }
-
-    /// R x + t.
-    pub fn point(&self, x: &Vector3<f64>) -> Vector3<f64> {
-        self.rotation * x + self.translation
-    }
-
-    /// The same as a pose.
-    pub fn pose(&self) -> Isometry3<f64> {
-        let rotation = Rotation3::from_matrix_unchecked(self.rotation);
-        Isometry3::from_parts(Translation3::from(self.translation), UnitQuaternion::from_rotation_matrix(&rotation))
-    }
-}
-
-/// How one tangent coordinate moves all links from one on.
+/// How one tangent coordinate moves links.
 #[derive(Clone, Copy, Debug)]
-struct Twist {
+struct Column {
     /// Its place in the tangent vector.
     coordinate: usize,
-    /// The first link that it moves; 0 is the base.
-    from: usize,
-    /// Velocity of the point at the origin of the frame of the measurements, metres per unit of the coordinate.
-    linear: Vector3<f64>,
-    /// Angular velocity, radians per unit.
-    angular: Vector3<f64>,
+    /// The joint, all of whose links it moves; `None` for the base, which is before all.
+    joint: Option<usize>,
+    twist: Twist,
 }
 
 /// A frame that parameters move.
@@ -95,18 +54,8 @@ pub struct Pass<'a> {
     /// Where it stands.
     positions: Vec<f64>,
     links: Vec<Motion>,
-    /// Of base, axes and corrections, those that move the links nearest to the base first.
-    twists: Vec<Twist>,
-}
-
-/// f: what moves θ in proportion to a parameter.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Term {
-    Offset,
-    Ratio,
-    Sine,
-    Cosine,
-    Torque(Load),
+    /// Of base, axes and corrections, joint by joint.
+    columns: Vec<Column>,
 }
 
 const HELD: usize = usize::MAX;
@@ -114,30 +63,17 @@ const HELD: usize = usize::MAX;
 impl<'a> Pass<'a> {
     /// At no posture yet: [`at`](Self::at) comes first.
     pub fn new(state: &'a State, layout: &'a Layout) -> Self {
-        let mut corrections = vec![Vec::new(); state.joints.len()];
-        let mut loads = state.bending();
-        for (block, range) in layout.blocks() {
-            let (joint, terms) = match block {
-                Block::Offset(joint) => (joint, [Some(Term::Offset), None]),
-                Block::Ratio(joint) => (joint, [Some(Term::Ratio), None]),
-                Block::Eccentricity(joint) => (joint, [Some(Term::Sine), Some(Term::Cosine)]),
-                Block::Compliance(joint, load) => {
-                    loads = state.loads.as_deref();
-                    (joint, [Some(Term::Torque(load)), None])
-                }
-                _ => continue,
-            };
-            corrections[joint].extend(range.zip(terms.into_iter().flatten()));
-        }
+        let corrections = layout.corrections();
+        let loads = if layout.has_compliance() { state.loads.as_deref() } else { state.bending() };
         let axes = state.joints.iter().enumerate();
         let axes = axes.map(|(joint, axis)| {
             let start = layout.point(joint).or_else(|| layout.direction(joint)).map_or(HELD, |range| range.start);
             (start, chart::basis(&axis.direction()))
         });
         let axes = axes.collect();
-        let (links, twists) = (Vec::with_capacity(state.joints.len() + 1), Vec::with_capacity(layout.dimension()));
+        let (links, columns) = (Vec::with_capacity(state.joints.len() + 1), Vec::with_capacity(layout.dimension()));
         let positions = Vec::with_capacity(state.joints.len());
-        Self { state, layout, corrections, axes, loads, torques: Vec::new(), positions, links, twists }
+        Self { state, layout, corrections, axes, loads, torques: Vec::new(), positions, links, columns }
     }
 
     /// The state.
@@ -159,25 +95,26 @@ impl<'a> Pass<'a> {
     pub fn at(&mut self, positions: &[f64]) -> &mut Self {
         debug_assert_eq!(positions.len(), self.state.joints.len());
         self.links.clear();
-        self.twists.clear();
+        self.columns.clear();
         self.positions.clear();
         self.positions.extend_from_slice(positions);
-        let mut link = Motion::of(&self.state.base);
+        let base = Motion::from(&self.state.base);
         if let Some(range) = self.layout.block(Block::Base) {
             for (k, coordinate) in range.enumerate() {
                 let unit = Vector3::ith(k % 3, 1.0);
                 let (linear, angular) =
-                    if k < 3 { (unit, Vector3::zeros()) } else { (link.translation.cross(&unit), unit) };
-                self.twists.push(Twist { coordinate, from: 0, linear, angular });
+                    if k < 3 { (unit, Vector3::zeros()) } else { (base.translation.cross(&unit), unit) };
+                self.columns.push(Column { coordinate, joint: None, twist: Twist { linear, angular } });
             }
         }
-        self.links.push(link);
+        self.links.push(base);
         if let Some(loads) = self.loads {
             self.torques = loads.torques(positions);
         }
         for (index, &reading) in positions.iter().enumerate() {
-            link = self.pass_joint(index, reading, &link);
-            self.links.push(link);
+            let before = self.links[self.state.tree.link_before(index)];
+            let behind = self.pass_joint(index, reading, &before);
+            self.links.push(behind);
         }
         self
     }
@@ -187,49 +124,31 @@ impl<'a> Pass<'a> {
     fn pass_joint(&mut self, index: usize, reading: f64, before: &Motion) -> Motion {
         let joint = &self.state.joints[index];
         let torques = self.torques.get(index).copied().unwrap_or_default();
-        let correction = &self.state.corrections[index];
-        let theta = correction.position(reading) + correction.given_way(&torques);
+        let theta = self.state.corrections[index].loaded(reading, &torques);
+        let behind = before.behind(joint, theta);
         let (start, basis) = &self.axes[index];
-        let from = index + 1;
-        let mut put = |coordinate, linear, angular| self.twists.push(Twist { coordinate, from, linear, angular });
-        let (axis_linear, axis_angular, after) = match joint {
-            Joint::Revolute(line) => {
-                let rotation = before.rotation * Rotation3::from_axis_angle(&line.direction, theta).matrix();
-                let pivot = before.point(&line.point.coords);
-                let translation = pivot - rotation * line.point.coords;
-                if *start != HELD {
-                    let turned = (before.rotation - rotation) * basis;
-                    let (d1, d2) = (turned.column(0).into_owned(), turned.column(1).into_owned());
-                    put(*start, d1, Vector3::zeros());
-                    put(start + 1, d2, Vector3::zeros());
-                    put(start + 2, pivot.cross(&d2), d2);
-                    put(start + 3, d1.cross(&pivot), -d1);
-                }
-                let angular = before.rotation * line.direction.into_inner();
-                (pivot.cross(&angular), angular, Motion { rotation, translation })
-            }
-            Joint::Prismatic(direction) => {
-                let along = before.rotation * direction.into_inner();
-                if *start != HELD {
-                    let turned = before.rotation * basis * theta;
-                    put(*start, turned.column(0).into_owned(), Vector3::zeros());
-                    put(start + 1, turned.column(1).into_owned(), Vector3::zeros());
-                }
-                let translation = before.translation + along * theta;
-                (along, Vector3::zeros(), Motion { rotation: before.rotation, translation })
-            }
-        };
-        for &(coordinate, term) in &self.corrections[index] {
-            let f = match term {
-                Term::Offset => 1.0,
-                Term::Ratio => reading,
-                Term::Sine => sin(reading),
-                Term::Cosine => cos(reading),
-                Term::Torque(load) => torques[load as usize],
-            };
-            put(coordinate, axis_linear * f, axis_angular * f);
+        let mut put = |coordinate, twist| self.columns.push(Column { coordinate, joint: Some(index), twist });
+        if *start != HELD {
+            before.axis_twists(joint, theta, basis, &behind, |k, twist| put(start + k, twist));
         }
-        after
+        let Twist { linear, angular } = before.joint_twist(joint);
+        let terms = &self.corrections[index];
+        let reading = read::<Plain>(reading, terms.iter().any(|(_, term)| term.needs_sine()));
+        for &(coordinate, term) in terms {
+            let (f, _) = term.factor(Plain, reading, &torques);
+            put(coordinate, Twist { linear: linear * f, angular: angular * f });
+        }
+        behind
+    }
+
+    /// The twists of base, axes and corrections that move a link, with their coordinates.
+    #[inline]
+    fn twists(&self, link: usize) -> impl Iterator<Item = (usize, &Twist)> {
+        let tree = &self.state.tree;
+        // A joint comes before the links that it moves.
+        let columns = self.columns.iter().take_while(move |column| column.joint.is_none_or(|joint| joint < link));
+        let moving = columns.filter(move |column| column.joint.is_none_or(|joint| tree.moves(joint, link)));
+        moving.map(|column| (column.coordinate, &column.twist))
     }
 
     /// Where a link is: the motion from θ = 0 in the robot's frame into the frame of the measurements.
@@ -249,8 +168,8 @@ impl<'a> Pass<'a> {
     pub fn point_columns(&self, target: usize, mut column: impl FnMut(usize, Vector3<f64>)) -> Vector3<f64> {
         let link = self.state.targets[target].link;
         let x = self.target(target);
-        for twist in self.twists.iter().take_while(|twist| twist.from <= link) {
-            column(twist.coordinate, twist.linear + twist.angular.cross(&x));
+        for (coordinate, twist) in self.twists(link) {
+            column(coordinate, twist.at(&x));
         }
         if let Some(range) = self.layout.block(Block::Target(target)) {
             let rotation = &self.links[link].rotation;
@@ -274,32 +193,65 @@ impl<'a> Pass<'a> {
         }
     }
 
+    /// Hands the twist of every coordinate that moves a frame to `each`, with the velocity of the frame's point that is `arm` (metres)
+    /// from its origin.
+    fn twists_at(&self, frame: Frame, origin: &Vector3<f64>, arm: &Vector3<f64>, mut each: impl FnMut(usize, Twist)) {
+        let link = self.state.link_of(frame);
+        let own = match frame {
+            Frame::Link(_) => None,
+            Frame::Target(target) => self.layout.block(Block::Target(target)),
+            Frame::Device(device) => self.layout.block(Block::Device(device)),
+        };
+        let x = origin + arm;
+        for (coordinate, twist) in link.into_iter().flat_map(|link| self.twists(link)) {
+            each(coordinate, Twist { linear: twist.at(&x), ..*twist });
+        }
+        let Some(own) = own else { return };
+        let rotation = link.map_or(Matrix3::identity(), |link| self.links[link].rotation);
+        for (k, coordinate) in own.enumerate() {
+            let unit = rotation.column(k % 3).into_owned();
+            let (linear, angular) = if k < 3 { (unit, Vector3::zeros()) } else { (unit.cross(arm), unit) };
+            each(coordinate, Twist { linear, angular });
+        }
+    }
+
     /// The twist (linear at the frame's own origin, then angular; 6 × m) by which every parameter moves a frame.
     pub fn frame_twists(&self, frame: Frame) -> Matrix6xX<f64> {
         let mut columns = Matrix6xX::zeros(self.layout.dimension());
         let origin = self.pose(frame).translation.vector;
-        let (link, own) = match frame {
-            Frame::Link(link) => (Some(link), None),
-            Frame::Target(target) => {
-                let fixed = &self.state.targets[target];
-                (Some(fixed.link), self.layout.block(Block::Target(target)))
-            }
-            Frame::Device(device) => (self.state.devices[device].link, self.layout.block(Block::Device(device))),
-        };
-        let mut put = |coordinate: usize, linear: &Vector3<f64>, angular: &Vector3<f64>| {
-            columns.fixed_view_mut::<3, 1>(0, coordinate).copy_from(linear);
-            columns.fixed_view_mut::<3, 1>(3, coordinate).copy_from(angular);
-        };
-        for twist in self.twists.iter().filter(|twist| link.is_some_and(|link| twist.from <= link)) {
-            put(twist.coordinate, &(twist.linear + twist.angular.cross(&origin)), &twist.angular);
-        }
-        let rotation = link.map_or(Matrix3::identity(), |link| self.links[link].rotation);
-        for (k, coordinate) in own.into_iter().flatten().enumerate() {
-            let unit = rotation.column(k % 3).into_owned();
-            let (linear, angular) = if k < 3 { (unit, Vector3::zeros()) } else { (Vector3::zeros(), unit) };
-            put(coordinate, &linear, &angular);
+        self.twists_at(frame, &origin, &Vector3::zeros(), |coordinate, Twist { linear, angular }| {
+            columns.fixed_view_mut::<3, 1>(0, coordinate).copy_from(&linear);
+            columns.fixed_view_mut::<3, 1>(3, coordinate).copy_from(&angular);
+        });
+        columns
+    }
+
+    /// The twist (linear at the frame's own origin, then angular; 6 × m; in the frame `seen_from`) by which every parameter moves a
+    /// frame as it is seen from another: the difference of the twists of the two.
+    pub fn relative_twists(&self, frame: Frame, seen_from: Frame) -> Matrix6xX<f64> {
+        let mut columns = Matrix6xX::zeros(self.layout.dimension());
+        let [x, observer] = [frame, seen_from].map(|frame| self.pose(frame));
+        let (back, arm) = (observer.rotation.inverse(), x.translation.vector - observer.translation.vector);
+        for (of, origin, arm, sign) in [(frame, x, Vector3::zeros(), 1.0), (seen_from, observer, arm, -1.0)] {
+            self.twists_at(of, &origin.translation.vector, &arm, |coordinate, Twist { linear, angular }| {
+                let mut linear_and_angular = columns.column_mut(coordinate);
+                linear_and_angular.fixed_rows_mut::<3>(0).axpy(sign, &(back * linear), 1.0);
+                linear_and_angular.fixed_rows_mut::<3>(3).axpy(sign, &(back * angular), 1.0);
+            });
         }
         columns
+    }
+
+    /// The adjoint of [`frame_twists`](Self::frame_twists): what the derivatives of a value by the motion of a frame (by the velocity
+    /// of its origin, then by its angular velocity) make of the derivatives by all coordinates (m).
+    pub fn adjoint(&self, frame: Frame, by_twist: &Vector6<f64>) -> DVector<f64> {
+        let mut slope = DVector::zeros(self.layout.dimension());
+        let (force, torque) = (by_twist.fixed_rows::<3>(0), by_twist.fixed_rows::<3>(3));
+        let origin = self.pose(frame).translation.vector;
+        self.twists_at(frame, &origin, &Vector3::zeros(), |coordinate, Twist { linear, angular }| {
+            slope[coordinate] += force.dot(&linear) + torque.dot(&angular);
+        });
+        slope
     }
 }
 

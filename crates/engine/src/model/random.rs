@@ -5,7 +5,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Block, Correction, Device, Load, Loads, Place, State, Target};
-use crate::kinematics::{Joint, Line};
+use crate::kinematics::{Joint, Line, Tree};
 
 /// A direction anywhere.
 pub fn random_direction(rng: &mut ChaCha8Rng) -> UnitVector3<f64> {
@@ -71,6 +71,18 @@ pub fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
         correction.compliance = [(); 2].map(|()| rng.random_range(-0.01..0.01));
     }
     state
+}
+
+/// The same robot with its joints on branches.
+pub fn branched(state: State, rng: &mut ChaCha8Rng) -> State {
+    let parent = |joint: usize| match rng.random_range(0..4) {
+        0 => None,
+        1 if joint > 0 => Some(rng.random_range(0..joint)),
+        _ => joint.checked_sub(1),
+    };
+    let tree = Tree::new((0..state.joints.len()).map(parent).collect()).expect("parents before children");
+    let loads = state.loads.as_deref().map(|loads| Loads { tree: tree.clone(), ..loads.clone() }.into());
+    State { tree, loads, ..state }
 }
 
 /// The same where no joint gives way to loads, and all its blocks but those of loads.

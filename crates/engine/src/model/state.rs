@@ -4,8 +4,8 @@ use std::{borrow::Cow, sync::Arc};
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3};
 
-use super::{Block, Frame, Layout, Load, Loads};
-use crate::{elementary::sin_cos, kinematics::Joint};
+use super::{Block, Frame, Layout, Loads};
+use crate::kinematics::{Correction, Joint, Tree, TreeError};
 
 /// Everything that can be learned: joints from base to hand, and what is placed on links or beside the robot.
 ///
@@ -17,8 +17,11 @@ pub struct State {
     /// Carries the robot's frame into that of the measurements.
     #[serde(with = "crate::as_numbers")]
     pub base: Isometry3<f64>,
-    /// The joints in order, the one nearest the base first.
+    /// The joints in order, those nearer to the base first.
     pub joints: Vec<Joint>,
+    /// Which joint carries which; of an arm each the next, which is stored as no parents at all.
+    #[serde(rename = "parents", default)]
+    pub tree: Tree,
     /// By joint: what its readings are corrected by.
     pub corrections: Vec<Correction>,
     /// What joints that give way bear; without it none does. Not stored with the rest: it belongs to the robot.
@@ -62,51 +65,6 @@ impl Hand {
     }
 }
 
-/// What makes a joint's position θ of its reading q:
-/// `θ = offset + ratio q + sine sin q + cosine cos q + compliance·τ`, τ the torques of the [`Loads`].
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Correction {
-    /// Rad or m.
-    pub offset: f64,
-    /// Without a unit.
-    pub ratio: f64,
-    /// Of an encoder that is mounted off its centre, rad.
-    pub sine: f64,
-    /// As `sine`.
-    pub cosine: f64,
-    /// By [`Load`], how much the joint gives way, rad per N·m of 1 kg.
-    pub compliance: [f64; 2],
-}
-
-impl Default for Correction {
-    fn default() -> Self {
-        Self { offset: 0.0, ratio: 1.0, sine: 0.0, cosine: 0.0, compliance: [0.0; 2] }
-    }
-}
-
-impl Correction {
-    /// θ at a reading without load, rad or m.
-    pub fn position(&self, reading: f64) -> f64 {
-        let proportional = self.offset + self.ratio * reading;
-        if self.sine == 0.0 && self.cosine == 0.0 {
-            return proportional;
-        }
-        let (sin, cos) = sin_cos(reading);
-        proportional + self.sine * sin + self.cosine * cos
-    }
-
-    /// What torques (by [`Load`], N·m per kg) add to that, rad.
-    pub fn given_way(&self, torques: &[f64; 2]) -> f64 {
-        self.compliance[0] * torques[0] + self.compliance[1] * torques[1]
-    }
-
-    /// ∂θ/∂q at a reading without load.
-    pub fn slope(&self, reading: f64) -> f64 {
-        let (sin, cos) = sin_cos(reading);
-        self.ratio + self.sine * cos - self.cosine * sin
-    }
-}
-
 /// The joints' positions at one posture.
 #[derive(Clone, Debug)]
 pub struct Thetas<'a> {
@@ -119,9 +77,8 @@ pub struct Thetas<'a> {
 impl Thetas<'_> {
     /// A joint's, rad or m.
     pub fn of(&self, joint: usize) -> f64 {
-        let correction = &self.corrections[joint];
-        let unloaded = correction.position(self.readings[joint]);
-        self.torques.get(joint).map_or(unloaded, |torques| unloaded + correction.given_way(torques))
+        let torques = self.torques.get(joint).copied().unwrap_or_default();
+        self.corrections[joint].loaded(self.readings[joint], &torques)
     }
 }
 
@@ -181,6 +138,7 @@ impl State {
             base: Isometry3::identity(),
             corrections: vec![Correction::default(); joints.len()],
             joints,
+            tree: Tree::default(),
             loads: None,
             targets: vec![target],
             devices: Vec::new(),
@@ -189,22 +147,42 @@ impl State {
         }
     }
 
+    /// A robot whose joints branch, with a marker on one of its links, both in the frame of the measurements, metres. `parents` has
+    /// for each joint the one that carries it, `None` for a joint on the base.
+    ///
+    /// # Errors
+    ///
+    /// [`TreeError`] if there is not one parent for each joint, a parent does not come before its child, or there is no such link.
+    pub fn branching(
+        joints: Vec<Joint>,
+        parents: Vec<Option<usize>>,
+        (link, marker): (usize, Point3<f64>),
+    ) -> Result<Self, TreeError> {
+        let count = joints.len();
+        if parents.len() != count {
+            return Err(TreeError::Count { joints: count, parents: parents.len() });
+        }
+        if link > count {
+            return Err(TreeError::Link { link, joints: count });
+        }
+        let mut state = Self { tree: Tree::new(parents)?, ..Self::arm(joints, marker) };
+        state.targets[0].link = link;
+        Ok(state)
+    }
+
     /// Where a target is at readings `positions` (rad or m, one per joint), in the frame of the measurements, metres.
     pub fn target_at(&self, target: usize, positions: &[f64]) -> Point3<f64> {
         debug_assert_eq!(positions.len(), self.joints.len());
         let Target { link, place } = &self.targets[target];
         let thetas = self.thetas(positions);
-        let moved =
-            (0..*link).rev().fold(place.origin(), |point, index| self.joints[index].carry(thetas.of(index), &point));
-        self.base * moved
+        self.base * self.tree.carried(&self.joints, *link, |joint| thetas.of(joint), place.origin())
     }
 
     /// Where a frame is at readings `positions` (rad or m, one per joint), in the frame of the measurements.
     pub fn frame_at(&self, frame: Frame, positions: &[f64]) -> Isometry3<f64> {
         let thetas = self.thetas(positions);
         let behind = |link: usize, place: Isometry3<f64>| {
-            let moved = (0..link).rev().fold(place, |place, index| self.joints[index].exp(thetas.of(index)) * place);
-            self.base * moved
+            self.base * self.tree.carried(&self.joints, link, |joint| thetas.of(joint), place)
         };
         match frame {
             Frame::Link(link) => behind(link, Isometry3::identity()),
@@ -250,9 +228,15 @@ impl State {
 
     /// The link that carries the hand; that of a device beside the robot is the base.
     pub fn hand_link(&self) -> usize {
-        match self.hand {
-            Hand::Target(target) => self.targets.get(target).map_or(0, |target| target.link),
-            Hand::Device(device) => self.devices[device].link.unwrap_or(0),
+        self.link_of(self.hand.frame()).unwrap_or(0)
+    }
+
+    /// The link that carries a frame; `None` for one beside the robot, or that is not there.
+    pub(super) fn link_of(&self, frame: Frame) -> Option<usize> {
+        match frame {
+            Frame::Link(link) => Some(link),
+            Frame::Target(target) => Some(self.targets.get(target)?.link),
+            Frame::Device(device) => self.devices.get(device)?.link,
         }
     }
 
@@ -265,20 +249,15 @@ impl State {
     /// The loads, where a joint gives way to them.
     pub fn bending(&self) -> Option<&Loads> {
         let loads = self.loads.as_deref()?;
-        let gives_way = |correction: &Correction| correction.compliance != [0.0; Load::ALL.len()];
+        let gives_way = |correction: &Correction| correction.compliance.iter().any(|by| *by != 0.0);
         self.corrections.iter().any(gives_way).then_some(loads)
     }
 
-    /// What the joints do to each link, `base e^{ξ₁θ₁} … e^{ξᵢθᵢ}` for i = 0 … n: the i-th carries what is fixed to
-    /// link i from where it is at θ = 0 into the frame of the measurements.
+    /// What the joints do to each link, `base e^{ξθ} …` along the path to it: the i-th carries what is fixed to link i (0 is the
+    /// base) from where it is at θ = 0 into the frame of the measurements.
     pub fn links(&self, positions: &[f64]) -> Vec<Isometry3<f64>> {
         let thetas = self.thetas(positions);
-        let mut links = Vec::with_capacity(self.joints.len() + 1);
-        links.push(self.base);
-        for (index, joint) in self.joints.iter().enumerate() {
-            links.push(links[index] * joint.exp(thetas.of(index)));
-        }
-        links
+        self.tree.links(self.base, &self.joints, |joint| thetas.of(joint))
     }
 
     /// The skeleton at θ: the pivot of every revolute joint in order, then the marker, metres.
@@ -286,12 +265,9 @@ impl State {
     /// A line has no distinguished point, so this is a drawing of the arm, not a property of its kinematics.
     pub fn skeleton(&self, positions: &[f64]) -> Vec<Point3<f64>> {
         let links = self.links(positions);
-        let mut points: Vec<_> = self
-            .joints
-            .iter()
-            .zip(&links)
-            .filter_map(|(joint, link)| joint.line().map(|line| link * line.point))
-            .collect();
+        let pivot =
+            |(index, joint): (usize, &Joint)| joint.line().map(|line| links[self.tree.link_before(index)] * line.point);
+        let mut points: Vec<_> = self.joints.iter().enumerate().filter_map(pivot).collect();
         points.push(self.marker_at(positions));
         points
     }
@@ -301,19 +277,27 @@ impl State {
         if self.base == Isometry3::identity() {
             return Cow::Borrowed(self);
         }
+        Cow::Owned(Self { base: Isometry3::identity(), ..self.carried(&self.base, |_| true) })
+    }
+
+    /// The robot with what hangs on some links carried by a motion of its own frame, as everything is placed at θ = 0.
+    pub fn carried(&self, motion: &Isometry3<f64>, is_moved: impl Fn(usize) -> bool) -> Self {
         let mut state = self.clone();
-        state.base = Isometry3::identity();
-        state.joints.iter_mut().for_each(|joint| *joint = joint.transformed(&self.base));
-        for target in &mut state.targets {
+        for (index, joint) in
+            state.joints.iter_mut().enumerate().filter(|(index, _)| is_moved(self.tree.link_before(*index)))
+        {
+            *joint = self.joints[index].transformed(motion);
+        }
+        for target in state.targets.iter_mut().filter(|target| is_moved(target.link)) {
             target.place = match &target.place {
-                Place::Point(point) => Place::Point(self.base * point),
-                Place::Pose(pose) => Place::Pose(self.base * pose),
+                Place::Point(point) => Place::Point(motion * point),
+                Place::Pose(pose) => Place::Pose(motion * pose),
             };
         }
-        state.devices.iter_mut().filter(|device| device.link.is_some()).for_each(|device| {
-            device.pose = self.base * device.pose;
-        });
-        Cow::Owned(state)
+        for device in state.devices.iter_mut().filter(|device| device.link.is_some_and(&is_moved)) {
+            device.pose = motion * device.pose;
+        }
+        state
     }
 
     /// The same robot with the point of every axis slid to where it is nearest to the axis point of `reference`: the

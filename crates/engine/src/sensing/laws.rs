@@ -10,7 +10,7 @@ use rand_distr::StandardNormal;
 use super::{CHANNELS, Channel, Observation, Position, Rig, Socket, Spacing, check_channel, examples};
 use crate::model::{
     Layout,
-    random::{all_blocks, random_state},
+    random::{all_blocks, branched, random_state},
 };
 
 proptest! {
@@ -22,6 +22,7 @@ proptest! {
     fn rows_equal_central_differences(seed: u64, joints in 1_usize..=12) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let state = random_state(&mut rng, joints);
+        let state = if seed % 2 == 0 { branched(state, &mut rng) } else { state };
         let layout = Layout::new(&state, all_blocks(&state));
         let positions: Vec<f64> = (0..joints).map(|_| rng.random_range(-2.0..2.0)).collect();
         for channel in examples(&mut rng, &state) {

@@ -160,7 +160,8 @@ fn motions_behind(state: &State, layout: &Layout, joint: usize) -> Option<DMatri
 /// The state with all that is behind a joint carried by a motion of the robot's frame.
 fn moved_behind(state: &State, joint: usize, motion: &Isometry3<f64>) -> State {
     let mut moved = state.clone();
-    for axis in moved.joints.iter_mut().skip(joint + 1) {
+    let hangs_on_it = |(index, _): &(usize, &mut Joint)| state.tree.moves(joint, state.tree.link_before(*index));
+    for (_, axis) in moved.joints.iter_mut().enumerate().filter(hangs_on_it) {
         *axis = match *axis {
             Joint::Revolute(line) => {
                 Joint::Revolute(Line { point: motion * line.point, direction: motion.rotation * line.direction })
@@ -168,13 +169,15 @@ fn moved_behind(state: &State, joint: usize, motion: &Isometry3<f64>) -> State {
             Joint::Prismatic(direction) => Joint::Prismatic(motion.rotation * direction),
         };
     }
-    for target in moved.targets.iter_mut().filter(|target| target.link > joint) {
+    for target in moved.targets.iter_mut().filter(|target| state.tree.moves(joint, target.link)) {
         target.place = match &target.place {
             Place::Point(point) => Place::Point(motion * point),
             Place::Pose(pose) => Place::Pose(motion * pose),
         };
     }
-    for device in moved.devices.iter_mut().filter(|device| device.link.is_some_and(|link| link > joint)) {
+    for device in
+        moved.devices.iter_mut().filter(|device| device.link.is_some_and(|link| state.tree.moves(joint, link)))
+    {
         device.pose = motion * device.pose;
     }
     moved

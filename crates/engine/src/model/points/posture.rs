@@ -13,32 +13,17 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Correction, Place, Points, Turn, Whitening};
-use crate::{elementary::sin_cos, kinematics::JointKind, model::pass::Term};
+use super::{Passed, Place, Points, Turned, Whitening};
+use crate::kinematics::{JointKind, Numbers, Plain, correction::LOADS};
 
 /// Points at one posture, with their whitened rows.
 pub struct Posture<'a> {
     points: &'a Points,
-    joints: Vec<Still>,
+    joints: Passed<Plain>,
     /// x and the axes of its link, in the order of the links.
     places: Vec<(Vector3<f64>, Matrix3<f64>)>,
     readings: Vec<f64>,
     rows: Vec<f64>,
-}
-
-/// A joint at its reading.
-struct Still {
-    /// E, before the joint.
-    before: Matrix3<f64>,
-    /// F, behind it.
-    after: Matrix3<f64>,
-    /// q.
-    pivot: Vector3<f64>,
-    theta: f64,
-    /// dθ by d reading.
-    rate: f64,
-    /// The reading, its sine and cosine.
-    reading: [f64; 3],
 }
 
 /// A column of a point's rows before it is whitened, with the joint that it belongs to.
@@ -73,21 +58,16 @@ impl Whitening {
 impl Points {
     /// At one posture (readings of the joints, rad or m, as many as there are joints).
     pub fn at(&self, posture: &[f64]) -> Posture<'_> {
-        let (mut joints, mut places) = (Vec::with_capacity(self.joints.len()), Vec::with_capacity(self.places.len()));
-        let (mut frame, mut pivot) = self.first;
+        let (mut walk, mut places) = (self.kernel.walk(Plain), Vec::with_capacity(self.places.len()));
         let mut next = self.places.iter().peekable();
         for link in 0..=self.joints.len() {
             while let Some(place) = next.next_if(|place| place.link == link) {
-                let (local, axes) = place.local;
-                places.push(if link == 0 { (local, axes) } else { (pivot + frame * local, frame * axes) });
+                places.push(walk.place(&place.fixed));
             }
-            let (Some(joint), Some(reading)) = (self.joints.get(link), posture.get(link)) else { break };
-            if let Some((rotation, arm)) = link.checked_sub(1).and_then(|before| self.joints[before].next.as_ref()) {
-                pivot += frame * arm;
-                frame *= rotation;
-            }
-            joints.push(joint.still(*reading, &mut frame, &mut pivot));
+            let Some(reading) = posture.get(link).filter(|_| link < self.joints.len()) else { break };
+            walk.step(*reading);
         }
+        let joints = walk.passed;
         let (m, d) = (self.dimension, self.equations());
         let (mut readings, mut rows) = (vec![0.0; d], vec![0.0; d * m]);
         for (place, (x, axes)) in self.places.iter().zip(&places) {
@@ -108,39 +88,37 @@ impl Points {
     /// What the parameters of every joint before a point at x do, with the joint. What is not asked for costs nothing where this is
     /// written out.
     #[inline(always)]
-    fn columns_of_joints(&self, place: &Place, joints: &[Still], x: Vector3<f64>, mut each: impl FnMut(usize, Column)) {
+    fn columns_of_joints(
+        &self,
+        place: &Place,
+        joints: &Passed<Plain>,
+        x: Vector3<f64>,
+        mut each: impl FnMut(usize, Column),
+    ) {
         let nothing = Vector3::zeros();
-        for (index, (joint, still)) in self.joints.iter().zip(joints).enumerate().take(place.link) {
-            let [e1, e2, axis] = columns(&still.before);
-            let [f1, f2, _] = columns(&still.after);
+        for (index, joint) in self.moving(place) {
+            let Turned { swept: [d1, d2], axis, basis: [f1, f2], pivot, reading } = joints.at(index);
             let turns = joint.kind == JointKind::Revolute;
-            let arm = x - still.pivot;
+            let arm = x - pivot;
             let swept = if turns { axis.cross(&arm) } else { axis };
             let mut put = |coordinate: usize, column: Vector3<f64>, own: Vector3<f64>, lever: Vector3<f64>| {
                 each(index, Column { coordinate, column, own, lever, read: nothing });
             };
             match (joint.axis, turns) {
                 (Some(start), true) => {
-                    let (d1, d2) = (e1 - f1, e2 - f2);
                     put(start, d1, -f2, nothing);
                     put(start + 1, d2, f1, nothing);
                     put(start + 2, d2.cross(&arm), f1.cross(&arm) + d2.cross(&swept), d2);
                     put(start + 3, arm.cross(&d1), swept.cross(&d1) - arm.cross(&f2), -d1);
                 }
                 (Some(start), false) => {
-                    put(start, e1 * still.theta, e1, nothing);
-                    put(start + 1, e2 * still.theta, e2, nothing);
+                    put(start, d1, f1, nothing);
+                    put(start + 1, d2, f2, nothing);
                 }
                 (None, _) => {}
             }
             for (coordinate, term) in &joint.terms {
-                let [reading, sine, cosine] = still.reading;
-                let (factor, rate) = match term {
-                    Term::Ratio => (reading, 1.0),
-                    Term::Sine => (sine, cosine),
-                    Term::Cosine => (cosine, -sine),
-                    Term::Offset | Term::Torque(_) => (1.0, 0.0),
-                };
+                let (factor, rate) = term.factor(Plain, reading, &[0.0; LOADS]);
                 let (own, lever) = if turns { (axis.cross(&swept), axis) } else { (nothing, nothing) };
                 each(
                     index,
@@ -171,27 +149,7 @@ impl Place {
     /// What the point's own coordinates do, where its link has these axes.
     fn own_columns(&self, axes: &Matrix3<f64>, mut each: impl FnMut(usize, Vector3<f64>)) {
         let Some(start) = self.own else { return };
-        columns(axes).into_iter().enumerate().for_each(|(k, column)| each(start + k, column));
-    }
-}
-
-impl Turn {
-    /// Turns or slides a joint's frame, which is before the joint, to a reading.
-    fn still(&self, reading: f64, frame: &mut Matrix3<f64>, pivot: &mut Vector3<f64>) -> Still {
-        let Correction { offset, ratio, sine, cosine, .. } = self.correction;
-        let (sin, cos) = if self.needs_sine() { sin_cos(reading) } else { (0.0, 0.0) };
-        let theta = ratio * reading + offset + sine * sin + cosine * cos;
-        let before = *frame;
-        match self.kind {
-            JointKind::Revolute => {
-                let [e1, e2, axis] = columns(frame);
-                let (sin, cos) = sin_cos(theta);
-                *frame = Matrix3::from_columns(&[e1 * cos + e2 * sin, e2 * cos - e1 * sin, axis]);
-            }
-            JointKind::Prismatic => *pivot += frame.column(2) * theta,
-        }
-        let rate = ratio + sine * cos - cosine * sin;
-        Still { before, after: *frame, pivot: *pivot, theta, rate, reading: [reading, sin, cos] }
+        Plain::columns(axes).into_iter().enumerate().for_each(|(k, column)| each(start + k, column));
     }
 }
 
@@ -211,7 +169,7 @@ impl Posture<'_> {
     pub fn add_slope(&self, (by_readings, by_rows): (&[f64], &[f64]), slope: &mut [f64]) {
         let m = self.points.dimension;
         // By joint: Σ c × u and Σ u × ω of its columns.
-        let mut sums = vec![(Vector3::zeros(), Vector3::zeros()); self.joints.len()];
+        let mut sums = vec![(Vector3::zeros(), Vector3::zeros()); self.joints.count];
         for (place, (x, axes)) in self.points.places.iter().zip(&self.places) {
             let at = 3 * place.index;
             let by = |coordinate: usize| {
@@ -227,27 +185,26 @@ impl Posture<'_> {
                 let u = by(of.coordinate);
                 sums[joint].0 += of.column.cross(&u);
                 sums[joint].1 += u.cross(&of.lever);
-                slope[joint] += self.joints[joint].rate * of.own.dot(&u) + of.read.dot(&u);
+                slope[joint] += self.rate(joint) * of.own.dot(&u) + of.read.dot(&u);
             });
             turned += sums.iter().map(|(turned, _)| turned).sum::<Vector3<f64>>();
-            let before = self.points.joints.iter().zip(&self.joints).zip(&sums).take(place.link);
-            for (((joint, still), sums), slope) in before.zip(slope.iter_mut()) {
-                let axis = still.before.column(2).into_owned();
-                turned -= sums.0;
-                *slope += still.rate
+            for (index, joint) in self.points.moving(place) {
+                let Turned { axis, pivot, .. } = self.joints.at(index);
+                turned -= sums[index].0;
+                slope[index] += self.rate(index)
                     * match joint.kind {
-                        JointKind::Revolute => axis.dot(&turned) + axis.cross(&(x - still.pivot)).dot(&moved),
+                        JointKind::Revolute => axis.dot(&turned) + axis.cross(&(x - pivot)).dot(&moved),
                         JointKind::Prismatic => axis.dot(&moved),
                     };
-                moved += sums.1;
+                moved += sums[index].1;
             }
         }
     }
-}
 
-#[inline]
-fn columns(a: &Matrix3<f64>) -> [Vector3<f64>; 3] {
-    [a.column(0).into_owned(), a.column(1).into_owned(), a.column(2).into_owned()]
+    /// dθ by d reading of a joint.
+    fn rate(&self, joint: usize) -> f64 {
+        self.points.kernel.correction(joint).rate(Plain, self.joints.at(joint).reading)
+    }
 }
 
 #[cfg(test)]
@@ -260,7 +217,10 @@ mod tests {
     use super::*;
     use crate::{
         lanes::GROUP,
-        model::{Layout, random::random_stiff_state},
+        model::{
+            Layout,
+            random::{branched, random_stiff_state},
+        },
     };
 
     proptest! {
@@ -272,6 +232,7 @@ mod tests {
         fn slopes_are_those_of_central_differences(seed: u64, joints in 1_usize..=8) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let (state, blocks) = random_stiff_state(&mut rng, joints);
+            let state = if seed % 2 == 0 { branched(state, &mut rng) } else { state };
             let layout = Layout::new(&state, blocks);
             let full = Matrix3::from_fn(|_, _| rng.random_range(-2.0..2.0));
             let whitenings = [Whitening::Full(full), Whitening::Even(rng.random_range(1.0..3.0))];

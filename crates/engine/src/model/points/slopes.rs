@@ -13,9 +13,9 @@
 use fearless_simd::{ExtractToken, Simd};
 use nalgebra::Vector3;
 
-use super::{Passed, Place, Points, Term, Turned, Wanted, Whitening};
+use super::{Passed, Place, Points, Wanted, Whitening};
 use crate::{
-    kinematics::JointKind,
+    kinematics::{JointKind, correction::LOADS},
     lanes::{Frame, GROUP, Lanes, Vector, load, splat, store},
 };
 
@@ -76,7 +76,7 @@ impl Points {
                 moved = moved + factors.of(simd, start + 3 + k).cross(Vector::splat(simd, &Vector3::ith(k, 1.0)));
             }
         }
-        for (index, joint) in self.joints.iter().enumerate().take(passed.count) {
+        for (index, joint) in self.moving(place) {
             let turned = passed.at(index);
             let (arm, is_revolute) = (*x - turned.pivot, joint.kind == JointKind::Revolute);
             let velocity = if is_revolute { turned.axis.cross(arm) } else { turned.axis };
@@ -95,15 +95,9 @@ impl Points {
                     own = f1.dot(g1) + f2.dot(g2);
                 }
             }
-            let [reading, sine, cosine] = turned.reading;
             let mut by_reading = splat(simd, 0.0);
             for (coordinate, term) in &joint.terms {
-                let (factor, growth) = match term {
-                    Term::Ratio => (reading, splat(simd, 1.0)),
-                    Term::Sine => (sine, cosine),
-                    Term::Cosine => (cosine, -sine),
-                    Term::Offset | Term::Torque(_) => (splat(simd, 1.0), splat(simd, 0.0)),
-                };
+                let (factor, growth) = term.factor(simd, turned.reading, &[0.0; LOADS]);
                 let g = factors.of(simd, *coordinate);
                 by_reading = growth * velocity.dot(g) + by_reading;
                 let g = g.scaled(factor);
@@ -116,33 +110,27 @@ impl Points {
             if is_revolute {
                 by_position -= turned.axis.dot(turning);
             }
-            add::<S>(joint.rate(&turned) * by_position + by_reading, slopes, index * GROUP + lane);
+            add::<S>(
+                self.kernel.correction(index).rate(simd, turned.reading) * by_position + by_reading,
+                slopes,
+                index * GROUP + lane,
+            );
         }
         if let Some(start) = place.own {
             for k in 0..3 {
                 turning = turning + axes.0[k].cross(factors.of(simd, start + k));
             }
         }
-        for (index, joint) in self.joints.iter().enumerate().take(passed.count) {
+        for (index, joint) in self.moving(place) {
             let turned = passed.at(index);
             if joint.kind == JointKind::Revolute {
-                add::<S>(joint.rate(&turned) * turned.axis.dot(turning), slopes, index * GROUP + lane);
+                add::<S>(
+                    self.kernel.correction(index).rate(simd, turned.reading) * turned.axis.dot(turning),
+                    slopes,
+                    index * GROUP + lane,
+                );
             }
         }
-    }
-}
-
-impl super::Turn {
-    /// By how much the joint moves as its reading does.
-    #[inline(always)]
-    fn rate<S: Simd>(&self, turned: &Turned<S>) -> Lanes<S> {
-        let simd = turned.axis.0[0].token();
-        let (ratio, sine, cosine) = (self.correction.ratio, self.correction.sine, self.correction.cosine);
-        if sine == 0.0 && cosine == 0.0 {
-            return splat(simd, ratio);
-        }
-        let [_, sin, cos] = turned.reading;
-        cos * splat(simd, sine) + (sin * splat(simd, -cosine) + splat(simd, ratio))
     }
 }
 
@@ -162,7 +150,10 @@ mod tests {
 
     use crate::{
         lanes::{GROUP, groups, levels},
-        model::{Layout, Points, Whitening, random::random_stiff_state},
+        model::{
+            Layout, Points, Whitening,
+            random::{branched, random_stiff_state},
+        },
     };
 
     proptest! {
@@ -173,6 +164,7 @@ mod tests {
         fn slopes_are_those_of_the_rows(seed: u64, joints in 1_usize..=12, count in 1_usize..=9) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let (state, blocks) = random_stiff_state(&mut rng, joints);
+            let state = if seed % 2 == 0 { branched(state, &mut rng) } else { state };
             let layout = Layout::new(&state, blocks);
             let full = Matrix3::from_fn(|_, _| rng.random_range(-5.0..5.0));
             let whitenings = [Whitening::Full(full), Whitening::Even(rng.random_range(1.0..9.0))];

@@ -16,10 +16,12 @@ use std::ops::Range;
 use fearless_simd::Simd;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Passed, Points, Term, Turn, Wanted, Whitening};
+use super::{Learned, Passed, Points, Term, Wanted, Whitening};
 use crate::{
-    elementary::{cos, sin},
-    kinematics::JointKind,
+    kinematics::{
+        JointKind, Plain,
+        correction::{LOADS, read},
+    },
     lanes::{Aligned, GROUP},
 };
 
@@ -63,7 +65,7 @@ pub struct Centre<'a> {
 
 /// A joint that is before the point, at the posture in the middle of a star.
 pub struct Pivot<'a> {
-    turn: &'a Turn,
+    joint: &'a Learned,
     weight: f64,
     /// h of its first two coordinates, if its axis is learned.
     columns: [Vector3<f64>; 2],
@@ -86,9 +88,13 @@ pub struct Ray {
 }
 
 impl Points {
-    /// How a walk passes the chain to the point; `None` where there is not just one, measured alike in all directions.
+    /// How a walk passes the chain to the point; `None` where there is not just one, measured alike in all directions, or where a joint
+    /// before it is of another branch.
     pub fn passage(&self) -> Option<Passage> {
         let [place] = self.places.as_slice() else { return None };
+        if self.moving(place).count() < place.link {
+            return None;
+        }
         let Whitening::Even(_) = place.whitening else { return None };
         let (mut order, mut stages) = (Vec::with_capacity(self.dimension), Vec::new());
         let mut pass = |coordinates: &mut dyn Iterator<Item = usize>, fixed: usize, of_axis: usize| {
@@ -126,7 +132,7 @@ impl Points {
 
     /// How much joint `joint` moves from one reading to another, rad or m.
     pub fn travel(&self, joint: usize, from: f64, to: f64) -> f64 {
-        let correction = &self.joints[joint].correction;
+        let correction = self.kernel.correction(joint);
         correction.position(to) - correction.position(from)
     }
 }
@@ -211,7 +217,7 @@ impl Centre<'_> {
         let arm = self.place() - pivot;
         let across = axis.cross(&arm);
         Pivot {
-            turn: &self.points.joints[joint],
+            joint: &self.points.joints[joint],
             weight: self.weight(),
             columns: [0, 1].map(|k| h.get(k).copied().unwrap_or_default()),
             basis: [0, 1].map(|which| self.vector(joint, which)),
@@ -227,13 +233,13 @@ impl Pivot<'_> {
     /// what corrects its reading is put to `terms`.
     #[inline(always)]
     pub fn ray(&self, reading: f64, [travel, sin, cos]: [f64; 3], terms: &mut Vec<Vector3<f64>>) -> Ray {
-        let (is_revolute, [f1, f2], [h1, h2]) = (self.turn.kind == JointKind::Revolute, self.basis, self.columns);
+        let (is_revolute, [f1, f2], [h1, h2]) = (self.joint.kind == JointKind::Revolute, self.basis, self.columns);
         let mut axis = [Vector3::zeros(); 4];
         let (rotation, shift, arm) = if is_revolute {
             let [across, inward] = self.across;
             let shift = across * sin + inward * (1.0 - cos);
             let arm = self.arm + shift;
-            if self.turn.axis.is_some() {
+            if self.joint.axis.is_some() {
                 let (bent, swung) = (self.weight * (1.0 - cos), self.weight * sin);
                 let d1 = h1 + f1 * bent - f2 * swung;
                 let d2 = h2 + f2 * bent + f1 * swung;
@@ -241,16 +247,16 @@ impl Pivot<'_> {
             }
             (rotation(&self.axis, sin, cos), shift, arm)
         } else {
-            if self.turn.axis.is_some() {
+            if self.joint.axis.is_some() {
                 let further = self.weight * travel;
                 (axis[0], axis[1]) = (h1 + f1 * further, h2 + f2 * further);
             }
             (Matrix3::identity(), self.axis * travel, self.arm)
         };
         terms.clear();
-        if !self.turn.terms.is_empty() {
+        if !self.joint.terms.is_empty() {
             let velocity = self.weight * if is_revolute { self.axis.cross(&arm) } else { self.axis };
-            terms.extend(self.turn.terms.iter().map(|(_, term)| velocity * factor(*term, reading)));
+            terms.extend(self.joint.terms.iter().map(|(_, term)| velocity * factor(*term, reading)));
         }
         Ray { rotation, shift, axis }
     }
@@ -258,12 +264,7 @@ impl Pivot<'_> {
 
 /// What a term is multiplied by at a reading.
 fn factor(term: Term, reading: f64) -> f64 {
-    match term {
-        Term::Ratio => reading,
-        Term::Sine => sin(reading),
-        Term::Cosine => cos(reading),
-        Term::Offset | Term::Torque(_) => 1.0,
-    }
+    term.factor(Plain, read::<Plain>(reading, term.needs_sine()), &[0.0; LOADS]).0
 }
 
 /// exp(δ [axis]×) for an angle of that sine and cosine.

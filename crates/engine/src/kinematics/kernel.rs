@@ -1,0 +1,180 @@
+//! The pass along the tree: where every joint is at a few postures, and what turns behind it.
+//!
+//! Every joint has a frame: its axis w is the third direction, the basis b₁, b₂ of the axis' chart are the others, and its
+//! origin is the pivot v. Between a joint's frame and that of a joint that it carries lie a fixed rotation and a fixed arm, so that
+//! with E the frame before the joint turns by θ, F the same after, and q its origin,
+//!
+//! ```text
+//! F = E rot₃(θ),     E⁺ = F (BᵀB⁺),     q⁺ = q + F Bᵀ(v⁺ − v)
+//! ```
+//!
+//! It is written once for [`Numbers`] of any kind. Functions are handed lanes, hence `#[inline(always)]`, and no closures.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+
+use super::{
+    Correction, Joint, JointKind, Numbers, Tree, chart,
+    correction::{Reading, read},
+    passed::{Passed, Turned},
+};
+
+/// A rotation, and a vector in metres: a frame, or what lies between two frames.
+pub type Placed = (Matrix3<f64>, Vector3<f64>);
+
+/// The joints of a robot, to be passed at many postures.
+#[derive(Clone, Debug)]
+pub struct Kernel {
+    tree: Tree,
+    /// That of the robot in the frame of the measurements.
+    base: Isometry3<f64>,
+    joints: Vec<Step>,
+}
+
+#[derive(Clone, Debug)]
+struct Step {
+    kind: JointKind,
+    correction: Correction,
+    /// Whether somebody wants the sine and the cosine of the reading.
+    needs_sine: bool,
+    /// B and v.
+    rest: Placed,
+    /// BᵀB⁺ and Bᵀ(v⁺ − v) from the joint that carries it; E and q if that is none.
+    from: Placed,
+}
+
+impl Kernel {
+    /// The joints of a robot whose base is at `base`, each with its correction. `needs_sine` tells of which joints the sine and the
+    /// cosine of the reading are wanted beside what the correction needs.
+    pub fn new(
+        tree: &Tree,
+        base: &Isometry3<f64>,
+        joints: &[Joint],
+        corrections: &[Correction],
+        needs_sine: impl Fn(usize) -> bool,
+    ) -> Self {
+        let rests: Vec<Placed> = joints
+            .iter()
+            .map(|joint| {
+                let pivot = joint.line().map_or_else(Vector3::zeros, |line| line.point.coords);
+                let (w, basis) = (joint.direction(), chart::basis(&joint.direction()));
+                (Matrix3::from_columns(&[basis.column(0).into_owned(), basis.column(1).into_owned(), *w]), pivot)
+            })
+            .collect();
+        let steps = joints.iter().zip(corrections).enumerate().map(|(index, (joint, correction))| {
+            let (frame, pivot) = rests[index];
+            let from = match tree.parent(index) {
+                None => (base.rotation.to_rotation_matrix().matrix() * frame, (base * Point3::from(pivot)).coords),
+                Some(parent) => {
+                    let (before, origin) = &rests[parent];
+                    (before.tr_mul(&frame), before.tr_mul(&(pivot - origin)))
+                }
+            };
+            let needs_sine = correction.needs_sine() || needs_sine(index);
+            Step { kind: joint.kind(), correction: *correction, needs_sine, rest: rests[index], from }
+        });
+        Self { tree: tree.clone(), base: *base, joints: steps.collect() }
+    }
+
+    /// The tree.
+    pub fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// A joint's correction.
+    pub fn correction(&self, joint: usize) -> &Correction {
+        &self.joints[joint].correction
+    }
+
+    /// A point (metres, where it is at θ = 0) and the axes of its link, as [`Walk::place`] takes them: in the frame of the joint that
+    /// carries the link, or where they are for good on the base.
+    pub fn fixed(&self, link: usize, x: &Point3<f64>) -> Placed {
+        match link.checked_sub(1).and_then(|joint| self.joints.get(joint)) {
+            None => (*self.base.rotation.to_rotation_matrix().matrix(), (self.base * x).coords),
+            Some(Step { rest: (frame, pivot), .. }) => (frame.transpose(), frame.tr_mul(&(x.coords - pivot))),
+        }
+    }
+
+    /// Begins a pass.
+    #[inline(always)]
+    pub fn walk<N: Numbers>(&self, numbers: N) -> Walk<'_, N> {
+        let (frame, pivot) = (numbers.rotation(&Matrix3::identity()), numbers.vector(&Vector3::zeros()));
+        Walk { kernel: self, numbers, passed: Passed::with_room(numbers, self.joints.len()), frame, pivot }
+    }
+}
+
+/// A pass along the tree at a few postures, which has come to some joint.
+pub struct Walk<'a, N: Numbers> {
+    kernel: &'a Kernel,
+    numbers: N,
+    /// The joints that it passed.
+    pub passed: Passed<N>,
+    /// F and q of the last of them.
+    frame: N::Rotation,
+    pivot: N::Vector,
+}
+
+impl<N: Numbers> Walk<'_, N> {
+    /// Goes back to the base.
+    #[inline(always)]
+    pub fn restart(&mut self) {
+        self.passed.count = 0;
+    }
+
+    /// Passes the next joint, with a reading of each posture.
+    #[inline(always)]
+    pub fn step(&mut self, reading: N::Number) {
+        let (index, numbers) = (self.passed.count, self.numbers);
+        let step = &self.kernel.joints[index];
+        let (rotation, arm) = &step.from;
+        match self.kernel.tree.parent(index) {
+            None => (self.frame, self.pivot) = (numbers.rotation(rotation), numbers.vector(arm)),
+            Some(parent) => {
+                if parent + 1 != index {
+                    (self.frame, self.pivot) = self.passed.frame(parent);
+                }
+                self.pivot = self.pivot + N::times(&self.frame, arm);
+                self.frame = N::then(&self.frame, rotation);
+            }
+        }
+        let reading = read::<N>(reading, step.needs_sine);
+        let turned = step.turn(numbers, reading, &mut self.frame, &mut self.pivot);
+        self.passed.push(&turned);
+    }
+
+    /// Where something that is [fixed](Kernel::fixed) to the link of the last joint is (metres), and the axes of that link.
+    #[inline(always)]
+    pub fn place(&self, (axes, x): &Placed) -> (N::Vector, N::Rotation) {
+        if self.passed.count == 0 {
+            return (self.numbers.vector(x), self.numbers.rotation(axes));
+        }
+        (self.pivot + N::times(&self.frame, x), N::then(&self.frame, axes))
+    }
+}
+
+impl Step {
+    /// Turns or slides a joint's frame, which is before the joint, to a reading.
+    #[inline(always)]
+    fn turn<N: Numbers>(
+        &self,
+        numbers: N,
+        reading: Reading<N>,
+        frame: &mut N::Rotation,
+        pivot: &mut N::Vector,
+    ) -> Turned<N> {
+        let theta = self.correction.unloaded(numbers, reading);
+        let [e1, e2, axis] = N::columns(frame);
+        let (swept, basis) = match self.kind {
+            JointKind::Revolute => {
+                let (sin, cos) = N::sin_cos(theta);
+                *frame = N::turned(frame, sin, cos);
+                let [f1, f2, _] = N::columns(frame);
+                ([e1 - f1, e2 - f2], [f1, f2])
+            }
+            JointKind::Prismatic => {
+                *pivot = *pivot + N::scaled(axis, theta);
+                ([N::scaled(e1, theta), N::scaled(e2, theta)], [e1, e2])
+            }
+        };
+        Turned { swept, axis, basis, pivot: *pivot, reading }
+    }
+}

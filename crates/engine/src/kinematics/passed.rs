@@ -1,0 +1,75 @@
+//! The joints that a walk along the tree has passed.
+
+use super::{Numbers, correction::Reading};
+use crate::lanes::Aligned;
+
+/// A joint at a few postures: d₁, d₂, f₃ and q; of a prismatic joint θ e₁ and θ e₂ in place of d₁ and d₂.
+pub struct Turned<N: Numbers> {
+    pub swept: [N::Vector; 2],
+    pub axis: N::Vector,
+    /// f₁ and f₂.
+    pub basis: [N::Vector; 2],
+    pub pivot: N::Vector,
+    /// The joint's reading, its sine and cosine.
+    pub reading: Reading<N>,
+}
+
+/// Vectors of it, the reading being one.
+const VECTORS: usize = 7;
+
+/// The joints that a walk along the tree has passed, at a few postures.
+pub struct Passed<N: Numbers> {
+    of: N,
+    numbers: Aligned,
+    /// How many there are.
+    pub count: usize,
+}
+
+/// Where the components of one of a joint's vectors are.
+#[inline(always)]
+fn at<N: Numbers>(vector: usize) -> [usize; 3] {
+    [3 * vector * N::COUNT, (3 * vector + 1) * N::COUNT, (3 * vector + 2) * N::COUNT]
+}
+
+impl<N: Numbers> Passed<N> {
+    /// None, with room for so many.
+    #[inline(always)]
+    pub fn with_room(numbers: N, joints: usize) -> Self {
+        Self { of: numbers, numbers: Aligned::of_any(joints * 3 * VECTORS * N::COUNT), count: 0 }
+    }
+
+    /// Adds the next one.
+    #[inline(always)]
+    pub fn push(&mut self, turned: &Turned<N>) {
+        let numbers = &mut self.numbers[self.count * 3 * VECTORS * N::COUNT..][..3 * VECTORS * N::COUNT];
+        let Turned { swept: [d1, d2], axis, basis: [f1, f2], pivot, reading } = *turned;
+        N::store(d1, numbers, at::<N>(0));
+        N::store(d2, numbers, at::<N>(1));
+        N::store(axis, numbers, at::<N>(2));
+        N::store(f1, numbers, at::<N>(3));
+        N::store(f2, numbers, at::<N>(4));
+        N::store(pivot, numbers, at::<N>(5));
+        N::store(N::join(reading), numbers, at::<N>(6));
+        self.count += 1;
+    }
+
+    /// One of them.
+    #[inline(always)]
+    pub fn at(&self, index: usize) -> Turned<N> {
+        let numbers = &self.numbers[index * 3 * VECTORS * N::COUNT..][..3 * VECTORS * N::COUNT];
+        Turned {
+            swept: [self.of.load(numbers, at::<N>(0)), self.of.load(numbers, at::<N>(1))],
+            axis: self.of.load(numbers, at::<N>(2)),
+            basis: [self.of.load(numbers, at::<N>(3)), self.of.load(numbers, at::<N>(4))],
+            pivot: self.of.load(numbers, at::<N>(5)),
+            reading: N::components(self.of.load(numbers, at::<N>(6))),
+        }
+    }
+
+    /// F and q of one of them.
+    #[inline(always)]
+    pub fn frame(&self, index: usize) -> (N::Rotation, N::Vector) {
+        let Turned { axis, basis: [f1, f2], pivot, .. } = self.at(index);
+        (N::of_columns([f1, f2, axis]), pivot)
+    }
+}
