@@ -16,7 +16,7 @@
 //! |---|---|
 //! | [`magnitude`] | which numbers are taken as magnitudes |
 //! | [`kinematics`] | joints as twists, minimal coordinates of lines, directions and rotations, joint limits |
-//! | [`model`] | what can be learned, in blocks; the prior; one pass over the chain that gives every derivative |
+//! | [`model`] | what can be learned, in blocks; the prior; one pass along the tree of joints that gives every derivative |
 //! | [`sensing`] | what is measured after a movement, channel by channel and whitened; what a head can see |
 //! | [`estimation`] | estimators and their beliefs: recursive least squares, stochastic gradient, a smoother with several hypotheses |
 //! | [`optimize`] | DIRECT and a bounded local search: minimisers over the unit cube that know nothing of robots |
