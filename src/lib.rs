@@ -28,7 +28,7 @@
 //!
 //! # Map
 //!
-//! This package is the program: the command line, the [server](server), the [export](export) of its page. What it is made of are crates of
+//! This package is the program: the command line, the [server], the [export] of its page. What it is made of are crates of
 //! their own, named here as the program names them; each uses only those above it.
 //!
 //! | crate | module here | what it holds |

@@ -42,7 +42,7 @@
 //! a frame's origin moves to the nearest point of the learned line, and the frame turns by the smallest rotation that takes
 //! the old direction to the new. A learned reading offset is a turn about the axis (or a shift along it), and goes into the
 //! `<origin>`; `<limit>` stays in the readings that the description had. The base link's frame stays where it is: what
-//! carries it into the frame of the measurements is [`State::base`](super::State::base), of which a URDF knows nothing.
+//! carries it into the frame of the measurements is [`State::base`](body_schema_engine::model::State::base), of which a URDF knows nothing.
 //! Links behind the last moving joint, the tip among them, move with that joint's frame; where only points were measured,
 //! nothing else says how the tip is turned.
 

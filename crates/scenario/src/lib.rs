@@ -2,7 +2,7 @@
 //!
 //! A scenario is TOML, read in two stages: `raw` says which keys there are, and `validate` turns them into a
 //! [`Scenario`] whose values can be relied on. Every problem names the file, the line, the key and the mend. From a
-//! scenario and a seed, [`assembly`](crate::assembly) draws an experiment.
+//! scenario and a seed, [`assembly`] draws an experiment.
 //!
 //! The robot is written joint by joint, or is that of a URDF; the world is simulated, or a table of measurements. Where both are
 //! files, whatever a scenario leaves out is taken from `measured.toml`, and from the table's titles.

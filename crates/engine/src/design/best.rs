@@ -13,7 +13,7 @@ pub struct BestDesign {
     /// Its movements: since the start, or since the change of the body.
     pub movements: u64,
     /// tr(W M⁻¹), what these data allow (see [`design`](crate::design)), in the units of the criterion: beside
-    /// [`Metrics::bound_trace`](body_schema_experiment::Metrics::bound_trace).
+    /// `bound_trace` of an experiment's metrics.
     pub best_design_trace: f64,
     /// By how much that may exceed the optimum, as a fraction of it: the gap of the equivalence theorem.
     pub gap: f64,

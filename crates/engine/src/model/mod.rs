@@ -9,7 +9,6 @@
 //! * [`Pass`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
 //!   and not among the kinematics since it is the layout that says which parameters there are.
 //! * [`Workspace`]: where predictions of the hand count.
-//! * [`urdf`]: robot descriptions, read into a chain and written with the axes that were learned.
 //! * [`Names`]: what blocks are called, and what is said of those that nothing determines.
 //! * [`Manifold`]: the postures in which a target is at a given place.
 

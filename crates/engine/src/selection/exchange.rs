@@ -16,7 +16,7 @@ use super::{
 use crate::{estimation::Belief, optimize::least};
 
 impl Belief {
-    /// Changes the covariance of every hypothesis as `movement` would, counted `weight` times; see [`condition`].
+    /// Changes the covariance of every hypothesis as `movement` would, counted `weight` times; see `condition`.
     pub fn after(&mut self, movement: &Movement, weight: impl Fn(usize) -> f64) -> bool {
         let there = Arc::new(self.rig.held_in(movement.socket));
         let whole = replace(&mut self.rig, there);

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{Active, Appraisal, Policy, Search, Selection, SelectionError, Situation};
 use crate::kinematics::JointBox;
 
-/// Chooses nothing: every movement is set from outside, by [`Agent::set`](body_schema_experiment::Agent::set).
+/// Chooses nothing: every movement is set from outside, by the `set` of an agent.
 ///
 /// What a movement would teach it tells by the criterion of active selection, and beside it what DIRECT would have found:
 /// by these a person is measured.
