@@ -229,13 +229,14 @@ mod tests {
         assert_eq!(point(7, None, &[]).random_median_mm, None);
     }
 
-    /// Of two real robots with a ball in sockets, at each of their places: 8 to 16 rows chosen by what is asked at the other places predict
-    /// the ball there better than random rows do. Several numbers of rows, since a single fit of a dozen rows says little.
+    /// Of two real robots with a ball in sockets, at each of their twelve places: rows chosen by what is asked at the other places predict
+    /// the ball there better than random rows do. Over all places and several numbers of rows, since a single fit of a dozen rows is half
+    /// as good or twice as good by chance.
     #[test]
     fn rows_chosen_by_what_is_asked_in_other_sockets_tell_more_than_random_ones() {
         const ROWS: [usize; 5] = [8, 10, 12, 14, 16];
+        let mut logarithms = Vec::new();
         for (name, places) in REAL {
-            let mut logarithms = Vec::new();
             for place in places {
                 let scenario = learned_at(name, place, "criterion = \"i\"");
                 let case = Case::new(&scenario).expect("measured");
@@ -250,8 +251,9 @@ mod tests {
                     logarithms.push((chosen / random).ln());
                 }
             }
-            let ratio = (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp();
-            assert!(ratio < 0.9, "{name}: {ratio} of random rows, {logarithms:?}");
         }
+        let ratio = (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp();
+        println!("{ratio} of random rows, {logarithms:.2?}");
+        assert!(ratio < 0.9, "{ratio} of random rows, {logarithms:.2?}");
     }
 }
