@@ -1,7 +1,10 @@
 //! The program is asked to end while its clients hold on.
 #![cfg(unix)]
 
-use std::time::{Duration, Instant};
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
 
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
@@ -37,6 +40,11 @@ async fn stubborn(program: &Program, session: &str) -> Vec<TcpStream> {
     clients
 }
 
+/// Whether a recording is complete.
+fn has_footer(file: &Path) -> bool {
+    std::fs::read(file).is_ok_and(|recording| recording.windows(4).rev().take(64).any(|tail| tail == b"FOOT"))
+}
+
 #[tokio::test]
 async fn any_signal_ends_the_server_soon_and_well_whatever_its_clients_do() {
     for signal in ["TERM", "INT", "HUP"].into_iter().filter(|signal| is_heard(signal)) {
@@ -52,9 +60,9 @@ async fn any_signal_ends_the_server_soon_and_well_whatever_its_clients_do() {
         assert!(begun.elapsed() < SOON, "{signal}: {:?}", begun.elapsed());
         assert_eq!((code, said.as_str()), (Some(0), "ended; every recording is complete\n"), "{signal}");
         drop(clients);
-        let recording = std::fs::read(folder.path().join(file)).expect("the file");
-        assert_eq!(steps_of_recording(&recording), (0..=300).collect());
-        assert!(recording.windows(4).rev().take(64).any(|tail| tail == b"FOOT"), "{signal}: a footer");
+        let file = folder.path().join(file);
+        assert_eq!(steps_of_recording(&std::fs::read(&file).expect("the file")), (0..=300).collect());
+        assert!(has_footer(&file), "{signal}: a footer");
     }
 }
 
@@ -67,13 +75,16 @@ async fn a_second_signal_ends_it_at_once() {
     let file = program.api.get_json(&session).await["file"].as_str().expect("a file").to_owned();
     let clients = stubborn(&program, &session).await;
     program.signal("TERM");
-    // Two that are there at once would be one.
-    tokio::time::sleep(Duration::from_millis(300)).await;
+    // The first has been heard once the recording is complete; what is waited for from then on are the clients.
+    let file = folder.path().join(file);
+    let asked = Instant::now();
+    while !has_footer(&file) && asked.elapsed() < SOON {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
     let begun = Instant::now();
     program.signal("INT");
     assert_eq!(program.end().0, Some(130));
     assert!(begun.elapsed() < Duration::from_secs(2), "{:?}", begun.elapsed());
     drop(clients);
-    let recording = std::fs::read(folder.path().join(file)).expect("the file");
-    assert!(recording.windows(4).rev().take(64).any(|tail| tail == b"FOOT"), "there was time for a footer");
+    assert!(has_footer(&file));
 }
