@@ -73,6 +73,8 @@
 //! [`Session::observations_csv`] and [`Session::calibration_toml`] are what `calibrate` reads; [`Session::calibrate`] does it
 //! here. See [`Results`]. A setup whose observations `calibrate` could not read is refused by [`Session::open`].
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod channel;
 mod checkpoint;
 mod draft;

@@ -27,6 +27,8 @@
 //!
 //! This module does no input or output.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod active;
 mod asked;
 mod beyond;

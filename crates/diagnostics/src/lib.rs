@@ -13,6 +13,8 @@
 //!
 //! Time and memory grow with rows and joints: fits use rows spread evenly over the table, at most some hundreds.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod columns;
 mod description;
 mod doubt;

@@ -4,6 +4,8 @@
 //! absorbs it. All start from the same estimate and see the same noise. The [`Judge`], who alone knows the truth, turns what
 //! they believe into metrics. One [`StepReport`] per step is all that the outside reads.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod agent;
 mod checkpoint;
 mod choice;
@@ -49,9 +51,9 @@ pub use report::{
 };
 pub use result::{JointModel, LearnerResult, MarkerModel, Model, OutlierReading, RunResult};
 pub use sight::{
-    CameraDescription, ChannelDescription, ChannelReading, CorrectionReport, PlaceReport, TargetDescription,
+    CameraDescription, ChannelDescription, ChannelReading, CorrectionReport, PlaceReport, TargetDescription, channels,
+    described,
 };
-pub use sight::{channels, described};
 pub use standpoint::{OwnedStandpoint, Standpoint};
 pub use streams::Stream;
 pub use told::Prospect;

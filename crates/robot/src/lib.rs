@@ -46,6 +46,8 @@
 //! Links behind the last moving joint, the tip among them, move with that joint's frame; where only points were measured,
 //! nothing else says how the tip is turned.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod chain;
 mod element;
 mod error;

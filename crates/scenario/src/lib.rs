@@ -7,6 +7,8 @@
 //! The robot is written joint by joint, or is that of a URDF; the world is simulated, or a table of measurements. Where both are
 //! files, whatever a scenario leaves out is taken from `measured.toml`, and from the table's titles.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod assembly;
 mod builtin;
 mod chain;

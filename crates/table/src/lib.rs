@@ -52,6 +52,8 @@
 //! [`TableError`] names line and column. What is no text, what is longer than [`MOST_BYTES`] or has more than [`MOST_ROWS`], two columns with one title, a
 //! line with too few or too many cells, and what is no finite number are refused as soon as they are seen.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod absent;
 mod error;
 mod guard;
