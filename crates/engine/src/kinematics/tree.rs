@@ -15,13 +15,13 @@ use super::Joint;
 /// The parents of a robot's joints. The default is an arm of however many joints.
 ///
 /// ```
-/// use body_schema::kinematics::Tree;
+/// use body_schema_engine::kinematics::Tree;
 ///
 /// // A trunk that carries two arms of two joints each.
 /// let tree = Tree::new(vec![None, Some(0), Some(1), Some(0), Some(3)])?;
 /// assert_eq!(tree.path(5).collect::<Vec<_>>(), [4, 3, 0]);
 /// assert!(tree.moves(0, 5) && !tree.moves(1, 5));
-/// # Ok::<(), body_schema::kinematics::TreeError>(())
+/// # Ok::<(), body_schema_engine::kinematics::TreeError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<Option<usize>>", into = "Vec<Option<usize>>")]
