@@ -1,12 +1,8 @@
 //! Sessions with a robot elsewhere, through what they offer to everybody.
 
-#[path = "ask_tell/channels.rs"]
 mod channels;
-#[path = "ask_tell/convergence.rs"]
 mod convergence;
-#[path = "ask_tell/refusals.rs"]
 mod refusals;
-#[path = "ask_tell/robot.rs"]
 mod robot;
 
 use std::collections::BTreeMap;

@@ -1,6 +1,5 @@
 //! Joints that give way to gravity: found in a table of measurements, written, and learned step by step.
 
-#[path = "bending/simulated.rs"]
 mod simulated;
 
 use body_schema::{

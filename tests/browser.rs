@@ -3,32 +3,17 @@
 //! Without the two this is skipped, unless the environment has `CI` or `BODY_SCHEMA_REQUIRE_BROWSER=1`. They are looked
 //! for in `PATH`, or where `CHROMEDRIVER` and `CHROMIUM` say.
 
-#[path = "browser/axe.rs"]
 mod axe;
-#[path = "browser/devtools.rs"]
-mod devtools;
-#[path = "browser/driver.rs"]
-mod driver;
-#[path = "browser/keyboard.rs"]
+pub(crate) mod devtools;
+pub(crate) mod driver;
 mod keyboard;
-#[path = "browser/newcomer.rs"]
 mod newcomer;
-#[path = "browser/pixels.rs"]
 mod pixels;
-#[path = "browser/pointer.rs"]
 mod pointer;
-#[path = "browser/robot.rs"]
 mod robot;
-#[path = "http/robot.rs"]
-#[allow(dead_code, reason = "the tests over HTTP need more of it")]
-mod robot_elsewhere;
-#[path = "browser/scene.rs"]
 mod scene;
-#[path = "browser/screens.rs"]
 mod screens;
-#[path = "browser/sharing.rs"]
 mod sharing;
-#[path = "browser/visits.rs"]
 mod visits;
 
 use std::net::SocketAddr;

@@ -1,6 +1,5 @@
 //! Calibration as a user meets it: files in, files out.
 
-#[path = "calibrate/sentences.rs"]
 mod sentences;
 
 use std::{

@@ -1,18 +1,11 @@
 //! The command line as a user meets it.
 
-#[path = "cli/bounds.rs"]
 mod bounds;
-#[path = "cli/closed.rs"]
 mod closed;
-#[path = "cli/heard.rs"]
-mod heard;
-#[path = "cli/inputs.rs"]
+pub(crate) mod heard;
 mod inputs;
-#[path = "cli/interrupted.rs"]
 mod interrupted;
-#[path = "cli/merge.rs"]
 mod merge;
-#[path = "cli/whole.rs"]
 mod whole;
 
 use std::process::{Command, Output};

@@ -1,6 +1,5 @@
 //! Convergence over fixed seeds. Every bar comes from a scenario file or from the design; none is tuned to the seeds.
 
-#[path = "convergence/sensors.rs"]
 mod sensors;
 
 use body_schema::{

@@ -4,7 +4,6 @@ use std::collections::HashSet;
 
 use body_schema::optimize::{Direct, DirectError, MAX_LEVEL, Minimum, Rectangle, Settings, Variant, minimize};
 
-#[path = "direct/problems.rs"]
 mod problems;
 
 use problems::{PROBLEMS, branin, goldstein_price, shubert};

@@ -3,13 +3,6 @@
 //! Without Chromium and chromedriver this is skipped, unless the environment has `CI` or
 //! `BODY_SCHEMA_REQUIRE_BROWSER=1`.
 
-#[allow(dead_code, reason = "shared with the tests of the page")]
-#[path = "browser/devtools.rs"]
-mod devtools;
-#[path = "browser/driver.rs"]
-#[allow(dead_code, reason = "the tests of the page with a server use the rest")]
-mod driver;
-#[path = "export/host.rs"]
 mod host;
 
 use std::{
@@ -17,10 +10,11 @@ use std::{
     process::{Command, Output},
 };
 
-use driver::Browser;
 use host::Host;
 use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::browser::driver::Browser;
 
 /// The whole folder, as it is promised.
 const MOST_BYTES: u64 = 25_000_000;

@@ -1,6 +1,5 @@
 //! Files and bodies that are nearly right. The short form of `fuzz/`: the same functions, for a few seconds.
 
-#[path = "mutated/entries.rs"]
 mod entries;
 
 use std::fs;

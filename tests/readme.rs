@@ -1,25 +1,35 @@
-//! The README's table of movements: every figure in it is measured, and is the same on every machine.
+//! The README's table of movements, and those of docs/learners.md: every figure in them is measured, and is the same on every machine.
 
 use std::process::Command;
 
 use serde_json::Value;
 
-/// Rows of the table: scenario, learner, and the cells converged, median, 90 %, worst.
-fn rows(text: &str) -> Vec<(String, String, [String; 4])> {
-    let lines = text.lines().skip_while(|line| !line.starts_with("| scenario | learner | converged |")).skip(2);
-    let mut scenario = String::new();
+/// The cells of the table under this head, where an empty first cell repeats the one above it.
+fn cells(text: &str, head: &str) -> Vec<Vec<String>> {
+    let lines = text.lines().skip_while(|line| !line.starts_with(head)).skip(2);
+    let mut first = String::new();
     let mut rows = Vec::new();
     for line in lines.take_while(|line| line.starts_with('|')) {
-        let cells: Vec<String> =
+        let mut cells: Vec<String> =
             line.trim_matches('|').split('|').map(|cell| cell.replace(['*', '`'], "").trim().to_owned()).collect();
-        let [named, learner, figures @ ..] = &cells[..] else { panic!("{line}") };
-        if !named.is_empty() {
-            scenario.clone_from(named);
+        match cells[0].is_empty() {
+            true => cells[0].clone_from(&first),
+            false => first.clone_from(&cells[0]),
         }
-        let figures = <[String; 4]>::try_from(figures.to_vec()).unwrap_or_else(|_| panic!("{line}"));
-        rows.push((scenario.clone(), learner.clone(), figures));
+        rows.push(cells);
     }
+    assert!(!rows.is_empty(), "no table under {head}");
     rows
+}
+
+/// Rows of the table of movements: scenario, learner, and the cells converged, median, 90 %, worst.
+fn movements(text: &str) -> Vec<(String, String, [String; 4])> {
+    let rows = cells(text, "| scenario | learner | converged |").into_iter();
+    rows.map(|row| {
+        let figures = <[String; 4]>::try_from(row[2..6].to_vec()).unwrap_or_else(|_| panic!("{row:?}"));
+        (row[0].clone(), row[1].clone(), figures)
+    })
+    .collect()
 }
 
 /// What a comparison says, as the table writes it.
@@ -40,10 +50,8 @@ fn measured(scenario: &str, learner: &str, steps: &str) -> [String; 4] {
     ]
 }
 
-#[test]
-fn the_table_of_movements_is_measured() {
-    let rows = rows(include_str!("../README.md"));
-    assert_eq!(rows.len(), 8);
+fn all_are_measured(rows: Vec<(String, String, [String; 4])>) {
+    assert_eq!(rows.len() % 2, 0, "two chains, the same learners");
     for (scenario, learner, figures) in rows {
         let steps = match (learner.as_str(), scenario.as_str()) {
             ("global", "arm-6dof") => "40",
@@ -51,5 +59,44 @@ fn the_table_of_movements_is_measured() {
             _ => "1000",
         };
         assert_eq!(measured(&scenario, &learner, steps), figures, "{scenario}, {learner}");
+    }
+}
+
+#[test]
+fn the_table_of_movements_is_measured() {
+    let rows = movements(include_str!("../README.md"));
+    assert_eq!(rows.len(), 8);
+    all_are_measured(rows);
+}
+
+const LEARNERS: &str = include_str!("../docs/learners.md");
+
+/// The first word of a cell: the scenario's name before what is said of it.
+fn name(cell: &str) -> &str {
+    cell.split([',', ' ']).next().expect("a word")
+}
+
+#[test]
+#[ignore = "half an hour: .ci/nightly tables"]
+fn the_tables_of_learners_are_measured() {
+    all_are_measured(movements(LEARNERS));
+    for row in cells(LEARNERS, "| scenario | movements made") {
+        assert_eq!(measured(name(&row[0]), "global", &row[1])[..], row[2..6], "{row:?}");
+    }
+    // Converged, and where half of the runs have: the median and the 90th percentile.
+    let brief = |[converged, median, ninety, _]: [String; 4]| match median.as_str() {
+        "–" => converged,
+        _ => format!("{converged}: {median}, {ninety}"),
+    };
+    for row in cells(LEARNERS, "| learner | what it is |") {
+        let learner = &row[0];
+        let scenarios =
+            [("arm-6dof", "1000", "40"), ("arm-6dof-doubled-error", "2000", "40"), ("arm-6dof-no-prior", "2000", "45")];
+        for ((scenario, steps, global), cell) in scenarios.into_iter().zip(&row[2..5]) {
+            if cell != "not offered" {
+                let steps = if learner == "global" { global } else { steps };
+                assert_eq!(brief(measured(scenario, learner, steps)), *cell, "{scenario}, {learner}");
+            }
+        }
     }
 }

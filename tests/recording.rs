@@ -1,14 +1,9 @@
 //! Recordings, read back with Rerun's own decoder, hold what the reports said.
 
-#[path = "recording/calibrations.rs"]
 mod calibrations;
-#[path = "recording/channels.rs"]
 mod channels;
-#[path = "recording/checks.rs"]
 mod checks;
-#[path = "recording/live.rs"]
 mod live;
-#[path = "recording/reading.rs"]
 mod reading;
 
 use std::{fs, path::PathBuf};

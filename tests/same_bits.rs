@@ -1,6 +1,5 @@
 //! The same bits from every processor: whole runs with plainer and wider instructions, on one thread and on two.
 
-#[path = "same_bits/runs.rs"]
 mod runs;
 
 use body_schema::{Instructions, use_at_most};

@@ -1,6 +1,5 @@
 //! Scenario files as users write them: what is wrong is said with file, line, key and mend.
 
-#[path = "scenarios/bounds.rs"]
 mod bounds;
 
 use body_schema::scenario::{BUILTIN, Problem, Scenario, ScenarioError, builtin};

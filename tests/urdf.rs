@@ -1,12 +1,8 @@
 //! Robot descriptions: what is read, what is refused and how, and that what is written is the model that was fitted.
 
-#[path = "urdf/library.rs"]
 mod library;
-#[path = "urdf/random.rs"]
 mod random;
-#[path = "urdf/reading.rs"]
 mod reading;
-#[path = "urdf/writing.rs"]
 mod writing;
 
 /// Robots as their makers describe them, with a base, a tip, and how many joints move between them.

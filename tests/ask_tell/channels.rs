@@ -10,7 +10,7 @@ use body_schema::{
 use nalgebra::{Isometry3, Vector3};
 use serde_json::{Value, json};
 
-use crate::robot::{Robot, open, quick};
+use crate::ask_tell::robot::{Robot, open, quick};
 
 /// What `calibrate` makes of the files that a session writes, from their texts.
 fn read_back(session: &Session) -> String {

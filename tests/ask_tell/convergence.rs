@@ -3,7 +3,7 @@
 use body_schema::ask_tell::Ask;
 use serde_json::json;
 
-use crate::robot::{Robot, open};
+use crate::ask_tell::robot::{Robot, open};
 
 /// Axes off by up to 3° and 1 cm, marker and base unknown, σ = 0.5 mm: 20 movements predict it to 0.9 mm in the mean, and 25 are enough. The URDF that
 /// comes of them does, too.

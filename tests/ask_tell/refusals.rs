@@ -8,7 +8,7 @@ use body_schema::ask_tell::{
 };
 use serde_json::{Value, json};
 
-use crate::robot::{Robot, open, quick};
+use crate::ask_tell::robot::{Robot, open, quick};
 
 #[test]
 fn setups() {

@@ -1,6 +1,6 @@
 //! What axe-core finds on a page. It is kept in `axe/` as its makers publish it, under the Mozilla Public License 2.0.
 
-use crate::driver::Browser;
+use crate::browser::driver::Browser;
 
 const AXE: &str = include_str!("axe/axe.min.js");
 

@@ -6,7 +6,7 @@ use fantoccini::wd::WebDriverCompatibleCommand;
 use reqwest::{Method, Url};
 use serde_json::{Value, json};
 
-use crate::driver::Browser;
+use crate::browser::driver::Browser;
 
 impl Browser {
     /// Gives the tab a screen of this size, pixels.

@@ -19,7 +19,7 @@ use reqwest::Url;
 use serde_json::{Value, json};
 use tokio::time::Instant;
 
-use crate::devtools::{Log, Network};
+use crate::browser::devtools::{Log, Network};
 
 const WAIT: Duration = Duration::from_secs(120);
 

@@ -1,6 +1,6 @@
 //! A visitor without a pointer, who may not see the panel's canvas either.
 
-use crate::{
+use crate::browser::{
     Server,
     axe::serious_findings,
     driver::Browser,

@@ -1,6 +1,6 @@
 //! A newcomer's two minutes: the first story from opening the page to its closing sentence, by the mouse alone.
 
-use crate::{
+use crate::browser::{
     Server,
     driver::Browser,
     pointer::{CONTROLS, click, place, reads},

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::driver::Browser;
+use crate::browser::driver::Browser;
 
 /// What has stood so long in one place stays there: a few frames of a busy machine.
 const STILL: Duration = Duration::from_millis(400);

@@ -3,11 +3,13 @@
 use serde_json::{Value, json};
 
 use crate::{
-    Server,
-    driver::Browser,
-    pointer::{click, reads},
-    robot_elsewhere::{carried_out, opening},
-    scene,
+    browser::{
+        Server,
+        driver::Browser,
+        pointer::{click, reads},
+        scene,
+    },
+    http::robot::{carried_out, opening},
 };
 
 /// What the robot's program asks the server.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use crate::{driver::Browser, pixels::Picture};
+use crate::browser::{driver::Browser, pixels::Picture};
 
 /// Long, because the pictures are computed without a graphics card.
 const DRAWN_WITHIN: Duration = Duration::from_secs(120);

@@ -1,6 +1,6 @@
 //! Small screens, large letters, and fingers.
 
-use crate::{Server, driver::Browser, scene::place, visits::ESCAPE};
+use crate::browser::{Server, driver::Browser, scene::place, visits::ESCAPE};
 
 /// A phone upright, on its side, and 1440 × 900 at 200 %.
 const SCREENS: [(u32, u32, bool); 3] = [(414, 896, true), (844, 390, true), (720, 450, false)];

@@ -1,6 +1,6 @@
 //! What visitors pass on.
 
-use crate::{
+use crate::browser::{
     Server,
     driver::Browser,
     keyboard::{ENTER, tab_to},

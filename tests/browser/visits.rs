@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::{
+use crate::browser::{
     Server,
     driver::Browser,
     scene::{at_rest, drawn, stays_as_it_is, turns_and_is_restored},

@@ -9,7 +9,7 @@ use std::{
 
 use flate2::{Compression, write::GzEncoder};
 
-use crate::{body_schema, failure};
+use crate::cli::{body_schema, failure};
 
 /// A calibration, and what its table is replaced by.
 fn with_table(folder: &Path, table: impl FnOnce(&Path)) -> String {

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{body_schema, failure};
+use crate::cli::{body_schema, failure};
 
 /// A folder with a calibration, its files, and an arm.
 struct Files(tempfile::TempDir);

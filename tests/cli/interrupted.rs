@@ -10,7 +10,7 @@ use std::{
 use re_log_encoding::DecoderApp;
 use serde_json::Value;
 
-use crate::{failure, heard::is_heard};
+use crate::cli::{failure, heard::is_heard};
 
 /// Whatever takes longer than this hangs.
 const SOON: Duration = Duration::from_secs(60);

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::{body_schema, failure, json};
+use crate::cli::{body_schema, failure, json};
 
 #[test]
 fn parts_that_were_computed_apart_merge_to_what_one_run_gives() {

@@ -8,7 +8,7 @@ use std::{
     process::{Command, Output, Stdio},
 };
 
-use crate::{body_schema, failure, json};
+use crate::cli::{body_schema, failure, json};
 
 /// Runs the program where no file may grow beyond so many bytes.
 fn limited(bytes: u64, arguments: &[&str]) -> Output {

@@ -9,7 +9,7 @@ use std::{
 
 use serde_json::json;
 
-use crate::{
+use crate::http::{
     program::Program,
     robot,
     support::{Api, SOON},

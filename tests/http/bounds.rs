@@ -3,7 +3,7 @@
 use body_schema::server::{Limits, Options};
 use serde_json::json;
 
-use crate::{
+use crate::http::{
     robot,
     support::{Server, problem},
 };

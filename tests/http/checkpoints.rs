@@ -10,7 +10,7 @@ use reqwest::{Method, StatusCode};
 use rusqlite::Connection;
 use serde_json::{Value, json};
 
-use crate::{
+use crate::http::{
     outside::tell,
     robot,
     streams::rows_of_recording,

@@ -6,7 +6,7 @@ use body_schema::{
 };
 use serde_json::json;
 
-use crate::support::{Server, problem};
+use crate::http::support::{Server, problem};
 
 #[tokio::test]
 async fn a_choice_can_be_looked_into_and_questioned() {

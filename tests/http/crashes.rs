@@ -9,7 +9,7 @@ use std::{
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 
-use crate::{program::Program, robot, support::Api};
+use crate::http::{program::Program, robot, support::Api};
 
 /// So many observations are posted while the server is killed.
 const OBSERVATIONS: usize = 50;

@@ -13,7 +13,7 @@ use tokio::{
 };
 use tokio_tungstenite::{WebSocketStream, client_async, tungstenite::Message};
 
-use crate::{
+use crate::http::{
     program::Program,
     support::{Api, SOON, Server, problem},
 };

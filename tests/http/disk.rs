@@ -7,7 +7,7 @@ use std::{path::Path, process::Command};
 use reqwest::{Method, StatusCode};
 use serde_json::json;
 
-use crate::{
+use crate::http::{
     program::Program,
     robot,
     streams::steps_of_recording,

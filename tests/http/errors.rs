@@ -3,7 +3,7 @@
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 
-use crate::support::{Server, problem};
+use crate::http::support::{Server, problem};
 
 #[tokio::test]
 async fn bodies() {

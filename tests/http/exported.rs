@@ -5,7 +5,7 @@ use std::{io::Read, process::Command};
 use flate2::read::GzDecoder;
 use serde_json::{Value, json};
 
-use crate::{outside::tell, program::Program, robot, streams::steps_of_recording};
+use crate::http::{outside::tell, program::Program, robot, streams::steps_of_recording};
 
 #[tokio::test]
 async fn a_stored_session_is_exported_while_its_server_runs() {

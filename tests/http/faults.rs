@@ -11,7 +11,7 @@ use reqwest::StatusCode;
 use serde_json::{Value, json};
 use tokio::{io::AsyncWriteExt, net::TcpStream};
 
-use crate::{
+use crate::http::{
     program::Program,
     robot,
     streams::steps_of_recording,

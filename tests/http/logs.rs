@@ -6,7 +6,7 @@ use std::{collections::BTreeSet, process::Command, time::Duration};
 use reqwest::{Client, Method, StatusCode, redirect::Policy};
 use serde_json::{Value, json};
 
-use crate::{
+use crate::http::{
     program::{LOG, Program},
     support::problem,
 };

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use body_schema::server::{Limits, Options};
 use serde_json::json;
 
-use crate::{
+use crate::http::{
     robot,
     support::{Server, problem},
 };

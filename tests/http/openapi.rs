@@ -4,7 +4,7 @@ use body_schema::server::{Limits, Options};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use crate::support::{Server, timeless};
+use crate::http::support::{Server, timeless};
 
 const ROUTES: [(&str, &str); 37] = [
     ("get", "/v1/scenarios"),
@@ -174,7 +174,7 @@ async fn responses_are_as_described() {
     let set = server.post(&path, json!({ "configuration": [0.1, 0.2, -0.3, -1.0, 0.4, 0.5] })).await;
     check(("post", route), 200, set.json().await.expect("JSON"));
     check(("get", route), 200, server.get_json(&path).await);
-    let created = server.post("/v1/sessions", crate::robot::opening()).await;
+    let created = server.post("/v1/sessions", crate::http::robot::opening()).await;
     let session = created.headers()["location"].to_str().expect("text").to_owned();
     check(("post", "/v1/sessions"), 201, created.json().await.expect("JSON"));
     let suggestions = "/v1/sessions/{id}/suggestions";
@@ -185,7 +185,7 @@ async fn responses_are_as_described() {
     let outcome = server.post(&format!("{session}/suggestions/2/outcome"), json!({ "state": "abandoned" })).await;
     check(("post", "/v1/sessions/{id}/suggestions/{sid}/outcome"), 200, outcome.json().await.expect("JSON"));
     let observations = "/v1/sessions/{id}/observations";
-    let told = crate::robot::carried_out(&asked["suggestions"][0]);
+    let told = crate::http::robot::carried_out(&asked["suggestions"][0]);
     let told = server.post(&format!("{session}/observations"), told).await;
     check(("post", observations), 201, told.json().await.expect("JSON"));
     check(("get", observations), 200, server.get_json(&format!("{session}/observations")).await);
@@ -200,7 +200,7 @@ async fn responses_are_as_described() {
     let path = format!("{session}/learners/global/configuration");
     let nobody = server.get(&path).await;
     check(("get", "/v1/sessions/{id}/learners/{name}/configuration"), 409, nobody.json().await.expect("JSON"));
-    for event in crate::streams::first_messages(&server, &session, 1).await {
+    for event in crate::http::streams::first_messages(&server, &session, 1).await {
         contract.check_schema(&live, &event);
     }
     let steps = server.post(&format!("{session}/steps"), json!({})).await;

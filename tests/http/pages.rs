@@ -5,7 +5,7 @@ use std::io::Read;
 use body_schema::server::Options;
 use reqwest::{Method, StatusCode};
 
-use crate::support::Server;
+use crate::http::support::Server;
 
 #[tokio::test]
 async fn the_page_and_all_that_it_names_are_served() {

@@ -8,7 +8,7 @@ use std::{
 
 use serde_json::json;
 
-use crate::support::{Api, steps};
+use crate::http::support::{Api, steps};
 
 /// Names the level of the program's log.
 pub const LOG: &str = "BODY_SCHEMA_LOG";
@@ -167,5 +167,5 @@ async fn sessions_are_recorded_although_reruns_switch_is_off() {
     let session = program.api.open_quick(1).await;
     assert_eq!(steps(&program.api.step(&session, 2).await["reports"]), [1, 2]);
     let recording = program.api.get(&format!("{session}/recording.rrd")).await.bytes().await.expect("a recording");
-    assert_eq!(crate::streams::steps_of_recording(&recording), (0..=2).collect());
+    assert_eq!(crate::http::streams::steps_of_recording(&recording), (0..=2).collect());
 }

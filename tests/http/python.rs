@@ -5,7 +5,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use crate::program::Program;
+use crate::http::program::Program;
 
 /// A Python that has the package, if there is one.
 fn python() -> Option<String> {

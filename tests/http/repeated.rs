@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::{
+use crate::http::{
     program::Program,
     robot,
     streams::rows_of_recording,

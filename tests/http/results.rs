@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, process::Command};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
-use crate::{
+use crate::http::{
     outside::tell,
     robot,
     support::{Server, problem},

@@ -7,7 +7,7 @@ use re_log_encoding::DecoderApp;
 use re_log_types::LogMsg;
 use serde_json::json;
 
-use crate::support::{Server, problem, steps};
+use crate::http::support::{Server, problem, steps};
 
 /// The times of an entity's rows in a recording.
 fn times(recording: &[u8], entity: &str, timeline: &'static str) -> BTreeSet<i64> {
@@ -28,7 +28,7 @@ async fn live_until<const N: usize>(server: &Server, session: &str, entity: &str
     let mut live = server.get(&format!("{session}/live.rrd")).await;
     let mut bytes = Vec::new();
     while bytes.len() < 13 || !times(&bytes, entity, "motion").is_superset(&wanted.into()) {
-        let more = tokio::time::timeout(crate::support::SOON, live.chunk()).await.expect("soon");
+        let more = tokio::time::timeout(crate::http::support::SOON, live.chunk()).await.expect("soon");
         bytes.extend(more.expect("a connection").expect("more"));
     }
     bytes

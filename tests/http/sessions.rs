@@ -8,7 +8,7 @@ use futures_util::future::join_all;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
-use crate::support::{Server, problem, steps, timeless};
+use crate::http::support::{Server, problem, steps, timeless};
 
 #[tokio::test]
 async fn a_whole_life() {
@@ -68,7 +68,7 @@ async fn who_follows_the_events_need_not_get_the_reports_twice() {
     assert_eq!(made, json!({ "step": 2, "remaining": null, "reports": [] }));
     let made: Value = server.post(&format!("{session}/steps"), steps_of(true)).await.json().await.expect("JSON");
     assert_eq!((&made["step"], steps(&made["reports"])), (&json!(4), vec![3, 4]));
-    assert_eq!(crate::streams::steps_of_events(&server, &session, 4).await, [0, 1, 2, 3, 4]);
+    assert_eq!(crate::http::streams::steps_of_events(&server, &session, 4).await, [0, 1, 2, 3, 4]);
     let wrong = json!({ "reports": "none" });
     problem(server.post(&format!("{session}/steps"), wrong).await, 422, Some("reports")).await;
     server.stop().await;
@@ -103,7 +103,7 @@ async fn downloads_agree_with_the_reports() {
     let recording = server.get(&format!("{session}/recording.rrd")).await;
     assert_eq!(recording.headers()["content-disposition"], "attachment; filename=\"arm-6dof-seed7-step5.rrd\"");
     let recording = recording.bytes().await.expect("a recording");
-    assert_eq!(crate::streams::steps_of_recording(&recording), (0..=5).collect());
+    assert_eq!(crate::http::streams::steps_of_recording(&recording), (0..=5).collect());
     server.stop().await;
 }
 
@@ -143,7 +143,7 @@ async fn a_recording_does_not_wait_for_the_steps_to_come() {
             tokio::time::sleep(std::time::Duration::from_millis(20)).await;
         }
         let recording = server.get(&format!("{session}/recording.rrd")).await.bytes().await.expect("a recording");
-        let made = crate::streams::steps_of_recording(&recording).len();
+        let made = crate::http::streams::steps_of_recording(&recording).len();
         assert!((2..1001).contains(&made), "{made} steps");
         server.delete(&session).await;
     };

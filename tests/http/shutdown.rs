@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use reqwest::{Method, StatusCode};
 use serde_json::json;
 
-use crate::{
+use crate::http::{
     streams::steps_of_recording,
     support::{SOON, Server},
 };

@@ -11,7 +11,10 @@ use tokio::{
     net::TcpStream,
 };
 
-use crate::{heard::is_heard, program::Program, streams::steps_of_recording};
+use crate::{
+    cli::heard::is_heard,
+    http::{program::Program, streams::steps_of_recording},
+};
 
 /// Ending takes five seconds at most; the machine that runs this may be busy.
 const SOON: Duration = Duration::from_secs(8);

@@ -9,7 +9,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio_tungstenite::{client_async, tungstenite::client::IntoClientRequest};
 use tokio_util::sync::CancellationToken;
 
-use crate::{
+use crate::http::{
     program::Program,
     support::{Api, Server, problem},
 };

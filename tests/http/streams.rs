@@ -15,7 +15,7 @@ use tokio_tungstenite::{
     tungstenite::{Message, protocol::frame::coding::CloseCode},
 };
 
-use crate::{
+use crate::http::{
     robot,
     support::{SOON, Server, timeless},
 };

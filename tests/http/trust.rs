@@ -14,7 +14,7 @@ use tokio::{
     time::{sleep, timeout},
 };
 
-use crate::{
+use crate::http::{
     robot,
     support::{Server, problem},
 };
@@ -277,7 +277,7 @@ mod memory {
     use tokio_tungstenite::client_async;
 
     use super::*;
-    use crate::program::Program;
+    use crate::http::program::Program;
 
     /// The memory stays within bounds whoever takes nothing of what is sent, and small requests are answered throughout.
     #[tokio::test]

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use crate::program::Program;
+use crate::http::program::Program;
 
 /// The shell's lines of a document, but for those that start the server.
 fn shell(document: &str) -> String {

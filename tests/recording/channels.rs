@@ -9,7 +9,7 @@ use body_schema::{
 };
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 
-use crate::{checks::check, path, reading::Reading, record, run};
+use crate::recording::{checks::check, path, reading::Reading, record, run};
 
 fn recorded(scenario: &str, steps: usize) -> (Reading, Vec<StepReport>, Vec<String>) {
     let (description, reports) = run(scenario, steps);

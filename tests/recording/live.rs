@@ -5,7 +5,7 @@ use std::fs;
 use body_schema::recording::{LiveLog, Recorder, Target, Theme};
 use futures_util::FutureExt;
 
-use crate::{
+use crate::recording::{
     checks::check,
     path,
     reading::{self, Reading},

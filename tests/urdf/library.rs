@@ -3,7 +3,7 @@
 //! To compute them anew, let this test write the descriptions, and the script beside it read them:
 //!
 //! ```sh
-//! cargo test --test urdf library; pip install yourdfpy
+//! cargo test --test all urdf::library; pip install yourdfpy
 //! python tests/urdf/forward_kinematics.py target/tmp/panda.urdf panda_link0 panda_link8 > tests/urdf/panda.json
 //! ```
 
