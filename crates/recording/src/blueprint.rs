@@ -1,5 +1,7 @@
 //! How a viewer arranges a recording when it opens it.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -7,7 +9,7 @@ use super::{
     charts::{BEST_DESIGN, CHARTS, CHARTS_WITHOUT_TRUTH, TRACE},
     layout::{Container, Part, Time, View},
     rerun::{
-        ApplicationId, EntityPath, LogMsg, Range2D,
+        EntityPath, LogMsg, Range2D, StoreId, StoreKind,
         blueprint::{
             archetypes::{
                 Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, VisualBounds2D as Bounds,
@@ -77,8 +79,10 @@ pub(super) struct Arranger {
     /// The roots of the learners.
     pub(super) roots: Vec<EntityPath>,
     pub(super) stage: Stage,
-    /// That of the recording.
-    pub(super) application: ApplicationId,
+    /// The recording.
+    pub(super) recording: StoreId,
+    /// How often it was arranged: viewers take up only what they have not met.
+    pub(super) arranged: AtomicU64,
 }
 
 impl Arranger {
@@ -90,13 +94,18 @@ impl Arranger {
         let tabs = self.partitions().into_iter().chain(self.limits()).chain(self.readings()).chain([note]);
         below.push(Container::tabs(tabs).into());
         let root = Container::vertical([scene, Container::horizontal(below).into()], [3.0, 1.0]);
-        root.messages(self.application.clone(), Time::Shown)
+        root.messages(self.store(), Time::Shown)
     }
 
     /// For a page that has controls and curves of its own: the scene alone, to look at and to turn.
     pub(super) fn scene(&self, theme: Theme, aspect: f64) -> Result<Vec<LogMsg>, RecordingError> {
         let scene: Part = self.view(theme, aspect, false).into();
-        Container::tabs([scene]).messages(self.application.clone(), Time::Led)
+        Container::tabs([scene]).messages(self.store(), Time::Led)
+    }
+
+    /// The store of one more arrangement.
+    fn store(&self) -> StoreId {
+        arrangement(&self.recording, self.arranged.fetch_add(1, Ordering::Relaxed))
     }
 
     /// All learners in one view. With `details` it can be asked what is what, there is a key to the colours, and the arms
@@ -177,12 +186,14 @@ impl Arranger {
     }
 }
 
+/// The store of an arrangement of a recording.
+fn arrangement(recording: &StoreId, number: u64) -> StoreId {
+    let name = format!("{}-arrangement-{number}", recording.recording_id().as_str());
+    StoreId::new(StoreKind::Blueprint, recording.application_id().clone(), name)
+}
+
 /// For a calibration: the robot beside the report, the residuals of all rows below.
-pub(super) fn calibration(
-    stage: &Stage,
-    application: ApplicationId,
-    unit: Unit,
-) -> Result<Vec<LogMsg>, RecordingError> {
+pub(super) fn calibration(stage: &Stage, recording: &StoreId, unit: Unit) -> Result<Vec<LogMsg>, RecordingError> {
     let [target, eye] = stage.camera(Shape::default().aspect()).map(|point| single(point.coords.into()));
     let contents = ["robot/**", "body/**", GROUNDS[0], "key"].map(|entity| format!("+ /{entity}"));
     let scene = View::new("3D", "The calibrated robot, row by row", &EntityPath::root())
@@ -196,7 +207,7 @@ pub(super) fn calibration(
     let outliers = chart("Probability of an outlier, by row", ["+ /outliers".to_owned()], Some([-0.05, 1.05]));
     let above = Container::horizontal([scene.into(), report.into()]);
     let below = Container::horizontal([residuals, outliers]);
-    Container::vertical([above.into(), below.into()], [2.0, 1.0]).messages(application, Time::Shown)
+    Container::vertical([above.into(), below.into()], [2.0, 1.0]).messages(arrangement(recording, 0), Time::Shown)
 }
 
 /// Curves; the vertical axis shows `range`, or what it takes.

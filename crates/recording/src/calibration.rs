@@ -65,9 +65,9 @@ const CLOUD: u8 = 70;
 pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &str) -> Result<(), RecordingError> {
     let name = &found.report.scenario;
     let application = ApplicationId::new_or_unknown(format!("body-schema-calibration-{name}"));
-    let store = StoreId::recording(application.clone(), format!("{name}-calibration"));
+    let store = StoreId::recording(application, format!("{name}-calibration"));
     let scene = Scene::of(found, case);
-    let mut rows = Rows::default();
+    let mut rows = Rows::of(&store);
     let title = RecordingInfo::new().with_name(format!("{name}, calibration"));
     rows.always(&EntityPath::properties(), &[&title]);
     rows.always(&EntityPath::root(), &[&ViewCoordinates::RIGHT_HAND_Z_UP()]);
@@ -95,7 +95,7 @@ pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &s
     }
     let mut file = RrdFile::create(path)?;
     file.append(&[message::store_info(&store)])?;
-    file.append(&arrangement(&scene.stage, application, found.report.unit)?)?;
+    file.append(&arrangement(&scene.stage, &store, found.report.unit)?)?;
     let messages: Vec<_> =
         rows.steps(|_| true)?.iter().map(|chunk| message::data(&store, chunk)).collect::<Result<_, _>>()?;
     file.append(&messages)?;

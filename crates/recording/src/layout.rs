@@ -6,10 +6,12 @@
 use uuid::Uuid;
 
 use super::{
-    MOTION, RecordingError, TIMELINE, message,
+    MOTION, RecordingError, TIMELINE,
+    ids::RowIds,
+    message,
     rerun::{
-        ApplicationId, Archetype, AsComponents, BlueprintActivationCommand, Chunk, EntityPath, LogMsg, RowId,
-        SerializedComponentBatch, StoreId, StoreKind, Timeline,
+        Archetype, AsComponents, BlueprintActivationCommand, Chunk, EntityPath, LogMsg, SerializedComponentBatch,
+        StoreId, Timeline,
         blueprint::{
             archetypes::{
                 ContainerBlueprint, EntityBehavior, PanelBlueprint, TimePanelBlueprint, ViewBlueprint, ViewContents,
@@ -99,10 +101,10 @@ impl Container {
     }
 
     /// The messages of a blueprint of this container alone, with all panels out of the way: those of the blueprint's
-    /// store, the command that activates it last. `application` is that of the recording.
-    pub(super) fn messages(self, application: ApplicationId, time: Time) -> Result<Vec<LogMsg>, RecordingError> {
-        let store = StoreId::random(StoreKind::Blueprint, application);
-        let mut blueprint = Blueprint { messages: vec![message::store_info(&store)], store, parts: 0 };
+    /// store, the command that activates it last.
+    pub(super) fn messages(self, store: StoreId, time: Time) -> Result<Vec<LogMsg>, RecordingError> {
+        let (messages, ids) = (vec![message::store_info(&store)], RowIds::of(&store));
+        let mut blueprint = Blueprint { messages, store, ids, parts: 0 };
         let root = blueprint.add_part(self.into())?.id;
         let viewport = ViewportBlueprint::new().with_root_container(RootContainer(root.into()));
         blueprint.add("viewport", &viewport.with_auto_layout(false).with_auto_views(false))?;
@@ -134,6 +136,7 @@ impl From<Container> for Part {
 struct Blueprint {
     store: StoreId,
     messages: Vec<LogMsg>,
+    ids: RowIds,
     /// How many views and containers it has.
     parts: u128,
 }
@@ -175,7 +178,7 @@ impl Blueprint {
     fn add(&mut self, entity: impl Into<EntityPath>, what: &dyn AsComponents) -> Result<(), RecordingError> {
         // Viewers look for blueprints on this timeline.
         let time = [(Timeline::new_sequence("blueprint"), 0)];
-        let chunk = Chunk::builder(entity).with_serialized_batches(RowId::new(), time, what.as_serialized_batches());
+        let chunk = Chunk::builder(entity).with_serialized_batches(self.ids.next(), time, what.as_serialized_batches());
         self.messages.push(message::data(&self.store, &chunk.build()?)?);
         Ok(())
     }

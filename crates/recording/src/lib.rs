@@ -78,6 +78,7 @@ mod error;
 mod file;
 mod frames;
 mod head;
+mod ids;
 mod layout;
 mod learner;
 mod live;

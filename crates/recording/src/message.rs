@@ -6,16 +6,17 @@
 
 use super::{
     RecordingError,
-    rerun::{Chunk, LogMsg, RowId, SetStoreInfo, StoreId, StoreInfo, StoreSource},
+    ids::{self, RowIds},
+    rerun::{Chunk, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource},
 };
 
 /// The first message of a store: what it is.
 pub(super) fn store_info(store: &StoreId) -> LogMsg {
     let info = StoreInfo::new(store.clone(), StoreSource::Other("body-schema".to_owned()));
-    SetStoreInfo { row_id: *RowId::new(), info }.into()
+    SetStoreInfo { row_id: *RowIds::of_store(store), info }.into()
 }
 
 /// The message that adds a chunk to a store.
 pub(super) fn data(store: &StoreId, chunk: &Chunk) -> Result<LogMsg, RecordingError> {
-    Ok(LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?))
+    Ok(LogMsg::ArrowMsg(store.clone(), chunk.clone_with_id(ids::chunk(store, chunk)).to_arrow_msg()?))
 }

@@ -1,10 +1,9 @@
 //! The observer that records.
 
 use body_schema_palette::{learner_color, learner_slots};
-use std::{
-    collections::HashSet,
-    time::{Duration, Instant},
-};
+use std::{collections::HashSet, sync::atomic::AtomicU64, time::Duration};
+
+use web_time::Instant;
 
 use super::{
     EllipsoidSize, LiveLog, MOST_FRAMES, RecordingError, TRUTH_COLOR, Target, Theme,
@@ -18,7 +17,7 @@ use super::{
     note::{key, note},
     rerun::{ApplicationId, Chunk, Color, EntityPath, LogMsg, RecordingInfo, SeriesLines, StoreId, ViewCoordinates},
     room::Room,
-    rows::{Rows, complete},
+    rows::Rows,
     stage::{GROUNDS, Stage},
     values::cells,
 };
@@ -99,10 +98,11 @@ impl Recorder {
                 LearnerEntities::new((index, learner_color(slot), name), description, ellipsoids)
             })
             .collect();
+        let store = StoreId::recording(ApplicationId::new_or_unknown(application), recording);
         let mut recorder = Self {
             description: description.clone(),
-            store: StoreId::recording(ApplicationId::new_or_unknown(application), recording),
-            rows: Rows::default(),
+            rows: Rows::of(&store),
+            store,
             file: file.as_deref().map(create).transpose()?,
             file_failure: None,
             live,
@@ -244,7 +244,7 @@ impl Recorder {
         let Self { rows, incomplete, store, file, live, .. } = self;
         let Some(live) = live else { return Ok(()) };
         let news = rows.news(|sheet| !hidden.contains(sheet.entity()), file.is_some()).and_then(|mut news| {
-            news.extend(incomplete.take().map(complete).transpose()?);
+            news.extend(incomplete.take().map(|step| rows.complete(step)).transpose()?);
             live.append(&messages(store, &news)?)
         });
         live.catch_up();
@@ -274,7 +274,7 @@ impl Recorder {
 
     /// Gives the recording up: no file is left of it, and the log is closed.
     pub fn discard(mut self) {
-        self.rows = Rows::default();
+        self.rows = Rows::of(&self.store);
         (self.finished, self.incomplete) = (true, None);
         if let Some(file) = self.file.take() {
             file.discard();
@@ -387,7 +387,8 @@ impl Recorder {
             description: self.description.clone(),
             roots: self.learners.iter().map(|learner| learner.root.clone()).collect(),
             stage: stage.clone(),
-            application: self.store.application_id().clone(),
+            recording: self.store.clone(),
+            arranged: AtomicU64::new(0),
         };
         let whole = arranger.whole()?;
         // To both targets, whatever happens to the other.
@@ -406,6 +407,42 @@ impl Drop for Recorder {
     fn drop(&mut self) {
         if let Err(error) = self.end() {
             tracing::error!("{error}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use body_schema_scenario::builtin;
+
+    use super::*;
+
+    /// A run recorded for those who follow it: what is written live, and the file that is put together of it. Someone follows it only
+    /// if `followed`, and it is flushed after every so many steps.
+    fn recorded(name: &str, steps: u64, every: u64, followed: bool) -> (Vec<u8>, Vec<u8>) {
+        let mut experiment = builtin(name).expect("a scenario").experiment(4711, None).expect("an experiment");
+        let live = LiveLog::new();
+        let follower = followed.then(|| live.subscribe());
+        let target = Target::live(live.clone()).with_recording_id("the same");
+        let mut recorder = Recorder::new(experiment.description(), target).expect("begun");
+        recorder.log(experiment.latest()).expect("recorded");
+        for step in 1..=steps {
+            recorder.log_moving(experiment.step().expect("a step"), 3).expect("recorded");
+            if step % every == 0 {
+                recorder.flush_shown().expect("flushed");
+            }
+        }
+        recorder.seal().expect("sealed");
+        drop(follower);
+        (live.parts_from(0).concat(), live.complete().expect("put together"))
+    }
+
+    #[test]
+    fn a_run_has_the_same_recording_whenever_and_however_it_is_written() {
+        for (name, steps) in [("arm-6dof", 12), ("head-fov", 5), ("arm-6dof-camera", 4)] {
+            let (live, file) = recorded(name, steps, 1, true);
+            assert_eq!(recorded(name, steps, 1, true), (live, file.clone()), "{name}");
+            assert!(recorded(name, steps, 4, false).1 == file, "{name}, flushed at other times");
         }
     }
 }

@@ -10,8 +10,9 @@ use std::{
 
 use super::{
     COMPLETE, MOTION, MOTION_PER_STEP, RecordingError, TIMELINE,
+    ids::RowIds,
     rerun::{
-        AsComponents, Chunk, ChunkError, ComponentIdentifier, DynamicArchetype, EntityPath, RowId, Timeline,
+        AsComponents, Chunk, ChunkError, ComponentIdentifier, DynamicArchetype, EntityPath, StoreId, Timeline,
         arrow::array::UInt64Array,
     },
     sheet::{Sheet, Timelines, When, sequence},
@@ -32,6 +33,7 @@ pub(super) struct Rows {
     kinds: HashMap<EntityPath, u64>,
     step: Timeline,
     motion: Timeline,
+    ids: RowIds,
 }
 
 /// Components that say how something looks. They hold until they are logged again, and each costs some 300 bytes in
@@ -39,15 +41,14 @@ pub(super) struct Rows {
 const LOOKS: [&str; 8] =
     ["colors", "draw_order", "fill_mode", "labels", "lengths", "line_radii", "radii", "show_labels"];
 
-impl Default for Rows {
-    fn default() -> Self {
+impl Rows {
+    /// None yet of this store.
+    pub(super) fn of(store: &StoreId) -> Self {
         let [step, motion] = [TIMELINE, MOTION].map(Timeline::new_sequence);
         let (sheets, index, looks, kinds) = Default::default();
-        Self { sheets, index, looks, kinds, step, motion }
+        Self { sheets, index, looks, kinds, step, motion, ids: RowIds::of(store) }
     }
-}
 
-impl Rows {
     /// What holds at all times.
     pub(super) fn always(&mut self, entity: &EntityPath, what: &[&dyn AsComponents]) {
         self.always_plain(entity, cells(what.iter().copied()));
@@ -55,7 +56,8 @@ impl Rows {
 
     /// The same where components are told one by one.
     pub(super) fn always_plain(&mut self, entity: &EntityPath, cells: Vec<Cell>) {
-        self.sheet(entity, When::Always).push(0, cells);
+        let id = self.ids.next();
+        self.sheet(entity, When::Always).push((id, 0), cells);
     }
 
     /// What holds from a step on, until the entity's next row.
@@ -66,7 +68,8 @@ impl Rows {
     /// The same where components are told one by one.
     pub(super) fn plain(&mut self, step: u64, entity: &EntityPath, mut cells: Vec<Cell>) {
         self.drop_looks(entity, &mut cells);
-        self.sheet(entity, When::Step).push(motion(step, 0), cells);
+        let id = self.ids.next();
+        self.sheet(entity, When::Step).push((id, motion(step, 0)), cells);
     }
 
     /// The same for what is drawn again and again: its look is asked for when the entity has no row yet, or its last one was
@@ -87,12 +90,14 @@ impl Rows {
 
     /// A number of a series at a step.
     pub(super) fn number(&mut self, step: u64, series: &EntityPath, number: f64) {
-        self.sheet(series, When::Step).push_number(motion(step, 0), number);
+        let id = self.ids.next();
+        self.sheet(series, When::Step).push_number((id, motion(step, 0)), number);
     }
 
     /// What holds so many ticks after a step, until the entity's next row. Whoever sees steps alone does not see it.
     pub(super) fn after(&mut self, step: u64, ticks: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
-        self.sheet(entity, When::Between).push(motion(step, ticks), cells(what.iter().copied()));
+        let id = self.ids.next();
+        self.sheet(entity, When::Between).push((id, motion(step, ticks)), cells(what.iter().copied()));
     }
 
     fn sheet(&mut self, entity: &EntityPath, when: When) -> &mut Sheet {
@@ -137,6 +142,16 @@ impl Rows {
         wanted.filter_map(|sheet| sheet.all(&named).transpose()).collect()
     }
 
+    /// Says that all rows of a step that views show stand before this one.
+    pub(super) fn complete(&self, step: u64) -> Result<Chunk, ChunkError> {
+        let time = [(Timeline::new_sequence(COMPLETE), sequence(step))];
+        let mark = DynamicArchetype::new_without_archetype()
+            .with_component_from_data("step", Arc::new(UInt64Array::from_iter_values([step])));
+        Chunk::builder(COMPLETE)
+            .with_serialized_batches(self.ids.of_complete(step), time, mark.as_serialized_batches())
+            .build()
+    }
+
     /// Whether so many bytes of one entity wait.
     pub(super) fn has_large(&self, bytes: usize) -> bool {
         self.sheets.iter().any(|sheet| sheet.bytes() >= bytes)
@@ -148,14 +163,6 @@ pub(super) fn by_steps(chunk: &Chunk) -> Option<Chunk> {
     let step = TIMELINE.into();
     let is_wanted = chunk.is_static() || chunk.timelines().contains_key(&step);
     is_wanted.then(|| chunk.timeline_sliced(step))
-}
-
-/// Says that all rows of a step that views show stand before this one.
-pub(super) fn complete(step: u64) -> Result<Chunk, ChunkError> {
-    let time = [(Timeline::new_sequence(COMPLETE), sequence(step))];
-    let mark = DynamicArchetype::new_without_archetype()
-        .with_component_from_data("step", Arc::new(UInt64Array::from_iter_values([step])));
-    Chunk::builder(COMPLETE).with_serialized_batches(RowId::new(), time, mark.as_serialized_batches()).build()
 }
 
 fn motion(step: u64, ticks: u64) -> u64 {
@@ -189,7 +196,7 @@ mod tests {
     #[test]
     fn both_readers_get_every_row_once() {
         let [hand, error] = ["hand", "error"].map(EntityPath::from);
-        let mut rows = Rows::default();
+        let mut rows = Rows::of(&StoreId::recording("test", "test"));
         let step = |rows: &mut Rows, step: u64| {
             rows.at(step, &hand, &[&place(step as f32)]);
             rows.after(step, 1, &hand, &[&place(0.5)]);
@@ -214,7 +221,7 @@ mod tests {
     #[test]
     fn looks_are_said_when_they_change() {
         let hand = EntityPath::from("hand");
-        let mut rows = Rows::default();
+        let mut rows = Rows::of(&StoreId::recording("test", "test"));
         let look = |label: &'static str| move || Points3D::update_fields().with_labels([label]);
         for (step, kind, label) in [(0, 0, "a"), (1, 0, "not asked for"), (2, 1, "b")] {
             let place = Values::Triples(vec![[step as f32, 0.0, 0.0]]);

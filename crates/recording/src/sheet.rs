@@ -63,8 +63,8 @@ impl Sheet {
         &self.entity
     }
 
-    pub(super) fn push(&mut self, ticks: u64, components: impl IntoIterator<Item = Cell>) {
-        let row = self.begin_row(ticks);
+    pub(super) fn push(&mut self, (id, ticks): (RowId, u64), components: impl IntoIterator<Item = Cell>) {
+        let row = self.begin_row(id, ticks);
         for (descriptor, values) in components {
             self.bytes += values.bytes();
             let (length, kind) = (values.len(), discriminant(&values));
@@ -84,13 +84,13 @@ impl Sheet {
         self.bytes
     }
 
-    pub(super) fn push_number(&mut self, ticks: u64, number: f64) {
-        self.begin_row(ticks);
+    pub(super) fn push_number(&mut self, (id, ticks): (RowId, u64), number: f64) {
+        self.begin_row(id, ticks);
         self.numbers.push(number);
     }
 
-    fn begin_row(&mut self, ticks: u64) -> usize {
-        self.ids.push(RowId::new());
+    fn begin_row(&mut self, id: RowId, ticks: u64) -> usize {
+        self.ids.push(id);
         self.ticks.push(ticks);
         self.ids.len() - 1
     }
