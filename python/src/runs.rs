@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use body_schema_experiment::{Comparison, RunResult, StepReport, Trace};
+use body_schema_experiment::{Experiment, Learner, LearnerOutcome};
 use body_schema_scenario::{Scenario, ScenarioError, builtin};
+use body_schema_wire::{Comparison, Metrics, RunResult, Trace};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -36,11 +37,12 @@ pub fn simulate(
         let scenario = scenario(name)?;
         let mut experiment = scenario.experiment(seed, learners.as_deref())?;
         let left = experiment.remaining().map_or(u64::MAX, |left| left as u64);
-        let mut curve = rows(experiment.latest());
+        let mut curve = rows(&experiment);
         for _ in 0..steps.unwrap_or(scenario.steps).min(left) {
-            curve.extend(rows(experiment.step().map_err(ScenarioError::from)?));
+            experiment.step().map_err(ScenarioError::from)?;
+            curve.extend(rows(&experiment));
         }
-        let result: RunResult = experiment.result();
+        let result = RunResult::of(&experiment);
         Ok(json!({ "result": result, "curve": curve }).to_string())
     });
     Ok(answer?)
@@ -71,18 +73,20 @@ pub fn compare(
     Ok(answer?)
 }
 
-/// The metrics that are numbers, by learner.
-fn rows(report: &StepReport) -> Vec<Value> {
-    let row = |learner: &body_schema_experiment::LearnerReport| {
-        let metrics = serde_json::to_value(&learner.metrics).unwrap_or_default();
+/// The metrics of the latest step that are numbers, by learner.
+fn rows(experiment: &Experiment) -> Vec<Value> {
+    let outcome = experiment.latest();
+    let step = outcome.step;
+    let row = |(learner, outcome): (&Learner, &LearnerOutcome)| {
+        let metrics = serde_json::to_value(Metrics::from(&outcome.metrics)).unwrap_or_default();
         let mut row = Map::from_iter([
-            ("step".to_owned(), report.step.into()),
-            ("learner".to_owned(), learner.name.as_str().into()),
+            ("step".to_owned(), step.into()),
+            ("learner".to_owned(), learner.setting.name.as_str().into()),
         ]);
         let metrics =
             metrics.as_object().into_iter().flatten().filter(|(_, value)| !value.is_array() && !value.is_object());
         row.extend(metrics.map(|(name, value)| (name.clone(), value.clone())));
         Value::Object(row)
     };
-    report.learners.iter().map(row).collect()
+    experiment.learners().iter().zip(&outcome.learners).map(row).collect()
 }

@@ -29,11 +29,13 @@ fn run(scenario: &Scenario, experiment: &mut Experiment, steps: usize) -> Vec<f6
     let mut stands = vec![constraints.start.clone(); learners];
     let mut travelled = vec![0.0; learners];
     for step in 0..steps {
-        let report = experiment.step().expect("a step");
-        for ((learner, stands), travelled) in report.learners.iter().zip(&mut stands).zip(&mut travelled) {
+        let outcome = experiment.step().expect("a step");
+        for (index, ((learner, stands), travelled)) in
+            outcome.learners.iter().zip(&mut stands).zip(&mut travelled).enumerate()
+        {
             let Some(movement) = &learner.movement else { continue };
             let violation = constraints.violation(stands.as_deref(), &movement.configuration);
-            assert!(violation.is_none(), "step {step}, {}: {violation:?}", learner.name);
+            assert!(violation.is_none(), "step {step}, learner {index}: {violation:?}");
             *travelled += stands.as_ref().map_or(0.0, |stands| travel(stands, &movement.configuration));
             *stands = Some(movement.configuration.clone());
         }
