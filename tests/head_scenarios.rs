@@ -85,15 +85,14 @@ fn active_starts_at_the_visible_pose_and_all_learners_may_miss() {
     let (head, pose, truth) = watched(&scenario);
     let mut experiment = scenario.experiment(4, None).expect("starts");
     for step in 0..30 {
-        experiment.step().expect("a step");
-        let report = StepReport::of(&experiment);
-        for learner in &report.learners {
+        let outcome = experiment.step().expect("a step");
+        for learner in &outcome.learners {
             let movement = learner.movement.as_ref().expect("moved");
             if step == 0 && learner.name == "active" {
                 assert_eq!(movement.configuration, pose);
             }
             let seen = head.sees(&truth.marker_at(&movement.configuration));
-            assert_eq!(movement.measured_marker_m.is_some(), seen);
+            assert_eq!(movement.measured_marker.is_some(), seen);
         }
     }
     let misses = |index: usize| experiment.latest().learners[index].metrics.misses;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use body_schema_experiment::{Experiment, Learner, LearnerOutcome};
+use body_schema_experiment::{LearnerOutcome, StepOutcome};
 use body_schema_scenario::{Scenario, ScenarioError, builtin};
 use body_schema_wire::{Comparison, Metrics, RunResult, Trace};
 use pyo3::prelude::*;
@@ -37,10 +37,9 @@ pub fn simulate(
         let scenario = scenario(name)?;
         let mut experiment = scenario.experiment(seed, learners.as_deref())?;
         let left = experiment.remaining().map_or(u64::MAX, |left| left as u64);
-        let mut curve = rows(&experiment);
+        let mut curve = rows(experiment.latest());
         for _ in 0..steps.unwrap_or(scenario.steps).min(left) {
-            experiment.step().map_err(ScenarioError::from)?;
-            curve.extend(rows(&experiment));
+            curve.extend(rows(experiment.step().map_err(ScenarioError::from)?));
         }
         let result = RunResult::of(&experiment);
         Ok(json!({ "result": result, "curve": curve }).to_string())
@@ -73,20 +72,18 @@ pub fn compare(
     Ok(answer?)
 }
 
-/// The metrics of the latest step that are numbers, by learner.
-fn rows(experiment: &Experiment) -> Vec<Value> {
-    let outcome = experiment.latest();
-    let step = outcome.step;
-    let row = |(learner, outcome): (&Learner, &LearnerOutcome)| {
-        let metrics = serde_json::to_value(Metrics::from(&outcome.metrics)).unwrap_or_default();
+/// The metrics that are numbers, by learner.
+fn rows(outcome: &StepOutcome) -> Vec<Value> {
+    let row = |learner: &LearnerOutcome| {
+        let metrics = serde_json::to_value(Metrics::from(&learner.metrics)).unwrap_or_default();
         let mut row = Map::from_iter([
-            ("step".to_owned(), step.into()),
-            ("learner".to_owned(), learner.setting.name.as_str().into()),
+            ("step".to_owned(), outcome.step.into()),
+            ("learner".to_owned(), learner.name.as_str().into()),
         ]);
         let metrics =
             metrics.as_object().into_iter().flatten().filter(|(_, value)| !value.is_array() && !value.is_object());
         row.extend(metrics.map(|(name, value)| (name.clone(), value.clone())));
         Value::Object(row)
     };
-    experiment.learners().iter().zip(&outcome.learners).map(row).collect()
+    outcome.learners.iter().map(row).collect()
 }

@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
         files.observe(&experiment);
         bar.inc(1);
-        if ending.as_ref().is_some_and(|ending| ending.is_reached(&experiment)) {
+        if ending.as_ref().is_some_and(|ending| ending.is_reached(experiment.latest())) {
             break;
         }
     }
@@ -105,7 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if !arguments.json.as_deref().is_some_and(output::is_stdout) {
         summarise(&result)?;
         if let Some(ending) = &ending {
-            output::say(ending.told(&experiment))?;
+            output::say(ending.told(experiment.latest()))?;
         }
         for path in written {
             output::say(format!("wrote {}", path.display()))?;

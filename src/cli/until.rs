@@ -1,7 +1,7 @@
 //! What ends a run early.
 
 use anyhow::Result;
-use body_schema_experiment::{Experiment, SETTLING_STEPS};
+use body_schema_experiment::{SETTLING_STEPS, StepOutcome};
 use body_schema_scenario::{LearnerSpec, Scenario};
 
 use super::BadInput;
@@ -43,21 +43,21 @@ impl Ending {
     }
 
     /// Whether every learner that can be settled is.
-    pub fn is_reached(&self, experiment: &Experiment) -> bool {
-        let mut outcomes = experiment.learners().iter().zip(&experiment.latest().learners);
-        outcomes.all(|(learner, outcome)| outcome.metrics.settled || !self.awaited.contains(&learner.setting.name))
+    pub fn is_reached(&self, outcome: &StepOutcome) -> bool {
+        let mut awaited = outcome.learners.iter().filter(|learner| self.awaited.contains(&learner.name));
+        awaited.all(|learner| learner.metrics.settled)
     }
 
-    /// Why a run ended where it stands.
-    pub fn told(&self, experiment: &Experiment) -> String {
+    /// Why a run ended with this step.
+    pub fn told(&self, outcome: &StepOutcome) -> String {
         let Self { target, others, .. } = self;
-        let steps = experiment.latest().step;
+        let steps = outcome.step;
         let but = if others.is_empty() {
             String::new()
         } else {
             format!(" ({} not waited for: no covariance to tell by)", list(others))
         };
-        if self.is_reached(experiment) {
+        if self.is_reached(outcome) {
             format!(
                 "stopped after {steps} movements: every learner is settled{but}, its own expected error was below {target}"
             )

@@ -237,6 +237,7 @@ impl Experiment {
             .zip(fared)
             .zip(judgements)
             .map(|((learner, (movement, _)), Judgement { metrics, allowed })| LearnerOutcome {
+                name: learner.setting.name.clone(),
                 movement,
                 metrics,
                 allowed,

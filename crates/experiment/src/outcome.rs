@@ -21,6 +21,8 @@ pub struct StepOutcome {
 /// One learner after one step. What it believes then is its [belief](super::Learner::belief).
 #[derive(Clone, Debug, PartialEq)]
 pub struct LearnerOutcome {
+    /// Its name.
+    pub name: String,
     /// The movement of this step; `None` at step 0 and after a failure.
     pub movement: Option<MovementOutcome>,
     /// The metrics after the update.

@@ -164,8 +164,7 @@ impl Choice {
     pub fn of(experiment: &Experiment, learner: &str) -> Result<Self, ChoiceError> {
         let Chosen { configuration, search, limits, before, after } = experiment.choice(learner)?;
         let outcome = experiment.latest();
-        let places = experiment.setting().learners.iter().zip(&outcome.learners);
-        let movement = places.filter(|(known, _)| known.name == learner).find_map(|(_, it)| it.movement.as_ref());
+        let movement = outcome.learners.iter().find(|it| it.name == learner).and_then(|it| it.movement.as_ref());
         let (settings, partition) = (search.settings(), search.partition());
         let searched = partition.searched(&limits);
         let point = searched.to_unit(&configuration);

@@ -230,7 +230,7 @@ impl RunResult {
             .zip(experiment.verdicts())
             .enumerate()
             .map(|(index, ((learner, outcome), verdict))| LearnerResult {
-                name: learner.setting.name.clone(),
+                name: outcome.name.clone(),
                 estimator: learner.setting.estimator.clone(),
                 policy: learner.setting.policy.clone(),
                 converged_at: verdict.convergence.converged_at(),

@@ -118,10 +118,10 @@ impl StepReport {
 
 impl LearnerReport {
     fn of(experiment: &Experiment, index: usize, (learner, outcome): (&Learner, &LearnerOutcome)) -> Self {
-        let LearnerOutcome { movement, metrics, allowed, failure } = outcome;
+        let LearnerOutcome { name, movement, metrics, allowed, failure } = outcome;
         let (belief, truth) = (learner.belief(), experiment.world().truth());
         Self {
-            name: learner.setting.name.clone(),
+            name: name.clone(),
             movement: movement.as_ref().map(|movement| MovementReport::of(experiment, index, learner, movement)),
             estimate: ModelReport::of_outcome(belief, truth, allowed),
             metrics: metrics.into(),

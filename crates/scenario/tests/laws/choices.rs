@@ -97,11 +97,12 @@ fn a_planner_appraises_by_its_own_criterion() {
         let learner = &experiment.step().expect("a step").learners[0];
         let movement = learner.movement.clone().expect("a movement");
         let found = experiment.appraise("global", &movement.configuration).expect("an appraisal");
-        assert!((found.criterion - movement.criterion().expect("chosen by it")).abs() < 1e-9 * found.trace);
+        let found = found.appraisal;
+        assert!((found.criterion - movement.criterion().expect("chosen by it")).abs() < 1e-9 * found.before);
         let plain = Criterion::new(&belief, &weights).expect("a covariance");
         let plain = plain.appraise(&movement.configuration).expect("an appraisal");
         assert!((plain.criterion / found.criterion - 1.0).abs() > 0.01, "{} {}", plain.criterion, found.criterion);
-        assert!(found.trace > plain.before, "what is between hypotheses counts too");
+        assert!(found.before > plain.before, "what is between hypotheses counts too");
     }
 }
 

@@ -6,6 +6,7 @@ use body_schema_engine::{
 };
 use body_schema_experiment::{Agent, ChoiceError, Event, Executed, Experiment, NoiseSequence};
 use body_schema_scenario::{Scenario, builtin};
+use body_schema_wire::Choice;
 
 /// A built-in scenario with `[constraints]`, and searches short enough for a test.
 fn bound(name: &str, constraints: &str) -> Scenario {
@@ -29,13 +30,11 @@ fn run(scenario: &Scenario, experiment: &mut Experiment, steps: usize) -> Vec<f6
     let mut stands = vec![constraints.start.clone(); learners];
     let mut travelled = vec![0.0; learners];
     for step in 0..steps {
-        let outcome = experiment.step().expect("a step");
-        for (index, ((learner, stands), travelled)) in
-            outcome.learners.iter().zip(&mut stands).zip(&mut travelled).enumerate()
-        {
+        let report = experiment.step().expect("a step");
+        for ((learner, stands), travelled) in report.learners.iter().zip(&mut stands).zip(&mut travelled) {
             let Some(movement) = &learner.movement else { continue };
             let violation = constraints.violation(stands.as_deref(), &movement.configuration);
-            assert!(violation.is_none(), "step {step}, learner {index}: {violation:?}");
+            assert!(violation.is_none(), "step {step}, {}: {violation:?}", learner.name);
             *travelled += stands.as_ref().map_or(0.0, |stands| travel(stands, &movement.configuration));
             *stands = Some(movement.configuration.clone());
         }
@@ -67,7 +66,7 @@ fn every_movement_of_a_run_is_feasible() {
     assert!(travelled.iter().all(|way| (1.0..=most).contains(way)), "{travelled:?}");
     assert!(experiment.latest().learners.iter().all(|learner| learner.failure.is_none()));
     // DIRECT's box is what can be reached; the choice says so, and holds what was chosen.
-    let choice = experiment.choice("active").expect("searched by DIRECT");
+    let choice = Choice::of(&experiment, "active").expect("searched by DIRECT");
     for (joint, x) in choice.joints.iter().zip(&choice.chosen.configuration) {
         assert!(joint.limits[1] - joint.limits[0] <= 50_f64.to_radians() + 1e-9 && !joint.name.is_empty());
         assert!((joint.limits[0]..=joint.limits[1]).contains(x));

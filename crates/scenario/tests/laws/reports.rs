@@ -12,7 +12,7 @@ fn scenarios() -> Vec<(Scenario, usize)> {
         [("arm-6dof", 6), ("head-fov", 6), ("arm-6dof-camera", 3), ("arm-6dof-outliers", 4), ("panda-sockets", 4)];
     let plain = plain.map(|(name, steps)| (builtin(name).expect("built in"), steps));
     let text = builtin("body-change").expect("built in").source.replace("\nstep = 300\n", "\nstep = 3\n");
-    let changing = Scenario::parse("changing.toml", text, &|_| Err("has no data".to_owned())).expect("valid");
+    let changing = Scenario::parse("changing.toml", &text, &|_| Err("has no data".to_owned())).expect("valid");
     plain.into_iter().chain([(changing, 6)]).collect()
 }
 

@@ -235,9 +235,8 @@ fn degenerate_arms_end_nobody() {
         let learners = ["active", "unscented", "global"].map(str::to_owned);
         let mut experiment = changed_arm(from, to).experiment(1001, Some(&learners)).expect("an experiment");
         for _ in 0..15 {
-            experiment.step().expect("a step");
-            for (learner, setting) in experiment.latest().learners.iter().zip(&experiment.setting().learners) {
-                let (name, metrics) = (&setting.name, &learner.metrics);
+            for learner in &experiment.step().expect("a step").learners {
+                let (name, metrics) = (&learner.name, &learner.metrics);
                 assert!(learner.failure.is_none(), "{name}: {:?}", learner.failure);
                 let told = [metrics.prediction_mean_m, metrics.expected_prediction_m, metrics.trace];
                 assert!(told.iter().all(|number| number.is_some_and(f64::is_finite)), "{name}: {told:?}");
