@@ -37,7 +37,8 @@
 //! | `body-schema-robot` | [`robot`] | descriptions of robots: URDF read and written |
 //! | `body-schema-table` | [`table`] | tables of measurements in CSV, read as they stream by |
 //! | `body-schema-diagnostics` | [`diagnostics`] | what is doubtful in such a table, with the evidence |
-//! | `body-schema-experiment` | [`experiment`] | agents that propose and absorb, a world, a judge; the reports that everything outside reads |
+//! | `body-schema-experiment` | [`experiment`] | agents that propose and absorb, a world, a judge; what came of every step |
+//! | `body-schema-wire` | [`wire`] | the reports that everything outside reads, made of that once they are wanted |
 //! | `body-schema-scenario` | [`scenario`] | scenario files, strictly read, and the experiments that are drawn from them |
 //! | `body-schema-calibration` | [`calibration`] | a robot calibrated by a table: fits, folds, figures, corrected descriptions |
 //! | `body-schema-ask-tell` | [`ask_tell`] | sessions with a robot elsewhere, which is asked to move and tells what it saw |
@@ -63,7 +64,6 @@ pub use body_schema_engine::{
     Instructions, design, elementary, estimation, kinematics, magnitude, model, optimize, parallel, selection, sensing,
     similar, use_at_most,
 };
-pub use body_schema_experiment as experiment;
 pub use body_schema_files as files;
 pub use body_schema_paper as paper;
 pub use body_schema_recording as recording;
@@ -71,6 +71,19 @@ pub use body_schema_report as report;
 pub use body_schema_robot as robot;
 pub use body_schema_scenario as scenario;
 pub use body_schema_table as table;
+pub use body_schema_wire as wire;
+
+/// Several learners in one world, step by step; and what is [told](wire) of them, as it was always named beside them.
+pub mod experiment {
+    pub use body_schema_experiment::*;
+    #[doc(no_inline)]
+    pub use body_schema_wire::{
+        AppraisalReport, BoxReport, ChannelReading, Choice, ChosenReport, Comparison, Curve, Description,
+        IterationReport, JointDescription, JointReport, LearnerComparison, LearnerDescription, LearnerReport,
+        LearnerResult, ModelReport, MovementReport, Quantiles, RunResult, RunSummary, SeedRun, StepReport, Summary,
+        Trace,
+    };
+}
 
 /// The code in the README, compiled and run.
 #[cfg(doctest)]

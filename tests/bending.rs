@@ -4,7 +4,7 @@ mod simulated;
 
 use body_schema::{
     calibration::{Calibration, Case, Extra, Figures, Options, Silent, Trial, calibrate},
-    experiment::{LearnerReport, ModelReport},
+    experiment::{LearnerReport, ModelReport, StepReport},
     robot::{Chain, Urdf},
     scenario::{Scenario, builtin},
 };
@@ -178,7 +178,7 @@ fn learners_that_are_asked_to_learn_what_gives_way() {
         for _ in 0..80 {
             experiment.step().expect("a step");
         }
-        let learner = experiment.latest().learners[0].clone();
+        let learner = StepReport::of(&experiment).learners.remove(0);
         (scenario, learner)
     };
     let ((scenario, knows), (_, knows_not)) = (ends(true), ends(false));

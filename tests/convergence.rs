@@ -3,7 +3,7 @@
 mod sensors;
 
 use body_schema::{
-    experiment::{Comparison, LearnerComparison, SeedRun, Trace},
+    experiment::{Comparison, LearnerComparison, RunResult, SeedRun, StepReport, Trace},
     scenario::{BUILTIN, Scenario, builtin},
     selection::Optimality,
 };
@@ -112,7 +112,7 @@ fn the_same_seed_gives_the_same_numbers() {
         let run = || {
             let mut experiment = scenario.experiment(5, None).expect("starts");
             (0..25).map(|_| experiment.step().map(|_| ())).collect::<Result<Vec<_>, _>>().expect("25 steps");
-            let mut report = experiment.latest().clone();
+            let mut report = StepReport::of(&experiment);
             for movement in report.learners.iter_mut().filter_map(|learner| learner.movement.as_mut()) {
                 movement.selection_ms = 0.0;
             }
@@ -126,11 +126,12 @@ fn the_same_seed_gives_the_same_numbers() {
 fn all_learners_of_a_seed_start_alike_and_see_the_same_noise() {
     let scenario = builtin("arm-6dof").expect("built in");
     let mut experiment = scenario.experiment(8, None).expect("starts");
-    let start = experiment.latest().clone();
+    let start = StepReport::of(&experiment);
     assert_eq!(start.learners[0].estimate.marker_m, start.learners[1].estimate.marker_m);
     let axes = |learner: usize| start.learners[learner].estimate.joints.iter().map(|j| j.axis).collect::<Vec<_>>();
     assert!(axes(0) == axes(1) && axes(1) == axes(2));
-    let report = experiment.step().expect("a step");
+    experiment.step().expect("a step");
+    let report = StepReport::of(&experiment);
     let noise = |learner: usize| {
         let movement = report.learners[learner].movement.as_ref().expect("moved");
         let truth = movement.true_skeleton_m.as_ref().and_then(|points| points.last()).expect("a marker");
@@ -183,7 +184,7 @@ fn the_global_learner_is_honest_and_knows_when_it_is_done() {
                 assert!((0.6..1.6).contains(&ratio), "seed {seed}, {step} movements: {ratio}");
             }
         }
-        let result = experiment.result().learners.remove(0);
+        let result = RunResult::of(&experiment).learners.remove(0);
         let (converged, settled) = (result.converged_at.expect("converges"), result.settled_at.expect("settles"));
         ratios.push(settled as f64 / converged as f64);
     }
@@ -201,7 +202,7 @@ fn the_global_learner_notices_a_changed_body_and_learns_it_anew() {
     for seed in 451..=454 {
         let mut experiment = scenario.experiment(seed, Some(&["global".to_owned()])).expect("starts");
         (0..350).for_each(|_| assert!(experiment.step().is_ok()));
-        let result = experiment.result().learners.remove(0);
+        let result = RunResult::of(&experiment).learners.remove(0);
         assert_eq!(result.false_alarms, 0, "seed {seed}");
         assert!(result.change_detected_at.is_some_and(|at| at <= 10), "seed {seed}: {:?}", result.change_detected_at);
         assert!(result.recovered_at.is_some_and(|at| at <= 25), "seed {seed}: {:?}", result.recovered_at);

@@ -1,7 +1,7 @@
 //! Scenarios with a head that watches or a body that changes: what is wrong in a file, and what learners may know.
 
 use body_schema::{
-    experiment::Summary,
+    experiment::{RunResult, StepReport, Summary},
     model::State,
     scenario::{Problem, Scenario, ScenarioError, WorldSpec, builtin},
     sensing::Head,
@@ -85,14 +85,14 @@ fn active_starts_at_the_visible_pose_and_all_learners_may_miss() {
     let (head, pose, truth) = watched(&scenario);
     let mut experiment = scenario.experiment(4, None).expect("starts");
     for step in 0..30 {
-        let report = experiment.step().expect("a step");
-        for learner in &report.learners {
+        let outcome = experiment.step().expect("a step");
+        for learner in &outcome.learners {
             let movement = learner.movement.as_ref().expect("moved");
             if step == 0 && learner.name == "active" {
                 assert_eq!(movement.configuration, pose);
             }
             let seen = head.sees(&truth.marker_at(&movement.configuration));
-            assert_eq!(movement.measured_marker_m.is_some(), seen);
+            assert_eq!(movement.measured_marker.is_some(), seen);
         }
     }
     let misses = |index: usize| experiment.latest().learners[index].metrics.misses;
@@ -112,7 +112,8 @@ fn what_is_known_stays_fixed() {
     assert_eq!(scenario.robot.layout.dimension(), 16);
     let mut experiment = scenario.experiment(2, None).expect("starts");
     for _ in 0..25 {
-        let report = experiment.step().expect("a step");
+        experiment.step().expect("a step");
+        let report = StepReport::of(&experiment);
         for learner in &report.learners {
             for (index, name) in scenario.robot.names.iter().enumerate() {
                 let joint = &learner.estimate.joints[index];
@@ -135,7 +136,7 @@ fn stabilising_noise_lets_the_filter_recover_from_a_changed_body() {
         let run = |seed: u64| {
             let mut experiment = scenario.experiment(seed, Some(&[learner.to_owned()])).expect("starts");
             (0..600).for_each(|_| assert!(experiment.step().is_ok()));
-            let learner = experiment.result().learners.remove(0);
+            let learner = RunResult::of(&experiment).learners.remove(0);
             learner.recovered_at
         };
         Summary::of((1..=8).map(run))
@@ -149,5 +150,5 @@ fn stabilising_noise_lets_the_filter_recover_from_a_changed_body() {
 fn without_a_change_nothing_recovers() {
     let mut experiment = builtin("arm-6dof").expect("built in").experiment(1, None).expect("starts");
     (0..40).for_each(|_| assert!(experiment.step().is_ok_and(|report| report.truth.is_none())));
-    assert!(experiment.result().learners.iter().all(|learner| learner.recovered_at.is_none()));
+    assert!(RunResult::of(&experiment).learners.iter().all(|learner| learner.recovered_at.is_none()));
 }

@@ -300,7 +300,7 @@ fn a_row_is_chosen_by_what_its_own_socket_tells() {
     let mut experiment = scenario.experiment(1, Some(&["rls:active".to_owned()])).expect("offered");
     for _ in 0..12 {
         let learner = &experiment.step().expect("a row").learners[0];
-        let (expected, found) = (learner.movement.as_ref().and_then(|it| it.criterion), learner.metrics.trace);
+        let (expected, found) = (learner.movement.as_ref().and_then(|it| it.criterion()), learner.metrics.trace);
         let (expected, found) = (expected.expect("chosen"), found.expect("kept"));
         assert!((found / expected - 1.0).abs() < 0.05, "{expected} {found}");
     }
@@ -362,7 +362,7 @@ fn runs_of_poses_and_sockets_tell_their_errors() {
         for _ in 0..6 {
             experiment.step().expect("a row");
         }
-        let result: RunResult = experiment.result();
+        let result = RunResult::of(&experiment);
         let metrics = &result.learners[0].metrics;
         assert_eq!((metrics.prediction_mean_deg.is_some(), metrics.scatter_m.is_some()), (of_poses, !of_poses));
         assert_eq!(metrics.prediction_mean_m.is_some(), of_poses, "{name}");

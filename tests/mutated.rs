@@ -127,11 +127,11 @@ fn recordings() {
     let whole = folder.path().join("whole.rrd");
     let mut experiment =
         builtin("arm-6dof").expect("built in").experiment(1, Some(&["random".to_owned()])).expect("valid");
-    let mut recorder = Recorder::new(experiment.description(), Target::file(&whole)).expect("a recorder");
-    recorder.log(experiment.latest()).expect("recorded");
+    let mut recorder = Recorder::new(&Description::of(&experiment), Target::file(&whole)).expect("a recorder");
+    recorder.log(&StepReport::of(&experiment)).expect("recorded");
     for _ in 0..3 {
         experiment.step().expect("a step");
-        recorder.log(experiment.latest()).expect("recorded");
+        recorder.log(&StepReport::of(&experiment)).expect("recorded");
     }
     recorder.finish().expect("finished");
     let whole = fs::read(whole).expect("the recording");

@@ -10,7 +10,7 @@ use std::{fs, path::PathBuf};
 
 use body_schema::{
     design::best_designs,
-    experiment::{Comparison, Description, StepReport, Trace},
+    experiment::{Comparison, Description, Experiment, StepReport, Trace},
     recording::{
         EllipsoidSize, LiveLog, Recorder, RecordingError, StepsCsv, Target, comparison_csv, learner_color,
         learner_slots,
@@ -20,13 +20,19 @@ use body_schema::{
 use checks::check;
 use reading::Reading;
 
+/// The report of one more step.
+fn next(experiment: &mut Experiment) -> StepReport {
+    experiment.step().unwrap();
+    StepReport::of(experiment)
+}
+
 fn run(scenario: &str, steps: usize) -> (Description, Vec<StepReport>) {
     let mut experiment = builtin(scenario).unwrap().experiment(3, None).unwrap();
-    let mut reports = vec![experiment.latest().clone()];
+    let mut reports = vec![StepReport::of(&experiment)];
     for _ in 0..steps {
-        reports.push(experiment.step().unwrap().clone());
+        reports.push(next(&mut experiment));
     }
-    (experiment.description().clone(), reports)
+    (Description::of(&experiment), reports)
 }
 
 fn path(name: &str) -> PathBuf {
@@ -159,14 +165,14 @@ fn a_changed_body_is_drawn_anew() {
     let text = scenario.source.replace("\nstep = 300", "\nstep = 2");
     let scenario = Scenario::parse("sooner", &text, &|_| Err("none".into())).unwrap();
     let mut experiment = scenario.experiment(3, None).unwrap();
-    let mut reports = vec![experiment.latest().clone()];
+    let mut reports = vec![StepReport::of(&experiment)];
     (0..4).for_each(|_| reports.push(experiment.step().unwrap().clone()));
     let changed: Vec<bool> = reports.iter().map(|report| report.truth.is_some()).collect();
     assert_eq!(changed, [false, false, false, true, false]);
     let live = LiveLog::new();
-    record(experiment.description(), &reports, Target::live(live.clone()));
+    record(&Description::of(&experiment), &reports, Target::live(live.clone()));
     let reading = Reading::of(&live.complete().unwrap());
-    check(&reading, experiment.description(), &reports);
+    check(&reading, &Description::of(&experiment), &reports);
     assert_eq!(reading.steps("/active/zero/truth/links"), [0, 3]);
 }
 

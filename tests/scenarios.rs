@@ -345,7 +345,7 @@ fn distances_alone_are_a_sensor_too() {
     assert_eq!((scenario.rig.channels().len(), scenario.rig.equations()), (4, 4));
     let mut experiment = scenario.experiment(1001, Some(&["global".to_owned(), "active".to_owned()])).expect("starts");
     // Four distances hold no more than the three coordinates of a position.
-    assert_eq!(experiment.description().movements_by_counting, 8);
+    assert_eq!(experiment.setting().movements_by_counting, 8);
     (0..30).for_each(|_| assert!(experiment.step().is_ok()));
     let [global, active] = [0, 1].map(|index| experiment.latest().learners[index].metrics.clone());
     assert_eq!((global.nis_dof, active.nis_dof), (Some(4), Some(4)));

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use body_schema_experiment::{Comparison, RunResult, StepReport, Trace};
+use body_schema_experiment::{LearnerOutcome, StepOutcome};
 use body_schema_scenario::{Scenario, ScenarioError, builtin};
+use body_schema_wire::{Comparison, Metrics, RunResult, Trace};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -40,7 +41,7 @@ pub fn simulate(
         for _ in 0..steps.unwrap_or(scenario.steps).min(left) {
             curve.extend(rows(experiment.step().map_err(ScenarioError::from)?));
         }
-        let result: RunResult = experiment.result();
+        let result = RunResult::of(&experiment);
         Ok(json!({ "result": result, "curve": curve }).to_string())
     });
     Ok(answer?)
@@ -72,11 +73,11 @@ pub fn compare(
 }
 
 /// The metrics that are numbers, by learner.
-fn rows(report: &StepReport) -> Vec<Value> {
-    let row = |learner: &body_schema_experiment::LearnerReport| {
-        let metrics = serde_json::to_value(&learner.metrics).unwrap_or_default();
+fn rows(outcome: &StepOutcome) -> Vec<Value> {
+    let row = |learner: &LearnerOutcome| {
+        let metrics = serde_json::to_value(Metrics::from(&learner.metrics)).unwrap_or_default();
         let mut row = Map::from_iter([
-            ("step".to_owned(), report.step.into()),
+            ("step".to_owned(), outcome.step.into()),
             ("learner".to_owned(), learner.name.as_str().into()),
         ]);
         let metrics =
@@ -84,5 +85,5 @@ fn rows(report: &StepReport) -> Vec<Value> {
         row.extend(metrics.map(|(name, value)| (name.clone(), value.clone())));
         Value::Object(row)
     };
-    report.learners.iter().map(row).collect()
+    outcome.learners.iter().map(row).collect()
 }

@@ -10,6 +10,7 @@ use body_schema_ask_tell::{
     json::{self, Unreadable},
 };
 use body_schema_calibration::Silent;
+use body_schema_wire::RunResult;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
@@ -116,7 +117,7 @@ impl Engine {
     }
 
     fn description(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(self.with(py, |session| written(session.description()))?)
+        Ok(self.with(py, |session| written(&session.description()))?)
     }
 
     fn status(&self, py: Python<'_>) -> PyResult<String> {
@@ -124,11 +125,11 @@ impl Engine {
     }
 
     fn estimate(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(self.with(py, |session| written(&session.latest().learners[0].estimate))?)
+        Ok(self.with(py, |session| written(&session.report().learners[0].estimate))?)
     }
 
     fn model(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(self.with(py, |session| written(&session.experiment().result().learners[0].model))?)
+        Ok(self.with(py, |session| written(&RunResult::of(session.experiment()).learners[0].model))?)
     }
 
     /// Predicted places of the hand at postures, metres.

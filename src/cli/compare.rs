@@ -7,9 +7,9 @@ use std::{
 
 use anyhow::{Context, Result};
 use body_schema_engine::design::best_designs;
-use body_schema_experiment::{Comparison, LearnerComparison, Trace};
 use body_schema_recording::comparison_csv;
 use body_schema_scenario::{Scenario, ScenarioError};
+use body_schema_wire::{Comparison, LearnerComparison, Trace};
 use comfy_table::Table;
 use rayon::prelude::*;
 

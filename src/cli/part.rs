@@ -11,9 +11,9 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use body_schema_experiment::{Comparison, Trace};
 use body_schema_files::AtomicFile;
 use body_schema_table::Guard;
+use body_schema_wire::{Comparison, Trace};
 use flate2::{Compression, bufread::GzDecoder, write::GzEncoder};
 use serde::{Deserialize, Serialize};
 

@@ -8,9 +8,10 @@ use std::{
 
 use anyhow::{Context, Result};
 use body_schema_engine::design::{BestDesign, best_designs};
-use body_schema_experiment::{Experiment, RunResult};
+use body_schema_experiment::Experiment;
 use body_schema_files::AtomicFile;
 use body_schema_recording::{EllipsoidSize, Recorder, StepsCsv, Target};
+use body_schema_wire::{Description, RunResult, StepReport};
 
 use super::{
     ScenarioArguments, designs,
@@ -82,7 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     bar.finish_and_clear();
 
-    let mut result = experiment.result();
+    let mut result = RunResult::of(&experiment);
     if arguments.limits {
         let stretches = scenario.design_stretches(result.steps);
         if let Some(designs) = interruption.unless(move || best_designs(&stretches)) {
@@ -130,7 +131,7 @@ impl<'a> Files<'a> {
     fn begin(experiment: &Experiment, arguments: &'a Arguments) -> Result<Self> {
         let recording = arguments.rrd.as_deref().map(|path| -> Result<_> {
             let target = Target::file(path).with_ellipsoids(arguments.ellipsoids);
-            Ok((path, Recorder::new(experiment.description(), target)?))
+            Ok((path, Recorder::new(&Description::of(experiment), target)?))
         });
         let mut begun = Self { recording: recording.transpose()?, table: None, failures: Failures::default() };
         let table = arguments.csv.as_deref().map(|path| Ok((path, StepsTable::begin(experiment, path)?)));
@@ -145,8 +146,11 @@ impl<'a> Files<'a> {
     }
 
     fn observe(&mut self, experiment: &Experiment) {
-        let report = experiment.latest();
-        let recorded = self.recording.as_mut().map_or(Ok(()), |(_, recorder)| recorder.log(report));
+        if self.recording.is_none() && self.table.is_none() {
+            return;
+        }
+        let report = StepReport::of(experiment);
+        let recorded = self.recording.as_mut().map_or(Ok(()), |(_, recorder)| recorder.log(&report));
         if let Err(error) = recorded {
             self.recording.take().into_iter().for_each(|(_, recorder)| recorder.discard());
             self.give_up(error.into());
@@ -154,7 +158,7 @@ impl<'a> Files<'a> {
         let tabled = self
             .table
             .as_mut()
-            .map_or(Ok(()), |(path, table)| table.rows.write(report).with_context(|| output::cannot(path)));
+            .map_or(Ok(()), |(path, table)| table.rows.write(&report).with_context(|| output::cannot(path)));
         if let Err(error) = tabled {
             self.table = None;
             self.give_up(error);
@@ -194,7 +198,7 @@ impl<'a> Files<'a> {
 impl StepsTable {
     fn begin(experiment: &Experiment, path: &Path) -> Result<Self> {
         let (file, whole) = output::create(path)?;
-        let rows = StepsCsv::new(experiment.description(), file).with_context(|| output::cannot(path))?;
+        let rows = StepsCsv::new(&Description::of(experiment), file).with_context(|| output::cannot(path))?;
         Ok(Self { rows, whole })
     }
 }

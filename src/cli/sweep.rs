@@ -5,8 +5,8 @@
 use std::{path::PathBuf, str::FromStr};
 
 use anyhow::Result;
-use body_schema_experiment::Summary;
 use body_schema_scenario::{Scenario, edited};
+use body_schema_wire::Summary;
 use serde::Serialize;
 use toml::Value;
 

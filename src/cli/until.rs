@@ -1,7 +1,7 @@
 //! What ends a run early.
 
 use anyhow::Result;
-use body_schema_experiment::{SETTLING_STEPS, StepReport};
+use body_schema_experiment::{SETTLING_STEPS, StepOutcome};
 use body_schema_scenario::{LearnerSpec, Scenario};
 
 use super::BadInput;
@@ -43,21 +43,21 @@ impl Ending {
     }
 
     /// Whether every learner that can be settled is.
-    pub fn is_reached(&self, report: &StepReport) -> bool {
-        let mut awaited = report.learners.iter().filter(|learner| self.awaited.contains(&learner.name));
+    pub fn is_reached(&self, outcome: &StepOutcome) -> bool {
+        let mut awaited = outcome.learners.iter().filter(|learner| self.awaited.contains(&learner.name));
         awaited.all(|learner| learner.metrics.settled)
     }
 
-    /// Why a run ended with this report.
-    pub fn told(&self, report: &StepReport) -> String {
+    /// Why a run ended with this step.
+    pub fn told(&self, outcome: &StepOutcome) -> String {
         let Self { target, others, .. } = self;
-        let steps = report.step;
+        let steps = outcome.step;
         let but = if others.is_empty() {
             String::new()
         } else {
             format!(" ({} not waited for: no covariance to tell by)", list(others))
         };
-        if self.is_reached(report) {
+        if self.is_reached(outcome) {
             format!(
                 "stopped after {steps} movements: every learner is settled{but}, its own expected error was below {target}"
             )

@@ -98,7 +98,7 @@ impl<'a> Plan<'a> {
         if steps > most || steps == 0 {
             return Err(ExportError::Steps { scenario: scenario.name.clone(), steps, most });
         }
-        let learners = session.description().learners.iter().map(|learner| learner.name.clone()).collect();
+        let learners = session.experiment().setting().learners.iter().map(|learner| learner.name.clone()).collect();
         Ok(Self { scenario, learners, steps, told: Some(session) })
     }
 

@@ -18,6 +18,7 @@ use super::{ExportError, Plan, error::Doing, write, write_json};
 use body_schema_ask_tell::Session;
 use body_schema_experiment::Experiment;
 use body_schema_recording::{LiveLog, Recorder, StepsCsv, Target, Theme};
+use body_schema_wire::{Choice, Description, RunResult, StepReport};
 
 /// Postures on the way from each step to the next, in which the page moves while it plays slowly.
 const FRAMES: u64 = 6;
@@ -50,9 +51,10 @@ pub(super) fn record(
     };
     let told = plan.told.map(Session::history).unwrap_or_default();
     let live = LiveLog::new();
-    let mut recorder = Recorder::new(experiment.description(), Target::live(live.clone()))?;
+    let description = Description::of(&experiment);
+    let mut recorder = Recorder::new(&description, Target::live(live.clone()))?;
     let mut table = Vec::new();
-    let mut csv = StepsCsv::new(experiment.description(), &mut table)?;
+    let mut csv = StepsCsv::new(&description, &mut table)?;
     let (mut reports, mut searched) = (Vec::new(), BTreeSet::new());
     for step in 0..=plan.steps {
         if step > 0 {
@@ -63,10 +65,10 @@ pub(super) fn record(
             }
             tick();
         }
-        let report = told.get(step as usize).unwrap_or_else(|| experiment.latest());
-        recorder.log_moving(report, FRAMES)?;
-        csv.write(report)?;
-        serde_json::to_writer(&mut reports, report)?;
+        let report = told.get(step as usize).cloned().unwrap_or_else(|| StepReport::of(&experiment));
+        recorder.log_moving(&report, FRAMES)?;
+        csv.write(&report)?;
+        serde_json::to_writer(&mut reports, &report)?;
         reports.push(b'\n');
     }
     csv.flush()?;
@@ -74,7 +76,7 @@ pub(super) fn record(
     let recording = recorder.recording_id().to_owned();
     recorder.finish()?;
 
-    write_json(&folder.join("description.json"), experiment.description())?;
+    write_json(&folder.join("description.json"), &description)?;
     write_packed(&folder.join("reports.ndjson.gz"), &reports)?;
     let messages = live.put_together(&live.scene_parts_from(1))?;
     write(&folder.join("scene.rrd"), &[vec![live.header()], messages].concat().concat())?;
@@ -87,7 +89,7 @@ pub(super) fn record(
     }
     write(&folder.join("recording.rrd"), &live.complete()?)?;
     write(&folder.join("steps.csv"), &table)?;
-    write_json(&folder.join("result.json"), &experiment.result())?;
+    write_json(&folder.join("result.json"), &RunResult::of(&experiment))?;
     Ok(Recorded { recording, aspects: ASPECTS.into(), searched })
 }
 
@@ -95,7 +97,7 @@ pub(super) fn record(
 fn write_selections(experiment: &Experiment, learners: &[String], folder: &Path) -> Result<Vec<String>, ExportError> {
     let mut searched = Vec::new();
     for learner in learners {
-        if let Ok(choice) = experiment.choice(learner) {
+        if let Ok(choice) = Choice::of(experiment, learner) {
             let name = learner.replace(':', "-");
             let file = format!("selections/{name}/{}.json.gz", choice.step);
             write_packed(&folder.join(file), &serde_json::to_vec(&choice)?)?;

@@ -21,13 +21,14 @@ async fn a_choice_can_be_looked_into_and_questioned() {
         experiment.step().expect("a step");
     }
     let choice: Choice = server.get(&of("active", "selection")).await.json().await.expect("a choice");
-    assert_eq!(choice, experiment.choice("active").expect("searched"));
+    assert_eq!(choice, Choice::of(&experiment, "active").expect("searched"));
     assert_eq!((choice.step, choice.joints[3].name.as_str()), (4, "elbow"));
 
     let proposed = json!({ "configuration": [0.1, 0.2, -0.3, -1.0] });
     let answer = server.post(&of("active", "evaluations"), proposed).await;
     let appraisal: AppraisalReport = answer.json().await.expect("an appraisal");
-    assert_eq!(appraisal, experiment.appraise("active", &[0.1, 0.2, -0.3, -1.0]).expect("an appraisal"));
+    let appraised = experiment.appraise("active", &[0.1, 0.2, -0.3, -1.0]).expect("an appraisal");
+    assert_eq!(appraisal, AppraisalReport::from(&appraised));
     assert!((0.0..=1.0).contains(&appraisal.chance_of_being_seen));
 
     problem(server.get(&of("random", "selection")).await, 409, None).await;

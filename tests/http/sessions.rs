@@ -41,16 +41,16 @@ async fn a_whole_life() {
     // The same as the library gives, but for wall times.
     let mut experiment = builtin("arm-6dof").and_then(|s| s.experiment(1, None)).expect("an experiment");
     let description: Description = serde_json::from_value(resource["description"].clone()).expect("a description");
-    assert_eq!(&description, experiment.description());
+    assert_eq!(description, Description::of(&experiment));
     for _ in 0..4 {
         experiment.step().expect("a step");
     }
     let report: StepReport = serde_json::from_value(made["reports"][2].clone()).expect("a report");
-    let expected = serde_json::to_value(experiment.latest()).expect("JSON");
+    let expected = serde_json::to_value(StepReport::of(&experiment)).expect("JSON");
     assert_eq!(timeless(&made["reports"][2]), timeless(&expected));
 
     let result: RunResult = server.get(&format!("{session}/result.json")).await.json().await.expect("a result");
-    assert_eq!(result, experiment.result());
+    assert_eq!(result, RunResult::of(&experiment));
     assert_eq!(result.learners[0].metrics, report.learners[0].metrics);
 
     server.delete(&session).await;
@@ -127,7 +127,7 @@ async fn sessions_do_not_mix_and_requests_queue() {
             alone.step().expect("a step");
         }
         let result: RunResult = server.get(&format!("{session}/result.json")).await.json().await.expect("a result");
-        assert_eq!(result, alone.result());
+        assert_eq!(result, RunResult::of(&alone));
     }
     server.stop().await;
 }

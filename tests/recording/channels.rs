@@ -166,11 +166,11 @@ fn a_long_recording_with_a_camera_is_small() {
     let third = "\n[[learner]]\nname = \"third\"\nestimator = \"smoother\"\npolicy = \"random\"\n";
     let scenario = Scenario::parse("three", &format!("{text}{third}"), &|_| Err("none".into())).unwrap();
     let mut experiment = scenario.experiment(3, None).unwrap();
-    let mut reports = vec![experiment.latest().clone()];
+    let mut reports = vec![StepReport::of(&experiment)];
     (0..200).for_each(|_| reports.push(experiment.step().unwrap().clone()));
-    assert_eq!(experiment.description().learners.len(), 3);
+    assert_eq!(experiment.learners().len(), 3);
     let file = path("camera.rrd");
-    record(experiment.description(), &reports, Target::file(&file));
+    record(&Description::of(&experiment), &reports, Target::file(&file));
     let bytes = fs::metadata(&file).unwrap().len();
     assert!(bytes < 10_000_000, "{bytes} bytes in 200 steps of three learners");
 }

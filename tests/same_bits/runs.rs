@@ -22,10 +22,10 @@ pub fn result((name, steps, learners): (&str, usize, &[&str])) -> String {
     let mut experiment = scenario.experiment(7, Some(&names)).expect("its learners");
     let mut all = Vec::new();
     for _ in 0..steps {
-        let report = experiment.step().unwrap_or_else(|error| panic!("{name}: {error}"));
-        all.push(serde_json::to_value(report).expect("JSON"));
+        experiment.step().unwrap_or_else(|error| panic!("{name}: {error}"));
+        all.push(serde_json::to_value(StepReport::of(&experiment)).expect("JSON"));
     }
-    all.push(serde_json::to_value(experiment.result()).expect("JSON"));
+    all.push(serde_json::to_value(RunResult::of(&experiment)).expect("JSON"));
     all.iter_mut().for_each(timeless);
     serde_json::to_string(&all).expect("JSON")
 }

@@ -1,6 +1,6 @@
 //! Running other seeds of what is shown, for the bands behind its curves.
 
-use body_schema_experiment::StepReport;
+use body_schema_wire::StepReport;
 
 use crate::{
     history::Row,

@@ -1,7 +1,7 @@
 //! Colours and marks that keep their meaning everywhere. They are those of the recordings.
 
-use body_schema_experiment::Description;
 use body_schema_palette as palette;
+use body_schema_wire::Description;
 use egui::Color32;
 use egui_plot::{LineStyle, MarkerShape};
 

@@ -1,6 +1,6 @@
 //! Playing the game: the visitor's movements against those of the learners that choose by themselves.
 
-use body_schema_experiment::AppraisalReport;
+use body_schema_wire::AppraisalReport;
 
 use crate::{
     game::{Due, Game, ROUNDS},

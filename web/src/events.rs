@@ -1,7 +1,7 @@
 //! What events do to the panel's state.
 
-use body_schema_experiment::StepReport;
 use body_schema_scenario::{ScenarioSummary, WorldKind};
+use body_schema_wire::StepReport;
 
 use crate::{
     history::History,

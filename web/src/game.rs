@@ -1,6 +1,6 @@
 //! Beat the algorithm: the movements that the visitor chooses, and when the server is asked about them.
 
-use body_schema_experiment::AppraisalReport;
+use body_schema_wire::AppraisalReport;
 
 /// Movements of a game.
 pub const ROUNDS: u64 = 10;

@@ -1,6 +1,7 @@
 //! What the learners have done so far: a few numbers per learner and step, small enough to keep them all.
 
-use body_schema_experiment::{ChannelReading, Convergence, Description, LearnerReport, StepReport};
+use body_schema_experiment::Convergence;
+use body_schema_wire::{ChannelReading, Description, LearnerReport, StepReport};
 
 /// One learner after one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -6,8 +6,8 @@
 use std::collections::BTreeMap;
 
 use body_schema_ask_tell::Outcome;
-use body_schema_experiment::{AppraisalReport, Choice, StepReport};
 use body_schema_scenario::ScenarioSummary;
+use body_schema_wire::{AppraisalReport, Choice, StepReport};
 use serde::{Deserialize, Serialize};
 
 use crate::wire::{Problem, Session, Standing};

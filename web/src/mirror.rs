@@ -1,6 +1,6 @@
 //! The panel in words, for those who hear it and for scripts.
 
-use body_schema_experiment::Description;
+use body_schema_wire::Description;
 
 use crate::{
     colours,

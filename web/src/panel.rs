@@ -1,7 +1,7 @@
 //! The panel's state.
 
-use body_schema_experiment::Description;
 use body_schema_scenario::ScenarioSummary;
+use body_schema_wire::Description;
 
 use crate::{
     game::Game,

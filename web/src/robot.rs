@@ -2,8 +2,8 @@
 
 use body_schema_ask_tell::{Answer, Outcome, Status, Suggestion};
 use body_schema_engine::kinematics::JointKind;
-use body_schema_experiment::{ChannelReading, Description};
 use body_schema_scenario::WorldKind;
+use body_schema_wire::{ChannelReading, Description};
 
 use crate::{host::Command, panel::Panel, wire::Standing};
 

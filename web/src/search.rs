@@ -1,7 +1,7 @@
 //! DIRECT's search for a movement, ready to be drawn.
 
 use body_schema_engine::optimize::{MAX_LEVEL, Plane, Projection, Variant};
-use body_schema_experiment::{BoxReport, Choice, ShapeReport};
+use body_schema_wire::{BoxReport, Choice, ShapeReport};
 
 /// A search in which everything is there that it refers to, so that drawing it needs no further care.
 #[derive(Clone, Debug)]
@@ -156,7 +156,7 @@ mod tests {
     fn search() -> Search {
         let mut experiment = builtin("arm-6dof").and_then(|arm| arm.experiment(1, None)).expect("an experiment");
         experiment.step().expect("a step");
-        Search::of(experiment.choice("active").expect("a choice by DIRECT")).expect("it holds together")
+        Search::of(Choice::of(&experiment, "active").expect("a choice by DIRECT")).expect("it holds together")
     }
 
     /// The sizes are those that DIRECT-l goes by: half the longest side, one half for the undivided cube.

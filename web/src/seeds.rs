@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use body_schema_experiment::{Description, StepReport};
+use body_schema_wire::{Description, StepReport};
 
 use crate::history::{History, Row};
 

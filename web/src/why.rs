@@ -1,6 +1,6 @@
 //! Why this posture: what was asked about the last movement, and what the server answered.
 
-use body_schema_experiment::{AppraisalReport, Choice};
+use body_schema_wire::{AppraisalReport, Choice};
 
 use crate::{search::Search, wire::Problem};
 

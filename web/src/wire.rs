@@ -2,8 +2,8 @@
 //! descriptions, reports, choices) are the engine's own types.
 
 use body_schema_ask_tell::{Answer, Status, Suggestion};
-use body_schema_experiment::Description;
 use body_schema_scenario::WorldKind;
+use body_schema_wire::Description;
 use serde::Deserialize;
 
 /// A session.

@@ -1,6 +1,7 @@
 //! Plain words for what the engine names by its terms, which stand in the tooltips.
 
-use body_schema_experiment::{CONFIRMATION, LearnerDescription};
+use body_schema_experiment::CONFIRMATION;
+use body_schema_wire::LearnerDescription;
 
 use crate::{history::Verdict, panel::Panel};
 

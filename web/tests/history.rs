@@ -1,8 +1,9 @@
 //! What the panel says of a run, held against what the engine says of it.
 
-use body_schema_experiment::{CONFIRMATION, Experiment, StepReport};
+use body_schema_experiment::{CONFIRMATION, Experiment};
 use body_schema_panel::history::{History, Verdict};
 use body_schema_scenario::builtin;
+use body_schema_wire::{Description, RunResult, StepReport};
 
 fn begin(scenario: &str, learners: &[&str]) -> Experiment {
     let learners: Vec<String> = learners.iter().map(|name| (*name).to_owned()).collect();
@@ -13,13 +14,14 @@ fn begin(scenario: &str, learners: &[&str]) -> Experiment {
 #[test]
 fn convergence_is_what_the_engine_says() {
     let mut experiment = begin("body-change", &["active", "random", "rigid"]);
-    let change = experiment.description().change_at.expect("the body changes");
-    let mut history = History::new(experiment.description());
-    assert!(history.take(experiment.latest()));
+    let change = experiment.setting().change_at.expect("the body changes");
+    let mut history = History::new(&Description::of(&experiment));
+    assert!(history.take(&StepReport::of(&experiment)));
     while experiment.latest().step < 2 * change {
-        assert!(history.take(experiment.step().expect("a step")));
+        experiment.step().expect("a step");
+        assert!(history.take(&StepReport::of(&experiment)));
     }
-    let learners = experiment.result().learners;
+    let learners = RunResult::of(&experiment).learners;
     assert!(
         learners.iter().any(|one| one.converged_at.is_some()) && learners.iter().any(|one| one.recovered_at.is_some())
     );
@@ -34,9 +36,10 @@ fn convergence_is_what_the_engine_says() {
 #[test]
 fn a_change_that_does_no_harm_is_confirmed_after_twenty_movements() {
     let mut experiment = begin("body-change", &["random"]);
-    let start = experiment.step().expect("a step").clone();
-    let change = experiment.description().change_at.expect("the body changes");
-    let mut history = History::new(experiment.description());
+    experiment.step().expect("a step");
+    let start = StepReport::of(&experiment);
+    let change = experiment.setting().change_at.expect("the body changes");
+    let mut history = History::new(&Description::of(&experiment));
     for step in 0..=change + CONFIRMATION {
         let mut report = StepReport { step, ..start.clone() };
         let metrics = &mut report.learners[0].metrics;

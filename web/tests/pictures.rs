@@ -58,7 +58,7 @@ fn game(size: Vec2, rounds: u64) -> Page {
     page.open_session();
     for round in 0..=rounds.min(ROUNDS - 1) {
         for tried in [0.9, 0.4] {
-            let limits = page.server.experiment().description().joints.iter().map(|joint| joint.limits);
+            let limits = page.server.experiment().setting().joints.iter().map(|joint| joint.limits);
             let within = |(joint, [lower, upper]): (usize, [f64; 2])| {
                 0.5 * (lower + upper + (upper - lower) * tried * (joint as f64 + round as f64 - 2.0).sin())
             };

@@ -1,8 +1,9 @@
 //! What the cards of the stories say, held against what the engine does.
 
-use body_schema_experiment::{Experiment, LearnerResult, StepReport};
+use body_schema_experiment::{Experiment, StepOutcome};
 use body_schema_panel::stories::{STORIES, Story};
 use body_schema_scenario::builtin;
+use body_schema_wire::{LearnerResult, RunResult};
 
 /// A story's own run.
 struct Run {
@@ -22,11 +23,11 @@ impl Run {
     }
 
     fn place(&self, learner: &str) -> usize {
-        let learners = &self.experiment.description().learners;
+        let learners = &self.experiment.setting().learners;
         learners.iter().position(|one| one.name == learner).expect("a learner of the story")
     }
 
-    fn to(&mut self, step: u64) -> &StepReport {
+    fn to(&mut self, step: u64) -> &StepOutcome {
         while self.experiment.latest().step < step {
             self.experiment.step().expect("a step");
         }
@@ -34,7 +35,7 @@ impl Run {
     }
 
     fn result(&self, learner: &str) -> LearnerResult {
-        self.experiment.result().learners.swap_remove(self.place(learner))
+        RunResult::of(&self.experiment).learners.swap_remove(self.place(learner))
     }
 
     fn says(&self, words: &str) -> bool {
@@ -47,7 +48,8 @@ fn ten_movements_are_enough_and_ellipsoids_do_as_the_cards_say() {
     let mut run = Run::of("arm-6dof");
     assert!(run.says("Ten movements are enough") && run.says("Those of global shrink") && run.says("stay large"));
     let places = ["active", "random", "global"].map(|name| run.place(name));
-    let trace = |report: &StepReport| places.map(|place| report.learners[place].metrics.trace.expect("a covariance"));
+    let trace =
+        |outcome: &StepOutcome| places.map(|place| outcome.learners[place].metrics.trace.expect("a covariance"));
     let first = trace(run.to(1));
     let tenth = trace(run.to(10));
     assert!(tenth[2] < 0.05 * first[2], "those of global shrink: {first:?} {tenth:?}");
@@ -55,7 +57,7 @@ fn ten_movements_are_enough_and_ellipsoids_do_as_the_cards_say() {
     let allowed = places.map(|place| run.experiment.latest().learners[place].metrics.bound_trace.expect("a bound"));
     assert!(later[0] > 10.0 * allowed[0] && later[1] > 10.0 * allowed[1], "{later:?} {allowed:?}");
     for (learner, stabilised) in [("active", true), ("random", true), ("global", false)] {
-        assert_eq!(run.experiment.description().learners[run.place(learner)].stabilised, stabilised, "{learner}");
+        assert_eq!(run.experiment.setting().learners[run.place(learner)].stabilised, stabilised, "{learner}");
     }
     run.to(600);
     let needed = ["global", "active", "random"].map(|name| run.result(name).converged_at.expect("it converges"));
@@ -66,7 +68,7 @@ fn ten_movements_are_enough_and_ellipsoids_do_as_the_cards_say() {
 fn all_recover_from_the_broken_elbow_and_who_asks_sooner() {
     let mut run = Run::of("body-change");
     assert!(run.says("After movement 300") && run.says("5 cm"));
-    assert_eq!(run.experiment.description().change_at, Some(300));
+    assert_eq!(run.experiment.setting().change_at, Some(300));
     run.to(500);
     let needed = ["active", "random", "global"].map(|name| run.result(name).recovered_at.expect("it recovers"));
     assert!(needed[0] < needed[1], "{needed:?}");

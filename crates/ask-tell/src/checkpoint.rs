@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Event, Happened, ledger::Ledger};
 use body_schema_experiment as experiment;
-use body_schema_experiment::{Description, StepReport};
+use body_schema_wire::{Description, StepReport};
 
 /// What was learned from the first events of a session, by the same build: replaying goes on from there, to the last bit as if it had
 /// begun at the first event.
@@ -82,8 +82,6 @@ pub(super) fn excluded(events: &[Event]) -> BTreeSet<u64> {
 
 /// A step that is replayed.
 pub struct Replayed<'a> {
-    /// Its report.
-    pub report: StepReport,
     /// After so many events.
     pub events: usize,
     pub(super) known: usize,
@@ -96,14 +94,24 @@ impl Replayed<'_> {
         Checkpoint::of(self.ledger, self.events, self.known)
     }
 
+    /// The step that it is.
+    pub fn step(&self) -> u64 {
+        self.ledger.experiment.latest().step
+    }
+
+    /// Its report.
+    pub fn report(&self) -> StepReport {
+        StepReport::of(&self.ledger.experiment)
+    }
+
     /// How many observations had been told, those that do not count among them.
     pub fn told(&self) -> u64 {
         self.ledger.told.len() as u64
     }
 
     /// What stays the same from step to step.
-    pub fn description(&self) -> &Description {
-        self.ledger.experiment.description()
+    pub fn description(&self) -> Description {
+        Description::of(&self.ledger.experiment)
     }
 
     /// How many events there are in all.

@@ -6,7 +6,7 @@ use super::{
     Ask, Choice, Event, Fault, Happened, Plan, Prepared, Refusal, Session, Suggestion, SuggestionState, Why,
     channel::label, ledger::Ledger,
 };
-use body_schema_experiment::{Agent, StepReport};
+use body_schema_experiment::Agent;
 
 /// A copy of a session at work.
 pub(super) struct Draft {
@@ -28,11 +28,11 @@ impl Draft {
     }
 
     /// Appends an event that can happen.
-    pub fn append(&mut self, happened: Happened) -> Result<Option<StepReport>, Refusal> {
+    pub fn append(&mut self, happened: Happened) -> Result<(), Refusal> {
         let event = Event { at_s: self.at_s, happened };
-        let report = self.ledger.apply(&event, &BTreeSet::new()).map_err(Refusal::Ended)?;
+        self.ledger.apply(&event, &BTreeSet::new()).map_err(Refusal::Ended)?;
         self.events.push(event);
-        Ok(report)
+        Ok(())
     }
 
     /// Ends what has run out.

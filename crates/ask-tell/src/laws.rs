@@ -194,7 +194,7 @@ proptest! {
         prop_assert_eq!(standing(&replayed), standing(&session));
         prop_assert_eq!(replayed.latest(), session.latest());
         let history = replayed.history();
-        prop_assert_eq!(history.last(), Some(session.latest()));
+        prop_assert_eq!(history.last(), Some(&session.report()));
         prop_assert_eq!(next(&replayed), next(&session));
     }
 
@@ -226,7 +226,7 @@ fn with_checkpoints(session: &Session) -> Vec<Checkpoint> {
     let replayed = Session::replay_from(session.setup().clone(), session.events().to_vec(), None, &mut |step| {
         let checkpoint = step.checkpoint().expect("a smoother keeps what it has learned");
         let checkpoint = Checkpoint::from_bytes(&checkpoint.to_bytes()).expect("its own");
-        assert_eq!(checkpoint.step(), step.report.step);
+        assert_eq!(checkpoint.step(), step.step());
         made.push(checkpoint);
         true
     });
@@ -239,7 +239,7 @@ fn from(session: &Session, checkpoint: &Checkpoint) -> (Session, Vec<u64>) {
     let mut steps = Vec::new();
     let (setup, events) = (session.setup().clone(), session.events().to_vec());
     let replayed = Session::replay_from(setup, events, Some(checkpoint), &mut |step| {
-        steps.push(step.report.step);
+        steps.push(step.step());
         true
     });
     (replayed.expect("it serves"), steps)
@@ -252,6 +252,7 @@ fn goes_on_from(session: &Session, checkpoint: &Checkpoint) -> Result<(), TestCa
     prop_assert_eq!(steps, (checkpoint.step() + 1..=last).collect::<Vec<_>>());
     prop_assert_eq!(standing(&replayed), standing(session));
     prop_assert_eq!(replayed.latest(), session.latest());
+    prop_assert_eq!(replayed.report(), session.report());
     prop_assert_eq!(next(&replayed), next(session));
     Ok(())
 }

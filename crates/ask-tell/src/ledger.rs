@@ -12,7 +12,7 @@ use super::{
     checkpoint::{Checkpoint, Hear, Replayed, excluded},
 };
 use body_schema_engine::selection::{Movement, Planned, Selection};
-use body_schema_experiment::{Agent, Event as AgentEvent, Experiment, Proposal, StepReport};
+use body_schema_experiment::{Agent, Event as AgentEvent, Experiment, Proposal};
 use body_schema_scenario::Scenario;
 
 /// An observation that was told.
@@ -84,30 +84,24 @@ impl Ledger {
                 return Err((first, "its checkpoint is of another session".to_owned()));
             }
         } else {
-            let report = self.experiment.latest().clone();
-            hear(Replayed { report, events: 0, known: events.len(), ledger: &self });
+            hear(Replayed { events: 0, known: events.len(), ledger: &self });
         }
         for (index, event) in events.iter().enumerate().skip(first) {
-            let report = self.apply(event, &excluded).map_err(|what| (index + 1, what))?;
-            let Some(report) = report else { continue };
-            if !hear(Replayed { report, events: index + 1, known: events.len(), ledger: &self }) {
+            let is_step = self.apply(event, &excluded).map_err(|what| (index + 1, what))?;
+            if is_step && !hear(Replayed { events: index + 1, known: events.len(), ledger: &self }) {
                 return Err((index + 1, "nobody waits for it any more".to_owned()));
             }
         }
         Ok(self)
     }
 
-    /// After one more event, where the observations of `skipped` do not count. Tells the report of an observation.
-    pub fn apply(&mut self, event: &Event, skipped: &BTreeSet<u64>) -> Result<Option<StepReport>, String> {
+    /// After one more event, where the observations of `skipped` do not count. Tells whether it is a step: an
+    /// observation that counts.
+    pub fn apply(&mut self, event: &Event, skipped: &BTreeSet<u64>) -> Result<bool, String> {
         self.apply_as(event, skipped, Replay::Learned)
     }
 
-    fn apply_as(
-        &mut self,
-        event: &Event,
-        skipped: &BTreeSet<u64>,
-        replay: Replay,
-    ) -> Result<Option<StepReport>, String> {
+    fn apply_as(&mut self, event: &Event, skipped: &BTreeSet<u64>, replay: Replay) -> Result<bool, String> {
         match &event.happened {
             Happened::Suggested { suggestion, choice } => {
                 let id = self.suggestions.len() as u64 + 1;
@@ -160,7 +154,7 @@ impl Ledger {
             Happened::Excluded { observation } => self.mark(*observation, true)?,
             Happened::Included { observation } => self.mark(*observation, false)?,
         }
-        Ok(None)
+        Ok(false)
     }
 
     fn observe(
@@ -169,11 +163,11 @@ impl Ledger {
         answer: &Answer,
         skipped: &BTreeSet<u64>,
         replay: Replay,
-    ) -> Result<Option<StepReport>, String> {
+    ) -> Result<bool, String> {
         let number = self.told.len() as u64 + 1;
         let executed = told.read(&self.scenario, &self.shapes).map_err(|fault| fault.to_string())?;
         let (seen, configuration) = (!executed.observation.is_miss(), executed.movement.configuration.clone());
-        let mut report = None;
+        let mut is_step = false;
         if skipped.contains(&number) {
             let agent = self.experiment.agent_mut();
             if let Some(agent) = agent {
@@ -186,7 +180,8 @@ impl Ledger {
             self.experiment.carry_out(&executed);
             self.counted.push(number);
         } else {
-            report = Some(self.experiment.tell(executed).map_err(|error| error.to_string())?.clone());
+            self.experiment.tell(executed).map_err(|error| error.to_string())?;
+            is_step = true;
             self.counted.push(number);
         }
         if let Some(id) = told.suggestion_id {
@@ -195,7 +190,7 @@ impl Ledger {
         }
         let excluded = skipped.contains(&number);
         self.told.push(Arc::new(Told { observation: told.clone(), answer: answer.clone(), excluded }));
-        Ok(report)
+        Ok(is_step)
     }
 
     /// The observations that do not count.

@@ -11,7 +11,7 @@ use super::{
     limits::*,
 };
 use body_schema_engine::estimation::Belief;
-use body_schema_experiment::Agent;
+use body_schema_experiment::{Agent, MovementOutcome};
 
 /// A change that was tried, with what is answered once it is made.
 #[must_use = "nothing has happened until it is committed"]
@@ -266,13 +266,13 @@ impl Ledger {
     /// What is answered to the latest observation.
     fn answer(&self, body_seems_changed: bool) -> Answer {
         let learner = &self.experiment.latest().learners[0];
-        let readings = learner.movement.iter().flat_map(|movement| &movement.readings);
+        let readings = learner.movement.iter().flat_map(|movement| &movement.weighed);
         let finite = |number: Option<f64>| number.filter(|number| number.is_finite());
         let metrics = &learner.metrics;
         let innovation = metrics.nis.zip(metrics.nis_dof).filter(|(_, degrees)| *degrees > 0);
         Answer {
             observation: self.told.len() as u64,
-            seen: learner.movement.as_ref().is_some_and(|movement| movement.seen),
+            seen: learner.movement.as_ref().is_some_and(MovementOutcome::seen),
             innovation_sigmas: finite(innovation.map(|(nis, degrees)| (nis / degrees as f64).sqrt())),
             outlier_probability: finite(readings.filter_map(|it| it.outlier_probability).reduce(f64::max)),
             expected_error_mm: finite(metrics.expected_prediction_m.map(|metres| metres * 1e3)),

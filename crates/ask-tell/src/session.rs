@@ -11,8 +11,9 @@ use super::{
 };
 use crate::json::repeated;
 use body_schema_engine::estimation::Belief;
-use body_schema_experiment::{Description, Experiment, StepReport};
+use body_schema_experiment::{Experiment, StepOutcome};
 use body_schema_scenario::Scenario;
+use body_schema_wire::{Description, StepReport};
 
 /// A session with a robot elsewhere; see the [module](super). A copy of it goes its own way.
 #[derive(Clone)]
@@ -217,13 +218,18 @@ impl Session {
     }
 
     /// What stays the same from step to step, as of any experiment.
-    pub fn description(&self) -> &Description {
-        self.ledger.experiment.description()
+    pub fn description(&self) -> Description {
+        Description::of(&self.ledger.experiment)
     }
 
-    /// The report of the latest observation that counts, as of any experiment's step; of step 0, if there is none.
-    pub fn latest(&self) -> &StepReport {
+    /// What came of the latest observation that counts, as of any experiment's step; of step 0, if there is none.
+    pub fn latest(&self) -> &StepOutcome {
         self.ledger.experiment.latest()
+    }
+
+    /// The report of it.
+    pub fn report(&self) -> StepReport {
+        StepReport::of(&self.ledger.experiment)
     }
 
     /// The experiment behind it, with its agent.
@@ -243,7 +249,7 @@ impl Session {
         let mut reports = Vec::new();
         // Whatever has happened can happen again.
         drop(ledger.replayed(&self.events, None, &mut |step| {
-            reports.push(step.report);
+            reports.push(step.report());
             true
         }));
         reports

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use super::{Enough, Session};
-use body_schema_experiment::ChannelReading;
+use body_schema_experiment::Reading;
 
 /// How a session stands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,7 +49,7 @@ impl Session {
         let metrics = &learner.metrics;
         let readings = self.experiment().agent().map_or_else(Vec::new, |agent| agent.readings());
         let suspected =
-            readings.iter().filter(|reading| reading.outlier_probability.is_some_and(|p| p > ChannelReading::OUTLIER));
+            readings.iter().filter(|reading| reading.outlier_probability.is_some_and(|p| p > Reading::OUTLIER));
         let numbers = suspected.filter_map(|reading| {
             let index = usize::try_from(reading.movement.checked_sub(1)?).ok()?;
             self.ledger().counted.get(index).copied()
@@ -90,7 +90,7 @@ impl Session {
         let seen = metrics.movements - metrics.misses;
         let (wanted, floor) = (self.scenario().settled_below_m, metrics.model_error_m.unwrap_or(0.0));
         let spare = wanted * wanted - floor * floor;
-        let is_determined = 2 * seen >= 3 * self.description().movements_by_counting as u64;
+        let is_determined = 2 * seen >= 3 * self.experiment().setting().movements_by_counting as u64;
         let expected = metrics.expected_prediction_m.filter(|_| is_determined && spare > 0.0)?;
         let needed = seen as f64 * (expected * expected - floor * floor).max(0.0) / spare;
         Some(((needed - seen as f64).ceil() as u64).max(1))

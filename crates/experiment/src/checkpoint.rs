@@ -29,7 +29,7 @@ impl Experiment {
     }
 
     /// The first learner makes a movement, and learns nothing from it until it [takes up](Self::take_up) what it has learned. No step
-    /// is reported.
+    /// is judged.
     pub fn carry_out(&mut self, executed: &Executed) {
         self.agent_mut().into_iter().for_each(|agent| agent.carry_out(executed));
         self.latest.step += 1;
@@ -38,7 +38,7 @@ impl Experiment {
     /// The first learner knows from now on what was learned from the movements that it has [made](Self::carry_out): so many, and no
     /// others. False where a checkpoint is of another experiment or of other movements; nothing can be made of the experiment then.
     ///
-    /// The latest report tells its number alone until the next step.
+    /// The latest outcome tells its number alone until the next step.
     pub fn take_up(&mut self, checkpoint: Checkpoint) -> bool {
         let Checkpoint { step, learned, concluded } = checkpoint;
         self.judge.take_up(&concluded, step);

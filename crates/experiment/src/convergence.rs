@@ -4,8 +4,7 @@
 pub const CONFIRMATION: u64 = 20;
 
 /// The thresholds of a scenario.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
     /// Largest `orientation_deg`, degrees.
     pub orientation_deg: f64,

@@ -10,18 +10,18 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Agent, Change, Description, Evaluation, Experiment, ExperimentError, Learner, LearnerDescription, StepReport,
-    Thresholds, World,
+    Agent, Change, Evaluation, Executed, Experiment, ExperimentError, Learner, LearnerSetting, Metrics,
+    MovementOutcome, Proposal, Setting, StepOutcome, Thresholds, World,
 };
 use body_schema_engine::{
     estimation::{Belief, Rls, StabilisingNoise},
     kinematics::JointBox,
     model::{Layout, State, random::random_arm},
     selection::{
-        Actions, Active, Appraisal, CriterionUnits, Minimiser, Policy, Random, Selection, SelectionError, Situation,
-        Weights,
+        Actions, Active, Appraisal, CriterionUnits, Minimiser, Movement, Policy, Random, Selection, SelectionError,
+        Situation, Weights,
     },
-    sensing::Rig,
+    sensing::{Equipment, Rig},
 };
 
 const JOINTS: usize = 3;
@@ -84,8 +84,8 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
         let estimator = Box::new(Rls::new(belief, covariance, Some(noise)));
         let agent = Agent::new(estimator, policy, Actions::Box(limits.clone()), limits.clone(), 5);
         let (name, estimator, policy) = (name.to_owned(), "rls".to_owned(), name.to_owned());
-        let description = LearnerDescription { name, estimator, policy, stabilised: true, robust: false };
-        Learner::new(description, agent, weights.clone(), vec![vec![0.5; JOINTS]], 0.01)
+        let setting = LearnerSetting { name, estimator, policy, stabilised: true, robust: false };
+        Learner::new(setting, agent, weights.clone(), vec![vec![0.5; JOINTS]], 0.01)
     };
     let active = Active::new(weights.clone(), Minimiser::Random { evaluations: 20 });
     let random = Box::new(Random::new(weights.clone(), None));
@@ -93,7 +93,7 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
         learner("active", Box::new(active)),
         learner("faltering", Box::new(Faltering { policy: random, falters: falters.clone() })),
     ];
-    let description = Description {
+    let setting = Setting {
         scenario: "two-learners".to_owned(),
         title: String::new(),
         seed: 5,
@@ -101,32 +101,34 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
         joints: Vec::new(),
         parameters: layout.dimension(),
         movements_by_counting: 1,
-        learners: learners.iter().map(|learner| learner.description.clone()).collect(),
+        learners: learners.iter().map(|learner| learner.setting.clone()).collect(),
         thresholds: Thresholds { orientation_deg: 5.0, location_m: 0.02 },
         movements_available: None,
         truth: None,
         change_at: world.change().map(|change| change.step),
         head: None,
         channels: Vec::new(),
-        cameras: Vec::new(),
-        targets: Vec::new(),
+        equipment: Equipment::default(),
         base_learned: false,
         sockets: Vec::new(),
         body: None,
     };
     let evaluation = Evaluation::of_truth(vec![vec![0.2; JOINTS], vec![-0.4; JOINTS]], &truth(), 0.01);
-    (Experiment::new(description, world, learners, evaluation, Vec::new()), falters)
+    (Experiment::new(setting, world, learners, evaluation, Vec::new()), falters)
 }
 
-/// The report of the next step, but for how long the choices took.
-fn step(experiment: &mut Experiment) -> StepReport {
+/// What came of the next step, but for how long the choices took.
+fn step(experiment: &mut Experiment) -> StepOutcome {
     timeless(experiment.step().expect("a step"))
 }
 
-fn timeless(report: &StepReport) -> StepReport {
-    let mut report = report.clone();
-    report.learners.iter_mut().filter_map(|learner| learner.movement.as_mut()).for_each(|it| it.selection_ms = 0.0);
-    report
+fn timeless(outcome: &StepOutcome) -> StepOutcome {
+    let mut outcome = outcome.clone();
+    for movement in outcome.learners.iter_mut().filter_map(|learner| learner.movement.as_mut()) {
+        let untimed = |proposal: &Arc<Proposal>| Arc::new(Proposal { selection_ms: 0.0, ..(**proposal).clone() });
+        movement.proposal = movement.proposal.as_ref().map(untimed);
+    }
+    outcome
 }
 
 /// The first learner has proposed by then.
@@ -138,14 +140,14 @@ fn a_learner_that_cannot_choose_changes_nothing() {
         if number % 2 == 0 {
             falters.store(true, Ordering::Relaxed);
             let before = timeless(faltering.latest());
-            let found = faltering.step().map(|report| report.step);
+            let found = faltering.step().map(|outcome| outcome.step);
             let (learner, source) = ("faltering".to_owned(), SelectionError::NoCovariance);
             assert_eq!(found, Err(ExperimentError::Selection { learner, source }));
             assert_eq!(timeless(faltering.latest()), before);
         }
-        let report = step(&mut steady);
-        assert!(report.learners.iter().all(|learner| learner.movement.is_some() && learner.failure.is_none()));
-        assert_eq!(step(&mut faltering), report);
+        let outcome = step(&mut steady);
+        assert!(outcome.learners.iter().all(|learner| learner.movement.is_some() && learner.failure.is_none()));
+        assert_eq!(step(&mut faltering), outcome);
     }
 }
 
@@ -161,7 +163,7 @@ fn a_world_that_has_nothing_to_show_changes_nothing() {
     let whole = std::mem::replace(&mut broken.world, nowhere);
     for _ in 0..2 {
         let before = timeless(broken.latest());
-        let found = broken.step().map(|report| report.step);
+        let found = broken.step().map(|outcome| outcome.step);
         assert!(matches!(&found, Err(ExperimentError::World { learner, .. }) if learner == "active"), "{found:?}");
         assert_eq!(timeless(broken.latest()), before);
     }
@@ -176,9 +178,37 @@ fn a_change_that_cannot_be_shown_has_not_happened() {
     (0..2).for_each(|_| drop(step(&mut experiment)));
     for _ in 0..2 {
         let before = timeless(experiment.latest());
-        let found = experiment.step().map(|report| report.step);
+        let found = experiment.step().map(|outcome| outcome.step);
         assert!(matches!(found, Err(ExperimentError::World { .. })), "{found:?}");
         assert_eq!((timeless(experiment.latest()), experiment.world().truth()), (before, Some(&truth())));
         assert!(experiment.world().change().is_some(), "still to come");
+    }
+}
+
+/// Who learns is told what was done and what was seen: whether anybody knows the truth makes no difference to it.
+#[test]
+fn a_learner_learns_the_same_where_nobody_knows_the_truth() {
+    let ((mut known, _), (mut outside, _)) = (experiment(world(None)), experiment(World::Outside));
+    for _ in 0..8 {
+        let made = step(&mut known).learners.remove(0);
+        let MovementOutcome { configuration, row, socket, observation, .. } = made.movement.expect("made");
+        let movement = Movement { configuration, row, socket };
+        outside.tell(Executed { proposal: None, movement, observation }).expect("told");
+        let [one, other] = [&known, &outside].map(|it| it.learners()[0].belief());
+        assert_eq!((&one.state, &one.covariance), (&other.state, &other.covariance));
+        let told = &outside.latest().learners[0];
+        let by_itself = |metrics: &Metrics| Metrics {
+            orientation_deg: None,
+            axis_deg: None,
+            location_m: None,
+            prediction_m: None,
+            prediction_mean_m: None,
+            nees: None,
+            nees_dof: None,
+            joints: Vec::new(),
+            ..metrics.clone()
+        };
+        assert_eq!(by_itself(&made.metrics), by_itself(&told.metrics));
+        assert!(made.metrics.axis_deg.is_some() && told.metrics.axis_deg.is_none());
     }
 }

@@ -2,14 +2,14 @@
 //!
 //! The judge holds what no agent may know. It turns beliefs into [`Metrics`] and runs into verdicts.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix3};
 use serde::{Deserialize, Serialize};
 
 use super::{
     convergence::{Convergence, Thresholds},
     gauge::Gauge,
     metrics::{self, Evaluation, Metrics},
-    report::StepReport,
+    outcome::{MovementOutcome, Standing},
 };
 use body_schema_engine::{
     design::Problem,
@@ -40,6 +40,26 @@ struct Bound {
     information: DMatrix<f64>,
 }
 
+/// What the judge hears of a learner after a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Evidence<'a> {
+    /// What it believes.
+    pub belief: &'a Belief,
+    /// How it stands by its own lights.
+    pub standing: &'a Standing,
+    /// The movement of the step, if it made one.
+    pub movement: Option<&'a MovementOutcome>,
+}
+
+/// What the judge says of a learner after a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
+    /// All metrics, those of the learner's own among them.
+    pub metrics: Metrics,
+    /// See [`LearnerOutcome::allowed`](super::LearnerOutcome::allowed).
+    pub allowed: Vec<Option<Matrix3<f64>>>,
+}
+
 /// What is known of one learner's run so far.
 #[derive(Clone, Debug)]
 pub struct Verdict {
@@ -67,6 +87,35 @@ impl Verdict {
     fn new(thresholds: Thresholds) -> Self {
         let unjudged = Convergence::new(thresholds);
         Self { convergence: unjudged.clone(), recovery: unjudged, settled_at: None, noticed_at: None, false_alarms: 0 }
+    }
+
+    /// After one more step of a body that changes after `change_at` movements, if it does.
+    fn observe(&mut self, step: u64, change_at: Option<u64>, metrics: &Metrics) {
+        let since_change = change_at.and_then(|change| step.checked_sub(change));
+        match since_change {
+            Some(movements @ 1..) => self.recovery.observe(movements, metrics.orientation_deg, metrics.location_m),
+            _ => self.convergence.observe(step, metrics.orientation_deg, metrics.location_m),
+        }
+        match since_change {
+            Some(movements @ 1..) if metrics.changes_noticed > self.false_alarms => {
+                self.noticed_at.get_or_insert(movements);
+            }
+            Some(1..) => {}
+            _ => self.false_alarms = metrics.changes_noticed,
+        }
+        if metrics.settled && self.settled_at.is_none() {
+            self.settled_at = Some(metrics.movements);
+        }
+    }
+}
+
+impl Bound {
+    /// What the data allow after one more movement.
+    fn after(&mut self, movement: Option<&MovementOutcome>) -> Option<Belief> {
+        if let Some(movement) = movement.filter(|movement| movement.seen()) {
+            self.information += self.problem.information(&movement.configuration);
+        }
+        self.problem.allowed(&self.information)
     }
 }
 
@@ -107,8 +156,14 @@ impl Judge {
         }
     }
 
-    /// The metrics of a belief that need a truth or held-out measurements; the others are left to the learner.
-    pub(super) fn metrics(&self, belief: &Belief, truth: Option<&State>) -> Metrics {
+    /// All metrics of a learner, beside the trace that its data allow.
+    fn metrics(
+        &self,
+        belief: &Belief,
+        truth: Option<&State>,
+        standing: &Standing,
+        bound_trace: Option<f64>,
+    ) -> Metrics {
         let layout = &*belief.layout;
         let gauge = self.gauge(belief);
         let aligned = truth.map(|truth| match gauge {
@@ -134,8 +189,17 @@ impl Judge {
             scatter_m: self.evaluation.scatter_m(&belief.state),
             nees: nees.map(|(nees, _)| nees),
             nees_dof: nees.map(|(_, dof)| dof),
+            expected_prediction_m: standing.expected_prediction_m,
+            model_error_m: standing.model_error_m,
+            trace: standing.trace,
+            nis: standing.nis.map(|(nis, _)| nis),
+            nis_dof: standing.nis.map(|(_, dof)| dof),
+            movements: standing.movements,
+            misses: standing.misses,
+            settled: standing.settled,
+            bound_trace,
+            changes_noticed: standing.changes_noticed,
             joints: self.evaluation.joints(&estimate, truth, layout),
-            ..Metrics::default()
         }
     }
 
@@ -158,36 +222,25 @@ impl Judge {
         verdict.convergence.observe(step, None, None);
     }
 
-    /// Completes a report with what the data allow, and draws the conclusions.
-    pub(super) fn conclude(&mut self, report: &mut StepReport) {
-        for (learner, Bound { problem, information }) in report.learners.iter_mut().zip(&mut self.bounds) {
-            if let Some(movement) = learner.movement.as_ref().filter(|it| it.seen) {
-                *information += problem.information(&movement.configuration);
+    /// Draws the conclusions from a step: one piece of evidence for each learner, in their order, and as many judgements.
+    pub fn conclude(&mut self, step: u64, truth: Option<&State>, evidence: &[Evidence<'_>]) -> Vec<Judgement> {
+        let mut judgements = Vec::with_capacity(evidence.len());
+        for (index, Evidence { belief, standing, movement }) in evidence.iter().enumerate() {
+            let bound = self.bounds.get_mut(index);
+            let data = bound.and_then(|bound| Some((bound.after(*movement)?, &bound.problem)));
+            let bound_trace = data.as_ref().and_then(|(allowed, problem)| {
+                allowed.covariance.as_ref().map(|covariance| problem.weights.trace(covariance))
+            });
+            let points = |allowed: &Belief| {
+                (0..allowed.layout.joints()).map(|joint| allowed.point_covariance(joint, 0.0)).collect()
+            };
+            let allowed = data.map(|(allowed, _)| points(&allowed)).unwrap_or_default();
+            let metrics = self.metrics(belief, truth, standing, bound_trace);
+            if let Some(verdict) = self.verdicts.get_mut(index) {
+                verdict.observe(step, self.change_at, &metrics);
             }
-            if let Some(allowed) = problem.allowed(information) {
-                learner.metrics.bound_trace = allowed.covariance.as_ref().map(|p| problem.weights.trace(p));
-                learner.estimate.allow(&allowed);
-            }
+            judgements.push(Judgement { metrics, allowed });
         }
-        for (verdict, learner) in self.verdicts.iter_mut().zip(&report.learners) {
-            let metrics = &learner.metrics;
-            let since_change = self.change_at.and_then(|change| report.step.checked_sub(change));
-            match since_change {
-                Some(movements @ 1..) => {
-                    verdict.recovery.observe(movements, metrics.orientation_deg, metrics.location_m);
-                }
-                _ => verdict.convergence.observe(report.step, metrics.orientation_deg, metrics.location_m),
-            }
-            match since_change {
-                Some(movements @ 1..) if metrics.changes_noticed > verdict.false_alarms => {
-                    verdict.noticed_at.get_or_insert(movements);
-                }
-                Some(1..) => {}
-                _ => verdict.false_alarms = metrics.changes_noticed,
-            }
-            if metrics.settled && verdict.settled_at.is_none() {
-                verdict.settled_at = Some(metrics.movements);
-            }
-        }
+        judgements
     }
 }

@@ -1,25 +1,24 @@
 //! One learner of a comparison: an agent, and how it has fared.
 
-use std::{mem::take, sync::OnceLock};
+use std::{
+    mem::take,
+    sync::{Arc, OnceLock},
+};
 
 use serde::{Deserialize, Serialize};
 
 use super::{
     agent::{AbsorbError, Agent, Executed, Learned, Proposal},
-    choice::{AppraisalReport, Choice, ChoiceError},
-    head::GazeReport,
-    judge::Judge,
-    metrics::Metrics,
-    report::{LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
-    sight::{ChannelDescription, readings},
+    chosen::{Appraised, ChoiceError, Chosen},
+    outcome::{MovementOutcome, Standing},
+    setting::LearnerSetting,
     standpoint::{OwnedStandpoint, Standpoint},
-    world::World,
 };
 use body_schema_engine::{
     estimation::{Belief, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
-    model::{Hand, State, Workspace},
-    selection::{Movement, Search, SelectionError, Weights},
+    model::{Hand, Workspace},
+    selection::{Movement, SelectionError, Weights},
     sensing::Observation,
 };
 
@@ -33,7 +32,7 @@ const UNAMBIGUOUS: f64 = 0.99;
 #[derive(Clone)]
 pub struct Learner {
     /// Its name, estimator and policy.
-    pub description: LearnerDescription,
+    pub setting: LearnerSetting,
     agent: Agent,
     /// The weights of its trace.
     weights: Weights,
@@ -48,7 +47,7 @@ pub struct Learner {
     best_gain_before: OnceLock<Option<f64>>,
     best_gain: OnceLock<Option<f64>>,
     /// What it proposed last.
-    last: Option<Proposal>,
+    last: Option<Arc<Proposal>>,
     /// Why it proposes nothing any more, though its agent has not ended.
     stopped: Option<SelectionError>,
     record: Record,
@@ -66,7 +65,7 @@ pub(super) struct Record {
 impl Learner {
     /// An agent that judges itself over `workspace` and is settled below that expected error, metres.
     pub fn new(
-        description: LearnerDescription,
+        setting: LearnerSetting,
         agent: Agent,
         weights: Weights,
         workspace: impl Into<Workspace>,
@@ -74,7 +73,7 @@ impl Learner {
     ) -> Self {
         let before = agent.standpoint().to_owned();
         Self {
-            description,
+            setting,
             agent,
             weights,
             workspace: workspace.into(),
@@ -94,17 +93,17 @@ impl Learner {
     }
 
     /// What it makes of every reading so far, where it weighs them.
-    pub(super) fn readings(&self) -> Vec<ReadingReport> {
+    pub fn readings(&self) -> Vec<ReadingReport> {
         self.agent.readings()
     }
 
     /// The scales of noise that it learns.
-    pub(super) fn noise(&self) -> Vec<NoiseReport> {
+    pub fn noise(&self) -> Vec<NoiseReport> {
         self.agent.noise()
     }
 
     /// How far joints' readings are off, where it learns that: one standard deviation each, rad or m.
-    pub(super) fn reading_sigmas(&self) -> Vec<f64> {
+    pub fn reading_sigmas(&self) -> Vec<f64> {
         self.agent.reading_sigmas()
     }
 
@@ -150,23 +149,24 @@ impl Learner {
     }
 
     /// Sets its next movement, and tells what that is expected to teach.
-    pub(super) fn set(&mut self, configuration: &[f64]) -> Result<AppraisalReport, ChoiceError> {
+    pub(super) fn set(&mut self, configuration: &[f64]) -> Result<Appraised, ChoiceError> {
         if !self.agent.is_set_from_outside() {
-            return Err(ChoiceError::ChoosesItself(self.description.name.clone()));
+            return Err(ChoiceError::ChoosesItself(self.setting.name.clone()));
         }
         if let Some(why) = self.end() {
-            return Err(ChoiceError::Ended { name: self.description.name.clone(), why });
+            return Err(ChoiceError::Ended { name: self.setting.name.clone(), why });
         }
         let appraisal = self.agent.set(configuration).map_err(|error| match error {
             SelectionError::Refused(why) => ChoiceError::Configuration(format!("is not feasible: {why}")),
             error => error.into(),
         })?;
-        let best = *self.best_gain.get_or_init(|| self.searched_gain(self.agent.standpoint()));
-        Ok(AppraisalReport::of(configuration, &appraisal, &self.belief().state, best))
+        let best_gain = *self.best_gain.get_or_init(|| self.searched_gain(self.agent.standpoint()));
+        let (configuration, estimate) = (configuration.to_vec(), self.belief().state.clone());
+        Ok(Appraised { configuration, appraisal, estimate, best_gain })
     }
 
     /// Why it proposes nothing any more, if it does not.
-    fn end(&self) -> Option<String> {
+    pub(super) fn end(&self) -> Option<String> {
         self.agent.failure().map(str::to_owned).or(self.stopped.as_ref().map(ToString::to_string))
     }
 
@@ -201,15 +201,11 @@ impl Learner {
         proposal: Option<Proposal>,
         movement: Movement,
         observation: Observation,
-        world: &World,
-        channels: &[ChannelDescription],
-    ) -> Result<(MovementReport, Update), AbsorbError> {
-        let truth = world.truth();
-        let row = movement.row;
-        let configuration = movement.configuration.clone();
+    ) -> Result<(MovementOutcome, Update), AbsorbError> {
+        let Movement { configuration, row, socket } = movement.clone();
         let before = self.agent.standpoint().to_owned();
-        let predicted = before.belief.state.marker_at(&configuration);
-        let measured = match before.belief.state.hand {
+        let predicted_marker = before.belief.state.marker_at(&configuration);
+        let measured_marker = match before.belief.state.hand {
             Hand::Target(hand) => observation.position(&before.belief.rig, hand),
             // What it sees is elsewhere.
             Hand::Device(_) => None,
@@ -229,28 +225,18 @@ impl Learner {
         self.record.misses += u64::from(!seen);
         self.record.changes_noticed += u64::from(update.change_noticed);
         let movements = self.record.movements;
-        let weighed = self.agent.latest_readings(movements);
-        let readings = readings(world, self.belief(), &configuration, &observed, channels, &weighed);
-        let selection = proposal.as_ref().map(|proposal| &proposal.selection);
-        let report = MovementReport {
-            predicted_marker_m: array(&predicted.coords),
-            measured_marker_m: measured.map(|position| array(&position.coords)),
-            estimated_skeleton_m: arrays(&shown(&self.belief().state, truth).skeleton(&configuration)),
-            true_skeleton_m: truth.map(|truth| arrays(&truth.skeleton(&configuration))),
-            gaze: gaze(world, &configuration),
-            row,
-            socket: None,
+        self.last = proposal.map(Arc::new);
+        let outcome = MovementOutcome {
             configuration,
-            criterion: selection.and_then(|selection| selection.criterion),
-            gain: selection.and_then(|selection| selection.gain),
-            evaluations: selection.map_or(0, |selection| selection.evaluations),
-            selection_ms: proposal.as_ref().map_or(0.0, |proposal| proposal.selection_ms),
-            readings,
-            seen,
-            partition: selection.and_then(|it| it.search.as_ref()).map(Search::partition),
+            row,
+            socket,
+            predicted_marker,
+            measured_marker,
+            observation: observed,
+            weighed: self.agent.latest_readings(movements),
+            proposal: self.last.clone(),
         };
-        self.last = proposal;
-        Ok((report, update))
+        Ok((outcome, update))
     }
 
     /// All that it has learned; `None` where nothing can go on from that.
@@ -266,40 +252,36 @@ impl Learner {
 
     /// How its last movement was chosen: the search by DIRECT that found it, or for a policy that plans, how the criterion
     /// of the next movement looked and where in it the movement lies.
-    pub(super) fn choice(&self, step: u64, report: &LearnerReport, limits: &JointBox) -> Result<Choice, ChoiceError> {
-        let not_searched = || ChoiceError::NotSearched(self.description.name.clone());
-        let movement = report.movement.as_ref().ok_or_else(not_searched)?;
-        let selection = &self.last.as_ref().ok_or_else(not_searched)?.selection;
+    pub(super) fn choice(&self, movement: Option<&MovementOutcome>, limits: JointBox) -> Result<Chosen, ChoiceError> {
+        let not_searched = || ChoiceError::NotSearched(self.setting.name.clone());
+        let movement = movement.ok_or_else(not_searched)?;
+        let selection = &movement.proposal.as_ref().ok_or_else(not_searched)?.selection;
         let (before, after) = (self.before.borrowed(), self.agent.standpoint());
         let search = match (&selection.plan, &selection.search) {
             (None, Some(search)) => search.clone(),
             _ => self.agent.explain(before)?.ok_or_else(not_searched)?,
         };
         let value = |standpoint| self.agent.appraise(standpoint, &movement.configuration).map(|it| it.before).ok();
-        Choice::of(step, report, movement, search, limits, [value(before), value(after)])
+        let (before, after) = (value(before), value(after));
+        Ok(Chosen { configuration: movement.configuration.clone(), search, limits, before, after })
     }
 
     /// What another movement would have taught instead of the last one, by what this learner chooses by.
-    pub(super) fn appraise(&self, configuration: &[f64]) -> Result<AppraisalReport, ChoiceError> {
+    pub(super) fn appraise(&self, configuration: &[f64]) -> Result<Appraised, ChoiceError> {
         let before = self.before.borrowed();
         let appraisal = self.agent.appraise(before, configuration)?;
         let searched =
             self.last.as_ref().filter(|last| last.selection.search.is_some() && last.selection.plan.is_none());
-        let best = match searched {
+        let best_gain = match searched {
             Some(last) => last.selection.gain,
             None => *self.best_gain_before.get_or_init(|| self.searched_gain(before)),
         };
-        Ok(AppraisalReport::of(configuration, &appraisal, &self.before.belief.state, best))
+        let (configuration, estimate) = (configuration.to_vec(), self.before.belief.state.clone());
+        Ok(Appraised { configuration, appraisal, estimate, best_gain })
     }
 
-    /// The learner as it stands, judged against the truth where one is known.
-    pub(super) fn report(
-        &mut self,
-        movement: Option<MovementReport>,
-        update: Update,
-        judge: &Judge,
-        truth: Option<&State>,
-    ) -> LearnerReport {
+    /// How it stands after an update, by its own lights.
+    pub(super) fn stand(&mut self, update: Update) -> Standing {
         let belief = self.agent.belief();
         let expected = belief.expected_error_m(&self.workspace);
         let is_certain = belief.weight() > UNAMBIGUOUS && self.agent.misfit().is_none();
@@ -308,30 +290,15 @@ impl Learner {
         } else {
             self.record.steps_below_target = 0;
         }
-        let metrics = Metrics {
+        Standing {
             expected_prediction_m: expected,
             model_error_m: (!self.agent.noise().is_empty()).then_some(belief.model_error_m),
             trace: belief.covariance.as_ref().map(|covariance| self.weights.trace(covariance)),
-            nis: update.nis.map(|(nis, _)| nis),
-            nis_dof: update.nis.map(|(_, dof)| dof),
+            nis: update.nis,
             movements: self.record.movements,
             misses: self.record.misses,
             settled: self.record.steps_below_target >= SETTLING_STEPS,
             changes_noticed: self.record.changes_noticed,
-            ..judge.metrics(belief, truth)
-        };
-        LearnerReport {
-            name: self.description.name.clone(),
-            movement,
-            estimate: ModelReport::of_belief(belief, truth),
-            metrics,
-            failure: self.end(),
         }
     }
-}
-
-/// Where the head that watches looks after the movement: at the true marker, as far as it can turn.
-fn gaze(world: &World, configuration: &[f64]) -> Option<GazeReport> {
-    let (head, truth) = (world.head()?, world.truth()?);
-    Some(GazeReport::of(head, &head.gaze_at(&truth.marker_at(configuration))))
 }

@@ -4,7 +4,6 @@
 //! truth moved along it onto the estimate (see [`Gauge`](super::gauge::Gauge)).
 
 use nalgebra::{Point3, Vector3};
-use serde::{Deserialize, Serialize};
 
 use body_schema_engine::{
     kinematics::Joint,
@@ -12,9 +11,8 @@ use body_schema_engine::{
     sensing::{Observation, Rig},
 };
 
-/// The metrics of one learner after one step. What needs the truth is null where none is known.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+/// The metrics of one learner after one step. What needs the truth is `None` where none is known.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Metrics {
     /// Mean over pairs i<j of learned revolute joints of |∠(ŵᵢ, ŵⱼ) − ∠(wᵢ, wⱼ)|, degrees: the paper's measure.
     pub orientation_deg: Option<f64>,
@@ -26,22 +24,18 @@ pub struct Metrics {
     pub prediction_m: Option<f64>,
     /// Mean of that distance, metres.
     pub prediction_mean_m: Option<f64>,
-    /// Mean angle between predicted and measured rotations of held-out poses, degrees; null where none were measured.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Mean angle between predicted and measured rotations of held-out poses, degrees; `None` where none were measured.
     pub prediction_mean_deg: Option<f64>,
-    /// Mean distance between predicted and measured points of held-out pictures, pixels; null where there are none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Mean distance between predicted and measured points of held-out pictures, pixels; `None` where there are none.
     pub prediction_mean_px: Option<f64>,
     /// With sockets: mean distance of the predicted target from its mean over the postures that hold it in the same socket, over
-    /// sockets that were not trained on, metres; null where there are none.
-    #[serde(default)]
+    /// sockets that were not trained on, metres; `None` where there are none.
     pub scatter_m: Option<f64>,
     /// The prediction error that the learner itself expects over its workspace: mean of √(tr(H P Hᵀ) + e²), e the model error,
     /// metres.
     pub expected_prediction_m: Option<f64>,
-    /// By how much predictions are off that no parameter explains, root mean square, metres; null for a learner that takes the noise
+    /// By how much predictions are off that no parameter explains, root mean square, metres; `None` for a learner that takes the noise
     /// for known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_error_m: Option<f64>,
     /// tr(W P), in the units of the criterion.
     pub trace: Option<f64>,
@@ -61,27 +55,24 @@ pub struct Metrics {
     pub settled: bool,
     /// tr(W F⁻¹), what prior and data collected so far allow, linearised at the truth (see [`design`](body_schema_engine::design));
     /// since the change of the body, if it changed.
-    #[serde(default)]
     pub bound_trace: Option<f64>,
     /// How often the learner noticed a change of the body.
-    #[serde(default)]
     pub changes_noticed: u64,
     /// Every joint of the chain by itself, base first.
     pub joints: Vec<JointMetrics>,
 }
 
-/// One joint against the truth; null where no truth is known, and for a joint that is not learned.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+/// One joint against the truth; `None` where no truth is known, and for a joint that is not learned.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointMetrics {
     /// Angle between estimated and true direction, signed, degrees.
     pub axis_deg: Option<f64>,
-    /// Distance of the true axis point to the estimated line, metres; null for a prismatic joint.
+    /// Distance of the true axis point to the estimated line, metres; `None` for a prismatic joint.
     pub location_m: Option<f64>,
     /// How far this joint's error shows above the noise: with the true arm but for this one joint, which is as
     /// estimated, the root mean square displacement of the marker over the first 50 configurations of the evaluation
     /// set, divided by the standard deviation σ of the sensor per coordinate. At 1 the error is as large as the noise of
-    /// one measurement. Null if the sensor has no noise.
+    /// one measurement. `None` if the sensor has no noise.
     pub signal_to_noise: Option<f64>,
 }
 

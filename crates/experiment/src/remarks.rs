@@ -1,7 +1,6 @@
 //! What is worth saying of a learner in words: what its numbers rest on, and what they leave open.
 
-use super::{World, gauge::Gauge, learner::Learner};
-use crate::{Description, Metrics};
+use super::{Experiment, Metrics, Setting, World, gauge::Gauge, learner::Learner};
 use body_schema_engine::{
     estimation::{Misfit, MisfitCause, NoiseReport, ReadingReport},
     kinematics::JointKind,
@@ -13,10 +12,20 @@ const LISTED: usize = 8;
 /// A scale of the noise nearer to 1 than this is as promised.
 const AS_PROMISED: f64 = 0.2;
 
+impl Experiment {
+    /// What is to be said of a learner in words, by its number; nothing of one that there is not.
+    pub fn remarks(&self, learner: usize) -> Vec<String> {
+        let outcome = self.latest.learners.get(learner);
+        let said = outcome.zip(self.learners.get(learner));
+        said.map(|(outcome, learner)| remarks(learner, &outcome.metrics, &self.setting, &self.world))
+            .unwrap_or_default()
+    }
+}
+
 /// All remarks on a learner.
-pub(super) fn remarks(learner: &Learner, metrics: &Metrics, description: &Description, world: &World) -> Vec<String> {
+fn remarks(learner: &Learner, metrics: &Metrics, setting: &Setting, world: &World) -> Vec<String> {
     let mut said = Vec::new();
-    said.extend(undetermined(learner, description, world));
+    said.extend(undetermined(learner, setting, world));
     said.extend(learner.noise().iter().filter_map(noise));
     said.extend(joint_noise(learner));
     said.extend(metrics.model_error_m.filter(|error| *error > 0.0).map(model_error));
@@ -33,7 +42,7 @@ pub(super) fn remarks(learner: &Learner, metrics: &Metrics, description: &Descri
     said
 }
 
-fn undetermined(learner: &Learner, description: &Description, world: &World) -> Option<String> {
+fn undetermined(learner: &Learner, setting: &Setting, world: &World) -> Option<String> {
     let belief = learner.belief();
     // Where the truth is known, it says what is in view.
     let (state, view) = match world.truth() {
@@ -41,7 +50,7 @@ fn undetermined(learner: &Learner, description: &Description, world: &World) -> 
         None => (&belief.state, InView::Unknown),
     };
     let gauge = Gauge::new(state, &belief.layout, &belief.rig, view, learner.limits());
-    description.called().untold(&belief.layout, &gauge.free(&belief.state), "any movement")
+    setting.called().untold(&belief.layout, &gauge.free(&belief.state), "any movement")
 }
 
 fn misfit(misfit: Misfit) -> String {

@@ -1,6 +1,6 @@
 //! Experiments with a robot elsewhere: their only learner is asked for movements, and told what came of them.
 
-use super::{Agent, Executed, Experiment, ExperimentError, Proposal, SocketDescription, StepReport};
+use super::{Agent, Executed, Experiment, ExperimentError, Proposal, StepOutcome};
 use body_schema_engine::{
     estimation::Belief,
     selection::{SelectionError, travel},
@@ -54,30 +54,23 @@ impl Experiment {
         Ok((proposal, Prospect { expected_error_m, chance_seen, travel }))
     }
 
-    /// The first learner takes in a movement that a robot elsewhere has made, and what was observed after it. A step is
-    /// reported as any other.
+    /// The first learner takes in a movement that a robot elsewhere has made, and what was observed after it. It is
+    /// a step as any other.
     ///
     /// # Errors
     ///
     /// [`ExperimentError::Absorb`] where the observation is refused or the learner has ended: nothing has happened then.
-    pub fn tell(&mut self, executed: Executed) -> Result<&StepReport, ExperimentError> {
+    pub fn tell(&mut self, executed: Executed) -> Result<&StepOutcome, ExperimentError> {
         let Executed { proposal, movement, observation } = executed;
-        let Self { learners, world, description, judge, latest, .. } = self;
-        let Some(learner) = learners.first_mut() else { return Ok(latest) };
-        let refused = |source| ExperimentError::Absorb { learner: description.learners[0].name.clone(), source };
+        let Some(learner) = self.learners.first_mut() else { return Ok(&self.latest) };
+        let refused = |source| ExperimentError::Absorb { learner: self.setting.learners[0].name.clone(), source };
         if let Some(failure) = learner.agent().failure() {
             return Err(refused(super::AbsorbError::Ended(failure.to_owned())));
         }
         let mut pending = learner.agent().pending().iter();
         let proposal = pending.find(|pending| Some(pending.id) == proposal).cloned();
-        let label = movement.socket.and_then(|socket| description.sockets.get(socket)).map(SocketDescription::label);
-        let (report, update) =
-            learner.learn(proposal, movement, observation, world, &description.channels).map_err(refused)?;
-        let report = super::MovementReport { socket: label, ..report };
-        let report = learner.report(Some(report), update, judge, None);
-        let mut report = StepReport { step: latest.step + 1, learners: vec![report], truth: None };
-        judge.conclude(&mut report);
-        *latest = report;
-        Ok(latest)
+        let (movement, update) = learner.learn(proposal, movement, observation).map_err(refused)?;
+        let fared = vec![(Some(movement), learner.stand(update))];
+        Ok(self.conclude(self.latest.step + 1, fared, false))
     }
 }

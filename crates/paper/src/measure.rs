@@ -8,8 +8,9 @@ use super::{
     outcome::{LearnedJoint, Outcome, Search, Timing, Trial, is_kept},
 };
 use body_schema_engine::{design::best_designs, optimize::History};
-use body_schema_experiment::{Comparison, Experiment, ExperimentError, Trace};
+use body_schema_experiment::{Experiment, ExperimentError, MovementOutcome};
 use body_schema_scenario::{Scenario, edited};
+use body_schema_wire::{Comparison, Trace};
 
 /// One experiment, its scenario, and the plan to carry it out by.
 pub struct Measurement<'a> {
@@ -102,9 +103,9 @@ impl Measurement<'_> {
         let mut experiment = self.start(self.scenario, seed)?;
         let mut choices = Vec::new();
         for _ in 0..steps {
-            let report = experiment.step().map_err(|source| self.broke_off(seed, source))?;
-            let movements = report.learners.iter().filter_map(|learner| learner.movement.as_ref());
-            choices.extend(movements.map(|movement| (movement.selection_ms, movement.evaluations)));
+            let outcome = experiment.step().map_err(|source| self.broke_off(seed, source))?;
+            let movements = outcome.learners.iter().filter_map(|learner| learner.movement.as_ref());
+            choices.extend(movements.map(|movement| (movement.selection_ms(), movement.evaluations())));
             (self.tick)();
         }
         choices.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -115,7 +116,7 @@ impl Measurement<'_> {
         Ok(Timing { median_ms: median.0, p95_ms: late.0, evaluations: median.1, choices: count })
     }
 
-    /// The search of one choice. Partitions come with the reports; the search is told the same values once more, for
+    /// The search of one choice. Its partition comes with the outcome; the search is told the same values once more, for
     /// its hull.
     fn search(&self, variant: &str, step: u64) -> Result<Search, PaperError> {
         let scenario = self.with(&[("selection.variant", toml::Value::String(variant.to_owned()))])?;
@@ -125,9 +126,8 @@ impl Measurement<'_> {
             experiment.step().map_err(|source| self.broke_off(seed, source))?;
         }
         let movement = experiment.latest().learners.first().and_then(|learner| learner.movement.as_ref());
-        let partition = movement
-            .and_then(|movement| movement.partition.clone())
-            .ok_or_else(|| self.impossible("nothing was searched"))?;
+        let partition =
+            movement.and_then(MovementOutcome::partition).ok_or_else(|| self.impossible("nothing was searched"))?;
         let values: Vec<f64> = partition.leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)).collect();
         let direct = History::replay(scenario.robot.limits.dimension(), scenario.selection.search, &values)?.search;
         (self.tick)();

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use body_schema_engine::{optimize::HullPoint, selection::Partition};
-use body_schema_experiment::{Comparison, LearnerComparison};
+use body_schema_wire::{Comparison, LearnerComparison};
 
 /// What one experiment gave.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,7 +33,7 @@ pub struct Trial {
 pub struct LearnedJoint {
     /// Its name.
     pub name: String,
-    /// Its place in the chain, and in [`Curve::joints`](body_schema_experiment::Curve::joints).
+    /// Its place in the chain, and in [`Curve::joints`](body_schema_wire::Curve::joints).
     pub index: usize,
 }
 

@@ -21,7 +21,7 @@ use super::{
     stage::{GROUNDS, Stage},
 };
 use body_schema_calibration::Unit;
-use body_schema_experiment::{Description, LearnerDescription};
+use body_schema_wire::{Description, LearnerDescription};
 
 /// The colours around a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]

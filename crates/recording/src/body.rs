@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::solid::Capsule;
 use body_schema_engine::model::State;
-use body_schema_experiment::{Description, JointDescription};
+use body_schema_wire::{Description, JointDescription};
 
 /// The colour of a body: lighter than the true arm, and to be seen on light and on dark ground.
 const BODY: [u8; 3] = [0xD6, 0xDA, 0xE0];
@@ -39,7 +39,7 @@ impl Figure {
     pub(super) fn of(description: &Description, arm: &State) -> Self {
         let figure = Self::beginning(&description.joints, arm);
         match description.body {
-            Some(body_schema_experiment::Body::Humanoid) => figure.humanoid(arm, description),
+            Some(body_schema_wire::Body::Humanoid) => figure.humanoid(arm, description),
             None => figure.pedestal(),
         }
     }

@@ -45,7 +45,7 @@ use super::{
 };
 use body_schema_calibration::{Calibration, Case, Reading, Residual, Unit};
 use body_schema_engine::model::State;
-use body_schema_experiment::ModelReport;
+use body_schema_wire::ModelReport;
 
 /// Rows that are recorded at most.
 pub const MOST_ROWS: usize = 2000;

@@ -8,7 +8,7 @@ use super::{
     solid::single,
 };
 use body_schema_engine::sensing::Head;
-use body_schema_experiment::{GazeReport, HeadDescription};
+use body_schema_wire::{GazeReport, HeadDescription};
 
 /// Length of the drawn cones, metres.
 const LENGTH_M: f64 = 0.35;

@@ -22,7 +22,7 @@ use super::{
     values::Cell,
 };
 use body_schema_engine::{model::State, optimize::Plane};
-use body_schema_experiment::{ChannelReading, Description, LearnerReport, MovementReport};
+use body_schema_wire::{ChannelReading, Description, LearnerReport, MovementReport};
 
 /// The true arm: grey.
 pub(super) const TRUE_ARM: ArmLook =

@@ -1,7 +1,7 @@
 //! Runs kept for later: as Rerun recordings (.rrd), live or in a file, and as csv.
 //!
-//! A [`Recorder`] observes the [`Description`](body_schema_experiment::Description) and every
-//! [`StepReport`](body_schema_experiment::StepReport) of an experiment, and reads nothing else. It writes to a file, to a
+//! A [`Recorder`] observes the [`Description`](body_schema_wire::Description) and every
+//! [`StepReport`](body_schema_wire::StepReport) of an experiment, and reads nothing else. It writes to a file, to a
 //! [`LiveLog`] that viewers follow, or to both.
 //!
 //! # Entities

@@ -1,6 +1,6 @@
 //! The series of a learner: every metric, and what is known of the choice of its movement.
 
-use body_schema_experiment::LearnerReport;
+use body_schema_wire::LearnerReport;
 
 /// Names, in the order of [`values`].
 pub(super) const NAMES: [&str; 20] = [

@@ -5,7 +5,7 @@ use super::{
     solid::single,
     values::{Cell, Values},
 };
-use body_schema_experiment::{JointDescription, ModelReport};
+use body_schema_wire::{JointDescription, ModelReport};
 
 /// An arm as one line through its points.
 pub(super) fn links(points_m: &[[f64; 3]]) -> Vec<Cell> {
@@ -53,7 +53,7 @@ pub(super) fn origins(model: &ModelReport) -> Vec<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use body_schema_experiment::JointReport;
+    use body_schema_wire::JointReport;
 
     #[test]
     fn the_arrow_of_a_slide_stands_at_the_next_point() {

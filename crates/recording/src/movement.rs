@@ -7,7 +7,7 @@ use super::{
     solid::single,
     values::{Cell, Values},
 };
-use body_schema_experiment::{ChannelReading, MovementReport};
+use body_schema_wire::{ChannelReading, MovementReport};
 
 /// The colour of a measurement; no learner's, and it shows on dark and on light ground.
 pub(super) const MEASURED: [u8; 3] = [0xE6, 0xB4, 0x22];

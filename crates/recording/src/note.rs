@@ -12,7 +12,7 @@ use super::{
     solid::single,
 };
 use body_schema_engine::kinematics::JointKind;
-use body_schema_experiment::Description;
+use body_schema_wire::Description;
 
 const HEAD: &str = "- **Head**: in pale grey the cone of the lens at rest, and the square over which its axis can turn; in the \
                     learner's pale colour the cone after the head has followed the marker. A marker outside it is missed: red, where \

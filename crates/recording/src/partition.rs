@@ -13,8 +13,8 @@ use body_schema_engine::{
     optimize::{Plane, Projection},
     selection::{Leaf, Partition},
 };
-use body_schema_experiment::JointDescription;
 use body_schema_palette::viridis;
+use body_schema_wire::JointDescription;
 
 const NO_VALUE: [u8; 3] = [0x60, 0x60, 0x60];
 const FRAME: [u8; 3] = [0x90, 0x90, 0x90];

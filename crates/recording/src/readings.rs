@@ -4,7 +4,7 @@ use super::{
     rerun::{Color, EntityPath, EntityPathPart, SeriesLines},
     rows::Rows,
 };
-use body_schema_experiment::{ChannelReading, Description};
+use body_schema_wire::{ChannelReading, Description};
 
 /// The series of one learner, by channel.
 pub(super) struct Readings {

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{body::Figure, posture::Posture};
 use body_schema_engine::model::State;
-use body_schema_experiment::Description;
+use body_schema_wire::Description;
 
 /// Postures, uniform in the joint limits, by which the room is judged; the same for every run.
 const POSTURES: usize = 200;

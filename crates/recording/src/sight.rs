@@ -11,7 +11,7 @@ use super::{
     solid::single,
 };
 use body_schema_engine::model::State;
-use body_schema_experiment::MovementReport;
+use body_schema_wire::MovementReport;
 
 /// The colour of rays: that of what was measured.
 const RAY: [u8; 4] = [0xE6, 0xB4, 0x22, 150];

@@ -4,7 +4,7 @@ use super::{
     rerun::{Color, Points3D, Radius},
     solid::single,
 };
-use body_schema_experiment::SocketDescription;
+use body_schema_wire::SocketDescription;
 
 /// Of those that are learned from, and of those that are held out.
 const LEARNED: [u8; 3] = [0x2F, 0x8F, 0x7A];

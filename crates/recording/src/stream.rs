@@ -180,6 +180,7 @@ mod tests {
     use super::{super::decoded::messages, *};
     use crate::LiveLog;
     use body_schema_scenario::builtin;
+    use body_schema_wire::{Description, StepReport};
 
     /// A recording of a single step, and where its messages begin, with their kinds.
     fn recorded() -> (Vec<u8>, Vec<(usize, MessageKind)>) {
@@ -188,8 +189,9 @@ mod tests {
         let learners = Some(&["random".to_owned()][..]);
         let mut experiment = builtin("arm-6dof").expect("built in").experiment(1, learners).expect("valid");
         let target = crate::Target::file(&file);
-        let mut recorder = crate::Recorder::new(experiment.description(), target).expect("a recorder");
-        recorder.log(experiment.step().expect("a step")).expect("recorded");
+        let mut recorder = crate::Recorder::new(&Description::of(&experiment), target).expect("a recorder");
+        experiment.step().expect("a step");
+        recorder.log(&StepReport::of(&experiment)).expect("recorded");
         recorder.finish().expect("finished");
         let bytes = std::fs::read(&file).expect("a file");
         let (mut at, mut found) = (StreamHeader::ENCODED_SIZE_BYTES, Vec::new());

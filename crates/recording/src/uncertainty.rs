@@ -9,7 +9,7 @@ use super::{
     solid::{quaternion, single},
     values::{Cell, Values},
 };
-use body_schema_experiment::{JointDescription, ModelReport};
+use body_schema_wire::{JointDescription, ModelReport};
 
 /// A learner's own covariance is drawn beside what its data allow where its standard deviations are so much larger.
 const KEPT_LARGE: f64 = 1.5;

@@ -6,7 +6,7 @@ use super::{
     misfit::{Misfit, Setting, misfit},
 };
 use body_schema_engine::sensing::Loss;
-use body_schema_experiment::LearnerDescription;
+use body_schema_experiment::LearnerSetting;
 
 /// A learner that a scenario offers.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -193,8 +193,8 @@ impl Scenario {
             .collect()
     }
 
-    /// A learner as reports describe it.
-    pub fn learner_description(&self, spec: &LearnerSpec) -> LearnerDescription {
+    /// A learner as experiments know it.
+    pub(crate) fn learner_setting(&self, spec: &LearnerSpec) -> LearnerSetting {
         let noise = match spec.estimator {
             EstimatorKind::Rls => self.filter.stabilising,
             EstimatorKind::Unscented => self.unscented.stabilising,
@@ -204,7 +204,7 @@ impl Scenario {
         let robust = spec.estimator == EstimatorKind::Smoother
             && spec.robust
             && matches!(self.smoother.loss, Loss::Mixture { .. });
-        LearnerDescription {
+        LearnerSetting {
             name: spec.name.clone(),
             estimator: spec.estimator.name().to_owned(),
             policy: spec.policy.name().to_owned(),

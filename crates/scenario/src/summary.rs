@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Scenario, WorldSpec};
-use body_schema_experiment::{JointDescription, LearnerDescription, SocketDescription, Thresholds};
+use super::{LearnerSpec, Scenario, WorldSpec};
+use body_schema_experiment::{JointSetting, SocketSetting};
+use body_schema_wire::{JointDescription, LearnerDescription, Thresholds};
 
 /// A scenario in brief.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,8 +80,13 @@ impl Scenario {
             learners: self.learners.iter().map(|spec| self.learner_description(spec)).collect(),
             compositions: self.compositions().iter().map(|spec| self.learner_description(spec)).collect(),
             explorer: self.explorer(),
-            thresholds: self.thresholds,
+            thresholds: self.thresholds.into(),
         }
+    }
+
+    /// A learner as reports describe it.
+    pub fn learner_description(&self, spec: &LearnerSpec) -> LearnerDescription {
+        LearnerDescription::from(&self.learner_setting(spec))
     }
 
     /// See [`ScenarioSummary::explorer`].
@@ -96,11 +102,11 @@ impl Scenario {
 
 impl super::Robot {
     /// The sockets, and where a known truth has them.
-    pub(crate) fn socket_descriptions(&self, is_true: bool) -> Vec<SocketDescription> {
-        let of = |socket: &super::SocketSpec, held_out| SocketDescription {
+    pub(crate) fn socket_settings(&self, is_true: bool) -> Vec<SocketSetting> {
+        let of = |socket: &super::SocketSpec, held_out| SocketSetting {
             name: socket.name.clone(),
             place: socket.place.clone(),
-            at_m: is_true.then(|| socket.at.into()),
+            at: is_true.then_some(socket.at),
             held_out,
         };
         let learned = self.sockets.iter().map(|socket| of(socket, false));
@@ -109,8 +115,13 @@ impl super::Robot {
 
     /// The joints as the page and recordings are told of them.
     pub fn joint_descriptions(&self) -> Vec<JointDescription> {
+        self.joint_settings().iter().map(JointDescription::from).collect()
+    }
+
+    /// The joints as experiments know them.
+    pub(crate) fn joint_settings(&self) -> Vec<JointSetting> {
         (self.names.iter().zip(&self.state.joints).zip(self.limits.joints()).enumerate())
-            .map(|(index, ((name, joint), &(lower, upper)))| JointDescription {
+            .map(|(index, ((name, joint), &(lower, upper)))| JointSetting {
                 name: name.clone(),
                 kind: joint.kind(),
                 learned: self.layout.is_learned(index),

@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 
 use super::{json, refusals::OfBodies};
 use crate::server::{App, extract::JsonBody, problem::Problem};
-use body_schema_experiment::{AppraisalReport, Choice};
+use body_schema_wire::{AppraisalReport, Choice};
 
 /// A posture to be appraised.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]

@@ -16,8 +16,8 @@ use crate::server::{
     problem::{Kind, Problem},
     session::Session,
 };
-use body_schema_experiment::RunResult;
 use body_schema_recording::{RecordingError, StepsCsv};
+use body_schema_wire::RunResult;
 
 /// The recording so far, complete: an .rrd file for Rerun's viewer.
 #[utoipa::path(get, path = "/v1/sessions/{id}/recording.rrd", tag = "results", operation_id = "getRecording",

@@ -46,8 +46,8 @@ use super::{
     metrics::OPEN_METRICS,
     problem::{Kind, PROBLEM_JSON, Problem},
 };
-use body_schema_experiment::StepReport;
 use body_schema_recording::{Shape, Theme};
+use body_schema_wire::StepReport;
 
 const JSON: &str = "application/json";
 const EVENT_STREAM: &str = "text/event-stream";

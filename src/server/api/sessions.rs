@@ -22,8 +22,8 @@ use crate::server::{
     session::{DamagedSession, Listed, NewOutsideSession, NewSession, SessionResource},
 };
 use body_schema_ask_tell::whole::{whole, whole_or_none};
-use body_schema_experiment::StepReport;
 use body_schema_recording::MOST_FRAMES;
+use body_schema_wire::StepReport;
 
 /// A request draws at most so many postures on the way: each takes some kilobytes of the session's memory.
 const MAX_FRAMES_PER_REQUEST: u64 = 1000;

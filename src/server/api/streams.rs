@@ -32,8 +32,8 @@ use crate::server::{
     problem::Problem,
     session::{Following, Kept, Standing},
 };
-use body_schema_experiment::{Description, StepReport};
 use body_schema_recording::LiveLog;
+use body_schema_wire::{Description, StepReport};
 
 /// Silence after which a comment or a ping shows that the connection still stands.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);

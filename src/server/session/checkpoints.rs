@@ -9,7 +9,7 @@ use crate::server::{
 };
 use body_schema_ask_tell as ask_tell;
 use body_schema_ask_tell::{Checkpoint, Event, ReplayError, Setup};
-use body_schema_experiment::Description;
+use body_schema_wire::Description;
 
 /// The steps since the latest checkpoint, of which there is none in the store yet.
 #[derive(Default)]
@@ -111,10 +111,10 @@ pub(super) struct ComeBy {
 impl ComeBy {
     /// Takes in a step, and tells its report; `None` where that cannot be written.
     pub(super) fn hear(&mut self, step: &ask_tell::Replayed<'_>, metrics: &Metrics) -> Option<Kept> {
-        if step.report.step > 0 {
+        if step.step() > 0 {
             metrics.replayed.inc();
         }
-        let kept = Kept::of(&step.report, step.description()).ok()?;
+        let kept = Kept::of(&step.report(), &step.description()).ok()?;
         self.saved.extend(self.since.step(&kept, step.told(), || step.checkpoint()));
         Some(kept)
     }
@@ -149,7 +149,7 @@ impl Replayed {
         let mut reports = Vec::new();
         if let Some(from) = from {
             let lacking = || ReplayError::NotASession("the reports of its steps are not all of them".to_owned());
-            reports = from.reports(session.description()).ok_or_else(lacking)?;
+            reports = from.reports(&session.description()).ok_or_else(lacking)?;
         }
         reports.extend(later);
         Ok(Self { session, reports, since, saved })

@@ -33,8 +33,8 @@ use crate::server::{
 };
 use body_schema_ask_tell as ask_tell;
 use body_schema_ask_tell::{ChannelShape, MOST_EVENTS, ReplayError, Setup, Status, VERSION};
-use body_schema_experiment::Description;
 use body_schema_scenario::WorldKind;
+use body_schema_wire::Description;
 
 /// So often a request is tried again whose session left memory just before it came.
 const ATTEMPTS: usize = 3;
@@ -83,7 +83,7 @@ pub(super) struct Summary {
 
 impl Summary {
     pub(super) fn of(session: &ask_tell::Session) -> Self {
-        Self { description: session.description().clone(), channels: session.channels().to_vec() }
+        Self { description: session.description(), channels: session.channels().to_vec() }
     }
 
     /// Of numbers, texts and lists alone, it can be written.

@@ -16,9 +16,10 @@ use uuid::Uuid;
 
 use super::{Kept, Shared};
 use crate::server::problem::{Kind, Problem};
-use body_schema_experiment::{AppraisalReport, Choice, Description, Experiment, RunResult};
+use body_schema_experiment::Experiment;
 use body_schema_recording::{EllipsoidSize, Recorder, RecordingError, Target};
 use body_schema_scenario::builtin;
+use body_schema_wire::{AppraisalReport, Choice, Description, RunResult, StepReport};
 
 /// Within a long command, what was made is published this often.
 const PUBLISH_EVERY: Duration = Duration::from_millis(200);
@@ -99,15 +100,16 @@ pub(super) type Reply<T> = oneshot::Sender<Result<T, Problem>>;
 /// The body of the thread. `opened` hears of the description once the session stands.
 pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply<Description>) {
     let Setup { id, scenario, seed, learners, ellipsoids, file, most_steps, shared, permit } = setup;
-    let open = || -> Result<(Experiment, Recorder, Kept), Problem> {
+    let open = || -> Result<(Experiment, Description, Recorder, Kept), Problem> {
         let experiment = builtin(&scenario)?.experiment(seed, learners.as_deref())?;
         let target = Target::live(shared.live.clone()).with_recording_id(id.to_string()).with_ellipsoids(ellipsoids);
         let target = file.iter().fold(target, |target, file| target.and_file(file));
         let unbegun = |error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}"));
-        let mut recorder = Recorder::new(experiment.description(), target).map_err(unbegun)?;
-        let recorded = recorder.log(experiment.latest()).and_then(|()| recorder.flush()).map_err(unbegun);
-        match recorded.and_then(|()| Kept::of(experiment.latest(), experiment.description())) {
-            Ok(start) => Ok((experiment, recorder, start)),
+        let (description, report) = (Description::of(&experiment), StepReport::of(&experiment));
+        let mut recorder = Recorder::new(&description, target).map_err(unbegun)?;
+        let recorded = recorder.log(&report).and_then(|()| recorder.flush()).map_err(unbegun);
+        match recorded.and_then(|()| Kept::of(&report, &description)) {
+            Ok(start) => Ok((experiment, description, recorder, start)),
             Err(problem) => {
                 recorder.discard();
                 Err(problem)
@@ -115,11 +117,12 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
         }
     };
     match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
-        Ok((experiment, mut recorder, start)) => {
+        Ok((experiment, description, mut recorder, start)) => {
             shared.publish(vec![start], experiment.remaining());
-            if opened.send(Ok(experiment.description().clone())).is_ok() {
+            if opened.send(Ok(description.clone())).is_ok() {
                 let waiting = VecDeque::new();
-                let mut engine = Engine { experiment, most_steps, shared: &shared, commands: &commands, waiting };
+                let mut engine =
+                    Engine { experiment, description, most_steps, shared: &shared, commands: &commands, waiting };
                 let outcome = catch_unwind(AssertUnwindSafe(|| engine.serve(&mut recorder)));
                 if let Err(panic) = outcome {
                     shared.fail(panicked(&*panic).detail.into());
@@ -140,6 +143,7 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
 
 struct Engine<'a> {
     experiment: Experiment,
+    description: Description,
     most_steps: u64,
     shared: &'a Shared,
     commands: &'a mpsc::Receiver<Command>,
@@ -182,12 +186,13 @@ impl Engine<'_> {
                 let outcome = self.steps((count, frames), expected, recorder, &mut reply);
                 drop(reply.send(outcome));
             }
-            Command::Result { reply } => drop(reply.send(Ok(self.experiment.result()))),
+            Command::Result { reply } => drop(reply.send(Ok(RunResult::of(&self.experiment)))),
             Command::Choice { learner, reply } => {
-                drop(reply.send(self.experiment.choice(&learner).map_err(Problem::from)));
+                drop(reply.send(Choice::of(&self.experiment, &learner).map_err(Problem::from)));
             }
             Command::Appraise { learner, configuration, reply } => {
-                drop(reply.send(self.experiment.appraise(&learner, &configuration).map_err(Problem::from)));
+                let appraised = self.experiment.appraise(&learner, &configuration).map_err(Problem::from);
+                drop(reply.send(appraised.map(|appraised| AppraisalReport::from(&appraised))));
             }
             Command::SetConfiguration { learner, configuration, reply } => {
                 drop(reply.send(self.set_configuration(&learner, &configuration, recorder)));
@@ -214,8 +219,8 @@ impl Engine<'_> {
     ) -> Result<AppraisalReport, Problem> {
         // Every posture that is tried out takes memory.
         self.shared.budget.check()?;
-        let appraisal = self.experiment.set_configuration(learner, configuration)?;
-        let learners = &self.experiment.description().learners;
+        let appraisal = AppraisalReport::from(&self.experiment.set_configuration(learner, configuration)?);
+        let learners = &self.description.learners;
         if let Some(index) = learners.iter().position(|described| described.name == learner) {
             let (step, skeleton_m) = (self.experiment.latest().step, &appraisal.estimated_skeleton_m);
             recorder.log_ghost(step, index, Some(skeleton_m)).map_err(recording_failed)?;
@@ -287,10 +292,10 @@ impl Engine<'_> {
     fn step(&mut self, frames: u64, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
         self.experiment.step().map_err(|error| Problem::new(Kind::EngineFailed, error.to_string()))?;
         self.shared.metrics.steps.inc();
-        let report = self.experiment.latest();
+        let report = StepReport::of(&self.experiment);
         // The step stands even if it cannot be recorded.
-        batch.made.push(Kept::of(report, self.experiment.description())?);
-        recorder.log_moving(report, frames).map_err(recording_failed)
+        batch.made.push(Kept::of(&report, &self.description)?);
+        recorder.log_moving(&report, frames).map_err(recording_failed)
     }
 
     fn publish(&self, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {

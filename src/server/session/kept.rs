@@ -5,8 +5,8 @@ use std::{mem::size_of, sync::Arc};
 use serde_json::value::{RawValue, to_raw_value};
 
 use crate::server::problem::{Kind, Problem};
-use body_schema_experiment::{Description, StepReport};
 use body_schema_recording::{RecordingError, StepsCsv};
+use body_schema_wire::{Description, StepReport};
 
 /// A report as its readers get it. Clones share the text.
 #[derive(Clone, Debug)]

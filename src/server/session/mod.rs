@@ -49,8 +49,8 @@ pub(super) use watching::{Following, Watching};
 
 use super::problem::{Kind, Problem};
 use body_schema_calibration::File;
-use body_schema_experiment::{AppraisalReport, Choice, Description, RunResult};
 use body_schema_recording::LiveLog;
+use body_schema_wire::{AppraisalReport, Choice, Description, RunResult};
 
 /// A session: its engine's command line, and all that it has left to read.
 pub(super) struct Session {
@@ -181,7 +181,7 @@ impl Session {
     /// The outcome so far, after whatever the session is busy with.
     pub(super) async fn result(&self) -> Result<RunResult, Problem> {
         if self.is_elsewhere() {
-            return self.tell(|robot| Ok(robot.experiment().result())).await;
+            return self.tell(|robot| Ok(RunResult::of(robot.experiment()))).await;
         }
         self.ask(|reply| Command::Result { reply }).await
     }
@@ -189,7 +189,7 @@ impl Session {
     /// How a learner's last movement was chosen, after whatever the session is busy with.
     pub(super) async fn choice(&self, learner: String) -> Result<Choice, Problem> {
         if self.is_elsewhere() {
-            return self.tell(move |robot| Ok(robot.experiment().choice(&learner)?)).await;
+            return self.tell(move |robot| Ok(Choice::of(robot.experiment(), &learner)?)).await;
         }
         self.ask(|reply| Command::Choice { learner, reply }).await
     }
@@ -197,7 +197,9 @@ impl Session {
     /// What another movement would have taught a learner, after whatever the session is busy with.
     pub(super) async fn appraise(&self, learner: String, configuration: Vec<f64>) -> Result<AppraisalReport, Problem> {
         if self.is_elsewhere() {
-            return self.tell(move |robot| Ok(robot.experiment().appraise(&learner, &configuration)?)).await;
+            return self
+                .tell(move |robot| Ok(AppraisalReport::from(&robot.experiment().appraise(&learner, &configuration)?)))
+                .await;
         }
         self.ask(|reply| Command::Appraise { learner, configuration, reply }).await
     }

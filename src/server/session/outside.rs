@@ -30,8 +30,9 @@ use body_schema_ask_tell::{
     Answer, Ask, ChannelShape, Happened, Most, Observation, Outcome, Prepared, ReplayError, Setup, Status, Suggestion,
     Suggestions, Told,
 };
-use body_schema_experiment::{Description, Experiment};
+use body_schema_experiment::Experiment;
 use body_schema_recording::{Recorder, RecordingError, Target};
+use body_schema_wire::Description;
 
 /// How soon at least, and how late at most, it is looked again whether the time of a suggestion has run out, seconds.
 const LOOK_AGAIN_S: [f64; 2] = [0.5, 3600.0];
@@ -80,7 +81,7 @@ pub(super) fn run(
     let open = || Elsewhere::open((id, made_s), origin, &most, store, shared.clone());
     match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
         Ok(mut robot) => {
-            if opened.send(Ok(robot.session.description().clone())).is_ok() {
+            if opened.send(Ok(robot.session.description())).is_ok() {
                 let served = catch_unwind(AssertUnwindSafe(|| robot.serve(jobs)));
                 if let Err(panic) = served {
                     shared.fail(panicked(&*panic).detail.into());
@@ -146,7 +147,7 @@ impl Elsewhere {
         }
         // Each life of a session in memory records anew: viewers must not take two recordings for one.
         let target = Target::live(shared.live.clone()).with_recording_id(Uuid::new_v4().to_string());
-        let begun = Recorder::new(session.description(), target.with_ellipsoids(shown.ellipsoids));
+        let begun = Recorder::new(&session.description(), target.with_ellipsoids(shown.ellipsoids));
         let recorder = begun.map_err(recording_failed)?;
         if is_new {
             store.insert(id, made_s, session.setup(), shown, session.events())?;
@@ -429,18 +430,18 @@ impl Elsewhere {
 
     /// Records what is new.
     fn record(&mut self) -> Result<Vec<Kept>, RecordingError> {
-        let report = self.session.latest();
         let mut reports = Vec::new();
         if self.is_rewritten {
             return Ok(reports);
         }
-        let step = report.step as usize;
+        let step = self.session.latest().step as usize;
         if step >= self.shared.steps() {
-            let kept = Kept::of(report, self.session.description());
+            let report = self.session.report();
+            let kept = Kept::of(&report, &self.session.description());
             reports.push(kept.map_err(|problem| RecordingError::Encode(problem.detail.into()))?);
             if self.recorded == step {
                 self.recorded += 1;
-                self.recorder.log(report)?;
+                self.recorder.log(&report)?;
             }
         }
         if !self.is_behind() {
@@ -452,7 +453,7 @@ impl Elsewhere {
     /// Draws the posture that is suggested next, as a ghost of the arm.
     fn show(&mut self) -> Result<(), RecordingError> {
         let next = self.session.pending().next();
-        let joints = &self.session.description().joints;
+        let joints = &self.session.experiment().setting().joints;
         let posture = next.and_then(|next| {
             let positions = joints.iter().map(|joint| next.configuration.get(&joint.name).copied());
             positions.collect::<Option<Vec<f64>>>()

@@ -5,8 +5,8 @@ use utoipa::ToSchema;
 
 use super::{Session, lock};
 use body_schema_ask_tell::{ChannelShape, Status};
-use body_schema_experiment::Description;
 use body_schema_scenario::WorldKind;
+use body_schema_wire::Description;
 
 /// A session as its resource shows it.
 #[derive(Clone, Debug, Serialize, ToSchema)]

@@ -1,6 +1,6 @@
 //! What was read after the movement that is shown, and how far it is from what each learner believes since.
 
-use body_schema_experiment::{ChannelDescription, ChannelReading};
+use body_schema_wire::{ChannelDescription, ChannelReading};
 use egui::{Label, RichText, Ui};
 
 use super::{alarm, learners::swatch};

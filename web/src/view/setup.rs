@@ -1,7 +1,7 @@
 //! What is compared: scenario, seed, learners.
 
-use body_schema_experiment::LearnerDescription;
 use body_schema_scenario::{ScenarioSummary, WorldKind};
+use body_schema_wire::LearnerDescription;
 use egui::{ComboBox, RichText, TextEdit, Ui};
 
 use crate::{panel::Panel, settings::MAX_SEED, wire::Session, words};

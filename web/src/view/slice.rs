@@ -1,7 +1,7 @@
 //! The partition of the joint box, cut by the plane of two joints through the chosen configuration.
 
 use body_schema_engine::optimize::{Plane, Projection};
-use body_schema_experiment::Choice;
+use body_schema_wire::Choice;
 use egui::{
     Align2, Color32, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, StrokeKind, Ui, WidgetInfo, accesskit::Role,
     pos2, vec2,

@@ -47,9 +47,8 @@ impl Default for Robot {
 
 impl Robot {
     fn keep(&mut self) {
-        let latest = self.session.experiment().latest();
-        if latest.step == self.reports.len() as u64 {
-            self.reports.push(super::server::written(latest));
+        if self.session.latest().step == self.reports.len() as u64 {
+            self.reports.push(super::server::written(self.session.report()));
         }
     }
 

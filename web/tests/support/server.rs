@@ -1,7 +1,8 @@
 //! The server's part, played by the engine itself: what it reports is what visitors get.
 
-use body_schema_experiment::{Choice, Experiment, StepReport};
+use body_schema_experiment::Experiment;
 use body_schema_scenario::{Scenario, builtin, edited};
+use body_schema_wire::{AppraisalReport, Choice, Description, StepReport};
 use serde_json::{Value, json};
 
 /// How long every choice is said to have taken, ms: the one number that is another in each run.
@@ -71,7 +72,7 @@ impl Server {
     }
 
     fn keep(&mut self) {
-        self.reports.push(written(self.experiment().latest()));
+        self.reports.push(written(StepReport::of(self.experiment())));
     }
 
     /// The reports that the page has not passed on yet.
@@ -83,7 +84,7 @@ impl Server {
 
     /// The session's id.
     pub fn id(&self) -> String {
-        let description = self.experiment().description();
+        let description = self.experiment().setting();
         format!("{}-{}", description.scenario, description.seed)
     }
 
@@ -92,13 +93,13 @@ impl Server {
         let experiment = self.experiment();
         json!({ "is": "session", "session": {
             "id": self.id(), "step": experiment.latest().step, "remaining": experiment.remaining(),
-            "description": experiment.description(),
+            "description": Description::of(experiment),
         } })
     }
 
     /// How a learner's last movement was chosen.
     pub fn choice(&self, learner: &str) -> Choice {
-        self.experiment().choice(learner).expect("a choice by DIRECT")
+        Choice::of(self.experiment(), learner).expect("a choice by DIRECT")
     }
 
     /// The same, passed on by the page.
@@ -109,29 +110,32 @@ impl Server {
     /// What another posture would have taught.
     pub fn evaluation(&self, learner: &str, configuration: &[f64]) -> Value {
         let appraisal = self.experiment().appraise(learner, configuration).expect("an appraisal");
-        json!({ "is": "evaluation", "evaluation": appraisal })
+        json!({ "is": "evaluation", "evaluation": AppraisalReport::from(&appraisal) })
     }
 
     /// Sets the next movement of a learner whose movements the visitor chooses, and says what it would teach.
     pub fn configure(&mut self, learner: &str, configuration: &[f64]) -> Value {
         let experiment = self.experiment.as_mut().expect("a session");
         let appraisal = experiment.set_configuration(learner, configuration).expect("an appraisal");
-        json!({ "is": "configured", "learner": learner, "evaluation": appraisal })
+        json!({ "is": "configured", "learner": learner, "evaluation": AppraisalReport::from(&appraisal) })
     }
 
     /// The session's comparison with another seed, from step 1 on.
     pub fn other_seed(&self, seed: u64, steps: u64) -> Value {
-        let description = self.experiment().description();
+        let description = self.experiment().setting();
         let learners: Vec<String> = description.learners.iter().map(|learner| learner.name.clone()).collect();
         let mut experiment = self.begin(&description.scenario, seed, Some(&learners));
-        let reports: Vec<Value> = (0..steps).map(|_| written(experiment.step().expect("a step"))).collect();
+        let next = |_| {
+            experiment.step().expect("a step");
+            written(StepReport::of(&experiment))
+        };
+        let reports: Vec<Value> = (0..steps).map(next).collect();
         json!({ "is": "seeds", "seed": seed, "reports": reports, "done": true })
     }
 }
 
 /// A report as JSON.
-pub(super) fn written(report: &StepReport) -> Value {
-    let mut report = report.clone();
+pub(super) fn written(mut report: StepReport) -> Value {
     for movement in report.learners.iter_mut().filter_map(|learner| learner.movement.as_mut()) {
         movement.selection_ms = SELECTION_MS;
     }

@@ -1,8 +1,8 @@
 //! What a claim is judged by, and the verdict.
 
 use crate::{experiments::PaperExperiment, outcome::Outcome, report::Agreement};
-use body_schema_experiment::{Curve, LearnerComparison, Quantiles};
 use body_schema_scenario::Scenario;
+use body_schema_wire::{Curve, LearnerComparison, Quantiles};
 
 /// The outcome of an experiment, and what was run.
 #[derive(Clone, Copy, Debug)]

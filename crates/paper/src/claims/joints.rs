@@ -5,7 +5,7 @@ use super::{
     evidence::{Evidence, Finding, percent, short},
 };
 use crate::{outcome::LearnedJoint, report::Agreement};
-use body_schema_experiment::{Curve, Quantiles};
+use body_schema_wire::{Curve, Quantiles};
 
 pub const CLAIMS: &[Claim] = &[
     Claim {

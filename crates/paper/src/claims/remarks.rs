@@ -6,8 +6,8 @@ use super::{
 };
 use crate::{outcome::Trial, report::Agreement};
 use body_schema_engine::optimize::least;
-use body_schema_experiment::Summary;
 use body_schema_scenario::EstimatorKind;
+use body_schema_wire::Summary;
 
 pub const CLAIMS: &[Claim] = &[
     Claim {
@@ -130,7 +130,7 @@ fn smaller_orientation_error(evidence: &Evidence<'_>) -> Option<Finding> {
 fn misses(evidence: &Evidence<'_>) -> Option<Finding> {
     let share = |learner: &str| {
         let runs = &evidence.learner(learner)?.runs;
-        let total = |count: fn(&body_schema_experiment::SeedRun) -> u64| runs.iter().map(count).sum::<u64>() as f64;
+        let total = |count: fn(&body_schema_wire::SeedRun) -> u64| runs.iter().map(count).sum::<u64>() as f64;
         Some(total(|run| run.misses) / total(|run| run.movements).max(1.0))
     };
     let (active, random) = (share("active")?, share("random")?);

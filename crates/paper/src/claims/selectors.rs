@@ -5,7 +5,7 @@ use super::{
     evidence::{Evidence, Finding, short},
 };
 use crate::report::Agreement;
-use body_schema_experiment::LearnerComparison;
+use body_schema_wire::LearnerComparison;
 
 pub const CLAIMS: &[Claim] = &[
     Claim {

@@ -268,7 +268,7 @@ fn active_is_better(evidence: &Evidence<'_>) -> Option<Finding> {
 
 fn random_is_trapped(evidence: &Evidence<'_>) -> Option<Finding> {
     let learners = &evidence.outcome.trials().first()?.comparison.learners;
-    let trapped = |summary: &body_schema_experiment::Summary| summary.runs - summary.converged;
+    let trapped = |summary: &body_schema_wire::Summary| summary.runs - summary.converged;
     let random = trapped(&evidence.learner("random")?.summary);
     let list: Vec<String> = learners
         .iter()

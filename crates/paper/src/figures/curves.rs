@@ -2,9 +2,9 @@
 
 use super::{Figure, Source, designs};
 use body_schema_chart::{Axis, Chart, Layer, Panel, Style};
-use body_schema_experiment::{Curve, LearnerComparison, Quantiles};
 use body_schema_palette::{TRUTH_COLOR, learner_color, learner_slots};
 use body_schema_scenario::WorldSpec;
+use body_schema_wire::{Curve, LearnerComparison, Quantiles};
 
 /// One error, in the unit of its axis.
 struct Quantity {

@@ -3,7 +3,7 @@
 use super::{Figure, Source};
 use crate::outcome::LearnedJoint;
 use body_schema_chart::{Axis, Chart, Layer, Panel, Style};
-use body_schema_experiment::{Curve, JointMetrics, LearnerComparison};
+use body_schema_wire::{Curve, JointMetrics, LearnerComparison};
 
 /// More joints than this cannot be told apart in one panel.
 const MOST: usize = 12;

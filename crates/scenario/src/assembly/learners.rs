@@ -24,7 +24,7 @@ impl Scenario {
         let agent = self.agent_of(spec, seed, briefing)?;
         let workspace = briefing.workspace.clone();
         let weights = briefing.weights.clone();
-        Ok(Learner::new(self.learner_description(spec), agent, weights, workspace, self.settled_below_m))
+        Ok(Learner::new(self.learner_setting(spec), agent, weights, workspace, self.settled_below_m))
     }
 
     pub(super) fn agent_of(&self, spec: &LearnerSpec, seed: u64, briefing: &Briefing) -> Result<Agent, ScenarioError> {

@@ -17,10 +17,7 @@ use body_schema_engine::{
     selection::{Actions, Movement, Watch, Weights},
     sensing::{InView, Observation},
 };
-use body_schema_experiment::{
-    Agent, Change, Description, Evaluation, Experiment, HeadDescription, ModelReport, Stream, World, channels,
-    described,
-};
+use body_schema_experiment::{Agent, Change, Evaluation, Experiment, Setting, Stream, World, channels};
 
 /// Configurations over which the prediction error is judged in a simulated world.
 const EVALUATION_SIZE: usize = 200;
@@ -242,13 +239,12 @@ impl Scenario {
         let layout = &briefing.layout;
         let learners =
             specs.iter().map(|spec| self.learner(spec, seed, briefing)).collect::<Result<Vec<_>, ScenarioError>>()?;
-        let (cameras, targets) = described(&robot.equipment);
-        let description = Description {
+        let setting = Setting {
             scenario: self.name.clone(),
             title: self.title.clone(),
             seed,
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            joints: robot.joint_descriptions(),
+            joints: robot.joint_settings(),
             parameters: layout.dimension(),
             movements_by_counting: movements_by_counting(
                 &robot.state,
@@ -257,23 +253,22 @@ impl Scenario {
                 world.truth().map_or(InView::Unknown, |_| InView::By(world.head())),
                 &robot.limits,
             ),
-            learners: specs.iter().map(|spec| self.learner_description(spec)).collect(),
+            learners: specs.iter().map(|spec| self.learner_setting(spec)).collect(),
             thresholds: self.thresholds,
             movements_available: briefing.actions.remaining(),
-            truth: world.truth().map(ModelReport::of_state),
+            truth: world.truth().cloned(),
             change_at: world.change().map(|change| change.step),
-            head: briefing.watch.as_ref().and_then(|watch| watch.head.as_ref().map(HeadDescription::of)),
+            head: briefing.watch.as_ref().and_then(|watch| watch.head),
             channels: channels(&self.rig, &robot.equipment),
-            cameras,
-            targets,
+            equipment: robot.equipment.clone(),
             base_learned: layout.block(Block::Base).is_some(),
-            sockets: robot.socket_descriptions(world.truth().is_some()),
+            sockets: robot.socket_settings(world.truth().is_some()),
             body: robot.body,
         };
         // Of what each learns itself; all or none.
         let problems = learners.iter().map(|learner| self.design_problem_of((*learner.belief().layout).clone()));
         let problems = problems.collect::<Option<_>>().unwrap_or_default();
-        Ok(Experiment::new(description, world, learners, evaluation, problems))
+        Ok(Experiment::new(setting, world, learners, evaluation, problems))
     }
 }
 
@@ -360,7 +355,7 @@ mod tests {
                     scenario.assemble(11, &specs, world, evaluation, &briefing).expect("an experiment");
                 [(); 3].map(|()| {
                     let report = experiment.step().expect("a step");
-                    let chosen = |learner: &body_schema_experiment::LearnerReport| {
+                    let chosen = |learner: &body_schema_experiment::LearnerOutcome| {
                         learner.movement.as_ref().expect("a movement").configuration.clone()
                     };
                     report.learners.iter().map(chosen).collect::<Vec<_>>()

@@ -14,7 +14,7 @@ use toml::Spanned;
 
 use super::{ErrorDraw, EstimatorKind, PolicyKind};
 use body_schema_engine::{kinematics::JointKind, selection::Optimality};
-use body_schema_experiment::Body;
+use body_schema_experiment as experiment;
 
 pub use constraints::{Constraints, ForbiddenBox};
 pub use exactly::Exactly;
@@ -60,6 +60,20 @@ pub struct Scenario {
     pub learners: Spanned<Vec<Learner>>,
     #[serde(default)]
     pub promises: BTreeMap<Spanned<String>, Spanned<u64>>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Body {
+    Humanoid,
+}
+
+impl From<Body> for experiment::Body {
+    fn from(body: Body) -> Self {
+        match body {
+            Body::Humanoid => Self::Humanoid,
+        }
+    }
 }
 
 #[derive(Debug, Deserialize)]

@@ -125,7 +125,7 @@ impl Check<'_> {
             state,
             layout,
             limits,
-            body: raw.body,
+            body: raw.body.map(Into::into),
             known,
             equipment,
             sockets,

@@ -4,8 +4,9 @@ use body_schema_engine::{
     estimation::HypothesisSettings,
     selection::{Criterion, Planning},
 };
-use body_schema_experiment::{ChoiceError, Experiment, MovementReport};
+use body_schema_experiment::{ChoiceError, Experiment, MovementOutcome};
 use body_schema_scenario::builtin;
+use body_schema_wire::{AppraisalReport, Choice, StepReport};
 
 /// A learner that plans, with short searches, and takes directions for unknown above this deviation.
 fn planning(name: &str, unknown: f64) -> Experiment {
@@ -24,15 +25,20 @@ fn the_chosen_movement_is_the_best_of_its_search_and_of_its_appraisal() {
         for _ in 0..steps {
             experiment.step().expect("a step");
         }
-        let choice = experiment.choice("active").expect("searched by DIRECT");
+        let choice = Choice::of(&experiment, "active").expect("searched by DIRECT");
         let last = choice.iterations.last().expect("iterations");
         assert_eq!((last.best_box, last.best), (Some(choice.chosen.rectangle), choice.chosen.criterion));
         assert_eq!(choice.boxes.len(), choice.evaluations);
         let same = experiment.appraise("active", &choice.chosen.configuration).expect("an appraisal");
-        let (found, chosen) = (same.criterion, choice.chosen.criterion.expect("a criterion"));
-        assert!((found - chosen).abs() < 1e-9 * same.trace, "{name}: {found} {chosen}");
+        let (found, chosen) = (same.appraisal.criterion, choice.chosen.criterion.expect("a criterion"));
+        assert!((found - chosen).abs() < 1e-9 * same.appraisal.before, "{name}: {found} {chosen}");
         let other = experiment.appraise("active", &vec![0.0; choice.joints.len()]).expect("an appraisal");
-        assert!(other.gain <= same.gain * (1.0 + 1e-9), "{name}: {} {}", other.gain, same.gain);
+        assert!(
+            other.appraisal.gain <= same.appraisal.gain * (1.0 + 1e-9),
+            "{name}: {} {}",
+            other.appraisal.gain,
+            same.appraisal.gain
+        );
         assert!(matches!(experiment.choice("random"), Err(ChoiceError::NotSearched(_))));
         assert!(experiment.appraise("random", &choice.chosen.configuration).is_ok(), "it has a covariance too");
         assert!(matches!(
@@ -56,7 +62,7 @@ fn a_planner_answers_at_every_step() {
         for step in 1..=10 {
             let learner = &experiment.step().expect("a step").learners[0];
             let movement = learner.movement.clone().expect("a movement");
-            without_search.extend((movement.evaluations == 0).then_some(step));
+            without_search.extend((movement.evaluations() == 0).then_some(step));
             answers(&experiment, &movement);
         }
         assert_eq!(without_search, carried_on);
@@ -64,18 +70,19 @@ fn a_planner_answers_at_every_step() {
 }
 
 /// The choice and the appraisal of a planner's last movement.
-fn answers(experiment: &Experiment, movement: &MovementReport) {
-    let choice = experiment.choice("global").expect("explained");
+fn answers(experiment: &Experiment, movement: &MovementOutcome) {
+    let choice = Choice::of(experiment, "global").expect("explained");
     assert_eq!(choice.chosen.configuration, movement.configuration);
     let holder = &choice.boxes[choice.chosen.rectangle];
     let levels = &holder.shapes.last().expect("a shape").levels;
     for ((x, centre), level) in choice.chosen.point.iter().zip(&holder.centre).zip(levels) {
         assert!((x - centre).abs() <= 0.5 * 3_f64.powi(-i32::from(*level)) + 1e-9, "step {}", choice.step);
     }
-    let appraisal = experiment.appraise("global", &movement.configuration).expect("an appraisal");
+    let appraised = experiment.appraise("global", &movement.configuration).expect("an appraisal");
+    let appraisal = AppraisalReport::from(&appraised);
     let tolerance = 1e-9 * appraisal.trace;
-    assert!((appraisal.criterion - movement.criterion.expect("chosen by it")).abs() < tolerance);
-    assert!((appraisal.gain - movement.gain.expect("chosen by it")).abs() < tolerance);
+    assert!((appraisal.criterion - movement.criterion().expect("chosen by it")).abs() < tolerance);
+    assert!((appraisal.gain - movement.gain().expect("chosen by it")).abs() < tolerance);
     assert!((choice.trace.expect("has one") - appraisal.trace).abs() < tolerance);
 }
 
@@ -90,11 +97,12 @@ fn a_planner_appraises_by_its_own_criterion() {
         let learner = &experiment.step().expect("a step").learners[0];
         let movement = learner.movement.clone().expect("a movement");
         let found = experiment.appraise("global", &movement.configuration).expect("an appraisal");
-        assert!((found.criterion - movement.criterion.expect("chosen by it")).abs() < 1e-9 * found.trace);
+        let found = found.appraisal;
+        assert!((found.criterion - movement.criterion().expect("chosen by it")).abs() < 1e-9 * found.before);
         let plain = Criterion::new(&belief, &weights).expect("a covariance");
         let plain = plain.appraise(&movement.configuration).expect("an appraisal");
         assert!((plain.criterion / found.criterion - 1.0).abs() > 0.01, "{} {}", plain.criterion, found.criterion);
-        assert!(found.trace > plain.before, "what is between hypotheses counts too");
+        assert!(found.before > plain.before, "what is between hypotheses counts too");
     }
 }
 
@@ -116,13 +124,13 @@ fn a_person_chooses_and_until_then_no_learner_moves() {
         let expected = experiment.set_configuration("human", &pose(step)).expect("a second one, which counts");
         assert_eq!(experiment.configuration("human").expect("known"), Some(pose(step).as_slice()));
         let made = experiment.step().expect("a step").learners[1].movement.clone().expect("a movement");
-        assert_eq!((made.configuration, made.gain), (pose(step), Some(expected.gain)));
-        let pairs = made.predicted_marker_m.iter().zip(expected.predicted_marker_m);
-        assert!(pairs.into_iter().all(|(made, expected)| (made - expected).abs() < 1e-12));
+        assert_eq!((made.gain(), made.configuration), (Some(expected.appraisal.gain), pose(step)));
+        assert!((made.predicted_marker - expected.appraisal.marker).amax() < 1e-12);
         // What was refused has left no trace in anybody.
         patient.set_configuration("human", &pose(step)).expect("set");
         patient.step().expect("a step");
-        for (one, other) in experiment.latest().learners.iter().zip(&patient.latest().learners) {
+        let [one, other] = [&experiment, &patient].map(|it| StepReport::of(it).learners);
+        for (one, other) in one.iter().zip(&other) {
             assert_eq!(one.estimate, other.estimate);
         }
     }
@@ -134,23 +142,24 @@ fn a_posture_is_told_its_share_of_the_best_gain() {
     for name in ["arm-6dof", "head-fov"] {
         let names = ["active", "human"].map(str::to_owned);
         let mut experiment = builtin(name).and_then(|s| s.experiment(2, Some(&names))).expect("starts");
-        let joints = experiment.description().joints.len();
+        let joints = experiment.setting().joints.len();
         for _ in 0..3 {
             let told = experiment.set_configuration("human", &vec![0.05; joints]).expect("an appraisal");
-            assert_eq!(told.share, Some((told.gain / told.best_gain.expect("searched")).clamp(0.0, 1.0)));
+            let share = told.appraisal.gain / told.best_gain.expect("searched");
+            assert_eq!(told.share(), Some(share.clamp(0.0, 1.0)));
             experiment.step().expect("a step");
             let again = experiment.appraise("human", &vec![0.05; joints]).expect("an appraisal");
-            assert_eq!((again.best_gain, again.share), (told.best_gain, told.share), "the same, looked back at");
+            assert_eq!((again.best_gain, again.share()), (told.best_gain, told.share()), "the same, looked back at");
         }
-        let choice = experiment.choice("human").expect("what DIRECT would have found");
+        let choice = Choice::of(&experiment, "human").expect("what DIRECT would have found");
         let best = choice.boxes.iter().filter_map(|found| Some((found.value?, &found.centre)));
         let (_, centre) = best.min_by(|a, b| a.0.total_cmp(&b.0)).expect("boxes");
         let limits = choice.joints.iter().map(|joint| joint.limits);
         let best: Vec<f64> = limits.zip(centre).map(|([lower, upper], x)| lower + x * (upper - lower)).collect();
-        let share = experiment.appraise("human", &best).expect("an appraisal").share.expect("searched");
+        let share = experiment.appraise("human", &best).expect("an appraisal").share().expect("searched");
         assert!(share > 1.0 - 1e-9, "{name}: {share}");
         let chosen = experiment.latest().learners[0].movement.clone().expect("a movement");
-        let share = experiment.appraise("active", &chosen.configuration).expect("an appraisal").share;
+        let share = experiment.appraise("active", &chosen.configuration).expect("an appraisal").share();
         assert!(share.expect("searched") > 1.0 - 1e-9, "{name}: {share:?}");
     }
 }

@@ -6,6 +6,7 @@ use body_schema_engine::{
 };
 use body_schema_experiment::{Agent, ChoiceError, Event, Executed, Experiment, NoiseSequence};
 use body_schema_scenario::{Scenario, builtin};
+use body_schema_wire::Choice;
 
 /// A built-in scenario with `[constraints]`, and searches short enough for a test.
 fn bound(name: &str, constraints: &str) -> Scenario {
@@ -65,7 +66,7 @@ fn every_movement_of_a_run_is_feasible() {
     assert!(travelled.iter().all(|way| (1.0..=most).contains(way)), "{travelled:?}");
     assert!(experiment.latest().learners.iter().all(|learner| learner.failure.is_none()));
     // DIRECT's box is what can be reached; the choice says so, and holds what was chosen.
-    let choice = experiment.choice("active").expect("searched by DIRECT");
+    let choice = Choice::of(&experiment, "active").expect("searched by DIRECT");
     for (joint, x) in choice.joints.iter().zip(&choice.chosen.configuration) {
         assert!(joint.limits[1] - joint.limits[0] <= 50_f64.to_radians() + 1e-9 && !joint.name.is_empty());
         assert!((joint.limits[0]..=joint.limits[1]).contains(x));

@@ -2,6 +2,7 @@
 
 use body_schema_engine::model::Block;
 use body_schema_scenario::{Scenario, builtin};
+use body_schema_wire::RunResult;
 
 const HOLDER: &str =
     "[[learner]]\nname = \"nominal\"\nestimator = \"smoother\"\npolicy = \"random\"\nholds_axes = true\n\n";
@@ -31,7 +32,7 @@ fn who_holds_the_axes_is_judged_by_what_is_left() {
         let run = |scenario: &Scenario, learners: &[String]| {
             let mut experiment = scenario.experiment(1001, Some(learners)).expect("an experiment");
             (0..4).for_each(|_| _ = experiment.step().expect("a step"));
-            let result = experiment.result();
+            let result = RunResult::of(&experiment);
             let metrics = experiment.latest().learners.iter().map(|learner| learner.metrics.clone());
             (metrics.collect::<Vec<_>>(), result)
         };

@@ -7,4 +7,5 @@ mod designs;
 mod holders;
 mod noises;
 mod observability;
+mod reports;
 mod runs;

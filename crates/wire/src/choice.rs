@@ -1,54 +1,11 @@
-//! How a movement was chosen, and what another one would have taught: the questions of whoever looks on.
+//! How a movement was chosen, and what another one would have taught, as they are told.
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Experiment,
-    report::{LearnerReport, MovementReport, array, arrays},
-};
-use body_schema_engine::{
-    kinematics::JointBox,
-    model::State,
-    optimize::{DirectError, History},
-    selection::{Appraisal, Search, SelectionError},
-};
-
-/// Why there is no answer.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ChoiceError {
-    /// No such learner.
-    #[error("there is no learner `{name}`; there are {known}")]
-    UnknownLearner {
-        /// The name asked for.
-        name: String,
-        /// Those that there are.
-        known: String,
-    },
-    /// The last movement was not found by DIRECT.
-    #[error("the last movement of `{0}` was not chosen by DIRECT: it has not moved yet, or its policy is another")]
-    NotSearched(String),
-    /// The learner chooses its movements itself.
-    #[error("`{0}` chooses its movements itself; only a learner whose policy is `human` takes a configuration")]
-    ChoosesItself(String),
-    /// The learner makes no movement any more.
-    #[error("`{name}` makes no movement any more: {why}")]
-    Ended {
-        /// Its name.
-        name: String,
-        /// Why.
-        why: String,
-    },
-    /// A configuration that this robot does not have.
-    #[error("`configuration` {0}")]
-    Configuration(String),
-    /// The criterion cannot be computed.
-    #[error(transparent)]
-    Selection(#[from] SelectionError),
-    /// The search cannot be repeated.
-    #[error("DIRECT: {0}")]
-    Search(#[from] DirectError),
-}
+use super::{array, arrays};
+use body_schema_engine::optimize::History;
+use body_schema_experiment::{Appraised, ChoiceError, Chosen, Experiment, MovementOutcome};
 
 /// How DIRECT chose a learner's last movement, iteration by iteration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -179,15 +136,16 @@ pub struct AppraisalReport {
     pub chance_of_being_seen: f64,
 }
 
-impl AppraisalReport {
-    pub(super) fn of(configuration: &[f64], appraisal: &Appraisal, estimate: &State, best_gain: Option<f64>) -> Self {
+impl From<&Appraised> for AppraisalReport {
+    fn from(appraised: &Appraised) -> Self {
+        let Appraised { configuration, appraisal, estimate, best_gain } = appraised;
         let rows = |matrix: &Matrix3<f64>| [0, 1, 2].map(|row| [0, 1, 2].map(|column| matrix[(row, column)]));
         Self {
-            configuration: configuration.to_vec(),
+            configuration: configuration.clone(),
             criterion: appraisal.criterion,
             gain: appraisal.gain,
-            best_gain,
-            share: best_gain.filter(|best| *best > 0.0).map(|best| (appraisal.gain / best).clamp(0.0, 1.0)),
+            best_gain: *best_gain,
+            share: appraised.share(),
             estimated_skeleton_m: arrays(&estimate.measured().skeleton(configuration)),
             trace: appraisal.before,
             predicted_marker_m: array(&appraisal.marker.coords),
@@ -198,18 +156,18 @@ impl AppraisalReport {
 }
 
 impl Choice {
-    /// `values` are the criterion before and after the movement. The joints' names are left to the caller, who knows them.
-    pub(super) fn of(
-        step: u64,
-        report: &LearnerReport,
-        movement: &MovementReport,
-        search: Search,
-        limits: &JointBox,
-        values: [Option<f64>; 2],
-    ) -> Result<Self, ChoiceError> {
+    /// How the last movement of a learner was chosen, by DIRECT or in sight of what DIRECT finds.
+    ///
+    /// # Errors
+    ///
+    /// [`ChoiceError`] where there is no such learner, and where its last movement was not found by DIRECT.
+    pub fn of(experiment: &Experiment, learner: &str) -> Result<Self, ChoiceError> {
+        let Chosen { configuration, search, limits, before, after } = experiment.choice(learner)?;
+        let outcome = experiment.latest();
+        let movement = outcome.learners.iter().find(|it| it.name == learner).and_then(|it| it.movement.as_ref());
         let (settings, partition) = (search.settings(), search.partition());
-        let searched = partition.searched(limits);
-        let point = searched.to_unit(&movement.configuration);
+        let searched = partition.searched(&limits);
+        let point = searched.to_unit(&configuration);
         let partition = partition.choosing(&point);
         let of_leaves: Vec<f64> = partition.leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)).collect();
         let dimension = partition.leaves.first().map_or(0, |leaf| leaf.centre.len());
@@ -235,97 +193,26 @@ impl Choice {
             hull: moment.potentially_optimal,
             lower_right_hull: moment.hull.iter().map(|point| point.rectangle).collect(),
         });
-        let [before, after] = values;
         Ok(Self {
-            step,
-            learner: report.name.clone(),
+            step: outcome.step,
+            learner: learner.to_owned(),
             variant: settings.variant.name().to_owned(),
             epsilon: settings.epsilon,
-            joints: (searched.joints().iter())
-                .map(|&(lower, upper)| SearchedJoint { name: String::new(), limits: [lower, upper] })
+            joints: (searched.joints().iter().zip(&experiment.setting().joints))
+                .map(|(&(lower, upper), joint)| SearchedJoint { name: joint.name.clone(), limits: [lower, upper] })
                 .collect(),
             trace: before,
             evaluations: partition.leaves.len(),
             chosen: ChosenReport {
                 rectangle: partition.chosen,
-                configuration: movement.configuration.clone(),
+                configuration,
                 point,
-                criterion: movement.criterion,
-                predicted_gain: movement.gain,
+                criterion: movement.and_then(MovementOutcome::criterion),
+                predicted_gain: movement.and_then(MovementOutcome::gain),
                 realised_gain: before.zip(after).map(|(before, after)| before - after),
             },
             iterations: iterations.collect(),
             boxes,
-        })
-    }
-}
-
-impl Experiment {
-    /// How the last movement of a learner was chosen, by DIRECT or in sight of what DIRECT finds.
-    pub fn choice(&self, learner: &str) -> Result<Choice, ChoiceError> {
-        let index = self.index_of(learner)?;
-        let limits = self.joint_box()?;
-        let mut choice = self.learners[index].choice(self.latest.step, &self.latest.learners[index], &limits)?;
-        for (joint, description) in choice.joints.iter_mut().zip(&self.description.joints) {
-            joint.name.clone_from(&description.name);
-        }
-        Ok(choice)
-    }
-
-    /// What a movement to `configuration` (rad or m per joint) would have taught a learner instead of its last one;
-    /// before the first movement, what it would teach now.
-    pub fn appraise(&self, learner: &str, configuration: &[f64]) -> Result<AppraisalReport, ChoiceError> {
-        let index = self.index_of(learner)?;
-        self.check_configuration(configuration)?;
-        self.learners[index].appraise(configuration)
-    }
-
-    /// Sets the next movement of a learner for which a person chooses, to `configuration` (rad or m per joint), and tells
-    /// what it is expected to teach. It may be set anew until the next step.
-    pub fn set_configuration(&mut self, learner: &str, configuration: &[f64]) -> Result<AppraisalReport, ChoiceError> {
-        let index = self.index_of(learner)?;
-        self.check_configuration(configuration)?;
-        self.learners[index].set(configuration)
-    }
-
-    /// The movement that is set for the next step of a learner for which a person chooses.
-    pub fn configuration(&self, learner: &str) -> Result<Option<&[f64]>, ChoiceError> {
-        let index = self.index_of(learner)?;
-        Ok(self.learners[index].configuration())
-    }
-
-    /// The learners for which a person chooses, as long as they learn, by name and place.
-    pub fn chosen_for(&self) -> impl Iterator<Item = (usize, &str)> {
-        let learners = self.learners.iter().enumerate().filter(|(_, learner)| learner.takes_configurations());
-        learners.map(|(index, learner)| (index, learner.description.name.as_str()))
-    }
-
-    fn check_configuration(&self, configuration: &[f64]) -> Result<(), ChoiceError> {
-        let limits = self.joint_box()?;
-        if configuration.len() != limits.dimension() {
-            let (found, wanted) = (configuration.len(), limits.dimension());
-            return Err(ChoiceError::Configuration(format!("has {found} numbers; this robot has {wanted} joints")));
-        }
-        for (joint, q) in configuration.iter().enumerate() {
-            if !limits.is_within(joint, *q, JointBox::ROUNDING) {
-                let (name, lower, upper) =
-                    (&self.description.joints[joint].name, limits.lower(joint), limits.upper(joint));
-                let said = format!("has {q} for `{name}`, whose limits are {lower} and {upper} (rad or m)");
-                return Err(ChoiceError::Configuration(said));
-            }
-        }
-        Ok(())
-    }
-
-    fn joint_box(&self) -> Result<JointBox, ChoiceError> {
-        let limits = self.description.joints.iter().map(|joint| (joint.limits[0], joint.limits[1]));
-        JointBox::new(limits.collect()).map_err(|error| ChoiceError::Configuration(error.to_string()))
-    }
-
-    fn index_of(&self, learner: &str) -> Result<usize, ChoiceError> {
-        self.description.learners.iter().position(|known| known.name == learner).ok_or_else(|| {
-            let known: Vec<&str> = self.description.learners.iter().map(|known| known.name.as_str()).collect();
-            ChoiceError::UnknownLearner { name: learner.to_owned(), known: known.join(", ") }
         })
     }
 }

@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::RunSummary;
-use crate::{Experiment, ExperimentError, JointMetrics, StepReport};
+use crate::JointMetrics;
+use body_schema_experiment::{Experiment, ExperimentError, MovementOutcome, StepOutcome};
 
 /// What is kept of one run of all learners.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,13 +44,11 @@ impl Trace {
     /// Runs `experiment` for `steps` steps and calls `tick` after each.
     pub fn run(mut experiment: Experiment, steps: u64, mut tick: impl FnMut()) -> Result<Self, ExperimentError> {
         let mut learners: Vec<LearnerTrace> = experiment
-            .description()
-            .learners
+            .learners()
             .iter()
-            .zip(&experiment.learners)
-            .map(|(learner, agent)| LearnerTrace {
-                name: learner.name.clone(),
-                parameters: agent.belief().layout.dimension(),
+            .map(|learner| LearnerTrace {
+                name: learner.setting.name.clone(),
+                parameters: learner.belief().layout.dimension(),
                 converged_at: None,
                 recovered_at: None,
                 movements: 0,
@@ -59,11 +58,11 @@ impl Trace {
                 selection_ms: Vec::with_capacity(steps as usize),
             })
             .collect();
-        let mut take = |report: &StepReport| {
-            for (trace, learner) in learners.iter_mut().zip(&report.learners) {
+        let mut take = |outcome: &StepOutcome| {
+            for (trace, learner) in learners.iter_mut().zip(&outcome.learners) {
                 trace.errors.push(RunSummary::from(&learner.metrics));
-                trace.joints.push(learner.metrics.joints.clone());
-                trace.selection_ms.extend(learner.movement.as_ref().map(|movement| movement.selection_ms));
+                trace.joints.push(learner.metrics.joints.iter().map(JointMetrics::from).collect());
+                trace.selection_ms.extend(learner.movement.as_ref().map(MovementOutcome::selection_ms));
                 (trace.movements, trace.misses) = (learner.metrics.movements, learner.metrics.misses);
             }
         };
@@ -72,11 +71,11 @@ impl Trace {
             take(experiment.step()?);
             tick();
         }
-        for (trace, verdict) in learners.iter_mut().zip(experiment.judge.verdicts()) {
+        for (trace, verdict) in learners.iter_mut().zip(experiment.verdicts()) {
             trace.converged_at = verdict.convergence.converged_at();
             trace.recovered_at = verdict.recovery.converged_at();
         }
-        let description = experiment.description();
-        Ok(Self { seed: description.seed, movements_by_counting: description.movements_by_counting, learners })
+        let setting = experiment.setting();
+        Ok(Self { seed: setting.seed, movements_by_counting: setting.movements_by_counting, learners })
     }
 }

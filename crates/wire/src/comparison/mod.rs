@@ -7,8 +7,9 @@ pub use trace::Trace;
 
 use serde::{Deserialize, Serialize};
 
-use super::metrics::{JointMetrics, Metrics};
+use super::JointMetrics;
 use body_schema_engine::design::BestDesign;
+use body_schema_experiment::Metrics;
 use statistics::{median, nearest_rank, sorted};
 
 /// Many runs of the same learners, one per seed: `compare --json`.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::report::{array, arrays};
+use super::{array, arrays};
 use body_schema_engine::sensing::{Gaze, Head};
 
 /// A camera head with pan and tilt.

@@ -2,13 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Experiment, convergence::Thresholds, metrics::Metrics, remarks::remarks, report::array};
+use super::{Metrics, Thresholds, array};
 use body_schema_engine::{
     design::BestDesign,
     estimation::{Belief, NoiseReport, ReadingReport},
     kinematics::{JointKind, chart},
     model::Block,
 };
+use body_schema_experiment::{Experiment, Outlier};
 
 /// The outcome of one run: `result.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -221,6 +222,46 @@ impl Model {
 }
 
 impl RunResult {
+    /// The outcome of an experiment so far.
+    pub fn of(experiment: &Experiment) -> Self {
+        let setting = experiment.setting();
+        let names: Vec<String> = setting.joints.iter().map(|joint| joint.name.clone()).collect();
+        let learners = (experiment.learners().iter().zip(&experiment.latest().learners))
+            .zip(experiment.verdicts())
+            .enumerate()
+            .map(|(index, ((learner, outcome), verdict))| LearnerResult {
+                name: outcome.name.clone(),
+                estimator: learner.setting.estimator.clone(),
+                policy: learner.setting.policy.clone(),
+                converged_at: verdict.convergence.converged_at(),
+                recovered_at: verdict.recovery.converged_at(),
+                change_detected_at: verdict.noticed_at,
+                false_alarms: verdict.false_alarms,
+                settled_at: verdict.settled_at,
+                failure: outcome.failure.clone(),
+                efficiency: None,
+                parameters: learner.belief().layout.dimension(),
+                metrics: Metrics::from(&outcome.metrics),
+                readings: learner.readings(),
+                noise: learner.noise(),
+                reading_sigmas: learner.reading_sigmas(),
+                remarks: experiment.remarks(index),
+                model: Model::new(learner.belief(), &names),
+            })
+            .collect();
+        Self {
+            scenario: setting.scenario.clone(),
+            seed: setting.seed,
+            version: setting.version.clone(),
+            steps: experiment.latest().step,
+            thresholds: setting.thresholds.into(),
+            movements_by_counting: setting.movements_by_counting,
+            best_designs: Vec::new(),
+            outliers: experiment.outliers().iter().map(OutlierReading::from).collect(),
+            learners,
+        }
+    }
+
     /// The same beside the best designs of the scenario.
     pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
         for learner in &mut self.learners {
@@ -230,46 +271,9 @@ impl RunResult {
     }
 }
 
-impl Experiment {
-    /// The outcome so far.
-    pub fn result(&self) -> RunResult {
-        let description = self.description();
-        let names: Vec<String> = description.joints.iter().map(|joint| joint.name.clone()).collect();
-        let learners = self
-            .learners
-            .iter()
-            .zip(&self.latest.learners)
-            .zip(self.judge.verdicts())
-            .map(|((learner, report), verdict)| LearnerResult {
-                name: report.name.clone(),
-                estimator: learner.description.estimator.clone(),
-                policy: learner.description.policy.clone(),
-                converged_at: verdict.convergence.converged_at(),
-                recovered_at: verdict.recovery.converged_at(),
-                change_detected_at: verdict.noticed_at,
-                false_alarms: verdict.false_alarms,
-                settled_at: verdict.settled_at,
-                failure: report.failure.clone(),
-                efficiency: None,
-                parameters: learner.belief().layout.dimension(),
-                metrics: report.metrics.clone(),
-                readings: learner.readings(),
-                noise: learner.noise(),
-                reading_sigmas: learner.reading_sigmas(),
-                remarks: remarks(learner, &report.metrics, description, &self.world),
-                model: Model::new(learner.belief(), &names),
-            })
-            .collect();
-        RunResult {
-            scenario: description.scenario.clone(),
-            seed: description.seed,
-            version: description.version.clone(),
-            steps: self.latest.step,
-            thresholds: description.thresholds,
-            movements_by_counting: description.movements_by_counting,
-            best_designs: Vec::new(),
-            outliers: self.outliers.clone(),
-            learners,
-        }
+impl From<&Outlier> for OutlierReading {
+    fn from(outlier: &Outlier) -> Self {
+        let Outlier { movement, channel } = *outlier;
+        Self { movement, channel }
     }
 }

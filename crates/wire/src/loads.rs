@@ -3,7 +3,7 @@
 use nalgebra::{UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::report::array;
+use super::array;
 use body_schema_engine::{
     kinematics::{Joint, Line, Tree},
     model::{Load, Loads, Mass},
