@@ -13,6 +13,7 @@ mod disk;
 mod errors;
 mod exported;
 mod faults;
+mod local;
 mod logs;
 mod metrics;
 mod openapi;

@@ -1,10 +1,8 @@
 // Recorded runs in files beside the page, offered as the server offers sessions: the same as session.js, without a server.
 
+import { content, wasmOf } from "./packed.js";
 import { ProblemError } from "./session.js";
 import { HEADER_BYTES } from "./viewer.js";
-
-/** How compressed files begin. Some hosts unpack them on the way, so that the content decides and not the name. */
-const GZIP = [0x1f, 0x8b];
 
 /** Nothing is computed here. */
 export const server = false;
@@ -25,23 +23,6 @@ async function get(path) {
   const response = await fetch(at(path));
   if (!response.ok) throw problem(response.status, "A file is missing", `${path} cannot be read from here`);
   return response;
-}
-
-/** The content of a file, unpacked if it is compressed. @returns {Promise<ReadableStream>} */
-async function content(response) {
-  const reader = response.body.getReader();
-  const first = await reader.read();
-  const whole = new ReadableStream({
-    start: (out) => (first.done ? out.close() : out.enqueue(first.value)),
-    async pull(out) {
-      const { done, value } = await reader.read();
-      if (done) out.close();
-      else out.enqueue(value);
-    },
-    cancel: (reason) => reader.cancel(reason),
-  });
-  const packed = !first.done && GZIP.every((byte, index) => first.value[index] === byte);
-  return packed ? whole.pipeThrough(new DecompressionStream("gzip")) : whole;
 }
 
 const unpacked = async (path) => new Response(await content(await get(path)));
@@ -85,12 +66,11 @@ const again = new Map();
 export async function wasm(address) {
   const path = address.split("?")[0];
   const length = (await manifest).unpacked[path] ?? 0;
-  const headers = { "Content-Type": "application/wasm", "Uncompressed-Length": String(length) };
   // The viewer's is fetched to show how far it is, and then to be used: hosts that let nothing be kept send it once.
   const [now, later] = again.get(address) ?? (await content(await get(address))).tee();
   if (later === undefined) again.delete(address);
   else again.set(address, [later]);
-  return new Response(now, { headers });
+  return wasmOf(now, length);
 }
 
 /** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */

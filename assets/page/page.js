@@ -10,8 +10,9 @@ import { SeedRuns } from "./seeds.js";
 import { copied, identity } from "./links.js";
 import { drawsInSoftware, startViewer } from "./viewer.js";
 
-/** Where runs come from: a server, or files beside the page. */
-const source = await import(document.documentElement.dataset.source === "files" ? "./files.js" : "./session.js");
+/** Where runs come from: a server, an engine in this browser, or files beside the page. */
+const SOURCES = { files: () => import("./files.js"), engine: () => import("./engine.js") };
+const source = await (SOURCES[document.documentElement.dataset.source] ?? (() => import("./session.js")))();
 const { arrangement, ask, Follower } = source;
 
 /** Keys that mean something to the panel wherever on the page they are pressed. */
@@ -180,7 +181,9 @@ const commands = {
   },
 
   async download({ path, name }) {
-    if (!path.startsWith("/v1/scenarios/")) return save(source.place(path), name);
+    if (!path.startsWith("/v1/scenarios/")) {
+      return source.file === undefined ? save(source.place(path), name) : saveBlob(await source.file(path), name);
+    }
     const scenario = await ask("GET", path);
     saveBlob(new Blob([scenario.source], { type: "application/toml" }), name);
   },

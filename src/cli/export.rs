@@ -19,8 +19,8 @@ use super::{
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Built-in scenarios (see `body-schema scenarios`) or paths of scenario files
-    #[arg(value_name = "SCENARIO", required_unless_present = "sessions")]
+    /// Built-in scenarios (see `body-schema scenarios`) or paths of scenario files, whose runs are recorded [default: none: the page computes every built-in scenario itself]
+    #[arg(value_name = "SCENARIO")]
     scenarios: Vec<String>,
     /// A session with a robot elsewhere, by the id under which a server keeps it; repeat for several
     #[arg(long = "session", value_name = "ID")]
@@ -95,6 +95,10 @@ fn address(text: &str) -> Result<String, String> {
 pub fn export(arguments: &Arguments) -> Result<()> {
     let scenarios = arguments.scenarios.iter().map(|name| load_scenario(name)).collect::<Result<Vec<Scenario>>>()?;
     let sessions = sessions(arguments)?;
+    if scenarios.is_empty() && sessions.is_empty() && (arguments.steps.is_some() || !arguments.learners.is_empty()) {
+        let what = "--steps and --learner are of recorded runs; name their scenarios, or leave both out: the page then computes what its visitors ask for";
+        return Err(BadInput(what.to_owned()).into());
+    }
     let seeds: BTreeSet<u64> = arguments.seeds.iter().flat_map(|range| range.first..=range.last).collect();
     let learners = (!arguments.learners.is_empty()).then_some(arguments.learners.as_slice());
     for scenario in &scenarios {

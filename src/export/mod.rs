@@ -1,8 +1,9 @@
-//! The page without a server: a folder of recorded runs that any static host serves.
+//! The page without a server: a folder that any static host serves. Without plans its engine is in it, and computes every built-in
+//! scenario in the visitor's browser; with plans it holds their runs, recorded.
 //!
 //! ```text
 //! index.html, *.js, *.css          the page, as the server has it, with relative addresses
-//! panel/, viewer/                  its WebAssembly, compressed; the page unpacks it
+//! panel/, viewer/, engine/         its WebAssembly, compressed; the page unpacks it
 //! export.json                      what is here: scenarios, and their runs
 //! scenarios/NAME.toml              the scenario files
 //! runs/NAME/SEED/                  a run: see the module `run`
@@ -47,7 +48,7 @@ pub const MAX_STEPS: u64 = 1000;
 
 /// What is to be exported.
 pub struct Export<'a> {
-    /// The scenarios, each with what to run of it.
+    /// The scenarios, each with what to run of it; with none the page computes all built-in ones itself.
     pub plans: Vec<Plan<'a>>,
     /// The seeds of each scenario; what was told has its own.
     pub seeds: Vec<u64>,

@@ -43,7 +43,8 @@ fn address(file: &PageFile) -> String {
 /// The page: with relative addresses, its policy in itself, and a title of its own. The picture for previews of links is
 /// below `base`, if that is known.
 fn index(template: &str, files: &[PageFile], plans: &[Plan<'_>], base: Option<&str>) -> String {
-    let mut page = template.replacen("<html ", "<html data-source=\"files\" ", 1);
+    let source = if plans.is_empty() { "engine" } else { "files" };
+    let mut page = template.replacen("<html ", &format!("<html data-source=\"{source}\" "), 1);
     for file in files {
         let versioned = format!("\"{}?v={}\"", address(file), file.version);
         page = page.replace(&format!("\"{}\"", file.path), &versioned);
@@ -54,10 +55,12 @@ fn index(template: &str, files: &[PageFile], plans: &[Plan<'_>], base: Option<&s
     let policy = format!("<meta http-equiv=\"Content-Security-Policy\" content=\"{CONTENT_SECURITY_POLICY}\" />");
     // First of all: a policy holds for what comes after it.
     page = page.replacen("<head>", &format!("<head>\n    {policy}"), 1);
-    let (title, about) = titles(plans);
-    page = replace_between(&page, "<title>", "</title>", &title);
-    for (property, content) in [("og:title", &title), ("og:description", &about)] {
-        page = with_property(page, property, content);
+    if !plans.is_empty() {
+        let (title, about) = titles(plans);
+        page = replace_between(&page, "<title>", "</title>", &title);
+        for (property, content) in [("og:title", &title), ("og:description", &about)] {
+            page = with_property(page, property, content);
+        }
     }
     replace_between(&page, "<noscript>", "</noscript>", "This page needs JavaScript.")
 }
@@ -117,6 +120,16 @@ mod tests {
         assert!(!addresses.clone().any(|text| text.starts_with('/')), "an address from the root of the host");
         assert!(addresses.clone().any(|text| text.starts_with("viewer/re_viewer_bg.wasm.gz?v=")));
         assert!(!page.contains("/v1/"), "no server, no interface");
+    }
+
+    #[test]
+    fn without_runs_the_page_has_the_engine() {
+        let page = index(INDEX, &Files::load(None).expect("the page").0, &[], None);
+        assert!(
+            page.contains("<html data-source=\"engine\"") && page.contains("\"engine/engine_bg.wasm.gz?v="),
+            "{page}"
+        );
+        assert!(page.contains("<title>body-schema: a robot learns"), "{page}");
     }
 
     #[test]

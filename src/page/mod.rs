@@ -34,12 +34,14 @@ macro_rules! embedded {
 }
 
 /// The page's own files, all but [`INDEX`].
-const PAGE: [(&str, &[u8]); 15] = [
+const PAGE: [(&str, &[u8]); 18] = [
     embedded!("controls.js"),
+    embedded!("engine.js"),
     embedded!("files.js"),
     embedded!("icon.svg"),
     embedded!("legend.js"),
     embedded!("links.js"),
+    embedded!("packed.js"),
     embedded!("page.css"),
     embedded!("page.js"),
     embedded!("picture.js"),
@@ -50,6 +52,7 @@ const PAGE: [(&str, &[u8]); 15] = [
     embedded!("seeds.js"),
     embedded!("session.js"),
     embedded!("viewer.js"),
+    embedded!("worker.js"),
 ];
 
 const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
@@ -137,6 +140,16 @@ pub(crate) fn files(panel: Option<&Path>) -> Result<Vec<PageFile>, PageError> {
     files.extend([
         PageFile::new("/panel/panel.js", JAVASCRIPT, panel_script),
         PageFile::compressed_already("/panel/panel_bg.wasm", "application/wasm", panel_wasm),
+        PageFile::new(
+            "/engine/engine.js",
+            JAVASCRIPT,
+            Bytes::from_static(include_bytes!("../../assets/engine/engine.js")),
+        ),
+        PageFile::compressed_already(
+            "/engine/engine_bg.wasm",
+            "application/wasm",
+            Bytes::from_static(include_bytes!("../../assets/engine/engine_bg.wasm.gz")),
+        ),
         PageFile::new("/viewer/re_viewer.js", JAVASCRIPT, Bytes::copy_from_slice(viewer.viewer_js())),
         PageFile::viewer("/viewer/re_viewer_bg.wasm", viewer_wasm(viewer)),
     ]);

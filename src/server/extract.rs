@@ -16,10 +16,7 @@ use super::{
     App, Limits,
     problem::{Kind, Problem},
 };
-use body_schema_ask_tell::{
-    json::{self, Unreadable},
-    whole::MOST as MOST_WHOLE,
-};
+use body_schema_ask_tell::whole::MOST as MOST_WHOLE;
 
 /// A JSON body. An absent one, and `null`, count as `{}`, so that defaults need no body.
 pub(super) struct JsonBody<T>(pub(super) T);
@@ -74,17 +71,7 @@ fn is_json(headers: &HeaderMap) -> bool {
 }
 
 pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
-    json::read(bytes).map_err(|Unreadable { is_malformed, field, what, hint }| {
-        if is_malformed {
-            return Problem::new(Kind::Malformed, what);
-        }
-        let detail = match &field {
-            Some(field) => format!("`{field}`: {what}; {hint}"),
-            None => format!("{what}; {hint}"),
-        };
-        let problem = Problem::new(Kind::InvalidValue, detail).hint(what, hint);
-        field.into_iter().fold(problem, Problem::field)
-    })
+    Ok(body_schema_backend::parse(bytes)?)
 }
 
 /// The parameters of a query, each of which must be among `known` and a whole number; absent ones are `None`.

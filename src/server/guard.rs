@@ -147,7 +147,7 @@ async fn as_problem(response: Response) -> Response {
         }
         StatusCode::NOT_FOUND => Problem::new(Kind::UnknownRoute, said),
         StatusCode::BAD_REQUEST => Problem::new(Kind::Malformed, said),
-        _ => Problem::new(Kind::Other(status), said),
+        _ => Problem::new(Kind::Other(status.as_u16(), status.canonical_reason().unwrap_or("Error")), said),
     };
     parts.headers.remove(header::CONTENT_TYPE);
     parts.headers.remove(header::CONTENT_LENGTH);

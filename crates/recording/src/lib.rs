@@ -63,7 +63,7 @@
 //! # Compatibility
 //!
 //! Rerun promises to read a recording with the version that wrote it and the next one only: scenario and seed are what
-//! lasts. Two recordings of one seed hold the same data but for `selection_ms`, the wall time, and Rerun's random ids.
+//! lasts. Two recordings of one run under one id have the same bytes but for the series `selection_ms`, which is wall time.
 
 mod blueprint;
 mod body;

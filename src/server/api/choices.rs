@@ -6,27 +6,11 @@ use axum::{
     extract::{Path, State},
     response::Response,
 };
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
 use super::{json, refusals::OfBodies};
 use crate::server::{App, extract::JsonBody, problem::Problem};
+use body_schema_backend::{Configuration, EvaluationRequest};
 use body_schema_wire::{AppraisalReport, Choice};
-
-/// A posture to be appraised.
-#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct EvaluationRequest {
-    /// One position per joint, rad (revolute) or m (prismatic), within its limits.
-    pub configuration: Vec<f64>,
-}
-
-/// The movement that a person has chosen.
-#[derive(Clone, Debug, Serialize, ToSchema)]
-pub struct Configuration {
-    /// One position per joint, rad (revolute) or m (prismatic); null if none is set for the next step.
-    pub configuration: Option<Vec<f64>>,
-}
 
 /// How DIRECT chose a learner's last movement: every rectangle and every iteration.
 #[utoipa::path(get, path = "/v1/sessions/{id}/learners/{name}/selection", tag = "sessions",

@@ -37,8 +37,8 @@ use utoipa_axum::{
     routes,
 };
 
-pub use scenarios::{ScenarioList, ScenarioResource};
-pub use sessions::{MadeSteps, SessionList, StepRequest};
+pub use body_schema_backend::{MadeSteps, ScenarioList, ScenarioResource, StepRequest};
+pub use sessions::SessionList;
 
 use super::{
     App, Limits,

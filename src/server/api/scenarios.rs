@@ -2,32 +2,10 @@
 
 use std::sync::OnceLock;
 
+use crate::server::{aside::aside, problem::Problem};
 use axum::{Json, extract::Path};
-use serde::Serialize;
-use utoipa::ToSchema;
-
-use crate::server::{
-    aside::aside,
-    problem::{Kind, Problem},
-};
-use body_schema_scenario::{BUILTIN, Scenario, ScenarioError, ScenarioSummary, builtin};
-
-/// The built-in scenarios.
-#[derive(Clone, Debug, Serialize, ToSchema)]
-pub struct ScenarioList {
-    /// All of them, simplest first.
-    pub scenarios: Vec<ScenarioSummary>,
-}
-
-/// A scenario with its source.
-#[derive(Clone, Debug, Serialize, ToSchema)]
-pub struct ScenarioResource {
-    /// The scenario in brief.
-    #[serde(flatten)]
-    pub summary: ScenarioSummary,
-    /// The scenario file, TOML.
-    pub source: String,
-}
+use body_schema_backend::{ScenarioList, ScenarioResource};
+use body_schema_scenario::ScenarioSummary;
 
 /// All built-in scenarios.
 #[utoipa::path(get, path = "/v1/scenarios", tag = "scenarios", operation_id = "listScenarios", responses(
@@ -43,8 +21,7 @@ fn summaries() -> Result<Vec<ScenarioSummary>, Problem> {
     if let Some(known) = SUMMARIES.get() {
         return Ok(known.clone());
     }
-    let read = BUILTIN.iter().map(|known| find(known.name).map(|scenario| scenario.summary()));
-    let read = read.collect::<Result<Vec<_>, Problem>>()?;
+    let read = body_schema_backend::summaries()?;
     Ok(SUMMARIES.get_or_init(|| read).clone())
 }
 
@@ -57,13 +34,6 @@ fn summaries() -> Result<Vec<ScenarioSummary>, Problem> {
     )
 )]
 pub(super) async fn get(Path(name): Path<String>) -> Result<Json<ScenarioResource>, Problem> {
-    let scenario = aside(move || find(&name)).await?;
+    let scenario = aside(move || Ok::<_, Problem>(body_schema_backend::scenario(&name)?)).await?;
     Ok(Json(ScenarioResource { summary: scenario.summary(), source: scenario.source }))
-}
-
-fn find(name: &str) -> Result<Scenario, Problem> {
-    builtin(name).map_err(|error| match error {
-        ScenarioError::UnknownScenario { .. } => Problem::new(Kind::UnknownScenario, error.to_string()).field("name"),
-        error => error.into(),
-    })
 }

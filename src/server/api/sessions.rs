@@ -8,8 +8,7 @@ use axum::{
     http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
-use serde::{Deserialize, Serialize, Serializer, de::IgnoredAny};
-use serde_json::value::RawValue;
+use serde::{Deserialize, Serialize, de::IgnoredAny};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
@@ -21,12 +20,7 @@ use crate::server::{
     requests,
     session::{DamagedSession, Listed, NewOutsideSession, NewSession, SessionResource},
 };
-use body_schema_ask_tell::whole::{whole, whole_or_none};
-use body_schema_recording::MOST_FRAMES;
-use body_schema_wire::StepReport;
-
-/// A request draws at most so many postures on the way: each takes some kilobytes of the session's memory.
-const MAX_FRAMES_PER_REQUEST: u64 = 1000;
+use body_schema_backend::{MadeSteps, StepRequest};
 
 /// How many sessions are listed at a time.
 const MOST_LISTED: u64 = 1000;
@@ -45,54 +39,6 @@ pub struct SessionList {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(format = "uuid")]
     pub next: Option<String>,
-}
-
-/// How far to go.
-#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct StepRequest {
-    /// How many steps to make.
-    #[serde(default = "one", deserialize_with = "whole")]
-    #[schema(default = 1, minimum = 1)]
-    pub count: u64,
-    /// The step that the session must be at; otherwise nothing is stepped (409). It makes a repeated request safe.
-    #[serde(default, deserialize_with = "whole_or_none")]
-    pub expected_step: Option<u64>,
-    /// So many postures are drawn on the way to each step in the live recording, on its timeline `motion`; downloads have
-    /// none of them. At most 1000 in one request.
-    #[serde(default, deserialize_with = "whole")]
-    #[schema(default = 0, maximum = 30)]
-    pub frames: u64,
-    /// Whether the answer carries the reports of the steps. Whoever follows the session's events or its WebSocket gets
-    /// them there.
-    #[serde(default = "yes")]
-    #[schema(default = true)]
-    pub reports: bool,
-}
-
-fn one() -> u64 {
-    1
-}
-
-fn yes() -> bool {
-    true
-}
-
-/// What was made of a [`StepRequest`].
-#[derive(Clone, Debug, Serialize, ToSchema)]
-pub struct MadeSteps {
-    /// The step that the session is at after these.
-    pub step: u64,
-    /// How many steps the recorded data set has left; null without an end.
-    pub remaining: Option<u64>,
-    /// The reports of the steps made, in order; empty if the request wants none.
-    #[serde(serialize_with = "all")]
-    #[schema(value_type = Vec<StepReport>)]
-    pub reports: Vec<Arc<RawValue>>,
-}
-
-fn all<S: Serializer>(reports: &[Arc<RawValue>], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(reports.iter().map(AsRef::as_ref))
 }
 
 /// All sessions, oldest first, at most 1000 at a time.
@@ -274,25 +220,11 @@ async fn to_its_end<T: Send + 'static>(
 pub(super) async fn step(
     State(app): State<Arc<App>>,
     Path(id): Path<String>,
-    JsonBody(StepRequest { count, expected_step, frames, reports }): JsonBody<StepRequest>,
+    JsonBody(request): JsonBody<StepRequest>,
 ) -> Result<Response, Problem> {
     let session = app.sessions.get(&id).await?;
-    let most = app.limits.steps_per_request;
-    if !(1..=most).contains(&count) {
-        let detail = format!("`count` must be from 1 to {most}, not {count}");
-        return Err(Problem::new(Kind::InvalidValue, detail).field("count"));
-    }
-    if frames > MOST_FRAMES {
-        let detail = format!("`frames` must be from 0 to {MOST_FRAMES}, not {frames}");
-        return Err(Problem::new(Kind::InvalidValue, detail).field("frames"));
-    }
-    if count * frames > MAX_FRAMES_PER_REQUEST {
-        let detail = format!(
-            "{count} steps with {frames} postures on the way to each are more than {MAX_FRAMES_PER_REQUEST} postures; ask \
-             for fewer of them, or for fewer steps"
-        );
-        return Err(Problem::new(Kind::InvalidValue, detail).field("frames"));
-    }
+    request.check(app.limits.steps_per_request)?;
+    let StepRequest { count, expected_step, frames, reports } = request;
     let session = session.watch();
     let made = session.make_steps(count, expected_step, frames).await?;
     let step = made.last().map_or(session.step(), |report| report.step);

@@ -391,7 +391,7 @@ impl Sessions {
         let damage = match looked {
             Ok(Ok(())) => None,
             Ok(Err(error @ (StoreError::Damaged { .. } | StoreError::Newer { .. }))) => {
-                Some(String::from(Problem::from(error).detail))
+                Some(Problem::from(error).into_detail())
             }
             // The disk may be there again later.
             Ok(Err(_)) | Err(_) => return,
@@ -418,7 +418,7 @@ async fn done_anyway<T: Send + 'static>(
 
 /// A session in the store as it can be shown; `None` if it is not there any more.
 fn summed_up(store: &Store, id: Uuid) -> Result<Option<SessionResource>, String> {
-    let told = |error: StoreError| String::from(Problem::from(error).detail);
+    let told = |error: StoreError| Problem::from(error).into_detail();
     let noted = store.summary(id).map_err(told)?;
     let noted = noted.and_then(|(text, step)| Some((serde_json::from_str::<Summary>(&text).ok()?, step)));
     let (Summary { description, channels }, step) = match noted {

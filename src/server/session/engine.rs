@@ -14,12 +14,11 @@ use std::{
 use tokio::sync::{OwnedSemaphorePermit, oneshot};
 use uuid::Uuid;
 
-use super::{Kept, Shared};
+use super::{Kept, NewSession, Shared};
 use crate::server::problem::{Kind, Problem};
-use body_schema_experiment::Experiment;
-use body_schema_recording::{EllipsoidSize, Recorder, RecordingError, Target};
-use body_schema_scenario::builtin;
-use body_schema_wire::{AppraisalReport, Choice, Description, RunResult, StepReport};
+use body_schema_backend::Steps;
+use body_schema_recording::{RecordingError, Target};
+use body_schema_wire::{AppraisalReport, Choice, Description, RunResult};
 
 /// Within a long command, what was made is published this often.
 const PUBLISH_EVERY: Duration = Duration::from_millis(200);
@@ -31,10 +30,7 @@ pub(super) const COMPLETE_AFTER: Duration = Duration::from_millis(500);
 pub(super) struct Setup {
     /// Also the recording's id, so that viewers tell two sessions of one seed apart.
     pub(super) id: Uuid,
-    pub(super) scenario: String,
-    pub(super) seed: u64,
-    pub(super) learners: Option<Vec<String>>,
-    pub(super) ellipsoids: EllipsoidSize,
+    pub(super) new: NewSession,
     /// The recording's file, if one is kept.
     pub(super) file: Option<PathBuf>,
     /// How many steps it makes at most.
@@ -99,37 +95,25 @@ pub(super) type Reply<T> = oneshot::Sender<Result<T, Problem>>;
 
 /// The body of the thread. `opened` hears of the description once the session stands.
 pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply<Description>) {
-    let Setup { id, scenario, seed, learners, ellipsoids, file, most_steps, shared, permit } = setup;
-    let open = || -> Result<(Experiment, Description, Recorder, Kept), Problem> {
-        let experiment = builtin(&scenario)?.experiment(seed, learners.as_deref())?;
-        let target = Target::live(shared.live.clone()).with_recording_id(id.to_string()).with_ellipsoids(ellipsoids);
+    let Setup { id, new, file, most_steps, shared, permit } = setup;
+    let open = || -> Result<(Steps, Kept), Problem> {
+        let target = Target::live(shared.live.clone()).with_recording_id(id.to_string());
         let target = file.iter().fold(target, |target, file| target.and_file(file));
-        let unbegun = |error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}"));
-        let (description, report) = (Description::of(&experiment), StepReport::of(&experiment));
-        let mut recorder = Recorder::new(&description, target).map_err(unbegun)?;
-        let recorded = recorder.log(&report).and_then(|()| recorder.flush()).map_err(unbegun);
-        match recorded.and_then(|()| Kept::of(&report, &description)) {
-            Ok(start) => Ok((experiment, description, recorder, start)),
-            Err(problem) => {
-                recorder.discard();
-                Err(problem)
-            }
-        }
+        Ok(Steps::open(&new, target, most_steps)?)
     };
     match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
-        Ok((experiment, description, mut recorder, start)) => {
-            shared.publish(vec![start], experiment.remaining());
-            if opened.send(Ok(description.clone())).is_ok() {
+        Ok((mut steps, start)) => {
+            shared.publish(vec![start], steps.remaining());
+            if opened.send(Ok(steps.description().clone())).is_ok() {
                 let waiting = VecDeque::new();
-                let mut engine =
-                    Engine { experiment, description, most_steps, shared: &shared, commands: &commands, waiting };
-                let outcome = catch_unwind(AssertUnwindSafe(|| engine.serve(&mut recorder)));
+                let mut engine = Engine { steps: &mut steps, shared: &shared, commands: &commands, waiting };
+                let outcome = catch_unwind(AssertUnwindSafe(|| engine.serve()));
                 if let Err(panic) = outcome {
-                    shared.fail(panicked(&*panic).detail.into());
+                    shared.fail(panicked(&*panic).into_detail());
                 }
             }
             // A file that cannot be completed is told of when the server ends.
-            if let Ok(finished) = catch_unwind(AssertUnwindSafe(|| recorder.finish())) {
+            if let Ok(finished) = catch_unwind(AssertUnwindSafe(|| steps.into_recorder().finish())) {
                 shared.note_recording(finished.err().map(|error| error.to_string()));
             }
         }
@@ -142,9 +126,7 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
 }
 
 struct Engine<'a> {
-    experiment: Experiment,
-    description: Description,
-    most_steps: u64,
+    steps: &'a mut Steps,
     shared: &'a Shared,
     commands: &'a mpsc::Receiver<Command>,
     /// Commands that came while steps were made, and wait for their turn.
@@ -153,12 +135,12 @@ struct Engine<'a> {
 
 impl Engine<'_> {
     /// Takes commands until told to stop or until nobody can send any more.
-    fn serve(&mut self, recorder: &mut Recorder) {
+    fn serve(&mut self) {
         loop {
             let command = self.waiting.pop_front().map_or_else(|| self.commands.recv_timeout(COMPLETE_AFTER), Ok);
             let command = command.or_else(|_| {
                 // Whoever asks for the recording is told if it cannot be written.
-                drop(self.flush(recorder));
+                drop(self.flush());
                 self.commands.recv()
             });
             if self.shared.stop.is_cancelled() {
@@ -167,43 +149,41 @@ impl Engine<'_> {
             match command {
                 Err(mpsc::RecvError) => return,
                 Ok(Command::End { reply }) => {
-                    let sealed = recorder.seal().map_err(|error| self.unsealed(&error));
+                    let sealed = self.steps.recorder().seal().map_err(|error| self.unsealed(&error));
                     let is_sealed = sealed.is_ok();
                     drop(reply.send(sealed));
                     if is_sealed {
                         return;
                     }
                 }
-                Ok(command) => self.obey(command, recorder),
+                Ok(command) => self.obey(command),
             }
         }
     }
 
-    fn obey(&mut self, command: Command, recorder: &mut Recorder) {
+    fn obey(&mut self, command: Command) {
         // Nobody may wait for an answer any longer; what was done stands all the same.
         match command {
             Command::Step { count, expected, frames, mut reply } => {
-                let outcome = self.steps((count, frames), expected, recorder, &mut reply);
+                let outcome = self.make((count, frames), expected, &mut reply);
                 drop(reply.send(outcome));
             }
-            Command::Result { reply } => drop(reply.send(Ok(RunResult::of(&self.experiment)))),
+            Command::Result { reply } => drop(reply.send(Ok(self.steps.result()))),
             Command::Choice { learner, reply } => {
-                drop(reply.send(Choice::of(&self.experiment, &learner).map_err(Problem::from)));
+                drop(reply.send(self.steps.choice(&learner).map_err(Problem::from)));
             }
             Command::Appraise { learner, configuration, reply } => {
-                let appraised = self.experiment.appraise(&learner, &configuration).map_err(Problem::from);
-                drop(reply.send(appraised.map(|appraised| AppraisalReport::from(&appraised))));
+                drop(reply.send(self.steps.appraise(&learner, &configuration).map_err(Problem::from)));
             }
             Command::SetConfiguration { learner, configuration, reply } => {
-                drop(reply.send(self.set_configuration(&learner, &configuration, recorder)));
+                drop(reply.send(self.set_configuration(&learner, &configuration)));
             }
             Command::Configuration { learner, reply } => {
-                let configuration = self.experiment.configuration(&learner).map_err(Problem::from);
-                drop(reply.send(configuration.map(|set| set.map(<[f64]>::to_vec))));
+                drop(reply.send(self.steps.configuration(&learner).map_err(Problem::from)));
             }
             // Whoever asks for the recording is told if it cannot be written.
-            Command::Show => drop(self.publish(&mut Batch::default(), recorder)),
-            Command::Flush { reply } => drop(reply.send(self.flush(recorder))),
+            Command::Show => drop(self.publish(&mut Batch::default())),
+            Command::Flush { reply } => drop(reply.send(self.flush())),
             Command::End { .. } | Command::Wake => {}
             #[cfg(test)]
             Command::Panic => panic!("as the test asked"),
@@ -211,21 +191,11 @@ impl Engine<'_> {
     }
 
     /// Sets a person's next movement, and shows the posture.
-    fn set_configuration(
-        &mut self,
-        learner: &str,
-        configuration: &[f64],
-        recorder: &mut Recorder,
-    ) -> Result<AppraisalReport, Problem> {
+    fn set_configuration(&mut self, learner: &str, configuration: &[f64]) -> Result<AppraisalReport, Problem> {
         // Every posture that is tried out takes memory.
         self.shared.budget.check()?;
-        let appraisal = AppraisalReport::from(&self.experiment.set_configuration(learner, configuration)?);
-        let learners = &self.description.learners;
-        if let Some(index) = learners.iter().position(|described| described.name == learner) {
-            let (step, skeleton_m) = (self.experiment.latest().step, &appraisal.estimated_skeleton_m);
-            recorder.log_ghost(step, index, Some(skeleton_m)).map_err(recording_failed)?;
-            self.shared.publish(Vec::new(), self.experiment.remaining());
-        }
+        let appraisal = self.steps.set_configuration(learner, configuration)?;
+        self.shared.publish(Vec::new(), self.steps.remaining());
         Ok(appraisal)
     }
 
@@ -234,31 +204,24 @@ impl Engine<'_> {
         self.shared.interrupted.store(false, Ordering::Relaxed);
         self.shared.note_recording(Some(error.to_string()));
         let detail = format!("{error}. The session is still there, with its whole recording: end it again then");
-        Problem::new(Kind::Storage, detail).step(self.experiment.latest().step)
+        Problem::new(Kind::Storage, detail).step(self.steps.step())
     }
 
-    fn flush(&self, recorder: &mut Recorder) -> Result<(), Problem> {
-        let flushed = recorder.flush().map_err(recording_failed);
-        self.shared.note_recording(recorder.file_failure().map(str::to_owned));
-        self.shared.publish(Vec::new(), self.experiment.remaining());
+    fn flush(&mut self) -> Result<(), Problem> {
+        let flushed = self.steps.recorder().flush().map_err(recording_failed);
+        self.shared.note_recording(self.steps.recorder().file_failure().map(str::to_owned));
+        self.shared.publish(Vec::new(), self.steps.remaining());
         flushed
     }
 
-    fn steps(
+    fn make(
         &mut self,
         (count, frames): (u64, u64),
         expected: Option<u64>,
-        recorder: &mut Recorder,
         reply: &mut Reply<Vec<Kept>>,
     ) -> Result<Vec<Kept>, Problem> {
-        let step = self.experiment.latest().step;
-        if let Some(expected) = expected.filter(|expected| *expected != step) {
-            let detail = format!("the session is at step {step}, not {expected}; nothing was stepped");
-            return Err(Problem::new(Kind::StepMismatch, detail).field("expected_step").step(step));
-        }
-        if let Some(problem) = self.too_many(count, step).or_else(|| self.waits_for_a_person(count)) {
-            return Err(problem.step(step));
-        }
+        self.steps.may_make(count, expected)?;
+        self.shared.budget.check().map_err(|problem| problem.step(self.steps.step()))?;
         let mut batch = Batch::default();
         let mut outcome = Ok(());
         while outcome.is_ok() && (batch.made.len() as u64) < count {
@@ -269,75 +232,41 @@ impl Engine<'_> {
                 outcome = Err(Problem::new(Kind::ShuttingDown, detail));
                 break;
             }
-            self.complete_for_those_who_ask(recorder);
-            outcome = self.step(frames, &mut batch, recorder);
+            self.complete_for_those_who_ask();
+            outcome = self.step(frames, &mut batch);
             if outcome.is_ok() && batch.last.elapsed() >= PUBLISH_EVERY {
-                outcome = self.publish(&mut batch, recorder);
+                outcome = self.publish(&mut batch);
             }
         }
-        let published = self.publish(&mut batch, recorder);
-        outcome.and(published).map(|()| batch.made).map_err(|problem| problem.step(self.experiment.latest().step))
+        let published = self.publish(&mut batch);
+        outcome.and(published).map(|()| batch.made).map_err(|problem| problem.step(self.steps.step()))
     }
 
     /// Whoever wants the recording so far need not wait for the steps to come.
-    fn complete_for_those_who_ask(&mut self, recorder: &mut Recorder) {
+    fn complete_for_those_who_ask(&mut self) {
         while let Ok(command) = self.commands.try_recv() {
             match command {
-                Command::Flush { reply } => drop(reply.send(self.flush(recorder))),
+                Command::Flush { reply } => drop(reply.send(self.flush())),
                 command => self.waiting.push_back(command),
             }
         }
     }
 
-    fn step(&mut self, frames: u64, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
-        self.experiment.step().map_err(|error| Problem::new(Kind::EngineFailed, error.to_string()))?;
+    fn step(&mut self, frames: u64, batch: &mut Batch) -> Result<(), Problem> {
+        let (kept, recorded) = self.steps.make(frames)?;
         self.shared.metrics.steps.inc();
-        let report = StepReport::of(&self.experiment);
-        // The step stands even if it cannot be recorded.
-        batch.made.push(Kept::of(&report, &self.description)?);
-        recorder.log_moving(&report, frames).map_err(recording_failed)
+        batch.made.push(kept);
+        Ok(recorded?)
     }
 
-    fn publish(&self, batch: &mut Batch, recorder: &mut Recorder) -> Result<(), Problem> {
+    fn publish(&mut self, batch: &mut Batch) -> Result<(), Problem> {
         // Steps that nobody watches are written in large chunks, with the next 256 of them or as soon as there is time.
-        let flushed = if self.shared.live.may_wait() { Ok(()) } else { recorder.flush_shown() };
+        let flushed = if self.shared.live.may_wait() { Ok(()) } else { self.steps.recorder().flush_shown() };
         let flushed = flushed.map_err(recording_failed);
-        self.shared.note_recording(recorder.file_failure().map(str::to_owned));
-        self.shared.publish(batch.made[batch.published..].to_vec(), self.experiment.remaining());
+        self.shared.note_recording(self.steps.recorder().file_failure().map(str::to_owned));
+        self.shared.publish(batch.made[batch.published..].to_vec(), self.steps.remaining());
         (batch.published, batch.last) = (batch.made.len(), Instant::now());
         flushed
-    }
-
-    /// What a learner lacks for which a person chooses: before any step is made, so that a request makes all or none.
-    fn waits_for_a_person(&self, count: u64) -> Option<Problem> {
-        let mut chosen_for = self.experiment.chosen_for();
-        if count > 1 {
-            let (_, name) = chosen_for.next()?;
-            let detail = format!("a person chooses each movement of `{name}`: make one step at a time, not {count}");
-            return Some(Problem::new(Kind::InvalidValue, detail).field("count"));
-        }
-        let unset = |name: &&str| matches!(self.experiment.configuration(name), Ok(None));
-        let name = chosen_for.map(|(_, name)| name).find(unset)?;
-        let detail = format!(
-            "`{name}` waits for a person to choose its movement; post {{\"configuration\": […]}}, one position per joint \
-             in rad or m, to /v1/sessions/{{id}}/learners/{name}/configuration, then step"
-        );
-        Some(Problem::new(Kind::NoConfiguration, detail))
-    }
-
-    fn too_many(&self, count: u64, step: u64) -> Option<Problem> {
-        let few =
-            |left: u64, detail: String| Problem::new(Kind::TooFewStepsLeft, detail).field("count").remaining(left);
-        if let Some(left) = self.experiment.remaining().map(|left| left as u64).filter(|left| count > *left) {
-            return Some(few(left, format!("the recorded data have {left} steps left, {count} were asked for")));
-        }
-        let left = self.most_steps.saturating_sub(step);
-        if count > left {
-            let most = self.most_steps;
-            let detail = format!("a session makes at most {most} steps: {left} are left, not {count}");
-            return Some(few(left, detail));
-        }
-        self.shared.budget.check().err()
     }
 }
 

@@ -84,7 +84,7 @@ pub(super) fn run(
             if opened.send(Ok(robot.session.description())).is_ok() {
                 let served = catch_unwind(AssertUnwindSafe(|| robot.serve(jobs)));
                 if let Err(panic) = served {
-                    shared.fail(panicked(&*panic).detail.into());
+                    shared.fail(panicked(&*panic).into_detail());
                 }
             }
         }
@@ -312,7 +312,7 @@ impl Elsewhere {
             let problem = Problem::from(refusal);
             // It is not the address that is wrong.
             match problem.is(Kind::UnknownSuggestion) {
-                true => Problem::new(Kind::SuggestionOfBody, problem.detail).field("suggestion_id"),
+                true => Problem::new(Kind::SuggestionOfBody, problem.into_detail()).field("suggestion_id"),
                 false => problem,
             }
         })?;
@@ -438,7 +438,7 @@ impl Elsewhere {
         if step >= self.shared.steps() {
             let report = self.session.report();
             let kept = Kept::of(&report, &self.session.description());
-            reports.push(kept.map_err(|problem| RecordingError::Encode(problem.detail.into()))?);
+            reports.push(kept.map_err(|problem| RecordingError::Encode(problem.detail.to_string().into()))?);
             if self.recorded == step {
                 self.recorded += 1;
                 self.recorder.log(&report)?;

@@ -7,16 +7,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use serde::{Deserialize, Serialize};
 use tokio::{
     sync::{OwnedSemaphorePermit, Semaphore, oneshot},
     time::timeout,
 };
 use tokio_util::sync::CancellationToken;
-use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::{Budget, Engine, Session, Shared, clock::now_s, dormant::Known, engine, lock};
+use super::{Budget, Engine, NewSession, Session, Shared, clock::now_s, dormant::Known, engine, lock};
 use crate::server::{
     Limits,
     aside::aside,
@@ -25,37 +23,12 @@ use crate::server::{
     requests,
     store::{Store, StoreError},
 };
-use body_schema_recording::EllipsoidSize;
 use body_schema_scenario::WorldKind;
 
 /// How long a session may take to end after it was told to …
 pub(super) const END_WITHIN: Duration = Duration::from_secs(10);
 /// … and when the server ends with it.
 const SHUT_DOWN_WITHIN: Duration = Duration::from_secs(4);
-
-/// What a session is made from.
-#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct NewSession {
-    /// Name of a built-in scenario.
-    #[schema(example = "arm-6dof")]
-    pub scenario: String,
-    /// Seed of all random streams.
-    #[serde(default = "first_seed", deserialize_with = "body_schema_ask_tell::whole::whole")]
-    #[schema(default = 1)]
-    pub seed: u64,
-    /// The learners to compare, by their names in the scenario; all of the scenario's if absent or null.
-    #[serde(default)]
-    #[schema(example = json!(["active", "random"]))]
-    pub learners: Option<Vec<String>>,
-    /// How large the ellipsoids of its recording are.
-    #[serde(default)]
-    pub ellipsoids: EllipsoidSize,
-}
-
-fn first_seed() -> u64 {
-    1
-}
 
 /// What is kept of sessions, and where.
 pub(in crate::server) struct Keeping {
@@ -124,10 +97,7 @@ impl Sessions {
         let file = self.recordings.as_ref().map(|_| format!("{}-seed{}-{id}.rrd", new.scenario, new.seed));
         let setup = engine::Setup {
             id,
-            scenario: new.scenario.clone(),
-            seed: new.seed,
-            learners: new.learners,
-            ellipsoids: new.ellipsoids,
+            new: new.clone(),
             file: self.recordings.as_ref().zip(file.as_ref()).map(|(directory, file)| directory.join(file)),
             most_steps: self.limits.steps_per_session,
             shared: shared.clone(),

@@ -3,41 +3,8 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::{Session, lock};
-use body_schema_ask_tell::{ChannelShape, Status};
+use super::{Session, SessionResource, lock};
 use body_schema_scenario::WorldKind;
-use body_schema_wire::Description;
-
-/// A session as its resource shows it.
-#[derive(Clone, Debug, Serialize, ToSchema)]
-pub struct SessionResource {
-    /// Its id.
-    #[schema(format = "uuid")]
-    pub id: String,
-    /// Where its movements are made.
-    pub world: WorldKind,
-    /// What stays the same from step to step.
-    pub description: Description,
-    /// The latest step; 0 is the start, before any movement. With a robot elsewhere a step is an observation that counts.
-    pub step: u64,
-    /// How many steps the recorded data set has left; null in a simulated world and with a robot elsewhere, which have no end.
-    pub remaining: Option<u64>,
-    /// The id of its recording, by which viewers tell one from another: with a robot elsewhere another one each time the
-    /// session comes back to memory. Null for one that is not there.
-    pub recording: Option<String>,
-    /// Name of the recording's file in the server's data directory; null if it keeps none.
-    pub file: Option<String>,
-    /// Why the recording's file lacks steps, if it could not be written; null otherwise. Nothing else is affected, and it is
-    /// written anew when the session ends.
-    pub recording_failure: Option<String>,
-    /// Why the session can make no more steps, if its engine has failed; null otherwise.
-    pub failure: Option<String>,
-    /// With a robot elsewhere: how it stands. Null for all others, and in a list for one that was not asked for since the
-    /// server was started.
-    pub status: Option<Status>,
-    /// With a robot elsewhere: its channels, by their names among the measurements of an observation; empty for all others.
-    pub channels: Vec<ChannelShape>,
-}
 
 impl Session {
     /// Where its movements are made.

@@ -1,8 +1,8 @@
-//! Builds the page's panel into `assets/panel`, which the server embeds:
+//! Builds the page's panel into `assets/panel` and the engine for the browser into `assets/engine`, which the program embeds:
 //!
 //! ```sh
 //! rustup target add wasm32-unknown-unknown    # once
-//! cargo run -p body-schema-bundle             # --check only tells whether assets/panel is of these sources
+//! cargo run -p body-schema-bundle             # --check only tells whether they are of these sources
 //! ```
 //!
 //! Where rustup has no such target, Debian's `rustc-web cargo-web rust-web-src lld-19` do it: set
@@ -23,8 +23,12 @@ use flate2::{Compression, write::GzEncoder};
 use wasm_bindgen_cli_support::Bindgen;
 
 const TARGET: &str = "wasm32-unknown-unknown";
+/// Wide registers, and random numbers from the browser.
+const FLAGS: &str = "-C target-feature=+simd128 --cfg getrandom_backend=\"wasm_js\"";
 /// The most that the compressed bundle may weigh: it is what a first visitor waits for.
 const MOST_BYTES: usize = 2_000_000;
+/// The most that the engine may weigh, which is loaded behind it.
+const MOST_ENGINE_BYTES: usize = 2_200_000;
 
 fn main() -> ExitCode {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -50,49 +54,63 @@ fn main() -> ExitCode {
 
 fn check(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
     let kept = fs::read_to_string(folder.join("stamp.txt")).unwrap_or_default();
-    if kept.trim() == stamp::of_sources(workspace)?.trim() {
+    if kept.trim() == stamp::of_sources(workspace, folder)?.trim() {
         Ok("the bundle is of these sources".to_owned())
     } else {
         Err("the bundle is older than its sources: run `cargo run -p body-schema-bundle`".into())
     }
 }
 
+/// What is built: the package, its module, the files' name, and how much of it compressed a visitor may be made to wait for.
+const BUNDLES: [(&str, &str, &str, usize); 2] = [
+    ("body-schema-panel", "body_schema_panel.wasm", "panel", MOST_BYTES),
+    ("body-schema-worker", "body_schema_worker.wasm", "engine", MOST_ENGINE_BYTES),
+];
+
+/// Builds all; each goes to a folder of its name beside that of the panel.
 fn build(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
     let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target/panel"), PathBuf::from);
     compile(workspace, &target)?;
-    let module = target.join(TARGET).join("release/body_schema_panel.wasm");
-    let made = target.join("bindgen");
-    // No wasm-opt: names removed, it saves nothing once compressed, and Debian's (108) exports the wrong table.
-    let mut bindgen = Bindgen::new();
-    bindgen.web(true)?.typescript(false).remove_name_section(true).remove_producers_section(true);
-    bindgen.input_path(module).out_name("panel").generate(&made)?;
-    let wasm = fs::read(made.join("panel_bg.wasm"))?;
-
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-    encoder.write_all(&wasm)?;
-    let compressed = encoder.finish()?;
-    let script = fs::read(made.join("panel.js"))?;
-    let size = compressed.len() + script.len();
-    if size > MOST_BYTES {
-        return Err(format!("the bundle weighs {size} bytes, more than {MOST_BYTES}").into());
+    let release = target.join(TARGET).join("release");
+    let mut said = Vec::new();
+    for (_, module, name, most) in BUNDLES {
+        let made = target.join("bindgen");
+        // No wasm-opt: names removed, it saves nothing once compressed, and Debian's (108) exports the wrong table.
+        let mut bindgen = Bindgen::new();
+        bindgen.web(true)?.typescript(false).remove_name_section(true).remove_producers_section(true);
+        bindgen.input_path(release.join(module)).out_name(name).generate(&made)?;
+        let wasm = fs::read(made.join(format!("{name}_bg.wasm")))?;
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+        encoder.write_all(&wasm)?;
+        let compressed = encoder.finish()?;
+        let script = fs::read(made.join(format!("{name}.js")))?;
+        let size = compressed.len() + script.len();
+        if size > most {
+            return Err(format!("the bundle `{name}` weighs {size} bytes, more than {most}").into());
+        }
+        let folder = if name == "panel" { folder.to_owned() } else { folder.with_file_name(name) };
+        fs::create_dir_all(&folder)?;
+        fs::write(folder.join(format!("{name}_bg.wasm.gz")), &compressed)?;
+        fs::write(folder.join(format!("{name}.js")), script)?;
+        let (wasm, compressed) = (wasm.len(), compressed.len());
+        said.push(format!("{}: {wasm} bytes of WebAssembly, {compressed} compressed", folder.display()));
     }
-    fs::create_dir_all(folder)?;
-    fs::write(folder.join("panel_bg.wasm.gz"), &compressed)?;
-    fs::write(folder.join("panel.js"), script)?;
-    fs::write(folder.join("stamp.txt"), stamp::of_sources(workspace)?)?;
-    let (wasm, compressed) = (wasm.len(), compressed.len());
-    Ok(format!("{}: {wasm} bytes of WebAssembly, {compressed} compressed", folder.display()))
+    let modules = BUNDLES.map(|(_, module, ..)| release.join(module).with_extension("d"));
+    fs::write(folder.join("sources.txt"), stamp::sources(workspace, &modules)?)?;
+    fs::write(folder.join("stamp.txt"), stamp::of_sources(workspace, folder)?)?;
+    Ok(said.join("\n"))
 }
 
 fn compile(workspace: &Path, target: &Path) -> Result<(), Box<dyn Error>> {
     let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.env("RUSTFLAGS", FLAGS);
     if env::var_os("BODY_SCHEMA_DEBIAN_RUST").is_some() {
         // Debian's compiler has the target's sources instead of its library.
         cargo = Command::new("/usr/bin/cargo");
         cargo
             .env("RUSTC", "/usr/bin/rustc")
             .env("RUSTC_BOOTSTRAP", "1")
-            .env("RUSTFLAGS", "-C linker-flavor=wasm-ld")
+            .env("RUSTFLAGS", format!("{FLAGS} -C linker-flavor=wasm-ld"))
             .env("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", "wasm-ld-19")
             .env_remove("RUSTUP_TOOLCHAIN")
             .env_remove("RUSTC_WRAPPER")
@@ -103,9 +121,10 @@ fn compile(workspace: &Path, target: &Path) -> Result<(), Box<dyn Error>> {
         // All at once: what nobody calls is left out across crates.
         .env("CARGO_PROFILE_RELEASE_LTO", "fat")
         .env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "1")
-        .args(["build", "--locked", "--release", "--package", "body-schema-panel", "--target", TARGET])
+        .args(["build", "--locked", "--release", "--target", TARGET])
+        .args(BUNDLES.iter().flat_map(|(package, ..)| ["--package", package]))
         .arg("--target-dir")
         .arg(target);
     let status = cargo.status().map_err(|error| format!("cargo does not start: {error}"))?;
-    if status.success() { Ok(()) } else { Err("the panel does not compile".into()) }
+    if status.success() { Ok(()) } else { Err("the panel or the engine does not compile".into()) }
 }

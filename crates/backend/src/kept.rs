@@ -4,23 +4,29 @@ use std::{mem::size_of, sync::Arc};
 
 use serde_json::value::{RawValue, to_raw_value};
 
-use crate::server::problem::{Kind, Problem};
 use body_schema_recording::{RecordingError, StepsCsv};
 use body_schema_wire::{Description, StepReport};
 
+use crate::{Kind, Problem};
+
 /// A report as its readers get it. Clones share the text.
 #[derive(Clone, Debug)]
-pub(in crate::server) struct Kept {
+pub struct Kept {
     /// The step that it is of.
-    pub(in crate::server) step: u64,
+    pub step: u64,
     /// All of it but the minimiser's partition, which only recordings hold.
-    pub(in crate::server) json: Arc<RawValue>,
+    pub json: Arc<RawValue>,
     /// Its rows of the table of all steps.
-    pub(in crate::server) rows: Arc<[u8]>,
+    pub rows: Arc<[u8]>,
 }
 
 impl Kept {
-    pub(super) fn of(report: &StepReport, description: &Description) -> Result<Self, Problem> {
+    /// Writes a report.
+    ///
+    /// # Errors
+    ///
+    /// [`Kind::Internal`] where it cannot be written.
+    pub fn of(report: &StepReport, description: &Description) -> Result<Self, Problem> {
         let failed = |error: String| Problem::new(Kind::Internal, format!("the report cannot be written: {error}"));
         let rows = rows(report, description).map_err(|error| failed(error.to_string()))?;
         let json = to_raw_value(report).map_err(|error| failed(error.to_string()))?;
@@ -28,19 +34,19 @@ impl Kept {
     }
 
     /// As it was kept before, with the report that it is of; `None` for what is none.
-    pub(super) fn read(text: &str, description: &Description) -> Option<Self> {
+    pub fn read(text: &str, description: &Description) -> Option<Self> {
         let report: StepReport = serde_json::from_str(text).ok()?;
         let json = RawValue::from_string(text.to_owned()).ok()?;
         Some(Self { step: report.step, json: json.into(), rows: rows(&report, description).ok()?.into() })
     }
 
     /// The report that it is of.
-    pub(super) fn report(&self) -> Option<StepReport> {
+    pub fn report(&self) -> Option<StepReport> {
         serde_json::from_str(self.json.get()).ok()
     }
 
     /// How much memory it takes.
-    pub(super) fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         size_of::<Self>() + self.json.get().len() + self.rows.len()
     }
 }

@@ -1,0 +1,139 @@
+// Runs that are computed in the visitor's own browser: the same as session.js, by a worker in place of a server.
+
+import { ProblemError } from "./session.js";
+
+export { wasm } from "./files.js";
+
+/** Runs are computed here and now. */
+export const server = true;
+
+/** What is to be used where the page cannot be shown. */
+export const instead = "the program `body-schema` does without.";
+
+/** Whoever follows a session, by a number that the worker knows it by. */
+const followers = new Map();
+let numbered = 0;
+
+/** Requests that are not answered yet, by their numbers. */
+const asked = new Map();
+
+/** A module of WebAssembly that does nothing, with an instruction that not every browser has: v128.const and a drop. */
+const SIMD = Uint8Array.of(
+  0, 97, 115, 109, 1, 0, 0, 0, 1, 4, 1, 96, 0, 0, 3, 2, 1, 0, 10, 23, 1, 21, 0, 253, 12,
+  0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 26, 11,
+);
+
+const worker = begun();
+
+/** The worker, once it has the engine. @returns {Promise<Worker>} */
+async function begun() {
+  if (!WebAssembly.validate(SIMD)) throw new Error("this browser knows no SIMD in WebAssembly, which the engine needs");
+  const address = (id) => new URL(document.getElementById(id).dataset.address, document.baseURI).href;
+  const worker = new Worker(address("engine-worker"), { type: "module" });
+  const { unpacked } = await fetch(new URL("export.json", document.baseURI)).then((response) => response.json());
+  const wasm = address("engine-wasm");
+  const bytes = unpacked[new URL(wasm).pathname.split("/").slice(-2).join("/")];
+  await new Promise((resolve, reject) => {
+    worker.onerror = (event) => reject(new Error(event.message || "its worker does not start"));
+    worker.onmessage = ({ data }) => (data.failure === undefined ? resolve() : reject(new Error(data.failure)));
+    worker.postMessage({ is: "begin", script: address("engine-script"), wasm, bytes });
+  });
+  worker.onerror = (event) => failed(event.message);
+  worker.onmessage = ({ data }) => receive(data);
+  return worker;
+}
+
+// Who asks for it first hears of a failure.
+worker.catch(() => {});
+
+function receive({ number, status, body, follower, parts, messages }) {
+  if (follower !== undefined) return followers.get(follower)?.receive(parts, messages);
+  const answer = asked.get(number);
+  asked.delete(number);
+  answer?.resolve({ status, body });
+}
+
+/** The engine has crashed: nothing is answered any more. */
+function failed(message) {
+  const problem = { status: 500, title: "The engine has failed", detail: `the engine has crashed: ${message}; reload the page` };
+  for (const { reject } of asked.values()) reject(new ProblemError(problem));
+  asked.clear();
+  for (const follower of followers.values()) follower.fail(problem.detail);
+}
+
+/** An answer's bytes. @returns {Promise<{status: number, body: ArrayBuffer}>} */
+async function answered(method, path, body) {
+  const there = await worker.catch((error) => {
+    const detail = `the engine cannot be started: ${error.message}`;
+    throw new ProblemError({ status: 500, title: "The engine has failed", detail });
+  });
+  const number = ++numbered;
+  const answer = new Promise((resolve, reject) => asked.set(number, { resolve, reject }));
+  there.postMessage({ is: "ask", number, method, path, body });
+  const { status, body: bytes } = await answer;
+  if (status < 400) return { status, body: bytes };
+  throw new ProblemError(JSON.parse(new TextDecoder().decode(bytes)));
+}
+
+/** The query to begin with. Sessions are of one visit alone. @param {string} search */
+export async function begin(search) {
+  const query = new URLSearchParams(search);
+  query.delete("session");
+  return { query: query.size > 0 ? `?${query}` : "", seeds: [] };
+}
+
+/** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */
+export async function arrangement(id, { theme, aspect }) {
+  const within = Math.min(Math.max(aspect, 0.2), 5).toFixed(3);
+  return (await answered("GET", `/v1/sessions/${id}/blueprint.rbl?theme=${theme}&aspect=${within}`)).body;
+}
+
+/** A file of a session. @param {string} path @returns {Promise<Blob>} */
+export async function file(path) {
+  return new Blob([(await answered("GET", path)).body], { type: "application/octet-stream" });
+}
+
+/**
+ * Asks the engine as one asks a server.
+ * @param {string} method
+ * @param {string} path
+ * @param {object} [body]
+ * @returns {Promise<any>} throws a ProblemError
+ */
+export async function ask(method, path, body) {
+  const answer = await answered(method, path, body === undefined ? "" : JSON.stringify(body));
+  return answer.status === 204 ? null : JSON.parse(new TextDecoder().decode(answer.body));
+}
+
+/** Follows a session. Nothing is lost on the way. */
+export class Follower {
+  #number = ++numbered;
+  #on;
+
+  /** @param {string} id @param {object} on as in session.js */
+  constructor(id, on) {
+    this.#on = on;
+    followers.set(this.#number, this);
+    worker.then((worker) => {
+      if (!followers.has(this.#number)) return;
+      on.connected();
+      worker.postMessage({ is: "follow", follower: this.#number, session: id });
+    });
+  }
+
+  stop() {
+    followers.delete(this.#number);
+    worker.then((worker) => worker.postMessage({ is: "leave", follower: this.#number }));
+  }
+
+  /** Parts of the recording, then the reports of their steps. */
+  receive(parts, messages) {
+    for (const part of parts) this.#on.part(part);
+    for (const message of messages) this.#on.message(message);
+  }
+
+  fail(why) {
+    this.stop();
+    this.#on.ended(why, false);
+  }
+}

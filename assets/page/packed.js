@@ -1,0 +1,33 @@
+// Files that are kept compressed: they are unpacked here, since not every host says that they are.
+
+/** How compressed files begin. Some hosts unpack them on the way, so that the content decides and not the name. */
+const GZIP = [0x1f, 0x8b];
+
+/** The content of an answer, unpacked if it is compressed. @param {Response} response @returns {Promise<ReadableStream>} */
+export async function content(response) {
+  const reader = response.body.getReader();
+  const first = await reader.read();
+  const whole = new ReadableStream({
+    start: (out) => (first.done ? out.close() : out.enqueue(first.value)),
+    async pull(out) {
+      const { done, value } = await reader.read();
+      if (done) out.close();
+      else out.enqueue(value);
+    },
+    cancel: (reason) => reader.cancel(reason),
+  });
+  const packed = !first.done && GZIP.every((byte, index) => first.value[index] === byte);
+  return packed ? whole.pipeThrough(new DecompressionStream("gzip")) : whole;
+}
+
+/** A file of WebAssembly, as the browser takes it. @param {string} address @param {number} [bytes] its size once unpacked */
+export async function unpacked(address, bytes = 0) {
+  const response = await fetch(address);
+  if (!response.ok) throw new Error(`${address} cannot be read (${response.status})`);
+  return wasmOf(await content(response), bytes);
+}
+
+/** WebAssembly as an answer of a host that knows it. @param {ReadableStream} stream @param {number} bytes */
+export function wasmOf(stream, bytes) {
+  return new Response(stream, { headers: { "Content-Type": "application/wasm", "Uncompressed-Length": String(bytes) } });
+}

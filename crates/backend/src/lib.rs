@@ -1,0 +1,19 @@
+//! What a page asks of experiments, answered: the same bytes by a server and by the visitor's own browser.
+//!
+//! [`Steps`] is an experiment with its recording, without threads, clocks or connections. A server has one in a thread of its own;
+//! [`Local`] has some and answers for them as the server's routes would. [`Problem`] is what is answered where something is wrong.
+
+mod kept;
+mod local;
+mod problem;
+mod requests;
+mod steps;
+
+pub use kept::Kept;
+pub use local::{Answer, Asked, Job, Local};
+pub use problem::{Beside, Kind, Problem};
+pub use requests::{
+    Configuration, EvaluationRequest, MadeSteps, NewSession, ScenarioList, ScenarioResource, SessionResource,
+    StepRequest, parse, read,
+};
+pub use steps::{Steps, scenario, summaries};

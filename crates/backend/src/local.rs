@@ -1,0 +1,253 @@
+//! Sessions in one thread, with nobody else: what the visitor's browser has in place of a server.
+
+use body_schema_recording::{LiveLog, RecordingError, Shape, StepsCsv, Target, Theme};
+use bytes::Bytes;
+use percent_encoding::percent_decode_str;
+use serde::{Serialize, de::DeserializeOwned};
+use serde_json::{json, to_vec};
+
+use crate::{
+    Configuration, EvaluationRequest, Kept, Kind, MadeSteps, NewSession, Problem, ScenarioList, ScenarioResource,
+    SessionResource, StepRequest, Steps, read, scenario, steps, summaries,
+};
+
+/// How many steps a session makes at most: what a browser's memory holds of it.
+const MOST_STEPS: u64 = 100_000;
+/// How many steps one request makes at most.
+const MOST_STEPS_PER_REQUEST: u64 = 1000;
+
+/// What is answered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// HTTP's status.
+    pub status: u16,
+    /// JSON, or the bytes of a file.
+    pub body: Vec<u8>,
+}
+
+/// What comes of asking.
+pub enum Asked {
+    /// The answer.
+    Done(Answer),
+    /// Steps that are still to be made, one by one, by [`Local::go_on`].
+    Begun(Job),
+}
+
+/// Steps that are being made.
+pub struct Job {
+    session: String,
+    request: StepRequest,
+    made: Vec<Kept>,
+}
+
+/// Some sessions.
+pub struct Local {
+    sessions: Vec<Session>,
+    /// Makes the id of a session.
+    ids: Box<dyn FnMut() -> String>,
+}
+
+struct Session {
+    id: String,
+    steps: Steps,
+    live: LiveLog,
+    history: Vec<Kept>,
+    /// The recording is always followed: it is written as it is made.
+    _follower: Box<dyn std::any::Any>,
+}
+
+impl Local {
+    /// None yet; `ids` makes their ids, each another.
+    pub fn new(ids: impl FnMut() -> String + 'static) -> Self {
+        Self { sessions: Vec::new(), ids: Box::new(ids) }
+    }
+
+    /// Answers a request as a server's routes would; `path` with its query.
+    pub fn ask(&mut self, method: &str, path: &str, body: &[u8]) -> Asked {
+        self.answer(method, path, body).unwrap_or_else(|problem| Asked::Done(refused(&problem)))
+    }
+
+    /// Makes one more of the steps; the answer once all are made or one could not be. A job that is dropped has made what it has made.
+    pub fn go_on(&mut self, job: &mut Job) -> Option<Answer> {
+        self.step(job).unwrap_or_else(|problem| Some(refused(&problem)))
+    }
+
+    /// The recording of a session from part `from` on, arranged for a page, and its reports from step `step` on, each as one message.
+    /// `None` where there is no such session.
+    pub fn news(&self, id: &str, from: usize, step: usize) -> Option<(Vec<Bytes>, Vec<String>)> {
+        let session = self.sessions.iter().find(|session| session.id == id)?;
+        let reports = session.history.iter().skip(step);
+        let reports = reports.map(|kept| format!("{{\"type\":\"step\",\"data\":{}}}", kept.json.get()));
+        Some((session.live.scene_parts_from(from), reports.collect()))
+    }
+
+    fn answer(&mut self, method: &str, path: &str, body: &[u8]) -> Result<Asked, Problem> {
+        let (path, query) = path.split_once('?').unwrap_or((path, ""));
+        let decoded = |part: &str| percent_decode_str(part).decode_utf8_lossy().into_owned();
+        let parts: Vec<String> = path.trim_start_matches('/').split('/').map(decoded).collect();
+        let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
+        let answer = match (method, parts.as_slice()) {
+            ("GET", ["v1", "scenarios"]) => ok(&ScenarioList { scenarios: summaries()? })?,
+            ("GET", ["v1", "scenarios", name]) => {
+                let scenario = scenario(name)?;
+                ok(&ScenarioResource { summary: scenario.summary(), source: scenario.source })?
+            }
+            ("GET", ["v1", "sessions"]) => {
+                let sessions: Vec<SessionResource> = self.sessions.iter().map(Session::resource).collect();
+                ok(&json!({ "sessions": sessions }))?
+            }
+            ("POST", ["v1", "sessions"]) => self.open(&read(body)?)?,
+            ("GET", ["v1", "sessions", id]) => ok(&self.session(id)?.resource())?,
+            ("DELETE", ["v1", "sessions", id]) => {
+                self.session(id)?;
+                self.sessions.retain(|session| session.id != *id);
+                Answer { status: 204, body: Vec::new() }
+            }
+            ("POST", ["v1", "sessions", id, "steps"]) => {
+                let request: StepRequest = read(body)?;
+                request.check(MOST_STEPS_PER_REQUEST)?;
+                self.session(id)?.steps.may_make(request.count, request.expected_step)?;
+                return Ok(Asked::Begun(Job { session: (*id).to_owned(), request, made: Vec::new() }));
+            }
+            ("GET", ["v1", "sessions", id, "learners", name, "selection"]) => {
+                ok(&self.session(id)?.steps.choice(name)?)?
+            }
+            ("POST", ["v1", "sessions", id, "learners", name, "evaluations"]) => {
+                let EvaluationRequest { configuration } = read(body)?;
+                ok(&self.session(id)?.steps.appraise(name, &configuration)?)?
+            }
+            ("GET", ["v1", "sessions", id, "learners", name, "configuration"]) => {
+                ok(&Configuration { configuration: self.session(id)?.steps.configuration(name)? })?
+            }
+            ("POST", ["v1", "sessions", id, "learners", name, "configuration"]) => {
+                let EvaluationRequest { configuration } = read(body)?;
+                ok(&self.session_mut(id)?.steps.set_configuration(name, &configuration)?)?
+            }
+            ("GET", ["v1", "sessions", id, "result.json"]) => ok(&self.session(id)?.steps.result())?,
+            ("GET", ["v1", "sessions", id, "steps.csv"]) => file(self.session(id)?.table().map_err(internal)?),
+            ("GET", ["v1", "sessions", id, "recording.rrd"]) => {
+                let session = self.session_mut(id)?;
+                let flushed = session.steps.recorder().flush();
+                flushed.map_err(|error| steps::recording_failed(&error))?;
+                file(session.live.complete().map_err(internal)?)
+            }
+            ("GET", ["v1", "sessions", id, "blueprint.rbl"]) => {
+                let (theme, aspect) = arranged(query)?;
+                let failed = |detail: String| Problem::new(Kind::Internal, format!("no arrangement: {detail}"));
+                let blueprint = self.session(id)?.live.blueprint(theme, aspect);
+                let blueprint = blueprint.map_err(|error| failed(error.to_string()))?;
+                file(blueprint.ok_or_else(|| failed("the recording has not begun".to_owned()))?.to_vec())
+            }
+            _ => {
+                let detail = format!("{method} {path} needs a server: start `body-schema serve`");
+                return Err(Problem::new(Kind::UnknownRoute, detail));
+            }
+        };
+        Ok(Asked::Done(answer))
+    }
+
+    fn session(&self, id: &str) -> Result<&Session, Problem> {
+        self.sessions.iter().find(|session| session.id == id).ok_or_else(|| Problem::unknown_session(id))
+    }
+
+    fn session_mut(&mut self, id: &str) -> Result<&mut Session, Problem> {
+        self.sessions.iter_mut().find(|session| session.id == id).ok_or_else(|| Problem::unknown_session(id))
+    }
+
+    fn open(&mut self, new: &NewSession) -> Result<Answer, Problem> {
+        let (id, live) = ((self.ids)(), LiveLog::new());
+        let follower = Box::new(live.subscribe());
+        let target = Target::live(live.clone()).with_recording_id(&id);
+        let (steps, start) = Steps::open(new, target, MOST_STEPS)?;
+        let session = Session { id, steps, live, history: vec![start], _follower: follower };
+        let answer = Answer { status: 201, ..ok(&session.resource())? };
+        self.sessions.push(session);
+        Ok(answer)
+    }
+
+    fn step(&mut self, job: &mut Job) -> Result<Option<Answer>, Problem> {
+        let session = self.session_mut(&job.session)?;
+        let at = |problem: Problem, step: u64| problem.step(step);
+        let made = session.steps.make(job.request.frames);
+        let (kept, recorded) = made.map_err(|problem| at(problem, session.steps.step()))?;
+        session.history.push(kept.clone());
+        job.made.push(kept);
+        let shown = session.steps.recorder().flush_shown().map_err(|error| steps::recording_failed(&error));
+        recorded.and(shown).map_err(|problem| at(problem, session.steps.step()))?;
+        if (job.made.len() as u64) < job.request.count {
+            return Ok(None);
+        }
+        let reports = job.made.drain(..).filter(|_| job.request.reports).map(|kept| kept.json).collect();
+        let remaining = session.steps.remaining().map(|left| left as u64);
+        ok(&MadeSteps { step: session.steps.step(), remaining, reports }).map(Some)
+    }
+}
+
+impl Session {
+    fn resource(&self) -> SessionResource {
+        SessionResource {
+            id: self.id.clone(),
+            world: steps::world(self.steps.description()),
+            description: self.steps.description().clone(),
+            step: self.steps.step(),
+            remaining: self.steps.remaining().map(|left| left as u64),
+            recording: Some(self.id.clone()),
+            file: None,
+            recording_failure: None,
+            failure: None,
+            status: None,
+            channels: Vec::new(),
+        }
+    }
+
+    fn table(&self) -> Result<Vec<u8>, RecordingError> {
+        let mut table = Vec::new();
+        StepsCsv::new(self.steps.description(), &mut table)?.flush()?;
+        self.history.iter().for_each(|kept| table.extend_from_slice(&kept.rows));
+        Ok(table)
+    }
+}
+
+/// The colours and the shape of the view that a query asks for.
+fn arranged(query: &str) -> Result<(Theme, f64), Problem> {
+    let (mut theme, mut shape, mut aspect) = (Theme::default(), Shape::default(), None);
+    for (name, value) in query.split('&').filter_map(|pair| pair.split_once('=')) {
+        match name {
+            "theme" => theme = word(name, value)?,
+            "shape" => shape = word(name, value)?,
+            "aspect" => aspect = Some(ratio(value)?),
+            _ => {}
+        }
+    }
+    Ok((theme, aspect.unwrap_or(shape.aspect())))
+}
+
+fn word<T: DeserializeOwned>(name: &str, value: &str) -> Result<T, Problem> {
+    let malformed = |error| Problem::new(Kind::Malformed, format!("`{name}`: {error}")).field(name);
+    let value = serde::de::value::StrDeserializer::<serde::de::value::Error>::new(value);
+    T::deserialize(value).map_err(malformed)
+}
+
+fn ratio(value: &str) -> Result<f64, Problem> {
+    value.parse().ok().filter(|aspect| (0.2..=5.0).contains(aspect)).ok_or_else(|| {
+        let detail = format!("`aspect` must be a number from 0.2 to 5, not `{value}`");
+        Problem::new(Kind::Malformed, detail).field("aspect")
+    })
+}
+
+fn ok<T: Serialize>(value: &T) -> Result<Answer, Problem> {
+    let body = to_vec(value).map_err(|error| Problem::new(Kind::Internal, format!("no JSON: {error}")))?;
+    Ok(Answer { status: 200, body })
+}
+
+fn file(body: Vec<u8>) -> Answer {
+    Answer { status: 200, body }
+}
+
+fn refused(problem: &Problem) -> Answer {
+    Answer { status: problem.status, body: to_vec(problem).unwrap_or_default() }
+}
+
+fn internal(error: RecordingError) -> Problem {
+    Problem::new(Kind::Internal, error.to_string())
+}

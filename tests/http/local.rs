@@ -1,0 +1,190 @@
+//! What answers in the visitor's browser, beside the server: the same bytes.
+
+use std::io::Cursor;
+
+use body_schema_backend::{Answer, Asked, Local};
+use re_chunk::Chunk;
+use re_log_encoding::Decoder;
+use re_log_types::LogMsg;
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::http::support::Server;
+
+/// Asks the backend of a browser, steps to their end.
+fn ask(local: &mut Local, method: &str, path: &str, body: &str) -> Answer {
+    match local.ask(method, path, body.as_bytes()) {
+        Asked::Done(answer) => answer,
+        Asked::Begun(mut job) => loop {
+            if let Some(answer) = local.go_on(&mut job) {
+                return answer;
+            }
+        },
+    }
+}
+
+/// A text without what differs from one time to another: how long choices took, and the ids of requests.
+fn timeless(bytes: &[u8]) -> String {
+    fn strip(value: &mut Value) {
+        match value {
+            Value::Object(members) => {
+                members.retain(|name, _| !matches!(name.as_str(), "selection_ms" | "request_id"));
+                members.values_mut().for_each(strip);
+            }
+            Value::Array(values) => values.iter_mut().for_each(strip),
+            _ => {}
+        }
+    }
+    match serde_json::from_slice::<Value>(bytes) {
+        // The order of members counts too, which a `Value` does not keep: see below.
+        Ok(mut value) => {
+            strip(&mut value);
+            value.to_string()
+        }
+        Err(_) => String::from_utf8_lossy(bytes).into_owned(),
+    }
+}
+
+/// The names of all members, in the order in which they are written.
+fn members(bytes: &[u8]) -> Vec<String> {
+    let text = String::from_utf8_lossy(bytes).into_owned();
+    let names = text.split('"').collect::<Vec<_>>();
+    let names = names.windows(2).filter(|pair| pair[1].starts_with(':')).map(|pair| pair[0].to_owned());
+    names.filter(|name| name != "request_id").collect()
+}
+
+/// All messages of a recording but for the series of times.
+fn recorded(bytes: &[u8]) -> Vec<String> {
+    let messages = Decoder::decode_lazy(Cursor::new(bytes)).map(|message| message.expect("a message"));
+    let said = messages.filter_map(|message: LogMsg| match message {
+        LogMsg::ArrowMsg(store, message) => {
+            let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
+            let is_time = chunk.entity_path().to_string().ends_with("selection_ms");
+            (!is_time).then(|| format!("{store:?} {} {:?}", message.chunk_id, message.batch))
+        }
+        other => Some(format!("{other:?}")),
+    });
+    said.collect()
+}
+
+struct Both {
+    server: Server,
+    local: Local,
+    session: String,
+}
+
+impl Both {
+    /// A session on either side, of one id.
+    async fn open(opening: Value) -> Self {
+        let server = Server::start().await;
+        let answer = server.post("/v1/sessions", opening.clone()).await;
+        let told = answer.bytes().await.expect("a body");
+        let id = serde_json::from_slice::<Value>(&told).expect("JSON")["id"].as_str().expect("an id").to_owned();
+        let session = format!("/v1/sessions/{id}");
+        let mut local = Local::new(move || id.clone());
+        let here = ask(&mut local, "POST", "/v1/sessions", &opening.to_string());
+        assert_eq!(here.status, 201, "{}", String::from_utf8_lossy(&here.body));
+        assert_eq!(String::from_utf8_lossy(&here.body), String::from_utf8_lossy(&told));
+        Self { server, local, session }
+    }
+
+    /// Both answer the same.
+    async fn same(&mut self, method: Method, path: &str, body: Option<Value>) -> (u16, Vec<u8>) {
+        let path = match path.starts_with("/v1") {
+            true => path.to_owned(),
+            false => format!("{}{path}", self.session),
+        };
+        let request = self.server.request(method.clone(), &path);
+        let request = body.iter().fold(request, |request, body| request.json(body));
+        let there = request.send().await.expect("an answer");
+        let status = there.status().as_u16();
+        let there = there.bytes().await.expect("a body").to_vec();
+        let text = body.map(|body| body.to_string()).unwrap_or_default();
+        let here = ask(&mut self.local, method.as_str(), &path, &text);
+        assert_eq!(here.status, status, "{method} {path}: {}", String::from_utf8_lossy(&here.body));
+        if path.contains(".rbl") {
+            assert!(here.body == there, "{method} {path}: {} bytes here, {} there", here.body.len(), there.len());
+        } else if path.contains(".rrd") {
+            assert!(recorded(&here.body) == recorded(&there), "{method} {path}");
+        } else {
+            assert_eq!(timeless(&here.body), timeless(&there), "{method} {path}");
+            assert_eq!(members(&here.body), members(&there), "{method} {path}");
+        }
+        (status, there)
+    }
+}
+
+/// Six scenarios, two hundred steps together, and everything that can be asked of them.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_browser_answers_as_the_server_does() {
+    let scenarios = [
+        ("arm-6dof", 60, "active"),
+        ("arm-12dof", 20, "active"),
+        ("head-fov", 40, "active"),
+        ("arm-6dof-camera", 10, "global"),
+        ("tiago-mocap", 30, "global"),
+        ("arm-7dof-socket", 40, "random"),
+    ];
+    for (scenario, steps, learner) in scenarios {
+        let mut both = Both::open(json!({ "scenario": scenario, "seed": 4711, "ellipsoids": "one-sigma" })).await;
+        let learners = both.server.get_json(&both.session).await["description"]["learners"].clone();
+        let names: Vec<&str> =
+            learners.as_array().expect("learners").iter().filter_map(|it| it["name"].as_str()).collect();
+        let learner = if names.contains(&learner) { learner } else { names[0] };
+        let mut made = 0;
+        while made < steps {
+            let body = json!({ "count": 10, "expected_step": made, "frames": 2 });
+            both.same(Method::POST, "/steps", Some(body)).await;
+            made += 10;
+        }
+        both.same(Method::GET, "", None).await;
+        both.same(Method::GET, &format!("/learners/{learner}/selection"), None).await;
+        let joints =
+            both.server.get_json(&both.session).await["description"]["joints"].as_array().expect("joints").len();
+        let posture = json!({ "configuration": vec![0.1; joints] });
+        both.same(Method::POST, &format!("/learners/{learner}/evaluations"), Some(posture)).await;
+        both.same(Method::GET, "/result.json", None).await;
+        both.same(Method::GET, "/steps.csv", None).await;
+        both.same(Method::GET, "/recording.rrd", None).await;
+        both.same(Method::GET, "/blueprint.rbl?theme=dark&aspect=1.250", None).await;
+        let (_, reports) = both.local.news(both.session.rsplit('/').next().expect("an id"), 0, 0).expect("a session");
+        assert_eq!(reports.len() as u64, steps + 1);
+        both.server.stop().await;
+    }
+}
+
+#[tokio::test]
+async fn what_is_wrong_is_told_in_the_same_words() {
+    let mut both = Both::open(json!({ "scenario": "arm-6dof", "seed": 1, "learners": ["human", "random"] })).await;
+    for (path, body) in [
+        ("/steps", json!({ "count": 0 })),
+        ("/steps", json!({ "count": 2 })),
+        ("/steps", json!({ "count": 1 })),
+        ("/steps", json!({ "count": 1, "expected_step": 7 })),
+        ("/steps", json!({ "count": 1, "frames": 31 })),
+        ("/steps", json!({ "counts": 1 })),
+        ("/learners/nobody/evaluations", json!({ "configuration": [0, 0, 0, 0, 0, 0] })),
+        ("/learners/human/evaluations", json!({ "configuration": [0] })),
+        ("/learners/human/configuration", json!({ "configuration": [9, 0, 0, 0, 0, 0] })),
+        ("/learners/random/configuration", json!({ "configuration": [0, 0, 0, 0, 0, 0] })),
+        ("/v1/sessions/00000000-0000-4000-8000-000000000000/steps", json!({})),
+        ("/v1/sessions", json!({ "scenario": "arm-6dofx" })),
+        ("/v1/sessions", json!({ "scenario": "arm-6dof", "learners": ["clever"] })),
+        ("/v1/sessions", json!({ "scenario": "arm-6dof", "seed": -1 })),
+    ] {
+        let (status, said) = both.same(Method::POST, path, Some(body)).await;
+        assert!(status >= 400, "{path}: {}", String::from_utf8_lossy(&said));
+    }
+    both.same(Method::POST, "/learners/human/configuration", Some(json!({ "configuration": [0.1, 0, 0, 0, 0, 0] })))
+        .await;
+    both.same(Method::GET, "/learners/human/configuration", None).await;
+    both.same(Method::POST, "/steps", Some(json!({}))).await;
+    both.same(Method::GET, "/learners/random/selection", None).await;
+    both.same(Method::GET, "/blueprint.rbl?aspect=9", None).await;
+    both.same(Method::GET, "/v1/scenarios", None).await;
+    both.same(Method::GET, "/v1/scenarios/head-fov", None).await;
+    both.same(Method::GET, "/v1/scenarios/head-fovx", None).await;
+    both.same(Method::DELETE, "", None).await;
+    both.same(Method::GET, "", None).await;
+    both.server.stop().await;
+}

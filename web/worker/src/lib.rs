@@ -1,0 +1,77 @@
+//! The engine in a worker of the visitor's browser.
+//!
+//! `assets/page/engine.js` speaks with it: the same requests as to a server, answered by [`body_schema_backend::Local`].
+
+#[cfg(target_arch = "wasm32")]
+mod engine {
+    use body_schema_backend::{Answer, Asked, Job, Local};
+    use js_sys::{Array, Reflect, Uint8Array};
+    use wasm_bindgen::prelude::*;
+
+    #[wasm_bindgen]
+    extern "C" {
+        #[wasm_bindgen(js_namespace = crypto, js_name = randomUUID)]
+        fn random_uuid() -> String;
+    }
+
+    /// The sessions of a page.
+    #[wasm_bindgen]
+    pub struct Engine {
+        local: Local,
+        /// Steps that are being made, and by which number they are known.
+        jobs: Vec<(u32, Job)>,
+        begun: u32,
+    }
+
+    #[wasm_bindgen]
+    impl Engine {
+        /// None yet.
+        #[wasm_bindgen(constructor)]
+        #[expect(clippy::new_without_default, reason = "JavaScript knows no defaults")]
+        pub fn new() -> Self {
+            Self { local: Local::new(random_uuid), jobs: Vec::new(), begun: 0 }
+        }
+
+        /// Answers a request: `{status, body}`, or the number of the steps that were begun and are to be [made](Self::go_on).
+        pub fn ask(&mut self, method: &str, path: &str, body: &[u8]) -> JsValue {
+            match self.local.ask(method, path, body) {
+                Asked::Done(answer) => told(answer),
+                Asked::Begun(job) => {
+                    self.begun += 1;
+                    self.jobs.push((self.begun, job));
+                    self.begun.into()
+                }
+            }
+        }
+
+        /// Makes one more step: `{status, body}` once all are made or one could not be.
+        pub fn go_on(&mut self, number: u32) -> Option<JsValue> {
+            let index = self.jobs.iter().position(|(known, _)| *known == number)?;
+            let answer = self.local.go_on(&mut self.jobs[index].1)?;
+            self.jobs.swap_remove(index);
+            Some(told(answer))
+        }
+
+        /// Makes no more of these steps.
+        pub fn give_up(&mut self, number: u32) {
+            self.jobs.retain(|(known, _)| *known != number);
+        }
+
+        /// What is new of a session: `[parts of the recording from one on, messages from a step on]`; nothing where there is no such
+        /// session.
+        pub fn news(&self, session: &str, from: usize, step: usize) -> Option<Array> {
+            let (parts, messages) = self.local.news(session, from, step)?;
+            let parts: Array = parts.iter().map(|part| Uint8Array::from(&part[..])).collect();
+            let messages: Array = messages.iter().map(|message| JsValue::from(message.as_str())).collect();
+            Some(Array::of2(&parts, &messages))
+        }
+    }
+
+    fn told(Answer { status, body }: Answer) -> JsValue {
+        let answer = js_sys::Object::new();
+        // An object takes whatever it is given.
+        let _ = Reflect::set(&answer, &"status".into(), &status.into());
+        let _ = Reflect::set(&answer, &"body".into(), &Uint8Array::from(&body[..]));
+        answer.into()
+    }
+}
