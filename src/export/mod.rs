@@ -72,6 +72,11 @@ pub struct Plan<'a> {
 
 impl<'a> Plan<'a> {
     /// The learners and steps that are asked for, or those that a page shows.
+    ///
+    /// # Errors
+    ///
+    /// [`ExportError::Scenario`] if the scenario has no such learners, [`ExportError::Steps`] if `steps` is 0 or more
+    /// than a page can show.
     pub fn new(scenario: &'a Scenario, learners: Option<&[String]>, steps: Option<u64>) -> Result<Self, ExportError> {
         let learners = learners.map_or_else(|| scenario.summary().explorer, <[String]>::to_vec);
         let available = scenario.experiment(1, Some(&learners))?.remaining().map(|left| left as u64);
@@ -165,9 +170,14 @@ impl Export<'_> {
         self.plans.iter().map(|plan| plan.steps * plan.seeds(&self.seeds).len() as u64).sum()
     }
 
-    /// Writes the folder. One that holds another export is replaced; one that holds anything else is refused unless `force`
-    /// says to write beside it. Everything is written aside, and takes its place once it is complete: where that fails the folder is as
-    /// it was. Seeds are run side by side; `tick` is called after every step.
+    /// Writes the folder. One that holds another export is replaced; one that holds anything else is refused unless `force` says to
+    /// write beside it. Everything is written aside, and takes its place once it is complete: where that fails the folder is as it was.
+    /// Seeds are run side by side; `tick` is called after every step.
+    ///
+    /// # Errors
+    ///
+    /// [`ExportError::NotEmpty`] if the folder holds something else and `force` is not set, [`ExportError::Page`] if the page's files
+    /// are missing, [`ExportError::Run`] if a run breaks off, [`ExportError::File`] if a file cannot be written.
     pub fn write(&self, out: &Path, force: bool, tick: &(dyn Fn() + Sync)) -> Result<Written, ExportError> {
         let is_export = examine(out, force)?;
         let is_there = out.exists();

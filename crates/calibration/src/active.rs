@@ -49,6 +49,12 @@ const SEED: u64 = 1;
 impl Case<'_> {
     /// The `count` most informative of `rows` for what is asked at `asked`, by their postures; in the order of the choice, and what was
     /// learned after each.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Active`] if `count` is 0 or more than the rows to choose from, [`CalibrationError::GivenUp`] if `progress`
+    /// says that nobody waits any longer, [`CalibrationError::Estimation`] or [`CalibrationError::Selection`] if a fit or the criterion
+    /// fails.
     pub fn choose(
         &self,
         rows: &[usize],
@@ -97,6 +103,11 @@ impl Case<'_> {
     }
 
     /// Held-out error after `1..=count` chosen rows, beside random orders; over all `splits`.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::NothingHeldOut`] if no split holds rows out; otherwise the errors of
+    /// [`choose`](Self::choose).
     pub fn active(
         &self,
         splits: &[Split],
@@ -122,6 +133,11 @@ impl Case<'_> {
     }
 
     /// Held-out error by number of rows in random orders; nothing where none are held out, or too many rows to try.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Estimation`] if a fit fails, [`CalibrationError::GivenUp`] if `progress` says that nobody
+    /// waits any longer.
     pub fn learning(&self, splits: &[Split], progress: &dyn Progress) -> Result<Vec<ActivePoint>, CalibrationError> {
         let fewest = splits.iter().map(|split| split.training.len()).min().unwrap_or(0);
         if splits.iter().all(|split| split.held_out.is_empty()) || !(3..=POOL).contains(&fewest) {

@@ -127,6 +127,10 @@ impl Extra {
 impl Case<'_> {
     /// What is worth adding, by folds among `rows` and where the robot is `asked` about; `plain` is a fit of them without it. And by how
     /// much wider than is stated readings scatter in these folds.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Prior`] or [`CalibrationError::Estimation`] if a fit fails.
     pub fn trials(
         &self,
         rows: &[usize],
@@ -213,6 +217,10 @@ impl Case<'_> {
     }
 
     /// The fit with what stays; `plain` itself where nothing does.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Prior`] or [`CalibrationError::Estimation`] if the fit fails.
     pub fn fuller(&self, trials: &[Trial], plain: &Fit) -> Result<Fit, CalibrationError> {
         match trials.iter().find(|trial| trial.kept) {
             Some(trial) => self.fit(&self.extended(&trial.extras, plain.state()), &plain.rows, Some(plain.state())),

@@ -67,6 +67,11 @@ const SEED: u64 = 1;
 impl Case<'_> {
     /// What explains `rows`, as far as `layout` can, from a start near which it is to be found; without one it is searched for
     /// wherever the prior allows.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Prior`] if the prior is not positive definite, [`CalibrationError::Estimation`] if the search does
+    /// not end at a minimum.
     pub fn fit(&self, layout: &Layout, rows: &[usize], near: Option<&State>) -> Result<Fit, CalibrationError> {
         let mut smoother = self.smoother(layout, near)?;
         let movements: Vec<_> = rows.iter().map(|row| &self.rows[*row]).collect();
@@ -90,6 +95,11 @@ impl Case<'_> {
 
     /// The chain as described with base, targets, cameras and sockets where `rows` put them. So its joints bear what they do with
     /// the target there, and what is fitted near to it takes that over.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Prior`] if the prior is not positive definite, [`CalibrationError::Estimation`] if the search does not
+    /// end at a minimum.
     pub fn nominal(&self, rows: &[usize]) -> Result<Fit, CalibrationError> {
         let mut fit = self.fit(&self.placing(), rows, None)?;
         fit.belief.state.loads = Some(self.scenario.robot.loads(fit.state()));

@@ -165,6 +165,11 @@ impl Svg {
 }
 
 /// The picture of a drawing as PNG, with fonts of our own: the same on every machine.
+///
+/// # Errors
+///
+/// [`RasterError::Svg`] if the text is no valid SVG, [`RasterError::Size`] if the picture has no pixels or too many,
+/// [`RasterError::Encode`] if PNG cannot hold it.
 pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
     static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
         let mut fonts = fontdb::Database::new();

@@ -107,6 +107,11 @@ pub enum Ending {
 }
 
 /// Runs what the plan holds, writes figures and tables, and returns the report.
+///
+/// # Errors
+///
+/// [`PaperError`] if the plan names an unknown experiment, a scenario or a run fails, a figure cannot be drawn, or a
+/// file cannot be read or written.
 pub fn run(plan: &Plan, progress: &dyn Progress) -> Result<Report, PaperError> {
     plan.check()?;
     let store = Store::open(&plan.out)?;

@@ -180,6 +180,10 @@ impl LiveLog {
     }
 
     /// Encodes messages and appends them, one part each; on an error none. A closed log ignores them.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if a message cannot be encoded; then none is appended.
     pub fn append(&self, messages: &[LogMsg]) -> Result<(), RecordingError> {
         let parts = messages.iter().map(encode).collect::<Result<Vec<_>, _>>()?;
         self.push(parts, None);
@@ -196,6 +200,10 @@ impl LiveLog {
 
     /// An arrangement of views for a page: the scene alone, in light or dark, for a view this many times as wide as high. A stream of its
     /// own, which a viewer that has the recording takes up whatever became of its last one. `None` before step 0.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if the arrangement cannot be encoded.
     pub fn blueprint(&self, theme: Theme, aspect: f64) -> Result<Option<Bytes>, RecordingError> {
         let arranger = self.state().arranger.clone();
         let Some(arranger) = arranger else { return Ok(None) };
@@ -256,6 +264,10 @@ impl LiveLog {
     /// 256 KiB at most unless a single row is larger.
     ///
     /// Takes about as long as it took to encode the parts: run it where it may block.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError`] if the parts cannot be decoded or encoded again.
     pub fn put_together(&self, parts: &[Bytes]) -> Result<Vec<Bytes>, RecordingError> {
         let mut together: Vec<Vec<u8>> = Vec::new();
         for few in in_few(parts) {

@@ -87,6 +87,11 @@ pub struct Recorder {
 
 impl Recorder {
     /// Opens the target and records what stays the same.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Create`] if the file cannot be created, [`RecordingError::Encode`] if what stays the same
+    /// cannot be encoded.
     pub fn new(description: &Description, target: Target) -> Result<Self, RecordingError> {
         let Target { file, grows, live, recording_id, ellipsoids } = target;
         let create = if grows { RrdFile::create_growing } else { RrdFile::create };
@@ -136,11 +141,21 @@ impl Recorder {
     }
 
     /// Records a step. Steps come in order; the first one is step 0.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if the step cannot be encoded; [`RecordingError::Write`] if the file cannot be
+    /// written and there is no live log.
     pub fn log(&mut self, report: &StepReport) -> Result<(), RecordingError> {
         self.log_moving(report, 0)
     }
 
     /// Records a step, and for those who watch live so many postures on the way to it (at most [`MOST_FRAMES`]).
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if the step cannot be encoded; [`RecordingError::Write`] if the file cannot be
+    /// written and there is no live log.
     pub fn log_moving(&mut self, report: &StepReport, frames: u64) -> Result<(), RecordingError> {
         let stage = match self.stage.take() {
             Some(stage) => stage,
@@ -185,6 +200,10 @@ impl Recorder {
 
     /// Draws an arm through these points (axis points in order, then the marker, metres) beside the learner's, for those
     /// who watch live: a posture that is tried out after `step`. `None` clears it, and so does the learner's next step.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if the drawing cannot be encoded for the live log.
     pub fn log_ghost(
         &mut self,
         step: u64,
@@ -199,6 +218,11 @@ impl Recorder {
 
     /// Records the best designs of several lengths, each at the step at which as many movements are made. At any time
     /// before the end.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if the curve cannot be encoded; [`RecordingError::Write`] if the file cannot be
+    /// written and there is no live log.
     pub fn log_best_designs(&mut self, designs: &[BestDesign]) -> Result<(), RecordingError> {
         if designs.is_empty() {
             return Ok(());
@@ -214,6 +238,11 @@ impl Recorder {
     }
 
     /// Writes the steps that wait. When this returns they are in the log, and with the operating system.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if a step cannot be encoded; [`RecordingError::Write`] if the file cannot be written
+    /// and there is no live log.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         (self.waiting_steps, self.waiting_rectangles, self.flushed) = (0, 0, Instant::now());
         let live = self.publish(&HashSet::new());
@@ -230,8 +259,12 @@ impl Recorder {
 
     /// Brings those who watch live up to date with what the arrangement of views shows at first; the rest, and the file, wait
     /// for the next [`flush`](Self::flush), at most 256 steps or two seconds of them. Every message costs about a kilobyte, and
-    /// most entities are series that no view shows: a live view that is up to date at every step needs half the messages
-    /// this way, and the file has few large ones.
+    /// most entities are series that no view shows: a live view that is up to date at every step needs half the messages this
+    /// way, and the file has few large ones.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if a step cannot be encoded for the live log.
     pub fn flush_shown(&mut self) -> Result<(), RecordingError> {
         let hidden = std::mem::take(&mut self.hidden);
         let published = self.publish(&hidden);
@@ -268,6 +301,10 @@ impl Recorder {
     }
 
     /// Writes what is left, ends the file with its footer, and closes the log.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError`] if what is left cannot be encoded, or the file can be written neither as it grew nor anew.
     pub fn finish(mut self) -> Result<(), RecordingError> {
         self.end()
     }
@@ -283,6 +320,10 @@ impl Recorder {
 
     /// Writes what is left and ends the file with its footer: nothing is recorded after it. A file that could not be written
     /// as it grew is written anew from the log. After an error it may be tried again, and steps may be recorded.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError`] if what is left cannot be encoded, or the file can be written neither as it grew nor anew.
     pub fn seal(&mut self) -> Result<(), RecordingError> {
         if self.finished {
             return Ok(());

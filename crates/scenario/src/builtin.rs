@@ -73,6 +73,10 @@ const DATA: &[(&str, &str)] = files![
 ];
 
 /// The built-in scenario of that name.
+///
+/// # Errors
+///
+/// [`ScenarioError::UnknownScenario`] if no built-in scenario has that name.
 pub fn builtin(name: &str) -> Result<Scenario, ScenarioError> {
     let names = || BUILTIN.iter().map(|builtin| builtin.name);
     let Some(found) = BUILTIN.iter().find(|builtin| builtin.name == name) else {

@@ -35,9 +35,14 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// Reads the columns that `wanted` finds among the titles of a CSV text: columns are separated by commas, and a number has
-    /// a decimal point if anything (`0.03`, `.03`, `3e-2`). Titles may end with a unit (see [`table`](body_schema_table)). A line on
+    /// Reads the columns that `wanted` finds among the titles of a CSV text: columns are separated by commas, and a number has a
+    /// decimal point if anything (`0.03`, `.03`, `3e-2`). Titles may end with a unit (see [`table`](body_schema_table)). A line on
     /// which nothing was measured, in a table without labels, is passed over. An error says which line or column is at fault.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`], which names line and column, if `wanted` does not find its columns, a cell is no number, or no line holds a
+    /// measurement.
     pub fn from_csv(
         text: &str,
         wanted: impl FnOnce(&Titles) -> Result<Columns, TableError>,

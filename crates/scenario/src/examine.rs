@@ -115,8 +115,11 @@ impl Scenario {
         seen.collect()
     }
 
-    /// Whether learners can begin from the prior, without building any: the standard deviations may be so small or so
-    /// large that their squares are none.
+    /// Checks, without building any learner, that learners can begin from the prior.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError::Prior`] if the square of a standard deviation, or its reciprocal, underflows or overflows.
     pub fn check_prior(&self) -> Result<(), ScenarioError> {
         let deviations = self.prior.standard_deviations(&self.robot.layout);
         if deviations.iter().all(|sd| (sd * sd).is_normal() && (sd * sd).recip().is_normal()) {

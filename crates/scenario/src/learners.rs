@@ -156,6 +156,12 @@ impl Scenario {
     ///
     /// A name is one of the scenario's, or an estimator and a policy, as in `smoother:random`: with the settings of the
     /// scenario, and the stabilising noise if it has any. `human` is `rls:human`.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError::NoLearner`] if the list is empty, [`ScenarioError::RepeatedLearner`] if a learner is in it
+    /// twice, [`ScenarioError::UnknownLearner`] or [`ScenarioError::Misfit`] if a name is none or its policy does not
+    /// fit.
     pub fn chosen(&self, names: Option<&[String]>) -> Result<Vec<LearnerSpec>, ScenarioError> {
         let Some(names) = names else {
             return Ok(self.learners.iter().filter(|spec| spec.by_default).cloned().collect());

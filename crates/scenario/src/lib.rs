@@ -105,6 +105,10 @@ impl Scenario {
     }
 
     /// The text of a data file that this scenario has already read.
+    ///
+    /// # Errors
+    ///
+    /// A clause that continues the file's name, if this scenario has not read such a file.
     pub fn data_file(&self, file: &str) -> Result<String, String> {
         let found = self.data.iter().find(|(name, _)| name == file).map(|(_, text)| text.clone());
         found.ok_or_else(|| "is not a data file of this scenario".to_owned())

@@ -76,8 +76,12 @@ impl Belief {
         }
     }
 
-    /// Whether an observation after a movement to `positions` (rad or m) can be taken in: it fits the rig, whose noise can be
-    /// divided by, and how far it is from what is believed can be computed.
+    /// Checks that an observation after a movement to `positions` (rad or m) can be absorbed.
+    ///
+    /// # Errors
+    ///
+    /// [`Refused`] if it does not fit the rig (see [`Observation::check`]), if a channel's noise cannot be divided by, or, as
+    /// [`Refused::Absurd`], if its distance from the prediction is not finite.
     pub fn accepts(&self, positions: &[f64], observation: &Observation) -> Result<(), Refused> {
         observation.check(&self.rig, self.state.joints.len(), positions)?;
         self.rig.check_noise()?;

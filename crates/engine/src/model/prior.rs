@@ -87,17 +87,30 @@ pub type Derivatives<'a> = (&'a mut DMatrix<f64>, &'a mut DVector<f64>);
 
 impl Prior {
     /// Around `guess` with the covariance P₀ (m × m) of its tangent coordinates.
+    ///
+    /// # Errors
+    ///
+    /// [`PriorError::NotPositive`] if the covariance is not m × m, symmetric and positive definite.
     pub fn around(guess: State, layout: &Layout, covariance: DMatrix<f64>) -> Result<Self, PriorError> {
         Self::new(guess, layout, covariance, |_| None)
     }
 
     /// Around `guess` with independent standard deviations, one per tangent coordinate.
+    ///
+    /// # Errors
+    ///
+    /// [`PriorError::NotPositive`] if there are not m deviations, or a square of one is not positive.
     pub fn with_deviations(guess: State, layout: &Layout, deviations: &DVector<f64>) -> Result<Self, PriorError> {
         Self::around(guess, layout, DMatrix::from_diagonal(&deviations.map(|sd| sd * sd)))
     }
 
-    /// As [`around`](Self::around), but blocks for which `within` tells a bound (metres) may be anywhere within it: of
-    /// what the guess and the covariance say of them nothing counts.
+    /// A prior whose blocks lie around `guess` with this covariance (m × m), but for those to which `within` gives a
+    /// bound (metres): they may be anywhere within ± that bound, and their part of guess and covariance is ignored.
+    ///
+    /// # Errors
+    ///
+    /// [`PriorError::NotPositive`] if the covariance is not m × m, symmetric and positive definite;
+    /// [`PriorError::Unbounded`] if `within` bounds a block of plain numbers.
     pub fn new(
         guess: State,
         layout: &Layout,

@@ -161,6 +161,11 @@ macro_rules! channels {
 
         impl Keys {
             /// The channel that these keys describe, of a robot with this equipment.
+            ///
+            /// # Errors
+            ///
+            /// [`KeyError`] if no channel has that name, or if the channel's own keys do not fit each other or the
+            /// equipment.
             pub fn channel(&self, equipment: &Equipment) -> Result<std::sync::Arc<dyn Channel>, KeyError> {
                 match self.channel.as_deref().unwrap_or(CHANNELS[0]) {
                     $(stringify!($module) => {

@@ -107,7 +107,12 @@ impl Observation {
         positions.find_map(|(of, position)| (of == target).then_some(position))
     }
 
-    /// Whether it can be an observation of `rig` after a movement of so many `joints` to `positions`.
+    /// Checks that `rig` can give this observation after a movement of so many `joints` to `positions` (rad or m).
+    ///
+    /// # Errors
+    ///
+    /// [`Refused::Joints`], [`Refused::Channels`] or [`Refused::Length`] if a count does not fit; [`Refused::Position`]
+    /// or [`Refused::Reading`] if a number is not finite or too large to compute with.
     pub fn check(&self, rig: &Rig, joints: usize, positions: &[f64]) -> Result<(), Refused> {
         if positions.len() != joints {
             return Err(Refused::Joints { found: positions.len(), wanted: joints });

@@ -64,6 +64,11 @@ impl Briefing {
 
 impl Scenario {
     /// The experiment of a seed with the named learners; with all of the scenario's if none are named.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError`] if the names do not choose learners (see [`chosen`](Scenario::chosen)), or if the prior of one
+    /// is not positive definite.
     pub fn experiment(&self, seed: u64, learners: Option<&[String]>) -> Result<Experiment, ScenarioError> {
         let (world, evaluation, briefing) = self.draw(seed);
         self.assemble(seed, &self.chosen(learners)?, world, evaluation, &briefing)
@@ -71,6 +76,10 @@ impl Scenario {
 
     /// The agent of a learner, told what the learners of this seed are told: what has no world to live in, but a robot of
     /// its own.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError`] if the prior is not positive definite.
     pub fn agent(&self, learner: &LearnerSpec, seed: u64) -> Result<Agent, ScenarioError> {
         let (.., briefing) = self.draw(seed);
         self.agent_of(learner, seed, &briefing)

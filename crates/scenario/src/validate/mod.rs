@@ -56,6 +56,11 @@ const UNIT_TOLERANCE: f64 = 1e-5;
 impl Scenario {
     /// Reads a scenario from `text`. `file` is how errors name it; `open` returns the text of a data file that the
     /// scenario names, or says why it cannot.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError::Invalid`] with every problem found: text that is no TOML, an unknown or missing key, a value
+    /// out of range, a data file that cannot be read.
     pub fn parse(file: &str, text: &str, open: &dyn Fn(&str) -> Result<String, String>) -> Result<Self, ScenarioError> {
         Self::parse_as(raw::Source::File, file, text, open)
     }

@@ -154,6 +154,10 @@ impl<'a> Scope<'a> {
     }
 
     /// A feasible posture, drawn uniformly.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::Infeasible`] if neither draws nor a search find a feasible posture.
     pub fn draw<R: Rng + ?Sized>(&self, limits: &JointBox, rng: &mut R) -> Result<Vec<f64>, SelectionError> {
         let mut draws = std::iter::repeat_with(|| limits.draw(rng)).take(PATIENCE);
         match draws.find(|posture| self.is_feasible(posture)) {
@@ -164,11 +168,19 @@ impl<'a> Scope<'a> {
 
     /// Some feasible postures, one at least where anything is constrained, always the same ones: where a search over the box
     /// comes upon none.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::Infeasible`] if the constraints exclude every posture that was tried.
     pub fn some(&self) -> Result<Vec<Vec<f64>>, SelectionError> {
         self.constraints.map_or(Ok(Vec::new()), |constraints| Ok(constraints.some(self.from)?))
     }
 
     /// The posture itself if it may be proposed, or else the nearest one to it, by travel, of some that may.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::Infeasible`] if the constraints exclude every posture that was tried.
     pub fn towards(&self, posture: Vec<f64>) -> Result<Vec<f64>, SelectionError> {
         if self.is_feasible(&posture) {
             return Ok(posture);
