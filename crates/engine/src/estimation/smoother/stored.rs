@@ -1,4 +1,4 @@
-//! What a smoother has learned, as bytes to go on from.
+//! What a smoother has learned, as bytes from which it can go on.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::{
     model::{Loads, Prior, Scales, State},
 };
 
-/// All of a smoother that measurements change.
+/// The part of a smoother that measurements change.
 #[derive(Serialize, Deserialize)]
 struct Stored {
     prior: Prior,
@@ -39,14 +39,14 @@ struct Stored {
 }
 
 impl Stored {
-    /// The states in it, of which none knows what its robot bears.
+    /// The stored states, which do not include the robot's loads.
     fn states(&mut self) -> impl Iterator<Item = &mut State> {
         let modes = self.hypotheses.modes.iter_mut().map(|mode| &mut mode.state);
         let settled = self.settled.iter_mut().map(|settled| &mut settled.state);
         [&mut self.pins, self.prior.guess_mut(), self.original.guess_mut()].into_iter().chain(settled).chain(modes)
     }
 
-    /// Whether it is of a smoother like this one.
+    /// Whether this was stored by a smoother like the given one.
     fn is_of(&self, smoother: &Smoother) -> bool {
         let m = smoother.belief.layout.dimension();
         let noises = smoother.unknown.len();
@@ -65,7 +65,7 @@ impl Stored {
 }
 
 impl Smoother {
-    /// All that it has learned; see [`Estimator::stored`](crate::estimation::Estimator::stored).
+    /// Everything learned so far; see [`Estimator::stored`](crate::estimation::Estimator::stored).
     pub(super) fn to_stored(&self) -> Option<Vec<u8>> {
         let posterior = &self.posterior;
         let stored = Stored {
@@ -93,7 +93,7 @@ impl Smoother {
         postcard::to_allocvec(&stored).ok()
     }
 
-    /// The same smoother where it has learned what is stored; `None` where that is of another.
+    /// This smoother with what is stored; `None` if that was stored by another kind of smoother.
     pub(super) fn with_stored(&self, stored: &[u8]) -> Option<Self> {
         let mut stored: Stored = postcard::from_bytes(stored).ok()?;
         if !stored.is_of(self) {
