@@ -1,4 +1,4 @@
-//! Carries experiments out.
+//! Carrying experiments out.
 
 use rayon::prelude::*;
 
@@ -24,7 +24,7 @@ pub struct Measurement<'a> {
 }
 
 impl Measurement<'_> {
-    /// Runs the experiment, on all cores; the outcome does not depend on how many there are, but for times.
+    /// Runs the experiment on all cores. The outcome, times excepted, does not depend on their number.
     pub fn run(&self) -> Result<Outcome, PaperError> {
         match self.experiment.kind {
             Kind::Comparison { .. } => {
@@ -115,7 +115,7 @@ impl Measurement<'_> {
         Ok(Timing { median_ms: median.0, p95_ms: late.0, evaluations: median.1, choices: count })
     }
 
-    /// The search of one choice. Partitions come with the reports; the search is told the same values once more, for
+    /// The search of one choice. The report holds its partition; the search is fed the same values once more to find
     /// its hull.
     fn search(&self, variant: &str, step: u64) -> Result<Search, PaperError> {
         let scenario = self.with(&[("selection.variant", toml::Value::String(variant.to_owned()))])?;

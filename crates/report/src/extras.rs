@@ -1,4 +1,4 @@
-//! What adding to the axes changes.
+//! The section on what correcting more than axes changes.
 
 use super::{
     contents::{number, sentence},

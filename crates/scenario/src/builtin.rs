@@ -1,4 +1,4 @@
-//! The scenarios that are embedded in the program.
+//! The scenarios that are built into the program.
 
 use super::{Scenario, ScenarioError, error::similar};
 
@@ -17,7 +17,7 @@ macro_rules! builtins {
     };
 }
 
-/// All of them, simplest first.
+/// All built-in scenarios, simplest first.
 pub const BUILTIN: &[Builtin] = builtins![
     "arm-6dof",
     "arm-6dof-doubled-error",

@@ -3,7 +3,7 @@
 use toml::{Table, Value};
 
 /// The TOML `text` with the value at each dotted path replaced, say `filter.measurement_variance_m2`. A path leads
-/// through tables that exist; its last key may be new. Comments are lost. An error says which path leads nowhere.
+/// through tables that exist; its last key may be new. Comments are lost.
 ///
 /// # Errors
 ///
