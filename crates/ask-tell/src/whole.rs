@@ -1,4 +1,4 @@
-//! Whole numbers as JSON Schema means them.
+//! Whole numbers as JSON Schema defines them.
 
 use std::fmt;
 
@@ -7,10 +7,10 @@ use serde::{
     de::{Error, Unexpected, Visitor},
 };
 
-/// The greatest whole number that is taken, that of OpenAPI's `int64`.
+/// The greatest whole number that is accepted, that of OpenAPI's `int64`.
 pub const MOST: u64 = i64::MAX as u64;
 
-/// A whole number from 0 as JSON Schema means it, for serde: `100.0` and `1e2` are 100.
+/// Reads a whole number from 0 as JSON Schema defines it, for serde: `100.0` and `1e2` are 100.
 ///
 /// # Errors
 ///

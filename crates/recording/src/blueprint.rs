@@ -1,4 +1,4 @@
-//! How a viewer arranges a recording when it opens it.
+//! The arrangement of views that a viewer shows when it opens a recording.
 
 use serde::{Deserialize, Serialize};
 
@@ -25,10 +25,10 @@ use body_schema_experiment::{Description, LearnerDescription};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Theme {
-    /// Dark on light ground.
+    /// Dark on a light background.
     #[default]
     Light,
-    /// Light on dark ground.
+    /// Light on a dark background.
     Dark,
 }
 
@@ -36,15 +36,15 @@ pub enum Theme {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Shape {
-    /// Rather wide than high: the learners stand beside one another.
+    /// Wider than high: the learners stand side by side.
     #[default]
     Wide,
-    /// Rather high than wide: they stand behind one another, seen from above.
+    /// Higher than wide: the learners stand one behind the other, seen from above.
     Tall,
 }
 
 impl Shape {
-    /// A view's width in heights.
+    /// The width of the view in heights.
     pub fn aspect(self) -> f64 {
         match self {
             Self::Wide => 1.4,
@@ -71,18 +71,18 @@ impl Theme {
     }
 }
 
-/// Arranges the views of one recording.
+/// The arranger of the views of one recording.
 pub(super) struct Arranger {
     pub(super) description: Description,
-    /// The roots of the learners.
+    /// The root entities of the learners.
     pub(super) roots: Vec<EntityPath>,
     pub(super) stage: Stage,
-    /// That of the recording.
+    /// The application of the recording.
     pub(super) application: ApplicationId,
 }
 
 impl Arranger {
-    /// For a file: the scene above; below, the curves, DIRECT's partition and the note.
+    /// The arrangement for a file: the scene above; below, the curves, DIRECT's partition and the note.
     pub(super) fn whole(&self) -> Result<Vec<LogMsg>, RecordingError> {
         let scene = self.view(Theme::default(), Shape::default().aspect(), true).into();
         let mut below = self.charts();
@@ -93,14 +93,14 @@ impl Arranger {
         root.messages(self.application.clone(), Time::Shown)
     }
 
-    /// For a page that has controls and curves of its own: the scene alone, to look at and to turn.
+    /// The arrangement for a page with controls and curves of its own: the scene alone, to look at and to turn.
     pub(super) fn scene(&self, theme: Theme, aspect: f64) -> Result<Vec<LogMsg>, RecordingError> {
         let scene: Part = self.view(theme, aspect, false).into();
         Container::tabs([scene]).messages(self.application.clone(), Time::Led)
     }
 
-    /// All learners in one view. With `details` it can be asked what is what, there is a key to the colours, and the arms
-    /// at θ = 0 can be switched on.
+    /// One view of all learners. With `details` hovering names entities, there is a key to the colours, and the arms at θ
+    /// = 0 can be switched on.
     fn view(&self, theme: Theme, aspect: f64, details: bool) -> View {
         let [target, eye] = self.stage.camera(aspect).map(|point| single(point.coords.into()));
         let (ground, labels): (_, &[&str]) = match theme {
@@ -152,7 +152,7 @@ impl Arranger {
         Some(chart(TRACE.0, self.roots.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")]), None))
     }
 
-    /// How far readings are from the estimates, and where a learner weighs them, how likely they are outliers.
+    /// The residuals of readings, and for a learner that weighs them the probability that they are outliers.
     fn readings(&self) -> Vec<Part> {
         let series = |kind: &'static str| self.roots.iter().map(move |root| format!("+ {root}/readings/{kind}/**"));
         let mut views = vec![chart("Residual per reading (σ)", series("residuals"), None)];
@@ -162,7 +162,8 @@ impl Arranger {
         views
     }
 
-    /// The partitions of those who have any: the joint box is divided by DIRECT, recorded movements are tried one by one.
+    /// The partitions of the learners that have one: DIRECT divides the joint box, while recorded movements are tried one
+    /// by one.
     fn partitions(&self) -> Vec<Part> {
         let is_box = self.description.movements_available.is_none();
         let divides = |learner: &LearnerDescription| is_box && learner.policy.starts_with("active");
@@ -177,7 +178,7 @@ impl Arranger {
     }
 }
 
-/// For a calibration: the robot beside the report, the residuals of all rows below.
+/// The arrangement for a calibration: the robot beside the report, the residuals of all rows below.
 pub(super) fn calibration(
     stage: &Stage,
     application: ApplicationId,
@@ -199,7 +200,7 @@ pub(super) fn calibration(
     Container::vertical([above.into(), below.into()], [2.0, 1.0]).messages(application, Time::Shown)
 }
 
-/// Curves; the vertical axis shows `range`, or what it takes.
+/// A chart of curves; the vertical axis shows `range`, or fits the data.
 fn chart(title: &str, contents: impl IntoIterator<Item = String>, range: Option<[f64; 2]>) -> Part {
     let view = View::new("TimeSeries", title, &EntityPath::root())
         .with_contents(contents)

@@ -1,4 +1,4 @@
-//! Runs and comparisons as csv.
+//! Runs and comparisons as CSV.
 
 use std::io;
 
@@ -7,7 +7,7 @@ use body_schema_engine::kinematics::JointKind;
 use body_schema_experiment::{Comparison, Description, Quantiles, StepReport};
 use body_schema_table::{Component, Title, Writer};
 
-/// Writes one row per step and learner. Units stand in the names of the columns; what is null is empty.
+/// A writer of one row per step and learner. Units stand in the names of the columns; null is an empty cell.
 pub struct StepsCsv<W: io::Write> {
     writer: Writer<W>,
     joints: usize,
@@ -36,7 +36,7 @@ impl<W: io::Write> StepsCsv<W> {
         Ok(table)
     }
 
-    /// Goes on with a table whose header is written elsewhere.
+    /// A writer that continues a table whose header is written elsewhere.
     pub fn without_header(description: &Description, output: W) -> Self {
         Self { writer: Writer::new(output), joints: description.joints.len() }
     }
@@ -64,7 +64,7 @@ impl<W: io::Write> StepsCsv<W> {
         Ok(())
     }
 
-    /// Passes everything on to the output.
+    /// Flushes all rows to the output.
     ///
     /// # Errors
     ///

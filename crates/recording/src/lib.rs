@@ -131,8 +131,8 @@ pub const MOTION: &str = "motion";
 /// The timeline of a live recording, and the entity on it, that tells up to which step it is whole.
 pub const COMPLETE: &str = "complete";
 
-/// So many ticks of [`MOTION`] are from one step to the next.
+/// The number of ticks of [`MOTION`] from one step to the next.
 pub const MOTION_PER_STEP: u64 = 32;
 
-/// At most so many postures are drawn between two steps.
+/// The most postures that are drawn between two steps.
 pub const MOST_FRAMES: u64 = 30;
