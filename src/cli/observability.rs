@@ -1,4 +1,4 @@
-//! `observability`: before any measurement, what can be determined and by how many postures.
+//! `observability`: what can be determined before any measurement, and with how many postures.
 
 use std::path::PathBuf;
 
@@ -76,7 +76,7 @@ fn summarise(found: &Observability) -> Result<()> {
     output::say(output::table(["standard deviation of", "before", &after[0], &after[1]], deviations))
 }
 
-/// Few enough to read: 1, 2, 3, 5, 8, 12, 20, 30, 50, … and the last.
+/// The points that are printed, few enough to read: 1, 2, 3, 5, 8, 12, 20, 30, 50, … and the last.
 fn told(errors: &[ErrorPoint]) -> impl Iterator<Item = &ErrorPoint> {
     let mut next = 1;
     errors.iter().filter(move |point| {

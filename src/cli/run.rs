@@ -114,7 +114,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     interrupted.map_or(Ok(()), |interrupted| Err(interrupted.into()))
 }
 
-/// What is written while the run goes on. A file that cannot be written is given up, and the run goes on without it.
+/// The files that are written while the run goes on. A file that cannot be written is given up, and the run goes on
+/// without it.
 struct Files<'a> {
     recording: Option<(&'a Path, Recorder)>,
     table: Option<(&'a Path, StepsTable)>,
@@ -166,7 +167,7 @@ impl<'a> Files<'a> {
         self.failures.keep(Err(error));
     }
 
-    /// Gives the files their names. Tells which have them, and what has failed.
+    /// Gives the files their names. Returns those that have them, and what has failed.
     fn end(self, designs: &[BestDesign]) -> (Vec<PathBuf>, Failures) {
         let Self { recording, table, mut failures } = self;
         let mut written = Vec::new();
@@ -185,7 +186,7 @@ impl<'a> Files<'a> {
         (written, failures)
     }
 
-    /// Leaves none of them.
+    /// Removes all of them.
     fn discard(self) {
         self.recording.into_iter().for_each(|(_, recorder)| recorder.discard());
     }

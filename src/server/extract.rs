@@ -1,4 +1,4 @@
-//! Reads requests, and says what is wrong with them in terms of the request.
+//! Reading requests; errors are stated in terms of the request.
 
 use std::sync::Arc;
 
@@ -24,11 +24,11 @@ use body_schema_ask_tell::{
 /// A JSON body. An absent one, and `null`, count as `{}`, so that defaults need no body.
 pub(super) struct JsonBody<T>(pub(super) T);
 
-/// What is read from a body. Whatever serde reads is read by [`parse`].
+/// A type that is read from a body. Types that serde reads are read by [`parse`].
 pub(super) trait FromJson: Sized {
     fn from_json(bytes: &[u8], limits: &Limits) -> Result<Self, Problem>;
 
-    /// What is told of a body beyond the limit of its route.
+    /// The problem of a body beyond the limit of its route.
     fn too_large(limits: &Limits) -> Problem {
         Problem::body_too_large(limits.body_bytes)
     }
@@ -87,7 +87,7 @@ pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     })
 }
 
-/// The parameters of a query, each of which must be among `known` and a whole number; absent ones are `None`.
+/// The parameters of a query, each a whole number among those `known`; absent ones are `None`.
 pub(super) fn whole_numbers<const N: usize>(
     query: Option<&str>,
     known: [&'static str; N],
@@ -107,7 +107,7 @@ pub(super) fn word<T: DeserializeOwned + Default>(name: &'static str, value: Opt
     })
 }
 
-/// The parameters of a query as they are written, each of which must be among `known`.
+/// The parameters of a query as written, each among those `known`.
 pub(super) fn parameters<'a, const N: usize>(
     query: Option<&'a str>,
     known: [&'static str; N],

@@ -1,4 +1,4 @@
-//! What holds for every request and every response.
+//! Middleware: what holds for every request and every response.
 
 use std::sync::Arc;
 
@@ -22,9 +22,9 @@ use super::{
     strangers::Reached,
 };
 
-/// Answers from so many bytes on are counted.
+/// The size from which on answers are counted, bytes.
 const LARGE_BYTES: usize = 64 << 10;
-/// So much is read of what an error that no handler made says.
+/// The most bytes that are read of an error that no handler made.
 const MOST_SAID_BYTES: usize = 64 << 10;
 
 /// The headers of every response.
@@ -32,7 +32,7 @@ const MOST_SAID_BYTES: usize = 64 << 10;
 pub(super) struct Headers(Arc<[(HeaderName, HeaderValue)]>);
 
 impl Headers {
-    /// With these origins allowed to show the page in a frame.
+    /// The headers, with these origins allowed to show the page in a frame.
     pub(super) fn new(frame_ancestors: &[FrameAncestor]) -> Self {
         let policy = match frame_ancestors {
             [] => format!("{CONTENT_SECURITY_POLICY}; frame-ancestors 'none'"),
@@ -56,7 +56,7 @@ impl Headers {
     }
 }
 
-/// The routes with all that holds for every one of them.
+/// The routes with the middleware around them.
 pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>, always: Headers) -> Router {
     let router = router
         .fallback(async |uri: Uri| {
@@ -74,7 +74,7 @@ pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>, always: Headers)
         .layer(from_fn_with_state(app.metrics.clone(), requests::attended))
 }
 
-/// A head that is larger than it may be, though not so large that it was not read.
+/// Refuses a head that is larger than allowed, though small enough to be read.
 async fn refuse_large_heads(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     match app.limits.too_large_a_head(request.method(), request.uri(), request.headers()) {
         Some(detail) => Problem::new(Kind::HeadTooLarge, detail).into_response(),
@@ -82,7 +82,7 @@ async fn refuse_large_heads(State(app): State<Arc<App>>, request: Request, next:
     }
 }
 
-/// Has large answers count until they are sent, beyond as many as there may be those who only read are asked to come again.
+/// Counts large answers until they are sent; beyond the limit, requests that only read are asked to come again.
 pub(super) async fn counted(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let only_reads = *request.method() == Method::GET;
     let response = next.run(request).await;
@@ -98,8 +98,8 @@ pub(super) async fn counted(State(app): State<Arc<App>>, request: Request, next:
     response.map(|body| Body::new(Holding::new(body, taken)))
 }
 
-/// Who has no business here: under a foreign name, without the token, or from a page of another origin, which must neither
-/// change anything nor open a WebSocket.
+/// Refuses requests under a foreign name, without the token, or from a page of another origin, which must neither change
+/// anything nor open a WebSocket.
 async fn refuse_strangers(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let mut hosts = request.headers().get_all(header::HOST).into_iter();
     let (Some(host), None) = (hosts.next().and_then(|host| host.to_str().ok()), hosts.next()) else {
@@ -123,7 +123,7 @@ async fn refuse_strangers(State(app): State<Arc<App>>, request: Request, next: N
     next.run(request).await
 }
 
-/// Scripts send no origin; browsers always do where it matters.
+/// Whether the origin is our own. Scripts send none; browsers always do where it matters.
 fn is_own_origin(headers: &HeaderMap, host: &str) -> bool {
     let Some(origin) = headers.get(header::ORIGIN) else { return true };
     let authority = origin.to_str().ok().and_then(|origin| origin.split_once("://")).map(|(_, authority)| authority);

@@ -53,23 +53,23 @@ pub use store::{Finding, Held, Shown, State, Store, StoreError, Stored};
 use strangers::Strangers;
 pub use strangers::{HostName, NoHostName, NoToken, Token};
 
-/// How a server is set up.
+/// The options of a server.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Where sessions with robots elsewhere are kept; made if it does not exist. Without it they end with the server.
+    /// The folder in which sessions with robots elsewhere are kept; made if it does not exist. Without it they end with
+    /// the server.
     pub data_dir: Option<PathBuf>,
     /// Whether recordings of all other sessions are kept there as files, `{scenario}-seed{seed}-{session}.rrd`.
     pub keep_recordings: bool,
-    /// What whoever asks has to carry. A server that can be reached from other machines needs one.
+    /// The token that requests must carry. A server that can be reached from other machines needs one.
     pub token: Option<Token>,
-    /// Names under which it is meant, beside those of this machine and the address at which it was reached.
+    /// The names of this server, beside those of this machine and the address at which it was reached.
     pub allow_hosts: Vec<HostName>,
-    /// How much it takes on.
+    /// The limits.
     pub limits: Limits,
-    /// A folder with another build of the page's panel than the one that is part of this program, for those who work
-    /// on it.
+    /// A folder with another build of the page's panel than this program's, for work on it.
     pub panel_dir: Option<PathBuf>,
-    /// Who may show the page in a frame; nobody if empty.
+    /// The origins that may show the page in a frame; nobody if empty.
     pub frame_ancestors: Vec<FrameAncestor>,
 }
 
@@ -79,10 +79,10 @@ pub enum ServerError {
     /// Sessions cannot be kept.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// Others can reach it, and nobody would have to carry a token.
+    /// Other machines can reach it, and requests would need no token.
     #[error("other machines can reach {0}, and real robots may hang on this server: it needs a token there")]
     Unguarded(SocketAddr),
-    /// The server has ended, and files lack their end.
+    /// The server has ended, and some files are incomplete.
     #[error("these recordings lack their end: {}", .0.join("; "))]
     Incomplete(Vec<String>),
     /// The page is incomplete.
@@ -93,7 +93,7 @@ pub enum ServerError {
     Socket(#[from] io::Error),
 }
 
-/// What all requests share.
+/// The state that all requests share.
 struct App {
     sessions: Arc<Sessions>,
     assets: assets::Assets,
@@ -103,9 +103,9 @@ struct App {
     limits: Limits,
     metrics: Arc<Metrics>,
     connections: Arc<Connections>,
-    /// What takes a core for a while.
+    /// The jobs that take a core for a while.
     jobs: Jobs,
-    /// What is on its way to clients.
+    /// The answers on their way to clients.
     answers: Arc<Budget>,
 }
 
@@ -119,11 +119,13 @@ pub struct Server {
 }
 
 impl Server {
-    /// One on `listener`, with all that it needs: what can fail at the start fails here.
+    /// A server on `listener`. Whatever can fail at the start fails here.
     ///
     /// # Errors
     ///
-    /// [`ServerError`] where sessions cannot be kept, files are missing, or strangers could come in.
+    /// [`ServerError::Store`] if sessions cannot be kept, [`ServerError::Page`] if files are missing,
+    /// [`ServerError::Unguarded`] if other machines can reach it and no token is set, [`ServerError::Socket`] if the
+    /// socket fails.
     pub fn new(listener: TcpListener, options: Options, shutdown: CancellationToken) -> Result<Self, ServerError> {
         let address = listener.local_addr()?;
         if !address.ip().to_canonical().is_loopback() && options.token.is_none() {
@@ -163,17 +165,17 @@ impl Server {
         Ok(Self { listener, app, router, shutdown, damage })
     }
 
-    /// What of the data directory was found damaged, in words: the rest is served.
+    /// The damage found in the data directory, in words; everything else is served.
     pub fn damage(&self) -> &[String] {
         &self.damage
     }
 
-    /// Serves until it is to end; then ends sessions, so that their recordings are complete, and open streams with them, and
+    /// Serves until the shutdown; then ends sessions, so that their recordings are complete, and open streams with them. It
     /// returns within five seconds, whatever its clients do.
     ///
     /// # Errors
     ///
-    /// [`ServerError::Incomplete`] where recordings could not be completed.
+    /// [`ServerError::Incomplete`] if recordings could not be completed, [`ServerError::Socket`] if the socket fails.
     pub async fn run(self) -> Result<(), ServerError> {
         let Self { listener, app, router, shutdown, damage: _ } = self;
         tokio::select! {
@@ -194,7 +196,7 @@ impl Server {
 ///
 /// # Errors
 ///
-/// [`ServerError`] of its start and of its end.
+/// The errors of [`Server::new`] and of [`Server::run`].
 pub async fn serve(listener: TcpListener, options: Options, shutdown: CancellationToken) -> Result<(), ServerError> {
     Server::new(listener, options, shutdown)?.run().await
 }

@@ -1,4 +1,4 @@
-//! Everything that can go wrong, as RFC 9457 problem details.
+//! Problems: every error as RFC 9457 problem details.
 
 use axum::{
     http::{HeaderValue, StatusCode, header},
@@ -15,7 +15,7 @@ use body_schema_scenario::ScenarioError;
 /// Media type of every error.
 pub const PROBLEM_JSON: &str = "application/problem+json";
 
-/// After how many seconds it is worth asking again where there is too much to do.
+/// The seconds after which a client should ask again where there is too much to do.
 pub(super) const RETRY_AFTER_S: u64 = 10;
 
 /// What went wrong (RFC 9457). Optional members are left out where they say nothing.
@@ -48,7 +48,7 @@ pub struct Problem {
     pub beside: Box<Beside>,
 }
 
-/// What is told of a problem beside the rest: members of the same object.
+/// Further members of a problem's object.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, ToSchema)]
 pub struct Beside {
     /// What is wrong with `field`: the first part of `detail`, where it has two.
@@ -66,12 +66,13 @@ pub struct Beside {
 #[derive(Clone, Debug)]
 pub(super) struct Refused {
     kind: &'static str,
-    /// What went wrong, where that is the server's own affair: to clients' mistakes their words may belong.
+    /// What went wrong, if that is internal to the server; details of clients' mistakes may hold their words, and are
+    /// not logged.
     why: Option<String>,
 }
 
 impl Refused {
-    /// Its kind, without the words that all kinds have in common.
+    /// The kind, without the prefix that all kinds share.
     pub(super) fn kind(&self) -> &'static str {
         self.kind.strip_prefix(URN).unwrap_or("other")
     }
@@ -81,7 +82,7 @@ impl Refused {
     }
 }
 
-/// How the kinds' names begin.
+/// The prefix of the kinds' names.
 const URN: &str = "urn:body-schema:problem:";
 
 /// The kinds of problems.
@@ -95,7 +96,7 @@ pub(super) enum Kind {
     UnknownSession,
     UnknownLearner,
     UnknownSuggestion,
-    /// The same, where the body names it.
+    /// An unknown suggestion that the body names.
     SuggestionOfBody,
     UnknownObservation,
     MethodNotAllowed,
@@ -192,7 +193,7 @@ impl Problem {
         Self { field: Some(field.into().into()), ..self }
     }
 
-    /// What is wrong, and what to do about it, each by itself.
+    /// Sets what is wrong, and separately what to do about it.
     pub(super) fn hint(mut self, what: impl Into<String>, hint: impl Into<String>) -> Self {
         (self.beside.what, self.beside.hint) = (Some(what.into()), Some(hint.into()));
         self
@@ -235,7 +236,7 @@ impl Problem {
     }
 }
 
-/// A scenario that cannot become a session, blamed on the body field that asked for it.
+/// A scenario that makes no session, attributed to the body field that asked for it.
 impl From<ScenarioError> for Problem {
     fn from(error: ScenarioError) -> Self {
         let field = match &error {
@@ -255,7 +256,7 @@ impl From<ScenarioError> for Problem {
     }
 }
 
-/// A question about a choice that has no answer.
+/// A question about a choice that cannot be answered.
 impl From<ChoiceError> for Problem {
     fn from(error: ChoiceError) -> Self {
         let (kind, field) = match &error {
@@ -272,7 +273,7 @@ impl From<ChoiceError> for Problem {
     }
 }
 
-/// A calibration that cannot become a session, blamed on the body field that is wrong.
+/// A calibration that makes no session, attributed to the body field that is wrong.
 impl From<SetupError> for Problem {
     fn from(error: SetupError) -> Self {
         let field = match &error {
@@ -293,14 +294,14 @@ impl From<SetupError> for Problem {
     }
 }
 
-/// A kept session that this program cannot take up.
+/// A kept session that this program cannot load.
 impl From<ReplayError> for Problem {
     fn from(error: ReplayError) -> Self {
         Self::new(Kind::EngineFailed, format!("the session cannot be taken up again: {error}"))
     }
 }
 
-/// What a session with a robot elsewhere has refused. Nothing has happened then.
+/// A refusal by a session with a robot elsewhere. Nothing has changed then.
 impl From<Refusal> for Problem {
     fn from(refusal: Refusal) -> Self {
         let (kind, field) = match &refusal {
@@ -323,14 +324,14 @@ impl From<Refusal> for Problem {
     }
 }
 
-/// What was observed comes to nothing yet.
+/// Observations without results yet.
 impl From<ResultsError> for Problem {
     fn from(error: ResultsError) -> Self {
         Self::new(Kind::NothingToShow, error.to_string())
     }
 }
 
-/// What could not be written has not happened.
+/// A change that could not be written, and so was not made.
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         match error {

@@ -195,7 +195,7 @@ impl Session {
     /// # Errors
     ///
     /// [`Refusal::UnknownObservation`] if there is no such observation, [`Refusal::Full`] if the session is full,
-    /// [`Refusal::GivenUp`] if `hear` ends it, [`Refusal::Stale`] or others if the checkpoint does not serve.
+    /// [`Refusal::Ended`] if `hear` ends the replay or the checkpoint does not serve.
     pub fn prepare_mark(
         &self,
         (number, excluded): (u64, bool),

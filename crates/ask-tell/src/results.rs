@@ -51,7 +51,8 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Calibration`] if no fit explains the observations.
+    /// The errors of [`results`](Self::results), and [`ResultsError::Calibration`] if no fit explains the observations, a
+    /// URDF cannot hold the fit, or `progress` says that nobody waits any longer.
     pub fn calibrate(&self, progress: &dyn Progress) -> Result<(Calibration, Vec<File>), ResultsError> {
         let results = self.results()?;
         let case = results.case()?;

@@ -82,7 +82,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`ReplayError::NotASession`] if the text is no session, the variant for a later version if it is one of those;
+    /// [`ReplayError::NotASession`] if the text is no session, [`ReplayError::Version`] if a later version wrote it;
     /// otherwise the errors of [`replay`](Self::replay).
     pub fn from_json(text: &str) -> Result<Self, ReplayError> {
         #[derive(Deserialize)]

@@ -1,4 +1,4 @@
-//! What the observations of a robot elsewhere come to, to take away.
+//! The results of a session with a robot elsewhere, for download.
 //!
 //! The robot's description is quick to make. The report judges it on data that it has not seen, which takes longer: it is made
 //! when it is first asked for, and kept until something changes.
@@ -151,7 +151,7 @@ fn description(session: &Session) -> Result<Vec<File>, Problem> {
     Ok(session.results()?.description()?)
 }
 
-/// The files of the report; those of one revision are made once, by whoever asks first.
+/// The files of the report; those of one revision are made once, by the first request.
 async fn report(app: &App, id: &str) -> Result<Arc<[File]>, Problem> {
     let session = app.sessions.get(id).await?.watch();
     let mut kept = session.report().lock().await;

@@ -25,12 +25,12 @@ use body_schema_ask_tell::whole::{whole, whole_or_none};
 use body_schema_experiment::StepReport;
 use body_schema_recording::MOST_FRAMES;
 
-/// A request draws at most so many postures on the way: each takes some kilobytes of the session's memory.
+/// The most postures on the way that one request draws: each takes some kilobytes of the session's memory.
 const MAX_FRAMES_PER_REQUEST: u64 = 1000;
 
-/// How many sessions are listed at a time.
+/// The most sessions that are listed at a time.
 const MOST_LISTED: u64 = 1000;
-/// So many reports are put together at once; of more, aside.
+/// The most reports that are put together at once; more are handled where they block no other request.
 const FEW_REPORTS: usize = 16;
 
 /// Sessions.
@@ -245,7 +245,7 @@ pub(super) async fn delete(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Does it whole, also for a client that goes away meanwhile.
+/// Completes the work, even for a client that goes away meanwhile.
 async fn to_its_end<T: Send + 'static>(
     work: impl Future<Output = Result<T, Problem>> + Send + 'static,
 ) -> Result<T, Problem> {

@@ -41,6 +41,11 @@ pub trait Estimator: Send + Sync {
 
     /// Absorbs what was observed after moving to `positions` (rad or m, one per joint), which the belief
     /// [accepts](Belief::accepts). An estimator that diverges keeps the belief that it had.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimationError::Diverged`] if the update leaves the range of numbers; [`EstimationError::Refused`] if the
+    /// estimator cannot read the observation.
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError>;
 
     /// A report on every reading so far; empty for an estimator that does not weigh readings.
@@ -83,6 +88,11 @@ pub trait Estimator: Send + Sync {
 
     /// Checks an observation, then absorbs it as [`correct`](Self::correct) does: an observation that does not fit is
     /// refused, and changes nothing.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimationError::Refused`] if the belief does not [accept](Belief::accepts) the observation; otherwise the errors
+    /// of [`correct`](Self::correct).
     fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         self.belief().accepts(positions, observation)?;
         self.correct(positions, observation)
