@@ -80,10 +80,10 @@ pub enum ServerError {
     #[error(transparent)]
     Store(#[from] StoreError),
     /// Other machines can reach it, and requests would need no token.
-    #[error("other machines can reach {0}, and real robots may hang on this server: it needs a token there")]
+    #[error("other machines can reach {0}, and real robots may be connected to this server; give it a token")]
     Unguarded(SocketAddr),
     /// The server has ended, and some files are incomplete.
-    #[error("these recordings lack their end: {}", .0.join("; "))]
+    #[error("these recordings are incomplete: {}", .0.join("; "))]
     Incomplete(Vec<String>),
     /// The page is incomplete.
     #[error(transparent)]

@@ -83,7 +83,7 @@ pub enum Refusal {
         state: SuggestionState,
     },
     /// There is no such observation.
-    #[error("there is no observation {number}; {count} were told so far, counted from 1")]
+    #[error("there is no observation {number}; {count} were received so far, counted from 1")]
     UnknownObservation {
         /// The number that was asked for.
         number: u64,
@@ -107,7 +107,7 @@ pub enum Refusal {
     #[error("{0}; exclude the observation at which it happened")]
     Ended(String),
     /// The caller no longer waits.
-    #[error("nobody waits for it any longer, and nothing has happened; ask again")]
+    #[error("the caller no longer waits, so nothing was done; ask again")]
     GivenUp,
     /// Another change was committed after this one was prepared.
     #[error("the session has changed since this was prepared; prepare it anew")]

@@ -8,7 +8,7 @@ use body_schema_scenario::{Scenario, ScenarioError};
 #[derive(Debug, thiserror::Error)]
 pub enum ResultsError {
     /// Nothing was seen.
-    #[error("nothing was observed yet; tell observations first")]
+    #[error("nothing was observed yet; report observations first")]
     Nothing,
     /// The observations are no table that `calibrate` can read.
     #[error(transparent)]

@@ -50,13 +50,13 @@ pub enum CalibrationError {
     #[error("the prior cannot be used: {0}; correct [prior]")]
     Prior(#[from] PriorError),
     /// The search for what explains the rows failed.
-    #[error("{0}; look at the doubts about the table first")]
+    #[error("no fit explains the rows: {0}; look at the doubts about the table first")]
     Estimation(#[from] EstimationError),
     /// No row could be chosen.
     #[error("no row could be chosen: {0}")]
     Selection(#[from] SelectionError),
     /// The caller no longer waits.
-    #[error("nobody waits for it any longer; ask again")]
+    #[error("the caller no longer waits, so the calibration was given up; ask again")]
     GivenUp,
     /// What was learned does not fit into a URDF.
     #[error("what was learned cannot be written as a URDF: {0}")]

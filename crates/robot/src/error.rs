@@ -32,7 +32,9 @@ impl UrdfError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Unwritable {
     /// The state's joints are not the chain's.
-    #[error("the chain has {wanted} moving joints and the state {found}, or not of the same kinds")]
+    #[error(
+        "the state does not fit the chain: it has {found} joints, the chain {wanted} that move, and their kinds must agree"
+    )]
     Joints {
         /// Joints of the state.
         found: usize,

@@ -87,7 +87,7 @@ pub enum ScenarioError {
         source: PriorError,
     },
     /// A learner cannot absorb the observations from before any movement.
-    #[error("scenario `{scenario}`: what is known before any movement: {source}")]
+    #[error("scenario `{scenario}`: the readings known before any movement cannot be learned from: {source}")]
     Beforehand {
         /// The scenario.
         scenario: String,

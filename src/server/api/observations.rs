@@ -121,7 +121,7 @@ pub(super) async fn get(
     let told = standing.observations.iter().find(|told| told.answer.observation == number);
     let unknown = || {
         let detail = format!(
-            "there is no observation {number}; {} were told so far, counted from 1",
+            "there is no observation {number}; {} were received so far, counted from 1",
             standing.observations.len()
         );
         Problem::new(Kind::UnknownObservation, detail).field("n")

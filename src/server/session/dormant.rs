@@ -379,7 +379,7 @@ impl Sessions {
         }
     }
 
-    /// Finds out whether a session is as it was written.
+    /// Checks whether a session is as it was written.
     async fn look_at(&self, known: &Arc<Known>) {
         if known.damage.get().is_some() {
             return;
@@ -403,7 +403,8 @@ impl Sessions {
     }
 }
 
-/// What is done whether or not whoever asked still waits; who waits too long is told what is to be said then.
+/// Runs work to its end whether or not the caller still waits; a caller that waits too long gets a problem that says
+/// `later`.
 async fn done_anyway<T: Send + 'static>(
     work: impl Future<Output = Result<T, Problem>> + Send + 'static,
     later: &'static str,
@@ -414,7 +415,7 @@ async fn done_anyway<T: Send + 'static>(
     }
 }
 
-/// A session in the store as it can be shown; `None` if it is not there any more.
+/// A session in the store as it can be shown; `None` if it is no longer there.
 fn summed_up(store: &Store, id: Uuid) -> Result<Option<SessionResource>, String> {
     let told = |error: StoreError| String::from(Problem::from(error).detail);
     let noted = store.summary(id).map_err(told)?;

@@ -1,4 +1,4 @@
-//! What is kept of a step, written once for all who will read it.
+//! The data kept of a step, written once for all readers.
 
 use std::{mem::size_of, sync::Arc};
 
@@ -8,14 +8,14 @@ use crate::server::problem::{Kind, Problem};
 use body_schema_experiment::{Description, StepReport};
 use body_schema_recording::{RecordingError, StepsCsv};
 
-/// A report as its readers get it. Clones share the text.
+/// A report as readers get it. Clones share the text.
 #[derive(Clone, Debug)]
 pub(in crate::server) struct Kept {
-    /// The step that it is of.
+    /// The step of the report.
     pub(in crate::server) step: u64,
-    /// All of it but the minimiser's partition, which only recordings hold.
+    /// The report as JSON, without the minimiser's partition, which only recordings hold.
     pub(in crate::server) json: Arc<RawValue>,
-    /// Its rows of the table of all steps.
+    /// The report's rows of the table of all steps.
     pub(in crate::server) rows: Arc<[u8]>,
 }
 
@@ -27,19 +27,19 @@ impl Kept {
         Ok(Self { step: report.step, json: json.into(), rows: rows.into() })
     }
 
-    /// As it was kept before, with the report that it is of; `None` for what is none.
+    /// Reads a report that was kept before; `None` for any other text.
     pub(super) fn read(text: &str, description: &Description) -> Option<Self> {
         let report: StepReport = serde_json::from_str(text).ok()?;
         let json = RawValue::from_string(text.to_owned()).ok()?;
         Some(Self { step: report.step, json: json.into(), rows: rows(&report, description).ok()?.into() })
     }
 
-    /// The report that it is of.
+    /// The report itself.
     pub(super) fn report(&self) -> Option<StepReport> {
         serde_json::from_str(self.json.get()).ok()
     }
 
-    /// How much memory it takes.
+    /// The memory that it takes, bytes.
     pub(super) fn bytes(&self) -> usize {
         size_of::<Self>() + self.json.get().len() + self.rows.len()
     }

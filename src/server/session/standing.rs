@@ -1,4 +1,4 @@
-//! What a session with a robot elsewhere is made from, and how it stands.
+//! The request for a session with a robot elsewhere, and the snapshot of its state.
 
 use std::sync::Arc;
 
@@ -44,7 +44,7 @@ pub enum OutsideWorld {
     Outside,
 }
 
-/// How a session stands, for everyone to read while its engine is busy. Followers are told of its status and what is pending.
+/// A snapshot of a session, for everyone to read while its engine is busy. Followers receive its status and what is pending.
 #[derive(Debug, Serialize, ToSchema)]
 pub(in crate::server) struct Standing {
     /// How it stands.

@@ -195,7 +195,7 @@ pub enum SelectionError {
     #[error("DIRECT: {0}")]
     Search(DirectError),
     /// Not a position for every joint.
-    #[error("a configuration of {0} positions is none of this robot")]
+    #[error("this robot does not have {0} joints; give one position for each of its joints")]
     NoConfiguration(usize),
     /// A person chooses, and has not chosen yet.
     #[error("a person chooses it, and has not chosen yet; set a configuration first, then step")]
@@ -207,7 +207,7 @@ pub enum SelectionError {
     #[error("no configuration is feasible: {0}")]
     Infeasible(#[from] Infeasible),
     /// No socket can be reached.
-    #[error("no posture within the limits and constraints brings a target to its socket, as far as is believed")]
+    #[error("by the present estimate, no posture within the limits and constraints brings a target to its socket")]
     OutOfReach,
     /// No configuration has a finite criterion.
     #[error("no configuration has a finite criterion: the belief has diverged")]

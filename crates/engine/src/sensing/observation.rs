@@ -53,7 +53,7 @@ pub enum Refused {
     #[error("nothing can be learned from these sensors: {0}")]
     Noise(#[from] UnusableNoise),
     /// A reading is so far from its prediction that the distance is not finite.
-    #[error("the readings are farther from what is expected than numbers reach")]
+    #[error("the readings are too far from their prediction to compute with; check their units")]
     Absurd,
     /// A reading that is no finite number.
     #[error("the reading of channel {channel} (counted from 0) is {value}, not a number from -1e12 to 1e12")]
