@@ -209,8 +209,8 @@ mod tests {
             assert!(missed(&outliers) <= rows / 100, "seed {seed}: {outliers:?}");
             assert!(outliers.len() * 10 >= planted.len() * 9, "seed {seed}: {outliers:?}");
             let fit = &smoother.fits()[0];
-            let spare = fit.equations - fit.absorbed;
-            assert!(((fit.squared / spare).sqrt() / fit.scale - 1.0).abs() < 0.05, "seed {seed}: {fit:?}");
+            let degrees_of_freedom = fit.equations - fit.absorbed;
+            assert!(((fit.squared / degrees_of_freedom).sqrt() / fit.scale - 1.0).abs() < 0.05, "seed {seed}: {fit:?}");
         }
     }
 

@@ -259,7 +259,7 @@ impl Smoother {
             let found = self.posterior.mode_from_afar(&mode.state, &layout, THOROUGH);
             self.hypotheses.modes.extend(found);
         }
-        self.hypotheses.calm = 0;
+        self.hypotheses.stable_steps = 0;
         self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         self.hypotheses.condense(self.settings.kept, &layout);
     }

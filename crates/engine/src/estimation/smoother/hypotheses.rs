@@ -37,7 +37,7 @@ impl Default for HypothesisSettings {
 pub(super) struct Hypotheses {
     pub modes: Vec<Mode>,
     /// Stable steps: how many in a row found no new mode of any weight.
-    pub calm: usize,
+    pub stable_steps: usize,
     /// Why the last mode was lost, where none is left.
     pub lost: Option<NoMode>,
 }

@@ -81,7 +81,7 @@ pub struct Smoother {
     /// Whether the scale of each kind of noise is learned.
     unknown: Vec<bool>,
     /// Degrees of freedom of each kind of noise: equations that no parameter absorbs.
-    spare: Vec<f64>,
+    degrees_of_freedom: Vec<f64>,
     /// What dropped readings said of each kind of noise.
     remembered: Vec<Left>,
     /// The movement at which a change of the body was last noticed.
@@ -100,7 +100,7 @@ pub struct Smoother {
 }
 
 /// The number of stable steps, without a new hypothesis, after which none are searched for.
-const CALM: usize = 6;
+const STABLE: usize = 6;
 /// The effort of the search for another body that explains surprising readings.
 const THOROUGH: Effort<'_> = Effort { steps: 60, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
 /// The movement number of what is known before the first movement.
@@ -120,7 +120,7 @@ impl Smoother {
         let posterior_prior = prior.clone();
         let posterior = Posterior::new(prior, rig.clone());
         let (nominal, unknown) = (rig.clone(), vec![false; rig.noises().len()]);
-        let (spare, remembered) = (vec![0.0; unknown.len()], vec![Left::default(); unknown.len()]);
+        let (degrees_of_freedom, remembered) = (vec![0.0; unknown.len()], vec![Left::default(); unknown.len()]);
         let mut smoother = Self {
             belief: Belief::new(posterior.prior.guess().clone(), layout, rig),
             posterior,
@@ -133,7 +133,7 @@ impl Smoother {
             past: Arc::default(),
             nominal,
             unknown,
-            spare,
+            degrees_of_freedom,
             remembered,
             changed_at: None,
             told_at: None,
@@ -220,7 +220,7 @@ impl Smoother {
 
     /// Whether one hypothesis has explained everything alone for some time.
     fn is_settled(&self) -> bool {
-        self.hypotheses.calm >= CALM
+        self.hypotheses.stable_steps >= STABLE
     }
 
     /// Whether there are as many independent equations as parameters; where some parameters can never be determined,
@@ -357,7 +357,7 @@ impl Smoother {
         self.publish();
         // What costs most is asked last.
         if self.belief.alternatives.is_empty() && self.explains() && self.is_determined() {
-            self.hypotheses.calm += 1;
+            self.hypotheses.stable_steps += 1;
             if self.is_settled() && self.told_at.is_none() && self.posterior.measurements.len() > KEPT {
                 let first = self.posterior.measurements[KEPT / 2].movement;
                 let settling = self.posterior.readings(&self.belief.state).take_while(|it| it.movement < first);
@@ -366,7 +366,7 @@ impl Smoother {
                 self.posterior.settle(KEPT / 2, &self.belief.state, &layout);
             }
         } else {
-            self.hypotheses.calm = 0;
+            self.hypotheses.stable_steps = 0;
         }
         Ok(Update { nis, change_noticed })
     }

@@ -24,10 +24,10 @@ impl Smoother {
     /// e, metres; 0 where the noise is known, and while there are fewer equations than parameters, so that the model error cannot be told
     /// yet.
     pub(super) fn model_error_m(&self) -> f64 {
-        let excess: Vec<f64> = (self.posterior.scales.iter().zip(&self.spare).zip(&self.unknown))
-            .map(|((scale, spare), unknown)| {
-                let by_chance = 1.0 + CHANCE * (2.0 / spare).sqrt();
-                if *unknown && *spare > 0.0 { (scale * scale - by_chance).max(0.0) } else { 0.0 }
+        let excess: Vec<f64> = (self.posterior.scales.iter().zip(&self.degrees_of_freedom).zip(&self.unknown))
+            .map(|((scale, degrees_of_freedom), unknown)| {
+                let by_chance = 1.0 + CHANCE * (2.0 / degrees_of_freedom).sqrt();
+                if *unknown && *degrees_of_freedom > 0.0 { (scale * scale - by_chance).max(0.0) } else { 0.0 }
             })
             .collect();
         let (state, layout) = (&self.belief.state, &self.belief.layout);

@@ -211,7 +211,7 @@ impl Smoother {
                     if self.noise_seen(noise) == 0 {
                         continue;
                     }
-                    self.spare[noise] = free;
+                    self.degrees_of_freedom[noise] = free;
                     // With equations to spare it may change as often as the modes follow.
                     let from = if free > NOISE_WEIGHT { self.posterior.scales[noise] } else { before[noise] };
                     ((left[noise].squared + NOISE_WEIGHT * from * from) / (free + NOISE_WEIGHT)).sqrt()

@@ -30,7 +30,7 @@ use crate::{
 /// The ratio below which the scatter of most readings puts a learned scale in doubt.
 const DOUBTFUL: f64 = 0.4;
 /// The degrees of freedom from which on most readings tell a scale.
-const SPARE: f64 = 6.0;
+const LEAST_DEGREES: f64 = 6.0;
 /// The most rounds in which modes and scales are found in turn.
 const ROUNDS: usize = 12;
 /// The change of a scale below which it has converged.
@@ -110,7 +110,8 @@ impl Smoother {
         let mut revised = false;
         for trial in tried {
             if self.hypotheses.modes.is_empty() || trial.evidence_beside(self) > self.evidence_beside(&trial) {
-                (self.posterior, self.hypotheses, self.spare) = (trial.posterior, trial.hypotheses, trial.spare);
+                (self.posterior, self.hypotheses, self.degrees_of_freedom) =
+                    (trial.posterior, trial.hypotheses, trial.degrees_of_freedom);
                 revised = true;
             }
         }
@@ -148,8 +149,10 @@ impl Smoother {
         let equations = self.posterior.fit(&mode.state, layout).into_iter().map(|fit| fit.equations);
         let common = self.posterior.common_scales(&mode.state).into_iter();
         let of = |((common, absorbed), equations): ((Option<f64>, f64), f64)| {
-            let spare = equations - absorbed;
-            common.filter(|_| spare >= SPARE).map(|common| common * (equations / spare).sqrt())
+            let degrees_of_freedom = equations - absorbed;
+            common
+                .filter(|_| degrees_of_freedom >= LEAST_DEGREES)
+                .map(|common| common * (equations / degrees_of_freedom).sqrt())
         };
         common.zip(absorbed).zip(equations).map(of).collect()
     }

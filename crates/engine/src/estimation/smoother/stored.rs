@@ -27,7 +27,7 @@ struct Stored {
     rng: ChaCha8Rng,
     movements: u64,
     past: Vec<ReadingReport>,
-    spare: Vec<f64>,
+    degrees_of_freedom: Vec<f64>,
     remembered: Vec<Left>,
     changed_at: Option<u64>,
     told_at: Option<u64>,
@@ -56,7 +56,7 @@ impl Stored {
             && is_square(self.original.covariance())
             && !self.hypotheses.modes.is_empty()
             && self.hypotheses.modes.iter().all(|mode| is_square(&mode.information))
-            && [self.scales.len(), self.spare.len(), self.remembered.len()] == [noises; 3]
+            && [self.scales.len(), self.degrees_of_freedom.len(), self.remembered.len()] == [noises; 3]
             && self.joints.is_some() == smoother.posterior.joints.is_some()
             && self.chain.is_some() == smoother.scaled.is_some()
             && self.pins.joints.len() == joints
@@ -80,7 +80,7 @@ impl Smoother {
             rng: self.rng.clone(),
             movements: self.movements,
             past: self.past.to_vec(),
-            spare: self.spare.clone(),
+            degrees_of_freedom: self.degrees_of_freedom.clone(),
             remembered: self.remembered.clone(),
             changed_at: self.changed_at,
             told_at: self.told_at,
@@ -121,7 +121,7 @@ impl Smoother {
             original: stored.original,
             movements: stored.movements,
             past: Arc::new(stored.past),
-            spare: stored.spare,
+            degrees_of_freedom: stored.degrees_of_freedom,
             remembered: stored.remembered,
             changed_at: stored.changed_at,
             told_at: stored.told_at,
