@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::{Case, Compliance, Extra, Fit, GivesWay};
+use super::{Case, Compliance, Extra, Fit, JointCompliance};
 use body_schema_engine::{
     elementary::{cos, sin},
     kinematics::JointKind,
@@ -96,7 +96,7 @@ impl Case<'_> {
             let Block::Compliance(joint, load) = block else { return None };
             let value = fuller.state().corrections[joint].compliance[load as usize];
             let pulls = torques.iter().map(|torques| torques[joint][load as usize].abs());
-            Some(GivesWay {
+            Some(JointCompliance {
                 joint: self.names.joints[joint].clone(),
                 load: load.name().to_owned(),
                 deg_per_nm: value.to_degrees(),
@@ -104,7 +104,7 @@ impl Case<'_> {
                 greatest_deg: (value * pulls.fold(0.0, f64::max)).to_degrees(),
             })
         };
-        let terms: Vec<GivesWay> = fuller.belief.layout.blocks().filter_map(term).collect();
+        let terms: Vec<JointCompliance> = fuller.belief.layout.blocks().filter_map(term).collect();
         let joint = loads.mass(Load::Elbow).link;
         let elbow = self.names.joints.get(joint).cloned().unwrap_or_default();
         (!terms.is_empty()).then(|| Compliance { up: loads.up.into_inner().into(), elbow, terms })

@@ -144,12 +144,12 @@ pub struct Compliance {
     /// The joint at whose origin the elbow is.
     pub elbow: String,
     /// The compliance by joint and load.
-    pub terms: Vec<GivesWay>,
+    pub terms: Vec<JointCompliance>,
 }
 
 /// The compliance of a joint to a load.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct GivesWay {
+pub struct JointCompliance {
     /// Its name.
     pub joint: String,
     /// `target` or `elbow`.
