@@ -106,14 +106,14 @@ impl Reached {
 }
 
 /// The authentication of requests.
-pub(super) struct Strangers {
+pub(super) struct Authentication {
     token: Option<Token>,
     /// The name of the cookie: cookies are shared among ports, so each server has its own name.
     cookie: String,
     hosts: Vec<HostName>,
 }
 
-impl Strangers {
+impl Authentication {
     pub(super) fn new(token: Option<Token>, hosts: Vec<HostName>, port: u16) -> Self {
         Self { token, hosts, cookie: format!("body-schema-{port}") }
     }
@@ -225,14 +225,14 @@ fn is_local(name: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn strangers(hosts: &[&str]) -> Strangers {
+    fn allowing(hosts: &[&str]) -> Authentication {
         let hosts = hosts.iter().map(|host| host.parse().expect("a name")).collect();
-        Strangers::new(None, hosts, 8080)
+        Authentication::new(None, hosts, 8080)
     }
 
     #[test]
     fn only_names_of_this_machine_are_local() {
-        let none = strangers(&[]);
+        let none = allowing(&[]);
         for host in ["localhost", "localhost:8080", "LOCALHOST:1", "127.0.0.1:80", "127.1.2.3", "[::1]:8080", "[::1]"] {
             assert!(none.are_meant_by(host, None), "{host}");
         }
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn a_server_is_meant_by_the_address_at_which_it_was_reached_and_by_allowed_names() {
-        let some = strangers(&["Lab.example.org", "10.0.0.9"]);
+        let some = allowing(&["Lab.example.org", "10.0.0.9"]);
         let reached = |address: &str| Some(Reached(Some(address.parse().expect("an address"))));
         assert!(some.are_meant_by("10.0.0.1:8080", reached("10.0.0.1:8080")));
         assert!(some.are_meant_by("10.0.0.1", reached("[::ffff:10.0.0.1]:80")));

@@ -18,7 +18,7 @@ use body_schema_calibration::Progress;
 const MOST_WAITING: usize = 64;
 
 /// Runs blocking work on a thread where it holds up no other request.
-pub(super) async fn aside<T, E>(work: impl FnOnce() -> Result<T, E> + Send + 'static) -> Result<T, Problem>
+pub(super) async fn run_blocking<T, E>(work: impl FnOnce() -> Result<T, E> + Send + 'static) -> Result<T, Problem>
 where
     T: Send + 'static,
     E: Into<Problem> + Send + 'static,
@@ -80,7 +80,7 @@ impl Jobs {
         let given_up = CancellationToken::new();
         let wanted = Wanted(given_up.clone());
         let _caller = given_up.drop_guard();
-        aside(move || {
+        run_blocking(move || {
             let _core = core;
             work(&wanted)
         })

@@ -39,12 +39,12 @@ use tokio::{
 use tokio_util::sync::CancellationToken;
 
 use super::{
+    authentication::Reached,
     holding::Holding,
     limits::Limits,
     metrics::Metrics,
     problem::{Kind, PROBLEM_JSON, Problem},
     rarely::Rarely,
-    strangers::Reached,
 };
 use stream::Stream;
 

@@ -15,11 +15,11 @@ use crate::page::CONTENT_SECURITY_POLICY;
 
 use super::{
     App, FrameAncestor,
+    authentication::Reached,
     holding::Holding,
     problem::{Kind, PROBLEM_JSON, Problem},
     requests,
     session::Taken,
-    strangers::Reached,
 };
 
 /// The size from which on answers are counted, bytes.
@@ -67,7 +67,7 @@ pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>, always: Headers)
     // Around the router as a whole: what is wrong with a method is known only there.
     Router::new()
         .fallback_service(router.with_state(app.clone()))
-        .layer(from_fn_with_state(app.clone(), refuse_strangers))
+        .layer(from_fn_with_state(app.clone(), authenticate))
         .layer(from_fn_with_state(app.clone(), refuse_large_heads))
         .layer(map_response(as_problem))
         .layer(map_response(move |response| with_headers(always.clone(), response)))
@@ -100,18 +100,18 @@ pub(super) async fn counted(State(app): State<Arc<App>>, request: Request, next:
 
 /// Refuses requests under a foreign name, without the token, or from a page of another origin, which must neither change
 /// anything nor open a WebSocket.
-async fn refuse_strangers(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+async fn authenticate(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let mut hosts = request.headers().get_all(header::HOST).into_iter();
     let (Some(host), None) = (hosts.next().and_then(|host| host.to_str().ok()), hosts.next()) else {
         let detail = "a request has one header `Host`: the name or the address of the server, with its port";
         return Problem::new(Kind::Malformed, detail).field("Host").into_response();
     };
     let reached = request.extensions().get::<ConnectInfo<Reached>>().map(|ConnectInfo(reached)| *reached);
-    if !app.strangers.are_meant_by(host, reached) {
+    if !app.authentication.are_meant_by(host, reached) {
         let detail = format!("this server does not answer to `{host}`; start it with --allow-host if it is to");
         return Problem::new(Kind::ForeignOrigin, detail).field("Host").into_response();
     }
-    if let Some(response) = app.strangers.turn_away(&request) {
+    if let Some(response) = app.authentication.turn_away(&request) {
         return response;
     }
     let harmless = matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS)

@@ -1,47 +1,54 @@
 //! The HTTP server: sessions to step and watch, robots elsewhere that ask and tell, and the page that shows them.
 //!
 //! ```text
-//! api/      the routes: scenarios, sessions, steps, suggestions, observations, streams, downloads; their OpenAPI description
-//! session/  experiments and robots elsewhere on threads of their own, and what they leave to read
-//! store/    the sessions of robots elsewhere on the disk
-//! extract   requests, read        problem  errors, as RFC 9457 problem details
-//! guard     foreign pages, headers, stray errors        assets   the page and Rerun's viewer
-//! aside     work that holds up nobody                    frame    who may embed the page
-//! strangers who may ask at all
-//! connections  how long each may keep us waiting          limits   how much is taken on
-//! holding   what an answer holds until it is sent
-//! requests  their ids and lines in the log                metrics  figures for Prometheus
+//! api/            the routes: scenarios, sessions, steps, suggestions, observations, streams, downloads; their OpenAPI description
+//! session/        experiments and robots elsewhere on threads of their own, and the state that they share with readers
+//! store/          the sessions of robots elsewhere on the disk
+//! extract         reading requests
+//! problem         errors, as RFC 9457 problem details
+//! middleware      origins, headers, errors that no handler made
+//! authentication  tokens, passes, and the names of the server
+//! connections     how long each may keep the server waiting
+//! limits          the limits of all of this
+//! blocking        work that must not hold up other requests
+//! requests        ids of requests, and their lines in the log
+//! metrics         figures for Prometheus
+//! holding         bodies that hold a value until they are sent
+//! assets          the page and Rerun's viewer
+//! frame           the origins that may embed the page
 //! ```
 //!
 //! Every session's engine computes on its own thread; the runtime's workers only carry messages and bytes. What is taken on,
 //! from connections to memory, is bounded by [`Limits`].
 
 mod api;
-mod aside;
 mod assets;
+mod authentication;
+mod blocking;
 mod connections;
 mod extract;
 mod frame;
-mod guard;
 mod holding;
 mod limits;
 mod metrics;
+mod middleware;
 mod problem;
 mod rarely;
 mod requests;
 mod session;
 mod store;
-mod strangers;
 
 use std::{io, net::SocketAddr, path::PathBuf, sync::Arc};
 
 use crate::page::PageError;
-use aside::Jobs;
 use axum::{Router, middleware::from_fn_with_state};
+use blocking::Jobs;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
 pub use api::{Health, Liveness, MadeSteps, ScenarioList, ScenarioResource, SessionList, StepRequest};
+use authentication::Authentication;
+pub use authentication::{HostName, NoHostName, NoToken, Token};
 use connections::Connections;
 pub use frame::{FrameAncestor, NoOrigin};
 pub use limits::{Limits, raise_descriptors};
@@ -50,8 +57,6 @@ pub use problem::{Beside, PROBLEM_JSON, Problem};
 use session::{Budget, Keeping, Sessions};
 pub use session::{DamagedSession, NewOutsideSession, NewSession, SessionResource};
 pub use store::{Finding, Held, Shown, State, Store, StoreError, Stored};
-use strangers::Strangers;
-pub use strangers::{HostName, NoHostName, NoToken, Token};
 
 /// The options of a server.
 #[derive(Clone, Debug, Default)]
@@ -99,7 +104,7 @@ struct App {
     assets: assets::Assets,
     /// The OpenAPI document, as it is sent.
     openapi: bytes::Bytes,
-    strangers: Strangers,
+    authentication: Authentication,
     limits: Limits,
     metrics: Arc<Metrics>,
     connections: Arc<Connections>,
@@ -152,16 +157,16 @@ impl Server {
             sessions: Sessions::new(Budget::new(limits.memory_bytes), keeping, metrics.clone(), shutdown.clone())?,
             assets: assets::Assets::load(options.panel_dir.as_deref())?,
             openapi: document,
-            strangers: Strangers::new(options.token, options.allow_hosts, address.port()),
+            authentication: Authentication::new(options.token, options.allow_hosts, address.port()),
             connections: Connections::new(limits.clone(), metrics.clone()),
             answers: Arc::new(Budget::new(limits.answers_bytes())),
             limits,
             metrics,
             jobs: Jobs::default(),
         });
-        let routes = routes.layer(from_fn_with_state(app.clone(), guard::counted));
+        let routes = routes.layer(from_fn_with_state(app.clone(), middleware::counted));
         let router = Router::new().merge(routes).merge(assets::routes(&app.assets));
-        let router = guard::layered(router, &app, guard::Headers::new(&options.frame_ancestors));
+        let router = middleware::layered(router, &app, middleware::Headers::new(&options.frame_ancestors));
         Ok(Self { listener, app, router, shutdown, damage })
     }
 

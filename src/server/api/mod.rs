@@ -42,7 +42,7 @@ pub use sessions::{MadeSteps, SessionList, StepRequest};
 
 use super::{
     App, Limits,
-    aside::aside,
+    blocking::run_blocking,
     metrics::OPEN_METRICS,
     problem::{Kind, PROBLEM_JSON, Problem},
 };
@@ -230,7 +230,7 @@ fn attachment(name: &str, content_type: &'static str, content: impl Into<Body>) 
 
 /// A JSON response, serialised where it blocks no other request.
 async fn json<T: Serialize + Send + 'static>(value: T) -> Result<Response, Problem> {
-    let bytes = aside(move || {
+    let bytes = run_blocking(move || {
         serde_json::to_vec(&value).map_err(|error| Problem::new(Kind::Internal, format!("no JSON: {error}")))
     });
     Ok(([(header::CONTENT_TYPE, JSON)], Body::from(bytes.await?)).into_response())

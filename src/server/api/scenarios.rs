@@ -7,7 +7,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::server::{
-    aside::aside,
+    blocking::run_blocking,
     problem::{Kind, Problem},
 };
 use body_schema_scenario::{BUILTIN, Scenario, ScenarioError, ScenarioSummary, builtin};
@@ -34,7 +34,7 @@ pub struct ScenarioResource {
     (status = 200, description = "All built-in scenarios, simplest first", body = ScenarioList)
 ))]
 pub(super) async fn list() -> Result<Json<ScenarioList>, Problem> {
-    Ok(Json(ScenarioList { scenarios: aside(summaries).await? }))
+    Ok(Json(ScenarioList { scenarios: run_blocking(summaries).await? }))
 }
 
 /// They are part of the program: those that have been read once need not be read again.
@@ -57,7 +57,7 @@ fn summaries() -> Result<Vec<ScenarioSummary>, Problem> {
     )
 )]
 pub(super) async fn get(Path(name): Path<String>) -> Result<Json<ScenarioResource>, Problem> {
-    let scenario = aside(move || find(&name)).await?;
+    let scenario = run_blocking(move || find(&name)).await?;
     Ok(Json(ScenarioResource { summary: scenario.summary(), source: scenario.source }))
 }
 

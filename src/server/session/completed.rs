@@ -13,7 +13,7 @@ use tokio::{sync::Mutex as AsyncMutex, task::spawn_blocking};
 
 use super::{Session, lock};
 use crate::server::{
-    aside::{Jobs, Wanted},
+    blocking::{Jobs, Wanted},
     problem::{Kind, Problem},
 };
 use body_schema_recording::{LiveLog, RecordingError};

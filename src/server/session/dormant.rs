@@ -26,7 +26,7 @@ use super::{
     registry::{END_WITHIN, no_engine, spawn},
 };
 use crate::server::{
-    aside::aside,
+    blocking::run_blocking,
     problem::{Kind, Problem},
     requests,
     store::{Shown, Store, StoreError, Stored},
@@ -245,7 +245,7 @@ impl Sessions {
         let _moving = known.still().await?;
         let (store, id) = (self.store.clone(), known.id);
         self.known(id).ok_or_else(|| Problem::unknown_session(id))?;
-        aside(move || store.delete(id)).await?;
+        run_blocking(move || store.delete(id)).await?;
         lock(&self.known).retain(|other| other.id != id);
         tracing::info!(request = requests::id(), session = %id, "a session was deleted");
         if let Some(session) = self.leave(id) {
@@ -344,7 +344,7 @@ impl Sessions {
         asleep: &[Arc<Known>],
     ) -> Result<BTreeMap<Uuid, Result<SessionResource, String>>, Problem> {
         let (store, asleep) = (self.store.clone(), asleep.to_vec());
-        aside(move || {
+        run_blocking(move || {
             let mut shown = BTreeMap::new();
             for known in asleep {
                 let remembered = lock(&known.resource).clone();
@@ -399,7 +399,7 @@ impl Sessions {
 
     async fn load(&self, id: Uuid) -> Result<Option<Stored>, Problem> {
         let store = self.store.clone();
-        aside(move || store.load(id)).await
+        run_blocking(move || store.load(id)).await
     }
 }
 

@@ -19,7 +19,7 @@ use uuid::Uuid;
 use super::{Budget, Engine, Session, Shared, clock::now_s, dormant::Known, engine, lock};
 use crate::server::{
     Limits,
-    aside::aside,
+    blocking::run_blocking,
     metrics::{Metrics, Present},
     problem::{Kind, Problem},
     requests,
@@ -166,7 +166,7 @@ impl Sessions {
     async fn has_room_for_recordings(&self) -> Result<(), Problem> {
         let Some(directory) = self.recordings.clone() else { return Ok(()) };
         let (most, used) =
-            (self.limits.recordings_bytes, aside(move || Ok::<_, Problem>(recordings_bytes(&directory))).await?);
+            (self.limits.recordings_bytes, run_blocking(move || Ok::<_, Problem>(recordings_bytes(&directory))).await?);
         match used < most {
             true => Ok(()),
             false => Err(Problem::new(

@@ -6,7 +6,7 @@ use axum::body::Bytes;
 use tokio::sync::Mutex as AsyncMutex;
 
 use super::{Session, memory::Counted, recording_failed};
-use crate::server::{aside::aside, problem::Problem};
+use crate::server::{blocking::run_blocking, problem::Problem};
 
 /// The number of parts from which on they are put together: a viewer reads some dozens a frame.
 const MANY_PARTS: usize = 200;
@@ -42,7 +42,7 @@ impl Session {
         if let Some(together) = kept.as_ref().filter(|together| !together.is_outdated(live.len())) {
             return Ok(Some(together.clone()));
         }
-        let made = aside(move || {
+        let made = run_blocking(move || {
             let parts = live.scene_parts_from(1);
             let next = 1 + parts.len();
             let parts = live.put_together(&parts).map_err(recording_failed)?;
