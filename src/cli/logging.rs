@@ -30,7 +30,7 @@ const MOST_WAITING: usize = 16 << 10;
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Log, on standard error")]
 pub struct LoggingArguments {
-    /// From which level on it is told what happens: off, error, warn, info, debug or trace [default: that of the environment's
+    /// Log events of this level and above: off, error, warn, info, debug or trace [default: that of the environment's
     /// BODY_SCHEMA_LOG, else info]
     #[arg(long = "log", value_name = "LEVEL", value_parser = level)]
     level: Option<LevelFilter>,

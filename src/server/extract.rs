@@ -99,7 +99,7 @@ pub(super) fn whole_numbers<const N: usize>(
     Ok(numbers)
 }
 
-/// One of the words that `T` is written as, its default where the parameter is absent.
+/// The value of a parameter that is written as one of a few words; the default if it is absent.
 pub(super) fn word<T: DeserializeOwned + Default>(name: &'static str, value: Option<&str>) -> Result<T, Problem> {
     let Some(value) = value else { return Ok(T::default()) };
     T::deserialize(value.into_deserializer()).map_err(|error: serde::de::value::Error| {

@@ -29,7 +29,7 @@ pub struct Problem {
     pub title: &'static str,
     /// The HTTP status code.
     pub status: u16,
-    /// What went wrong this time, and how to mend it.
+    /// What went wrong this time, and what to do.
     #[schema(value_type = String)]
     pub detail: Box<str>,
     /// The body field, parameter or header that is to blame.
@@ -42,7 +42,7 @@ pub struct Problem {
     /// How many steps can still be made, where that is too few.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remaining: Option<u64>,
-    /// What is told beside.
+    /// Further members.
     #[serde(flatten)]
     #[schema(inline)]
     pub beside: Box<Beside>,

@@ -11,7 +11,7 @@ pub fn is_usable(x: f64) -> bool {
     x.abs() <= GREATEST
 }
 
-/// What is wrong with a text that says no [usable](is_usable) number.
+/// The reason why a text is no [usable](is_usable) number.
 pub fn what_is_wrong(text: &str) -> &'static str {
     match text.parse::<f64>() {
         Ok(x) if x.is_finite() => "is beyond ±1e12",

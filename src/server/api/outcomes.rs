@@ -35,7 +35,7 @@ pub(super) async fn urdf(State(app): State<Arc<App>>, Path(id): Path<String>) ->
     Ok(attachment("model.urdf", "application/xml", file))
 }
 
-/// The same origins of joints as YAML, as `ros_calibration`s and drivers take them.
+/// The origins of joints with what was learned, as YAML, in the form of `ros_calibration`s and drivers.
 #[utoipa::path(get, path = "/v1/sessions/{id}/kinematics.yaml", tag = "results", operation_id = "getKinematics",
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
@@ -63,7 +63,7 @@ pub(super) async fn report_json(State(app): State<Arc<App>>, Path(id): Path<Stri
     Ok(([(header::CONTENT_TYPE, "application/json")], report).into_response())
 }
 
-/// The same report to be read, with its figures.
+/// The report of `calibrate` as a page to read, with its figures.
 #[utoipa::path(get, path = "/v1/sessions/{id}/report.html", tag = "results", operation_id = "getReportPage",
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(

@@ -1,4 +1,4 @@
-//! What experiments there are.
+//! The built-in scenarios.
 
 use std::sync::OnceLock;
 

@@ -58,8 +58,8 @@ pub struct StepRequest {
     /// The step that the session must be at; otherwise nothing is stepped (409). It makes a repeated request safe.
     #[serde(default, deserialize_with = "whole_or_none")]
     pub expected_step: Option<u64>,
-    /// So many postures are drawn on the way to each step in the live recording, on its timeline `motion`; downloads have
-    /// none of them. At most 1000 in one request.
+    /// The number of postures drawn on the way to each step in the live recording, on its timeline `motion`; downloads
+    /// have none of them. At most 1000 in one request.
     #[serde(default, deserialize_with = "whole")]
     #[schema(default = 0, maximum = 30)]
     pub frames: u64,
@@ -78,7 +78,7 @@ fn yes() -> bool {
     true
 }
 
-/// What was made of a [`StepRequest`].
+/// The answer to a [`StepRequest`].
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct MadeSteps {
     /// The step that the session is at after these.
@@ -126,7 +126,7 @@ pub(super) async fn list(State(app): State<Arc<App>>, RawQuery(query): RawQuery)
     json(SessionList { sessions, damaged, next: next.map(|id| id.to_string()) }).await
 }
 
-/// What a session is made from: a scenario of ours, or a robot elsewhere.
+/// The request for a session: a scenario of ours, or a robot elsewhere.
 #[derive(ToSchema)]
 #[schema(as = OpenSession)]
 #[serde(untagged)]
@@ -203,10 +203,10 @@ pub(super) async fn get(State(app): State<Arc<App>>, Path(id): Path<String>) -> 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Condition {
-    /// In any case.
+    /// End it in any case.
     #[default]
     Always,
-    /// If no stream follows it.
+    /// End it only if no stream follows it.
     Unwatched,
 }
 

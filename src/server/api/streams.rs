@@ -71,7 +71,7 @@ pub(super) enum LiveEvent {
         /// Its index.
         next: usize,
     },
-    /// With a robot elsewhere: how it stands, at first and whenever that changes.
+    /// The status of a session with a robot elsewhere, at first and whenever it changes.
     #[schema(value_type = Standing)]
     Status(Arc<Standing>),
 }

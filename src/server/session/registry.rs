@@ -33,7 +33,7 @@ pub(super) const END_WITHIN: Duration = Duration::from_secs(10);
 /// … and when the server ends.
 const SHUT_DOWN_WITHIN: Duration = Duration::from_secs(4);
 
-/// What a session is made from.
+/// The request for a session of a built-in scenario.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewSession {
@@ -48,7 +48,7 @@ pub struct NewSession {
     #[serde(default)]
     #[schema(example = json!(["active", "random"]))]
     pub learners: Option<Vec<String>>,
-    /// How large the ellipsoids of its recording are.
+    /// The size of the ellipsoids of its recording.
     #[serde(default)]
     pub ellipsoids: EllipsoidSize,
 }

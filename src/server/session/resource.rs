@@ -14,13 +14,14 @@ pub struct SessionResource {
     /// Its id.
     #[schema(format = "uuid")]
     pub id: String,
-    /// Where its movements are made.
+    /// The kind of world in which its movements are made.
     pub world: WorldKind,
-    /// What stays the same from step to step.
+    /// The description of its experiment, which is the same at every step.
     pub description: Description,
     /// The latest step; 0 is the start, before any movement. With a robot elsewhere a step is an observation that counts.
     pub step: u64,
-    /// How many steps the recorded data set has left; null in a simulated world and with a robot elsewhere, which have no end.
+    /// The number of steps that the recorded data set has left; null in a simulated world and with a robot elsewhere, which
+    /// have no end.
     pub remaining: Option<u64>,
     /// The id of its recording, by which viewers tell one from another: with a robot elsewhere another one each time the
     /// session comes back to memory. Null for one that is not there.
@@ -32,15 +33,16 @@ pub struct SessionResource {
     pub recording_failure: Option<String>,
     /// Why the session can make no more steps, if its engine has failed; null otherwise.
     pub failure: Option<String>,
-    /// With a robot elsewhere: how it stands. Null for all others, and in a list for one that was not asked for since the
-    /// server was started.
+    /// The status of a session with a robot elsewhere. Null for all others, and in a list for one that was not asked for
+    /// since the server was started.
     pub status: Option<Status>,
-    /// With a robot elsewhere: its channels, by their names among the measurements of an observation; empty for all others.
+    /// The channels of a session with a robot elsewhere, by their names among the measurements of an observation; empty for
+    /// all others.
     pub channels: Vec<ChannelShape>,
 }
 
 impl Session {
-    /// Where its movements are made.
+    /// The kind of its world.
     pub(super) fn world(&self) -> WorldKind {
         match self.description.movements_available {
             _ if self.is_elsewhere() => WorldKind::Outside,
@@ -67,7 +69,7 @@ impl Session {
     }
 }
 
-/// A session that was kept, and is not as it was written.
+/// A kept session that is not as it was written.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct DamagedSession {
     /// Its id.

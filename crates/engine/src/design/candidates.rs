@@ -30,7 +30,8 @@ impl Problem {
         is_some.then(|| Self { rig: Arc::new(self.rig.limited_to(&sighted)), ..self.clone() })
     }
 
-    /// At most `count` poses that `is_wanted`, beside those known to be and the one at which something is said to be seen.
+    /// At most `count` poses that `is_wanted`, drawn beside known ones and beside the one at which something is known to
+    /// be seen.
     fn beside(
         &self,
         count: usize,

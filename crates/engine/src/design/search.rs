@@ -45,7 +45,7 @@ const UNBALANCED: f64 = 0.1;
 const EXCHANGES: usize = 60;
 /// The polish of candidates, to a hundredth of the gap that is usually asked for.
 const CLIMB: Polish = Polish { steps: 40, tolerance: 1e-4 };
-/// Of the best poses that slopes lead to so many follow the border of what is in view, by so many steps at most; the first step and
+/// The number of the best poses found by ascent that then follow the border of view, and the most steps of each; the first step and
 /// the last, in sides of the cube.
 const FOLLOWED: usize = 40;
 const FOLLOWING: usize = 250;

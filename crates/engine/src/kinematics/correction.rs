@@ -17,13 +17,13 @@ pub const LOADS: usize = 2;
 /// The coefficients that turn a joint's reading q into its position θ.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Correction {
-    /// Rad or m.
+    /// The offset, rad or m.
     pub offset: f64,
-    /// Without a unit.
+    /// The factor of the reading, without a unit.
     pub ratio: f64,
-    /// Of an encoder that is mounted off its centre, rad.
+    /// The factor of sin q, for an encoder that is mounted off its centre, rad.
     pub sine: f64,
-    /// As `sine`.
+    /// The factor of cos q, rad.
     pub cosine: f64,
     /// Compliance by load: how much the joint gives way, rad per N·m of 1 kg.
     pub compliance: [f64; LOADS],
@@ -90,7 +90,7 @@ impl Correction {
     }
 }
 
-/// One of the numbers of a [`Correction`], by what it multiplies.
+/// A coefficient of a [`Correction`], by the function that it multiplies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Term {
     /// f = 1.

@@ -12,9 +12,9 @@ pub enum Block {
     Base,
     /// The axis of a joint.
     Axis(usize),
-    /// What is added to a joint's reading, rad or m.
+    /// The offset of a joint's reading, rad or m.
     Offset(usize),
-    /// What a joint's reading is multiplied by.
+    /// The factor of a joint's reading.
     Ratio(usize),
     /// The eccentricity of a joint's encoder: the coefficients of sine and cosine of its reading, rad.
     Eccentricity(usize),

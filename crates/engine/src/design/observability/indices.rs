@@ -28,8 +28,8 @@ pub struct Indices {
 }
 
 impl Indices {
-    /// Of `postures` movements whose scaled information is JᵀJ (m × m), over the `rank` directions that can be determined: σ of the
-    /// others is nothing, and would make every index nothing.
+    /// The indices of `postures` movements whose scaled information is JᵀJ (m × m), over the `rank` directions that can be
+    /// determined: σ of the others is nothing, and would make every index nothing.
     pub fn of(information: &DMatrix<f64>, rank: usize, postures: usize) -> Self {
         if rank == 0 {
             return Self::default();

@@ -14,7 +14,7 @@ pub struct Observability {
     pub title: String,
     /// The version of this program.
     pub version: String,
-    /// What is to be learned, and what can be.
+    /// The parameters to be learned, and those that can be determined.
     pub parameters: ObservedParameters,
     /// Directions that can be determined, but of which the best postures tell little.
     pub weak: Vec<Weak>,
@@ -34,7 +34,7 @@ pub struct Observability {
     pub best: Vec<Posture>,
 }
 
-/// What is to be learned, and what can be.
+/// The parameters to be learned, and those that can be determined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ObservedParameters {
@@ -50,9 +50,9 @@ pub struct ObservedParameters {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Weak {
-    /// What is left of its deviation after the best N postures, as a share of the prior's.
+    /// The deviation that is left after the best N postures, as a share of the prior's.
     pub left: f64,
-    /// What it is, in words.
+    /// The direction, in words.
     pub said: String,
 }
 
