@@ -1,4 +1,8 @@
 //! The information of rows, from their postures alone.
+//!
+//! With H the whitened Jacobian of the rows and P₀ the prior, both around the description, P = (P₀⁻¹ + HᵀH)⁻¹ is what they leave, and
+//! √(tr(J P Jᵀ)) what is expected of other postures with Jacobian J (criterion I of optimal design). Nothing that was measured
+//! enters but the joints' readings, which put the target and the sockets where they are best explained by the description.
 
 use std::sync::Arc;
 

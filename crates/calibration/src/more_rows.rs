@@ -52,7 +52,7 @@ impl Falls {
         self.shares.iter().map(|(share, mu)| share / (1.0 + (k - 1.0) * mu)).sum()
     }
 
-    /// The error and its fall from k, when the present error is `error`.
+    /// The error at k and its fall from there, rebased so that k counts as 1; `error` is the present error.
     fn from(self, k: f64, error: f64) -> (f64, Self) {
         let (square, whole) = (self.with_own(k), self.at(k));
         let of = |(share, mu): (f64, f64)| {

@@ -82,7 +82,7 @@ pub trait Channel: fmt::Debug + Send + Sync {
         Some((self.target()?, Point3::from_slice(reading.get(..3)?)))
     }
 
-    /// The residual between two readings in physical units, for reports; `None` for kinds of quantity that the channel
+    /// The residual between two readings in physical units, for reports. It is `None` for kinds of quantity that the channel
     /// does not measure.
     fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
         let _ = (y, h);
