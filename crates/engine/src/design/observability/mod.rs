@@ -90,7 +90,7 @@ impl Prospect {
     ///
     /// # Errors
     ///
-    /// [`SelectionError`] where no movement can be chosen, as where the constraints leave none within reach.
+    /// [`SelectionError`] if no movement can be chosen, for example because the constraints leave none within reach.
     pub fn observability(
         &self,
         postures: usize,

@@ -43,7 +43,8 @@ impl<'a> Scope<'a> {
     ///
     /// # Errors
     ///
-    /// Where a list has come to its end, or nothing in it is feasible, or a joint cannot come back within its limits.
+    /// [`SelectionError::Exhausted`] if a list has come to its end; [`SelectionError::Infeasible`] if nothing in it is
+    /// feasible, or a joint cannot come back within its limits.
     pub fn of(situation: &Situation<'a>) -> Result<Self, SelectionError> {
         let (constraints, from) = (situation.constraints, standing(situation));
         let domain = match (situation.actions, constraints) {
@@ -78,7 +79,7 @@ impl<'a> Scope<'a> {
     ///
     /// # Errors
     ///
-    /// Where a joint cannot come back within its limits.
+    /// [`SelectionError::Infeasible`] if a joint cannot come back within its limits.
     pub fn around(
         situation: &Situation<'a>,
         joints: &'a JointBox,
