@@ -41,8 +41,8 @@ pub struct Arguments {
     part: Option<PathBuf>,
     #[command(flatten)]
     threads: Threads,
-    /// Set the best possible designs of 5, 10, 20, … movements beside the learners: what nobody can beat with as many.
-    /// It takes a second for 6 joints, half a minute for 12, minutes for 20
+    /// Add the best possible designs of 5, 10, 20, … movements, which no learner can beat with as many. It takes a
+    /// second for 6 joints, half a minute for 12, minutes for 20
     #[arg(long)]
     limits: bool,
 }

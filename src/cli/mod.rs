@@ -167,7 +167,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
 /// The number of threads.
 #[derive(Debug, clap::Args)]
 struct Threads {
-    /// Run on so many threads, 512 at most [default: one per core]; only times depend on it
+    /// Number of threads, 512 at most [default: one per core]; only times depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=512))]
     threads: Option<u16>,
 }

@@ -16,7 +16,7 @@ pub struct Arguments {
     /// The path of a scenario or calibration file, with a table or without, or a built-in scenario; recorded rows do not count
     #[arg(value_name = "FILE")]
     file: String,
-    /// Look at so many postures
+    /// Number of postures to look at
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=1000))]
     postures: u16,
     /// The error of predictions that is wanted, millimetres [default: the file's `[settled]`]

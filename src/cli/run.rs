@@ -47,7 +47,7 @@ pub struct Arguments {
     /// Write the outcome and the learned models as JSON to FILE, or to standard output for `-`
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Set the best possible designs of several lengths beside the learners (see `compare --help`)
+    /// Add the best possible designs of several lengths (see `compare --help`)
     #[arg(long)]
     limits: bool,
 }

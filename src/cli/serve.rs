@@ -32,7 +32,7 @@ pub struct Arguments {
     /// Keep nothing: sessions end with the server
     #[arg(long, conflicts_with = "data_dir")]
     ephemeral: bool,
-    /// Answer only those who carry the token in FILE [default: on addresses that other machines can reach a token is drawn
+    /// Answer only requests with the token in FILE [default: on addresses that other machines can reach a token is drawn
     /// and printed, on others none is needed]
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,

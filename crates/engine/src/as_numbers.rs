@@ -1,4 +1,4 @@
-//! What mathematics is made of, stored as numbers: `#[serde(with = "crate::as_numbers")]`.
+//! Vectors, matrices and rotations, stored as numbers: `#[serde(with = "crate::as_numbers")]`.
 //!
 //! nalgebra stores its matrices only together with products that multiply and add at once where the processor can, by which bits
 //! differ from machine to machine.

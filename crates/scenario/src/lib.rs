@@ -374,7 +374,7 @@ pub struct SmootherSpec {
     pub sigma: f64,
     /// The number of hypotheses that are kept and searched.
     pub hypotheses: HypothesisSettings,
-    /// What a reading costs that is far from its prediction.
+    /// The cost of a reading, as a function of its distance from the prediction.
     pub loss: Loss,
     /// Whether the size of the noise is unknown, so that the sensors' σ are only units.
     pub noise_unknown: bool,

@@ -78,9 +78,9 @@ impl Motion {
         }
     }
 
-    /// How the link `behind` a joint at a position moves with the joint's axis, by tangent coordinate, where this is the motion of the
-    /// link before it and `basis` is that of the axis' chart. Of an axis (v, w), with D = (R − R⁺)\[b₁ b₂\] = \[d₁ d₂\] and the
-    /// pivot at q,
+    /// The twists of the link `behind` a joint, one for each tangent coordinate of the joint's axis. `self` is the motion of the link
+    /// before the joint, and `basis` that of the axis' chart. For an axis (v, w), with D = (R − R⁺)\[b₁ b₂\] = \[d₁ d₂\] and the pivot
+    /// at q,
     ///
     /// ```text
     /// point        (d₁, 0), (d₂, 0)

@@ -36,7 +36,7 @@ pub struct Points {
     joints: Vec<Learned>,
     /// Tangent coordinates, m.
     dimension: usize,
-    /// In the order of their links.
+    /// The points, in the order of their links.
     places: Vec<Place>,
 }
 
@@ -78,14 +78,14 @@ pub enum Whitening {
 enum Wanted<'a> {
     /// The Jacobian's rows of each group.
     Rows(&'a mut [f64]),
-    /// Of what multiplies the rows of each group, the derivatives of the product.
+    /// The derivatives of the Jacobian's rows of each group, multiplied by given numbers.
     Slopes(&'a [f64], &'a mut [f64]),
     /// The rows of each group, and its joints.
     Centres(&'a mut [f64], &'a mut [f64]),
 }
 
-/// Where the rows of one point at a few postures of a group are put: of each tangent coordinate all equations, of each of them
-/// one candidate beside the other.
+/// The output for the rows of one point at a few postures of a group: for each tangent coordinate all equations, for each
+/// equation its candidates side by side.
 struct Columns<'a> {
     /// The rows of the group, `equations × GROUP` numbers for each coordinate; all zero at first.
     rows: &'a mut [f64],

@@ -28,7 +28,7 @@ pub enum Refused {
     Position {
         /// The joint.
         joint: usize,
-        /// What was given.
+        /// The number given.
         value: f64,
     },
     /// The number of readings is not the number of channels.
@@ -60,7 +60,7 @@ pub enum Refused {
     Reading {
         /// The channel.
         channel: usize,
-        /// What was given.
+        /// The number given.
         value: f64,
     },
 }

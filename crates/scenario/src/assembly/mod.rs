@@ -41,7 +41,7 @@ struct Briefing {
     actions: Actions,
     workspace: Workspace,
     watch: Option<Watch>,
-    /// What is known before any movement, with its error.
+    /// The readings known before any movement, with their error.
     beforehand: Option<Observation>,
 }
 
