@@ -1,8 +1,7 @@
 //! Learn a robot's kinematic body schema from a few well-chosen movements, and watch it happen.
 //!
-//! A robot moves its joints to angles θ, and a camera or tracker reports where a marker on its hand is. From such pairs
-//! this crate estimates where every joint axis is, with its uncertainty, and chooses the next movement so that it
-//! teaches most. The source is
+//! A robot moves its joints to angles θ, and a camera or tracker reports where a marker on its hand is. From such pairs this crate
+//! estimates where every joint axis is, with its uncertainty, and chooses the next movement so that it teaches most. The source is
 //!
 //! > R. Martinez-Cantin, M. Lopes, L. Montesano: *Body Schema Acquisition through Active Learning*, ICRA 2010.
 //!
@@ -23,13 +22,13 @@
 //! # }
 //! ```
 //!
-//! Without scenarios: [`estimation::Rls`] learns from movements that somebody made, [`selection::Active`] chooses the next
-//! one, and [`ask_tell::Session`] does both for a robot elsewhere.
+//! Without scenarios: [`estimation::Rls`] learns from movements that somebody made, [`selection::Active`] chooses the next one, and
+//! [`ask_tell::Session`] does both for a robot elsewhere.
 //!
 //! # Map
 //!
-//! This package is the program: the command line, the [server], the [export] of its page. What it is made of are crates of
-//! their own, named here as the program names them; each uses only those above it.
+//! This package is the program: the command line, the [server], the [export] of its page. It is made of the following crates, named here as
+//! the program names them; each uses only those above it.
 //!
 //! | crate | module here | what it holds |
 //! |---|---|---|
@@ -41,11 +40,11 @@
 //! | `body-schema-wire` | [`wire`] | the reports that everything outside reads, made of that once they are wanted |
 //! | `body-schema-scenario` | [`scenario`] | scenario files, strictly read, and the experiments that are drawn from them |
 //! | `body-schema-calibration` | [`calibration`] | a robot calibrated by a table: fits, folds, figures, corrected descriptions |
-//! | `body-schema-ask-tell` | [`ask_tell`] | sessions with a robot elsewhere, which is asked to move and tells what it saw |
+//! | `body-schema-ask-tell` | [`ask_tell`] | sessions with a robot elsewhere, which is asked to move and reports what it saw |
 //! | `body-schema-palette` | | the colours that learners have everywhere |
 //! | `body-schema-chart` | | panels of curves for print, as SVG and PNG |
-//! | `body-schema-report` | [`report`] | what people read of a calibration: text, HTML, plots |
-//! | `body-schema-files` | [`files`] | files and folders that have their names only once they are whole |
+//! | `body-schema-report` | [`report`] | reports of a calibration for readers: text, HTML, plots |
+//! | `body-schema-files` | [`files`] | files and folders that get their names only once they are whole |
 //! | `body-schema-recording` | [`recording`] | runs and calibrations as Rerun recordings and CSV files |
 //! | `body-schema-paper` | [`paper`] | the paper's experiments beside its numbers, drawn as charts |
 //!

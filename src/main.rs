@@ -6,7 +6,7 @@ use clap::Parser;
 
 mod cli;
 
-/// One that gives memory back: sessions come and go in a server that runs for weeks.
+/// An allocator that returns memory to the system: sessions come and go in a server that runs for weeks.
 #[cfg(all(feature = "jemalloc", target_os = "linux"))]
 #[global_allocator]
 static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;

@@ -1,4 +1,4 @@
-//! The engine as Python sees it: texts of JSON in and out. What is pleasant about it is written in Python, beside this crate.
+//! The engine for Python: JSON texts in and out. The convenient interface is written in Python, beside this crate.
 //!
 //! The interpreter's lock is released while anything is computed. A session is behind a lock of its own, so that threads may
 //! share it.

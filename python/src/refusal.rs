@@ -1,10 +1,10 @@
-//! What is refused, as an exception of the package's own.
+//! Refusals, as exceptions of the package.
 
 use body_schema_ask_tell::{Fault, Refusal, ReplayError, ResultsError, SetupError};
 use body_schema_scenario::ScenarioError;
 use pyo3::prelude::*;
 
-/// Which exception, and what it says.
+/// A failure: the exception to raise, and its message.
 pub struct Failure {
     kind: &'static str,
     message: String,
@@ -16,7 +16,7 @@ impl Failure {
         Self { kind, message: message.to_string(), fault: None }
     }
 
-    /// The same, and in which file.
+    /// This failure, with the name of the file.
     pub fn of_file(self, path: &str) -> Self {
         let fault = self.fault.map(|fault| Fault { what: format!("{path}: {}", fault.what), ..fault });
         Self { message: format!("{path}: {}", self.message), fault, ..self }

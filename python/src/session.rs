@@ -20,7 +20,7 @@ use crate::refusal::Failure;
 #[pyclass(frozen)]
 pub struct Engine(Mutex<Session>);
 
-/// What becomes of a suggestion that is not carried out.
+/// The outcome of a suggestion that is not carried out.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Ended {
@@ -32,8 +32,8 @@ struct Ended {
 type Answer = Result<String, Failure>;
 
 impl Engine {
-    /// What `work` makes of the session, with the interpreter's lock released. What failed has changed nothing, so that a
-    /// panic in between leaves a sound session, too.
+    /// Runs `work` on the session with the interpreter's lock released. A change that fails changes nothing, so a panic
+    /// in between leaves a sound session.
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(MutexGuard<'_, Session>) -> T + Send) -> T {
         py.detach(|| work(self.0.lock().unwrap_or_else(PoisonError::into_inner)))
     }
@@ -41,14 +41,14 @@ impl Engine {
 
 #[pymethods]
 impl Engine {
-    /// Of the JSON of a setup.
+    /// Opens a session from the JSON of a setup.
     #[staticmethod]
     fn open(py: Python<'_>, setup: &str) -> PyResult<Self> {
         let opened = py.detach(|| Ok::<_, Failure>(Session::open(read::<Setup>("calibration", setup)?)?));
         Ok(Self(Mutex::new(opened?)))
     }
 
-    /// Of what `save` gave.
+    /// Loads a session that `save` wrote.
     #[staticmethod]
     fn load(py: Python<'_>, text: &str) -> PyResult<Self> {
         let loaded = py.detach(|| Session::from_json(text));
@@ -132,7 +132,7 @@ impl Engine {
         Ok(self.with(py, |session| written(&RunResult::of(session.experiment()).learners[0].model))?)
     }
 
-    /// Predicted places of the hand at postures, metres.
+    /// Predicted positions of the hand at postures, metres.
     fn predict(&self, py: Python<'_>, postures: Vec<Vec<f64>>) -> PyResult<Vec<[f64; 3]>> {
         let predicted = self.with(py, |session| {
             let state = session.belief().map(|belief| belief.state.clone());
@@ -155,7 +155,7 @@ impl Engine {
         Ok(predicted?)
     }
 
-    /// `report.json`.
+    /// The content of `report.json`.
     fn report(&self, py: Python<'_>) -> PyResult<String> {
         let answer = self.with(py, |session| -> Answer { written(&session.calibrate(&Silent)?.0.report) });
         Ok(answer?)
@@ -202,12 +202,12 @@ pub fn setup_of_urdf(urdf: &str, base: Option<&str>, tip: Option<&str>) -> PyRes
     Ok(written(&Setup::from_urdf(urdf, base, tip))?)
 }
 
-/// JSON of what holds numbers, names and lists alone.
+/// JSON of a value that holds only numbers, names and lists.
 fn written<T: Serialize + ?Sized>(value: &T) -> Answer {
     serde_json::to_string(value).map_err(|error| Failure::new("EngineError", error))
 }
 
-/// Reads JSON; `whole` is what is blamed where no field of it is.
+/// Reads JSON; `whole` is named in the error where no field of it is wrong.
 fn read<T: DeserializeOwned>(whole: &str, text: &str) -> Result<T, Failure> {
     json::read(text.as_bytes()).map_err(|Unreadable { field, what, hint, .. }| {
         Fault { field: field.unwrap_or_else(|| whole.to_owned()), what, mend: hint.to_owned() }.into()

@@ -1,4 +1,4 @@
-//! `calibrate`: a robot's description and a table in, a corrected description and a report out.
+//! `calibrate`: from a robot's description and a table to a corrected description and a report.
 
 use std::{
     path::{Path, PathBuf},
@@ -41,7 +41,7 @@ pub struct Arguments {
     json: Option<PathBuf>,
 }
 
-/// No table has more rows.
+/// The most rows of a table.
 const MOST_ROWS: u64 = body_schema_table::MOST_ROWS as u64;
 
 /// One bar for each stage.
@@ -119,8 +119,8 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
     failures.end()
 }
 
-/// Writes all files into a folder, and tells those that lie in it. They are written aside, and the folder of an earlier calibration is
-/// exchanged for them, so that nothing of it is left, and nothing is lost where writing fails.
+/// Writes all files into a folder, and returns those directly in it. They are written in a hidden folder, which then replaces that of
+/// an earlier calibration: nothing of the old one is left, and nothing is lost where writing fails.
 fn write(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<PathBuf>> {
     refuse_other(folder)?;
     let cannot = || {
@@ -135,7 +135,7 @@ fn write(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<Path
     Ok(told.into_iter().map(|file| folder.join(file)).collect())
 }
 
-/// Whether a name is that of a file that a calibration writes.
+/// Whether a calibration writes a file of this name.
 fn is_ours(name: &str) -> bool {
     const OURS: [&str; 7] = [
         "calibrated.urdf",
@@ -149,7 +149,7 @@ fn is_ours(name: &str) -> bool {
     OURS.contains(&name) || name == "folds" || name.ends_with(".svg")
 }
 
-/// Refuses a folder that holds what no calibration wrote.
+/// Refuses a folder with files that no calibration wrote.
 fn refuse_other(folder: &Path) -> Result<()> {
     if folder.file_name().is_none() {
         return Err(BadInput(format!("{} is no name of a folder; name one with --out", folder.display())).into());
@@ -171,7 +171,7 @@ fn refuse_other(folder: &Path) -> Result<()> {
     }
 }
 
-/// Writes all files below a folder, and tells the names of those that lie in it.
+/// Writes all files below a folder, and returns the names of those directly in it.
 fn write_into(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<String>> {
     let mut told = Vec::new();
     for File { path, text } in found.files(case)?.into_iter().chain(report::files(found, case)) {

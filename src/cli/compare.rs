@@ -41,13 +41,13 @@ pub struct Arguments {
     part: Option<PathBuf>,
     #[command(flatten)]
     threads: Threads,
-    /// Set the best possible designs of 5, 10, 20, … movements beside the learners: what nobody can beat with as many.
-    /// It takes a second for 6 joints, half a minute for 12, minutes for 20
+    /// Add the best possible designs of 5, 10, 20, … movements, which no learner can beat with as many. It takes a
+    /// second for 6 joints, half a minute for 12, minutes for 20
     #[arg(long)]
     limits: bool,
 }
 
-/// Where a comparison goes.
+/// The outputs of a comparison.
 #[derive(Debug, clap::Args)]
 pub struct Outputs {
     /// Write everything as JSON to FILE, or to standard output for `-`
@@ -85,13 +85,13 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
 }
 
 impl Outputs {
-    /// That they, and the part that is written, can be written, and write over nothing that is read.
+    /// Checks that the outputs, and the part that is written, can be written, and overwrite no input.
     pub fn check(&self, part: Option<&Path>, inputs: &[PathBuf]) -> Result<()> {
         let outputs = output::Outputs::default().file("--json", self.json.as_deref());
         outputs.file("--csv", self.csv.as_deref()).file("--part", part).check(inputs)
     }
 
-    /// Writes what is wanted, and says the rest.
+    /// Writes the requested outputs, and prints the rest.
     pub fn tell(&self, comparison: &Comparison) -> Result<()> {
         let mut failures = Failures::default();
         if let Some(path) = &self.csv {
@@ -143,7 +143,7 @@ fn one_part(
     output::say(format!("wrote {count} runs to {}", path.display()))
 }
 
-/// Runs the learners over the seeds, on all cores; the outcome does not depend on how many there are.
+/// Runs the learners over the seeds, on all cores; the outcome does not depend on their number.
 pub fn over_seeds(
     scenario: &Scenario,
     learners: Option<&[String]>,

@@ -1,4 +1,4 @@
-//! What any learner could reach, beside what the learners did, in lines to read.
+//! Lines on what any learner could reach, beside what the learners reached.
 
 use anyhow::Result;
 use body_schema_engine::design::BestDesign;
@@ -6,7 +6,7 @@ use body_schema_scenario::{Scenario, WorldSpec};
 
 use super::{BadInput, output};
 
-/// Refuses to look for best designs where there can be none.
+/// Refuses to search for best designs where there can be none.
 pub fn check(scenario: &Scenario) -> Result<()> {
     let why = match &scenario.world {
         _ if scenario.design_problem().is_some() => return Ok(()),
@@ -17,7 +17,8 @@ pub fn check(scenario: &Scenario) -> Result<()> {
     Err(BadInput(format!("--limits: scenario `{}` {why}; leave --limits out", scenario.name)).into())
 }
 
-/// Prints the counting yardstick, and where best designs were asked for how near each learner's data came to the last.
+/// Prints the counting yardstick, and, if best designs were asked for, how near each learner's data came to the last
+/// one.
 pub fn say<'a>(
     movements_by_counting: usize,
     best_designs: &[BestDesign],

@@ -58,9 +58,9 @@ struct SeedRange {
     last: u64,
 }
 
-/// More runs than this make a folder that nobody downloads.
+/// The most runs: more make a folder that is too large to download.
 const MOST_SEEDS: usize = 200;
-/// Browsers read greater numbers as others.
+/// The greatest seed that browsers read exactly.
 const MAX_SEED: u64 = (1 << 53) - 1;
 
 impl FromStr for SeedRange {
@@ -129,13 +129,13 @@ pub fn export(arguments: &Arguments) -> Result<()> {
     output::say(format!("any static host serves it; here: python3 -m http.server -d {out}"))
 }
 
-/// Where sessions are read, if any are.
+/// The folder of stored sessions, if any are exported.
 fn data_dir(arguments: &Arguments) -> Result<Option<PathBuf>> {
     let folder = || arguments.data_dir.clone().map_or_else(serve::usual_data_dir, Ok);
     (!arguments.sessions.is_empty()).then(folder).transpose()
 }
 
-/// The stored sessions that are asked for.
+/// The requested stored sessions.
 fn sessions(arguments: &Arguments) -> Result<Vec<Session>> {
     let Some(folder) = data_dir(arguments)? else { return Ok(Vec::new()) };
     let mend = || format!("no sessions can be read in {}; name the server's folder with --data-dir", folder.display());

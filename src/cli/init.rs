@@ -73,7 +73,7 @@ pub fn init(arguments: &Arguments) -> Result<()> {
     output::say(format!("wrote {}; look it over, then: body-schema calibrate {}", out.display(), out.display()))
 }
 
-/// What the calibration is called: letters, digits and what else a name may have.
+/// The name of the calibration: letters, digits and other characters that a name may have.
 fn name(file: &Path) -> String {
     let stem = file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let name: String =
@@ -82,7 +82,7 @@ fn name(file: &Path) -> String {
     if name.is_empty() { "robot".to_owned() } else { name.to_owned() }
 }
 
-/// How a file is named from another's folder: by its name where it lies there, else by its whole path.
+/// The path of a file as seen from another's folder: its name if it lies there, otherwise its whole path.
 fn beside(file: &Path, other: &Path) -> String {
     let folder = |path: &Path| {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();

@@ -1,4 +1,4 @@
-//! Where scenarios and their data come from.
+//! Loading scenarios and their data.
 
 use std::{
     fs::File,
@@ -12,18 +12,19 @@ use body_schema_table::{Guard, MOST_BYTES};
 
 use super::BadInput;
 
-/// A scenario file, or a description, is no longer, in bytes: neither is a table.
+/// The most bytes of a scenario file or a description.
 const MOST_TEXT: u64 = 16 << 20;
 
 /// Reads the text of a scenario, as [`Scenario::parse`] does.
 type Parse = fn(&str, &str, &dyn Fn(&str) -> Result<String, String>) -> Result<Scenario, ScenarioError>;
 
-/// A built-in scenario by name, or else a file by path.
+/// Loads a built-in scenario by name, or else a file by path.
 pub fn load_scenario(name: &str) -> Result<Scenario> {
     load(name, Scenario::parse)
 }
 
-/// The same, or a calibration file without a table: of a robot that is still to be measured.
+/// Loads a scenario as [`load_scenario`] does, or a calibration file without a table: of a robot that is still to be
+/// measured.
 pub fn load_robot(name: &str) -> Result<Scenario> {
     load(name, |file, text, open| {
         let is_unmeasured = |keys: toml::Table| {
@@ -54,7 +55,7 @@ fn load(name: &str, parse: Parse) -> Result<Scenario> {
     Ok(parse(name, &text, &|file| read_data(&folder.join(file)))?)
 }
 
-/// The files that a scenario was read from: none of a built-in one.
+/// The files that a scenario was read from; empty for a built-in one.
 pub fn files_of(name: &str, scenario: &Scenario) -> Vec<PathBuf> {
     if BUILTIN.iter().any(|builtin| builtin.name == name) {
         return Vec::new();
@@ -64,15 +65,15 @@ pub fn files_of(name: &str, scenario: &Scenario) -> Vec<PathBuf> {
     scenario.data.iter().map(|(file, _)| folder.join(file)).chain([path.clone()]).collect()
 }
 
-/// The text of a table, or of a robot's description, by how the file is called.
+/// The text of a table, or of a robot's description; which of the two is decided by the file's name.
 pub(super) fn read_data(path: &Path) -> Result<String, String> {
     let is_description =
         path.extension().is_some_and(|end| ["urdf", "xml", "xacro"].iter().any(|it| end.eq_ignore_ascii_case(it)));
     read_text(path, if is_description { MOST_TEXT } else { MOST_BYTES })
 }
 
-/// The text of a file of so many bytes at most. An error continues a sentence that begins with the file's name. What has no end, or
-/// is no text, is refused as soon as that is seen.
+/// The text of a file of at most `most` bytes. An error continues a sentence that begins with the file's name. Endless or binary
+/// input is refused as soon as it is recognised.
 pub(super) fn read_text(path: &Path, most: u64) -> Result<String, String> {
     let file = File::open(path).map_err(|error| format!("cannot be read: {error}"))?;
     let long = file.metadata().map(|found| found.len()).ok().filter(|long| *long > most);

@@ -1,4 +1,4 @@
-//! How much a server takes on, as arguments.
+//! The limits of a server, as arguments.
 
 use std::time::Duration;
 
@@ -100,7 +100,7 @@ impl LimitArguments {
     }
 }
 
-/// More than a machine can have, of whatever is counted: a slip of the finger.
+/// A parser of counts, with a maximum beyond what a machine can have: more is a slip of the finger.
 fn count() -> RangedU64ValueParser<usize> {
     RangedU64ValueParser::new().range(1..=1_000_000)
 }
@@ -119,7 +119,7 @@ fn steps() -> RangedU64ValueParser {
     RangedU64ValueParser::new().range(1..=super::MOST_STEPS)
 }
 
-/// As long as a day at most: more is meant as something else.
+/// Parses seconds, at most a day: more is meant as something else.
 fn seconds(text: &str) -> Result<Duration, String> {
     const DAY_S: f64 = 24.0 * 3600.0;
     let seconds: Option<f64> = text.parse().ok().filter(|seconds| *seconds > 0.0 && *seconds <= DAY_S);

@@ -1,4 +1,4 @@
-//! What `serve` tells while it runs, on standard error.
+//! The log of `serve`, on standard error.
 
 use std::{
     io::{IsTerminal, stderr},
@@ -18,19 +18,19 @@ use tracing_subscriber::{
 
 use super::BadInput;
 
-/// Where the level stands if no argument names one.
+/// The environment variable for the level, if no argument sets it.
 const VARIABLE: &str = "BODY_SCHEMA_LOG";
-/// Whose lines are of that level; those of the crates underneath are told from warnings on, as what they say below that is not
-/// ours to vouch for.
+/// The target whose lines have that level; those of other crates are logged from warnings on, because we cannot vouch for
+/// their other lines.
 const OURS: &str = "body_schema";
 
-/// So many lines wait to be written at most.
+/// The most lines that wait to be written.
 const MOST_WAITING: usize = 16 << 10;
 
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Log, on standard error")]
 pub struct LoggingArguments {
-    /// From which level on it is told what happens: off, error, warn, info, debug or trace [default: that of the environment's
+    /// Log events of this level and above: off, error, warn, info, debug or trace [default: that of the environment's
     /// BODY_SCHEMA_LOG, else info]
     #[arg(long = "log", value_name = "LEVEL", value_parser = level)]
     level: Option<LevelFilter>,
@@ -49,7 +49,7 @@ enum Format {
 }
 
 impl LoggingArguments {
-    /// Has everything told from now on. What waits to be written is written when the answer goes.
+    /// Starts logging. Waiting lines are written when the returned guard is dropped.
     pub fn begin(&self) -> Result<WorkerGuard> {
         let level = self.level.map_or_else(usual_level, Ok)?;
         // Who does not read the log, as a terminal that is halted, holds up nobody: lines are lost then.

@@ -1,4 +1,4 @@
-//! `merge`: the parts of a comparison, computed apart.
+//! `merge`: puts the parts of a comparison together, which were computed separately.
 
 use std::path::PathBuf;
 

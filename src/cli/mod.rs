@@ -1,4 +1,4 @@
-//! Commands, their arguments, and what becomes of their errors.
+//! Commands, their arguments, and the handling of their errors.
 
 mod calibrate;
 mod compare;
@@ -84,7 +84,7 @@ enum Command {
     Check(scenarios::CheckArguments),
 }
 
-/// Which scenario, and which of its learners.
+/// The choice of a scenario, and of its learners.
 #[derive(Debug, clap::Args)]
 struct ScenarioArguments {
     /// A built-in scenario (see `body-schema scenarios`) or the path of a scenario file
@@ -112,23 +112,23 @@ impl ScenarioArguments {
     }
 }
 
-/// Movements: more nobody waits for.
+/// The most movements: nobody waits for more.
 const MOST_STEPS: u64 = 1_000_000_000;
 
-/// How many movements.
+/// Parses a number of movements.
 fn steps(text: &str) -> Result<u64, String> {
     let steps = text.parse().ok().filter(|steps| *steps <= MOST_STEPS);
     steps.ok_or_else(|| format!("write a number of movements from 0 to {MOST_STEPS}"))
 }
 
-/// A length that robots have to do with.
+/// Parses a length that is plausible for robots.
 fn millimetres(text: &str) -> Result<f64, String> {
     const MOST: f64 = 1e6;
     let mm = text.parse::<f64>().ok().filter(|mm| *mm > 0.0 && *mm <= MOST);
     mm.ok_or_else(|| format!("a number of millimetres above 0 is needed, at most {MOST}, as 50"))
 }
 
-/// Refuses learners for which a person chooses: on the command line nobody does.
+/// Refuses learners for which a person chooses, which is impossible on the command line.
 fn no_person(learners: &[LearnerSpec]) -> Result<()> {
     let Some(LearnerSpec { name, .. }) = learners.iter().find(|spec| spec.policy == PolicyKind::Human) else {
         return Ok(());
@@ -164,16 +164,16 @@ pub fn run(arguments: Arguments) -> Result<()> {
     }
 }
 
-/// On how many threads work is done.
+/// The number of threads.
 #[derive(Debug, clap::Args)]
 struct Threads {
-    /// Run on so many threads, 512 at most [default: one per core]; only times depend on it
+    /// Number of threads, 512 at most [default: one per core]; only times depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=512))]
     threads: Option<u16>,
 }
 
 impl Threads {
-    /// Runs `work` on them, or on the common pool.
+    /// Runs `work` on these threads, or on the common pool.
     fn run<T: Send>(&self, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
         match self.threads {
             None => work(),
@@ -186,12 +186,12 @@ impl Threads {
     }
 }
 
-/// Something that the user gave and can mend.
+/// An error in what the user gave, which the user can correct.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct BadInput(String);
 
-/// Whether the error lies in what was asked, and not in carrying it out.
+/// Whether the error lies in the request rather than in carrying it out.
 fn is_bad_input(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.is::<BadInput>()
@@ -202,7 +202,7 @@ fn is_bad_input(error: &anyhow::Error) -> bool {
     })
 }
 
-/// With what the program ends: 2 where the error lies in what was asked, as a shell has it after a signal, else 1.
+/// The exit code: 2 if the error lies in the request, the shell's code after a signal, otherwise 1.
 pub fn exit_code(error: &anyhow::Error) -> u8 {
     match error.downcast_ref::<signals::Interrupted>() {
         Some(interrupted) => interrupted.signal.exit_code(),
@@ -211,8 +211,8 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
     }
 }
 
-/// The error with its causes. Many of our errors name their cause in the midst of what they say, before the mend: a
-/// cause that was already told is not told again.
+/// The error with its causes. Many of our errors name their cause in the middle of their text, before the hint; a cause
+/// that is already there is not repeated.
 pub fn told(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |told, cause| match told.as_str() {
         "" => cause,
@@ -221,14 +221,14 @@ pub fn told(error: &anyhow::Error) -> String {
     })
 }
 
-/// Whether the reader of our output went away, as `head` does: no failure.
+/// Whether the reader of our output went away, as `head` does, which is no failure.
 pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
     })
 }
 
-/// How many steps to run: what was asked, else the scenario's own; no more than there are recorded movements.
+/// The number of steps to run: as requested, or else the scenario's; at most the number of recorded movements.
 fn steps_of(scenario: &Scenario, asked: Option<u64>) -> Result<u64> {
     let steps = asked.unwrap_or(scenario.steps);
     let available = scenario.experiment(1, None).context("the scenario cannot start")?.remaining();

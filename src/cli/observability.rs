@@ -1,4 +1,4 @@
-//! `observability`: before any measurement, what can be determined and by how many postures.
+//! `observability`: what can be determined before any measurement, and with how many postures.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ pub struct Arguments {
     /// The path of a scenario or calibration file, with a table or without, or a built-in scenario; recorded rows do not count
     #[arg(value_name = "FILE")]
     file: String,
-    /// Look at so many postures
+    /// Number of postures to look at
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=1000))]
     postures: u16,
     /// The error of predictions that is wanted, millimetres [default: the file's `[settled]`]
@@ -76,7 +76,7 @@ fn summarise(found: &Observability) -> Result<()> {
     output::say(output::table(["standard deviation of", "before", &after[0], &after[1]], deviations))
 }
 
-/// Few enough to read: 1, 2, 3, 5, 8, 12, 20, 30, 50, … and the last.
+/// The points that are printed, few enough to read: 1, 2, 3, 5, 8, 12, 20, 30, 50, … and the last.
 fn told(errors: &[ErrorPoint]) -> impl Iterator<Item = &ErrorPoint> {
     let mut next = 1;
     errors.iter().filter(move |point| {

@@ -1,4 +1,4 @@
-//! Where results go: files, standard output, tables.
+//! Outputs of commands: files, standard output, tables.
 
 use std::{
     fs::File,
@@ -28,18 +28,18 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     atomic::write(path, (text + "\n").as_bytes()).with_context(|| cannot(path))
 }
 
-/// What an error says first that is about writing a file.
+/// The beginning of an error about writing a file.
 pub fn cannot(path: &Path) -> String {
     format!("cannot write {}; what was there before is as it was", path.display())
 }
 
-/// Begins a file that is written bit by bit, and has its name once it is committed.
+/// Begins a file that is written piece by piece, and gets its name once it is committed.
 pub fn create(path: &Path) -> Result<(BufWriter<File>, AtomicFile)> {
     let (file, whole) = AtomicFile::create(path).with_context(|| cannot(path))?;
     Ok((BufWriter::new(file), whole))
 }
 
-/// What a command writes, by the options that name it. It is checked before any work is done.
+/// The outputs of a command, by the options that name them. They are checked before any work is done.
 #[derive(Default)]
 pub struct Outputs<'a> {
     files: Vec<(&'static str, &'a Path)>,
@@ -47,20 +47,19 @@ pub struct Outputs<'a> {
 }
 
 impl<'a> Outputs<'a> {
-    /// A file, where one is asked for.
+    /// Adds a file, if one is requested.
     pub fn file(mut self, option: &'static str, path: Option<&'a Path>) -> Self {
         self.files.extend(path.filter(|path| !is_stdout(path)).map(|path| (option, path)));
         self
     }
 
-    /// A folder whose files are replaced.
+    /// Adds a folder whose files are replaced.
     pub fn folder(mut self, option: &'static str, path: Option<&'a Path>) -> Self {
         self.folders.extend(path.map(|path| (option, path)));
         self
     }
 
-    /// Refuses what would write over a file that is read, or over another output, whatever the ways that lead to it; then what cannot
-    /// be written.
+    /// Refuses an output that would overwrite an input or another output, through whatever links; then one that cannot be written.
     pub fn check(&self, inputs: &[PathBuf]) -> Result<()> {
         for (index, (option, path)) in self.files.iter().enumerate() {
             let shown = path.display();
@@ -114,18 +113,18 @@ fn is_file(path: &Path) -> bool {
     path.metadata().is_ok_and(|found| found.is_file())
 }
 
-/// Whether two paths lead to one file: by links of both kinds, and where there is none yet.
+/// Whether two paths lead to one file: through links of both kinds, and also where there is no file yet.
 fn is_same(one: &Path, other: &Path) -> bool {
     let is_linked = || is_file(one) && is_file(other) && same_file::is_same_file(one, other).unwrap_or(false);
     resolved(one) == resolved(other) || is_linked()
 }
 
-/// Whether a path is that of a folder, or leads into it.
+/// Whether a path is a folder's, or leads into it.
 fn is_within(path: &Path, folder: &Path) -> bool {
     resolved(path).starts_with(resolved(folder))
 }
 
-/// Where a path leads, whether or not there is anything yet.
+/// The path behind all links, whether or not there is anything yet.
 fn resolved(path: &Path) -> PathBuf {
     let place = atomic::destination(path).ok().flatten().unwrap_or_else(|| path.to_owned());
     let mut above = place.ancestors().skip(1);
@@ -140,7 +139,7 @@ fn resolved(path: &Path) -> PathBuf {
     place.canonicalize().ok().or_else(in_folder).unwrap_or_else(|| place.clone())
 }
 
-/// What of a command's results could not be written. Everything else is written and told all the same.
+/// The results of a command that could not be written. All others are written and printed all the same.
 #[derive(Default)]
 pub struct Failures(Vec<anyhow::Error>);
 
@@ -149,7 +148,7 @@ impl Failures {
         self.0.extend(written.err());
     }
 
-    /// Fails where anything did.
+    /// Returns an error if anything failed.
     pub fn end(self) -> Result<()> {
         let mut failures = self.0;
         let Some(last) = failures.pop() else { return Ok(()) };
@@ -158,7 +157,7 @@ impl Failures {
     }
 }
 
-/// Tells something on standard error. Whoever has closed it goes without.
+/// Prints text to standard error, if that is open.
 pub fn tell(text: impl std::fmt::Display) {
     drop(writeln!(std::io::stderr(), "{text}"));
 }
@@ -177,12 +176,12 @@ pub fn table<const N: usize>(header: [impl ToString; N], rows: impl IntoIterator
     table
 }
 
-/// A number with so many decimals, or a dash.
+/// A number with this many decimals, or a dash.
 pub fn number(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.decimals$}"))
 }
 
-/// Prints a line, or a table, to standard output. Whoever has read enough of it, as `head`, may close it.
+/// Prints a line, or a table, to standard output. A reader that has read enough, such as `head`, may close it.
 pub fn say(text: impl std::fmt::Display) -> Result<()> {
     match writeln!(std::io::stdout(), "{text}") {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),

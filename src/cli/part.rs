@@ -19,14 +19,14 @@ use serde::{Deserialize, Serialize};
 
 use super::{BadInput, output, seeds::MOST as MOST_SEEDS};
 
-/// The form of these files.
+/// The version of the form of these files.
 const FORM: u32 = 1;
-/// There is a seed for each.
+/// The most parts: one for each seed.
 const MOST_PARTS: u64 = MOST_SEEDS;
-/// The longest part that is read, unpacked, and what all may have together, in bytes: they are held in memory.
+/// The most bytes of a part, unpacked, and of all parts together: they are held in memory.
 const MOST_BYTES: u64 = 256 << 20;
 const MOST_BYTES_OF_ALL: u64 = 4 << 30;
-/// So many missing parts are named.
+/// The most missing parts that are named.
 const NAMED: usize = 12;
 
 /// One of so many parts, counted from 1.
@@ -65,13 +65,13 @@ impl FromStr for Shard {
     }
 }
 
-/// What a part is a part of.
+/// The comparison that a part belongs to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct About {
     form: u32,
-    /// Of body-schema: another may compute other runs.
+    /// The version of body-schema: another may compute other runs.
     version: String,
-    /// The name of the scenario, and its file, which has to be the same for all.
+    /// The name of the scenario, and its file, which must be the same for all parts.
     scenario: String,
     source: String,
     learners: Vec<String>,
@@ -88,7 +88,7 @@ impl About {
         Self { form: FORM, version, scenario, source, learners, steps, seeds, shard }
     }
 
-    /// Why this and another are no parts of one comparison; nothing if they are.
+    /// The reason why this part and another do not belong to one comparison; `None` if they do.
     fn differs_from(&self, other: &Self) -> Option<&'static str> {
         let alike = [
             (self.version == other.version, "another version of body-schema wrote it"),
@@ -103,7 +103,7 @@ impl About {
     }
 }
 
-/// A file that is being written. It has its name only once it is whole.
+/// A part that is being written. It gets its name only once it is whole.
 pub struct Writer {
     path: PathBuf,
     whole: AtomicFile,
@@ -134,7 +134,7 @@ impl Writer {
     }
 }
 
-/// What one run over all seeds would have given.
+/// Merges parts into what one run over all seeds would have given.
 pub fn merged(paths: &[PathBuf]) -> Result<Comparison> {
     let refuse = |path: &Path, why: &str| BadInput(format!("{}: {why}", path.display()));
     let (mut all, mut traces): (Vec<(About, &Path)>, Vec<Trace>) = (Vec::new(), Vec::new());
@@ -175,7 +175,7 @@ pub fn merged(paths: &[PathBuf]) -> Result<Comparison> {
     Ok(Comparison::of(&about.scenario, about.steps, &traces))
 }
 
-/// Reads a part, and takes what it has of the bytes that are left for all.
+/// Reads a part, and deducts its size from the bytes that are left for all.
 fn read(path: &Path, left: &mut u64) -> Result<(About, Vec<Trace>)> {
     let name = path.display();
     let file = File::open(path).with_context(|| format!("cannot read {name}"))?;

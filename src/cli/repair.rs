@@ -1,4 +1,4 @@
-//! `repair`: what a crash left, mended.
+//! `repair`: repairs what a crash left.
 
 use std::{
     ffi::OsStr,
@@ -15,7 +15,7 @@ use super::{
     output::{self, Outputs},
 };
 
-/// What `--help` tells.
+/// The text of `--help`.
 pub const ABOUT: &str = "\
 Mend what a crash left of sessions that a server keeps, or of a recording
 
@@ -97,7 +97,7 @@ fn folder(path: &Path, check: bool) -> Result<Vec<Finding>> {
     }
 }
 
-/// A recording, mended in its place unless it is to be left there.
+/// Repairs a recording, in its place unless `out` names another file.
 fn recording(path: &Path, out: Option<&Path>, check: bool) -> Result<Finding> {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     let condition = match examine(path) {

@@ -48,7 +48,7 @@ pub struct Arguments {
     /// Write the outcome and the learned models as JSON to FILE, or to standard output for `-`
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Set the best possible designs of several lengths beside the learners (see `compare --help`)
+    /// Add the best possible designs of several lengths (see `compare --help`)
     #[arg(long)]
     limits: bool,
 }
@@ -115,7 +115,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     interrupted.map_or(Ok(()), |interrupted| Err(interrupted.into()))
 }
 
-/// What is written while the run goes on. A file that cannot be written is given up, and the run goes on without it.
+/// The files that are written while the run goes on. A file that cannot be written is given up, and the run goes on
+/// without it.
 struct Files<'a> {
     recording: Option<(&'a Path, Recorder)>,
     table: Option<(&'a Path, StepsTable)>,
@@ -170,7 +171,7 @@ impl<'a> Files<'a> {
         self.failures.keep(Err(error));
     }
 
-    /// Gives the files their names. Tells which have them, and what has failed.
+    /// Gives the files their names. Returns those that have them, and what has failed.
     fn end(self, designs: &[BestDesign]) -> (Vec<PathBuf>, Failures) {
         let Self { recording, table, mut failures } = self;
         let mut written = Vec::new();
@@ -189,7 +190,7 @@ impl<'a> Files<'a> {
         (written, failures)
     }
 
-    /// Leaves none of them.
+    /// Removes all of them.
     fn discard(self) {
         self.recording.into_iter().for_each(|(_, recorder)| recorder.discard());
     }

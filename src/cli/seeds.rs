@@ -17,13 +17,13 @@ impl Seeds {
         [*self.0.start(), *self.0.end()]
     }
 
-    /// How many seeds.
+    /// The number of seeds.
     pub fn count(&self) -> u64 {
         (self.0.end() - self.0.start()).saturating_add(1)
     }
 }
 
-/// More seeds than this are a slip of the finger.
+/// The most seeds; more are a slip of the finger.
 pub const MOST: u64 = 100_000;
 
 impl FromStr for Seeds {

@@ -32,7 +32,7 @@ pub struct Arguments {
     /// Keep nothing: sessions end with the server
     #[arg(long, conflicts_with = "data_dir")]
     ephemeral: bool,
-    /// Answer only those who carry the token in FILE [default: on addresses that other machines can reach a token is drawn
+    /// Answer only requests with the token in FILE [default: on addresses that other machines can reach a token is drawn
     /// and printed, on others none is needed]
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
@@ -52,7 +52,7 @@ pub struct Arguments {
     limits: LimitArguments,
 }
 
-/// No file with a token is longer, in bytes.
+/// The most bytes of a file with a token.
 const MOST_TOKEN: u64 = 1 << 20;
 
 const DEFAULT_ADDRESS: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
@@ -134,12 +134,12 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
     served
 }
 
-/// Prints a line. Whoever has closed standard output is served all the same.
+/// Prints a line, if standard output is open.
 fn say(line: String) {
     drop(writeln!(std::io::stdout(), "{line}"));
 }
 
-/// Where sessions are kept; `None` if nowhere.
+/// The folder in which sessions are kept; `None` if nowhere.
 fn data_dir(arguments: &Arguments) -> Result<Option<PathBuf>> {
     if arguments.ephemeral {
         return Ok(None);
@@ -155,7 +155,7 @@ pub(super) fn usual_data_dir() -> Result<PathBuf> {
     Ok(project.data_dir().to_owned())
 }
 
-/// What whoever asks has to carry; `None` if nothing.
+/// The token that requests must carry; `None` if none.
 fn token(arguments: &Arguments) -> Result<Option<Token>> {
     if let Some(file) = &arguments.token_file {
         let mend =
@@ -177,7 +177,7 @@ fn reachable(address: SocketAddr) -> SocketAddr {
     }
 }
 
-/// The first signal asks the server to end, the second ends the program. Tells of the second, if it came.
+/// Ends the server at the first signal, and the program at the second. The returned cell holds the second, if it came.
 fn end_by_signals(shutdown: CancellationToken) -> Result<Arc<OnceLock<Signal>>> {
     let mut signals = Signals::new().context("cannot wait for signals")?;
     let ordered = Arc::new(OnceLock::new());

@@ -25,7 +25,7 @@ impl Signal {
     const INTERRUPT: Self = Self(2);
     const TERMINATE: Self = Self(15);
 
-    /// What a shell expects of a program that it has ended.
+    /// The exit code that a shell expects of a program ended by this signal.
     pub fn exit_code(self) -> u8 {
         128 + self.0
     }
@@ -41,12 +41,12 @@ impl fmt::Display for Signal {
     }
 }
 
-/// All that ask to end, from when this is made on. A file that has become too large for the process (`ulimit -f`) is an error from then
-/// on, which is told, and no end without a word.
+/// All signals that ask to end, received from when this is made. From then on, a file that has become too large for the process
+/// (`ulimit -f`) is a reported error rather than a silent end.
 pub struct Signals {
     #[cfg(unix)]
     unix: [tokio::signal::unix::Signal; 2],
-    /// None where the program was started to stay when its terminal goes, as by `nohup`.
+    /// The hang-up signal; `None` if the program was started to stay when its terminal goes, for example by `nohup`.
     #[cfg(unix)]
     hang_up: Option<tokio::signal::unix::Signal>,
     #[cfg(unix)]
@@ -58,7 +58,7 @@ pub struct Signals {
 const TOO_LARGE: i32 = if cfg!(any(target_arch = "mips", target_arch = "mips64")) { 31 } else { 25 };
 
 impl Signals {
-    /// Within a runtime.
+    /// Registers the signals; to be called within a runtime.
     pub fn new() -> std::io::Result<Self> {
         #[cfg(unix)]
         {
@@ -71,7 +71,7 @@ impl Signals {
         Ok(Self {})
     }
 
-    /// The next of them.
+    /// The next signal.
     pub async fn next(&mut self) -> Signal {
         #[cfg(unix)]
         {
@@ -99,7 +99,7 @@ impl Signals {
     }
 }
 
-/// Whether whoever started the program had it ignore SIGHUP; known on Linux alone.
+/// Whether the program was started with SIGHUP ignored; known on Linux only.
 #[cfg(unix)]
 fn ignores_hang_up() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -107,18 +107,18 @@ fn ignores_hang_up() -> bool {
     ignored.is_some_and(|ignored| ignored & 1 != 0)
 }
 
-/// For work that no runtime does: whether it was asked to end. A second signal ends the program at once.
+/// For work outside of a runtime: whether it was asked to end. A second signal ends the program at once.
 #[derive(Clone)]
 pub struct Interruption(Arc<AtomicU8>);
 
-/// What the program may still take after it was ordered to end: files want their footers.
+/// The time that the program may still take after the second signal, to write the footers of files.
 pub const INSTANT: Duration = Duration::from_millis(250);
 
-/// How often work that cannot be interrupted is looked after.
+/// The interval at which work that cannot be interrupted is checked.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 impl Interruption {
-    /// From now on.
+    /// Begins to watch for signals.
     pub fn watch() -> Result<Self> {
         let told = Self(Arc::default());
         let number = told.0.clone();
@@ -139,7 +139,7 @@ impl Interruption {
         }
     }
 
-    /// Does work that cannot be interrupted, and leaves it to itself if a signal comes.
+    /// Does work that cannot be interrupted, and abandons it if a signal comes.
     pub fn unless<T: Send + 'static>(&self, work: impl FnOnce() -> T + Send + 'static) -> Option<T> {
         if self.signal().is_some() {
             return None;
@@ -161,12 +161,12 @@ impl Interruption {
     }
 }
 
-/// From now on the first signal ends the program at once: for work of which nothing is kept that is not whole.
+/// Lets the first signal end the program at once: for work whose unfinished results are not kept.
 pub fn end_at_once() -> Result<()> {
     wait(async |signals| signals.next().await)
 }
 
-/// Ends the program by the signal that `order` waits for, and leaves nothing unfinished.
+/// Ends the program by the signal that `order` waits for, and removes everything unfinished.
 fn wait(order: impl AsyncFnOnce(&mut Signals) -> Signal + Send + 'static) -> Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().context("cannot start")?;
     let mut signals = {
@@ -178,7 +178,7 @@ fn wait(order: impl AsyncFnOnce(&mut Signals) -> Signal + Send + 'static) -> Res
     Ok(())
 }
 
-/// What was asked for was not done to the end, because of a signal.
+/// An error: a signal ended the work early.
 #[derive(Debug, thiserror::Error)]
 #[error("{told}")]
 pub struct Interrupted {

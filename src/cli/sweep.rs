@@ -59,12 +59,12 @@ impl FromStr for Axis {
     }
 }
 
-/// One point of the grid and how the learner fared there.
+/// A point of the grid, and the learner's results there.
 #[derive(Debug, Serialize)]
 struct Trial {
     values: Vec<(String, String)>,
     summary: Summary,
-    /// Median errors at the end, to rank what does not converge.
+    /// Median errors at the end, for ranking points that do not converge.
     location_m: Option<f64>,
     prediction_mean_m: Option<f64>,
 }
@@ -140,10 +140,10 @@ pub fn sweep(arguments: &Arguments) -> Result<()> {
     failures.end()
 }
 
-/// A grid of more points is a slip of the finger.
+/// The most points of a grid; more are a slip of the finger.
 const MOST_POINTS: usize = 10_000;
 
-/// Medians this close cannot be told apart by a few dozen seeds.
+/// The ratio of medians within which a few dozen seeds cannot tell two apart.
 const INDISTINGUISHABLE: f64 = 1.05;
 
 /// Of the trials whose median is within 5 % of the lowest, the one with the lowest 90th percentile; the first trial
@@ -173,7 +173,7 @@ fn grid(axes: &[Axis]) -> Vec<Vec<(String, Value)>> {
     })
 }
 
-/// The scenario with these values; recorded data stay those of `base`.
+/// The scenario with these values; recorded data are those of `base`.
 fn with_values(base: &Scenario, values: &[(String, Value)]) -> Result<Scenario> {
     let text = edited(&base.source, values).map_err(BadInput)?;
     let open = |file: &str| base.data_file(file);

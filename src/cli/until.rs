@@ -1,4 +1,4 @@
-//! What ends a run early.
+//! The early end of a run.
 
 use anyhow::Result;
 use body_schema_experiment::{SETTLING_STEPS, StepOutcome};
@@ -6,7 +6,7 @@ use body_schema_scenario::{LearnerSpec, Scenario};
 
 use super::BadInput;
 
-/// What may end a run early.
+/// The reasons to end a run early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Until {
     /// The learners' own verdict, without truth.
@@ -16,16 +16,16 @@ pub enum Until {
 /// The end of a run whose learners are all settled: those that can be.
 #[derive(Clone, Debug)]
 pub struct Ending {
-    /// What a learner's own expected error must stay below, in words.
+    /// The threshold of a learner's own expected error, in words.
     target: String,
-    /// The learners waited for.
+    /// The learners that are waited for.
     awaited: Vec<String>,
-    /// Those that keep no covariance, and so expect no error of themselves.
+    /// The learners that keep no covariance, and so expect no error.
     others: Vec<String>,
 }
 
 impl Ending {
-    /// The end of a run of these learners; refused if none of them can ever settle.
+    /// The end of a run of these learners. Returns an error if none of them can ever settle.
     pub fn of(scenario: &Scenario, learners: &[LearnerSpec]) -> Result<Self> {
         let (awaited, others): (Vec<_>, Vec<_>) = learners.iter().partition(|spec| spec.estimator.keeps_covariance());
         let names = |specs: Vec<&LearnerSpec>| specs.into_iter().map(|spec| spec.name.clone()).collect::<Vec<_>>();

@@ -1,4 +1,4 @@
-//! What can go wrong with an export.
+//! Errors of an export.
 
 use std::{
     io,
@@ -16,19 +16,19 @@ pub enum ExportError {
     /// The folder holds something else.
     #[error("the folder {} is not empty and holds no export; name another with --out, or write into it with --force", .0.display())]
     NotEmpty(PathBuf),
-    /// A run cannot be so long.
+    /// A run cannot have this many steps.
     #[error(
         "a run of `{scenario}` in a page has 1 to {most} steps, {steps} were asked for; use --steps {most} or fewer"
     )]
     Steps {
         /// The scenario.
         scenario: String,
-        /// What was asked for.
+        /// The number that was asked for.
         steps: u64,
-        /// What is possible.
+        /// The most that is possible.
         most: u64,
     },
-    /// A scenario cannot be run so.
+    /// The scenario has no such learners, or cannot be run.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// A run broke off.
@@ -63,7 +63,7 @@ pub enum ExportError {
 }
 
 impl ExportError {
-    /// Whether the error lies in what was asked, and not in carrying it out.
+    /// Whether the error lies in the request rather than in carrying it out.
     pub fn is_bad_input(&self) -> bool {
         match self {
             Self::NotEmpty(_) | Self::Steps { .. } => true,
@@ -73,7 +73,7 @@ impl ExportError {
     }
 }
 
-/// Says what was being done to which file when it failed.
+/// Adds to an error what was being done to which file.
 pub(super) trait Doing<T> {
     fn doing(self, doing: &'static str, path: &Path) -> Result<T, ExportError>;
 }

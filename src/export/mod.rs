@@ -32,47 +32,52 @@ use body_schema_scenario::{Scenario, ScenarioSummary, WorldSpec};
 use error::Doing;
 use run::Recorded;
 
-/// What says that a folder is an export, and what is in it.
+/// The name of the manifest, which marks a folder as an export and lists its content.
 const MANIFEST: &str = "export.json";
 /// The folders of runs and scenario files.
 const RUNS: &str = "runs";
 const SCENARIOS: &str = "scenarios";
-/// Where those of an earlier export wait for their end.
+/// The folder in which the runs of an earlier export wait to be removed.
 const OLD: &str = ".old";
-/// Raised when the meaning of a file changes.
+/// The version of the form; raised when the meaning of a file changes.
 const FORMAT: u32 = 1;
-/// Steps of a run unless told otherwise.
+/// The steps of a run, unless stated otherwise.
 const USUAL_STEPS: u64 = 100;
 /// The longest run: what a page can fetch at once.
 pub const MAX_STEPS: u64 = 1000;
 
-/// What is to be exported.
+/// An export: what to write, and how.
 pub struct Export<'a> {
     /// The scenarios, each with what to run of it; with none the page computes all built-in ones itself.
     pub plans: Vec<Plan<'a>>,
-    /// The seeds of each scenario; what was told has its own.
+    /// The seeds of each scenario; a session has its own.
     pub seeds: Vec<u64>,
-    /// The address at which the folder will be, with a slash at its end, if it is known: previews of links to it have a
-    /// picture only then.
+    /// The address at which the folder will be served, with a slash at its end, if known: previews of links to it have
+    /// a picture only then.
     pub address: Option<String>,
-    /// Another build of the page's panel than that of this program, for those who work on it.
+    /// Another build of the page's panel than this program's, for work on it.
     pub panel_dir: Option<PathBuf>,
 }
 
-/// A scenario, and what to run of it.
+/// A scenario, and its runs.
 pub struct Plan<'a> {
     /// The scenario.
     pub scenario: &'a Scenario,
-    /// Its learners, by their names.
+    /// The learners' names.
     pub learners: Vec<String>,
     /// Steps of each run.
     pub steps: u64,
-    /// What was told by a robot elsewhere; it is shown in place of runs of its own.
+    /// A session with a robot elsewhere, which is shown in place of runs.
     told: Option<&'a Session>,
 }
 
 impl<'a> Plan<'a> {
-    /// The learners and steps that are asked for, or those that a page shows.
+    /// A plan with the given learners and steps, or those that a page shows by default.
+    ///
+    /// # Errors
+    ///
+    /// [`ExportError::Scenario`] if the scenario has no such learners, [`ExportError::Steps`] if `steps` is 0 or more
+    /// than a page can show.
     pub fn new(scenario: &'a Scenario, learners: Option<&[String]>, steps: Option<u64>) -> Result<Self, ExportError> {
         let learners = learners.map_or_else(|| scenario.summary().explorer, <[String]>::to_vec);
         let available = scenario.experiment(1, Some(&learners))?.remaining().map(|left| left as u64);
@@ -87,11 +92,11 @@ impl<'a> Plan<'a> {
         Ok(Self { scenario, learners, steps, told: None })
     }
 
-    /// A session with a robot elsewhere: its observations that count, or so many of them.
+    /// A plan that shows a session with a robot elsewhere: its first `steps` counting observations, or all.
     ///
     /// # Errors
     ///
-    /// [`ExportError::Steps`] of more than there are, and where there are none.
+    /// [`ExportError::Steps`] if `steps` is 0 or more than there are observations, or if there are none.
     pub fn told(session: &'a Session, steps: Option<u64>) -> Result<Self, ExportError> {
         let scenario = &**session.scenario();
         let most = session.latest().step.min(MAX_STEPS);
@@ -103,13 +108,13 @@ impl<'a> Plan<'a> {
         Ok(Self { scenario, learners, steps, told: Some(session) })
     }
 
-    /// The seeds of its runs, of those that are asked for.
+    /// The seeds of its runs: the requested ones, or that of its session.
     fn seeds(&self, asked: &[u64]) -> Vec<u64> {
         self.told.map_or_else(|| asked.to_vec(), |session| vec![session.setup().seed])
     }
 }
 
-/// As many as tell the story: where the body changes, also what comes after that.
+/// The default number of steps: where the body changes, it includes what comes after that.
 fn usual_steps(scenario: &Scenario) -> u64 {
     let changes_at = match &scenario.world {
         WorldSpec::Simulated { change: Some(change), .. } => change.step,
@@ -118,29 +123,29 @@ fn usual_steps(scenario: &Scenario) -> u64 {
     (changes_at + USUAL_STEPS).min(scenario.steps)
 }
 
-/// What was written.
+/// What an export wrote.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// How many files.
+    /// The number of files.
     pub files: u64,
-    /// Their size together, bytes.
+    /// The size of all files, bytes.
     pub bytes: u64,
 }
 
-/// What is in a folder.
+/// The content of a folder.
 #[derive(Debug, Serialize, Deserialize)]
 struct Manifest {
     format: u32,
     version: String,
     scenarios: Vec<Exported>,
-    /// Sizes of the compressed files once they are unpacked, bytes, by address.
+    /// The sizes of compressed files when unpacked, bytes, by address.
     unpacked: std::collections::BTreeMap<String, usize>,
 }
 
 /// A scenario of the folder.
 #[derive(Debug, Serialize, Deserialize)]
 struct Exported {
-    /// As a server lists it, with the learners and steps of its runs alone.
+    /// The scenario as a server lists it, with the learners and steps of its runs alone.
     #[serde(flatten)]
     summary: ScenarioSummary,
     /// The address of its file.
@@ -161,14 +166,19 @@ struct ExportedRun {
 }
 
 impl Export<'_> {
-    /// How many steps there are to make.
+    /// The number of steps to make.
     pub fn steps(&self) -> u64 {
         self.plans.iter().map(|plan| plan.steps * plan.seeds(&self.seeds).len() as u64).sum()
     }
 
-    /// Writes the folder. One that holds another export is replaced; one that holds anything else is refused unless `force`
-    /// says to write beside it. Everything is written aside, and takes its place once it is complete: where that fails the folder is as
-    /// it was. Seeds are run side by side; `tick` is called after every step.
+    /// Writes the folder. One that holds another export is replaced; one that holds anything else is refused unless `force` says to
+    /// write beside it. Everything is written to a hidden folder first, and takes its place once it is complete; if that fails the
+    /// folder is unchanged. Seeds are run side by side; `tick` is called after every step.
+    ///
+    /// # Errors
+    ///
+    /// [`ExportError::NotEmpty`] if the folder holds something else and `force` is not set, [`ExportError::Page`] if the page's files
+    /// are missing, [`ExportError::Run`] if a run breaks off, [`ExportError::File`] if a file cannot be written.
     pub fn write(&self, out: &Path, force: bool, tick: &(dyn Fn() + Sync)) -> Result<Written, ExportError> {
         let is_export = examine(out, force)?;
         let is_there = out.exists();
@@ -219,7 +229,7 @@ impl Export<'_> {
     }
 }
 
-/// Whether the folder holds an export; refused where it holds something else.
+/// Whether the folder holds an export; an error if it holds something else.
 fn examine(out: &Path, force: bool) -> Result<bool, ExportError> {
     if !out.exists() {
         return Ok(false);
@@ -233,7 +243,8 @@ fn examine(out: &Path, force: bool) -> Result<bool, ExportError> {
     if is_empty || is_export || force { Ok(is_export) } else { Err(ExportError::NotEmpty(out.to_owned())) }
 }
 
-/// Puts a whole export in the place of an earlier one, whose runs go with what is left of the new one's folder.
+/// Puts a new export in the place of an earlier one, whose runs are removed with the rest of the new one's hidden
+/// folder.
 fn put(from: &Path, to: &Path, is_export: bool) -> Result<(), ExportError> {
     let old = from.join(OLD);
     fs::create_dir(&old).doing("make the folder", &old)?;
@@ -276,7 +287,7 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), ExportError> {
     write(path, &serde_json::to_vec(value)?)
 }
 
-/// All files below a folder.
+/// The number and size of all files below a folder.
 fn measure(folder: &Path) -> Result<Written, ExportError> {
     let mut sum = Written { files: 0, bytes: 0 };
     for entry in fs::read_dir(folder).doing("read the folder", folder)? {

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use super::{ExportError, Plan, write};
 use crate::page::{self, CONTENT_SECURITY_POLICY, INDEX, PageFile};
 
-/// All files of the page but the page itself.
+/// All files of the page except the page itself.
 pub(super) struct Files(Vec<PageFile>);
 
 impl Files {
@@ -13,7 +13,7 @@ impl Files {
         Ok(Self(page::files(panel)?))
     }
 
-    /// Sizes of the compressed ones once they are unpacked, bytes.
+    /// The sizes of compressed files when unpacked, bytes.
     pub(super) fn unpacked(&self) -> BTreeMap<String, usize> {
         self.0.iter().filter(|file| is_packed(file)).map(|file| (address(file), file.bytes.len())).collect()
     }
@@ -29,7 +29,7 @@ impl Files {
     }
 }
 
-/// WebAssembly is what is large.
+/// Whether a file is large enough to be compressed: WebAssembly is.
 fn is_packed(file: &PageFile) -> bool {
     file.path.ends_with(".wasm")
 }
@@ -40,8 +40,8 @@ fn address(file: &PageFile) -> String {
     if is_packed(file) { format!("{path}.gz") } else { path.to_owned() }
 }
 
-/// The page: with relative addresses, its policy in itself, and a title of its own. The picture for previews of links is
-/// below `base`, if that is known.
+/// The page for an export: with relative addresses, its policy in itself, and a title of its own. The picture for
+/// previews of links is below `base`, if that is known.
 fn index(template: &str, files: &[PageFile], plans: &[Plan<'_>], base: Option<&str>) -> String {
     let source = if plans.is_empty() { "engine" } else { "files" };
     let mut page = template.replacen("<html ", &format!("<html data-source=\"{source}\" "), 1);

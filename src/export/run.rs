@@ -20,18 +20,18 @@ use body_schema_experiment::Experiment;
 use body_schema_recording::{LiveLog, Recorder, StepsCsv, Target, Theme};
 use body_schema_wire::{Choice, Description, RunResult, StepReport};
 
-/// Postures on the way from each step to the next, in which the page moves while it plays slowly.
+/// The number of postures on the way from each step to the next, in which the page moves while it plays slowly.
 const FRAMES: u64 = 6;
-/// The shapes of the view for which it is arranged, width in heights: a page takes the widest that is not wider than its
+/// The aspect ratios (width in heights) for which views are arranged: a page takes the widest that is not wider than its
 /// own, so that no arm is cut off.
 const ASPECTS: [f64; 11] = [0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.8];
 
-/// What the page must know of a run before it opens it.
+/// The facts about a run that the page needs before it opens it.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Recorded {
     /// The id of its recording.
     recording: String,
-    /// The shapes for which its view is arranged, width in heights, in order.
+    /// The aspect ratios for which its view is arranged, in order.
     aspects: Vec<f64>,
     /// The learners whose choices are explained.
     searched: BTreeSet<String>,
@@ -93,7 +93,7 @@ pub(super) fn record(
     Ok(Recorded { recording, aspects: ASPECTS.into(), searched })
 }
 
-/// How the last movements were chosen, of those learners that can tell, which are returned.
+/// Writes how the last movements were chosen, and returns the learners for which that is known.
 fn write_selections(experiment: &Experiment, learners: &[String], folder: &Path) -> Result<Vec<String>, ExportError> {
     let mut searched = Vec::new();
     for learner in learners {
@@ -107,7 +107,7 @@ fn write_selections(experiment: &Experiment, learners: &[String], folder: &Path)
     Ok(searched)
 }
 
-/// Compresses a file; the page unpacks it, whatever the host says of it.
+/// Writes a compressed file; the page unpacks it, whatever headers the host sends.
 fn write_packed(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
     let packed = encoder.write_all(bytes).and_then(|()| encoder.finish());

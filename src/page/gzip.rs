@@ -1,4 +1,4 @@
-//! Files as they are sent: compressed once, whoever asks for them first.
+//! Compressed forms of files, each made once, at the first request.
 
 use std::{
     io::{Read, Write},
@@ -8,12 +8,12 @@ use std::{
 use bytes::Bytes;
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 
-/// The compressed form of a file, made when it is first wanted; those who ask meanwhile wait for it.
+/// The compressed form of a file, made when it is first wanted; requests that come meanwhile wait for it.
 #[derive(Clone, Default)]
 pub(crate) struct Compressed(Arc<OnceLock<Option<Bytes>>>);
 
 impl Compressed {
-    /// One that was made when the program was built.
+    /// A form that was made when the program was built.
     pub(crate) fn ready(bytes: Bytes) -> Self {
         Self(Arc::new(OnceLock::from(Some(bytes))))
     }
@@ -23,7 +23,7 @@ impl Compressed {
         self.0.get_or_init(|| gzip(bytes)).clone()
     }
 
-    /// The same without blocking the thread that asks.
+    /// The compressed form, made without blocking the calling thread.
     pub(crate) async fn of_large(&self, bytes: Bytes) -> Option<Bytes> {
         if let Some(done) = self.0.get() {
             return done.clone();
@@ -32,7 +32,7 @@ impl Compressed {
         tokio::task::spawn_blocking(move || compressed.of(&bytes)).await.ok().flatten()
     }
 
-    /// Begins in the background, so that it is ready when it is asked for.
+    /// Begins compressing in the background, so that the form is ready when it is asked for.
     pub(crate) fn begin(&self, bytes: Bytes) {
         if self.0.get().is_none() {
             let compressed = self.clone();
@@ -49,7 +49,7 @@ fn gzip(bytes: &[u8]) -> Option<Bytes> {
     encoder.finish().ok().map(Bytes::from)
 }
 
-/// What was compressed; empty if it does not unpack, and the browser says so.
+/// The unpacked bytes; empty if they do not unpack, which the browser then reports.
 pub(crate) fn unpack(compressed: &[u8]) -> Bytes {
     let mut plain = Vec::new();
     drop(GzDecoder::new(compressed).read_to_end(&mut plain));

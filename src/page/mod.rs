@@ -1,4 +1,5 @@
-//! The files of the page and of Rerun's viewer, out of the program itself: what the server sends and what an export writes.
+//! The files of the page and of Rerun's viewer, which are part of the program: the server sends them and an export writes
+//! them.
 
 pub(crate) mod gzip;
 
@@ -15,8 +16,8 @@ use re_web_viewer_server::WebViewerData;
 
 use gzip::Compressed;
 
-/// Scripts, styles, images and connections from here and from nowhere else; the viewer is WebAssembly. It also keeps
-/// the viewer from calling its makers' telemetry and from loading fonts.
+/// The policy of the page: scripts, styles, images and connections come from this server alone; the viewer is
+/// WebAssembly. It also keeps the viewer from calling its makers' telemetry and from loading fonts.
 pub(crate) const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
      style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'";
 
@@ -57,7 +58,7 @@ const PAGE: [(&str, &[u8]); 18] = [
 
 const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
 
-/// The media type of one of them, by how its name ends.
+/// The media type of a file, by the end of its name.
 fn media_type(path: &str) -> &'static str {
     match path.rsplit('.').next() {
         Some("css") => "text/css; charset=utf-8",
@@ -73,7 +74,7 @@ pub enum PageError {
     /// The viewer's WebAssembly is missing.
     #[error("the viewer cannot be loaded: {0}")]
     Viewer(#[from] re_web_viewer_server::WebViewerDataError),
-    /// Another build of the panel was asked for and is not there.
+    /// The requested build of the panel is not there.
     #[error("the panel's file {} cannot be read: {source}", file.display())]
     Panel {
         /// The file.
@@ -89,7 +90,8 @@ pub(crate) struct PageFile {
     pub(crate) path: &'static str,
     pub(crate) content_type: &'static str,
     pub(crate) bytes: Bytes,
-    /// Changes with the content: the entity tag, and `?v=` in the addresses under which it may be kept for ever.
+    /// The file's version, which changes with its content: the entity tag, and `?v=` in the addresses under which it
+    /// may be cached for ever.
     pub(crate) version: String,
     pub(crate) compressed: Compressed,
 }
@@ -102,13 +104,14 @@ impl PageFile {
         Self { path, content_type, bytes, version, compressed: Compressed::default() }
     }
 
-    /// The viewer's 42 MB: compressed from the start of the program on, so that the first visitor too gets 14 MB.
+    /// The viewer's file of 42 MB: compressed from the start of the program on, so that the first visitor too gets 14
+    /// MB.
     fn viewer(path: &'static str, bytes: Bytes) -> Self {
         VIEWER_WASM.begin(bytes.clone());
         Self { compressed: VIEWER_WASM.clone(), ..Self::new(path, "application/wasm", bytes) }
     }
 
-    /// A file that was compressed when it was built; who does not take it so gets it unpacked.
+    /// A file that was compressed when it was built; clients that do not accept gzip get it unpacked.
     fn compressed_already(path: &'static str, content_type: &'static str, compressed: Bytes) -> Self {
         let file = Self::new(path, content_type, gzip::unpack(&compressed));
         Self { compressed: Compressed::ready(compressed), ..file }
@@ -119,7 +122,7 @@ impl PageFile {
 ///
 /// # Errors
 ///
-/// [`PageError`] where that folder lacks a file, or the program its viewer.
+/// [`PageError::Panel`] if that folder lacks a file, [`PageError::Viewer`] if the program lacks its viewer.
 pub(crate) fn files(panel: Option<&Path>) -> Result<Vec<PageFile>, PageError> {
     let viewer = WebViewerData::load(None)?;
     let (panel_script, panel_wasm) = match panel {

@@ -1,4 +1,4 @@
-//! The page's files as they are sent.
+//! The page's files as the server sends them.
 
 use std::{borrow::Cow, path::Path, sync::Arc};
 
@@ -17,7 +17,7 @@ use super::{
 };
 use crate::page::{self, INDEX, PageFile, gzip};
 
-/// What the page says of its picture, which previews take from a whole address only.
+/// The page's property for its picture, which previews need as a whole address.
 const PREVIEW: &str = "\"og:image\" content=\"";
 
 /// All files, by their paths.
@@ -50,7 +50,7 @@ impl Assets {
     }
 }
 
-/// The page as it is under the address by which it was asked for.
+/// The page as it is under the address by which it was requested.
 fn at(file: &PageFile, headers: &HeaderMap) -> PageFile {
     let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default();
     let host = text("host");

@@ -1,8 +1,8 @@
-//! Connections: how many there are, and how long each may keep the server waiting.
+//! Connections: their number, and how long each may keep the server waiting.
 //!
-//! One that sends no request, sends it slowly, or does not take what it asked for, ends; one whose request has come is served
-//! as long as that takes. When there are as many as there may be, the one that has waited longest for a request makes room, and
-//! where all are busy a newcomer is told so.
+//! A connection that sends no request, sends it slowly, or does not take what it asked for, is ended; one whose request has
+//! come is served as long as that takes. At the maximum, the one that has waited longest for a request makes room; where all
+//! are busy, a newcomer gets an error.
 
 mod stream;
 
@@ -39,23 +39,23 @@ use tokio::{
 use tokio_util::sync::CancellationToken;
 
 use super::{
+    authentication::Reached,
     holding::Holding,
     limits::Limits,
     metrics::Metrics,
     problem::{Kind, PROBLEM_JSON, Problem},
     rarely::Rarely,
-    strangers::Reached,
 };
 use stream::Stream;
 
-/// What a connection that has to make room may take to end.
+/// The time that a connection which has to make room may take to end.
 const ROOM_WITHIN: Duration = Duration::from_millis(100);
-/// How many are told at a time that all are busy, and how long that may take.
+/// The most newcomers that are told at a time that all are busy, and the time for it.
 const MOST_REFUSALS: usize = 16;
 const REFUSED_WITHIN: Duration = Duration::from_millis(500);
-/// How long no connection is taken after the operating system has refused one, for want of descriptors or memory.
+/// The pause after the operating system has refused a connection for want of descriptors or memory.
 const REST: Duration = Duration::from_millis(20);
-/// How long connections may take to end by themselves at shutdown …
+/// The time that connections may take to end by themselves at shutdown …
 const DRAIN_WITHIN: Duration = Duration::from_secs(3);
 /// … and after they were broken off.
 const BREAK_WITHIN: Duration = Duration::from_secs(1);
@@ -64,26 +64,27 @@ const BREAK_WITHIN: Duration = Duration::from_secs(1);
 pub(super) struct Connections {
     limits: Limits,
     most: usize,
-    /// One for each connection, also while it ends, and for each WebSocket.
+    /// A permit for each connection, also while it ends, and for each WebSocket.
     permits: Arc<Semaphore>,
     open: Mutex<Vec<Arc<Connection>>>,
-    /// Breaks off all of them.
+    /// Cancels all of them.
     broken: CancellationToken,
-    /// What is told where all are busy …
+    /// The answer where all are busy …
     busy: Bytes,
-    /// … and to how many more at a time.
+    /// … and a permit for each newcomer that is being sent it.
     refusals: Arc<Semaphore>,
     metrics: Arc<Metrics>,
-    /// Of those that could not be taken.
+    /// The log of those that could not be taken.
     rarely: Rarely,
 }
 
-/// What a connection is at.
+/// The phase of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// Between two requests, since then.
+    /// Between two requests, since that time.
     Idle(Instant),
-    /// The head of a request is coming, since then; from the beginning, as a connection is opened to ask for something.
+    /// The head of a request is coming, since that time; from the beginning, as a connection is opened to ask for
+    /// something.
     Asking(Instant),
     /// A request is served, or a WebSocket is open.
     Busy,
@@ -92,14 +93,14 @@ enum Phase {
 /// A connection, as the others know it.
 struct Connection {
     phase: watch::Sender<Phase>,
-    /// It has to make room.
+    /// Cancelled when it has to make room.
     evicted: CancellationToken,
-    /// The last request was refused, maybe before it had come as a whole.
+    /// Whether the last request was refused, perhaps before all of it had come.
     unread: AtomicBool,
 }
 
 impl Connection {
-    /// Bytes have come.
+    /// Notes that bytes have come.
     fn heard(&self) {
         self.phase.send_if_modified(|phase| {
             let is_idle = matches!(phase, Phase::Idle(_));
@@ -110,12 +111,12 @@ impl Connection {
         });
     }
 
-    /// Whether something of a request may be left that nobody will read.
+    /// Whether part of a request may be left that nobody will read.
     fn has_unread(&self) -> bool {
         self.unread.load(Ordering::Relaxed)
     }
 
-    /// Since when it has waited for the head of a request; `None` while it serves one.
+    /// The time since which it has waited for the head of a request; `None` while it serves one.
     fn waiting_since(&self) -> Option<Instant> {
         match *self.phase.borrow() {
             Phase::Idle(since) | Phase::Asking(since) => Some(since),
@@ -141,12 +142,12 @@ impl Connections {
         })
     }
 
-    /// How many are open.
+    /// The number of open connections.
     pub(super) fn count(&self) -> usize {
         self.lock().len()
     }
 
-    /// Serves those who come until the server shuts down.
+    /// Serves connections until the server shuts down.
     pub(super) async fn serve(self: &Arc<Self>, listener: TcpListener, router: Router, shutdown: &CancellationToken) {
         let service = TowerToHyperService::new(router);
         loop {
@@ -192,7 +193,7 @@ impl Connections {
         tokio::spawn(self.clone().attend(stream, place, reached, service.clone(), shutdown.clone()));
     }
 
-    /// Tells a newcomer that all are busy, unless many are being told so.
+    /// Sends a newcomer the answer that all are busy, unless many are being sent it.
     fn refuse(&self, mut stream: TcpStream) {
         let (busy, Ok(place)) = (self.busy.clone(), self.refusals.clone().try_acquire_owned()) else { return };
         tokio::spawn(async move {
@@ -218,7 +219,7 @@ impl Connections {
         timeout(ROOM_WITHIN, self.permits.clone().acquire_owned()).await.ok()?.ok()
     }
 
-    /// Ends the connection that has waited longest for a request; tells whether there is one.
+    /// Ends the connection that has waited longest for a request; false if there is none.
     fn make_room(&self) -> bool {
         let open = self.lock();
         let waiting = open.iter().filter(|connection| !connection.evicted.is_cancelled());
@@ -299,7 +300,7 @@ impl Connections {
         }
     }
 
-    /// Waits for all of them to end after the shutdown has begun, and breaks off those that do not.
+    /// Waits for all of them to end after the shutdown has begun, and cancels those that do not.
     pub(super) async fn end(&self) {
         let all = u32::try_from(self.most).unwrap_or(u32::MAX);
         if timeout(DRAIN_WITHIN, self.permits.acquire_many(all)).await.is_err() {
@@ -313,7 +314,7 @@ impl Connections {
     }
 }
 
-/// A connection's place among all, which it leaves when its stream is closed.
+/// The place of a connection among all, freed when its stream is closed.
 struct Place {
     connection: Arc<Connection>,
     all: Arc<Connections>,
@@ -326,7 +327,7 @@ impl Drop for Place {
     }
 }
 
-/// As long as a request is served and its answer is sent. After it the connection waits for the next.
+/// The marker of a request being served, until its answer is sent. After it the connection waits for the next request.
 struct Served(Arc<Connection>);
 
 impl Drop for Served {
@@ -335,7 +336,7 @@ impl Drop for Served {
     }
 }
 
-/// A problem as a whole answer, after which the connection is closed.
+/// A problem as a complete answer, after which the connection is closed.
 fn refusal(problem: &Problem) -> Bytes {
     let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::SERVICE_UNAVAILABLE);
     let body = serde_json::to_string(problem).unwrap_or_default();

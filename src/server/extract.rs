@@ -1,4 +1,4 @@
-//! Reads requests, and says what is wrong with them in terms of the request.
+//! Reading requests; errors are stated in terms of the request.
 
 use std::sync::Arc;
 
@@ -21,11 +21,11 @@ use body_schema_ask_tell::whole::MOST as MOST_WHOLE;
 /// A JSON body. An absent one, and `null`, count as `{}`, so that defaults need no body.
 pub(super) struct JsonBody<T>(pub(super) T);
 
-/// What is read from a body. Whatever serde reads is read by [`parse`].
+/// A type that is read from a body. Types that serde reads are read by [`parse`].
 pub(super) trait FromJson: Sized {
     fn from_json(bytes: &[u8], limits: &Limits) -> Result<Self, Problem>;
 
-    /// What is told of a body beyond the limit of its route.
+    /// The problem of a body beyond the limit of its route.
     fn too_large(limits: &Limits) -> Problem {
         Problem::body_too_large(limits.body_bytes)
     }
@@ -74,7 +74,7 @@ pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     Ok(body_schema_backend::parse(bytes)?)
 }
 
-/// The parameters of a query, each of which must be among `known` and a whole number; absent ones are `None`.
+/// The parameters of a query, each a whole number among those `known`; absent ones are `None`.
 pub(super) fn whole_numbers<const N: usize>(
     query: Option<&str>,
     known: [&'static str; N],
@@ -86,7 +86,7 @@ pub(super) fn whole_numbers<const N: usize>(
     Ok(numbers)
 }
 
-/// One of the words that `T` is written as, its default where the parameter is absent.
+/// The value of a parameter that is written as one of a few words; the default if it is absent.
 pub(super) fn word<T: DeserializeOwned + Default>(name: &'static str, value: Option<&str>) -> Result<T, Problem> {
     let Some(value) = value else { return Ok(T::default()) };
     T::deserialize(value.into_deserializer()).map_err(|error: serde::de::value::Error| {
@@ -94,7 +94,7 @@ pub(super) fn word<T: DeserializeOwned + Default>(name: &'static str, value: Opt
     })
 }
 
-/// The parameters of a query as they are written, each of which must be among `known`.
+/// The parameters of a query as written, each among those `known`.
 pub(super) fn parameters<'a, const N: usize>(
     query: Option<&'a str>,
     known: [&'static str; N],

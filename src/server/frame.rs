@@ -1,4 +1,4 @@
-//! Who may show the page in a frame.
+//! The origins that may show the page in a frame.
 
 use std::{fmt, str::FromStr};
 

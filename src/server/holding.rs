@@ -1,4 +1,4 @@
-//! The body of an answer that holds something until it is sent, or given up.
+//! A body of an answer that holds a value until it is sent, or given up.
 
 use std::{
     pin::Pin,
@@ -9,7 +9,7 @@ use axum::body::Body;
 use bytes::Bytes;
 use http_body::{Body as HttpBody, Frame, SizeHint};
 
-/// A body that holds something.
+/// A body that holds a value until it is sent.
 pub(super) struct Holding<T> {
     body: Body,
     _held: T,

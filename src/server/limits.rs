@@ -1,4 +1,4 @@
-//! How much a server takes on. Whatever is beyond is answered at once: 408, 413, 422, 429, 431, or 503 with `Retry-After`.
+//! The limits of a server. A request beyond one is answered at once: 408, 413, 422, 429, 431, or 503 with `Retry-After`.
 
 use std::time::Duration;
 
@@ -7,61 +7,60 @@ use tokio::sync::Semaphore;
 
 use body_schema_ask_tell::{MOST_EVALUATIONS, MOST_JOINTS, MOST_SETUP_BYTES, MOST_TARGETS, Most};
 
-/// How much a server takes on, all in one place. `docs/trust.md` has the same as a table, with what is answered beyond each.
+/// All limits of a server. `docs/trust.md` has them as a table, with the answer beyond each.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// How many connections there are at most, and never more than half of the descriptors that the process may open. When
-    /// one more comes, the one that has waited longest for a request makes room.
+    /// The most connections, and never more than half of the descriptors that the process may open. When one more comes,
+    /// the one that has waited longest for a request makes room.
     pub connections: usize,
     /// How long a request's head may take to come.
     pub header_timeout: Duration,
     /// How long a connection may wait for its next request.
     pub idle_timeout: Duration,
-    /// How large a request's head may be, bytes.
+    /// The most bytes of a request's head.
     pub header_bytes: usize,
-    /// How many header fields it may have.
+    /// The most header fields.
     pub headers: usize,
     /// How long a request's body may take to come. What is then done with it takes as long as it takes.
     pub body_timeout: Duration,
-    /// How large a body may be, bytes; that which opens a session with a robot elsewhere may be
+    /// The most bytes of a body; that which opens a session with a robot elsewhere may be
     /// [larger](Self::setup_body_bytes).
     pub body_bytes: usize,
     /// How long a client may take nothing of what is written to it.
     pub write_timeout: Duration,
-    /// How many follow one session at most: its events, its growing recording, its WebSocket.
+    /// The most followers of one session: its events, its growing recording, its WebSocket.
     pub streams_per_session: usize,
-    /// How many sessions there are in memory at most, and as many again with robots elsewhere. When one more is asked for, one
-    /// that was idle for [`idle_after`](Self::idle_after) makes room.
+    /// The most sessions in memory, and as many again with robots elsewhere. When one more is asked for, one that was idle for
+    /// [`idle_after`](Self::idle_after) makes room.
     pub sessions: usize,
-    /// How many sessions with robots elsewhere are kept at most.
+    /// The most sessions with robots elsewhere that are kept.
     pub stored_sessions: usize,
-    /// How large the file may be in which they are kept, bytes; beyond it nothing is taken in.
+    /// The most bytes of the file in which they are kept; beyond it nothing is accepted.
     pub stored_bytes: u64,
-    /// How large the recordings may be together that are kept as files, bytes; beyond it no session is opened whose recording
-    /// would be.
+    /// The most bytes of the recordings that are kept as files; beyond it no session is opened whose recording would be.
     pub recordings_bytes: u64,
-    /// How many joints a robot elsewhere may have that move.
+    /// The most joints that move of a robot elsewhere.
     pub joints: usize,
-    /// How many targets it may have.
+    /// The most targets of a robot elsewhere.
     pub targets: usize,
-    /// How often its criterion may be evaluated for each movement.
+    /// The most evaluations of its criterion for each movement.
     pub evaluations: usize,
-    /// How many steps a session makes at most.
+    /// The most steps of a session.
     pub steps_per_session: u64,
-    /// How many steps one request makes at most.
+    /// The most steps of one request.
     pub steps_per_request: u64,
-    /// What reports and recordings of all sessions may take together, bytes; beyond it no session makes steps.
+    /// The most bytes of reports and recordings of all sessions together; beyond it no session makes steps.
     pub memory_bytes: usize,
-    /// After this time without a request and without anyone watching, a session may have to make room for another. One with a
-    /// robot elsewhere leaves memory then, and comes back when it is asked for.
+    /// The time without a request and without a follower after which a session may have to make room for another. One with a
+    /// robot elsewhere then leaves memory, and comes back when it is asked for.
     pub idle_after: Duration,
 }
 
-/// So much of answers may be on its way however little memory there is.
+/// The least bytes of answers that may be on their way, however little memory there is.
 const LEAST_ANSWERS_BYTES: usize = 16 << 20;
-/// So much of a head is read at a time.
+/// The bytes of a head that are read at a time.
 const LEAST_HEADER_BYTES: usize = 8 << 10;
-/// So many times as large as it may be a head is still read, so that it gets an answer that says what is wrong.
+/// The multiple of the limit up to which a head is still read, so that it gets an answer that says what is wrong.
 const READ_BEYOND: usize = 4;
 
 impl Default for Limits {
@@ -92,27 +91,27 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// How large the body may be that opens a session with a robot elsewhere, bytes.
+    /// The most bytes of the body that opens a session with a robot elsewhere.
     pub fn setup_body_bytes(&self) -> usize {
         MOST_SETUP_BYTES + self.body_bytes
     }
 
-    /// How much of large answers may be on its way to clients, bytes.
+    /// The most bytes of large answers on their way to clients.
     pub(super) fn answers_bytes(&self) -> usize {
         (self.memory_bytes / 8).max(LEAST_ANSWERS_BYTES)
     }
 
-    /// How large a session with a robot elsewhere may be.
+    /// The limits of a session with a robot elsewhere.
     pub(super) fn most(&self) -> Most {
         Most { joints: self.joints, targets: self.targets, evaluations: self.evaluations }
     }
 
-    /// How much of a head is read, and of an answer held, at a time: no less than HTTP asks for.
+    /// The bytes of a head that are read, and of an answer that are held, at a time: no less than HTTP asks for.
     pub(super) fn buffer_bytes(&self) -> usize {
         self.header_bytes.saturating_mul(READ_BEYOND).max(LEAST_HEADER_BYTES)
     }
 
-    /// How many header fields are read.
+    /// The number of header fields that are read.
     pub(super) fn most_headers(&self) -> usize {
         self.headers.saturating_mul(READ_BEYOND)
     }
@@ -128,19 +127,20 @@ impl Limits {
         (bytes > most).then(|| format!("address and header fields together may have {most} bytes, not {bytes}"))
     }
 
-    /// As many connections as there can be in this process.
+    /// The number of connections that are possible in this process.
     pub(super) fn possible_connections(&self) -> usize {
         self.connections_within(descriptors()).min(Semaphore::MAX_PERMITS)
     }
 
-    /// As many connections as these limits and the process's descriptors allow; the other half is for files and the rest.
+    /// The number of connections that these limits and the process's descriptors allow; the other half is for files and
+    /// the rest.
     fn connections_within(&self, descriptors: Option<u64>) -> usize {
         let half = descriptors.and_then(|all| usize::try_from(all / 2).ok()).unwrap_or(usize::MAX);
         self.connections.min(half).max(1)
     }
 }
 
-/// How many descriptors this process may open; `None` where the platform does not say.
+/// The number of descriptors that this process may open; `None` where the platform does not say.
 fn descriptors() -> Option<u64> {
     #[cfg(unix)]
     return rlimit::Resource::NOFILE.get_soft().ok();
@@ -148,8 +148,8 @@ fn descriptors() -> Option<u64> {
     None
 }
 
-/// Has this process open as many descriptors as it may ask for, where the platform has such a limit. For programs, at their
-/// start.
+/// Raises the number of descriptors that this process may open as far as allowed, where the platform has such a limit. For
+/// programs, at their start.
 pub fn raise_descriptors() {
     // With fewer there are fewer connections.
     drop(rlimit::increase_nofile_limit(u64::MAX));

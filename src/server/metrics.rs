@@ -1,4 +1,4 @@
-//! What a server tells of itself in figures, in the text form of OpenMetrics, which Prometheus reads.
+//! The server's figures, in the text form of OpenMetrics, which Prometheus reads.
 
 use std::{sync::atomic::AtomicU64, time::Duration};
 
@@ -16,13 +16,13 @@ use body_schema_scenario::WorldKind;
 /// The media type of the figures.
 pub(super) const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
-/// Upper bounds of the durations that are told apart, seconds: a file of the page takes well below a millisecond, many steps take
-/// minutes.
+/// Upper bounds of the durations that are distinguished, seconds: a file of the page takes well below a millisecond, many steps
+/// take minutes.
 const DURATIONS_S: [f64; 10] = [0.001, 0.005, 0.025, 0.1, 0.5, 1.0, 5.0, 15.0, 60.0, 300.0];
-/// The route of a request for what is not there, or that had no business here.
+/// The route of a request for a missing page, or without authorisation.
 const NO_ROUTE: &str = "none";
 
-/// All figures of a server. Copies of counters count together.
+/// All figures of a server. Copies of counters share their count.
 pub(super) struct Metrics {
     registry: Registry,
     requests: Family<Request, Counter>,
@@ -30,13 +30,14 @@ pub(super) struct Metrics {
     problems: Family<Problem, Counter>,
     /// Steps that sessions made.
     pub(super) steps: Counter,
-    /// Observations that robots elsewhere told.
+    /// Observations received from robots elsewhere.
     pub(super) observations: Counter,
-    /// Observations of robots elsewhere that were learned from once more: after a while out of memory, or without one of them.
+    /// Observations of robots elsewhere that were learned from again: after a while out of memory, or after a change of what
+    /// is excluded.
     pub(super) replayed: Counter,
     /// Sessions whose engine failed.
     pub(super) failed_sessions: Counter,
-    /// Connections for which there was no room …
+    /// Connections that were refused for want of room …
     pub(super) refused_connections: Counter,
     /// … and those that made room for another.
     pub(super) evicted_connections: Counter,
@@ -49,21 +50,21 @@ pub(super) struct Metrics {
     memory: Gauge,
 }
 
-/// What there is at the moment.
+/// The server's state at the moment.
 pub(super) struct Present {
     /// Sessions in memory.
     pub(super) sessions: [(WorldKind, usize); 3],
     /// Sessions with robots elsewhere, in memory or not.
     pub(super) stored_sessions: usize,
-    /// Who follows a session by a stream.
+    /// Followers of sessions by a stream.
     pub(super) streams: usize,
     /// Open connections.
     pub(super) connections: usize,
-    /// What reports and recordings take, bytes.
+    /// The memory of reports and recordings, bytes.
     pub(super) memory_bytes: usize,
 }
 
-/// How much there may be.
+/// The limits that are reported.
 pub(super) struct Most {
     pub(super) connections: usize,
     pub(super) memory_bytes: usize,
@@ -159,7 +160,7 @@ impl Metrics {
         all.register_with_unit("memory_limit", most_held, Unit::Bytes, constant(most.memory_bytes));
     }
 
-    /// Counts an answer, and how long it took to begin.
+    /// Counts an answer, and the time until it began.
     pub(super) fn answered(&self, method: &'static str, route: Option<&str>, status: StatusCode, after: Duration) {
         let route = route.unwrap_or(NO_ROUTE);
         let request = Request { method, route: route.to_owned(), status: status.as_u16() };
@@ -173,7 +174,7 @@ impl Metrics {
         self.problems.get_or_create(&Problem { kind, status: status.as_u16() }).inc();
     }
 
-    /// All figures, with what there is at the moment.
+    /// All figures, with the state at the moment.
     pub(super) fn text(&self, present: &Present) -> Result<String, std::fmt::Error> {
         for (world, count) in present.sessions {
             self.sessions.get_or_create(&InWorld { world: name(world) }).set(whole(count));

@@ -1,47 +1,54 @@
 //! The HTTP server: sessions to step and watch, robots elsewhere that ask and tell, and the page that shows them.
 //!
 //! ```text
-//! api/      the routes: scenarios, sessions, steps, suggestions, observations, streams, downloads; their OpenAPI description
-//! session/  experiments and robots elsewhere on threads of their own, and what they leave to read
-//! store/    the sessions of robots elsewhere on the disk
-//! extract   requests, read        problem  errors, as RFC 9457 problem details
-//! guard     foreign pages, headers, stray errors        assets   the page and Rerun's viewer
-//! aside     work that holds up nobody                    frame    who may embed the page
-//! strangers who may ask at all
-//! connections  how long each may keep us waiting          limits   how much is taken on
-//! holding   what an answer holds until it is sent
-//! requests  their ids and lines in the log                metrics  figures for Prometheus
+//! api/            the routes: scenarios, sessions, steps, suggestions, observations, streams, downloads; their OpenAPI description
+//! session/        experiments and robots elsewhere on threads of their own, and the state that they share with readers
+//! store/          the sessions of robots elsewhere on the disk
+//! extract         reading requests
+//! problem         errors, as RFC 9457 problem details
+//! middleware      origins, headers, errors that no handler made
+//! authentication  tokens, passes, and the names of the server
+//! connections     how long each may keep the server waiting
+//! limits          the limits of all of this
+//! blocking        work that must not hold up other requests
+//! requests        ids of requests, and their lines in the log
+//! metrics         figures for Prometheus
+//! holding         bodies that hold a value until they are sent
+//! assets          the page and Rerun's viewer
+//! frame           the origins that may embed the page
 //! ```
 //!
 //! Every session's engine computes on its own thread; the runtime's workers only carry messages and bytes. What is taken on,
 //! from connections to memory, is bounded by [`Limits`].
 
 mod api;
-mod aside;
 mod assets;
+mod authentication;
+mod blocking;
 mod connections;
 mod extract;
 mod frame;
-mod guard;
 mod holding;
 mod limits;
 mod metrics;
+mod middleware;
 mod problem;
 mod rarely;
 mod requests;
 mod session;
 mod store;
-mod strangers;
 
 use std::{io, net::SocketAddr, path::PathBuf, sync::Arc};
 
 use crate::page::PageError;
-use aside::Jobs;
 use axum::{Router, middleware::from_fn_with_state};
+use blocking::Jobs;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
 pub use api::{Health, Liveness, MadeSteps, ScenarioList, ScenarioResource, SessionList, StepRequest};
+use authentication::Authentication;
+pub use authentication::{HostName, NoHostName, NoToken, Token};
 use connections::Connections;
 pub use frame::{FrameAncestor, NoOrigin};
 pub use limits::{Limits, raise_descriptors};
@@ -50,26 +57,24 @@ pub use problem::{Beside, PROBLEM_JSON, Problem};
 use session::{Budget, Keeping, Sessions};
 pub use session::{DamagedSession, NewOutsideSession, NewSession, SessionResource};
 pub use store::{Finding, Held, Shown, State, Store, StoreError, Stored};
-use strangers::Strangers;
-pub use strangers::{HostName, NoHostName, NoToken, Token};
 
-/// How a server is set up.
+/// The options of a server.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Where sessions with robots elsewhere are kept; made if it does not exist. Without it they end with the server.
+    /// The folder in which sessions with robots elsewhere are kept; made if it does not exist. Without it they end with
+    /// the server.
     pub data_dir: Option<PathBuf>,
     /// Whether recordings of all other sessions are kept there as files, `{scenario}-seed{seed}-{session}.rrd`.
     pub keep_recordings: bool,
-    /// What whoever asks has to carry. A server that can be reached from other machines needs one.
+    /// The token that requests must carry. A server that can be reached from other machines needs one.
     pub token: Option<Token>,
-    /// Names under which it is meant, beside those of this machine and the address at which it was reached.
+    /// The names of this server, beside those of this machine and the address at which it was reached.
     pub allow_hosts: Vec<HostName>,
-    /// How much it takes on.
+    /// The limits.
     pub limits: Limits,
-    /// A folder with another build of the page's panel than the one that is part of this program, for those who work
-    /// on it.
+    /// A folder with another build of the page's panel than this program's, for work on it.
     pub panel_dir: Option<PathBuf>,
-    /// Who may show the page in a frame; nobody if empty.
+    /// The origins that may show the page in a frame; nobody if empty.
     pub frame_ancestors: Vec<FrameAncestor>,
 }
 
@@ -79,11 +84,11 @@ pub enum ServerError {
     /// Sessions cannot be kept.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// Others can reach it, and nobody would have to carry a token.
-    #[error("other machines can reach {0}, and real robots may hang on this server: it needs a token there")]
+    /// Other machines can reach it, and requests would need no token.
+    #[error("other machines can reach {0}, and real robots may be connected to this server; give it a token")]
     Unguarded(SocketAddr),
-    /// The server has ended, and files lack their end.
-    #[error("these recordings lack their end: {}", .0.join("; "))]
+    /// The server has ended, and some files are incomplete.
+    #[error("these recordings are incomplete: {}", .0.join("; "))]
     Incomplete(Vec<String>),
     /// The page is incomplete.
     #[error(transparent)]
@@ -93,19 +98,19 @@ pub enum ServerError {
     Socket(#[from] io::Error),
 }
 
-/// What all requests share.
+/// The state that all requests share.
 struct App {
     sessions: Arc<Sessions>,
     assets: assets::Assets,
     /// The OpenAPI document, as it is sent.
     openapi: bytes::Bytes,
-    strangers: Strangers,
+    authentication: Authentication,
     limits: Limits,
     metrics: Arc<Metrics>,
     connections: Arc<Connections>,
-    /// What takes a core for a while.
+    /// The jobs that take a core for a while.
     jobs: Jobs,
-    /// What is on its way to clients.
+    /// The answers on their way to clients.
     answers: Arc<Budget>,
 }
 
@@ -119,11 +124,13 @@ pub struct Server {
 }
 
 impl Server {
-    /// One on `listener`, with all that it needs: what can fail at the start fails here.
+    /// A server on `listener`. Whatever can fail at the start fails here.
     ///
     /// # Errors
     ///
-    /// [`ServerError`] where sessions cannot be kept, files are missing, or strangers could come in.
+    /// [`ServerError::Store`] if sessions cannot be kept, [`ServerError::Page`] if files are missing,
+    /// [`ServerError::Unguarded`] if other machines can reach it and no token is set, [`ServerError::Socket`] if the
+    /// socket fails.
     pub fn new(listener: TcpListener, options: Options, shutdown: CancellationToken) -> Result<Self, ServerError> {
         let address = listener.local_addr()?;
         if !address.ip().to_canonical().is_loopback() && options.token.is_none() {
@@ -150,30 +157,30 @@ impl Server {
             sessions: Sessions::new(Budget::new(limits.memory_bytes), keeping, metrics.clone(), shutdown.clone())?,
             assets: assets::Assets::load(options.panel_dir.as_deref())?,
             openapi: document,
-            strangers: Strangers::new(options.token, options.allow_hosts, address.port()),
+            authentication: Authentication::new(options.token, options.allow_hosts, address.port()),
             connections: Connections::new(limits.clone(), metrics.clone()),
             answers: Arc::new(Budget::new(limits.answers_bytes())),
             limits,
             metrics,
             jobs: Jobs::default(),
         });
-        let routes = routes.layer(from_fn_with_state(app.clone(), guard::counted));
+        let routes = routes.layer(from_fn_with_state(app.clone(), middleware::counted));
         let router = Router::new().merge(routes).merge(assets::routes(&app.assets));
-        let router = guard::layered(router, &app, guard::Headers::new(&options.frame_ancestors));
+        let router = middleware::layered(router, &app, middleware::Headers::new(&options.frame_ancestors));
         Ok(Self { listener, app, router, shutdown, damage })
     }
 
-    /// What of the data directory was found damaged, in words: the rest is served.
+    /// The damage found in the data directory, in words; everything else is served.
     pub fn damage(&self) -> &[String] {
         &self.damage
     }
 
-    /// Serves until it is to end; then ends sessions, so that their recordings are complete, and open streams with them, and
+    /// Serves until the shutdown; then ends sessions, so that their recordings are complete, and open streams with them. It
     /// returns within five seconds, whatever its clients do.
     ///
     /// # Errors
     ///
-    /// [`ServerError::Incomplete`] where recordings could not be completed.
+    /// [`ServerError::Incomplete`] if recordings could not be completed, [`ServerError::Socket`] if the socket fails.
     pub async fn run(self) -> Result<(), ServerError> {
         let Self { listener, app, router, shutdown, damage: _ } = self;
         tokio::select! {
@@ -194,7 +201,7 @@ impl Server {
 ///
 /// # Errors
 ///
-/// [`ServerError`] of its start and of its end.
+/// The errors of [`Server::new`] and of [`Server::run`].
 pub async fn serve(listener: TcpListener, options: Options, shutdown: CancellationToken) -> Result<(), ServerError> {
     Server::new(listener, options, shutdown)?.run().await
 }

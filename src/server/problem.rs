@@ -23,7 +23,7 @@ use body_schema_scenario::ScenarioError;
 /// Media type of every error.
 pub const PROBLEM_JSON: &str = "application/problem+json";
 
-/// After how many seconds it is worth asking again where there is too much to do.
+/// The seconds after which a client should ask again where there is too much to do.
 pub(super) const RETRY_AFTER_S: u64 = 10;
 
 /// What went wrong, as an answer.
@@ -35,12 +35,13 @@ pub struct Problem(backend::Problem);
 #[derive(Clone, Debug)]
 pub(super) struct Refused {
     kind: &'static str,
-    /// What went wrong, where that is the server's own affair: to clients' mistakes their words may belong.
+    /// What went wrong, if that is internal to the server; details of clients' mistakes may hold their words, and are
+    /// not logged.
     why: Option<String>,
 }
 
 impl Refused {
-    /// Its kind, without the words that all kinds have in common.
+    /// The kind, without the prefix that all kinds share.
     pub(super) fn kind(&self) -> &'static str {
         self.kind.strip_prefix(URN).unwrap_or("other")
     }
@@ -50,7 +51,7 @@ impl Refused {
     }
 }
 
-/// How the kinds' names begin.
+/// The prefix of the kinds' names.
 const URN: &str = "urn:body-schema:problem:";
 
 impl Problem {
@@ -128,7 +129,7 @@ macro_rules! told_as_by_the_backend {
 }
 told_as_by_the_backend!(backend::Problem, ScenarioError, ChoiceError, SetupError, ReplayError, Refusal, ResultsError);
 
-/// What could not be written has not happened.
+/// A change that could not be written, and so was not made.
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         match error {

@@ -1,14 +1,14 @@
-//! Lines in the log about what may happen many times a second.
+//! Logging of events that may happen many times a second.
 
 use std::{
     sync::{Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
-/// At most one line in this time.
+/// The interval in which at most one line is logged.
 const APART: Duration = Duration::from_secs(10);
 
-/// Tells of something that may happen often now and then, with how often it has happened since it was last told.
+/// A logger of frequent events, which also reports how often they have happened since its last line.
 #[derive(Default)]
 pub(super) struct Rarely(Mutex<Untold>);
 
@@ -19,7 +19,7 @@ struct Untold {
 }
 
 impl Rarely {
-    /// It has happened; `line` tells of it, unless that was done a moment ago.
+    /// Notes an event; `line` logs it, unless another was logged a moment ago.
     pub(super) fn tell(&self, line: impl FnOnce(u64)) {
         let mut untold = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         untold.times += 1;

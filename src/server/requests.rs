@@ -1,7 +1,7 @@
 //! Every request has an id, and leaves one line in the log and its mark in the figures.
 //!
-//! Of what a client has written a line holds its request id alone: the route is the pattern that matched, never the address
-//! that was asked for, so that no token and no body can come there.
+//! Of the client's input a line holds only the request id: the route is the pattern that matched, never the requested
+//! address, so that no token and no body can get into the log.
 
 use std::{
     pin::Pin,
@@ -23,9 +23,9 @@ use uuid::Uuid;
 
 use super::{metrics::Metrics, problem::Refused};
 
-/// Where a request's id comes and goes.
+/// The header of a request's id.
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
-/// So long an id is taken from a client.
+/// The most bytes of an id from a client.
 const MOST_ID_BYTES: usize = 64;
 
 tokio::task_local! {
@@ -37,7 +37,7 @@ pub(super) fn id() -> Option<String> {
     ID.try_with(|id| id.to_string()).ok()
 }
 
-/// Work for a task of its own, under the id of the request that is being served.
+/// Work for a separate task, under the id of the request that is being served.
 pub(super) fn carried<F: Future>(work: F) -> impl Future<Output = F::Output> {
     let id = ID.try_with(Arc::clone).ok();
     async move {
@@ -48,7 +48,7 @@ pub(super) fn carried<F: Future>(work: F) -> impl Future<Output = F::Output> {
     }
 }
 
-/// Serves a request under an id: that which it came with, if it is a plain one, or a new one.
+/// Serves a request under an id: the client's, if it is a plain one, or a new one.
 pub(super) async fn attended(State(metrics): State<Arc<Metrics>>, request: Request, next: Next) -> Response {
     let id = given(request.headers()).unwrap_or_else(|| Uuid::new_v4().simple().to_string()).into();
     let mut exchange = Exchange::begun(&id, request.method(), metrics);
@@ -59,7 +59,7 @@ pub(super) async fn attended(State(metrics): State<Arc<Metrics>>, request: Reque
     response.map(|body| Body::new(Sent { body, exchange }))
 }
 
-/// Has the answer tell which route it is of.
+/// Marks the answer with its route.
 pub(super) async fn routed(route: Option<MatchedPath>, request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     if let Some(route) = route {
@@ -68,7 +68,7 @@ pub(super) async fn routed(route: Option<MatchedPath>, request: Request, next: N
     response
 }
 
-/// The id that a request came with, if it is fit to be told again.
+/// The id that a request came with, if it may be repeated.
 fn given(headers: &HeaderMap) -> Option<String> {
     let mut ids = headers.get_all(REQUEST_ID).into_iter();
     let (Some(id), None) = (ids.next()?.to_str().ok(), ids.next()) else { return None };
@@ -76,7 +76,7 @@ fn given(headers: &HeaderMap) -> Option<String> {
     (is_plain && (1..=MOST_ID_BYTES).contains(&id.len())).then(|| id.to_owned())
 }
 
-/// A request and its answer, told of when the answer was sent or nobody waits for it any longer.
+/// A request and its answer, logged when the answer was sent or nobody waits for it any longer.
 struct Exchange {
     id: Arc<str>,
     method: &'static str,
@@ -85,7 +85,7 @@ struct Exchange {
     metrics: Arc<Metrics>,
 }
 
-/// What is known of an answer once it begins.
+/// The facts about an answer once it begins.
 struct Answer {
     status: StatusCode,
     route: Option<MatchedPath>,
@@ -155,7 +155,7 @@ impl Drop for Exchange {
     }
 }
 
-/// A method as figures and lines call it: clients may invent others.
+/// The name of a method in figures and lines: clients may invent others.
 fn known(method: &Method) -> &'static str {
     match *method {
         Method::GET => "GET",

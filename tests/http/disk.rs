@@ -124,7 +124,7 @@ async fn a_server_that_ends_on_a_full_disk_says_which_recordings_lack_their_end(
     let (long, short): (String, String) = (file(&long).await, file(&short).await);
     let (code, said) = program.terminate();
     assert_eq!(code, Some(1));
-    assert!(said.contains("lack their end") && said.contains(&long) && !said.contains(&short), "{said}");
+    assert!(said.contains("are incomplete") && said.contains(&long) && !said.contains(&short), "{said}");
     assert!(!said.contains("every recording is complete"), "{said}");
     let recording = std::fs::read(folder.path().join(short)).expect("the file");
     assert_eq!(steps_of_recording(&recording), (0..=1).collect());

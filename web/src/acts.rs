@@ -1,14 +1,14 @@
-//! What those who do not see the panel's canvas do to the elements that stand for its widgets, as egui takes it.
+//! Actions on the elements that stand for the panel's widgets, from visitors who do not see its canvas, in egui's form.
 
 use egui::accesskit::{Action, ActionData, ActionRequest, NodeId, TreeId};
 use serde::Deserialize;
 
-/// What was done to an element.
+/// An action on an element.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Act {
     /// The element.
     id: String,
-    /// What was done.
+    /// The kind of action.
     #[serde(flatten)]
     deed: Deed,
 }
@@ -29,7 +29,7 @@ enum Deed {
 }
 
 impl Act {
-    /// The events that do it in egui.
+    /// The events that carry it out in egui.
     pub fn events(&self) -> Vec<egui::Event> {
         let Ok(node) = self.id.parse() else { return Vec::new() };
         let request = |action, data| {

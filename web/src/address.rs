@@ -1,7 +1,7 @@
-//! The visitor's choice as it stands in the page's address.
+//! The visitor's choice in the page's address.
 //!
-//! An address may come from anywhere and from any version: what is unknown or out of range is replaced by its default,
-//! with a notice, and nothing is ever refused as a whole.
+//! An address may come from anywhere and from any version: unknown parts, and parts out of range, are replaced by their
+//! defaults, with a notice; an address is never refused as a whole.
 
 use crate::settings::{
     ELLIPSOIDS, HUMAN, MAX_RESTORED, MAX_RUN, MAX_SEED, MAX_SPEED, MIN_SPEED, Settings, StopWhen, Tab, short,
@@ -11,7 +11,7 @@ use crate::settings::{
 const VERSION: &str = "1";
 
 impl Settings {
-    /// Reads an address's query, with a notice for everything that could not be used.
+    /// Reads an address's query, with a notice for each part that could not be used.
     pub fn parse(query: &str) -> (Self, Vec<String>) {
         let (mut settings, mut notices) = (Self { robot: true, ..Self::default() }, Vec::new());
         for pair in query.trim_start_matches('?').split('&').filter(|pair| !pair.is_empty()) {
@@ -107,8 +107,8 @@ impl Settings {
         query
     }
 
-    /// The query of a link to give away: it names what is shared rather than how to share it, and no session but that of a
-    /// robot elsewhere, which cannot be run again.
+    /// The query of a link for others: it names what is shared rather than how to share it, and no session except that of
+    /// a robot elsewhere, which cannot be run again.
     pub fn link(&self) -> String {
         let session = self.session.as_deref().filter(|_| self.robot);
         self.choice() + &session.map(|id| format!("&session={}", encode(id))).unwrap_or_default()
@@ -167,7 +167,7 @@ fn yes(value: &str) -> Option<bool> {
     }
 }
 
-/// Percent-decoding; what is malformed stays as it is.
+/// Percent-decoding; malformed parts stay as they are.
 fn decode(text: &str) -> String {
     let bytes = text.as_bytes();
     let mut decoded = Vec::with_capacity(bytes.len());

@@ -1,4 +1,4 @@
-//! Running other seeds of what is shown, for the bands behind its curves.
+//! Running other seeds of the shown comparison, for the bands behind its curves.
 
 use body_schema_wire::StepReport;
 
@@ -11,12 +11,12 @@ use crate::{
 };
 
 impl Panel {
-    /// The band of a learner, if other seeds of what is shown were run.
+    /// The band of a learner, if other seeds of the shown comparison were run.
     pub fn band(&self, learner: usize, value: impl Fn(&Row) -> Option<f64>) -> Option<Band> {
         self.other_seeds()?.band(learner, value)
     }
 
-    /// Runs other seeds of what is shown.
+    /// Runs other seeds of the shown comparison.
     pub fn run_seeds(&mut self) {
         let Some(description) = self.description().cloned() else { return };
         let first = description.seed;
@@ -32,20 +32,20 @@ impl Panel {
         self.seeds = Some(SeedRuns::new(description, steps));
     }
 
-    /// Takes a part of one of them in.
+    /// Adds a part of another seed's run.
     pub(crate) fn take_seed(&mut self, seed: u64, reports: &[StepReport], done: bool) {
         if self.seeds.as_mut().is_some_and(|seeds| seeds.take(seed, reports, done)) {
             self.ask(Command::EnoughSeed { seed });
         }
     }
 
-    /// The runs of other seeds, if they are of what is shown.
+    /// The runs of other seeds, if they belong to the shown comparison.
     pub fn other_seeds(&self) -> Option<&SeedRuns> {
         let description = self.description()?;
         self.seeds.as_ref().filter(|seeds| seeds.is_of(description))
     }
 
-    /// Stops running other seeds; what they have done stays.
+    /// Stops running other seeds; their results so far stay.
     pub fn cancel_seeds(&mut self) {
         self.seeds.iter_mut().for_each(SeedRuns::cancel);
         self.ask(Command::CancelSeeds);

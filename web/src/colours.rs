@@ -1,11 +1,11 @@
-//! Colours and marks that keep their meaning everywhere. They are those of the recordings.
+//! Colours and marks with the same meaning everywhere, shared with recordings.
 
 use body_schema_palette as palette;
 use body_schema_wire::Description;
 use egui::Color32;
 use egui_plot::{LineStyle, MarkerShape};
 
-/// The slot of every learner, by its name: what its colour, line and mark go by.
+/// The slot of every learner by its name, which decides its colour, line and mark.
 pub fn slots(description: &Description) -> Vec<usize> {
     palette::learner_slots(description.learners.iter().map(|learner| learner.name.as_str()))
 }
@@ -16,7 +16,7 @@ pub fn learner(slot: usize) -> Color32 {
     Color32::from_rgb(red, green, blue)
 }
 
-/// The line of a slot: told apart without colour too.
+/// The line style of a slot, which is distinct without colour too.
 pub fn line_style(slot: usize) -> LineStyle {
     match slot % 3 {
         0 => LineStyle::Solid,

@@ -1,4 +1,4 @@
-//! Playing the game: the visitor's movements against those of the learners that choose by themselves.
+//! The game: the visitor's movements against those of the learners that choose by themselves.
 
 use body_schema_wire::AppraisalReport;
 
@@ -10,7 +10,7 @@ use crate::{
     settings::{GAME, HUMAN},
 };
 
-/// How a game ended.
+/// The result of a game.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Score {
     /// In words.
@@ -36,7 +36,7 @@ impl Panel {
         self.open(0);
     }
 
-    /// Ends the game: the usual learners on the same seed.
+    /// Ends the game, and opens the usual learners on the same seed.
     pub fn end_contest(&mut self) {
         self.settings.learners.clear();
         self.choose_usual_learners();
@@ -49,7 +49,7 @@ impl Panel {
         self.game = Game::new(middles.collect(), session.step, self.now);
     }
 
-    /// Another posture for the next movement.
+    /// Sets another posture for the next movement.
     pub fn pose(&mut self, values: Vec<f64>) {
         self.game.set(values, self.now);
     }
@@ -59,12 +59,12 @@ impl Panel {
         self.human().is_some() && self.is_ready() && !self.busy && self.history.latest() < ROUNDS
     }
 
-    /// Makes the movement that the sliders say, as soon as the server knows of it.
+    /// Makes the movement that the sliders show, as soon as the server knows it.
     pub fn make_movement(&mut self) {
         self.game.wanted = self.may_move();
     }
 
-    /// What time does to the game; after how many seconds it is to be looked at again.
+    /// Advances the game to `now`, and returns the seconds until it should be called again.
     pub(crate) fn play_game(&mut self, now: f64) -> Option<f64> {
         let human = self.human().filter(|_| self.is_ready())?;
         let latest = self.history.latest();
@@ -112,7 +112,7 @@ impl Panel {
         format!("Movement {} of {ROUNDS}: choose a posture, then make the movement.", made + 1)
     }
 
-    /// How the game ended, once it has.
+    /// The result of the game, once it has ended.
     pub fn score(&self) -> Option<Score> {
         let human = self.human()?;
         let learners = &self.description()?.learners;

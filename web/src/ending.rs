@@ -1,20 +1,21 @@
-//! How a run ended, in a sentence: computed from the run, and naming both sides of every comparison.
+//! The end of a run, in a sentence computed from the run that names both sides of every comparison.
 
 use crate::{
     history::{Verdict, Yardstick},
     panel::Panel,
 };
 
-/// What has become of a learner at the end.
+/// The outcome of a learner at the end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
-    /// Accurate from this movement on; after a change of the body they are counted from there.
+    /// Accurate from this movement on; after a change of the body movements are counted from the change.
     After(u64),
-    /// Its estimate ran away.
+    /// Its estimate diverged.
     Diverged,
-    /// Not within as many movements as were made.
+    /// Not accurate within this many movements.
     NotWithin(u64),
-    /// No truth to judge by: the error over measurements held out, metres, at the end and as a mean over the run.
+    /// The error over held-out measurements, metres, where there is no truth to judge by: at the end, and the mean over
+    /// the run.
     HeldOut {
         /// At the end.
         last: f64,
@@ -28,14 +29,14 @@ pub enum Outcome {
 pub struct Ending {
     /// The sentence.
     pub sentence: String,
-    /// What was counted.
+    /// The quantity that was counted.
     pub counted: String,
     /// Every learner by its place in the description, the best first.
     pub outcomes: Vec<(usize, Outcome)>,
 }
 
 impl Outcome {
-    /// In a few words.
+    /// The outcome in a few words.
     pub fn words(self) -> String {
         match self {
             Self::After(movements) => movements.to_string(),
@@ -45,7 +46,7 @@ impl Outcome {
         }
     }
 
-    /// The smaller, the better.
+    /// The rank: the smaller, the better.
     fn rank(self) -> f64 {
         match self {
             Self::After(movements) => movements as f64,
@@ -62,7 +63,7 @@ impl Panel {
         self.description().is_some_and(|description| description.truth.is_some()) && self.history.is_told()
     }
 
-    /// How the run ended; `None` while it goes on.
+    /// The end of the run; `None` while it goes on.
     pub fn ending(&self) -> Option<Ending> {
         let latest = self.history.latest();
         let over = self.is_told() || latest >= self.run_to() || self.remaining() == Some(0);
@@ -107,8 +108,8 @@ impl Panel {
         }
     }
 
-    /// The two that the sentence compares: who asks with who does not, or else the first with the last. The better
-    /// stands first.
+    /// The two learners that the sentence compares, the better one first: one that chooses with one that does not, or
+    /// else the first with the last.
     fn compared(&self, outcomes: &[(usize, Outcome)]) -> Option<[(usize, Outcome); 2]> {
         let learners = &self.description()?.learners;
         let named = |name: &str| outcomes.iter().position(|(learner, _)| learners[*learner].name == name);
@@ -117,7 +118,7 @@ impl Panel {
     }
 }
 
-/// `a` is the better.
+/// The sentence, where `a` is the better.
 fn sentence(a: &str, first: Outcome, b: &str, second: Outcome) -> String {
     use Outcome::{After, Diverged, HeldOut, NotWithin};
     match (first, second) {

@@ -1,4 +1,4 @@
-//! What events do to the panel's state.
+//! The effects of events on the panel's state.
 
 use body_schema_scenario::{ScenarioSummary, WorldKind};
 use body_schema_wire::StepReport;
@@ -16,7 +16,7 @@ use crate::{
 };
 
 impl Panel {
-    /// Takes in what happened.
+    /// Handles an event.
     pub fn receive(&mut self, event: Event) {
         match event {
             Event::Begin { query, known, server, seeds } => {
@@ -76,7 +76,7 @@ impl Panel {
         }
     }
 
-    /// There is no session of the address's id.
+    /// Handles that there is no session with the address's id.
     fn without_session(&mut self) {
         if self.session.is_some() {
             self.stay("That session is gone: it was deleted, or the server was started anew without it.".to_owned());
@@ -90,7 +90,7 @@ impl Panel {
         self.open(self.settings.first_step());
     }
 
-    /// Goes on with the session that is shown, since there is no other.
+    /// Stays with the shown session, since there is no other.
     fn stay(&mut self, why: String) {
         (self.opening, self.restoring, self.wanted) = (false, None, None);
         self.settings.robot = self.is_outside();
@@ -140,7 +140,7 @@ impl Panel {
         }
     }
 
-    /// Shows a session that is there already.
+    /// Shows an existing session.
     pub(crate) fn find(&mut self, session: String) {
         self.pause();
         self.restoring = None;
@@ -149,7 +149,7 @@ impl Panel {
         self.ask(Command::Find { session });
     }
 
-    /// The learners that tell most beside each other, unless the visitor chose some.
+    /// Chooses the learners that are most instructive side by side, unless the visitor chose some.
     pub(crate) fn choose_usual_learners(&mut self) {
         if self.settings.learners.is_empty()
             && let Some(scenario) = self.scenario()
@@ -262,7 +262,8 @@ impl Panel {
         if is_new { self.open(1) } else { self.link = Link::Unreachable(sentence.to_owned()) }
     }
 
-    /// The session is at this step; its reports may still be on their way, and until then nothing is asked for.
+    /// Notes that the session is at this step. Its reports may still be on their way, and until then nothing is asked
+    /// for.
     fn stepped(&mut self, step: u64) {
         self.awaited = Some(step).filter(|step| *step > self.history.latest());
         self.busy = self.awaited.is_some();

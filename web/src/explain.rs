@@ -2,7 +2,7 @@
 
 use crate::{host::Command, panel::Panel, settings::Tab};
 
-/// While steps are made, the search is asked for so often at most, s.
+/// The least time between requests for the search while steps are made, s.
 const ASK_EVERY: f64 = 0.5;
 
 impl Panel {
@@ -14,7 +14,7 @@ impl Panel {
         Some(&chosen.or_else(active)?.name)
     }
 
-    /// Asks how the latest movement was chosen, if that is to be seen and not known yet.
+    /// Asks how the latest movement was chosen, if that is shown and not known yet.
     pub(crate) fn explain(&mut self, now: f64) {
         let latest = self.history.latest();
         if self.settings.tab != Tab::Why || !self.is_ready() || self.why.waiting || self.restoring.is_some() {

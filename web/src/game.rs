@@ -1,16 +1,16 @@
-//! Beat the algorithm: the movements that the visitor chooses, and when the server is asked about them.
+//! The state of the game "Beat the algorithm": the visitor's movements, and when the server is asked about them.
 
 use body_schema_wire::AppraisalReport;
 
 /// Movements of a game.
 pub const ROUNDS: u64 = 10;
-/// So long nothing is asked after a change, s: sliders change with every frame.
+/// The time after a change during which nothing is asked, s: sliders change with every frame.
 const DEBOUNCE: f64 = 0.08;
 
-/// What the visitor is about to do.
+/// The visitor's next movement.
 #[derive(Clone, Debug, Default)]
 pub struct Game {
-    /// The posture as the sliders say, rad or m per joint.
+    /// The posture of the sliders, rad or m per joint.
     pub values: Vec<f64>,
     /// The joints of the slice, across and up.
     pub axes: (usize, usize),
@@ -22,13 +22,13 @@ pub struct Game {
     pub shares: Vec<f64>,
     /// Movements made.
     pub made: u64,
-    /// The movement is to be made as soon as its posture is known to the server.
+    /// Whether the movement is to be made as soon as the server knows its posture.
     pub(crate) wanted: bool,
     changed_at: Option<f64>,
     asked: Option<Vec<f64>>,
 }
 
-/// What is to be done.
+/// The next thing to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Due {
     Nothing,
@@ -38,13 +38,13 @@ pub(crate) enum Due {
 }
 
 impl Game {
-    /// A game with this posture to begin with.
+    /// A game that begins with this posture.
     pub(crate) fn new(values: Vec<f64>, made: u64, now: f64) -> Self {
         let axes = (0, values.len().saturating_sub(1).min(1));
         Self { values, axes, made, changed_at: Some(now), ..Self::default() }
     }
 
-    /// Another posture.
+    /// Sets another posture.
     pub(crate) fn set(&mut self, values: Vec<f64>, now: f64) {
         if values != self.values {
             (self.values, self.evaluation, self.changed_at) = (values, None, Some(now));
@@ -87,7 +87,7 @@ impl Game {
         self.evaluation.is_some() && self.asked.is_none() && self.changed_at.is_none()
     }
 
-    /// The movement was made: what was known of postures is no longer so.
+    /// Notes that the movement was made, so that knowledge of postures is out of date.
     pub(crate) fn moved(&mut self, made: u64, now: f64) {
         self.shares.extend(self.evaluation.take().and_then(|evaluation| evaluation.share));
         self.tried.clear();

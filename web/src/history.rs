@@ -1,9 +1,9 @@
-//! What the learners have done so far: a few numbers per learner and step, small enough to keep them all.
+//! The history of the learners: a few numbers per learner and step, small enough to keep them all.
 
 use body_schema_experiment::Convergence;
 use body_schema_wire::{ChannelReading, Description, LearnerReport, StepReport};
 
-/// One learner after one step.
+/// The numbers of one learner after one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Row {
     /// Mean error of the angles between axes, degrees.
@@ -12,17 +12,17 @@ pub struct Row {
     pub location_m: Option<f64>,
     /// Mean distance of the predicted marker, metres.
     pub prediction_m: Option<f64>,
-    /// Mean distance of a predicted target from its mean in sockets that nobody learned from, metres.
+    /// Mean distance of a predicted target from its mean in held-out sockets, metres.
     pub scatter_m: Option<f64>,
     /// Mean error of predictions over the workspace as the learner itself expects it, metres.
     pub expected_m: Option<f64>,
     /// tr(W P).
     pub trace: Option<f64>,
-    /// What the data collected allow of it, linearised at the truth.
+    /// The least trace that its data allow, linearised at the truth.
     pub bound: Option<f64>,
     /// Expected fall of the trace.
     pub gain: Option<f64>,
-    /// How long the choice took, ms.
+    /// The time of the choice, ms.
     pub selection_ms: Option<f64>,
     /// Movements made.
     pub movements: u64,
@@ -30,21 +30,21 @@ pub struct Row {
     pub misses: u64,
     /// The learner's own verdict.
     pub settled: bool,
-    /// It has stopped learning.
+    /// Whether it has stopped learning.
     pub failed: bool,
     /// The step since which both errors are within the thresholds; `None` outside of them, and where no truth is known.
     pub within_since: Option<u64>,
-    /// The same, once enough movements have confirmed it.
+    /// The movement at which it converged, once enough movements have confirmed it.
     pub converged_at: Option<u64>,
 }
 
 impl Row {
-    /// What tells how good it is where no truth is known, metres; see [`Yardstick`].
+    /// The error that shows how good it is where no truth is known, metres; see [`Yardstick`].
     pub fn error_m(&self) -> Option<f64> {
         self.prediction_m.or(self.scatter_m).or(self.expected_m)
     }
 
-    /// `convergence` is judged up to this report, and counts from step `begin`.
+    /// The row of a report; `convergence` is judged up to it, and counts from step `begin`.
     fn of(report: &LearnerReport, convergence: &Convergence, begin: u64) -> Self {
         let LearnerReport { movement, metrics, failure, .. } = report;
         let step = |movements: u64| begin + movements;
@@ -73,57 +73,57 @@ impl Row {
     }
 }
 
-/// What tells best how good the learners are.
+/// The error by which learners are best judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Yardstick {
-    /// Predictions, held against the truth or measurements that were held out.
+    /// Predictions, compared with the truth or with held-out measurements.
     Prediction,
-    /// Where nothing but sockets is measured, the scatter of predictions in them.
+    /// The scatter of predictions in sockets, if nothing else is measured.
     Scatter,
-    /// With a robot elsewhere, what they expect themselves.
+    /// The learners' own expected error, with a robot elsewhere.
     Expected,
 }
 
-/// What has become of a learner.
+/// The state of a learner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// No movement yet.
     Waiting,
-    /// Its estimate ran away; it has stopped.
+    /// Its estimate diverged; it has stopped.
     Diverged,
-    /// On its way; there is no truth to judge by.
+    /// It is learning; there is no truth to judge by.
     Learning,
-    /// It says itself that it knows enough; there is no truth to judge by.
+    /// It reports that it has settled; there is no truth to judge by.
     Settled,
-    /// Errors outside the thresholds.
+    /// Its errors are outside the thresholds.
     Outside,
-    /// Within the thresholds since a movement; so many more have confirmed it.
+    /// Its errors have been within the thresholds since a movement, and this many more have confirmed it.
     Within(u64, u64),
-    /// Within the thresholds since this movement, confirmed by 20 more.
+    /// Its errors have been within the thresholds since this movement, confirmed by 20 more.
     Converged(u64),
 }
 
-/// After so many movements of which it has seen none, nothing more is to be expected of a learner.
+/// The number of movements without a sighting after which no progress of a learner is expected.
 const BLIND: u64 = 100;
 
 /// All steps of a session.
 #[derive(Clone, Debug, Default)]
 pub struct History {
     change_at: Option<u64>,
-    /// Per learner; the engine's rule, from the start or from the change of the body.
+    /// The convergence of each learner by the engine's rule, from the start or from the change of the body.
     convergence: Vec<Convergence>,
     /// The step of the first row.
     first: u64,
-    /// Step by step, all learners.
+    /// The rows of all learners, step by step.
     rows: Vec<Vec<Row>>,
-    /// The same of what was read; empty where nothing was moved.
+    /// The readings of all learners, step by step; empty where nothing was moved.
     readings: Vec<Vec<Vec<ChannelReading>>>,
-    /// Per learner, the reason why it stopped.
+    /// The reason why each learner stopped, if it did.
     failures: Vec<Option<String>>,
 }
 
 impl History {
-    /// A session that has not begun.
+    /// The history of a session that has not begun.
     pub fn new(description: &Description) -> Self {
         Self {
             change_at: description.change_at,
@@ -135,7 +135,7 @@ impl History {
         }
     }
 
-    /// Whether nothing more is to be told of a learner: it has learned the arm, has run away, or sees nothing any more.
+    /// Whether a learner's story is over: it has learned the arm, has diverged, or no longer sees anything.
     pub fn is_over(&self, learner: usize) -> bool {
         let latest = self.latest();
         let misses = |step| self.row(step, learner).map_or(0, |row| row.misses);
@@ -143,7 +143,7 @@ impl History {
         matches!(self.verdict(latest, learner), Verdict::Converged(_) | Verdict::Diverged) || is_blind()
     }
 
-    /// What tells best how good the learners are.
+    /// The error by which the learners are best judged.
     pub fn yardstick(&self) -> Yardstick {
         let rows = self.rows.last().map_or(&[][..], Vec::as_slice);
         let any = |value: fn(&Row) -> Option<f64>| rows.iter().any(|row| value(row).is_some());
@@ -158,7 +158,7 @@ impl History {
         }
     }
 
-    /// Whether nothing more is to be told of any learner, and the body will not change any more.
+    /// Whether every learner's story is over, and the body will not change any more.
     pub fn is_told(&self) -> bool {
         self.change_at.is_none_or(|change| self.latest() > change)
             && (0..self.failures.len()).all(|learner| self.is_over(learner))
@@ -174,13 +174,13 @@ impl History {
         self.curve(learner, |row| row.error_m().filter(|_| row.movements > 0))
     }
 
-    /// Its mean over the movements; 0 before any.
+    /// The mean of [`errors`](Self::errors); 0 before any movement.
     pub fn mean_error(&self, learner: usize) -> f64 {
         let errors = self.errors(learner);
         errors.iter().map(|[_, error]| error).sum::<f64>() / errors.len().max(1) as f64
     }
 
-    /// Takes a report in, the first whatever its step; one that is known already or leaves a gap changes nothing.
+    /// Adds a report, the first whatever its step. One that is known already or leaves a gap changes nothing.
     pub fn take(&mut self, report: &StepReport) -> bool {
         if self.rows.is_empty() {
             self.first = report.step;
@@ -216,7 +216,7 @@ impl History {
         self.first + self.rows.len().saturating_sub(1) as u64
     }
 
-    /// Whether there is nothing yet.
+    /// Whether it is empty.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
@@ -226,7 +226,7 @@ impl History {
         self.rows.get(usize::try_from(step.checked_sub(self.first)?).ok()?)?.get(learner)
     }
 
-    /// What a learner read at a step, channel by channel.
+    /// The readings of a learner at a step, channel by channel.
     pub fn readings(&self, step: u64, learner: usize) -> &[ChannelReading] {
         let at = step.checked_sub(self.first).and_then(|index| self.readings.get(usize::try_from(index).ok()?));
         at.and_then(|learners| learners.get(learner)).map_or(&[], Vec::as_slice)
@@ -241,12 +241,12 @@ impl History {
             .collect()
     }
 
-    /// Why a learner stopped.
+    /// The reason why a learner stopped.
     pub fn failure(&self, learner: usize) -> Option<&str> {
         self.failures.get(learner)?.as_deref()
     }
 
-    /// What has become of a learner up to a step. After a change of the body movements count from the change.
+    /// The state of a learner up to a step. After a change of the body movements count from the change.
     pub fn verdict(&self, step: u64, learner: usize) -> Verdict {
         let Some(row) = self.row(step, learner) else { return Verdict::Waiting };
         if row.failed {
@@ -269,7 +269,7 @@ impl History {
         }
     }
 
-    /// Where the learner converged, judged up to a step.
+    /// The movement at which the learner converged, judged up to a step.
     pub fn converged_at(&self, step: u64, learner: usize) -> Option<u64> {
         match self.verdict(step, learner) {
             Verdict::Converged(first) => Some(first),

@@ -1,7 +1,7 @@
-//! What passes between the panel and the page that holds it.
+//! The messages between the panel and the page that holds it.
 //!
-//! The panel keeps no connection and reads no clock: the page tells it what happened ([`Event`]) and does what it asks
-//! ([`Command`]). So everything that it does can be tested without a browser.
+//! The panel keeps no connection and reads no clock: the page reports events to it ([`Event`]) and carries out its
+//! commands ([`Command`]), so that everything it does can be tested without a browser.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::wire::{Problem, Session, Standing};
 
-/// What happened.
+/// An event that the page reports.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "is", rename_all = "snake_case")]
 pub enum Event {
@@ -20,18 +20,18 @@ pub enum Event {
     Begin {
         /// The address's query.
         query: String,
-        /// The visitor has been here before, so that the tour need not be offered.
+        /// Whether the visitor has been here before, so that the tour need not be offered.
         known: bool,
-        /// Whether a server is there; without one the page shows recorded runs.
+        /// Whether there is a server; without one the page shows recorded runs.
         #[serde(default = "usual")]
         server: bool,
         /// The seeds of the recorded runs, where there is no server.
         #[serde(default)]
         seeds: Vec<u64>,
     },
-    /// Where the scene is.
+    /// The place of the scene.
     Layout {
-        /// Seen from the panel.
+        /// The side on which it is, seen from the panel.
         scene: Side,
     },
     /// The visitor went back or forth to this address.
@@ -39,7 +39,7 @@ pub enum Event {
         /// The address's query.
         query: String,
     },
-    /// The scenarios there are.
+    /// The available scenarios.
     Scenarios {
         /// All of them.
         scenarios: Vec<ScenarioSummary>,
@@ -49,21 +49,21 @@ pub enum Event {
         /// Oldest first.
         sessions: Vec<Session>,
     },
-    /// What was asked for or said about a robot's movements is done; how the session stands since comes by itself.
+    /// A request about a robot's movements is done; the session's new status comes by itself.
     Told,
-    /// The session that was asked for is there; null if there is none of that id.
+    /// The requested session; null if there is none with that id.
     Session {
         /// The session.
         session: Option<Box<Session>>,
     },
     /// A request was refused.
     Refused {
-        /// What was asked, a [`Command`]'s name.
+        /// The name of the [`Command`] that was refused.
         asked: String,
         /// Why.
         problem: Problem,
     },
-    /// The connection stands.
+    /// The connection is open.
     Connected,
     /// A message of the session's WebSocket.
     Live {
@@ -74,19 +74,19 @@ pub enum Event {
     Stepped {
         /// The session that was stepped.
         session: String,
-        /// The step that it is at.
+        /// The step that the session is at.
         step: u64,
     },
-    /// The connection broke; it is tried again.
+    /// The connection broke, and is tried again.
     Lost {
-        /// After so many seconds.
+        /// The seconds until then.
         seconds: f64,
     },
     /// The session has ended.
     Ended {
         /// Why its engine failed, if it did.
         failure: Option<String>,
-        /// It went while there was no connection: the server was started anew.
+        /// Whether it ended while there was no connection: the server was started anew.
         unseen: bool,
     },
     /// The scene shows this step.
@@ -101,12 +101,12 @@ pub enum Event {
     },
     /// The scene cannot be drawn.
     NoScene {
-        /// Why.
+        /// The reason.
         reason: String,
     },
     /// How a movement was chosen; null if it was not chosen by a search.
     Selection {
-        /// The learner asked for.
+        /// The learner that was asked about.
         learner: String,
         /// The answer.
         selection: Option<Box<Choice>>,
@@ -116,7 +116,7 @@ pub enum Event {
         /// The answer.
         evaluation: Box<AppraisalReport>,
     },
-    /// What the next movement of a learner whose movements the visitor chooses would teach.
+    /// What the next movement would teach a learner whose movements the visitor chooses.
     Configured {
         /// The learner.
         learner: String,
@@ -127,31 +127,31 @@ pub enum Event {
     Seeds {
         /// Its seed.
         seed: u64,
-        /// Its next reports; a request for steps answers with those it made, so that the first is of step 1.
+        /// Its next reports; a request for steps is answered with those it made, so that the first is of step 1.
         reports: Vec<StepReport>,
         /// Whether this seed is done.
         done: bool,
     },
     /// Something was copied, or could not be.
     Copied {
-        /// Whether it was.
+        /// Whether copying succeeded.
         done: bool,
-        /// What there is to say about it, if it is not the usual.
+        /// A note on it, if it is not the usual one.
         #[serde(default)]
         note: Option<String>,
     },
 }
 
-/// Where something lies, seen from the panel.
+/// The side on which something is, seen from the panel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
-    /// Beside it, on the left.
+    /// On the left.
     Left,
-    /// Beside it, on the right.
+    /// On the right.
     #[default]
     Right,
-    /// Above it.
+    /// Above.
     Above,
 }
 
@@ -163,15 +163,15 @@ fn usual() -> bool {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "type", content = "data", rename_all = "lowercase")]
 pub enum Live {
-    /// The first; the session's resource has said it already.
+    /// The description, which comes first; the session's resource has it already.
     Description(serde::de::IgnoredAny),
     /// A step.
     Step(Box<StepReport>),
-    /// With a robot elsewhere: how it stands.
+    /// The status of a session with a robot elsewhere.
     Status(Box<Standing>),
 }
 
-/// What the page is to do.
+/// A command to the page.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "do", rename_all = "snake_case")]
 pub enum Command {
@@ -179,21 +179,21 @@ pub enum Command {
     Scenarios,
     /// Ask for the sessions with robots elsewhere.
     Robots,
-    /// Have the next movement of a robot elsewhere suggested.
+    /// Ask for a suggestion of the next movement of a robot elsewhere.
     Suggest {
         /// The session.
         session: String,
     },
-    /// Say that a suggestion is not carried out.
+    /// Report that a suggestion is not carried out.
     EndSuggestion {
         /// The session.
         session: String,
         /// The suggestion's id.
         suggestion: u64,
-        /// What becomes of it.
+        /// Its outcome.
         state: Outcome,
     },
-    /// Say that a suggestion was carried out and nothing was seen.
+    /// Report that a suggestion was carried out and nothing was seen.
     NotSeen {
         /// The session.
         session: String,
@@ -215,14 +215,14 @@ pub enum Command {
         seed: u64,
         /// The learners; null for all.
         learners: Option<Vec<String>>,
-        /// How large ellipsoids are drawn.
+        /// The size of the drawn ellipsoids.
         ellipsoids: String,
     },
     /// Make steps.
     Step {
-        /// Where.
+        /// The session.
         session: String,
-        /// How many.
+        /// The number of steps.
         count: u64,
         /// The step that the session must be at.
         expected_step: u64,
@@ -259,14 +259,14 @@ pub enum Command {
         /// Rad or m per joint.
         configuration: Vec<f64>,
     },
-    /// Point at the line of the scene's legend with this mark, and at no other.
+    /// Highlight the line of the scene's legend with this mark, and no other.
     Point {
         /// The mark's name; null for none.
         at: Option<&'static str>,
     },
     /// Put a picture of the scene on the clipboard.
     Picture,
-    /// Show the scene as it was at first.
+    /// Restore the first view of the scene.
     RestoreView,
     /// Run other seeds in the background.
     Seeds {
@@ -279,14 +279,14 @@ pub enum Command {
         /// Steps of each.
         steps: u64,
     },
-    /// Of this seed nothing more is needed.
+    /// Note that a seed has been run far enough.
     EnoughSeed {
         /// The seed.
         seed: u64,
     },
     /// Stop running other seeds.
     CancelSeeds,
-    /// Make this the address.
+    /// Set the page's address.
     Address {
         /// The query.
         query: String,
@@ -296,27 +296,27 @@ pub enum Command {
         /// The text; for the address, its query with the question mark.
         text: String,
     },
-    /// Offer a file.
+    /// Offer a file for download.
     Download {
-        /// Where it is.
+        /// Its path.
         path: String,
         /// Its name.
         name: String,
     },
     /// Remember that the visitor knows the tour.
     Known,
-    /// Tell assistive technology; scripts read the rest.
+    /// Pass the state in words to assistive technology; scripts read the rest.
     Say(Box<Mirror>),
 }
 
-/// The panel's state in words and numbers, for those who do not see it.
+/// The panel's state in words and numbers, for visitors who do not see it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Mirror {
-    /// All of it in sentences.
+    /// The whole state in sentences.
     pub text: String,
-    /// What has just happened, to be read out.
+    /// News to be read out.
     pub news: String,
-    /// What the panel is about: `loading`, `ready`, `playing`, `stopped`, `lost`, `expired`, `failed`.
+    /// The panel's phase: `loading`, `ready`, `playing`, `stopped`, `lost`, `expired`, `failed`.
     pub phase: String,
     /// The step that is shown.
     pub step: u64,
@@ -326,11 +326,11 @@ pub struct Mirror {
     pub session: String,
     /// Whether the visitor is typing, so that keys are text.
     pub typing: bool,
-    /// What is shown in the scene.
+    /// The caption of the scene.
     pub caption: Caption,
 }
 
-/// What the legend over the scene says, and what stands under a picture of it.
+/// The texts of the legend over the scene, and of the caption under a picture of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Caption {
     /// Scenario, seed and step.
@@ -339,11 +339,11 @@ pub struct Caption {
     pub learners: Vec<Captioned>,
     /// What the translucent ellipsoids are.
     pub ellipsoids: String,
-    /// Whether there is a true arm to be seen.
+    /// Whether a true arm is shown.
     pub truth: bool,
-    /// What is drawn of the measurements.
+    /// What is drawn of the measurements, in words.
     pub seen: String,
-    /// Whether the movement that is suggested next can be seen.
+    /// Whether the next suggested movement is shown.
     pub suggested: bool,
 }
 

@@ -20,7 +20,7 @@ pub const SHORTCUTS: [(&str, &str); 11] = [
 ];
 
 impl Panel {
-    /// Does what the pressed keys stand for, unless the visitor types, and tells the page whether that is so.
+    /// Handles the pressed keys, unless the visitor is typing, and tells the page which is the case.
     pub fn take_keys(&mut self, ctx: &Context) {
         let typing = ctx.text_edit_focused();
         self.set_typing(typing);
@@ -75,9 +75,10 @@ impl Panel {
     }
 }
 
-/// What was held down with a key that has just been pressed; nothing if that makes it a shortcut of somebody else's.
+/// The modifiers held down with a key that has just been pressed; `None` if they make it another program's shortcut.
 ///
-/// This is read from the press itself: those elsewhere on the page are passed on without what is held down at the moment.
+/// They are read from the press itself: presses elsewhere on the page are passed on without the modifiers held at the
+/// moment.
 fn press_of(ctx: &Context, wanted: Key) -> Option<Modifiers> {
     ctx.input(|input| {
         input.events.iter().find_map(|event| match event {

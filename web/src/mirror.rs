@@ -1,4 +1,4 @@
-//! The panel in words, for those who hear it and for scripts.
+//! The panel in words, for screen readers and scripts.
 
 use body_schema_wire::Description;
 
@@ -9,11 +9,11 @@ use crate::{
     settings::ELLIPSOIDS,
 };
 
-/// How often words are renewed, s: a screen reader must be able to finish a sentence.
+/// The interval at which words are renewed, s: a screen reader must be able to finish a sentence.
 const SAY_EVERY: f64 = 1.0;
 
 impl Panel {
-    /// What the legend over the scene says, and what stands under a picture of it.
+    /// The texts of the legend over the scene, and of the caption under a picture of it.
     pub fn caption(&self) -> Caption {
         let Some(description) = self.description() else { return Caption::default() };
         let title = self.title(description);
@@ -92,7 +92,7 @@ impl Panel {
         text
     }
 
-    /// Tells the page when something has changed: numbers at once, words once a second.
+    /// Sends the state to the page when it has changed: numbers at once, words once a second.
     pub(crate) fn mirror(&mut self, now: f64) {
         let (said_at, before) = &self.said;
         let mut mirror = Mirror {

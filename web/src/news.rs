@@ -1,20 +1,21 @@
-//! What is read out when it happens: to those who hear the panel, silence is as important as words.
+//! The news that is read out when something happens. Only a few events are: to those who hear the panel, silence is as
+//! important as words.
 
 use crate::{history::Verdict, panel::Panel};
 
-/// What was true when something was last read out.
+/// The state when something was last read out.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Told {
     session: String,
     phase: &'static str,
     step: u64,
     notices: Vec<String>,
-    /// Per learner, whether its end was told.
+    /// For each learner, whether its end was read out.
     ended: Vec<bool>,
 }
 
 impl Panel {
-    /// What has happened since this was last asked.
+    /// The news since the last call.
     pub(crate) fn news(&mut self) -> Option<String> {
         let phase = self.phase();
         let session = self.session.as_ref().map(|session| session.id.clone()).unwrap_or_default();
@@ -62,7 +63,7 @@ impl Panel {
         Some(format!("Opened {scenario}, seed {seed}, comparing {}, at step {}.", names.join(", "), self.cursor))
     }
 
-    /// Per learner, whether it has learned the arm, is sure of itself or ran away by the latest step.
+    /// For each learner, whether it has learned the arm, has settled or has diverged by the latest step.
     fn endings(&self) -> Vec<bool> {
         let (latest, learners) = (self.history.latest(), self.description().map_or(0, |one| one.learners.len()));
         let ended = |learner| {

@@ -16,16 +16,16 @@ use crate::{
     wire::Session,
 };
 
-/// What the panel can do at the moment.
+/// The state of the connection.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Link {
-    /// Nothing has come yet.
+    /// Nothing has been received yet.
     Loading,
     /// The server cannot be reached, or refused to begin.
     Unreachable(String),
-    /// A session is there and followed.
+    /// There is a session, and it is followed.
     Connected,
-    /// The connection broke; it is tried again after so many seconds.
+    /// The connection broke, and is tried again after this many seconds.
     Lost(f64),
     /// The session was deleted or had to make room.
     Expired,
@@ -33,31 +33,31 @@ pub enum Link {
     Failed(String),
 }
 
-/// The chart that is in sight unless the visitor chose another.
+/// The title of the chart that is shown unless the visitor chose another.
 pub(crate) const PREDICTION: &str = "Prediction error";
 
-/// How fast steps are made.
+/// The pace of making steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pace {
-    /// When the last steps were asked for.
+    /// When steps were last asked for.
     pub(crate) asked_at: f64,
-    /// Learners that had settled when playing began.
+    /// The number of learners that had settled when playing began.
     pub(crate) settled: usize,
-    /// The story was told already when playing began.
+    /// Whether the story was over already when playing began.
     pub(crate) told: bool,
-    /// Play no further than this step.
+    /// The step at which playing stops.
     pub(crate) until: Option<u64>,
 }
 
 /// The panel.
 pub struct Panel {
-    /// What the visitor chose.
+    /// The visitor's choices.
     pub settings: Settings,
-    /// What there is to choose from.
+    /// The available scenarios.
     pub scenarios: Vec<ScenarioSummary>,
-    /// What the visitor should know, newest last.
+    /// Notices for the visitor, newest last.
     pub notices: Vec<String>,
-    /// Whether there is a session, and how it stands with it.
+    /// The state of the connection to a session.
     pub link: Link,
     /// The session.
     pub session: Option<Session>,
@@ -67,13 +67,13 @@ pub struct Panel {
     pub cursor: u64,
     /// Whether steps are being made.
     pub playing: bool,
-    /// Why the run has stopped.
+    /// Why the run has stopped, if it has.
     pub stopped: Option<String>,
-    /// Why there is no scene.
+    /// Why there is no scene, if there is none.
     pub no_scene: Option<String>,
     /// How the last movement was chosen.
     pub why: Why,
-    /// Other seeds, in the background, once they were asked for.
+    /// The runs of other seeds in the background, once they were asked for.
     pub seeds: Option<SeedRuns>,
     /// The card of the story that is open.
     pub tour: Option<usize>,
@@ -98,32 +98,32 @@ pub struct Panel {
     /// The answer to the last copying.
     pub copied: Option<String>,
     pub(crate) spots: Spots,
-    /// What is marked in the legend of the scene.
+    /// The mark that is highlighted in the legend of the scene.
     pub(crate) pointed: Option<&'static str>,
     /// The card that was drawn last, by its story and place.
     pub(crate) card_shown: Option<(usize, usize)>,
-    /// What the card that has just been opened speaks of.
+    /// What the card that has just been opened refers to.
     pub(crate) reveal: Option<Spot>,
-    /// How high the open card is.
+    /// The height of the open card.
     pub(crate) card_height: f32,
-    /// The ending was brought into view.
+    /// Whether the ending was brought into view.
     pub(crate) ending_seen: bool,
     /// The tab that was drawn last.
     pub(crate) tab_shown: Tab,
-    /// The visitor touches the screen.
+    /// Whether the visitor touches the screen.
     pub(crate) touch: bool,
-    /// Where the scene lies.
+    /// The side on which the scene is.
     pub(crate) scene: Side,
-    /// By how much a swipe over what stays in place has moved what scrolls.
+    /// How far a swipe over fixed parts has moved the scrolling part.
     pub(crate) swiped: f32,
-    /// While it plays, seconds from one frame to the next where drawing is slow; 0 where it is not.
+    /// The seconds between frames while it plays, where drawing is slow; 0 where it is not.
     pub drawn_every: f64,
     pub(crate) opening: bool,
-    /// A request for steps is under way.
+    /// Whether a request for steps is under way.
     pub(crate) busy: bool,
     /// The step whose report is awaited.
     pub(crate) awaited: Option<u64>,
-    /// Steps up to this one are made at once, to restore a run.
+    /// The step up to which steps are made at once, to restore a run.
     pub(crate) restoring: Option<u64>,
     /// The step to show once it is there.
     pub(crate) wanted: Option<u64>,
@@ -197,17 +197,17 @@ impl Panel {
         self.commands.push(command);
     }
 
-    /// What the page is to do, in order.
+    /// Takes the commands for the page, in order.
     pub fn take_commands(&mut self) -> Vec<Command> {
         std::mem::take(&mut self.commands)
     }
 
-    /// Whether there is anything for the page to do.
+    /// Whether there are commands for the page.
     pub(crate) fn has_commands(&self) -> bool {
         !self.commands.is_empty()
     }
 
-    /// Tells the visitor something, once.
+    /// Adds a notice for the visitor, once.
     pub(crate) fn notice(&mut self, text: String) {
         const MOST: usize = 6;
         if !self.notices.contains(&text) {
@@ -217,7 +217,7 @@ impl Panel {
         self.notices.drain(..surplus);
     }
 
-    /// What the session runs.
+    /// The description of the session's experiment.
     pub fn description(&self) -> Option<&Description> {
         self.session.as_ref().map(|session| &session.description)
     }
@@ -237,7 +237,7 @@ impl Panel {
         STORIES.iter().position(|story| story.scenario == self.settings.scenario)
     }
 
-    /// Whether it goes on between its frames, and is drawn less often than it does something.
+    /// Whether the panel works between its frames, and is drawn less often than it works.
     pub fn draws_sparingly(&self) -> bool {
         self.playing && self.drawn_every > 0.0
     }
@@ -247,7 +247,7 @@ impl Panel {
         self.link == Link::Connected && self.session.is_some() && !self.opening && !self.history.is_empty()
     }
 
-    /// How far a run is being restored, 0 to 1.
+    /// The share of a run that has been restored, 0 to 1.
     pub fn restored(&self) -> Option<f32> {
         let target = self.restoring?;
         Some(self.history.latest() as f32 / target.max(1) as f32)

@@ -1,4 +1,4 @@
-//! Making steps and going through those that were made.
+//! Playing: making steps, and moving among those that were made.
 
 use body_schema_experiment::CONFIRMATION;
 
@@ -9,20 +9,21 @@ use crate::{
     settings::{MAX_SPEED, MIN_SPEED, StopWhen},
 };
 
-/// The speeds that keys go through, steps a second.
+/// The speeds that keys select, steps a second.
 pub const SPEEDS: [f64; 8] = [MIN_SPEED, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, MAX_SPEED];
-/// Where drawing is slow, so many steps are made at once at most.
+/// The most steps that are made at once where drawing is slow.
 const MOST_AT_ONCE: u64 = 25;
-/// So many are made at once to restore a run.
+/// The number of steps that are made at once to restore a run.
 const RESTORED_AT_ONCE: u64 = 50;
-/// So many movements before the body changes, a run that was fast-forwarded is slow again.
+/// The number of movements before a change of the body at which a fast-forwarded run slows down again.
 const BEFORE_CHANGE: u64 = 5;
 /// How long playing waits for a step to be shown, s.
 const SHOWN_WITHIN: f64 = 5.0;
-/// At this speed and below, steps/s, and for single steps, the scene shows postures between steps: so many.
+/// The speed, steps/s, up to which the scene shows postures between steps, also for single steps; and the number of
+/// these postures.
 const SLOW: f64 = 4.0;
 pub(crate) const FRAMES: u64 = 12;
-/// How often the address follows, s: browsers allow some hundred changes a minute.
+/// The interval at which the address follows, s: browsers allow some hundred changes a minute.
 const ADDRESS_EVERY: f64 = 1.0;
 
 impl Panel {
@@ -81,10 +82,10 @@ impl Panel {
         (judging.iter().filter(|row| row.settled).count(), judging.len())
     }
 
-    /// What playing fast-forwards to, since until then nothing is to be seen that was not seen before: the last
-    /// learner that has not learned the arm, or the change of the body.
+    /// The goal of fast-forwarding, until which nothing new is to be seen: the last learner that has not learned the
+    /// arm, or the change of the body.
     pub fn fast_forward(&self) -> Option<String> {
-        /// So many movements without news are enough.
+        /// The number of movements without news that is enough.
         const QUIET: u64 = 100;
         let due = self.playing && self.settings.stop == StopWhen::Told && !self.pace.told && self.pace.until.is_none();
         let description = self.description().filter(|description| due && description.truth.is_some())?;
@@ -144,13 +145,13 @@ impl Panel {
             .map(|(_, learner)| learner.name.clone())
     }
 
-    /// One step: the next that was made, or a new one.
+    /// Moves one step forward: to the next one that was made, or makes a new one.
     pub fn forward(&mut self) {
         self.pause();
         if self.cursor < self.history.latest() { self.cursor += 1 } else { self.make_step() }
     }
 
-    /// The step before, of those that were made.
+    /// Moves one step back among those that were made.
     pub fn back(&mut self) {
         self.pause();
         self.cursor = self.cursor.saturating_sub(1);
@@ -184,7 +185,7 @@ impl Panel {
         }
     }
 
-    /// Makes so many steps, with so many postures shown on the way to each.
+    /// Asks for `count` steps, with `frames` postures shown on the way to each.
     pub(crate) fn request(&mut self, count: u64, frames: u64) {
         let Some(session) = &self.session else { return };
         let command =
@@ -194,7 +195,7 @@ impl Panel {
         self.ask(command);
     }
 
-    /// Opens the session anew.
+    /// Opens the session again from its start.
     pub fn reset(&mut self) {
         if self.is_outside() {
             return;
@@ -222,7 +223,8 @@ impl Panel {
         self.settings.speed = next.copied().unwrap_or(speed);
     }
 
-    /// What time does. It returns after how many seconds it must be called again, if nothing happens before.
+    /// Advances the panel to `now`, and returns the seconds after which it must be called again, if nothing happens
+    /// before.
     pub fn tick(&mut self, now: f64) -> Option<f64> {
         self.now = now;
         let mut again = None;

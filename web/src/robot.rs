@@ -1,4 +1,4 @@
-//! A robot elsewhere: what it is asked to do, how the session with it stands, and what the visitor says of a suggestion.
+//! A robot elsewhere: its suggestions, the status of its session, and the visitor's reports about suggestions.
 
 use body_schema_ask_tell::{Answer, Outcome, Status, Suggestion};
 use body_schema_engine::kinematics::JointKind;
@@ -10,13 +10,13 @@ use crate::{host::Command, panel::Panel, wire::Standing};
 /// The robot of a session with one elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Robot {
-    /// How the session stands, once that was told.
+    /// The snapshot of the session, once that was received.
     pub standing: Option<Standing>,
-    /// Something is asked for or said, and not answered yet.
+    /// Whether a request is not answered yet.
     pub(crate) asking: bool,
 }
 
-/// What the visitor says of the movement that is suggested.
+/// The visitor's report about the suggested movement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Said {
     /// The robot cannot go there.
@@ -28,7 +28,7 @@ pub enum Said {
 }
 
 impl Said {
-    /// All, with what stands on their buttons and what each does.
+    /// All reports, with the labels of their buttons and what each does.
     pub const ALL: [(Self, &str, &str); 3] = [
         (
             Self::NotReachable,
@@ -60,13 +60,13 @@ impl Panel {
         }
     }
 
-    /// Has a movement suggested, as the robot's own program would.
+    /// Asks for a suggestion, as the robot's own program would.
     pub(crate) fn suggest(&mut self) {
         let Some(session) = self.asked_session() else { return };
         self.ask(Command::Suggest { session });
     }
 
-    /// Says what becomes of the movement that is suggested.
+    /// Reports the outcome of the suggested movement.
     pub(crate) fn say(&mut self, said: Said) {
         let Some(Suggestion { id: suggestion, configuration, .. }) = self.suggestion().cloned() else { return };
         let Some(session) = self.asked_session() else { return };
@@ -77,14 +77,14 @@ impl Panel {
         });
     }
 
-    /// The session, about which one thing is asked at a time.
+    /// The session, if no other request about it is under way.
     fn asked_session(&mut self) -> Option<String> {
         let session = self.session.as_ref().filter(|_| !self.robot.asking)?.id.clone();
         self.robot.asking = true;
         Some(session)
     }
 
-    /// What goes on, in a sentence.
+    /// The present activity, in a sentence.
     pub(crate) fn robot_status(&self) -> String {
         let latest = self.history.latest();
         let Some(Standing { status, pending, .. }) = &self.robot.standing else { return "Loading…".to_owned() };
@@ -101,7 +101,7 @@ impl Panel {
         }
     }
 
-    /// The robot in sentences: what is suggested, and how the session stands.
+    /// The robot in sentences: the suggestion, and the status of the session.
     pub(crate) fn robot_words(&self) -> Vec<String> {
         let (Some(Standing { status, last, .. }), Some(description)) = (&self.robot.standing, self.description())
         else {
@@ -118,7 +118,7 @@ impl Panel {
     }
 }
 
-/// Where a suggestion moves each joint: its name, the position in the units of the URDF, and in those that people read.
+/// The target of a suggestion for each joint: its name, the position in the units of the URDF, and in units for people.
 pub fn positions(description: &Description, suggestion: &Suggestion) -> Vec<[String; 3]> {
     let joints = description.joints.iter().filter_map(|joint| {
         let position = *suggestion.configuration.get(&joint.name)?;
@@ -131,7 +131,7 @@ pub fn positions(description: &Description, suggestion: &Suggestion) -> Vec<[Str
     joints.collect()
 }
 
-/// What is expected of a suggestion, in sentences.
+/// The expectations of a suggestion, in sentences.
 pub fn expectations(description: &Description, suggestion: &Suggestion, status: &Status) -> Vec<String> {
     let mut words = Vec::new();
     if let Some(socket) = &suggestion.socket {
@@ -155,7 +155,7 @@ pub fn expectations(description: &Description, suggestion: &Suggestion, status: 
     words
 }
 
-/// How a session stands, in sentences.
+/// The status of a session, in sentences.
 pub fn standing(status: &Status, last: Option<&Answer>) -> Vec<String> {
     let mut words = vec![accuracy(status), told(status)];
     words.extend(last.map(latest));
@@ -170,7 +170,7 @@ pub fn standing(status: &Status, last: Option<&Answer>) -> Vec<String> {
     words
 }
 
-/// How accurate it is, and how many movements are left until that is enough.
+/// A sentence on its accuracy, and how many movements are left until that is enough.
 fn accuracy(status: &Status) -> String {
     let Some(now) = status.expected_error_mm else {
         return "How accurate it is, this estimator cannot tell.".to_owned();

@@ -1,9 +1,9 @@
-//! DIRECT's search for a movement, ready to be drawn.
+//! The search of DIRECT for a movement, ready to be drawn.
 
 use body_schema_engine::optimize::{MAX_LEVEL, Plane, Projection, Variant};
 use body_schema_wire::{BoxReport, Choice, ShapeReport};
 
-/// A search in which everything is there that it refers to, so that drawing it needs no further care.
+/// A checked search: everything that it refers to exists, so that drawing it needs no further checks.
 #[derive(Clone, Debug)]
 pub struct Search {
     choice: Choice,
@@ -14,7 +14,7 @@ pub struct Search {
 /// A rectangle of the slice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// Where it is in the unit square.
+    /// Its place in the unit square.
     pub place: Projection,
     /// The criterion at its centre.
     pub value: Option<f64>,
@@ -34,7 +34,7 @@ pub struct Dot {
 }
 
 impl Search {
-    /// The search behind a choice; `None` if that does not hold together.
+    /// The search behind a choice; `None` if the choice is inconsistent.
     pub fn of(choice: Choice) -> Option<Self> {
         let (joints, boxes) = (choice.joints.len(), &choice.boxes);
         let is_shape =
@@ -56,17 +56,17 @@ impl Search {
         Some(Self { choice, variant, busiest })
     }
 
-    /// The choice that it led to.
+    /// The choice that the search led to.
     pub fn choice(&self) -> &Choice {
         &self.choice
     }
 
-    /// How it measures rectangles.
+    /// The variant of DIRECT, which decides how rectangles are measured.
     pub fn variant(&self) -> Variant {
         self.variant
     }
 
-    /// The joints that were divided most, for a slice in which there is something to see.
+    /// The joints that were divided most, for a slice with something to see.
     pub fn busiest(&self) -> Plane {
         self.busiest
     }

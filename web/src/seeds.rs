@@ -1,4 +1,4 @@
-//! Many seeds of the same comparison, run in the background: is what is seen luck?
+//! Other seeds of the same comparison, run in the background, which show how much of the result is luck.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,9 +6,9 @@ use body_schema_wire::{Description, StepReport};
 
 use crate::history::{History, Row};
 
-/// How many further seeds are run.
+/// The number of further seeds.
 pub const SEEDS: u64 = 10;
-/// How few seeds make no band.
+/// The least number of seeds for a band.
 const FEWEST: usize = 3;
 
 /// The runs of other seeds.
@@ -22,7 +22,7 @@ pub struct SeedRuns {
     runs: BTreeMap<u64, History>,
 }
 
-/// What the middle 80 % of seeds did at a step: 10th, 50th and 90th percentile.
+/// The band of the middle 80 % of seeds at each step: 10th, 50th and 90th percentile.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Band {
     /// Steps.
@@ -36,24 +36,24 @@ pub struct Band {
 }
 
 impl SeedRuns {
-    /// Runs of so many steps that have just been asked for.
+    /// Runs of this many steps that have just been asked for.
     pub(crate) fn new(description: Description, steps: u64) -> Self {
         Self { running: true, description, steps, done: BTreeSet::new(), runs: BTreeMap::new() }
     }
 
-    /// How much is done, 0 to 1.
+    /// The share that is done, 0 to 1.
     pub fn progress(&self) -> f32 {
         let under_way = self.runs.iter().filter(|(seed, _)| !self.done.contains(seed));
         let made: u64 = under_way.map(|(_, run)| run.latest()).sum();
         (self.done() as f32 + made as f32 / self.steps.max(1) as f32) / SEEDS as f32
     }
 
-    /// How many seeds are done.
+    /// The number of seeds that are done.
     pub fn done(&self) -> u64 {
         self.done.len() as u64
     }
 
-    /// How far each is run at most.
+    /// The most steps of each run.
     pub fn steps(&self) -> u64 {
         self.steps
     }

@@ -1,4 +1,4 @@
-//! What the visitor chose.
+//! The visitor's choices.
 
 use body_schema_scenario::ScenarioSummary;
 
@@ -36,7 +36,7 @@ impl StopWhen {
     ];
 }
 
-/// What the lower part of the panel shows.
+/// The tabs of the lower part of the panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tab {
     /// Errors over the steps.
@@ -73,7 +73,7 @@ pub struct Settings {
     pub run_to: Option<u64>,
     /// When to stop before.
     pub stop: StopWhen,
-    /// What is shown.
+    /// The tab that is shown.
     pub tab: Tab,
     /// The learner whose choice is explained.
     pub learner: Option<String>,

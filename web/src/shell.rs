@@ -87,6 +87,10 @@ impl PanelHandle {
     }
 
     /// Draws on a canvas from now on; sparingly where that is slow.
+    ///
+    /// # Errors
+    ///
+    /// A JavaScript value that says why the canvas cannot be drawn on.
     pub async fn start(
         &self,
         canvas: web_sys::HtmlCanvasElement,
@@ -107,6 +111,10 @@ impl PanelHandle {
     }
 
     /// Takes in an event, as JSON. What the panel does not know is refused with a reason.
+    ///
+    /// # Errors
+    ///
+    /// The reason, as a string, if the JSON is no event that the panel knows.
     pub fn receive(&self, event: &str) -> Result<(), JsValue> {
         let event = serde_json::from_str(event).map_err(|error| JsValue::from_str(&error.to_string()))?;
         self.inbox.borrow_mut().events.push(event);
@@ -164,6 +172,10 @@ impl PanelHandle {
     }
 
     /// Does what was done to an element, told as JSON.
+    ///
+    /// # Errors
+    ///
+    /// The reason, as a string, if the JSON is no act that the panel knows.
     pub fn act(&self, act: &str) -> Result<(), JsValue> {
         let act: Act = serde_json::from_str(act).map_err(|error| JsValue::from_str(&error.to_string()))?;
         self.push(|inbox| {

@@ -1,9 +1,9 @@
-//! What goes on, in a sentence.
+//! The present activity, in a sentence.
 
 use crate::panel::{Link, Panel};
 
 impl Panel {
-    /// What stands above the controls: what goes on, or what to do.
+    /// The sentence above the controls: the present activity, or what to do.
     pub fn status(&self) -> String {
         let latest = self.history.latest();
         match &self.link {

@@ -29,11 +29,11 @@ pub struct Story {
 pub struct Card {
     /// Its title.
     pub title: &'static str,
-    /// What it says.
+    /// Its text.
     pub text: &'static str,
-    /// What it points at.
+    /// The spot that it points at.
     pub spot: Spot,
-    /// What it offers to do, the first being the one that the story goes on with.
+    /// The actions that it offers; the story goes on with the first.
     pub acts: &'static [Act],
 }
 
@@ -68,7 +68,7 @@ impl Spots {
     }
 }
 
-/// What a card does.
+/// An action of a card.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Act {
     /// Play to a step at so many steps a second, and pause.
@@ -88,7 +88,7 @@ pub enum Act {
 }
 
 impl Act {
-    /// What stands on its button.
+    /// The label of its button.
     pub fn label(self) -> String {
         match self {
             Self::PlayTo(step, _) => format!("Play to movement {step}"),

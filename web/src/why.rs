@@ -4,7 +4,7 @@ use body_schema_wire::{AppraisalReport, Choice};
 
 use crate::{search::Search, wire::Problem};
 
-/// What is known of the last search.
+/// The knowledge of the last search.
 #[derive(Clone, Debug, Default)]
 pub struct Why {
     /// The search.

@@ -1,4 +1,4 @@
-//! What the server itself says, as far as the panel reads it. What it passes on from the engine (scenarios,
+//! The server's own messages, as far as the panel reads them. What it passes on from the engine (scenarios,
 //! descriptions, reports, choices) are the engine's own types.
 
 use body_schema_ask_tell::{Answer, Status, Suggestion};
@@ -11,10 +11,10 @@ use serde::Deserialize;
 pub struct Session {
     /// Its id.
     pub id: String,
-    /// Where its movements are made.
+    /// The kind of world in which its movements are made.
     #[serde(default = "simulated")]
     pub world: WorldKind,
-    /// What it runs.
+    /// The description of its experiment.
     pub description: Description,
     /// Its latest step.
     pub step: u64,
@@ -34,11 +34,11 @@ fn simulated() -> WorldKind {
 /// How a session with a robot elsewhere stands.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Standing {
-    /// In numbers.
+    /// The status in numbers.
     pub status: Status,
     /// The suggestions that wait to be carried out, in the order in which they were chosen.
     pub pending: Vec<Suggestion>,
-    /// What was answered to the latest observation.
+    /// The answer to the latest observation.
     #[serde(default)]
     pub last: Option<Answer>,
 }

@@ -22,7 +22,7 @@ pub fn about(learner: &LearnerDescription) -> &'static str {
     }
 }
 
-/// The same with the terms of the field.
+/// The description of a learner with the terms of the field.
 pub fn terms(learner: &LearnerDescription) -> String {
     let LearnerDescription { name, estimator, policy, .. } = learner;
     let about = about(learner);
@@ -30,7 +30,7 @@ pub fn terms(learner: &LearnerDescription) -> String {
 }
 
 impl Panel {
-    /// What has become of a learner at the step that is shown.
+    /// The state of a learner at the shown step, in words.
     pub fn verdict(&self, learner: usize) -> String {
         let change = self.description().and_then(|one| one.change_at).filter(|change| self.cursor > *change);
         match self.history.verdict(self.cursor, learner) {
@@ -47,7 +47,7 @@ impl Panel {
         }
     }
 
-    /// What that means, with its term.
+    /// The meaning of that state, with its term.
     pub(crate) fn verdict_terms(&self, learner: usize) -> String {
         let thresholds = self.description().map(|description| description.thresholds);
         let [degrees, millimetres] =

@@ -1,4 +1,4 @@
-//! The channels of a session: their names, and the shapes in which their readings are told.
+//! The channels of a session: their names, and the JSON shapes of their readings.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -11,7 +11,7 @@ use body_schema_engine::{
 use body_schema_scenario::{Robot, SocketSpec};
 use body_schema_table::Rotation;
 
-/// What a channel is called, and how its readings are told.
+/// A channel's name, and the JSON shape of its readings.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ChannelShape {
@@ -33,14 +33,14 @@ pub enum Shape {
     Pose,
     /// `[[u, v], …]`, pixels.
     Pixels {
-        /// How many pairs.
+        /// The number of pairs.
         points: usize,
     },
-    /// Metres.
+    /// A number, metres.
     Distance,
     /// `{"socket": "PLACE/NAME"}`.
     Sockets {
-        /// What may stand there.
+        /// The allowed values.
         sockets: Vec<String>,
     },
 }
@@ -48,7 +48,7 @@ pub enum Shape {
 /// The key of all sockets together.
 pub(super) const SOCKET: &str = "socket";
 
-/// The channels that a robot's readings are told by: those that always read in the order of the rig, then that of the sockets.
+/// The channels of a robot's readings: those that always read, in the order of the rig, then that of the sockets.
 pub(super) fn shapes(robot: &Robot, rig: &Rig) -> Vec<ChannelShape> {
     let mut shapes: Vec<ChannelShape> = Vec::new();
     let always = rig.channels().iter().filter(|channel| channel.occasion() == Occasion::Always);
@@ -80,13 +80,13 @@ fn named(robot: &Robot, channel: &dyn Channel) -> (String, Shape) {
     }
 }
 
-/// A socket by its place, if it has one, and its name.
+/// A socket's label: its place, if it has one, and its name.
 pub(super) fn label(socket: &SocketSpec) -> String {
     socket.place.as_ref().map_or_else(|| socket.name.clone(), |place| format!("{place}/{}", socket.name))
 }
 
 impl Shape {
-    /// The channel's own numbers of a reading as it was told.
+    /// The channel's own numbers from a reading in JSON.
     pub(super) fn read(&self, field: &str, told: &Value) -> Result<Vec<f64>, Fault> {
         let refuse = |mend: &str| Err(Fault::new(field, format!("{} is no reading of it", shown(told)), mend));
         match self {
@@ -123,7 +123,7 @@ impl Shape {
         }
     }
 
-    /// The number of the socket that was told.
+    /// The index of the socket named in JSON.
     pub(super) fn socket(&self, field: &str, told: &Value) -> Result<usize, Fault> {
         let Self::Sockets { sockets } = self else {
             return Err(Fault::new(field, "this channel knows no sockets", "remove it"));
@@ -136,13 +136,13 @@ impl Shape {
     }
 }
 
-/// A list of so many numbers that can be a reading.
+/// A list of `count` numbers that can be a reading.
 fn numbers(told: &Value, count: usize) -> Option<Vec<f64>> {
     let list = told.as_array().filter(|list| list.len() == count)?;
     list.iter().map(|x| x.as_f64().filter(|x| is_usable(*x))).collect()
 }
 
-/// A value in an error.
+/// A value as it is shown in an error.
 fn shown(told: &Value) -> String {
     const MOST: usize = 80;
     let text = told.to_string();

@@ -1,4 +1,4 @@
-//! What a session has come to after some of its events, so that nobody need learn it again.
+//! Checkpoints: what a session has learned from some of its events, so that it need not be learned again.
 
 use std::collections::BTreeSet;
 
@@ -8,13 +8,13 @@ use super::{Event, Happened, ledger::Ledger};
 use body_schema_experiment as experiment;
 use body_schema_wire::{Description, StepReport};
 
-/// What was learned from the first events of a session, by the same build: replaying goes on from there, to the last bit as if it had
-/// begun at the first event.
+/// A checkpoint: what was learned from the first events of a session, by the same build. Replaying goes on from it, with results
+/// equal to the last bit to those from the first event.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint {
-    /// After so many events.
+    /// The number of events that it covers.
     events: usize,
-    /// So many were known when it was made: which observations count is told by all of them.
+    /// The number of events known when it was made, which decide which observations count.
     known: usize,
     experiment: experiment::Checkpoint,
 }
@@ -24,18 +24,18 @@ impl Checkpoint {
         Some(Self { events, known, experiment: ledger.experiment.checkpoint()? })
     }
 
-    /// As [`to_bytes`](Self::to_bytes) wrote it; `None` for anything else, as what another build wrote.
+    /// Reads what [`to_bytes`](Self::to_bytes) wrote; `None` for anything else, such as bytes from another build.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         postcard::from_bytes(bytes).ok()
     }
 
-    /// To be read by the same build.
+    /// The checkpoint as bytes for the same build.
     pub fn to_bytes(&self) -> Vec<u8> {
         // It holds numbers, texts and lists alone.
         postcard::to_allocvec(self).unwrap_or_default()
     }
 
-    /// After so many events it was made.
+    /// The number of events after which it was made.
     pub fn events(&self) -> usize {
         self.events
     }
@@ -45,8 +45,8 @@ impl Checkpoint {
         self.experiment.step()
     }
 
-    /// Whether replaying these events may go on from it: all that came before it counts as it did, and some observation that counts
-    /// comes after it.
+    /// Whether replaying these events may go on from it: everything before it counts as it did then, and some observation that
+    /// counts comes after it.
     pub fn serves(&self, events: &[Event]) -> bool {
         if self.events > events.len() || self.known > events.len() {
             return false;
@@ -67,7 +67,7 @@ impl Checkpoint {
     }
 }
 
-/// The observations that do not count after all of these events.
+/// The observations that are excluded after all of these events.
 pub(super) fn excluded(events: &[Event]) -> BTreeSet<u64> {
     let mut excluded = BTreeSet::new();
     for event in events {
@@ -80,7 +80,7 @@ pub(super) fn excluded(events: &[Event]) -> BTreeSet<u64> {
     excluded
 }
 
-/// A step that is replayed.
+/// A step of a replay.
 pub struct Replayed<'a> {
     /// After so many events.
     pub events: usize,
@@ -89,7 +89,7 @@ pub struct Replayed<'a> {
 }
 
 impl Replayed<'_> {
-    /// What was learned up to it; `None` for a learner that keeps nothing to go on from.
+    /// The checkpoint after this step; `None` for a learner that cannot go on from one.
     pub fn checkpoint(&self) -> Option<Checkpoint> {
         Checkpoint::of(self.ledger, self.events, self.known)
     }
@@ -114,14 +114,14 @@ impl Replayed<'_> {
         Description::of(&self.ledger.experiment)
     }
 
-    /// How many events there are in all.
+    /// The number of all events.
     pub fn of(&self) -> usize {
         self.known
     }
 }
 
-/// Finds the checkpoint from which replaying these events is to go on.
+/// A function that finds the checkpoint from which replaying these events goes on.
 pub type Find<'a> = dyn FnMut(&[Event]) -> Option<Checkpoint> + 'a;
 
-/// Hears of every step that is replayed, and says whether it is to go on.
+/// A function that receives every replayed step, and says whether to go on.
 pub type Hear<'a> = dyn FnMut(Replayed<'_>) -> bool + 'a;

@@ -1,4 +1,4 @@
-//! A copy of a session, on which a change is tried.
+//! A draft: a copy of a session, on which a change is tried.
 
 use std::{collections::BTreeSet, sync::Arc};
 
@@ -35,7 +35,7 @@ impl Draft {
         Ok(())
     }
 
-    /// Ends what has run out.
+    /// Expires suggestions whose time has run out.
     fn expire(&mut self) {
         let Some(now) = self.at_s else { return };
         let has_ended = |suggestion: &&Arc<Suggestion>| suggestion.expires_at_s.is_some_and(|at| at <= now);
@@ -53,7 +53,7 @@ impl Draft {
         Ok(())
     }
 
-    /// Replaces nothing yet, but ends what can no longer be carried out.
+    /// Ends suggestions that can no longer be carried out, without replacing them.
     pub fn drop_infeasible(&mut self) -> Result<(), Refusal> {
         let refused = self.ledger.experiment.agent().map_or_else(Vec::new, Agent::infeasible);
         self.supersede(refused.into_iter().map(|id| id + 1).collect(), Why::Constraints)
@@ -65,7 +65,7 @@ impl Draft {
         Prepared { revision, events, answer, ledger }
     }
 
-    /// One more suggestion, given all that are pending.
+    /// Adds one suggestion, chosen given all that are pending.
     pub fn suggest(&mut self, ask: &Ask) -> Result<(), Refusal> {
         let (proposal, prospect) = self.ledger.experiment.next_proposal().map_err(Refusal::Selection)?;
         let selection = proposal.selection;

@@ -1,4 +1,4 @@
-//! What is refused, and why: the field, what is wrong with it, how to mend it.
+//! Errors: the field, what is wrong with it, and what to do.
 
 use std::fmt;
 
@@ -6,14 +6,14 @@ use super::SuggestionState;
 use body_schema_engine::selection::SelectionError;
 use body_schema_scenario::{Problem, ScenarioError};
 
-/// Something that is wrong with what was given.
+/// A value of the input that is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// The field, with its path, as `configuration.elbow`.
+    /// The field, with its path, such as `configuration.elbow`.
     pub field: String,
     /// What is wrong.
     pub what: String,
-    /// How to mend it.
+    /// What to do about it.
     pub mend: String,
 }
 
@@ -38,13 +38,13 @@ impl From<Problem> for Fault {
     }
 }
 
-/// Why there is no session of a setup.
+/// Why a setup makes no session.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
     /// Values that cannot be used.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Invalid(Vec<Fault>),
-    /// No agent can be made of it.
+    /// No agent can be made of the setup.
     #[error("`agent`: {0}")]
     Agent(ScenarioError),
 }
@@ -60,42 +60,42 @@ impl From<Fault> for SetupError {
     }
 }
 
-/// Why something was refused. Nothing was changed by it.
+/// Why a request was refused. It changed nothing.
 #[derive(Debug, thiserror::Error)]
 pub enum Refusal {
-    /// A field of what was given.
+    /// A field of the request is wrong.
     #[error(transparent)]
     Field(#[from] Fault),
     /// There is no such suggestion.
     #[error("there is no suggestion {id}; {count} were made so far, counted from 1")]
     UnknownSuggestion {
-        /// What was asked for.
+        /// The id that was asked for.
         id: u64,
-        /// How many there are.
+        /// The number of suggestions.
         count: usize,
     },
-    /// The suggestion has come to its end.
+    /// The suggestion is no longer pending.
     #[error("suggestion {id} is {state} and not pending; ask for the next suggestion")]
     NotPending {
-        /// Which.
+        /// The suggestion's id.
         id: u64,
-        /// What became of it.
+        /// Its state.
         state: SuggestionState,
     },
     /// There is no such observation.
-    #[error("there is no observation {number}; {count} were told so far, counted from 1")]
+    #[error("there is no observation {number}; {count} were received so far, counted from 1")]
     UnknownObservation {
-        /// What was asked for.
+        /// The number that was asked for.
         number: u64,
-        /// How many there are.
+        /// The number of observations.
         count: usize,
     },
-    /// No more fits into the session.
+    /// The session is full.
     #[error("this session has {most} {what}, the most that there may be; {mend}")]
     Full {
-        /// Of what.
+        /// What there are too many of.
         what: &'static str,
-        /// How many.
+        /// The most that fit.
         most: usize,
         /// What to do.
         mend: &'static str,
@@ -106,15 +106,15 @@ pub enum Refusal {
     /// The estimate has left the range of numbers: nothing is learned any more.
     #[error("{0}; exclude the observation at which it happened")]
     Ended(String),
-    /// Whoever asked waits no longer.
-    #[error("nobody waits for it any longer, and nothing has happened; ask again")]
+    /// The caller no longer waits.
+    #[error("the caller no longer waits, so nothing was done; ask again")]
     GivenUp,
-    /// Something else was committed after this was prepared.
+    /// Another change was committed after this one was prepared.
     #[error("the session has changed since this was prepared; prepare it anew")]
     Stale,
 }
 
-/// Why stored events are none of this session.
+/// Why stored events make no session.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The setup does not fit this version.
@@ -123,20 +123,20 @@ pub enum ReplayError {
     /// The text is no session.
     #[error("this is no session of body-schema: {0}")]
     NotASession(String),
-    /// Written by a later version.
+    /// The session was written by a later version.
     #[error(
         "this session was written in version {found} of its form, and this program knows {known}; update body-schema"
     )]
     Version {
-        /// Of the session.
+        /// The version of the session.
         found: u32,
-        /// The latest known.
+        /// The latest known version.
         known: u32,
     },
-    /// An event that cannot have happened.
+    /// An event cannot have happened.
     #[error("event {index} (counted from 1) cannot have happened: {what}")]
     Event {
-        /// Counted from 1.
+        /// The event, counted from 1.
         index: usize,
         /// Why not.
         what: String,

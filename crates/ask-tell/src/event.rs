@@ -1,4 +1,4 @@
-//! What happens in a session.
+//! The events of a session.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,13 +7,13 @@ use super::{Answer, Observation, Outcome, Setup, Suggestion};
 /// The version of the form in which sessions are written.
 pub const VERSION: u32 = 1;
 
-/// Something that happened.
+/// An event.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Event {
-    /// When, seconds since 1970, if whoever called said so.
+    /// Its time, seconds since 1970, if the caller gave one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_s: Option<f64>,
-    /// What.
+    /// What happened.
     #[serde(flatten)]
     pub happened: Happened,
 }
@@ -24,46 +24,46 @@ pub struct Event {
 pub enum Happened {
     /// A movement was suggested.
     Suggested {
-        /// As it was then: pending.
+        /// The suggestion as it was then: pending.
         suggestion: Suggestion,
         /// How it was chosen.
         choice: Choice,
     },
-    /// A suggestion is not carried out.
+    /// A suggestion is not going to be carried out.
     Outcome {
-        /// Its id.
+        /// The suggestion's id.
         suggestion: u64,
         /// Why.
         state: Outcome,
-        /// The same in words.
+        /// The reason in words.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         reason: Option<String>,
     },
     /// Suggestions are replaced.
     Superseded {
-        /// Their ids.
+        /// The suggestions' ids.
         suggestions: Vec<u64>,
-        /// Why.
+        /// The reason.
         why: Why,
     },
     /// The time of suggestions ran out.
     Expired {
-        /// Their ids.
+        /// The suggestions' ids.
         suggestions: Vec<u64>,
     },
-    /// An observation was told.
+    /// An observation was received.
     Observed {
-        /// As it was told.
+        /// The observation as it was received.
         told: Observation,
-        /// What was answered.
+        /// The answer to it.
         answer: Answer,
     },
-    /// An observation counts for nothing from now on.
+    /// An observation is excluded from now on.
     Excluded {
         /// Its number.
         observation: u64,
     },
-    /// It counts again.
+    /// An observation counts again.
     Included {
         /// Its number.
         observation: u64,
@@ -87,30 +87,30 @@ pub enum Why {
 pub struct Choice {
     /// The criterion after the movement, in its own units.
     pub criterion: Option<f64>,
-    /// How many configurations were evaluated.
+    /// The number of configurations that were evaluated.
     pub evaluations: usize,
-    /// How long it took, milliseconds.
+    /// The time it took, milliseconds.
     pub selection_ms: f64,
-    /// What is planned to follow.
+    /// The planned movements that follow.
     pub plan: Option<Plan>,
 }
 
 /// Movements that are planned to follow a suggestion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// Rad or m per joint, base first.
+    /// The postures, rad or m per joint, base first.
     pub postures: Vec<Vec<f64>>,
-    /// How many of them are made before the next plan.
+    /// The number of them that are made before the next plan.
     pub committed: usize,
 }
 
 /// A whole session, as it is written to a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Document {
-    /// [`VERSION`].
+    /// The version of the form, [`VERSION`].
     pub version: u32,
-    /// What it is about.
+    /// The setup.
     pub setup: Setup,
-    /// What happened, in order.
+    /// The events, in order.
     pub events: Vec<Event>,
 }

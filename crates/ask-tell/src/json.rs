@@ -1,5 +1,5 @@
-//! JSON as it is told: what cannot be read is named by its field, and a key that is there twice is refused, since a reader that takes
-//! the last of them and one that takes the first do different things.
+//! Reading JSON: errors name the field, and a key that is there twice is refused, because some readers take the first of them and
+//! others the last.
 
 use std::{collections::HashSet, fmt};
 
@@ -10,7 +10,7 @@ use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error, IgnoredA
 pub struct Unreadable {
     /// Whether it is no JSON at all.
     pub is_malformed: bool,
-    /// The field that is to blame, with its path, as `parts[1].length`.
+    /// The field that is wrong, with its path, such as `parts[1].length`.
     pub field: Option<String>,
     /// What is wrong.
     pub what: String,
@@ -22,7 +22,7 @@ pub struct Unreadable {
 ///
 /// # Errors
 ///
-/// [`Unreadable`] where it is no JSON, no object, or says what `T` is not, a key twice included.
+/// [`Unreadable`] if it is no JSON, no object, does not fit `T`, or has a key twice.
 pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Unreadable> {
     // Syntax first: a text that breaks off is not blamed on the field where it does.
     serde_json::from_slice::<IgnoredAny>(bytes).map_err(|error| Unreadable {
@@ -64,7 +64,7 @@ pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Unreadable> {
     })
 }
 
-/// The path of the first key that an object has twice. What is no JSON has none.
+/// The path of the first key that an object has twice; `None` for text that is no JSON.
 pub fn repeated(bytes: &[u8]) -> Option<String> {
     let mut found = None;
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);

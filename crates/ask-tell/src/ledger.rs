@@ -1,4 +1,4 @@
-//! What the events of a session come to.
+//! The state of a session after its events.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -15,14 +15,14 @@ use body_schema_engine::selection::{Movement, Planned, Selection};
 use body_schema_experiment::{Agent, Event as AgentEvent, Experiment, Proposal};
 use body_schema_scenario::Scenario;
 
-/// An observation that was told.
+/// An observation that was received.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Told {
-    /// As it was told.
+    /// The observation as it was received.
     pub observation: Observation,
-    /// What was answered.
+    /// The answer to it.
     pub answer: Answer,
-    /// Whether it counts for nothing.
+    /// Whether it is excluded.
     pub excluded: bool,
 }
 
@@ -32,25 +32,25 @@ pub(super) struct Ledger {
     pub scenario: Arc<Scenario>,
     pub shapes: Arc<[ChannelShape]>,
     pub experiment: Experiment,
-    /// All that were ever made, by id.
+    /// All suggestions ever made, by id.
     pub suggestions: Vec<Arc<Suggestion>>,
-    /// All that were ever told, by number.
+    /// All observations ever received, by number.
     pub told: Vec<Arc<Told>>,
-    /// By what happened to the agent: the number of its observation. Excluded ones are not among them.
+    /// The numbers of the observations that the agent has learned from, in its order; excluded ones are not among them.
     pub counted: Vec<u64>,
 }
 
-/// What becomes of an observation that counts.
+/// The way to replay an observation that counts.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Replay {
-    /// It is learned from.
+    /// The agent learns from it.
     Learned,
-    /// What it taught is taken up later.
+    /// The agent only carries it out; what it taught is restored later.
     CarriedOut,
 }
 
 impl Ledger {
-    /// Before any event.
+    /// The state before any event.
     pub fn new(setup: &Setup, scenario: Arc<Scenario>) -> Result<Self, SetupError> {
         let agent = match &setup.agent {
             Some(agent) => scenario.chosen(Some(std::slice::from_ref(agent))),
@@ -63,8 +63,9 @@ impl Ledger {
         Ok(Self { scenario, shapes, experiment, suggestions, told, counted })
     }
 
-    /// After all of `events`. Those that are excluded in the end never counted. What was learned up to a checkpoint is not learned
-    /// again. `hear` hears of every observation that counts after that; without a checkpoint first of how it stands before any.
+    /// The state after all of `events`. Observations that are excluded at the end never count. What was learned up to a checkpoint
+    /// is not learned again. `hear` receives every counting observation after that; without a checkpoint also the state before
+    /// any.
     pub fn replayed(
         mut self,
         events: &[Event],
@@ -193,7 +194,7 @@ impl Ledger {
         Ok(is_step)
     }
 
-    /// The observations that do not count.
+    /// The excluded observations.
     pub fn excluded(&self) -> BTreeSet<u64> {
         let numbered = (1..).zip(&self.told);
         numbered.filter(|(_, told)| told.excluded).map(|(number, _)| number).collect()

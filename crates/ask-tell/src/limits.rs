@@ -1,43 +1,43 @@
-//! How large a session may be.
+//! The limits of a session's size.
 
-/// Bytes of a setup as JSON, the text of the URDF included.
+/// The most bytes of a setup as JSON, the text of the URDF included.
 pub const MOST_SETUP_BYTES: usize = 8 << 20;
-/// Characters of any name, title or other text of a setup but the URDF.
+/// The most characters of any name, title or other text of a setup except the URDF.
 pub const MOST_TEXT_CHARACTERS: usize = 300;
-/// Joints that move.
+/// The most joints that move.
 pub const MOST_JOINTS: usize = 40;
-/// Targets.
+/// The most targets.
 pub const MOST_TARGETS: usize = 16;
-/// Points of all targets together.
+/// The most points of all targets together.
 pub const MOST_POINTS: usize = 200;
-/// Cameras.
+/// The most cameras.
 pub const MOST_CAMERAS: usize = 16;
-/// Sockets.
+/// The most sockets.
 pub const MOST_SOCKETS: usize = 64;
-/// Channels, those of sockets and of what is known of them included.
+/// The most channels, those of sockets and of what is known of them included.
 pub const MOST_CHANNELS: usize = 128;
-/// Events of a session.
+/// The most events of a session.
 pub const MOST_EVENTS: usize = 100_000;
-/// Pending suggestions of one client.
+/// The most pending suggestions of one client.
 pub const MOST_SUGGESTIONS: usize = 20;
-/// Pending suggestions of all clients together.
+/// The most pending suggestions of all clients together.
 pub const MOST_PENDING: usize = 60;
-/// Characters of a client's name.
+/// The most characters of a client's name.
 pub const MOST_CLIENT_CHARACTERS: usize = 100;
-/// Characters of a reason.
+/// The most characters of a reason.
 pub const MOST_REASON_CHARACTERS: usize = 1000;
-/// Evaluations of the criterion for each movement.
+/// The most evaluations of the criterion for each movement.
 pub const MOST_EVALUATIONS: usize = 100_000;
 
-/// How large the robot of a session may be, and how much is computed for each movement. The greatest there may be by default; a
-/// server may have less to give.
+/// Limits of the robot's size, and of the computation for each movement. The defaults are the greatest possible; a server may
+/// set lower ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Most {
-    /// Joints that move.
+    /// The most joints that move.
     pub joints: usize,
-    /// Targets.
+    /// The most targets.
     pub targets: usize,
-    /// Evaluations of the criterion for each movement.
+    /// The most evaluations of the criterion for each movement.
     pub evaluations: usize,
 }
 

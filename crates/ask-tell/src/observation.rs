@@ -1,4 +1,4 @@
-//! What a robot tells after it has moved.
+//! Observations that a robot reports after it has moved.
 
 use std::{collections::BTreeMap, f64::consts::TAU, fmt};
 
@@ -20,50 +20,51 @@ use body_schema_experiment::Executed;
 use body_schema_robot::Segment;
 use body_schema_scenario::Scenario;
 
-/// A movement as it was executed, and what was seen after it.
+/// A movement as it was executed, with what was seen after it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Observation {
-    /// The suggestion that it carries out, if it does.
+    /// The suggestion that it carries out, if any.
     #[serde(default, deserialize_with = "crate::whole::whole_or_none", skip_serializing_if = "Option::is_none")]
     pub suggestion_id: Option<u64>,
-    /// Where the joints were, by name, in the units of the URDF (rad, m).
+    /// The positions of the joints by name, in the units of the URDF (rad, m).
     #[serde(deserialize_with = "by_name")]
     pub configuration: BTreeMap<String, f64>,
-    /// By channel what it saw, in the shape of its kind (see the [module](super)); null where it saw nothing.
+    /// The readings by channel, in the shape of its kind (see the [module](super)); null where it saw nothing.
     #[serde(default)]
     #[cfg_attr(feature = "openapi", schema(value_type = BTreeMap<String, Value>))]
     pub measurements: BTreeMap<String, Value>,
 }
 
-/// What is answered to an observation.
+/// The answer to an observation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Answer {
-    /// Its number, counted from 1: by it it is excluded.
+    /// Its number, counted from 1, by which it can be excluded.
     pub observation: u64,
     /// Whether any channel had a reading.
     pub seen: bool,
-    /// How far it was from what was expected, root mean square over its equations in standard deviations of the innovation,
+    /// The distance from what was expected, root mean square over its equations in standard deviations of the innovation,
     /// `√(eᵀ S⁻¹ e / d)`: about 1 where all is well. Null where nothing was seen, and without a covariance.
     pub innovation_sigmas: Option<f64>,
-    /// The probability that it is an outlier, after it was taken in: the greatest of its channels'. Null where nothing was
-    /// seen, and for an estimator that knows of no outliers.
+    /// The probability that it is an outlier after it was absorbed, the greatest of its channels'. Null where nothing was
+    /// seen, and for an estimator without outliers.
     pub outlier_probability: Option<f64>,
-    /// The mean error of predictions over the workspace that is expected now, millimetres; null without a covariance.
+    /// The expected mean error of predictions over the workspace now, millimetres; null without a covariance.
     pub expected_error_mm: Option<f64>,
     /// Whether the body seems to have changed: what was learned before is dropped then, and pending suggestions are superseded.
     pub body_seems_changed: bool,
 }
 
-/// How far beyond its limits a joint may be said to be, as a share of its range, and how far outside a picture a point, as a share of
-/// its size: more is a mistake.
+/// The share of its range by which a joint may be reported beyond its limits, and the share of a picture's size by which a point may
+/// be reported outside it; more is a mistake.
 const BEYOND: f64 = 0.1;
-/// So many turns further than it is asked to go a joint may be said to be, whatever its limits: more are degrees.
+/// The most turns by which a joint may be reported beyond where it was asked to go, whatever its limits; more means
+/// that the number is in degrees.
 const TURNS: f64 = 2.0;
 
-/// Positions by name. A list is refused: it does not say which joint is which.
+/// Reads positions by name. A list is refused: it does not say which joint is which.
 fn by_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, f64>, D::Error> {
     struct ByName;
 
@@ -82,7 +83,7 @@ fn by_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String
     deserializer.deserialize_map(ByName)
 }
 
-/// Whether two values are the same, numbers as numbers: 1 is 1.0.
+/// Whether two values are equal, numbers compared as numbers: 1 is 1.0.
 fn are_same(one: &Value, other: &Value) -> bool {
     match (one, other) {
         (Value::Number(one), Value::Number(other)) => one == other || one.as_f64() == other.as_f64(),
@@ -98,7 +99,7 @@ fn are_same(one: &Value, other: &Value) -> bool {
 }
 
 impl Observation {
-    /// Whether another tells the same. Numbers are compared as numbers, however they are written: 1 is 1.0.
+    /// Whether two observations have the same content, with numbers compared as numbers: 1 is 1.0.
     pub fn tells_the_same(&self, other: &Self) -> bool {
         let Self { suggestion_id, configuration, measurements } = self;
         let is_there =
@@ -109,7 +110,7 @@ impl Observation {
             && measurements.iter().all(is_there)
     }
 
-    /// The movement and its readings, by the channels of a scenario.
+    /// The movement and its readings, in the order of a scenario's channels.
     pub(super) fn read(&self, scenario: &Scenario, shapes: &[ChannelShape]) -> Result<Executed, Fault> {
         let configuration = self.positions(scenario)?;
         let known = || shapes.iter().map(|shape| shape.name.as_str());
@@ -167,8 +168,8 @@ impl Observation {
         names.iter().map(of).collect()
     }
 
-    /// That nothing is told that can hardly be: a joint far beyond where it can go, a point far outside a picture. Such numbers are in
-    /// another unit, or of another joint.
+    /// Refuses implausible numbers: a joint far beyond where it can go, or a point far outside a picture. Such numbers are in another
+    /// unit, or belong to another joint.
     pub(super) fn check_reach(
         &self,
         scenario: &Scenario,
@@ -193,7 +194,7 @@ impl Observation {
     }
 }
 
-/// That a joint was not far beyond its limits, nor turned further than it is asked to by more than [`TURNS`].
+/// Refuses a joint far beyond its limits, or turned further than it was asked to by more than [`TURNS`].
 fn within_reach(segment: &Segment, asked: (f64, f64), position: f64) -> Result<(), Fault> {
     let turns = segment.kind.moves() == Some(JointKind::Revolute);
     let refuse = |what: String, mend: &str| Err(Fault::new(format!("configuration.{}", segment.name), what, mend));
@@ -216,7 +217,7 @@ fn within_reach(segment: &Segment, asked: (f64, f64), position: f64) -> Result<(
     Ok(())
 }
 
-/// That points are not far outside a camera's picture.
+/// Refuses points far outside a camera's picture.
 fn within_picture(field: &str, camera: &CameraKind, reading: &[f64]) -> Result<(), Fault> {
     let [width, height] = camera.size_px;
     let is_within = |x: f64, size: f64| (-BEYOND * size..=(1.0 + BEYOND) * size).contains(&x);

@@ -1,4 +1,4 @@
-//! Changes of a session, tried on a copy: what a store writes before they are made.
+//! Prepared changes of a session, which a store writes before they are made.
 
 use std::sync::Arc;
 
@@ -13,12 +13,12 @@ use super::{
 use body_schema_engine::estimation::Belief;
 use body_schema_experiment::{Agent, MovementOutcome};
 
-/// A change that was tried, with what is answered once it is made.
+/// A change that was tried, with the answer once it is made.
 #[must_use = "nothing has happened until it is committed"]
 pub struct Prepared<A> {
-    /// How many events the session had.
+    /// The number of events that the session had.
     pub(super) revision: usize,
-    /// What is appended.
+    /// The events that are appended.
     pub(super) events: Vec<Event>,
     /// The answer.
     pub(super) answer: A,
@@ -27,17 +27,17 @@ pub struct Prepared<A> {
 }
 
 impl<A> Prepared<A> {
-    /// The events that will be appended, to be written first; none where nothing changes.
+    /// The events that will be appended, to be written first; empty where nothing changes.
     pub fn events(&self) -> &[Event] {
         &self.events
     }
 
-    /// How many events come before these.
+    /// The number of events before these.
     pub fn revision(&self) -> usize {
         self.revision
     }
 
-    /// What will be answered.
+    /// The answer that will be given.
     pub fn answer(&self) -> &A {
         &self.answer
     }
@@ -49,16 +49,19 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`Refusal`] of a wrong field, of more than fit, and where nothing can be chosen.
+    /// [`Refusal::Field`] if a field is wrong, [`Refusal::Full`] if no more suggestions fit, [`Refusal::Selection`] or
+    /// [`Refusal::Ended`] if no movement can be chosen.
     pub fn prepare_suggest(&self, ask: &Ask, now_s: Option<f64>) -> Result<Prepared<Suggestions>, Refusal> {
         self.prepare_suggest_while(ask, now_s, &|| true)
     }
 
-    /// The same as long as somebody waits for it, which is asked before each suggestion.
+    /// Prepares suggestions as [`prepare_suggest`](Self::prepare_suggest) does, as long as the caller waits, which is
+    /// asked before each suggestion.
     ///
     /// # Errors
     ///
-    /// The same, and [`Refusal::GivenUp`].
+    /// [`Refusal::GivenUp`] if the caller no longer waits; otherwise the errors of
+    /// [`prepare_suggest`](Self::prepare_suggest).
     pub fn prepare_suggest_while(
         &self,
         ask: &Ask,
@@ -92,11 +95,12 @@ impl Session {
         Ok(draft.done(answer))
     }
 
-    /// A pending suggestion is not carried out.
+    /// Marks a pending suggestion as not going to be carried out.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] where there is no such suggestion, or it is not pending.
+    /// [`Refusal::UnknownSuggestion`] if there is no such suggestion, [`Refusal::NotPending`] if it is not pending;
+    /// others if a field is wrong or the session is full.
     pub fn prepare_outcome(
         &self,
         id: u64,
@@ -123,11 +127,12 @@ impl Session {
         Ok(draft.done(answer))
     }
 
-    /// Takes in an observation, whether it was suggested or not.
+    /// Absorbs an observation, whether its movement was suggested or not.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] of a wrong field, of a suggestion that there is not, and once the estimate has diverged.
+    /// [`Refusal::Field`] if a field is wrong, [`Refusal::UnknownSuggestion`] if it names a suggestion that does not
+    /// exist, [`Refusal::Full`] if the session is full, [`Refusal::Ended`] if the estimate has diverged.
     pub fn prepare_observe(&self, told: Observation, now_s: Option<f64>) -> Result<Prepared<Answer>, Refusal> {
         self.check_room(1)?;
         let mut draft = Draft::of(self, now_s)?;
@@ -165,30 +170,32 @@ impl Session {
         Ok(draft.done(answer))
     }
 
-    /// An observation counts for nothing from now on: the belief is what replaying the rest gives.
+    /// Excludes an observation: the belief becomes what replaying the rest gives.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] where there is no such observation.
+    /// [`Refusal::UnknownObservation`] if there is no such observation, [`Refusal::Full`] if the session is full.
     pub fn prepare_exclude(&self, number: u64, now_s: Option<f64>) -> Result<Prepared<()>, Refusal> {
         self.prepare_mark((number, true), now_s, &mut |_| None, &mut |_| true)
     }
 
-    /// An excluded observation counts again: the belief is as if it had never been excluded.
+    /// Includes an excluded observation again: the belief becomes what it would be had the observation never been
+    /// excluded.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] where there is no such observation.
+    /// [`Refusal::UnknownObservation`] if there is no such observation, [`Refusal::Full`] if the session is full.
     pub fn prepare_include(&self, number: u64, now_s: Option<f64>) -> Result<Prepared<()>, Refusal> {
         self.prepare_mark((number, false), now_s, &mut |_| None, &mut |_| true)
     }
 
-    /// Excludes an observation or includes it again, from the checkpoint on that `find` finds, if it does: one that
-    /// [serves](super::Checkpoint::serves). `hear` hears of the history from there on as it is then, and says whether to go on.
+    /// Excludes an observation or includes it again, replaying from the checkpoint that `find` returns, if it returns one that
+    /// [serves](super::Checkpoint::serves). `hear` receives the history from there on as it becomes, and says whether to go on.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] where there is no such observation, where the checkpoint does not serve, and where it is not to go on.
+    /// [`Refusal::UnknownObservation`] if there is no such observation, [`Refusal::Full`] if the session is full,
+    /// [`Refusal::Ended`] if `hear` ends the replay or the checkpoint does not serve.
     pub fn prepare_mark(
         &self,
         (number, excluded): (u64, bool),
@@ -216,11 +223,11 @@ impl Session {
         Ok(draft.done(()))
     }
 
-    /// Ends the pending suggestions whose time has run out.
+    /// Expires the pending suggestions whose time has run out.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] of what is no time.
+    /// [`Refusal::Field`] if `now_s` is no valid time.
     pub fn prepare_expire(&self, now_s: f64) -> Result<Prepared<()>, Refusal> {
         Ok(Draft::of(self, Some(now_s))?.done(()))
     }
@@ -234,7 +241,7 @@ impl Session {
 }
 
 impl Ask {
-    /// How many suggestions are asked for.
+    /// The number of suggestions that are asked for.
     fn check(&self, now_s: Option<f64>) -> Result<usize, Fault> {
         let most = MOST_SUGGESTIONS as u64;
         let count = self.count.unwrap_or(1);
@@ -263,7 +270,7 @@ impl Ask {
 }
 
 impl Ledger {
-    /// What is answered to the latest observation.
+    /// The answer to the latest observation.
     fn answer(&self, body_seems_changed: bool) -> Answer {
         let learner = &self.experiment.latest().learners[0];
         let readings = learner.movement.iter().flat_map(|movement| &movement.weighed);
@@ -299,7 +306,7 @@ impl Answer {
     }
 }
 
-/// The place of what is counted from 1.
+/// The index of something counted from 1.
 fn position(number: u64) -> Option<usize> {
     usize::try_from(number.checked_sub(1)?).ok()
 }

@@ -1,9 +1,8 @@
-//! That a session comes to something: whether `calibrate` reads what it will write is tried when it is opened, with observations that
-//! are made up.
+//! The rehearsal of a session: when it is opened, made-up observations show whether `calibrate` can read what it will write.
 //!
-//! Joints, targets and columns have names, and in a table several of them can be one: two columns of one title, a sensor's that is
-//! a joint's, a name that ends with a blank. Whatever `calibrate` reads otherwise than it was written is found by writing and reading
-//! it.
+//! Joints, targets and columns have names, and in a table several of them can collide: two columns with one title, a sensor's column
+//! with a joint's title, a name that ends with a blank. Writing a table and reading it finds whatever `calibrate` would read
+//! differently.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -18,16 +17,17 @@ use body_schema_experiment::Executed;
 use body_schema_scenario::{Problem, Scenario, ScenarioError};
 use body_schema_table::{Quantity, Table, TableError, Titles};
 
-/// So many observations are made up: few first, more where these are too few for what is held out.
+/// The numbers of made-up observations that are tried: few first, more if these are too few for what is held out.
 const ROWS: [usize; 3] = [24, 200, 2000];
-/// How far a number may be from what was written, as a share of it (or of 1): units are converted to and fro.
+/// The most by which a number may differ from what was written, as a share of it (or of 1), because units are converted
+/// back and forth.
 const TOLERANCE: f64 = 1e-9;
-/// What to do about names that are in each other's way.
+/// The advice for colliding names.
 const MEND: &str = "name the columns of each sensor, `columns = […]`, each once, and other than joints: as many as its readings have \
                     numbers, without blanks at their ends";
 
 impl Session {
-    /// Whether there will be results of the session, as soon as enough was observed.
+    /// Checks that the session will have results as soon as enough was observed.
     ///
     /// # Errors
     ///
@@ -44,7 +44,8 @@ impl Session {
         Err(SetupError::Invalid(refused))
     }
 
-    /// Whether a table can tell joints from each other and from sockets, and has what rows are held out by.
+    /// Checks that a table can tell joints from each other and from sockets, and has the columns by which rows are held
+    /// out.
     fn check_names(&self) -> Result<(), Fault> {
         let Scenario { robot, .. } = &**self.scenario();
         let kinds = robot.names.iter().zip(&robot.state.joints).map(|(name, joint)| (name, Quantity::of(joint.kind())));
@@ -78,7 +79,7 @@ impl Session {
         }
     }
 
-    /// Writes so many observations, and reads them as `calibrate` does.
+    /// Writes `count` observations, and reads them as `calibrate` does.
     fn rehearse(&self, count: usize) -> Result<(), Vec<Fault>> {
         let told = self.made_up(count);
         let written = self.csv_of(&told);
@@ -127,7 +128,7 @@ impl Session {
         Ok(())
     }
 
-    /// Observations of the robot as it is described, in postures that are drawn.
+    /// Observations of the robot as described, in random postures.
     fn made_up(&self, count: usize) -> Vec<Executed> {
         let Scenario { robot, rig, .. } = &**self.scenario();
         let (sockets, mut rng) = (robot.sockets.len(), ChaCha8Rng::seed_from_u64(0));
@@ -148,7 +149,7 @@ impl Session {
     }
 }
 
-/// What is wrong with a table that nobody has written yet, blamed on the key that mends it.
+/// A problem of a table that does not exist yet, attributed to the key that corrects it.
 fn blamed(problem: Problem) -> Fault {
     match problem.key.starts_with("measurements") {
         true => {
@@ -162,7 +163,7 @@ fn are_near(one: f64, other: f64) -> bool {
     (one - other).abs() <= TOLERANCE * one.abs().max(1.0)
 }
 
-/// Whether a reading is read as it was told.
+/// Whether a reading is read as it was given.
 fn is_read_so(channel: &dyn Channel, told: Option<&[f64]>, read: Option<&[f64]>) -> bool {
     let (Some(told), Some(read)) = (told, read) else { return told.is_none() && read.is_none() };
     if told.len() != read.len() {

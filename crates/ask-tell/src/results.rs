@@ -1,4 +1,4 @@
-//! What a session comes to: what `calibrate` makes of its observations.
+//! The results of a session: what `calibrate` makes of its observations.
 
 use super::{Session, table::FILE};
 use body_schema_calibration::{Calibration, CalibrationError, Case, File, Options, Progress, Silent, calibrate};
@@ -8,20 +8,20 @@ use body_schema_scenario::{Scenario, ScenarioError};
 #[derive(Debug, thiserror::Error)]
 pub enum ResultsError {
     /// Nothing was seen.
-    #[error("nothing was observed yet; tell observations first")]
+    #[error("nothing was observed yet; report observations first")]
     Nothing,
-    /// The observations are no table to calibrate by.
+    /// The observations are no table that `calibrate` can read.
     #[error(transparent)]
     Table(#[from] ScenarioError),
-    /// There is no calibration by them.
+    /// The calibration failed.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
 }
 
-/// What `calibrate` makes of a session's observations, all of them at once: the same as of the table and the file that the
-/// session writes, since they are what it reads.
+/// The calibration of a session's observations, all of them at once. It equals that of the table and the file that the
+/// session writes, since they are its input.
 ///
-/// It need not be what the agent believes, to the last digit: that took in one observation after the other.
+/// It may differ from the agent's belief in the last digits, because the agent absorbed one observation after the other.
 pub struct Results {
     scenario: Scenario,
 }
@@ -31,7 +31,8 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`ResultsError`] where nothing was observed yet.
+    /// [`ResultsError::Nothing`] if nothing was observed yet, [`ResultsError::Table`] if the observations make no
+    /// table.
     pub fn results(&self) -> Result<Results, ResultsError> {
         let csv = self.observations_csv();
         if csv.lines().count() < 2 {
@@ -40,17 +41,18 @@ impl Session {
         Ok(Results { scenario: self.recorded(&csv)? })
     }
 
-    /// What `calibrate` makes of a table of observations, and of the file that goes with it.
+    /// The scenario that `calibrate` makes of a table of observations, and of the file that goes with it.
     pub(super) fn recorded(&self, csv: &str) -> Result<Scenario, ScenarioError> {
         let open = |file: &str| if file == FILE { Ok(csv.to_owned()) } else { self.setup().open(file) };
         Scenario::parse("calibration.toml", &self.calibration_toml(), &open)
     }
 
-    /// Everything that `calibrate` finds, its report and its files.
+    /// Calibrates, and returns everything that `calibrate` finds, its report and its files.
     ///
     /// # Errors
     ///
-    /// [`ResultsError`] where nothing was observed yet, or nothing explains it.
+    /// The errors of [`results`](Self::results), and [`ResultsError::Calibration`] if no fit explains the observations, a
+    /// URDF cannot hold the fit, or `progress` says that nobody waits any longer.
     pub fn calibrate(&self, progress: &dyn Progress) -> Result<(Calibration, Vec<File>), ResultsError> {
         let results = self.results()?;
         let case = results.case()?;
@@ -65,17 +67,17 @@ impl Results {
     ///
     /// # Errors
     ///
-    /// [`ResultsError`] where there is none.
+    /// [`ResultsError::Calibration`] if the scenario has no table.
     pub fn case(&self) -> Result<Case<'_>, ResultsError> {
         Ok(Case::new(&self.scenario)?)
     }
 
-    /// The robot's description with what was learned, `calibrated.urdf`, and the same origins as `kinematics.yaml`: without
-    /// whatever judges them, in a fraction of the time.
+    /// The robot's description with what was learned, `calibrated.urdf`, and the same origins as `kinematics.yaml`, without
+    /// judging them and so in a fraction of the time.
     ///
     /// # Errors
     ///
-    /// [`ResultsError`] where nothing explains the observations, or a URDF cannot hold what does.
+    /// [`ResultsError::Calibration`] if no fit explains the observations, or a URDF cannot hold the fit.
     pub fn description(&self) -> Result<Vec<File>, ResultsError> {
         Ok(Calibration::description(&self.case()?, &Silent)?)
     }

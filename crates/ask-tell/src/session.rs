@@ -15,7 +15,7 @@ use body_schema_experiment::{Experiment, StepOutcome};
 use body_schema_scenario::Scenario;
 use body_schema_wire::{Description, StepReport};
 
-/// A session with a robot elsewhere; see the [module](super). A copy of it goes its own way.
+/// A session with a robot elsewhere; see the [module](super). A clone is independent of the original.
 #[derive(Clone)]
 pub struct Session {
     setup: Setup,
@@ -24,40 +24,43 @@ pub struct Session {
 }
 
 impl Session {
-    /// A session in which nothing has happened yet.
+    /// A new session, without events.
     ///
     /// # Errors
     ///
-    /// [`SetupError`] names the key that is wrong, and how to mend it.
+    /// [`SetupError::Invalid`] names the keys that are wrong, [`SetupError::Agent`] says why no agent can be made.
     pub fn open(setup: Setup) -> Result<Self, SetupError> {
         let session = Self::begun(setup)?;
         session.check_results()?;
         Ok(session)
     }
 
-    /// The same of a setup that was opened before: whether there will be results is not asked again.
+    /// A new session of a setup that was opened before, without checking again that it will have results.
     fn begun(setup: Setup) -> Result<Self, SetupError> {
         let scenario = Arc::new(setup.scenario()?);
         let ledger = Ledger::new(&setup, scenario)?;
         Ok(Self { setup, ledger, events: Vec::new() })
     }
 
-    /// A session of stored events. Nothing is chosen again. Whether there will be [results](Self::check_results) is not asked.
+    /// A session from stored events. Nothing is chosen again, and whether there will be [results](Self::check_results) is not
+    /// checked.
     ///
     /// # Errors
     ///
-    /// [`ReplayError`] names the first event that cannot have happened.
+    /// [`ReplayError::Event`] names the first event that cannot have happened, [`ReplayError::Setup`] says why the setup does
+    /// not fit this version.
     pub fn replay(setup: Setup, events: Vec<Event>) -> Result<Self, ReplayError> {
         Self::replay_from(setup, events, None, &mut |_| true)
     }
 
-    /// The same from a checkpoint on, if there is one. `hear` hears of its [history](Self::history) from there on as it goes, and says
-    /// whether to go on.
+    /// Replays stored events from a checkpoint on, if there is one. `hear` receives the [history](Self::history) from there on, and
+    /// says whether to go on.
     ///
     /// # Errors
     ///
-    /// [`ReplayError`] names the first event that cannot have happened, or before which nobody wanted to go on; and the last before a
-    /// checkpoint that does not [serve](Checkpoint::serves).
+    /// [`ReplayError::Setup`] if the setup does not fit this version; [`ReplayError::Event`] with the first event that cannot have
+    /// happened, or before which `hear` ended the replay, or with the last before a checkpoint that does not
+    /// [serve](Checkpoint::serves).
     pub fn replay_from(
         setup: Setup,
         events: Vec<Event>,
@@ -70,16 +73,18 @@ impl Session {
         Ok(Self { setup, ledger, events })
     }
 
-    /// What was learned so far, for [`replay_from`](Self::replay_from); `None` for a learner that keeps nothing to go on from.
+    /// A checkpoint of what was learned so far, for [`replay_from`](Self::replay_from); `None` for a learner that cannot go on
+    /// from one.
     pub fn checkpoint(&self) -> Option<Checkpoint> {
         Checkpoint::of(&self.ledger, self.events.len(), self.events.len())
     }
 
-    /// A session as [`to_json`](Self::to_json) wrote it.
+    /// Reads a session that [`to_json`](Self::to_json) wrote.
     ///
     /// # Errors
     ///
-    /// [`ReplayError`] where the text is no session, or one of a later version.
+    /// [`ReplayError::NotASession`] if the text is no session, [`ReplayError::Version`] if a later version wrote it;
+    /// otherwise the errors of [`replay`](Self::replay).
     pub fn from_json(text: &str) -> Result<Self, ReplayError> {
         #[derive(Deserialize)]
         struct Version {
@@ -97,11 +102,11 @@ impl Session {
         Self::replay(setup, events)
     }
 
-    /// Whether the session keeps within these bounds.
+    /// Checks that the session is within limits.
     ///
     /// # Errors
     ///
-    /// [`SetupError::Invalid`] names the key of the calibration that goes beyond.
+    /// [`SetupError::Invalid`] names the key of the calibration that exceeds them.
     pub fn check_within(&self, most: &Most) -> Result<(), SetupError> {
         Ok(check_size(&self.ledger.scenario, most)?)
     }
@@ -114,11 +119,12 @@ impl Session {
         serde_json::to_string(&document).unwrap_or_default()
     }
 
-    /// Makes a prepared change, whose events were written.
+    /// Commits a prepared change, whose events must have been written.
     ///
     /// # Errors
     ///
-    /// [`Refusal::Stale`] where another was made since: nothing has happened then, and the events must be unwritten.
+    /// [`Refusal::Stale`] if another change was committed since: this one is not made, and its events must be removed
+    /// from the store.
     pub fn commit<A>(&mut self, prepared: Prepared<A>) -> Result<A, Refusal> {
         let Prepared { revision, events, answer, ledger } = prepared;
         if revision != self.events.len() {
@@ -131,21 +137,21 @@ impl Session {
         Ok(answer)
     }
 
-    /// [Prepares](Self::prepare_suggest) and commits.
+    /// Prepares suggestions and commits them; see [`prepare_suggest`](Self::prepare_suggest).
     ///
     /// # Errors
     ///
-    /// [`Refusal`]: nothing has happened then.
+    /// [`Refusal`] of the preparation; nothing has changed then.
     pub fn suggest(&mut self, ask: &Ask, now_s: Option<f64>) -> Result<Suggestions, Refusal> {
         let prepared = self.prepare_suggest(ask, now_s)?;
         self.commit(prepared)
     }
 
-    /// [Prepares](Self::prepare_outcome) and commits.
+    /// Prepares an outcome and commits it; see [`prepare_outcome`](Self::prepare_outcome).
     ///
     /// # Errors
     ///
-    /// [`Refusal`]: nothing has happened then.
+    /// [`Refusal`] of the preparation; nothing has changed then.
     pub fn outcome(
         &mut self,
         id: u64,
@@ -157,57 +163,57 @@ impl Session {
         self.commit(prepared)
     }
 
-    /// [Prepares](Self::prepare_observe) and commits.
+    /// Prepares an observation and commits it; see [`prepare_observe`](Self::prepare_observe).
     ///
     /// # Errors
     ///
-    /// [`Refusal`]: nothing has happened then.
+    /// [`Refusal`] of the preparation; nothing has changed then.
     pub fn observe(&mut self, told: Observation, now_s: Option<f64>) -> Result<Answer, Refusal> {
         let prepared = self.prepare_observe(told, now_s)?;
         self.commit(prepared)
     }
 
-    /// [Prepares](Self::prepare_exclude) and commits.
+    /// Prepares an exclusion and commits it; see [`prepare_exclude`](Self::prepare_exclude).
     ///
     /// # Errors
     ///
-    /// [`Refusal`]: nothing has happened then.
+    /// [`Refusal`] of the preparation; nothing has changed then.
     pub fn exclude(&mut self, number: u64, now_s: Option<f64>) -> Result<(), Refusal> {
         let prepared = self.prepare_exclude(number, now_s)?;
         self.commit(prepared)
     }
 
-    /// [Prepares](Self::prepare_include) and commits.
+    /// Prepares an inclusion and commits it; see [`prepare_include`](Self::prepare_include).
     ///
     /// # Errors
     ///
-    /// [`Refusal`]: nothing has happened then.
+    /// [`Refusal`] of the preparation; nothing has changed then.
     pub fn include(&mut self, number: u64, now_s: Option<f64>) -> Result<(), Refusal> {
         let prepared = self.prepare_include(number, now_s)?;
         self.commit(prepared)
     }
 
-    /// What it is about.
+    /// The setup.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
 
-    /// What happened, in order.
+    /// The events, in order.
     pub fn events(&self) -> &[Event] {
         &self.events
     }
 
-    /// The suggestions that wait to be carried out, of all clients, in the order in which they were chosen.
+    /// The pending suggestions of all clients, in the order in which they were chosen.
     pub fn pending(&self) -> impl Iterator<Item = &Arc<Suggestion>> {
         self.ledger.pending()
     }
 
-    /// All suggestions that were ever made, by id.
+    /// All suggestions ever made, by id.
     pub fn suggestions(&self) -> &[Arc<Suggestion>] {
         &self.ledger.suggestions
     }
 
-    /// All observations that were ever told, by number.
+    /// All observations ever received, by number.
     pub fn observations(&self) -> &[Arc<Told>] {
         &self.ledger.told
     }
@@ -237,13 +243,13 @@ impl Session {
         &self.ledger.experiment
     }
 
-    /// What is believed now.
+    /// The present belief.
     pub fn belief(&self) -> Option<&Belief> {
         self.ledger.experiment.belief()
     }
 
-    /// One report per observation that counts, from step 0, as belongs to the belief of now: what a recording shows of a
-    /// stored session.
+    /// One report per observation that counts, from step 0 on, all consistent with the present belief: what a recording
+    /// shows of a stored session.
     pub fn history(&self) -> Vec<StepReport> {
         let Ok(ledger) = Ledger::new(&self.setup, self.scenario().clone()) else { return Vec::new() };
         let mut reports = Vec::new();
@@ -255,7 +261,7 @@ impl Session {
         reports
     }
 
-    /// What the session was set up with, read.
+    /// The scenario made of the setup.
     pub fn scenario(&self) -> &Arc<Scenario> {
         &self.ledger.scenario
     }

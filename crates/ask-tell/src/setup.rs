@@ -1,4 +1,4 @@
-//! What a session is about.
+//! The setup of a session.
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -15,13 +15,13 @@ use body_schema_scenario::{Scenario, ScenarioError};
 ///
 /// * `robot.urdf` is the text of the description, not the name of a file;
 /// * `robot.base` and `robot.tip` may be left out where one link hangs on nothing and nothing hangs on one link;
-/// * `name` may be left out, which is that of the robot then, and a null is as good as nothing;
-/// * there are no `measurements`: they are told;
+/// * `name` may be left out, and is then the robot's; a null counts as left out;
+/// * there are no `measurements`: they are reported as observations;
 /// * sockets are listed, each with a posture in which the target was in it: `"socket": [{"name": "0", "place": "front",
 ///   "posture_deg": […]}, …]`. What they have in common stands in `sockets`.
 ///
-/// Whatever is left out is as `calibrate` takes it: the marker is somewhere on the tip, the robot stands somewhere, noise is learned,
-/// rows may be outliers, movements go to what predictions over the whole joint box need.
+/// Whatever is left out has the defaults of `calibrate`: the marker is somewhere on the tip, the robot stands somewhere, noise is
+/// learned, rows may be outliers, movements go to what predictions over the whole joint box need.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
@@ -30,33 +30,33 @@ pub struct Setup {
     #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub calibration: Value,
     /// The learner that decides: the first of the calibration's, which is `global` unless it lists others; or an estimator and a
-    /// policy, as `smoother:random`.
+    /// policy, such as `smoother:random`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub agent: Option<String>,
-    /// Of all that is drawn.
+    /// The seed of all random draws.
     #[serde(default, deserialize_with = "crate::whole::whole")]
     pub seed: u64,
 }
 
-/// What errors and files call the description.
+/// The name of the description in errors and files.
 pub(super) const URDF: &str = "robot.urdf";
-/// What a session is called that has no name, and whose robot has none.
+/// The name of a session if neither it nor its robot has one.
 const NAME: &str = "session";
-/// So much of a robot's name makes one of a session.
+/// The most characters of a robot's name that become a session's.
 const MOST_NAME_CHARACTERS: usize = 40;
 
 impl Setup {
-    /// Of these keys, with the usual agent.
+    /// A setup of these keys, with the default agent.
     pub fn new(calibration: Value) -> Self {
         Self { calibration, agent: None, seed: 0 }
     }
 
-    /// Of the text of a calibration file. `open` returns the text of the URDF that it names, or says why it cannot; its table,
-    /// `[measurements]`, is left out.
+    /// A setup from the text of a calibration file. `open` returns the text of the URDF that it names, or the reason why it
+    /// cannot; the table, `[measurements]`, is left out.
     ///
     /// # Errors
     ///
-    /// [`SetupError::Invalid`] where it is no TOML or the description cannot be opened.
+    /// [`SetupError::Invalid`] if the text is no TOML or the description cannot be opened.
     pub fn from_toml(text: &str, open: &dyn Fn(&str) -> Result<String, String>) -> Result<Self, SetupError> {
         let unreadable = |error: toml::de::Error| {
             let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
@@ -79,7 +79,7 @@ impl Setup {
         calibration.map(Self::new).map_err(|error| Fault::new("calibration", error.to_string(), "correct it").into())
     }
 
-    /// Of the text of a URDF: what is measured is the position of a marker somewhere on `tip`.
+    /// A setup from the text of a URDF, whose measurement is the position of a marker somewhere on `tip`.
     pub fn from_urdf(urdf: &str, base: Option<&str>, tip: Option<&str>) -> Self {
         Self::new(serde_json::json!({ "robot": { "urdf": urdf, "base": base, "tip": tip } }))
     }
@@ -89,7 +89,7 @@ impl Setup {
         self.calibration.pointer("/robot/urdf").and_then(Value::as_str).unwrap_or_default()
     }
 
-    /// The scenario of it: the robot's sensors, prior and agents.
+    /// The scenario of the setup: the robot's sensors, prior and agents.
     pub(super) fn scenario(&self) -> Result<Scenario, SetupError> {
         let text = toml::to_string(&self.table()?).map_err(|error| {
             Fault::new("calibration", error.to_string(), "write values that a calibration file can have")
@@ -110,7 +110,7 @@ impl Setup {
         if file == URDF { Ok(self.urdf().to_owned()) } else { Err("is not part of a session".to_owned()) }
     }
 
-    /// The keys as they stand in a file, the description under its name.
+    /// The keys as they stand in a file, with the description under its name.
     pub(super) fn table(&self) -> Result<Table, Fault> {
         let size = self.calibration.to_string().len();
         if size > MOST_SETUP_BYTES {
@@ -153,7 +153,7 @@ impl Setup {
     }
 }
 
-/// JSON as TOML, which knows no null.
+/// JSON as TOML, which has no null.
 fn tabled(path: &str, keys: &Map<String, Value>) -> Result<Table, Fault> {
     let given = keys.iter().filter(|(_, value)| !value.is_null());
     given
@@ -189,7 +189,7 @@ fn value_of(path: &str, value: &Value) -> Result<toml::Value, Fault> {
     })
 }
 
-/// Names and titles are told with every reading and every answer.
+/// Checks the length of a name or title: they are repeated with every reading and every answer.
 fn is_short(path: &str, text: &str) -> Result<(), Fault> {
     let count = text.chars().count();
     if count <= MOST_TEXT_CHARACTERS {
@@ -203,7 +203,7 @@ fn below(path: &str, key: &str) -> String {
     if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
 }
 
-/// That a session of it has bounds.
+/// Checks that a session of the scenario is within limits.
 pub(super) fn check_size(scenario: &Scenario, most: &Most) -> Result<(), Fault> {
     let robot = &scenario.robot;
     let points = robot.equipment.targets.iter().map(|target| target.points.len()).sum();

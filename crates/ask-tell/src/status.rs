@@ -1,4 +1,4 @@
-//! How a session stands.
+//! The status of a session.
 
 use std::collections::BTreeSet;
 
@@ -7,43 +7,43 @@ use serde::{Deserialize, Serialize};
 use super::{Enough, Session};
 use body_schema_experiment::Reading;
 
-/// How a session stands.
+/// The status of a session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Status {
-    /// How many events there are.
+    /// The number of events.
     pub revision: u64,
-    /// Observations told, the excluded ones among them.
+    /// The number of observations received, excluded ones included.
     pub observations: u64,
-    /// Those that are excluded, by number.
+    /// The excluded observations, by number.
     pub excluded: Vec<u64>,
-    /// Of those that count, how many saw nothing.
+    /// The number of counting observations that saw nothing.
     pub not_seen: u64,
-    /// Of those that count, which rather are outliers than not, as is believed now, by number.
+    /// The counting observations that are likelier outliers than not under the present belief, by number.
     pub outliers: Vec<u64>,
-    /// Pending suggestions of all clients.
+    /// The number of pending suggestions of all clients.
     pub pending: u64,
-    /// The mean error of predictions over the workspace that is expected now, millimetres; null without a covariance.
+    /// The expected mean error of predictions over the workspace now, millimetres; null without a covariance.
     pub expected_error_mm: Option<f64>,
-    /// What of it no parameter explains, millimetres; null where the noise is known.
+    /// The part of it that no parameter explains, millimetres; null where the noise is known.
     pub model_error_mm: Option<f64>,
-    /// What is wanted, millimetres.
+    /// The wanted accuracy, millimetres.
     pub wanted_mm: f64,
-    /// There once no more are needed.
+    /// Present once no more observations are needed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub enough: Option<Enough>,
-    /// About how many more movements there are until then, if they teach as those so far did: the error that is not the model's
-    /// falls with the root of their number. Null before there are half as many again as could determine the robot, and where the model's
-    /// own error is more than is wanted, so that no number will do.
+    /// The estimated number of further movements until then, if they teach as those so far did: the error other than the model's falls
+    /// with the root of their number. Null before there are half as many again as could determine the robot, and where the model's own
+    /// error is more than is wanted, so that no number will do.
     pub movements_left: Option<u64>,
-    /// How often the body seemed to have changed.
+    /// The number of times that the body seemed to have changed.
     pub changes_noticed: u64,
     /// Why nothing is learned any more; null as long as something is.
     pub failure: Option<String>,
 }
 
 impl Session {
-    /// How it stands.
+    /// The present status.
     pub fn status(&self) -> Status {
         let learner = &self.latest().learners[0];
         let metrics = &learner.metrics;
@@ -71,7 +71,7 @@ impl Session {
         }
     }
 
-    /// There once no more observations are needed.
+    /// What was reached, once no more observations are needed.
     pub fn enough(&self) -> Option<Enough> {
         let metrics = &self.latest().learners[0].metrics;
         let expected = metrics.expected_prediction_m.filter(|_| metrics.settled)?;

@@ -1,42 +1,42 @@
-//! Movements that are suggested, and what becomes of them.
+//! Suggestions of movements, and their states.
 
 use std::{collections::BTreeMap, fmt};
 
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeStruct};
 
-/// A movement that is suggested. As JSON its `configuration` lists the joints in the order of `joints`.
+/// A suggested movement. As JSON its `configuration` lists the joints in the order of `joints`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Suggestion {
-    /// Counted from 1 over all clients.
+    /// Its id, counted from 1 over all clients.
     pub id: u64,
-    /// How many events the session had when it was chosen.
+    /// The number of events that the session had when it was chosen.
     pub revision: u64,
-    /// For whom; null for who gave no name.
+    /// The client that it is for; null if the client gave no name.
     #[serde(default)]
     pub client: Option<String>,
     /// The names of the joints, base first: the order in which lists of positions are written.
     #[serde(default)]
     pub joints: Vec<String>,
-    /// Where to move, by joint name, in the units of the URDF (rad, m).
+    /// The positions to move to, by joint name, in the units of the URDF (rad, m).
     pub configuration: BTreeMap<String, f64>,
-    /// The socket that the target is to be held in, as `PLACE/NAME`; null without sockets.
+    /// The socket that the target is to be held in, such as `PLACE/NAME`; null without sockets.
     #[serde(default)]
     pub socket: Option<String>,
-    /// By how much the criterion is expected to fall, in its own units; null for a policy without one, and for a movement that
-    /// was told in advance, as the first into a socket.
+    /// The expected fall of the criterion, in its own units; null for a policy without one, and for a movement that was given
+    /// in advance, such as the first into a socket.
     pub expected_gain: Option<f64>,
-    /// The mean error of predictions over the workspace that is expected after it and all that were pending before it,
+    /// The expected mean error of predictions over the workspace after it and all that were pending before it,
     /// millimetres; null for an estimator without a covariance.
     pub expected_error_mm_after: Option<f64>,
     /// The chance that anything is seen, 0 to 1.
     pub chance_seen: f64,
-    /// By how far the joint that moves farthest moves, from where the robot will stand then, rad (or m); null where nobody
-    /// knows where that is.
+    /// The distance that the joint with the longest way moves, from where the robot will stand then, rad (or m); null if
+    /// that is unknown.
     pub travel_rad: Option<f64>,
-    /// What became of it.
+    /// Its state.
     pub state: SuggestionState,
-    /// When it expires, seconds since 1970; null if it does not.
+    /// The time of its expiry, seconds since 1970; null if it does not expire.
     #[serde(default)]
     pub expires_at_s: Option<f64>,
 }
@@ -62,8 +62,8 @@ impl Serialize for Suggestion {
     }
 }
 
-/// A configuration whose joints are written in this order. Programs that take the values of an object in the order of their text
-/// then have them base first.
+/// A configuration with its joints written in this order, so that programs that take an object's values in the order of their
+/// text have them base first.
 struct InOrder<'a> {
     joints: &'a [String],
     configuration: &'a BTreeMap<String, f64>,
@@ -78,7 +78,7 @@ impl Serialize for InOrder<'_> {
     }
 }
 
-/// What became of a suggestion; see the [module](super).
+/// The state of a suggestion; see the [module](super).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
@@ -87,13 +87,13 @@ pub enum SuggestionState {
     Pending,
     /// An observation names it.
     Observed,
-    /// An observation names it, and nothing was seen.
+    /// An observation names it, and no channel had a reading.
     NotSeen,
     /// The robot cannot go there.
     Infeasible,
-    /// Nobody carries it out.
+    /// It will not be carried out.
     Abandoned,
-    /// Another takes its place.
+    /// Another suggestion takes its place.
     Superseded,
     /// Its time ran out.
     Expired,
@@ -113,14 +113,14 @@ impl fmt::Display for SuggestionState {
     }
 }
 
-/// What is told of a suggestion that is not carried out.
+/// The report that a suggestion is not carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// The robot cannot go there.
     Infeasible,
-    /// Nobody carries it out.
+    /// It will not be carried out.
     Abandoned,
 }
 
@@ -133,21 +133,21 @@ impl From<Outcome> for SuggestionState {
     }
 }
 
-/// What is asked for.
+/// A request for suggestions.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Ask {
-    /// How many pending suggestions the client wants to have, 1 unless told otherwise.
+    /// The number of pending suggestions that the client wants to have; 1 by default.
     #[serde(deserialize_with = "crate::whole::whole_or_none")]
     #[cfg_attr(feature = "openapi", schema(minimum = 1, maximum = 20))]
     pub count: Option<u64>,
-    /// Who asks.
+    /// The client's name.
     #[cfg_attr(feature = "openapi", schema(min_length = 1, max_length = 100))]
     pub client: Option<String>,
-    /// Whether the client's pending suggestions are to be replaced.
+    /// Whether the client's pending suggestions are replaced.
     pub replan: bool,
-    /// How long new suggestions stay pending, seconds; for ever unless told otherwise.
+    /// How long new suggestions stay pending, seconds; for ever by default.
     #[cfg_attr(feature = "openapi", schema(exclusive_minimum = 0.0))]
     pub expires_s: Option<f64>,
 }
@@ -156,21 +156,21 @@ pub struct Ask {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Suggestions {
-    /// In the order in which they were chosen.
+    /// The suggestions, in the order in which they were chosen.
     pub suggestions: Vec<Suggestion>,
-    /// There once no more are needed.
+    /// Present once no more observations are needed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub enough: Option<Enough>,
 }
 
-/// The accuracy that was wanted is reached: what the agent expects of its predictions has been below it for five movements.
+/// The wanted accuracy is reached: the agent's expected error of predictions has been below it for five movements.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Enough {
-    /// The mean error of predictions over the workspace that is expected now, millimetres.
+    /// The expected mean error of predictions over the workspace now, millimetres.
     pub expected_error_mm: f64,
-    /// What was wanted, millimetres.
+    /// The wanted accuracy, millimetres.
     pub wanted_mm: f64,
-    /// From how many observations, those that are excluded not counted.
+    /// The number of observations behind it, excluded ones not counted.
     pub observations: u64,
 }

@@ -6,18 +6,18 @@ use super::{ChannelShape, Session, Shape, channel::SOCKET};
 use body_schema_experiment::Executed;
 use body_schema_table::{Layout, Reading, Titles, Writer};
 
-/// What the table is called.
+/// The name of the table.
 pub(super) const FILE: &str = "observations.csv";
 
-/// How a channel's numbers become the cells of a row.
+/// The way from a channel's numbers to the cells of a row.
 struct Cells {
     titles: Vec<String>,
-    /// None of sockets, which have columns of their own.
+    /// The columns of the reading; none for sockets, which have columns of their own.
     reading: Option<Reading>,
 }
 
 impl Cells {
-    /// Of the columns that a calibration names, or else as titles are by themselves.
+    /// The cells of the columns that a calibration names, or of the default titles.
     fn new(ChannelShape { name, shape }: &ChannelShape, named: Option<Vec<String>>) -> Self {
         let (layout, usual) = match shape {
             Shape::Position => (Layout::Position, Layout::Position.titles(name)),
@@ -42,8 +42,8 @@ impl Cells {
 }
 
 impl Session {
-    /// The observations that count and saw anything, as CSV: one line of titles, then one line per observation. Joints are in
-    /// rad and m, readings in the columns that the calibration names, or else titled as `docs/calibrate.md` says. `calibrate`
+    /// The counting observations with a reading, as CSV: one line of titles, then one line per observation. Joints are in rad
+    /// and m, readings in the columns that the calibration names, or else titled as `docs/calibrate.md` says. `calibrate`
     /// reads it by the file that [`calibration_toml`](Self::calibration_toml) gives.
     pub fn observations_csv(&self) -> String {
         let counted = self.observations().iter().filter(|told| !told.excluded);
@@ -52,7 +52,7 @@ impl Session {
         self.csv_of(&seen)
     }
 
-    /// The same of these observations.
+    /// The given observations as CSV, in the form of [`observations_csv`](Self::observations_csv).
     pub(super) fn csv_of(&self, observations: &[Executed]) -> String {
         let mut writer = Writer::new(Vec::new());
         let names = &self.scenario().robot.names;
@@ -84,8 +84,8 @@ impl Session {
         writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
     }
 
-    /// The calibration file for [`observations_csv`](Self::observations_csv) under that name, beside `robot.urdf`. What only
-    /// movements are chosen by is left out.
+    /// The calibration file for [`observations_csv`](Self::observations_csv) under that name, beside `robot.urdf`. Keys that
+    /// only serve the choice of movements are left out.
     pub fn calibration_toml(&self) -> String {
         let Ok(mut table) = self.setup().table() else { return String::new() };
         ["constraints", "view", "socket"].iter().for_each(|key| drop(table.remove(*key)));
@@ -106,7 +106,7 @@ impl Session {
         toml::to_string(&table).unwrap_or_default()
     }
 
-    /// By channel that always reads, in the order of the rig.
+    /// The cells of each channel that always reads, in the order of the rig.
     fn cells(&self) -> Vec<Cells> {
         let calibration = &self.setup().calibration;
         let sensors = calibration.get("sensor");

@@ -1,4 +1,4 @@
-//! Whole numbers as JSON Schema means them.
+//! Whole numbers as JSON Schema defines them.
 
 use std::fmt;
 
@@ -7,10 +7,14 @@ use serde::{
     de::{Error, Unexpected, Visitor},
 };
 
-/// The greatest whole number that is taken, that of OpenAPI's `int64`.
+/// The greatest whole number that is accepted, that of OpenAPI's `int64`.
 pub const MOST: u64 = i64::MAX as u64;
 
-/// A whole number from 0 as JSON Schema means it, for serde: `100.0` and `1e2` are 100.
+/// Reads a whole number from 0 as JSON Schema defines it, for serde: `100.0` and `1e2` are 100.
+///
+/// # Errors
+///
+/// The deserializer's error if the value is no number, has a fraction, is negative, or is above [`MOST`].
 pub fn whole<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
     struct Whole;
 
@@ -39,7 +43,11 @@ pub fn whole<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error
     deserializer.deserialize_any(Whole)
 }
 
-/// The same where it may be absent or null.
+/// Reads a whole number from 0, as [`whole`] does, or nothing where it is absent or null.
+///
+/// # Errors
+///
+/// The deserializer's error if the value is neither null nor a number that [`whole`] takes.
 pub fn whole_or_none<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
     #[derive(Deserialize)]
     struct Given(#[serde(deserialize_with = "whole")] u64);

@@ -1,4 +1,4 @@
-//! What is kept of a step, written once for all who will read it.
+//! The data kept of a step, written once for all readers.
 
 use std::{mem::size_of, sync::Arc};
 
@@ -9,7 +9,7 @@ use body_schema_wire::{Description, StepReport};
 
 use crate::{Kind, Problem};
 
-/// A report as its readers get it. Clones share the text.
+/// A report as readers get it. Clones share the text.
 #[derive(Clone, Debug)]
 pub struct Kept {
     /// The step that it is of.

@@ -1,9 +1,9 @@
-//! Few rows instead of all: the most informative ones, beside random ones.
+//! Active choice of rows: the most informative ones instead of all, compared with random ones.
 //!
-//! Rows are picked one by one by the scenario's criterion. Before the first, the belief is the prior at the description; after
-//! each, everything is fitted anew to the rows picked so far, and predictions are judged by the rows that are held out. Once what no
-//! parameter explains makes predictions worse than what is not known of the parameters, rows are picked to be distributed like the postures
-//! that are asked about, as a session's movements are.
+//! Rows are picked one by one by the scenario's criterion. Before the first, the belief is the prior at the description; after each,
+//! everything is fitted anew to the rows picked so far, and predictions are judged by the rows that are held out. Once the model error
+//! makes predictions worse than the uncertainty of the parameters does, rows are picked to be distributed like the postures that are asked
+//! about, as a session's movements are.
 
 use nalgebra::DMatrix;
 use rand::seq::SliceRandom;
@@ -18,37 +18,43 @@ use body_schema_engine::{
 };
 use body_schema_experiment::Stream;
 
-/// Held-out error after so many rows.
+/// The held-out error after a number of rows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActivePoint {
-    /// Rows learned from.
+    /// The number of rows learned from.
     pub rows: usize,
-    /// Mean held-out error with rows that were chosen, millimetres; null where none are.
+    /// The mean held-out error with chosen rows, millimetres; null without chosen rows.
     pub active_mm: Option<f64>,
-    /// The median over random orders, millimetres.
+    /// The median of the mean held-out error over random orders, millimetres.
     pub random_median_mm: Option<f64>,
-    /// Their lower quartile.
+    /// The lower quartile over random orders, millimetres.
     pub random_q25_mm: Option<f64>,
-    /// Their upper quartile.
+    /// The upper quartile over random orders, millimetres.
     pub random_q75_mm: Option<f64>,
 }
 
-/// Random orders beside chosen rows.
+/// The number of random orders beside chosen rows.
 pub const ORDERS: usize = 20;
-/// Random orders where no rows are chosen, and at how many numbers of rows they are judged.
+/// The number of random orders where no rows are chosen, and of the row counts at which they are judged.
 const FEW_ORDERS: usize = 8;
 const SIZES: usize = 8;
-/// Rows among which are chosen, spread evenly, where there are more; and up to how many the error by number of rows is
-/// worked out without being asked for.
+/// The most rows among which rows are chosen, spread evenly; also the most rows for which the error by number of rows
+/// is computed without being asked for.
 const POOL: usize = 2000;
-/// With fewer rows a fit is searched wherever the prior allows, not near the last.
+/// The number of rows below which a fit is searched wherever the prior allows, not near the last.
 const SEARCHED: usize = 8;
-/// Seed of the random orders.
+/// The seed of the random orders.
 const SEED: u64 = 1;
 
 impl Case<'_> {
-    /// The `count` most informative of `rows` for what is asked at `asked`, by their postures; in the order of the choice, and what was
-    /// learned after each.
+    /// The `count` of `rows` that are most informative, by their postures, for predictions at the rows `asked`: in the order of the
+    /// choice, with the fit after each.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Active`] if `count` is 0 or more than the rows to choose from, [`CalibrationError::GivenUp`] if `progress`
+    /// says that nobody waits any longer, [`CalibrationError::Estimation`] or [`CalibrationError::Selection`] if a fit or the criterion
+    /// fails.
     pub fn choose(
         &self,
         rows: &[usize],
@@ -96,7 +102,12 @@ impl Case<'_> {
         belief.rig.equations_of(&belief.state, &belief.layout, &row.positions, &row.observation).rows
     }
 
-    /// Held-out error after `1..=count` chosen rows, beside random orders; over all `splits`.
+    /// The held-out error after `1..=count` chosen rows, and in random orders, over all `splits`.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::NothingHeldOut`] if no split holds rows out; otherwise the errors of
+    /// [`choose`](Self::choose).
     pub fn active(
         &self,
         splits: &[Split],
@@ -121,7 +132,13 @@ impl Case<'_> {
         Ok(sizes.iter().enumerate().map(point).collect())
     }
 
-    /// Held-out error by number of rows in random orders; nothing where none are held out, or too many rows to try.
+    /// The held-out error by number of rows in random orders; empty if no rows are held out, or too many rows would
+    /// have to be tried.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Estimation`] if a fit fails, [`CalibrationError::GivenUp`] if `progress` says that nobody
+    /// waits any longer.
     pub fn learning(&self, splits: &[Split], progress: &dyn Progress) -> Result<Vec<ActivePoint>, CalibrationError> {
         let fewest = splits.iter().map(|split| split.training.len()).min().unwrap_or(0);
         if splits.iter().all(|split| split.held_out.is_empty()) || !(3..=POOL).contains(&fewest) {
@@ -134,7 +151,7 @@ impl Case<'_> {
         Ok(sizes.iter().zip(&random).map(|(rows, errors)| point(*rows, None, errors)).collect())
     }
 
-    /// By number of rows, by random order: the mean held-out error over all splits.
+    /// The mean held-out error over all splits, by number of rows and random order.
     fn random(
         &self,
         splits: &[Split],

@@ -1,8 +1,8 @@
-//! Where predictions are asked for, and what an error there is.
+//! The workspace of a calibration: where predictions are asked for, and how errors there are measured.
 //!
-//! Rows that are held out say where: for a target in sockets, how far the predicted target scatters in each of them, which is all that
-//! such rows can tell. Where none are held out it is the table's postures; for a target in sockets, places anywhere that the robot
-//! reaches, with postures anywhere within the joint limits that bring the target there, as believed.
+//! Held-out rows define it: for a target in sockets, how far the predicted target scatters in each of them, which is all that such
+//! rows can tell. Where none are held out it is the table's postures; for a target in sockets, places anywhere that the robot reaches,
+//! with postures anywhere within the joint limits that bring the target there, as believed.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -10,16 +10,16 @@ use rand_chacha::ChaCha8Rng;
 use super::{Case, Split};
 use body_schema_engine::model::{Manifold, State, Workspace};
 
-/// Postures at most.
+/// The most postures.
 const POSTURES: usize = 300;
-/// Held-out rows that stand for themselves; fewer do not say where a robot is asked about.
+/// The least number of held-out rows that define a workspace.
 const FEWEST: usize = 10;
-/// Places, and postures at each.
+/// The number of places, and of postures at each.
 const PLACES: usize = 20;
 const EACH: usize = 10;
 
 impl Case<'_> {
-    /// The postures that predictions are asked for by a robot that is believed to be in `state`.
+    /// The postures for which predictions are asked of a robot that is believed to be in `state`.
     pub(super) fn asked_about(&self, state: &State, splits: &[Split]) -> Workspace {
         let mut held_out: Vec<usize> = splits.iter().flat_map(|split| &split.held_out).copied().collect();
         held_out.sort_unstable();
@@ -30,7 +30,7 @@ impl Case<'_> {
         self.predicted(&spread(if held_out.len() < FEWEST { &all } else { &held_out }))
     }
 
-    /// The hand in these rows.
+    /// The workspace of the hand in these rows.
     pub(super) fn predicted(&self, rows: &[usize]) -> Workspace {
         Workspace {
             configurations: rows.iter().map(|row| self.rows[*row].positions.clone()).collect(),
@@ -39,13 +39,13 @@ impl Case<'_> {
         }
     }
 
-    /// The hand that meets itself in sockets of these rows; anywhere, where they are none.
+    /// The workspace of the hand that meets itself in sockets of these rows; anywhere, without rows.
     pub(super) fn met(&self, state: &State, rows: &[usize]) -> Workspace {
         let asked = self.in_sockets(rows);
         if asked.configurations.is_empty() { self.anywhere(state) } else { asked }
     }
 
-    /// Rows in which a target is held in a socket, each with the others there.
+    /// The workspace of rows in which a target is held in a socket, each compared with the others there.
     pub(super) fn in_sockets(&self, rows: &[usize]) -> Workspace {
         let held: Vec<usize> = rows.iter().copied().filter(|row| self.held(&self.rows[*row]).is_some()).collect();
         let posture = |row: usize| (self.rows[row].socket.unwrap_or_default(), self.rows[row].positions.as_slice());
@@ -67,7 +67,7 @@ impl Case<'_> {
     }
 }
 
-/// So many of some rows as are looked at, spread evenly.
+/// Some of the rows, as many as are looked at, spread evenly.
 fn spread(rows: &[usize]) -> Vec<usize> {
     let count = rows.len().min(POSTURES);
     (0..count).map(|k| rows[k * rows.len() / count]).collect()

@@ -13,11 +13,11 @@ use body_schema_engine::{
     model::{Block, Layout},
 };
 
-/// Deviations from which on a correction is told.
+/// The deviations from which on a correction is reported.
 const TOLD: f64 = 3.0;
 
 impl Case<'_> {
-    /// Of every joint whose axis was corrected by more than three deviations of the prior as stated, in words.
+    /// A sentence on every joint whose axis was corrected by more than three deviations of the prior as stated.
     pub(super) fn beyond_prior(&self, fit: &Fit) -> Vec<String> {
         self.found_beyond(fit).unwrap_or_default()
     }
@@ -47,7 +47,8 @@ impl Case<'_> {
     }
 }
 
-/// How many deviations of one normal number are as improbable as χ² with so many degrees of freedom being larger, two-sided.
+/// The deviation of one normal number that is as improbable, two-sided, as a χ² of so many degrees of freedom above this
+/// value.
 fn deviations(chi2: f64, degrees: usize) -> f64 {
     let d = degrees as f64;
     let variance = 2.0 / (9.0 * d);

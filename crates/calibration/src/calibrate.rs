@@ -1,4 +1,4 @@
-//! From a case to everything that its report says.
+//! Calibration: from a case to everything in its report.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,42 +12,42 @@ use super::{
 use body_schema_diagnostics::{Doubt, DoubtKind, Line, few_folds};
 use body_schema_engine::{most::middle, selection::Optimality};
 
-/// What is asked beside the fit.
+/// The options of a calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
-    /// Hold out every row once, in so many folds, whatever the file says.
+    /// The number of folds in which every row is held out once, in place of the file's rule.
     pub folds: Option<usize>,
-    /// Choose so many rows one by one, and judge them beside random ones.
+    /// The number of rows to choose one by one, and to compare with random ones.
     pub active: Option<usize>,
 }
 
-/// What came of a calibration.
+/// The result of a calibration.
 #[derive(Clone, Debug)]
 pub struct Calibration {
     /// The report.
     pub report: Report,
-    /// The chain as described, with base, targets, cameras and sockets fitted to the rows that are learned from.
+    /// The chain as described, with base, targets, cameras and sockets fitted to the training rows.
     pub nominal: Fit,
-    /// What a URDF can hold.
+    /// The fit of what a URDF can hold.
     pub fit: Fit,
-    /// What was added to it.
+    /// The corrections that were added to it.
     pub extras: Vec<Extra>,
-    /// With that; the same where nothing was.
+    /// The extended model with these corrections; equal to `fit` where there are none.
     pub fuller: Fit,
-    /// Fold by fold what a URDF can hold; empty without folds.
+    /// The fit of what a URDF can hold, fold by fold; empty without folds.
     pub folds: Vec<Fit>,
 }
 
-/// What a split says.
+/// The judgement of one split.
 struct Judged {
     before: Vec<Residual>,
     after: Vec<Residual>,
     fuller: Vec<Residual>,
-    /// By what is tried.
+    /// The residuals of each trial.
     tried: Vec<Vec<Residual>>,
-    /// By reading: its row, and whether it lies within what is stated.
+    /// For each reading its row, and whether it lies within the stated interval.
     covered: Vec<(usize, bool)>,
-    /// By how much that was widened.
+    /// The factor by which that interval was widened.
     widening: f64,
 }
 
@@ -55,7 +55,7 @@ struct Judged {
 ///
 /// # Errors
 ///
-/// [`CalibrationError`] where the options do not fit the table, and where nothing explains it.
+/// [`CalibrationError`] if the options do not fit the table, or no fit explains it.
 pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) -> Result<Calibration, CalibrationError> {
     let splits = case.splits(options.folds)?;
     let has_folds = splits.len() > 1;
@@ -209,15 +209,16 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     Ok(Calibration { report, nominal, fit, extras, fuller, folds: if has_folds { folds } else { Vec::new() } })
 }
 
-/// So many times the σ that is stated is no noise of that sensor.
+/// The multiple of the stated σ beyond which residuals are no noise of that sensor.
 const NO_NOISE: f64 = 10.0;
-/// Nor is so many times what held-out rows are missed by an error that calibration leaves, with so many equations to spare.
+/// The multiple of the held-out error beyond which residuals are no error that calibration leaves, and the degrees of
+/// freedom needed to say so.
 const NO_ERROR: f64 = 60.0;
 const ENOUGH: f64 = 60.0;
-/// Rows of which so large a share are outliers are none.
+/// The share of rows beyond which rows cannot all be outliers.
 const NO_OUTLIERS: f64 = 0.3;
 
-/// The doubt that the description explains the readings at all, calibrated.
+/// The doubt that the calibrated description explains the readings at all.
 fn misfit(noise: &[Noise], held_out: Option<&Figures>, outliers: usize, rows: usize) -> Option<Doubt> {
     let times = |noise: &Noise| noise.explaining_sigma.map_or(0.0, |sigma| sigma / noise.sigma);
     let worst = noise.iter().max_by(|a, b| times(a).total_cmp(&times(b))).filter(|noise| times(noise) > NO_NOISE);
@@ -258,7 +259,8 @@ fn misfit(noise: &[Noise], held_out: Option<&Figures>, outliers: usize, rows: us
 }
 
 impl Case<'_> {
-    /// `widening` says how much wider than by noise and uncertainty what is stated of readings is.
+    /// Judges a split. `widening` is the factor by which the stated interval of readings is wider than noise and
+    /// uncertainty make it.
     fn judge(
         &self,
         split: &Split,
@@ -340,7 +342,7 @@ impl Case<'_> {
         }
     }
 
-    /// The rows that are likelier outliers than not by the fit that learned from them, and `others`.
+    /// The rows that are likelier outliers than not in the fit that learned from them, and `others`.
     fn outliers(&self, fit: &Fit, others: BTreeSet<usize>) -> Vec<Outlier> {
         let told = |(row, probability): (usize, f64)| {
             let Line { file, number } = &self.rows[row].line;
@@ -352,7 +354,8 @@ impl Case<'_> {
         outliers
     }
 
-    /// The readings that are likelier outliers than not by the fit that learned from them, and far beyond most of their sensor.
+    /// The readings that are likelier outliers than not in the fit that learned from them, and far beyond most of their
+    /// sensor's.
     fn strays(&self, fit: &Fit) -> BTreeSet<(usize, Sensed)> {
         let outliers: BTreeSet<usize> = fit.suspected().into_iter().map(|(row, _)| row).collect();
         if outliers.is_empty() {
@@ -364,7 +367,8 @@ impl Case<'_> {
         strays
     }
 
-    /// Every reading by the model that had not learned from its row, if there is one, else by the calibrated one.
+    /// Every reading as predicted by the model that had not learned from its row, if there is one, otherwise by the
+    /// calibrated one.
     fn readings(&self, fit: &Fit, splits: &[Split], judged: &[Judged], choice: Option<&Choice>) -> Vec<Reading> {
         let probabilities: std::collections::HashMap<usize, f64> = fit.outliers().into_iter().collect();
         let has_folds = splits.len() > 1;
@@ -393,20 +397,20 @@ impl Case<'_> {
     }
 }
 
-/// The rows of which no reading went wrong altogether.
+/// The rows without a stray reading.
 fn without(rows: &[usize], strays: &BTreeSet<(usize, Sensed)>) -> Vec<usize> {
     let strays: BTreeSet<usize> = strays.iter().map(|(row, _)| *row).collect();
     rows.iter().copied().filter(|row| !strays.contains(row)).collect()
 }
 
-/// An outlier that is more than so many times the median residual of its sensor says nothing of how good a model is. What is nearer
-/// may be an error of the model, and counts.
+/// The multiple of its sensor's median residual beyond which an outlier is ignored in judging a model. A nearer one may be an error
+/// of the model, and counts.
 const STRAY: f64 = 10.0;
-/// Without a fit that knows the reading, so many times the median is no error of a model.
+/// The multiple of the median that is no model error, for readings that no fit knows.
 const GROSS: f64 = 50.0;
 
-/// The readings whose residual is more than so many times the median of their sensor: as if they were in other units, or said that nothing
-/// was seen. A bad model, off by the same everywhere, has none of them.
+/// The readings whose residual is more than `times` the median of their sensor: as from other units, or from a mark for an unseen target.
+/// A bad model that is off by the same everywhere has none of them.
 fn gross(times: f64, residuals: &[&Residual]) -> BTreeSet<(usize, Sensed)> {
     let mut by_sensor: BTreeMap<Sensed, Vec<&Residual>> = BTreeMap::new();
     residuals.iter().for_each(|it| by_sensor.entry(it.sensor).or_default().push(it));

@@ -1,4 +1,4 @@
-//! What is to be calibrated, and by what.
+//! The calibration case: a described robot, and its measurements.
 
 use std::sync::{Arc, Mutex};
 
@@ -14,43 +14,43 @@ use super::{CalibrationError, Extra, Split};
 /// A row of the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// Where it stands.
+    /// Its line in the file.
     pub line: Line,
     /// Joint positions, rad or m.
     pub positions: Vec<f64>,
-    /// What was measured.
+    /// The observation.
     pub observation: Observation,
-    /// The socket in which a target was held: its number among the robot's, those that are held out after the others.
+    /// The socket in which a target was held: its number among the robot's, held-out ones after the others.
     pub socket: Option<usize>,
 }
 
-/// A robot as it is described, and what was measured of it.
+/// A described robot, with the measurements to calibrate it by.
 #[derive(Clone, Debug)]
 pub struct Case<'a> {
-    /// What the calibration file says.
+    /// The scenario of the calibration file.
     pub scenario: &'a Scenario,
-    /// The robot as it is described, with what its joints bear.
+    /// The robot as described, with its loads.
     guess: State,
     /// The rows, in the order of the table.
     pub rows: Vec<Row>,
-    /// By row, its [posture](fn@body_schema_diagnostics::postures).
+    /// The [posture](fn@body_schema_diagnostics::postures) of each row.
     pub(super) postures: Vec<usize>,
-    /// What everything is called.
+    /// The names of everything that can be learned.
     pub names: Names,
     /// The URDF, where the robot comes from one.
     pub described: Option<&'a Described>,
-    /// What is known before any row, as the distance between two sockets.
+    /// Observations from before any row, such as the distance between two sockets.
     pub(super) known: Option<&'a Observation>,
     pub(super) rig: Arc<Rig>,
     pub(super) loss: Loss,
-    /// By layout: what is known of the chain, shared by all fits.
+    /// The prior of the chain by layout, shared by all fits.
     pub(super) chains: Chains,
 }
 
-/// What is known of a chain, by layout.
+/// The prior of a chain, by layout.
 type Chains = Arc<Mutex<Vec<(Layout, Option<Arc<ChainPrior>>)>>>;
 
-/// Rows held out under this seed, where the scenario draws them by one.
+/// The seed under which rows are held out, where the scenario draws them by one.
 const SEED: u64 = 1;
 
 impl<'a> Case<'a> {
@@ -58,7 +58,7 @@ impl<'a> Case<'a> {
     ///
     /// # Errors
     ///
-    /// [`CalibrationError::Simulated`] where it simulates its world.
+    /// [`CalibrationError::Simulated`] if it simulates its world.
     pub fn new(scenario: &'a Scenario) -> Result<Self, CalibrationError> {
         let WorldSpec::Measured { measurements, held_out } = &scenario.world else {
             return Err(CalibrationError::Simulated { scenario: scenario.name.clone() });
@@ -85,7 +85,7 @@ impl<'a> Case<'a> {
         })
     }
 
-    /// The robot as it is described.
+    /// The robot as described.
     pub fn guess(&self) -> &State {
         &self.guess
     }
@@ -95,14 +95,14 @@ impl<'a> Case<'a> {
         &self.rig
     }
 
-    /// What a URDF can hold, and where base, targets, cameras and sockets are: no ratios, no eccentricity and no
+    /// The layout of what a URDF can hold, and of base, targets, cameras and sockets: no ratios, no eccentricity and no
     /// compliance.
     pub fn writable(&self) -> Layout {
         let holds = |block: &Block| !matches!(block, Block::Ratio(_) | Block::Eccentricity(_) | Block::Compliance(..));
         self.layout(|block| holds(&block))
     }
 
-    /// Where base, targets, cameras and sockets are, with the chain as described.
+    /// The layout of base, targets, cameras and sockets, with the chain as described.
     pub fn placing(&self) -> Layout {
         let is_of_chain = |block: &Block| matches!(block, Block::Axis(_) | Block::Offset(_));
         let learned = self.writable();
@@ -110,7 +110,7 @@ impl<'a> Case<'a> {
         Layout::new(self.guess(), places)
     }
 
-    /// What a URDF can hold, and more, of a robot that bears what `near` does.
+    /// The layout of what a URDF can hold and of `extras`, for a robot with the loads of `near`.
     pub fn extended(&self, extras: &[Extra], near: &State) -> Layout {
         let learned = self.writable();
         let blocks: Vec<Block> = learned.blocks().map(|(block, _)| block).collect();
@@ -125,13 +125,13 @@ impl<'a> Case<'a> {
         Layout::new(self.guess(), learned.filter(|block| wanted(*block)))
     }
 
-    /// Rows to learn from and rows to judge by, as the scenario says, or by `folds`: fold f holds out postures f, f + K, …, each
+    /// The training rows and held-out rows, by the scenario's rule, or in `folds`: fold f holds out postures f, f + K, …, each
     /// with all its rows. There are no more folds than postures.
     ///
     /// # Errors
     ///
-    /// [`CalibrationError::Folds`] where there are fewer rows than folds, or fewer than two folds;
-    /// [`CalibrationError::OnePosture`] where all rows repeat each other.
+    /// [`CalibrationError::Folds`] if there are fewer rows than folds, or fewer than two folds; [`CalibrationError::OnePosture`]
+    /// if all rows repeat each other.
     pub fn splits(&self, folds: Option<usize>) -> Result<Vec<Split>, CalibrationError> {
         let Some(folds) = folds else {
             let WorldSpec::Measured { held_out, .. } = &self.scenario.world else { return Ok(Vec::new()) };
@@ -152,12 +152,12 @@ impl<'a> Case<'a> {
         Ok(Split::folds(&rows, folds, &self.postures))
     }
 
-    /// Whether nothing is measured but that targets are where they were before.
+    /// Whether the only measurement is that targets are where they were before.
     pub fn meets_itself(&self) -> bool {
         self.rig.channels().iter().all(|channel| channel.occasion() != Occasion::Always)
     }
 
-    /// The target that a row held in a socket.
+    /// The target that a row held in a socket, and the socket.
     pub(super) fn held(&self, row: &Row) -> Option<(usize, usize)> {
         let robot = &self.scenario.robot;
         let number = row.socket?;

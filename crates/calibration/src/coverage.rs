@@ -1,11 +1,11 @@
-//! Whether held-out readings lie where they are said to.
+//! Coverage: the share of held-out readings that lie within their stated intervals.
 //!
-//! A reading y of d numbers that nothing was learned from is predicted with covariance S = R + J P Jᵀ, R the noise as it was learned and
-//! P the posterior covariance, so that `(y − h)ᵀ S⁻¹ (y − h)` is below the 95 % point of χ² with d degrees of freedom in 95 of 100
-//! readings, where everything that is said is true. What no parameter explains is no normal noise: it is large in some postures and small
-//! in others. So where folds among the training rows find less than 95 % of their readings there, what is stated is as much wider as
-//! they need, by a factor of lengths w: `(y − h)ᵀ S⁻¹ (y − h) ≤ w² χ²` (conformal prediction; Vovk, *Cross-conformal predictors*, 2015).
-//! Readings of one posture share their errors: the interval of the share is that of means over postures.
+//! A held-out reading y of d numbers is predicted with covariance S = R + J P Jᵀ, R the noise as it was learned and P the posterior
+//! covariance, so that `(y − h)ᵀ S⁻¹ (y − h)` is below the 95 % point of χ² with d degrees of freedom in 95 of 100 readings if the model
+//! is right. The model error is no normal noise: it is large in some postures and small in others. So where folds among the training rows
+//! find less than 95 % of their readings there, the stated interval is widened as much as they need, by a factor of lengths w: `(y − h)ᵀ
+//! S⁻¹ (y − h) ≤ w² χ²` (conformal prediction; Vovk, *Cross-conformal predictors*, 2015). Readings of one posture share their errors: the
+//! interval of the share is that of means over postures.
 
 use std::collections::BTreeMap;
 
@@ -14,19 +14,19 @@ use serde::{Deserialize, Serialize};
 use super::{Case, Fit};
 use body_schema_engine::sensing::{Observation, Occasion};
 
-/// What share lies within what 95 % should.
+/// The share of readings within the 95 % intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
-    /// Readings that were held out.
+    /// The number of held-out readings.
     pub readings: usize,
-    /// The share of them within the 95 % that are stated.
+    /// The share of them within the stated 95 % intervals.
     pub share: f64,
     /// The lower end of its 95 % interval, clustered by posture.
     pub low: f64,
     /// The upper end.
     pub high: f64,
-    /// By how much wider than by noise and uncertainty alone what is stated is, as folds among the training rows say: a factor of
-    /// lengths, the mean over the splits.
+    /// The factor of lengths by which the stated intervals are wider than noise and uncertainty alone make them, from folds among
+    /// the training rows; the mean over the splits.
     #[serde(default = "unwidened")]
     pub widened: f64,
 }
@@ -35,14 +35,15 @@ fn unwidened() -> f64 {
     1.0
 }
 
-/// What is stated.
+/// The stated probability.
 const STATED: f64 = 0.95;
-/// Deviations of a normal number to either side that hold as much, and of one side.
+/// The quantiles of a normal number for this probability, two-sided and one-sided.
 const BOTH_SIDES: f64 = 1.96;
 const ONE_SIDE: f64 = 1.645;
 
 impl Coverage {
-    /// Of readings by their row, where what is stated was `widened`; `None` of fewer than ten rows, which tell nothing.
+    /// The coverage from readings by row, where intervals were `widened`; `None` for fewer than ten rows, which tell
+    /// nothing.
     pub(super) fn of(covered: &[(usize, bool)], widened: f64) -> Option<Self> {
         let mut rows: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
         for (row, is_within) in covered {
@@ -66,7 +67,7 @@ impl Coverage {
         })
     }
 
-    /// What is to be said where the share is not what is stated.
+    /// A warning where the share is not the stated one.
     pub fn warning(&self) -> Option<String> {
         let Self { readings, share, low, high, .. } = self;
         let percent = |share: &f64| 100.0 * share;
@@ -85,8 +86,8 @@ impl Coverage {
 }
 
 impl Case<'_> {
-    /// By reading of `rows`, which nothing was learned from: its row, and how far it is from what is predicted, as a share of how far
-    /// 95 % are by noise and uncertainty.
+    /// For each reading of `rows`, which were not learned from, its row, and its distance from the prediction as a share of the 95 %
+    /// interval by noise and uncertainty.
     pub(super) fn reaches(&self, fit: &Fit, rows: &[usize]) -> Vec<(usize, f64)> {
         let belief = &fit.belief;
         let Some(covariance) = &belief.covariance else { return Vec::new() };
@@ -111,7 +112,7 @@ impl Case<'_> {
     }
 }
 
-/// w, by the reaches of readings that nothing was learned from: their 95 % point, where it is above 1.
+/// w, from the reaches of held-out readings: their 95 % point, or 1 if that is less.
 pub(super) fn widening(reaches: &[(usize, f64)]) -> f64 {
     let mut reaches: Vec<f64> = reaches.iter().map(|it| it.1).collect();
     let within = (STATED * reaches.len() as f64).ceil() as usize;

@@ -1,4 +1,4 @@
-//! What rows would tell, by their postures alone.
+//! The information of rows, from their postures alone.
 //!
 //! With H the whitened Jacobian of the rows and P₀ the prior, both around the description, P = (P₀⁻¹ + HᵀH)⁻¹ is what they leave, and
 //! √(tr(J P Jᵀ)) what is expected of other postures with Jacobian J (criterion I of optimal design). Nothing that was measured
@@ -12,13 +12,13 @@ use super::{CalibrationError, Case, Fit};
 use body_schema_engine::{estimation::Belief, model::State, sensing::Observation};
 
 impl Case<'_> {
-    /// The belief that `rows` would leave of the chain as it is described, by their postures alone.
+    /// The belief about the described chain that `rows` would leave, from their postures alone.
     pub(super) fn designed(&self, rows: &[usize]) -> Result<Option<Fit>, CalibrationError> {
         let nominal = self.nominal(rows)?;
         Ok(self.stated(nominal.state(), rows).map(|belief| Fit { belief, rows: rows.to_vec(), ..nominal }))
     }
 
-    /// What `rows` leave unknown around a state, with noise and prior as they are stated; `None` where that is no covariance.
+    /// The belief around a state that `rows` leave, with noise and prior as stated; `None` if that has no covariance.
     pub(super) fn stated(&self, state: &State, rows: &[usize]) -> Option<Belief> {
         let layout = self.writable();
         let before = match self.chain(&layout) {
@@ -39,8 +39,8 @@ impl Case<'_> {
         Some(Belief::new(state.clone(), Arc::new(layout), self.rig.clone()).with_covariance(covariance))
     }
 
-    /// By postures alone, of the rows that the file trains on: the expected scatter in sockets that are held out, root mean square,
-    /// millimetres. `None` where nothing is held out or nothing can be told.
+    /// The expected scatter in held-out sockets, root mean square, millimetres, from the postures of the training rows alone.
+    /// `None` where nothing is held out or the scatter cannot be computed.
     pub(super) fn scatter_mm(&self) -> Option<f64> {
         let split = self.splits(None).ok()?.into_iter().next()?;
         let (asked, fit) = (self.in_sockets(&split.held_out), self.designed(&split.training).ok()??);
@@ -49,8 +49,8 @@ impl Case<'_> {
         Some(squares.max(0.0).sqrt() * 1e3).filter(|mm| mm.is_finite())
     }
 
-    /// By postures alone, of the rows that the file trains on, or of all: the standard deviation of a span of 1 m of the calibrated robot,
-    /// millimetres.
+    /// The standard deviation of a span of 1 m of the calibrated robot, millimetres, from the postures alone of the training rows, or of
+    /// all.
     pub(super) fn size_mm(&self) -> Option<f64> {
         let splits = self.splits(None).ok()?;
         let rows = match splits.as_slice() {

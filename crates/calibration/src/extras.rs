@@ -1,18 +1,19 @@
-//! What axes cannot explain, learned as far as rows that were not learned from say that it predicts better.
+//! Extra corrections, which axes cannot express, kept only if they predict rows better that were not learned from.
 //!
-//! The rows that are held out decide nothing. Within the training rows there are folds of their own: what is added stays
-//! where the mean error over them falls by more than two standard errors, taken from the differences reading by reading.
+//! The rows that are held out decide nothing. Within the training rows there are folds of their own: what is added stays where the mean
+//! error over them falls by more than two standard errors, taken from the differences reading by reading.
 //!
-//! Folds say nothing of postures that lie elsewhere than all rows. With p and p′ the hand as predicted without and with what is added, P and
-//! P′ the covariances and J, J′ the Jacobians, all fitted to all rows, what is added changes predictions where the robot is asked about by
+//! Folds say nothing of postures that lie elsewhere than all rows. With p and p′ the hand as predicted without and with what is added, P
+//! and P′ the covariances and J, J′ the Jacobians, all fitted to all rows, what is added changes predictions where the robot is asked about
+//! by
 //!
 //! ```text
 //! c = rms ‖p′ − p‖,    v = √ mean tr(J′ P′ J′ᵀ − J P Jᵀ)
 //! ```
 //!
-//! of which v is what it makes less certain. Postures that are asked about lie outside those of the rows where v is more than twice as large
-//! there as over the rows. What is added stays then only where c is above two v: a change that is certain. Where it is not, what stays
-//! may be a part of it for which both hold.
+//! of which v is what it makes less certain. Postures that are asked about lie outside those of the rows where v is more than twice as
+//! large there as over the rows. What is added stays then only where c is above two v: a change that is certain. Where it is not, what
+//! stays may be a part of it for which both hold.
 
 use std::cmp::Ordering;
 
@@ -25,7 +26,7 @@ use body_schema_engine::{
     model::{Block, Layout, State, Workspace, listed},
 };
 
-/// What can be added to axes.
+/// A correction that can be added to axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Extra {
@@ -33,11 +34,11 @@ pub enum Extra {
     Ratios,
     /// Sine and cosine of readings, of all revolute joints whose axes are learned: encoders off their centres.
     Eccentricity,
-    /// How much the same joints give way to gravity, at the target and at the elbow.
+    /// How much these joints give way to gravity, at the target and at the elbow.
     Compliance,
 }
 
-/// What is tried: each, the two that are functions of a joint's own reading, and all together.
+/// The combinations that are tried: each alone, the two that are functions of a joint's own reading, and all together.
 pub(super) const TRIED: [&[Extra]; 5] = [
     &[Extra::Ratios],
     &[Extra::Eccentricity],
@@ -46,49 +47,50 @@ pub(super) const TRIED: [&[Extra]; 5] = [
     &[Extra::Ratios, Extra::Eccentricity, Extra::Compliance],
 ];
 
-/// Folds among the training rows, and how many postures there must be for any.
+/// The number of folds among the training rows, and the least number of postures for any.
 const FOLDS: usize = 5;
 const FEWEST: usize = 10;
-/// Postures lie outside others where what is added is so many times as uncertain.
+/// The factor of uncertainty beyond which postures lie outside those of the rows.
 const OUTSIDE: f64 = 2.0;
 /// Deviations by which a change of predictions is certain.
 const CERTAIN: f64 = 2.0;
-/// Rows of the inner folds at most, spread evenly over the table: that many decide.
+/// The most rows of the inner folds, spread evenly over the table; that many are enough to decide.
 const MOST: usize = 2000;
 
-/// What came of adding something.
+/// A trial of extra corrections.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
-    /// What was added.
+    /// The corrections that were added.
     pub extras: Vec<Extra>,
-    /// Parameters more.
+    /// The number of parameters that they add.
     pub parameters: usize,
-    /// What has no parameter of its own, since it cannot be told from others, in words.
+    /// The corrections without a parameter of their own, because they cannot be told from others, in words.
     pub merged: Vec<String>,
     /// Mean error over the folds among the training rows without it, in the unit of the report.
     pub inner_without: Option<f64>,
-    /// The same with it.
+    /// Mean error over the folds among the training rows with it, in the unit of the report.
     pub inner: Option<f64>,
-    /// The standard error of their difference.
+    /// The standard error of the difference of the two.
     pub standard_error: Option<f64>,
-    /// Held-out figures with it; for the reader, who decides nothing by them either.
+    /// Held-out figures with it, for information; they decide nothing.
     pub held_out: Option<Figures>,
-    /// By how much it changes predictions where the robot is asked about, root mean square, millimetres; null where the folds do not speak
-    /// for it.
+    /// The change that it makes to predictions where the robot is asked about, root mean square, millimetres; null where the folds do not
+    /// support it.
     #[serde(default)]
     pub change_mm: Option<f64>,
-    /// How much less certain it makes them there, one standard deviation, millimetres.
+    /// The standard deviation that it adds to predictions there, millimetres.
     #[serde(default)]
     pub change_sd_mm: Option<f64>,
-    /// Whether it does not stay, though folds speak for it, since the postures that are asked about lie outside those of the rows.
+    /// Whether it is dropped although the folds support it, because the postures that are asked about lie outside those of the
+    /// rows.
     #[serde(default)]
     pub is_beyond: bool,
-    /// Whether it stays.
+    /// Whether it is kept.
     pub kept: bool,
 }
 
 impl Trial {
-    /// Why it does not stay, though folds speak for it.
+    /// Why it is dropped although the folds support it.
     pub(super) fn warning(&self) -> Option<String> {
         let (change, sd) = (self.change_mm.filter(|_| self.is_beyond)?, self.change_sd_mm?);
         let names = listed(self.extras.iter().map(|extra| extra.name().to_owned()).collect());
@@ -110,7 +112,7 @@ impl Extra {
         }
     }
 
-    /// Its blocks, where all of `extras` are learned.
+    /// Its blocks, when all of `extras` are learned.
     pub(super) fn blocks(self, case: &Case<'_>, extras: &[Self], near: &State) -> Vec<Block> {
         let joints = (0..case.guess().joints.len()).filter(|joint| case.scenario.robot.layout.is_learned(*joint));
         match self {
@@ -125,8 +127,12 @@ impl Extra {
 }
 
 impl Case<'_> {
-    /// What is worth adding, by folds among `rows` and where the robot is `asked` about; `plain` is a fit of them without it. And by how
-    /// much wider than is stated readings scatter in these folds.
+    /// Tries the extra corrections by folds among `rows` and where the robot is `asked` about; `plain` is a fit of the rows without
+    /// them. Returns the trials, and the factor by which readings scatter more widely in these folds than stated.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Prior`] or [`CalibrationError::Estimation`] if a fit fails.
     pub fn trials(
         &self,
         rows: &[usize],
@@ -190,7 +196,7 @@ impl Case<'_> {
         Ok((trials, widening(&reaches)))
     }
 
-    /// c and v, millimetres; `None` where no covariance says.
+    /// c and v, millimetres; `None` without a covariance.
     fn change(&self, plain: &Fit, fuller: &Fit, asked: &Workspace) -> Option<[f64; 2]> {
         let square = |fit: &Fit| {
             let jacobian = asked.jacobian(fit.state(), &fit.belief.layout);
@@ -201,7 +207,7 @@ impl Case<'_> {
         (change.is_finite() && sd.is_finite()).then_some([change * 1e3, sd * 1e3])
     }
 
-    /// What every fold leaves of the rows that it holds out, and how far they [reach](Self::reaches).
+    /// The residuals of every fold's held-out rows, and how far these [reach](Self::reaches).
     fn inner(&self, layout: &Layout, folds: &[Split], near: &State) -> Result<Inner, CalibrationError> {
         let judged = |fold: &Split| -> Result<Inner, CalibrationError> {
             let fit = self.fit(layout, &fold.training, Some(near))?;
@@ -212,7 +218,11 @@ impl Case<'_> {
         Ok((residuals.concat(), reaches.concat()))
     }
 
-    /// The fit with what stays; `plain` itself where nothing does.
+    /// The extended model with the corrections that are kept; `plain` itself if none are.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Prior`] or [`CalibrationError::Estimation`] if the fit fails.
     pub fn fuller(&self, trials: &[Trial], plain: &Fit) -> Result<Fit, CalibrationError> {
         match trials.iter().find(|trial| trial.kept) {
             Some(trial) => self.fit(&self.extended(&trial.extras, plain.state()), &plain.rows, Some(plain.state())),

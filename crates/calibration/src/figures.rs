@@ -11,22 +11,22 @@ use serde::{Deserialize, Serialize};
 use super::{Case, Fit, Reading};
 use body_schema_engine::sensing::{Apart, Occasion};
 
-/// A reading beside what was predicted for it.
+/// The residual of a reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Residual {
     /// The row.
     pub row: usize,
     /// What was sensed.
     pub sensor: Sensed,
-    /// What was predicted, in the channel's own units.
+    /// The prediction, in the channel's own units.
     pub predicted: Vec<f64>,
-    /// What was measured.
+    /// The measurement.
     pub measured: Vec<f64>,
-    /// How far they are apart.
+    /// The difference, in physical units.
     pub apart: Apart,
 }
 
-/// What a residual is of.
+/// The source of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Sensed {
     /// A channel of the rig, by its number.
@@ -38,7 +38,7 @@ pub enum Sensed {
 /// Mean, root mean square and maximum of errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
-    /// How many readings.
+    /// The number of readings.
     pub readings: usize,
     /// Mean distance, millimetres; null where no length was measured.
     pub mean_mm: Option<f64>,
@@ -61,7 +61,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Of some residuals.
+    /// The figures of some residuals.
     pub fn of<'a>(residuals: impl IntoIterator<Item = &'a Residual>) -> Self {
         let residuals: Vec<&Residual> = residuals.into_iter().collect();
         let figures = |of: &dyn Fn(&Apart) -> Option<f64>| {
@@ -95,7 +95,7 @@ impl Figures {
         self.told(self.unit())[0]
     }
 
-    /// The unit in which they are told.
+    /// The unit in which they are reported.
     pub fn unit(&self) -> Unit {
         match (self.mean_mm, self.mean_px) {
             (Some(_), _) => Unit::Millimetres,
@@ -114,23 +114,23 @@ impl Figures {
     }
 }
 
-/// The one unit in which the errors of a table are compared: that of lengths where any was measured, else of pictures, else of
-/// rotations. Readings that have none of it do not count then.
+/// The one unit in which the errors of a table are compared: that of lengths where any was measured, otherwise of pictures,
+/// otherwise of rotations. Readings without it do not count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Unit {
-    /// mm.
+    /// Millimetres.
     #[serde(rename = "mm")]
     Millimetres,
-    /// px.
+    /// Pixels.
     #[serde(rename = "px")]
     Pixels,
-    /// deg.
+    /// Degrees.
     #[serde(rename = "deg")]
     Degrees,
 }
 
 impl Unit {
-    /// A residual in it.
+    /// A residual in this unit.
     pub fn of(self, apart: &Apart) -> Option<f64> {
         match self {
             Self::Millimetres => apart.length_m.map(|metres| metres * 1e3),
@@ -139,7 +139,7 @@ impl Unit {
         }
     }
 
-    /// A reported reading's residual in it.
+    /// A reported reading's residual in this unit.
     pub fn of_reading(self, reading: &Reading) -> Option<f64> {
         match self {
             Self::Millimetres => reading.residual_mm,
@@ -160,10 +160,10 @@ impl fmt::Display for Unit {
 }
 
 impl Case<'_> {
-    /// The residuals of `rows` by what was learned from others, or from them.
+    /// The residuals of `rows` under a fit, whether it learned from them or not.
     ///
-    /// A target that was held in a socket is compared with where the socket was found to be; with its own mean over `rows`
-    /// there, where no row was learned from that socket.
+    /// A target that was held in a socket is compared with the socket's fitted position; if no row was learned from that
+    /// socket, with its own mean over `rows` there.
     pub fn residuals(&self, fit: &Fit, rows: &[usize]) -> Vec<Residual> {
         let state = fit.state();
         let sockets = self.sockets(fit, rows);
@@ -192,7 +192,7 @@ impl Case<'_> {
         residuals
     }
 
-    /// By number: where the sockets of `rows` are.
+    /// The positions of the sockets of `rows`, by number.
     fn sockets(&self, fit: &Fit, rows: &[usize]) -> BTreeMap<usize, Point3<f64>> {
         let of = |row: &usize| self.held(&self.rows[*row]);
         let learned: BTreeSet<usize> = fit.rows.iter().filter_map(of).map(|(socket, _)| socket).collect();
@@ -209,7 +209,7 @@ impl Case<'_> {
 }
 
 impl Case<'_> {
-    /// How far the two sockets of every place are apart that `rows` know, as predicted.
+    /// The predicted distance between the two sockets of every place that `rows` name.
     pub fn distances(&self, fit: &Fit, rows: &[usize]) -> Vec<SocketDistance> {
         let robot = &self.scenario.robot;
         let place = |number: usize| robot.sockets.iter().chain(&robot.held_out_sockets).nth(number)?.place.clone();
@@ -230,18 +230,18 @@ impl Case<'_> {
     }
 }
 
-/// The distance of the two sockets of one place: what a scatter alone is blind to, how large the robot is.
+/// The distance between the two sockets of one place. It shows how large the robot is, which a scatter alone does not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SocketDistance {
     /// The place.
     pub place: String,
-    /// As the calibrated model predicts it, millimetres.
+    /// The distance that the calibrated model predicts, millimetres.
     pub predicted_mm: f64,
-    /// As it is known, millimetres.
+    /// The known distance, millimetres.
     pub known_mm: Option<f64>,
 }
 
-/// The mean of points; `None` of none.
+/// The mean of points; `None` without points.
 pub fn mean(points: impl Iterator<Item = Point3<f64>>) -> Option<Point3<f64>> {
     let (sum, count) = points.fold((Vector3::zeros(), 0.0), |(sum, count), point| (sum + point.coords, count + 1.0));
     (count > 0.0).then(|| Point3::from(sum / count))

@@ -1,11 +1,11 @@
-//! What is written: URDF, YAML and JSON.
+//! The output files: URDF, YAML and JSON.
 
 use std::fmt::Write;
 
 use super::{Calibration, CalibrationError, Case, Extra, Fit, Progress, learned::axis};
 use body_schema_engine::model::{Correction, State};
 
-/// A file of the output, by its path below the folder.
+/// An output file, with its path below the folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct File {
     /// Its path, with `/`.
@@ -27,7 +27,7 @@ impl Calibration {
     ///
     /// # Errors
     ///
-    /// [`CalibrationError::Unwritable`] where an axis is farther from the description than a URDF's gauge reaches.
+    /// [`CalibrationError::Unwritable`] if an axis is farther from the description than a URDF's gauge reaches.
     pub fn files(&self, case: &Case<'_>) -> Result<Vec<File>, CalibrationError> {
         let mut files = described("", case, &self.fit)?;
         for (fold, fit) in self.folds.iter().enumerate() {
@@ -40,12 +40,13 @@ impl Calibration {
         Ok(files)
     }
 
-    /// `calibrated.urdf` and `kinematics.yaml` alone, the same as those of [`files`](Self::files), without what judges them: no
-    /// folds, and nothing beyond what a URDF can hold. None without a URDF.
+    /// `calibrated.urdf` and `kinematics.yaml` alone, equal to those of [`files`](Self::files), without judging them: no folds,
+    /// and nothing that a URDF cannot hold. Empty without a URDF.
     ///
     /// # Errors
     ///
-    /// [`CalibrationError`] as of [`calibrate`](super::calibrate()).
+    /// [`CalibrationError`] if the table has no rows or the fit fails, and [`CalibrationError::Unwritable`] if an axis is
+    /// farther from the description than a URDF's gauge reaches.
     pub fn description(case: &Case<'_>, progress: &dyn Progress) -> Result<Vec<File>, CalibrationError> {
         let splits = case.splits(None)?;
         let Some(first) = splits.first() else { return Err(CalibrationError::NoRows) };
@@ -65,7 +66,7 @@ impl Calibration {
         described("", case, &fit)
     }
 
-    /// The fuller model: what corrects readings, and the axes that belong to it.
+    /// The extended model as YAML: the corrections of readings, and the axes that belong to them.
     fn readings_yaml(&self, case: &Case<'_>) -> Result<String, CalibrationError> {
         let loads = self.fuller.state().loads.as_deref().filter(|_| self.extras.contains(&Extra::Compliance));
         let bent = if loads.is_some() { " + compliance·τ" } else { "" };
@@ -114,7 +115,7 @@ fn described(folder: &str, case: &Case<'_>, fit: &Fit) -> Result<Vec<File>, Cali
     ])
 }
 
-/// Axes at θ = 0 in the base's frame, metres.
+/// The axes at θ = 0 in the base's frame, metres.
 fn axes_yaml(case: &Case<'_>, state: &State) -> String {
     let mut text = "axes:\n".to_owned();
     let list = |numbers: nalgebra::Vector3<f64>| format!("[{:?}, {:?}, {:?}]", numbers.x, numbers.y, numbers.z);

@@ -14,31 +14,32 @@ use body_schema_engine::{
 use body_schema_experiment::Stream;
 use body_schema_scenario::Known;
 
-/// What explains some rows.
+/// The fit of some rows.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The state, with its covariance.
     pub belief: Belief,
-    /// What is made of every reading: `movement` counts the rows that it was learned from, from 1.
+    /// The report on every reading: `movement` counts the rows that it was learned from, from 1.
     pub readings: Vec<ReadingReport>,
-    /// How well they are fitted, by kind of noise.
+    /// The quality of the fit, by kind of noise.
     pub noise: Vec<NoiseFit>,
-    /// How far joints stand beside what they read, where that was learned: one standard deviation each, rad or m.
+    /// The learned standard deviation of each joint's readings, rad or m; empty if it was not learned.
     pub reading_sigmas: Vec<f64>,
     /// The rows that it was learned from.
     pub rows: Vec<usize>,
-    /// By how much errors along the chain were found to be larger than the prior states, where the robot is described.
+    /// The factors by which errors along the chain were found to be larger than the prior states, where the robot is
+    /// described.
     pub scales: Option<Scales>,
 }
 
 impl Fit {
-    /// What was learned.
+    /// The learned state.
     pub fn state(&self) -> &State {
         &self.belief.state
     }
 
-    /// By row that it was learned from: the probability that one of its readings is an outlier; empty where outliers are
-    /// not looked for.
+    /// For each row that it was learned from, the probability that one of its readings is an outlier; empty where
+    /// outliers are not looked for.
     pub fn outliers(&self) -> Vec<(usize, f64)> {
         if self.readings.is_empty() {
             return Vec::new();
@@ -55,18 +56,23 @@ impl Fit {
         by_row
     }
 
-    /// Those of them that are likelier outliers than not.
+    /// The rows that are likelier outliers than not, with that probability.
     pub fn suspected(&self) -> Vec<(usize, f64)> {
         self.outliers().into_iter().filter(|(_, probability)| *probability > 0.5).collect()
     }
 }
 
-/// Random numbers of the search; fits of one table differ by nothing else than rows and layout.
+/// The seed of the search; fits of one table differ only in rows and layout.
 const SEED: u64 = 1;
 
 impl Case<'_> {
-    /// What explains `rows`, as far as `layout` can, from a start near which it is to be found; without one it is searched for
+    /// Fits the parameters of `layout` to `rows`, searching from a state `near` the solution; without one the search goes
     /// wherever the prior allows.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Prior`] if the prior is not positive definite, [`CalibrationError::Estimation`] if the search does
+    /// not end at a minimum.
     pub fn fit(&self, layout: &Layout, rows: &[usize], near: Option<&State>) -> Result<Fit, CalibrationError> {
         let mut smoother = self.smoother(layout, near)?;
         let movements: Vec<_> = rows.iter().map(|row| &self.rows[*row]).collect();
@@ -88,8 +94,13 @@ impl Case<'_> {
         })
     }
 
-    /// The chain as described with base, targets, cameras and sockets where `rows` put them. So its joints bear what they do with
-    /// the target there, and what is fitted near to it takes that over.
+    /// Fits base, targets, cameras and sockets to `rows`, with the chain as described. Its joints bear the loads of the target at
+    /// its fitted place, and fits near this one use the same loads.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Prior`] if the prior is not positive definite, [`CalibrationError::Estimation`] if the search does not
+    /// end at a minimum.
     pub fn nominal(&self, rows: &[usize]) -> Result<Fit, CalibrationError> {
         let mut fit = self.fit(&self.placing(), rows, None)?;
         fit.belief.state.loads = Some(self.scenario.robot.loads(fit.state()));
@@ -140,7 +151,7 @@ impl Case<'_> {
         self.chain(layout).map_or_else(|| self.scenario.prior.standard_deviations(layout), |chain| chain.deviations())
     }
 
-    /// The prior along the chain of a described robot, the same for all fits of a layout.
+    /// The prior along the chain of a described robot, shared by all fits of a layout.
     pub(super) fn chain(&self, layout: &Layout) -> Option<Arc<ChainPrior>> {
         let mut known = self.chains.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, chain)) = known.iter().find(|(of, _)| of == layout) {
@@ -151,8 +162,8 @@ impl Case<'_> {
         chain
     }
 
-    /// The guess with its base where the rigid motion that fits best puts it, by the targets that were seen in `rows`, and
-    /// with sockets where they held their targets in the mean.
+    /// The guess with its base moved by the best rigid motion to the targets seen in `rows`, and with sockets at the mean
+    /// of the targets that they held.
     fn placed(&self, rows: &[usize]) -> State {
         let mut state = self.guess().clone();
         let (mut predicted, mut seen) = (Vec::new(), Vec::new());
@@ -179,10 +190,10 @@ impl Case<'_> {
     }
 }
 
-/// How often places are left out, at most.
+/// The most rounds in which places are left out.
 const ROUNDS: usize = 10;
 
-/// The rigid motion that fits best to most of the places, whatever the others say.
+/// The rigid motion that fits most of the places best, whatever the others say.
 fn motion_of_most(from: &[Point3<f64>], to: &[Point3<f64>]) -> Isometry3<f64> {
     let fit = |rows: &[usize]| {
         let (from, to): (Vec<_>, Vec<_>) = rows.iter().map(|row| (from[*row], to[*row])).unzip();

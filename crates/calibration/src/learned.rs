@@ -1,4 +1,4 @@
-//! What a fit says of joints, base and targets, with standard deviations.
+//! The learned joints, base and targets of a fit, with standard deviations.
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Vector3};
 
@@ -9,12 +9,12 @@ use body_schema_engine::{
     sensing::Occasion,
 };
 
-/// Correlations above this are told, and so many at most.
+/// The correlation above which a pair is reported, and the most pairs.
 const TOLD: f64 = 0.9;
 const MOST: usize = 30;
 
 impl Case<'_> {
-    /// How every joint was corrected.
+    /// The correction of every joint.
     pub(super) fn joints(&self, fit: &Fit) -> Vec<Joint> {
         let guess = self.guess();
         let state = fit.state().slid_towards(guess);
@@ -62,12 +62,12 @@ impl Case<'_> {
         Some(Correction { value: value * unit, sd: sd * unit })
     }
 
-    /// Where the base link is in the frame of the measurements.
+    /// The pose of the base link in the frame of the measurements.
     pub(super) fn base(&self, fit: &Fit) -> Placement {
         placement(&fit.state().base, self.spread(fit, Block::Base).as_ref())
     }
 
-    /// Where the targets are: in the frames of their links where there is a URDF.
+    /// The places of the targets, in the frames of their links if there is a URDF.
     pub(super) fn targets(&self, fit: &Fit) -> Result<Vec<Target>, CalibrationError> {
         let frames = match &self.described {
             Some(description) => Some(description.chain.fitted(&fit.fitted_part())?.frames),
@@ -131,7 +131,7 @@ impl Case<'_> {
         found.into_iter().take(MOST).map(told).collect()
     }
 
-    /// What the residuals say of the noise.
+    /// The noise that the residuals show.
     pub(super) fn noise(&self, fit: &Fit) -> Vec<Noise> {
         let of = |noise: &body_schema_engine::estimation::NoiseFit| {
             let sensor = &self.rig.channels()[noise.channel];
@@ -149,7 +149,7 @@ impl Case<'_> {
         fit.noise.iter().filter(|noise| noise.equations > 0.0).map(of).collect()
     }
 
-    /// What was sensed, in words.
+    /// The source of a reading, in words.
     pub(super) fn sensor(&self, sensed: Sensed) -> String {
         let (name, number) = match sensed {
             Sensed::Socket(socket) => (self.names.sockets.get(socket), socket),
@@ -197,7 +197,7 @@ fn deviations(spread: Option<&Matrix3<f64>>, unit: f64) -> [f64; 3] {
     spread.map_or([0.0; 3], |spread| spread.diagonal().map(|variance| variance.max(0.0).sqrt() * unit).into())
 }
 
-/// Where an axis is: a direction, and of a revolute joint the point nearest to where the description has it.
+/// The direction of an axis, and for a revolute joint the point on it nearest to where the description has it.
 pub fn axis(joint: &kinematics::Joint) -> (Vector3<f64>, Option<Vector3<f64>>) {
     (joint.direction().into_inner(), joint.line().map(|line| line.point.coords))
 }

@@ -1,4 +1,4 @@
-//! Calibration of a robot by a table of what was measured of it.
+//! Calibration of a robot from a table of measurements.
 //!
 //! ```text
 //! Scenario ─► Case ─► calibrate() ─► Calibration ─► files: calibrated.urdf, kinematics.yaml, readings.yaml, report.json
@@ -15,9 +15,9 @@
 //!
 //! # What is fitted
 //!
-//! The headline is what a URDF can hold: axes, and reading offsets where they are asked for, with base, targets, cameras
-//! and sockets. *Before* is the chain as it is described, with base, targets, cameras and sockets fitted to the same
-//! training rows: what can be done without touching the URDF. Beside both stands the fuller model.
+//! The main result is the model that a URDF can hold: axes, and reading offsets where they are asked for, with base,
+//! targets, cameras and sockets. *Before* is the chain as described, with base, targets, cameras and sockets fitted to the
+//! same training rows: the best that is possible without touching the URDF. Beside both stands the extended model.
 //!
 //! # Where errors are taken
 //!

@@ -1,8 +1,8 @@
-//! Which loads of which joints can be told from what else corrects their readings, and what was learned of them.
+//! The loads that can be told from other corrections of readings, and their learned compliance.
 
 use nalgebra::DVector;
 
-use super::{Case, Compliance, Extra, Fit, GivesWay};
+use super::{Case, Compliance, Extra, Fit, JointCompliance};
 use body_schema_engine::{
     elementary::{cos, sin},
     kinematics::JointKind,
@@ -10,29 +10,29 @@ use body_schema_engine::{
 };
 use body_schema_experiment::Stream;
 
-/// Postures within the limits, over which corrections are compared, and the seed of their draw.
+/// The number of postures within the limits over which corrections are compared, and the seed of their draw.
 const POSTURES: usize = 300;
 const SEED: u64 = 1;
-/// What is smaller than this, relative to what it is compared with, cannot be told from nothing.
+/// The relative size below which a function cannot be told from zero.
 const NOTHING: f64 = 1e-3;
 
-/// The loads that have parameters of their own beside other corrections.
+/// The loads with parameters of their own beside other corrections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Borne {
     pub blocks: Vec<Block>,
-    /// Those that have none, and why.
+    /// The loads without, and why.
     pub said: Vec<String>,
 }
 
-/// What corrects a reading, over the postures, without its mean: an offset has no term of its own.
+/// The values of a correction over the postures, less their mean: an offset has no term of its own.
 struct Term {
     name: String,
     values: Vec<DVector<f64>>,
 }
 
 impl Case<'_> {
-    /// The loads of all revolute joints whose axes are learned, less those that are nothing but other corrections among `extras`
-    /// over the joints' limits; of a robot that bears what `near` does.
+    /// The loads of all revolute joints whose axes are learned, for a robot with the loads of `near`; those that equal other
+    /// corrections among `extras` over the joints' limits are left out.
     pub(super) fn borne(&self, extras: &[Extra], near: &State) -> Borne {
         let mut borne = Borne::default();
         let Some(loads) = &near.loads else { return borne };
@@ -86,7 +86,7 @@ impl Case<'_> {
         borne
     }
 
-    /// What `fuller` says of how joints give way; `None` where it was not learned.
+    /// The learned compliance of the extended model; `None` where it was not learned.
     pub(super) fn compliance(&self, fuller: &Fit) -> Option<Compliance> {
         let loads = fuller.state().loads.as_deref()?;
         let covariance = fuller.belief.covariance.as_ref();
@@ -96,7 +96,7 @@ impl Case<'_> {
             let Block::Compliance(joint, load) = block else { return None };
             let value = fuller.state().corrections[joint].compliance[load as usize];
             let pulls = torques.iter().map(|torques| torques[joint][load as usize].abs());
-            Some(GivesWay {
+            Some(JointCompliance {
                 joint: self.names.joints[joint].clone(),
                 load: load.name().to_owned(),
                 deg_per_nm: value.to_degrees(),
@@ -104,13 +104,13 @@ impl Case<'_> {
                 greatest_deg: (value * pulls.fold(0.0, f64::max)).to_degrees(),
             })
         };
-        let terms: Vec<GivesWay> = fuller.belief.layout.blocks().filter_map(term).collect();
+        let terms: Vec<JointCompliance> = fuller.belief.layout.blocks().filter_map(term).collect();
         let joint = loads.mass(Load::Elbow).link;
         let elbow = self.names.joints.get(joint).cloned().unwrap_or_default();
         (!terms.is_empty()).then(|| Compliance { up: loads.up.into_inner().into(), elbow, terms })
     }
 
-    /// `loads:` of readings.yaml.
+    /// The section `loads:` of readings.yaml.
     pub(super) fn loads_yaml(&self, loads: &Loads) -> String {
         let list = |v: &nalgebra::Vector3<f64>| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
         let mass = |load: Load| {
@@ -131,7 +131,7 @@ impl Case<'_> {
     }
 }
 
-/// The names of the terms that add up to `values`, a function of this size with its mean; `None` if they do not.
+/// The names of the terms whose sum is `values`, a function of this size with its mean; `None` if there is no such sum.
 fn alike(values: &DVector<f64>, size: f64, terms: &[Term]) -> Option<String> {
     if values.norm() <= NOTHING * size {
         return Some("its offset".to_owned());
@@ -159,7 +159,7 @@ fn centred(values: DVector<f64>) -> DVector<f64> {
     values.add_scalar(-mean)
 }
 
-/// What is left of a vector beside an orthonormal basis.
+/// The part of a vector orthogonal to a basis.
 fn without(mut vector: DVector<f64>, basis: &[DVector<f64>]) -> DVector<f64> {
     for unit in basis.iter().chain(basis) {
         let along = unit.dot(&vector);

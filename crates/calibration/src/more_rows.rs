@@ -1,44 +1,44 @@
-//! What more rows would bring.
+//! The error to expect after more rows.
 //!
-//! With P = L Lᵀ the covariance that rows and prior leave, I the information of the rows alone and J the Jacobian of the hand where
-//! it is asked about, k times as many rows of the same kind leave
+//! With P = L Lᵀ the covariance that rows and prior leave, I the information of the rows alone and J the Jacobian of the hand where it is
+//! asked about, k times as many rows of the same kind leave
 //!
 //! ```text
 //! (P⁻¹ + (k − 1) I)⁻¹ = L V diag(1 / (1 + (k − 1) μ)) Vᵀ Lᵀ,    Lᵀ I L = V diag(μ) Vᵀ
 //! e²(k) = Σᵢ ‖J L vᵢ‖² / (1 + (k − 1) μᵢ)
 //! ```
 //!
-//! so that what no row tells (μ = 0) never falls, whatever their number. Beside that stands what no parameter explains: residuals beyond
-//! the σ that the sensor's maker promises, which may as well be noise unless the same posture was measured again and tells; and what
-//! held-out rows are off beyond all that is expected.
+//! so that the part that no row determines (μ = 0) never falls, whatever their number. The model error is added to that: residuals beyond
+//! the σ that the sensor's maker promises, which may also be noise unless repeated postures show which; and the excess of held-out errors
+//! over all that is expected.
 //!
-//! Rows know their own postures better than others. Where it is asked about those, each is asked without the rows that were measured
-//! there, with H whitened and A = H P Hᵀ:
+//! Rows know their own postures better than others. Where predictions are asked for at those postures, each is judged without the rows
+//! that were measured there, with H whitened and A = H P Hᵀ:
 //!
 //! ```text
 //! J P₋ᵣ Jᵀ = J P Jᵀ + C (I − A)⁻¹ Cᵀ,    C = J P Hᵀ
 //! e²(k) (1 + own / k)
 //! ```
 //!
-//! A target that meets itself in sockets is asked about at other places than those learned from. What errs alike in all rows of one place
-//! shows in no residual there, so that residuals below the stated σ do not say that less than σ is to be reckoned with elsewhere:
-//! rows then count as σ has them, as k = s² < 1 times as many, s the scale that was found.
+//! A target that meets itself in sockets is asked about at other places than those learned from. An error that is equal in all rows of
+//! one place shows in no residual there, so residuals below the stated σ do not show that errors elsewhere are below σ. Rows then count
+//! with the stated σ, as k = s² < 1 times as many, where s is the scale that was found.
 
 use nalgebra::{Cholesky, DMatrix};
 
 use super::{Case, Figures, Fit, MoreRows, Noise};
 use body_schema_engine::{elementary::hypot, estimation::NoiseFit, model::Workspace};
 
-/// So many times the rows that there are is as many as anybody could measure.
+/// The greatest multiple of the number of rows that is considered: more cannot be measured.
 const MOST: f64 = 1e3;
-/// Deviations that chance is granted before held-out rows are said to be worse than expected.
+/// The deviations attributed to chance before held-out rows count as worse than expected.
 const CHANCE: f64 = 2.0;
 
-/// How the expected error falls.
+/// The fall of the expected error with the number of rows.
 struct Falls {
-    /// By direction, its share of the square now where rows may know their own postures, and μ.
+    /// For each direction its present share of the square, where rows may know their own postures, and μ.
     shares: Vec<(f64, f64)>,
-    /// By how much the square is larger now where they do not.
+    /// The excess of the square at present where rows do not know their own postures.
     own: f64,
 }
 
@@ -52,7 +52,7 @@ impl Falls {
         self.shares.iter().map(|(share, mu)| share / (1.0 + (k - 1.0) * mu)).sum()
     }
 
-    /// The error and its fall from where k is 1, of an `error` now.
+    /// The error at k and its fall from there, rebased so that k counts as 1; `error` is the present error.
     fn from(self, k: f64, error: f64) -> (f64, Self) {
         let (square, whole) = (self.with_own(k), self.at(k));
         let of = |(share, mu): (f64, f64)| {
@@ -65,8 +65,8 @@ impl Falls {
 }
 
 impl Case<'_> {
-    /// What more rows would bring where the robot is `asked` about, by what is expected and by what held-out rows say, each of which was predicted by
-    /// `share` of the rows; `repeats_m` is the noise that repeated postures tell, per coordinate.
+    /// The error after more rows where the robot is `asked` about, from what is expected and from held-out rows, each of which was
+    /// predicted by `share` of the rows; `repeats_m` is the noise of repeated postures, per coordinate.
     pub(super) fn more_rows(
         &self,
         fit: &Fit,
@@ -132,7 +132,7 @@ impl Case<'_> {
         told
     }
 
-    /// As how many rows one counts for what is asked elsewhere.
+    /// The number of rows that one row counts for where other places are asked about.
     fn counted(&self, fit: &Fit, asked: &Workspace) -> f64 {
         let learned = |place: &usize| *place < fit.state().sockets.len();
         if asked.places.iter().all(learned) {
@@ -148,7 +148,7 @@ impl Case<'_> {
         fit.rows.iter().map(of).sum::<usize>() / fit.rows.len().max(1)
     }
 
-    /// p, root mean square, metres; and how it falls.
+    /// p, root mean square, metres, and its fall.
     fn falls(&self, fit: &Fit, workspace: &Workspace) -> Option<(f64, Falls)> {
         let belief = &fit.belief;
         let factor = Cholesky::new(belief.covariance.clone()?)?.l();
@@ -164,7 +164,7 @@ impl Case<'_> {
         (total > 0.0 && total.is_finite()).then(|| (error, Falls { shares: shares.collect(), own }))
     }
 
-    /// By how much the sum of squares is larger where no row knows its own posture.
+    /// The excess of the sum of squares where no row knows its own posture.
     fn own(&self, fit: &Fit, workspace: &Workspace) -> Option<f64> {
         let belief = &fit.belief;
         let covariance = belief.covariance.as_ref()?;
@@ -189,7 +189,7 @@ impl Case<'_> {
     }
 }
 
-/// The same in words.
+/// A sentence on these figures.
 fn said(told: &MoreRows, is_told: bool) -> String {
     let MoreRows { rows, wanted_mm: wanted, model_error_mm: floor, untold_mm: untold, .. } = told;
     let (error, expected) = (told.from_parameters_mm.unwrap_or_default(), told.expected_mm.unwrap_or_default());

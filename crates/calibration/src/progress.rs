@@ -1,32 +1,32 @@
-//! How far a calibration has come.
+//! The progress of a calibration.
 
 use super::CalibrationError;
 
-/// Is told what is being done; from any thread.
+/// A receiver of progress, called from any thread.
 pub trait Progress: Sync {
-    /// So many steps of something begin.
+    /// A stage of `steps` steps begins.
     fn stage(&self, what: &str, steps: u64);
 
-    /// One of them is done.
+    /// One step is done.
     fn tick(&self);
 
-    /// Whether nobody waits for it any longer; this is asked after each step.
+    /// Whether the caller no longer waits; asked after each step.
     fn is_given_up(&self) -> bool {
         false
     }
 
-    /// One step is done, and the next is wanted.
+    /// Marks one step as done, and checks that the caller still waits.
     ///
     /// # Errors
     ///
-    /// [`CalibrationError::GivenUp`] if it is not.
+    /// [`CalibrationError::GivenUp`] if the caller no longer waits.
     fn advance(&self) -> Result<(), CalibrationError> {
         self.tick();
         if self.is_given_up() { Err(CalibrationError::GivenUp) } else { Ok(()) }
     }
 }
 
-/// Tells nobody.
+/// Progress that is reported to nobody.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

@@ -1,4 +1,4 @@
-//! How large the calibrated robot is: what a scatter in sockets is blind to.
+//! The uncertainty of the calibrated robot's size, which a scatter in sockets does not show.
 //!
 //! With pᵢ the predicted targets at postures all over the joint limits, c their mean and Jᵢ = ∂pᵢ/∂δ, the similarity that fits moved
 //! predictions pᵢ + Jᵢ δ best has, to first order, the scale
@@ -8,7 +8,7 @@
 //! ```
 //!
 //! whatever rigid motion goes with it, so that where the robot stands does not enter. A span of 1 m is then uncertain by √(g P gᵀ)
-//! metres, with P the posterior covariance. What no parameter explains is not in it.
+//! metres, with P the posterior covariance. The model error is not included.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::SeedableRng;
@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{Case, Fit};
 use body_schema_engine::model::{Layout, State, Workspace, jacobian};
 
-/// Postures, uniform in the joint limits.
+/// The number of postures, uniform in the joint limits.
 const POSTURES: usize = 300;
 
 impl Case<'_> {
@@ -38,7 +38,7 @@ fn deviation(slope: &DVector<f64>, covariance: &DMatrix<f64>) -> f64 {
     slope.dot(&(covariance * slope)).max(0.0).sqrt()
 }
 
-/// gᵀ: how the scale of what is predicted over a workspace follows the parameters.
+/// gᵀ: the derivative of the scale of the predictions over a workspace by the parameters.
 fn scale(state: &State, layout: &Layout, workspace: &Workspace) -> DVector<f64> {
     let points = workspace.points(state);
     let centre = points.iter().map(|point| point.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64;

@@ -1,20 +1,20 @@
-//! Rows to learn from, and rows to judge by.
+//! Splits into training rows and held-out rows.
 
 use std::collections::HashMap;
 
-/// Rows by their index in the table.
+/// A split of the rows, by their index in the table.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Split {
-    /// What is learned from.
+    /// The rows that are learned from.
     pub training: Vec<usize>,
-    /// What nothing is learned from.
+    /// The rows that are held out.
     pub held_out: Vec<usize>,
 }
 
 impl Split {
-    /// So many folds of `rows`, or as many as they have postures: the one with number f holds out the f-th of every K postures,
-    /// counted from 0 as they appear, with all their rows. `postures` says by row of the table which it is in; where no row
-    /// repeats another these are the f-th of every K rows.
+    /// The folds of `rows`, `folds` of them, or as many as the rows have postures. Fold f holds out every K-th posture from f
+    /// on, counted from 0 as they appear, with all its rows. `postures` gives the posture of each row of the table; where no
+    /// row repeats another, fold f holds out every K-th row.
     pub fn folds(rows: &[usize], folds: usize, postures: &[usize]) -> Vec<Self> {
         let (numbers, count) = Self::numbered(rows, postures);
         let folds = folds.min(count);
@@ -27,7 +27,7 @@ impl Split {
         (0..folds).map(fold).collect()
     }
 
-    /// By row its posture, counted from 0 as they appear among `rows`; and how many there are.
+    /// The posture of each row, counted from 0 as they appear among `rows`; and the number of postures.
     pub fn numbered(rows: &[usize], postures: &[usize]) -> (Vec<usize>, usize) {
         let mut known: HashMap<usize, usize> = HashMap::new();
         let number = |row: &usize| {

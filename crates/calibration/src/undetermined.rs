@@ -1,8 +1,8 @@
-//! What the rows cannot determine, in words.
+//! The directions that the rows cannot determine, in words.
 //!
 //! With Λ the information of the rows alone, scaled to a unit diagonal, directions whose eigenvalue is less than 10⁻¹² of the
-//! greatest are told by no row: the estimate stays there where the description has it. Beside these stand parameters that the
-//! rows tell so little of that their deviation has hardly fallen from the prior's.
+//! greatest are determined by no row: there the estimate stays as described. Also named are parameters whose deviation has
+//! hardly fallen from the prior's.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 
@@ -14,11 +14,11 @@ use body_schema_engine::{
 
 /// The share of a parameter that undetermined directions must hold for it to be named.
 const NAMED: f64 = 0.05;
-/// A deviation above this share of the prior's has hardly fallen.
+/// The share of the prior's deviation above which a deviation has hardly fallen.
 const HARDLY: f64 = 0.9;
 
 impl Case<'_> {
-    /// How much of what was learned the rows determine.
+    /// The determined and undetermined parameters of a fit.
     pub(super) fn determined(&self, fit: &Fit) -> Parameters {
         let layout = &*fit.belief.layout;
         let free = self.undetermined(fit);
@@ -28,7 +28,8 @@ impl Case<'_> {
         Parameters { learned: layout.dimension(), rank: layout.dimension() - free.ncols(), undetermined }
     }
 
-    /// The same fit with the covariance of what is written down: what no row tells is as the file has it, and has no deviation.
+    /// The fit with the covariance of the written files: a direction that no row determines is as the file has it, and has no
+    /// deviation.
     pub(super) fn in_gauge(&self, fit: &Fit) -> Fit {
         let free = self.undetermined(fit);
         let mut shown = fit.clone();
@@ -43,7 +44,7 @@ impl Case<'_> {
         shown
     }
 
-    /// What directions among `free` (m × k, orthonormal) mean, in words, and those of which the meaning is not known.
+    /// The meaning of the directions `free` (m × k, orthonormal), in words, and those of unknown meaning.
     fn meanings(&self, state: &State, layout: &Layout, free: &DMatrix<f64>) -> (Vec<String>, DMatrix<f64>) {
         let (mut said, mut left) = (Vec::new(), free.clone());
         let mut take = |moved: Vec<State>| {
@@ -94,7 +95,7 @@ impl Case<'_> {
         (said, left)
     }
 
-    /// An orthonormal basis of what no row tells (m × k).
+    /// An orthonormal basis of the directions that no row determines (m × k).
     fn undetermined(&self, fit: &Fit) -> DMatrix<f64> {
         let belief = &fit.belief;
         let mut information = self.information(fit);
@@ -106,7 +107,7 @@ impl Case<'_> {
         null_space(&information)
     }
 
-    /// What the rows of a fit tell of its parameters, without the prior (m × m).
+    /// The information of a fit's rows about its parameters, without the prior (m × m).
     pub(super) fn information(&self, fit: &Fit) -> DMatrix<f64> {
         let belief = &fit.belief;
         let m = belief.layout.dimension();
@@ -118,7 +119,7 @@ impl Case<'_> {
         information
     }
 
-    /// Blocks of which every coordinate is known hardly better than before.
+    /// A sentence on the blocks whose every coordinate is known hardly better than before.
     fn hardly(&self, fit: &Fit, free: &DMatrix<f64>) -> Option<String> {
         let layout = &*fit.belief.layout;
         let covariance = fit.belief.covariance.as_ref()?;
@@ -144,9 +145,9 @@ impl Case<'_> {
     }
 }
 
-/// A direction is told where less of it than this share is beside it.
+/// The share of a direction outside the basis below which the direction counts as part of it.
 const ALIKE: f64 = 1e-4;
-/// How far states are moved for directions: rad, or share of lengths.
+/// The step by which states are moved to find directions: rad, or a share of lengths.
 const STEP: f64 = 1e-6;
 
 fn together(count: usize) -> String {
@@ -156,7 +157,7 @@ fn together(count: usize) -> String {
     }
 }
 
-/// An orthonormal basis of what is across `direction` in the space of `basis`.
+/// An orthonormal basis of the part of the space of `basis` orthogonal to `direction`.
 fn without(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
     let k = basis.ncols();
     let Some(along) = basis.tr_mul(direction).try_normalize(0.0) else { return basis.clone() };
@@ -168,7 +169,7 @@ fn without(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
     basis * reflection.columns(0, k - 1)
 }
 
-/// A base that moves one way, and all that it carries the other.
+/// The states with the base moved one way, and all that it carries the other.
 fn moved_with_base(state: &State) -> Vec<State> {
     let motions = (0..6).map(|k| {
         let unit = Vector3::from_fn(|axis, _| if axis == k % 3 { STEP } else { 0.0 });
@@ -182,14 +183,14 @@ fn moved_with_base(state: &State) -> Vec<State> {
     motions.map(moved).collect()
 }
 
-/// A zero that is off, and all that is behind it turned or shifted the other way.
+/// The state with a joint's zero shifted, and all that is behind it moved the other way.
 fn moved_behind(state: &State, joint: usize) -> State {
     let mut moved = state.carried(&state.joints[joint].exp(-STEP), |link| state.tree.moves(joint, link));
     moved.corrections[joint].offset += STEP;
     moved
 }
 
-/// All lengths longer by a share.
+/// The state with all lengths longer by a share.
 fn larger(state: &State) -> State {
     let longer = |pose: &mut Isometry3<f64>| pose.translation.vector *= 1.0 + STEP;
     let mut moved = state.clone();

@@ -1,17 +1,17 @@
-//! Whether what was learned is to be used.
+//! The verdict: whether the result should be used.
 
 use serde::{Deserialize, Serialize};
 
 use super::{HeldOut, MoreRows, Unit};
 use body_schema_diagnostics::{Doubt, DoubtKind};
 
-/// An answer to the first question of whoever reads a report.
+/// The answer to the reader's first question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Use {
     /// Use it.
     Yes,
-    /// Use it within the limits that are told.
+    /// Use it within the stated limits.
     Limited,
     /// Do not use it.
     No,
@@ -26,25 +26,25 @@ pub struct Verdict {
     pub because: String,
 }
 
-/// By how much held-out errors must fall for anything to be gained.
+/// The share by which held-out errors must fall for a gain.
 const GAINED: f64 = 0.02;
-/// Of all rows so many may be outliers.
+/// The largest share of rows that may be outliers.
 const OUTLIERS: f64 = 0.1;
 
-/// What a verdict is made of.
+/// The grounds of a verdict.
 pub(super) struct Grounds<'a> {
     pub doubts: &'a [Doubt],
     pub held_out: Option<&'a HeldOut>,
     pub more_rows: &'a MoreRows,
-    /// Rows that are likelier outliers than not, of how many.
+    /// The number of rows that are likelier outliers than not, and of all rows.
     pub outliers: (usize, usize),
     pub unit: Unit,
-    /// Of a robot of which nothing tells how large it is: the standard deviation of a span of 1 m, millimetres.
+    /// The standard deviation of a span of 1 m, millimetres, for a robot of which no measurement tells how large it is.
     pub unsized_mm: Option<f64>,
 }
 
 impl Verdict {
-    /// Weighs what a report says: first whether the table means what it says, then held-out rows, then what they do not tell.
+    /// Judges a report: first whether the table means what it says, then held-out rows, then what they do not tell.
     pub(super) fn of(grounds: &Grounds<'_>) -> Self {
         let Grounds { doubts, held_out, more_rows, outliers, unit, unsized_mm } = grounds;
         let answer = |r#use: Use, because: String| Self { r#use, because };
@@ -94,7 +94,7 @@ impl Verdict {
         }
     }
 
-    /// The verdict in one line, on the file or what else was learned.
+    /// The verdict in one line, about `of`.
     pub fn said(&self, of: &str) -> String {
         let answer = match self.r#use {
             Use::Yes => "yes",
@@ -105,7 +105,7 @@ impl Verdict {
     }
 }
 
-/// Whether a table of which this is doubted may say something else than it seems to.
+/// Whether a doubt of this kind means that a table may say something other than it seems to.
 fn is_grave(kind: DoubtKind) -> bool {
     use DoubtKind::{Base, Lag, Mirror, Misfit, Order, Pose, Sign, Size, Unit, Zero};
     matches!(kind, Base | Lag | Mirror | Misfit | Order | Pose | Sign | Size | Unit | Zero)

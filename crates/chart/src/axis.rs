@@ -1,24 +1,24 @@
-//! Axes: from values to places, and which values to name.
+//! Axes: the map from values to places, and the ticks.
 
-/// How values are spread.
+/// The spacing of values on an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Evenly.
+    /// Even spacing.
     Linear,
-    /// By their logarithm.
+    /// Logarithmic spacing.
     Log,
 }
 
 /// One axis of a panel.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What it shows, with its unit.
+    /// Its name, with the unit.
     pub label: String,
-    /// How it is spread.
+    /// Its spacing.
     pub scale: Scale,
     /// Its ends.
     pub range: [f64; 2],
-    /// Where a logarithmic axis shows zero, which it has no place for, if anywhere.
+    /// The value in whose place a logarithmic axis shows zero, if any.
     pub zero: Option<f64>,
 }
 
@@ -43,19 +43,20 @@ impl Axis {
         Self { label: label.to_owned(), scale: Scale::Linear, range: [low - room, high + room], zero: None }
     }
 
-    /// The same axis with these ends.
+    /// This axis with these ends.
     pub fn over(mut self, lower: f64, upper: f64) -> Self {
         self.range = [lower, upper];
         self
     }
 
-    /// The same axis, a logarithmic one, with zero shown in the place of a small value.
+    /// This logarithmic axis, with zero shown in the place of a small value.
     pub fn with_zero_at(mut self, value: f64) -> Self {
         self.zero = Some(value);
         self
     }
 
-    /// Where a value lies: 0 at the lower end, 1 at the upper. Values that a logarithm cannot show lie at the lower end.
+    /// The place of a value: 0 at the lower end, 1 at the upper. Values that a logarithm cannot show lie at the lower
+    /// end.
     pub fn place(&self, value: f64) -> f64 {
         let [lower, upper] = self.range;
         match self.scale {
@@ -103,7 +104,7 @@ impl Axis {
         }
     }
 
-    /// Powers of ten as such on an axis that goes far, plain numbers on others.
+    /// A tick's name: a power of ten on an axis that spans many, a plain number on others.
     fn name(&self, value: f64) -> String {
         let [lower, upper] = self.range;
         if self.scale == Scale::Log && (lower < 1e-3 || upper > 1e5) {

@@ -15,7 +15,7 @@ pub struct Panel {
     pub x: Axis,
     /// The vertical axis.
     pub y: Axis,
-    /// What is drawn, the first at the bottom.
+    /// The layers, the first at the bottom.
     pub layers: Vec<Layer>,
 }
 
@@ -38,7 +38,7 @@ pub enum Layer {
     },
     /// Points that are not joined.
     Points {
-        /// Where they are.
+        /// Their places.
         points: Vec<[f64; 2]>,
         /// Their shape.
         marker: Marker,
@@ -58,14 +58,14 @@ pub enum Layer {
     },
     /// A horizontal line with a name, such as a threshold.
     Level {
-        /// Where.
+        /// Its value.
         y: f64,
         /// Its name.
         label: String,
     },
     /// A place on the horizontal axis, marked above the panel.
     Event {
-        /// Where.
+        /// Its value.
         x: f64,
         /// Its name.
         label: String,
@@ -160,7 +160,7 @@ impl Panel {
         }
     }
 
-    /// Markers at even distances, each curve's beside the others'.
+    /// Draws markers at even distances, each curve's beside the others'.
     fn draw_markers(
         &self,
         svg: &mut Svg,
@@ -183,7 +183,8 @@ impl Panel {
         }
     }
 
-    /// Names of events above the panel, each where the one before it ends at the earliest, as long as there is room.
+    /// Draws the names of events above the panel, each no earlier than where the one before it ends, as long as there
+    /// is room.
     fn draw_events(&self, svg: &mut Svg, [left, top, width, _]: [f64; 4]) {
         let mut events: Vec<_> = self
             .layers

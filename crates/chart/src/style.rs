@@ -13,7 +13,7 @@ pub const MINOR_GRID: Colour = [0xF0, 0xF0, 0xF0];
 /// Thresholds.
 pub const LEVEL: Colour = [0x77, 0x77, 0x77];
 
-/// How one curve looks: three ways to tell it from the others.
+/// The style of a curve: colour, dashes and marker, each enough to tell it from the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Style {
     /// Its colour.
@@ -39,7 +39,7 @@ pub enum Marker {
     Dot,
 }
 
-/// The dashes of what is no line, but points only.
+/// The dash pattern of points without a line.
 const NO_LINE: &str = "none";
 
 const DASHES: [&str; 4] = ["", "7 3", "2 2.5", "9 3 2 3"];

@@ -18,11 +18,11 @@ pub type Colour = [u8; 3];
 /// How text is aligned at its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
-    /// It begins there.
+    /// Text begins at the place.
     Start,
-    /// It is centred there.
+    /// Text is centred at the place.
     Middle,
-    /// It ends there.
+    /// Text ends at the place.
     End,
 }
 
@@ -139,7 +139,7 @@ impl Svg {
         ));
     }
 
-    /// What `draw` draws is cut off outside a rectangle.
+    /// Draws with `draw`, clipped to a rectangle.
     pub fn clipped(&mut self, [left, top, width, height]: [f64; 4], draw: impl FnOnce(&mut Self)) {
         self.clips += 1;
         let id = self.clips;
@@ -151,7 +151,7 @@ impl Svg {
         self.push(format_args!("</g>"));
     }
 
-    /// The whole document. `description` is for those who cannot see it.
+    /// The whole document. `description` is for readers who cannot see it.
     pub fn finish(&self, description: &str) -> String {
         let [width, height] = self.size;
         format!(
@@ -164,7 +164,12 @@ impl Svg {
     }
 }
 
-/// The picture of a drawing as PNG, with fonts of our own: the same on every machine.
+/// The picture of a drawing as PNG, with built-in fonts, so that it is the same on every machine.
+///
+/// # Errors
+///
+/// [`RasterError::Svg`] if the text is no valid SVG, [`RasterError::Size`] if the picture has no pixels or too many,
+/// [`RasterError::Encode`] if PNG cannot hold it.
 pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
     static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
         let mut fonts = fontdb::Database::new();

@@ -1,15 +1,15 @@
-//! What a column shows by itself.
+//! Doubts that a column raises by itself.
 
 use super::{Doubt, DoubtKind, Evidence, Line, Subject};
 use body_schema_engine::kinematics::{Joint, JointKind};
 
-/// What is forgiven to limits, rad or m: rounding, and where a robot comes to rest.
+/// The slack of limits, rad or m, for rounding and for where a robot comes to rest.
 const SLACK: f64 = 1e-3;
 
-/// How far an axis may well be off, rad, and what of it at the target no sensor tells, metres.
+/// The plausible error of an axis, rad, and how much of it at the target no sensor measures, metres.
 const AXIS: f64 = 0.01;
 const SEEN: f64 = 2e-5;
-/// How far a target is from an axis at least, metres: it can be moved away from it.
+/// The least distance of a target from an axis, metres: it can be moved away from the axis.
 const ARM: f64 = 0.5;
 
 pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
@@ -23,7 +23,7 @@ pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
     doubts
 }
 
-/// A joint that moves too little for its axis to be told.
+/// The doubt about a joint that moves too little for its axis to be determined.
 fn constant(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
     let count = evidence.configurations.len();
     if count < 2 || !subject.learned.get(joint).copied().unwrap_or(true) {
@@ -78,7 +78,7 @@ fn outside(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -
     })
 }
 
-/// Neighbouring columns that repeat neighbours are told together.
+/// The doubt about repeated columns; neighbours that repeat neighbours are reported together.
 fn repeated(evidence: &Evidence) -> Option<Doubt> {
     if evidence.repeated.is_empty() {
         return None;

@@ -1,16 +1,16 @@
-//! What a description makes of what was seen, its own errors included.
+//! How well a description explains the measurements, its own errors included.
 //!
-//! A description that is off by what calibration is for does not fit either, before it is calibrated. So descriptions are compared by
-//! their evidence: with eⱼ how far the frame of joint j is off in the frame before it (a shift and a turn, so that errors are carried
-//! along), P₀ the prior of these and of where base and target are, and r what is left of the readings,
+//! A description with errors that calibration would correct does not fit before it is calibrated either. So descriptions are compared
+//! by their evidence: with eⱼ how far the frame of joint j is off in the frame before it (a shift and a turn, so that errors are
+//! carried along), P₀ the prior of these and of where base and target are, and r what is left of the readings,
 //!
 //! ```text
 //! ln p = −½ [ N ln s² + ‖r‖²/s² + eᵀ P₀⁻¹ e + ln det(I + P₀ JᵀJ/s²) ]
 //! ```
 //!
-//! at the mode, which Gauss and Newton's steps find with s in turn: `s² = ‖r‖²/(N − γ)`, γ the equations that parameters account
-//! for, and not below the σ of the sensor (MacKay, *Bayesian interpolation*, 1992). No more than some equations count: what no
-//! parameter explains, as gears and bending, is the same in many rows.
+//! at the mode, which Gauss and Newton's steps find with s in turn: `s² = ‖r‖²/(N − γ)`, γ the equations that parameters account for,
+//! and not below the σ of the sensor (MacKay, *Bayesian interpolation*, 1992). The number of equations that count is limited: what no
+//! parameter explains, such as gears and bending, is the same in many rows.
 
 use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix3, Matrix3xX, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3,
@@ -22,34 +22,34 @@ use super::{
 };
 use body_schema_engine::{elementary::ln, kinematics::Joint};
 
-/// Standard deviation of the zero of a joint's readings, rad; what calibrations correct is less.
+/// The standard deviation of a joint's zero, rad; calibrations correct less than that.
 const ZERO_RAD: f64 = 0.02;
-/// Of what nobody knows: metres and radians.
+/// The standard deviations of the unknown: metres and radians.
 const ANYWHERE: (f64, f64) = (10.0, 3.0);
-/// Steps at most.
+/// The most steps.
 const STEPS: usize = 20;
-/// A step that changes the cost by less ends the search.
+/// The change of the cost below which the search ends.
 const FOUND: f64 = 1e-3;
-/// So many equations count at most.
+/// The most equations that count.
 const COUNTED: f64 = 60.0;
 
-/// What a description explains.
+/// The part of the measurements that a description explains.
 #[derive(Clone, Debug)]
 pub struct Explained {
-    /// The logarithm of the evidence, but for what does not depend on the description.
+    /// The logarithm of the evidence, up to a constant that does not depend on the description.
     pub log_evidence: f64,
-    /// What is left, root mean square of positions, metres.
+    /// The residual of positions, root mean square, metres.
     pub rms: f64,
-    /// The same of rotations, radians, where these were seen.
+    /// The residual of rotations, root mean square, radians, where they were measured.
     pub turned: Option<f64>,
-    /// By how much every joint that turns stands beside its reading, rad.
+    /// The offset of every joint that turns from its reading, rad.
     pub zeros: Vec<f64>,
-    /// How the chain stands then.
+    /// The chain with the errors that were found.
     pub standing: Standing,
 }
 
 impl Explained {
-    /// Where the target is explained to be at other rows, in the frame of the measurements.
+    /// The explained positions of the target at other rows, in the frame of the measurements.
     pub fn places(&self, subject: &Subject, rows: &[Vec<f64>], seen: &Seen) -> Vec<Point3<f64>> {
         let chain = Chain::new(subject.joints, rows, seen);
         let errors = chain.errors(&self.standing);
@@ -58,43 +58,43 @@ impl Explained {
     }
 }
 
-/// What is known beside the subject.
+/// What is known in addition to the description.
 #[derive(Clone, Copy, Debug)]
 pub struct Known<'a> {
-    /// Where the base is; `None` where nobody knows.
+    /// The pose of the base; `None` if unknown.
     pub base: Option<&'a Base>,
     /// Standard deviation of the zeros of joints that turn, rad.
     pub zero_rad: f64,
 }
 
 impl Known<'_> {
-    /// Nothing but that the description is right, but for what calibration mends.
+    /// The description is right, up to errors that calibration corrects.
     pub const DESCRIBED: Self = Self { base: None, zero_rad: ZERO_RAD };
-    /// That any joint's zero may be anywhere.
+    /// Any joint's zero may be anywhere.
     pub const ZEROS_ANYWHERE: Self = Self { base: None, zero_rad: 1.5 };
 }
 
 /// A chain whose frames may be off.
 struct Chain<'a> {
     joints: &'a [Joint],
-    /// By joint: a point on its axis, and axes of which the third is its direction.
+    /// For each joint a point on its axis, and axes of which the third is its direction.
     frames: Vec<(Point3<f64>, Rotation3<f64>)>,
     seen: &'a Seen,
     body: Vec<Point3<f64>>,
     rows: &'a [Vec<f64>],
 }
 
-/// How a chain stands.
+/// A chain with its errors.
 #[derive(Clone, Debug)]
 pub struct Standing {
     placed: Placed,
-    /// By joint: a shift and a turn in its axes.
+    /// For each joint a shift and a turn, in its axes.
     errors: DVector<f64>,
 }
 
 const PLACES: usize = 12;
 
-/// What a description explains of `seen` at `rows`, from where base and target are found to be without its errors.
+/// Explains `seen` at `rows` by the description, beginning with the base and target that are found without its errors.
 pub fn explain(
     subject: &Subject,
     rows: &[Vec<f64>],
@@ -179,7 +179,7 @@ pub fn explain(
 }
 
 impl Subject<'_> {
-    /// How many of so many equations count.
+    /// How many of `equations` count.
     pub(super) fn counted(&self, equations: usize) -> f64 {
         (equations as f64).min(COUNTED)
     }
@@ -223,7 +223,7 @@ impl<'a> Chain<'a> {
         (0..self.joints.len()).map(|joint| self.error(standing, joint)).collect()
     }
 
-    /// Where the last link is, row by row.
+    /// The pose of the last link at a row.
     fn tip(&self, standing: &Standing, errors: &[Isometry3<f64>], row: &[f64]) -> Isometry3<f64> {
         let each = self.joints.iter().zip(row).zip(errors);
         each.fold(standing.placed.base, |at, ((joint, q), error)| at * error * joint.exp(*q))

@@ -1,4 +1,4 @@
-//! One doubt, said so that it can be looked into.
+//! A diagnostic: one doubt about a table, with what to check.
 
 use std::{fmt, sync::Arc};
 
@@ -19,11 +19,11 @@ pub enum DoubtKind {
     Size,
     /// How poses are written: inverted, or their rotations in another convention.
     Pose,
-    /// Joints and measurements that do not belong together.
+    /// Joints and measurements that were taken at different times.
     Lag,
-    /// Where the base stands.
+    /// The pose of the base.
     Base,
-    /// Nothing explains the table.
+    /// A table that nothing explains.
     Misfit,
     /// A joint that does not move.
     Constant,
@@ -45,20 +45,21 @@ pub enum DoubtKind {
     FewFolds,
 }
 
-/// Something in a table that may be wrong. It reads as a sentence that names row or column, evidence and mend.
+/// A diagnostic: something in a table that may be wrong. It reads as a sentence that names row or column, the evidence,
+/// and what to do.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Doubt {
     /// What is doubted.
     pub kind: DoubtKind,
-    /// The column, if it is about one.
+    /// The column that it is about, if any.
     pub column: Option<String>,
-    /// The lines, if it is about some.
+    /// The lines that it is about, if any.
     pub lines: Vec<Line>,
     /// What is suspected.
     pub what: String,
-    /// Why.
+    /// The evidence.
     pub evidence: String,
-    /// How to mend it, if it is wrong.
+    /// What to do, if it is wrong.
     pub mend: String,
 }
 
@@ -77,7 +78,7 @@ impl fmt::Display for Doubt {
 /// A line of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Line {
-    /// The file, where rows are from more than one.
+    /// The file, where rows come from more than one.
     pub file: Option<Arc<str>>,
     /// Its number in that file, counted from 1.
     pub number: usize,
@@ -110,7 +111,7 @@ pub fn listed(lines: &[Line]) -> String {
     told.collect::<Vec<_>>().join("; ")
 }
 
-/// A length as a reader likes it.
+/// A length in a unit that reads well.
 pub(super) fn length(metres: f64) -> String {
     if metres >= 1.0 { format!("{metres:.1} m") } else { format!("{:.2} mm", metres * 1e3) }
 }

@@ -1,32 +1,33 @@
-//! How well a chain's motions explain what was seen, with what nobody knows left free.
+//! Fits of a chain's motions to the measurements, with unknown base, target or sockets left free.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
 
 use body_schema_engine::{elementary::hypot, kinematics::rotation, model::best_motion, most};
 
-/// What was seen, row by row.
+/// The measurements, row by row.
 #[derive(Clone, Debug)]
 pub enum Sight {
     /// A target on the last link; where base and target are is unknown.
     Target(Seen),
-    /// Sockets that held a target; target and sockets are unknown.
+    /// The sockets that held a target; target and sockets are unknown.
     Sockets(Vec<usize>),
 }
 
-/// What was seen of a target, row by row.
+/// The poses of a target that were measured, row by row.
 #[derive(Clone, Debug)]
 pub struct Seen {
-    /// Where it may be at θ = 0.
+    /// Its likely position at θ = 0.
     pub guess: Point3<f64>,
-    /// By row its pose; of a position the rotation says nothing.
+    /// Its pose in each row; for a position the rotation means nothing.
     pub poses: Vec<Isometry3<f64>>,
-    /// By row the rotation vector as it was written, which may be longer than half a turn.
+    /// Its rotation vector in each row as written, which may be longer than half a turn.
     pub turns: Vec<Vector3<f64>>,
-    /// A turn by one radian counts as much as a shift by so many metres; `None` of positions.
+    /// The length by which a rotation error is weighed: one radian counts as much as a shift by this many metres;
+    /// `None` for positions.
     pub arm: Option<f64>,
 }
 
-/// Where base and target are.
+/// The poses of base and target.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed {
     /// The base.
@@ -35,31 +36,32 @@ pub struct Placed {
     pub target: Isometry3<f64>,
 }
 
-/// What a fit leaves.
+/// The residuals of a fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// Root mean square, metres.
+    /// The root mean square, metres.
     pub rms: f64,
-    /// What fits are compared by: `rms`; with sockets per rotation of the last link, since a link that does not turn leaves
-    /// every target where it is.
+    /// The residual by which fits are compared: `rms`; with sockets it is taken per rotation of the last link, since a link
+    /// that does not turn leaves every target where it is.
     pub judged: f64,
-    /// Root mean square of rotations, radians, where these were seen.
+    /// The root mean square of rotations, radians, where they were measured.
     pub turned: Option<f64>,
-    /// Where base and target are then, and the rows that say so; `None` with sockets.
+    /// Base and target of the fit, and the rows it rests on; `None` with sockets.
     pub placed: Option<(Placed, Vec<usize>)>,
 }
 
-/// Steps of Gauss and Newton at most; a good hypothesis needs four.
+/// The most Gauss–Newton steps; a good hypothesis needs four.
 const STEPS: usize = 12;
-/// Of all rows one in so many at most is left out that is far off: a few that went wrong shall not decide what all others say.
+/// One row in this many may be left out for being far off, so that a few bad rows do not outweigh all others.
 const FEW: usize = 10;
-/// How often rows are left out, at most.
+/// The most rounds in which rows are left out.
 const ROUNDS: usize = 4;
-/// How far from where it may be a target is looked for, metres.
+/// How far from its likely position a target is searched for, metres.
 const AROUND: f64 = 0.2;
 
 impl Sight {
-    /// What is left when the last link moves by `motions`, row by row; from several starts if `thorough`.
+    /// Fits base, target or sockets when the last link moves by `motions`, row by row; from several starts if
+    /// `thorough`.
     pub fn fit(&self, motions: &[Isometry3<f64>], thorough: bool) -> Fit {
         match self {
             Self::Target(seen) => seen.of_most(motions, thorough),
@@ -69,24 +71,23 @@ impl Sight {
 }
 
 impl Seen {
-    /// Points of the target that stand for it, in its own frame: its origin, and of a pose one along each axis.
+    /// The points that stand for the target, in its own frame: its origin, and for a pose one along each axis.
     pub fn body(&self) -> Vec<Point3<f64>> {
         let arm = self.arm.into_iter().flat_map(|arm| axes().map(|axis| Point3::from(axis * arm)));
         std::iter::once(Point3::origin()).chain(arm).collect()
     }
 
-    /// The share with which the square of a point's distance counts, so that all points together count as the equations of a
-    /// reading do.
+    /// The weight of a point's squared distance, such that all points together count as the equations of a reading do.
     pub fn share(&self) -> f64 {
         if self.arm.is_some() { 1.0 / 3.0 } else { 1.0 }
     }
 
-    /// Equations of one reading.
+    /// The number of equations of a reading.
     pub fn equations(&self) -> usize {
         if self.arm.is_some() { 6 } else { 3 }
     }
 
-    /// These rows alone.
+    /// These measurements at the given rows only.
     pub fn of(&self, rows: &[usize]) -> Self {
         let poses = rows.iter().map(|row| self.poses[*row]).collect();
         let turns = rows.iter().map(|row| self.turns[*row]).collect();
@@ -171,7 +172,7 @@ impl Seen {
         Placed { base: Isometry3::from_parts(at(0), b), target: Isometry3::from_parts(at(3), x) }
     }
 
-    /// Gauss and Newton from a start: the root mean square of what is left, and where.
+    /// Refines a start by Gauss–Newton steps: the root mean square of the residuals, and base and target.
     fn refined(&self, motions: &[Isometry3<f64>], start: Placed) -> (f64, Placed) {
         let body = self.body();
         let count = (self.poses.len() * body.len()).max(1) as f64;
@@ -222,7 +223,7 @@ impl Seen {
     }
 }
 
-/// Shifted by `shift`, and turned by `turn` about its own origin.
+/// A pose shifted by `shift`, and turned by `turn` about its own origin.
 pub fn moved(pose: &Isometry3<f64>, shift: Vector3<f64>, turn: Vector3<f64>) -> Isometry3<f64> {
     let translation = Translation3::from(pose.translation.vector + shift);
     Isometry3::from_parts(translation, rotation::turned(&pose.rotation, &turn))
@@ -242,7 +243,7 @@ fn axes() -> [Vector3<f64>; 3] {
     [Vector3::x(), Vector3::y(), Vector3::z()]
 }
 
-/// `Tⱼ p` is the same in all rows of a socket, p free: a linear problem.
+/// Fits sockets: `Tⱼ p` is the same in all rows of a socket, p free; a linear problem.
 fn of_sockets(sockets: &[usize], motions: &[Isometry3<f64>]) -> Fit {
     let count = sockets.iter().max().map_or(0, |last| last + 1);
     let mut means = vec![(0.0, Matrix3::<f64>::zeros(), Vector3::<f64>::zeros()); count];

@@ -1,9 +1,9 @@
 //! Other ways to read a table, compared by how well the description explains them.
 //!
-//! A way is first tried with the chain as it is described, base and target free. Those few that fit best are then compared by the
-//! evidence of the description with its own errors ([`description`](super::description)): what calibration would mend is no fault
-//! of the table. A table of sockets, whose evidence nothing gives a scale, and that of a very long chain are judged by what is left
-//! alone.
+//! A reading of the table is first tried with the chain as described, base and target free. Those few that fit best are then
+//! compared by the evidence of the description with its own errors ([`description`](super::description)): errors that calibration
+//! would correct are no fault of the table. A table of sockets, whose evidence has no scale, and that of a very long chain are
+//! judged by their residuals alone.
 
 use std::f64::consts::PI;
 
@@ -23,28 +23,28 @@ use body_schema_engine::{
     most::middle,
 };
 
-/// Where nothing gives evidence a scale a way to read the table must bring the residual below this share of what it was.
+/// The share of the residual below which another reading of the table must bring it, where evidence has no scale.
 const CONVINCING: f64 = 0.5;
-/// The logarithm of the odds from which on a way to read the table is told.
+/// The logarithm of the odds from which on another reading of the table is reported.
 const TOLD: f64 = 15.0;
-/// Zeros that are off by less are what calibration is for, radians; and so are sizes, by less than this share.
+/// The size of zeros (radians), and of the change of a size (a share), below which they are left to calibration.
 const OFF: f64 = 0.1;
 const ANOTHER_SIZE: f64 = 0.03;
-/// Faults that are looked for one after the other.
+/// The most faults that are looked for one after the other.
 const ROUNDS: usize = 5;
-/// Rows of fits, and the joints above which fits take fewer.
+/// The number of rows of fits, and the number of joints above which fits take fewer.
 const ROWS: usize = 100;
 const MANY_JOINTS: usize = 40;
-/// Up to so many joints any two columns are tried in each other's place, and beyond it neighbours.
+/// The number of joints up to which any two columns are tried in each other's place; beyond it only neighbours are.
 const SWAPS: usize = 12;
-/// Ways to read the table of which the evidence is asked.
+/// The number of readings of the table whose evidence is computed.
 const ASKED: usize = 8;
-/// Rows that lag by less are told by what moves, if by anything.
+/// The lag of rows below which the test of moving rows decides, if any does.
 const LAGGING: f64 = 0.02;
-/// A description does not fit where more is left of its readings, once calibrated: a share of how far they are spread, and radians.
+/// The residuals after calibration above which a description does not fit: a share of how far readings are spread, and radians.
 const MISFIT: (f64, f64) = (0.05, 0.09);
 
-/// A robot that reaches farther is described in another unit, metres.
+/// The reach above which a robot must be described in another unit, metres.
 const LARGE: f64 = 30.0;
 
 pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
@@ -82,21 +82,21 @@ pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
 #[derive(Clone)]
 pub struct Readings<'a> {
     subject: Subject<'a>,
-    /// By row that was seen: where the joints were.
+    /// The joints' positions, for each row with a reading.
     configurations: Vec<Vec<f64>>,
-    /// Where they stand.
+    /// The lines of these rows.
     lines: Vec<Line>,
     sight: Sight,
     /// The name of the target.
     target: String,
-    /// By how much the target's coordinates have been scaled.
+    /// The factor by which the target's coordinates have been scaled.
     size: f64,
 }
 
-/// What the description makes of a table.
+/// How well the description explains a table.
 struct Judged {
     fit: Fit,
-    /// `None` where evidence has no scale.
+    /// The explanation; `None` where evidence has no scale.
     explained: Option<Explained>,
 }
 
@@ -134,7 +134,7 @@ impl<'a> Readings<'a> {
         Some(Self { subject: *subject, configurations, lines, sight, target, size: 1.0 })
     }
 
-    /// What its target is called.
+    /// The target's name.
     pub fn name(&self) -> &str {
         &self.target
     }
@@ -159,7 +159,7 @@ impl<'a> Readings<'a> {
         Self { configurations, lines, sight, target: self.target.clone(), ..*self }
     }
 
-    /// By row: what the joints do to the last link.
+    /// The motion of the last link in each row.
     fn motions(&self) -> Vec<Isometry3<f64>> {
         let motion = |row: &Vec<f64>| {
             Tree::default().links(Isometry3::identity(), self.joints(), |joint| row[joint]).pop().unwrap_or_default()
@@ -198,7 +198,7 @@ impl<'a> Readings<'a> {
         read
     }
 
-    /// What was seen beside the joints of so many rows later.
+    /// Pairs the measurements with the joints of `rows` rows later.
     fn lag(&mut self, rows: f64) {
         let all = self.configurations.len();
         let (whole, part) = (rows.floor() as isize, rows - rows.floor());
@@ -224,7 +224,7 @@ impl<'a> Readings<'a> {
         Judged { fit, explained }
     }
 
-    /// What the description makes of the rows of a fit, its own errors included.
+    /// How well the description explains the rows of a fit, its own errors included.
     fn explained(&self, fit: &Fit, from: Option<Placed>, known: Known<'_>) -> Option<Explained> {
         let (Sight::Target(seen), Some((placed, rows))) = (&self.sight, &fit.placed) else { return None };
         if self.joints().len() > MANY_JOINTS {
@@ -248,14 +248,14 @@ impl<'a> Readings<'a> {
         fit.placed.is_some() && fit.judged <= 2.0 * self.subject.sigma_m * self.size
     }
 
-    /// Whether what is left of a table, with the errors of the description, is no more than what calibration leaves.
+    /// Whether the residuals of a table, given the description's errors, are no larger than calibration leaves.
     fn fits(&self, left: &Explained) -> bool {
         let Sight::Target(seen) = &self.sight else { return true };
         let most = (MISFIT.0 * self.spreads(seen).1).max(10.0 * self.subject.sigma_m * self.size);
         left.rms <= most && left.turned.is_none_or(|turned| turned <= MISFIT.1)
     }
 
-    /// The hypothesis that is told, if any is, and what it makes of the table; `standing` is found anew where the hypothesis leads to a
+    /// The hypothesis to report, if any, and how well it explains the table; `standing` is found anew where the hypothesis leads to a
     /// better place.
     fn best(&self, standing: &mut Judged) -> Option<(Hypothesis, Judged)> {
         let taken = self.taken();
@@ -308,8 +308,8 @@ impl<'a> Readings<'a> {
         Some((hypothesis, found))
     }
 
-    /// The zeros of several joints that are off at once, as where a robot was assembled or homed otherwise than it is described, where
-    /// that explains more than anything else does, of which the evidence is given.
+    /// The zeros of several joints that are off at once, as after another assembly or homing, if that explains more than anything
+    /// else, whose evidence is `other`.
     fn of_zeros(&self, standing: &Judged, other: Option<f64>) -> Option<(Vec<(usize, f64)>, Judged)> {
         let before = standing.explained.as_ref().filter(|left| !self.fits(left))?;
         let taken = self.taken();
@@ -358,19 +358,19 @@ impl<'a> Readings<'a> {
         tried
     }
 
-    /// Whether the robot as it is described is as large as no robot is.
+    /// Whether the described robot is larger than any robot.
     pub fn is_too_large(&self) -> bool {
         matches!(&self.sight, Sight::Target(seen) if self.spreads(seen).0 > LARGE)
     }
 
-    /// How far the target would be spread, and how far it was seen to be, metres.
+    /// The predicted and the measured spread of the target, metres.
     fn spreads(&self, seen: &fit::Seen) -> (f64, f64) {
         let at: Vec<Point3<f64>> = self.motions().iter().map(|motion| motion * seen.guess).collect();
         let points: Vec<Point3<f64>> = seen.poses.iter().map(|pose| pose.translation.vector.into()).collect();
         (spread(&at), spread(&points))
     }
 
-    /// The size with which coordinates fit best.
+    /// The factor of the coordinates that fits best.
     fn sized(&self) -> (f64, Fit) {
         let left = |log: f64| {
             let fit = self.whole(Hypothesis::Size(exp(log))).1;
@@ -433,8 +433,8 @@ impl<'a> Readings<'a> {
             .collect()
     }
 
-    /// Each joint by itself; what stands before and behind it is computed once, so that a joint costs the same however many
-    /// there are.
+    /// Tries each joint by itself; what stands before and behind it is computed once, so that a joint costs the same
+    /// however many there are.
     fn of_joints(&self) -> Vec<(Hypothesis, Fit)> {
         let mut tried = Vec::new();
         let mut before: Vec<Isometry3<f64>> = vec![Isometry3::identity(); self.configurations.len()];
@@ -524,7 +524,7 @@ impl<'a> Readings<'a> {
     }
 }
 
-/// The shift within half a turn that leaves least: on a grid of 30 deg, then between its neighbours if `fine`.
+/// The shift within half a turn with the least residual: on a grid of 30 deg, then between its neighbours if `fine`.
 fn shift(left: &dyn Fn(f64) -> Fit, fine: bool) -> (f64, Fit) {
     const STEP: f64 = PI / 6.0;
     let grid = (-5..=6).map(|k| f64::from(k) * STEP).map(|by| (by, left(by)));
@@ -542,7 +542,7 @@ fn shift(left: &dyn Fn(f64) -> Fit, fine: bool) -> (f64, Fit) {
     best
 }
 
-/// How far most points are from where most are.
+/// The distance of most points from where most are.
 fn spread(points: &[Point3<f64>]) -> f64 {
     let middle = |values: Vec<f64>| middle(values).unwrap_or(f64::NAN);
     let centre = Point3::from(Vector3::from_fn(|k, _| middle(points.iter().map(|point| point[k]).collect())));

@@ -1,11 +1,11 @@
-//! A way to read a table, and how it is told.
+//! A hypothesis on how a table should be read, and its report.
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::{Doubt, DoubtKind, Subject, doubt::length, fit::Fit, hypotheses::Readings};
 use body_schema_engine::{elementary::ln, kinematics::JointKind};
 
-/// A way to read the table.
+/// A way to read the table that may be the right one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hypothesis {
     /// A joint's readings times a factor: −1 turns the sign round, others change units.
@@ -18,21 +18,21 @@ pub enum Hypothesis {
     Swapped(usize, usize),
     /// The target's coordinates times a factor: another unit.
     Target(f64),
-    /// The same, where it is no unit.
+    /// The target's coordinates times a factor that is no unit.
     Size(f64),
     /// The target's coordinates in a left-handed frame.
     Mirrored,
-    /// The pose of the measurements' frame in the target's.
+    /// Poses inverted: the pose of the measurements' frame in the target's.
     Inverted,
-    /// Rotations the other way round, positions as they are.
+    /// Rotations inverted, positions as they are.
     Transposed,
-    /// The real part of quaternions in the other place: first for last, or last for first.
+    /// Quaternions with the real part at the other end.
     RealFirst,
     RealLast,
-    /// Rotation vectors that are roll, pitch and yaw; and the other way round.
+    /// Rotation vectors that are roll, pitch and yaw, or the other way round.
     RollPitchYaw,
     RotationVector,
-    /// Joints as they were so many rows later; between two rows on the straight way from one to the other.
+    /// Measurements paired with the joints of this many rows later; interpolated between rows.
     Lag(f64),
 }
 
@@ -59,7 +59,7 @@ impl Hypothesis {
         }
     }
 
-    /// By how much coordinates are scaled.
+    /// The factor by which it scales coordinates.
     pub fn size(self) -> f64 {
         match self {
             Self::Target(factor) | Self::Size(factor) => factor,
@@ -67,14 +67,14 @@ impl Hypothesis {
         }
     }
 
-    /// Whether it may be right and leave much, since something else is wrong too. What changes all readings by as much as fits best is
-    /// found for anything.
+    /// Whether it may be right although it leaves large residuals, since something else is wrong too. A factor that changes all
+    /// readings fits best at some value for any table.
     pub fn may_leave_much(self) -> bool {
         !matches!(self, Self::Size(_) | Self::Lag(_) | Self::RollPitchYaw | Self::RotationVector | Self::Transposed)
     }
 
-    /// The logarithm of how likely such a fault is beside others, before the table is looked at: where two ways explain it alike, the
-    /// plainer one is told.
+    /// The logarithm of the prior probability of such a fault relative to others: where two readings explain the table alike, the
+    /// plainer one is reported.
     pub fn log_prior(self, joints: usize) -> f64 {
         let joints = joints as f64;
         match self {
@@ -247,7 +247,7 @@ pub fn zeros_doubt(subject: &Subject, shifts: &[(usize, f64)], residual: &Fit, l
     }
 }
 
-/// By how much better the description fits.
+/// A clause on how much better the description fits.
 fn read_so(residual: &Fit, left: &Fit) -> String {
     let turned =
         |fit: &Fit| fit.turned.map(|turned| format!(" and {:.2} deg", turned.to_degrees())).unwrap_or_default();

@@ -1,9 +1,9 @@
 //! Rows that were measured while the robot moved.
 //!
 //! Where joints and measurements are paired by clocks that differ, the hand may have begun to move to the next posture when it was seen,
-//! or may still have come from the one before. What is left of such a row points to where the target is in the other posture, and of a
-//! row that went wrong in another way it points anywhere: the cosine c of the angle between both is uniform then. With half of the rows
-//! that are off on their way, whose cosines have the density `(k + 1)/2 · ((1 + c)/2)ᵏ`, the logarithm of the odds is
+//! or may still have been on its way from the one before. The residual of such a row points to the target's place in the other posture;
+//! the residual of a row that went wrong in another way points anywhere: the cosine c of the angle between both is uniform then. With
+//! half of the rows that are off on their way, whose cosines have the density `(k + 1)/2 · ((1 + c)/2)ᵏ`, the logarithm of the odds is
 //!
 //! ```text
 //! Σ ln( ½ (k + 1) ((1 + c)/2)ᵏ + ½ )
@@ -19,15 +19,18 @@ use body_schema_engine::{
 
 /// A row is off where more is left of it than so many times what is left of the middle one.
 const OFF: f64 = 2.0;
-/// Half of the rows on their way are within 20 deg or so of it: noise, and the robot's own errors, turn what is left.
+/// The width of the cone, degrees, within which half of the rows on their way lie: noise, and the robot's own errors,
+/// turn residuals.
 const NARROW: f64 = 20.0;
-/// The logarithm of the odds from which on it is told; chance reaches it in one table of 100 at most, as the odds of what is not so are 1 in the mean.
+/// The logarithm of the odds from which on it is reported; chance reaches it in one table of 100 at most, since the odds of a false
+/// hypothesis are 1 in the mean.
 const TOLD: f64 = 4.6;
 /// A row is on its way within this angle, degrees, and at most this share of it.
 const WITHIN: f64 = 40.0;
 const SHARE: f64 = 0.5;
 
-/// The doubt that the robot stood still, by where the target should be and where it was seen, row by row; less than `sigma` is not off.
+/// The doubt that the robot stood still, from the target's expected and measured place in each row; a residual less than `sigma` is not
+/// off.
 pub fn doubt(lines: &[Line], places: &[Point3<f64>], seen: &[Point3<f64>], sigma: f64) -> Option<Doubt> {
     let left: Vec<_> = seen.iter().zip(places).map(|(seen, place)| seen - place).collect();
     let middle = middle(left.iter().map(nalgebra::Vector3::norm).collect()).filter(|middle| *middle > 0.0)?;

@@ -1,15 +1,15 @@
-//! Which rows of a table are one posture.
+//! Grouping the rows of a table by posture.
 
 use std::collections::HashMap;
 
-/// Postures that differ by less in every joint are one, rad or m: what encoders repeat to.
+/// The difference in every joint, rad or m, below which two postures are one: the repeatability of encoders.
 pub const SAME: f64 = 1e-4;
-/// So many neighbours of a row are compared with it at most. Only of a posture with more repeats some are passed over, and the
+/// The most neighbours of a row that are compared with it. Some are skipped only for a posture with more repeats, and the
 /// others link them.
 const NEIGHBOURS: usize = 256;
 
-/// By row its posture, counted from 0 in the order in which they first appear: rows whose joints all agree to [`SAME`] are one,
-/// and rows that agree with one such row. Where no row repeats another it is the number of the row.
+/// The posture of each row, numbered from 0 in the order in which postures first appear: rows whose joints all agree to
+/// [`SAME`] are one posture, and so are rows that agree with one such row. Without repeats the posture's number is the row's.
 pub fn postures(configurations: &[Vec<f64>]) -> Vec<usize> {
     let joints = configurations.iter().map(Vec::len).max().unwrap_or(0);
     // Rows that agree are near each other along any direction: one that has a share of every joint.

@@ -1,4 +1,4 @@
-//! Postures that were measured more than once.
+//! Doubts and noise from postures that were measured more than once.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -6,9 +6,9 @@ use nalgebra::{Point3, Vector3};
 
 use super::{Doubt, DoubtKind, Evidence, Line, SAME, doubt::length, postures};
 
-/// A row so many robust standard deviations from its posture's others had not settled.
+/// The distance from its posture's other rows, in robust standard deviations, beyond which a row had not settled.
 const FAR: f64 = 6.0;
-/// Deviations, in coordinates, below which none is far from the others.
+/// The number of deviations, in coordinates, below which none is judged to be far from the others.
 const TELLING: usize = 9;
 
 /// The doubts, and σ per coordinate.
@@ -58,7 +58,7 @@ pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
     (doubts, Some(sigma))
 }
 
-/// Rows that are held out although a row in the same posture is learned from.
+/// The doubt about held-out rows whose posture is also learned from.
 fn leakage(postures: &[usize], evidence: &Evidence) -> Option<Doubt> {
     let held_out: BTreeSet<usize> = evidence.held_out.iter().copied().collect();
     let mut trained: HashMap<usize, usize> = HashMap::new();
@@ -99,7 +99,7 @@ pub fn few_folds(folds: usize, postures: usize, rows: usize) -> Option<Doubt> {
     })
 }
 
-/// Rows that are equal to an earlier one in every number; they are taken out of `repeated`.
+/// The doubt about rows that are equal to an earlier one in every number; they are taken out of `repeated`.
 fn copies(repeated: &mut [Vec<usize>], evidence: &Evidence) -> Option<Doubt> {
     let mut lines = Vec::new();
     let mut originals = Vec::new();
@@ -135,8 +135,8 @@ fn copies(repeated: &mut [Vec<usize>], evidence: &Evidence) -> Option<Doubt> {
     })
 }
 
-/// By row of a posture that saw the target more than once: how far from the median of its posture; and how many such postures
-/// there are.
+/// For each row of a posture that saw the target more than once, its distance from the median of its posture; and the number
+/// of such postures.
 fn deviations(repeated: &[Vec<usize>], points: &[Option<Point3<f64>>]) -> (Vec<(usize, Vector3<f64>)>, usize) {
     let (mut deviations, mut postures) = (Vec::new(), 0);
     for rows in repeated {

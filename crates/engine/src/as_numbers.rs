@@ -1,4 +1,4 @@
-//! What mathematics is made of, stored as numbers: `#[serde(with = "crate::as_numbers")]`.
+//! Vectors, matrices and rotations, stored as numbers: `#[serde(with = "crate::as_numbers")]`.
 //!
 //! nalgebra stores its matrices only together with products that multiply and add at once where the processor can, by which bits
 //! differ from machine to machine.
@@ -8,12 +8,12 @@ use nalgebra::{
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
-/// What can be written as numbers, and made of the same numbers again to the last bit.
+/// Types that can be written as numbers, and made from the same numbers again to the last bit.
 pub trait Numbers: Sized {
     /// Its numbers.
     fn numbers(&self) -> Vec<f64>;
 
-    /// What has these numbers; `None` where nothing has.
+    /// The value with these numbers; `None` if there is none.
     fn of(numbers: &[f64]) -> Option<Self>;
 }
 

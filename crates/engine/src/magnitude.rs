@@ -1,5 +1,5 @@
-//! How large and how small the numbers of a robot may be: what people and programs tell is refused beyond, where it can still be
-//! named, since squares and fourth powers of it would not be numbers any more, and results would be silently wrong.
+//! The numeric range of a robot's numbers. Input beyond it is refused where it can still be named: its squares and fourth powers would
+//! leave the range of floating point, and results would be silently wrong.
 
 /// The greatest: metres, radians, degrees, pixels, seconds, kilograms and their noise are all far below.
 pub const GREATEST: f64 = 1e12;
@@ -11,7 +11,7 @@ pub fn is_usable(x: f64) -> bool {
     x.abs() <= GREATEST
 }
 
-/// What is wrong with a text that says no [usable](is_usable) number.
+/// The reason why a text is no [usable](is_usable) number.
 pub fn what_is_wrong(text: &str) -> &'static str {
     match text.parse::<f64>() {
         Ok(x) if x.is_finite() => "is beyond ±1e12",

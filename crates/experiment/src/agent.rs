@@ -190,6 +190,11 @@ impl Agent {
     /// nothing until one is absorbed or withdrawn. An agent that has ended proposes nothing.
     ///
     /// An error leaves the agent as it was, but for proposals made before it was met: no choice ends an agent.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError`] if the policy cannot choose: no movement is left, none is feasible, or the criterion is not
+    /// finite.
     pub fn propose(&mut self, count: usize) -> Result<&[Proposal], SelectionError> {
         self.drop_infeasible();
         while self.pending.len() < count && self.failure.is_none() {
@@ -201,6 +206,11 @@ impl Agent {
 
     /// One more proposal, chosen given the pending ones, which is not proposed by that: whoever stores it first
     /// [restores](Self::restore) it then.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError`] if the policy cannot choose: no movement is left, none is feasible, or the criterion is not
+    /// finite.
     pub fn next_proposal(&self) -> Result<Proposal, SelectionError> {
         let start = Instant::now();
         let selection = self.select()?;
@@ -291,6 +301,11 @@ impl Agent {
 
     /// Proposes this movement in place of all that are pending, whatever its policy would choose. It is a proposal as any
     /// other: stored with the events, and restored with them. An agent that has ended proposes nothing.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::NoConfiguration`] if there is not one position for each joint, [`SelectionError::Refused`] if
+    /// the constraints exclude the posture; others if the criterion cannot be computed there.
     pub fn set(&mut self, configuration: &[f64]) -> Result<Appraisal, SelectionError> {
         let appraisal = self.appraise(self.standpoint(), configuration)?;
         self.refuse(&[], configuration)?;
@@ -309,6 +324,11 @@ impl Agent {
     /// The robot cannot go to `configuration`: it and its neighbourhood are excluded (see
     /// [`Vetoes`](body_schema_engine::selection::Vetoes)), and pending proposals in there replaced, with those that were to follow them.
     /// An error leaves the veto in force.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::NoConfiguration`] if there is not one position for each joint; others if the policy cannot replace what was
+    /// pending.
     pub fn veto(&mut self, configuration: &[f64]) -> Result<&[Proposal], SelectionError> {
         if configuration.len() != self.limits.dimension() {
             return Err(SelectionError::NoConfiguration(configuration.len()));
@@ -371,6 +391,11 @@ impl Agent {
 
     /// Takes in movements that were executed, in order. If one does not fit, none is absorbed. Tells what each update
     /// found; an update that ends the agent ends the list, and those before it count.
+    ///
+    /// # Errors
+    ///
+    /// [`AbsorbError::Refused`] if an observation does not fit, [`AbsorbError::Ended`] if the agent has ended before,
+    /// or ends because its estimate diverges.
     pub fn absorb(&mut self, executed: &[Executed]) -> Result<Vec<Update>, AbsorbError> {
         if let Some(failure) = &self.failure {
             return Err(AbsorbError::Ended(failure.clone()));
@@ -435,6 +460,11 @@ impl Agent {
     }
 
     /// Restores an event of a stored list, in its turn, without choosing anything again.
+    ///
+    /// # Errors
+    ///
+    /// [`AbsorbError::Refused`] if the observation of an executed movement does not fit. That the agent has ended is no
+    /// error here.
     pub fn restore(&mut self, event: &Event) -> Result<(), AbsorbError> {
         match event {
             Event::Proposed(proposal) => self.proposed(proposal.clone()),
@@ -456,6 +486,11 @@ impl Agent {
     }
 
     /// What a movement would teach it where it stood at `standpoint`, by what it chooses by.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::NoConfiguration`] if there is not one position for each joint; others if the criterion cannot
+    /// be computed there.
     pub fn appraise(&self, standpoint: Standpoint<'_>, configuration: &[f64]) -> Result<Appraisal, SelectionError> {
         if configuration.len() != self.limits.dimension() {
             return Err(SelectionError::NoConfiguration(configuration.len()));
@@ -467,6 +502,10 @@ impl Agent {
     }
 
     /// How the criterion of the next movement looked over the joint box at `standpoint`, if its policy plans.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError`] if the policy cannot repeat its search at that standpoint.
     pub fn explain(&self, standpoint: Standpoint<'_>) -> Result<Option<Search>, SelectionError> {
         // Of manifolds there is no partition of the joint box to show, recorded or not.
         if standpoint.belief.rig.holds(0).is_some() {

@@ -180,8 +180,13 @@ impl World {
     }
 
     /// A movement as it is carried out, under a draw of chance: what is to be held in a socket is pushed into it. The joints then
-    /// read the nearest posture in which the target is there, but for what play and their noise, which are σ at the target,
-    /// make of it.
+    /// read the nearest posture in which the target is there, but for what play and their noise, which are σ at the target, make
+    /// of it.
+    ///
+    /// # Errors
+    ///
+    /// [`WorldError::OutOfReach`] if no posture brings a target into the socket; [`WorldError`] of the observation's check if the
+    /// movement does not fit the robot.
     pub fn execute(&self, movement: &Movement, draw: &Draw) -> Result<Movement, WorldError> {
         let (Self::Simulated { truth, rig, limits, .. }, Some(socket)) = (self, movement.socket) else {
             return Ok(movement.clone());
@@ -199,6 +204,12 @@ impl World {
     }
 
     /// What is seen after `movement`, under a draw of chance.
+    ///
+    /// # Errors
+    ///
+    /// [`WorldError::NotRecorded`] or [`WorldError::NoSuchRow`] if the data set does not have this movement,
+    /// [`WorldError::Outside`] if the robot is elsewhere; the refusal of the observation's check if the movement does
+    /// not fit the robot.
     pub fn observe(&self, movement: &Movement, draw: &Draw) -> Result<Observation, WorldError> {
         match self {
             Self::Simulated { truth, rig, head, outliers, .. } => {

@@ -1,7 +1,7 @@
 //! Files and folders that have their names only once they are whole.
 //!
-//! What is written stands under a hidden name beside its destination, and is renamed when it is complete: a full disk, an error and a
-//! signal leave what was there before. Devices, pipes and FIFOs are written to as they are.
+//! A file is written under a hidden name beside its destination, and is renamed when it is complete: a full disk, an error or a
+//! signal leaves what was there before. Devices, pipes and FIFOs are written to as they are.
 
 use std::{
     collections::BTreeSet,
@@ -16,10 +16,10 @@ use tempfile::{Builder, TempDir, TempPath};
 /// What the hidden names begin and end with.
 const BEGIN: &str = ".body-schema-";
 const END: &str = ".unfinished";
-/// Symbolic links that lead from one to the next, at most.
+/// The most symbolic links that are followed in a row.
 const MOST_LINKS: usize = 40;
 
-/// What is being written by this process. While it is held nothing begins, and nothing gets its name.
+/// The files and folders that this process is writing. While the lock is held, none is begun and none gets its name.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
@@ -27,7 +27,7 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ends the process, and leaves nothing unfinished behind.
+/// Ends the process, and removes everything unfinished.
 pub fn exit(code: i32) -> ! {
     let paths = unfinished();
     for path in paths.iter() {
@@ -38,7 +38,7 @@ pub fn exit(code: i32) -> ! {
     std::process::exit(code)
 }
 
-/// Does what no signal may end half-way. It begins no file or folder, and gives none its name.
+/// Does work that no signal may interrupt. The work must begin no file or folder, and give none its name.
 pub fn undisturbed<T>(work: impl FnOnce() -> T) -> T {
     let _list = unfinished();
     work()
@@ -54,10 +54,10 @@ impl Drop for Listed {
     }
 }
 
-/// A file that is being written. It replaces its destination when it is [committed](Self::commit), and is removed where it is not.
+/// A file that is being written. It replaces its destination when it is [committed](Self::commit); otherwise it is removed.
 #[derive(Debug)]
 pub struct AtomicFile {
-    /// `None` where the destination is written to as it is.
+    /// The hidden file; `None` where the destination is written to directly.
     hidden: Option<Hidden>,
 }
 
@@ -75,7 +75,8 @@ impl AtomicFile {
     ///
     /// # Errors
     ///
-    /// Where nothing can be written there: there is no such folder, `path` is a folder, it or its folder is read-only.
+    /// The system's error if nothing can be written there: there is no such folder, `path` is a folder, or it or its folder is
+    /// read-only.
     pub fn create(path: &Path) -> io::Result<(File, Self)> {
         let Some(destination) = destination(path)? else {
             return Ok((File::create(path)?, Self { hidden: None }));
@@ -109,16 +110,18 @@ impl AtomicFile {
     ///
     /// # Errors
     ///
-    /// Where that cannot be; the destination is as it was then.
+    /// The system's error if the bytes cannot be stored or the file cannot be renamed; the destination is then
+    /// unchanged.
     pub fn commit(self) -> io::Result<()> {
         self.named(|path, destination| path.persist(destination).map_err(io::Error::from))
     }
 
-    /// The same where nothing may be replaced.
+    /// Gives the file its name, once its bytes are on the disk, unless there is something at the destination.
     ///
     /// # Errors
     ///
-    /// The same, and where there is something at the destination.
+    /// The system's error if there is something at the destination, the bytes cannot be stored, or the file cannot be
+    /// renamed; the destination is then unchanged.
     pub fn commit_new(self) -> io::Result<()> {
         self.named(|path, destination| path.persist_noclobber(destination).map_err(io::Error::from))
     }
@@ -134,7 +137,7 @@ impl AtomicFile {
 ///
 /// # Errors
 ///
-/// As of [`AtomicFile::create`] and [`AtomicFile::commit`], and where there is no room.
+/// The system's error if the file cannot be created, written or renamed; the destination is then unchanged.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let (mut file, whole) = AtomicFile::create(path)?;
     file.write_all(bytes)?;
@@ -142,11 +145,11 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     whole.commit()
 }
 
-/// Whether a file can be written there; nothing is changed.
+/// Checks, without changing anything, that a file can be written at `path`.
 ///
 /// # Errors
 ///
-/// As of [`AtomicFile::create`].
+/// The system's error if there is no such folder, `path` is a folder, or it or its folder is read-only.
 pub fn check(path: &Path) -> io::Result<()> {
     match destination(path)? {
         // Whoever opens a FIFO waits for its reader.
@@ -155,11 +158,11 @@ pub fn check(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Whether a folder can be made there, or written into; nothing is changed.
+/// Checks, without changing anything, that a folder can be made at `folder`, or written into.
 ///
 /// # Errors
 ///
-/// Where `folder`, or the nearest folder above it that is there, is none or may not be written to.
+/// The system's error if `folder`, or the nearest existing folder above it, is no folder or may not be written to.
 pub fn check_folder(folder: &Path) -> io::Result<()> {
     let is_there = |path: &&Path| fs::symlink_metadata(path).is_ok();
     let above = folder.ancestors().find(is_there).unwrap_or(Path::new("."));
@@ -171,7 +174,7 @@ pub fn check_folder(folder: &Path) -> io::Result<()> {
 ///
 /// # Errors
 ///
-/// Where it is a folder, or cannot be looked at.
+/// The system's error if it is a folder or cannot be examined.
 pub fn destination(path: &Path) -> io::Result<Option<PathBuf>> {
     let name = path.file_name().ok_or(io::ErrorKind::IsADirectory)?;
     let mut place = folder_of(path).join(name);
@@ -204,7 +207,7 @@ fn behind_links(folder: &Path) -> PathBuf {
     folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
 }
 
-/// A hidden folder that is being filled. It is removed where it is not [put in a place](Self::replace).
+/// A hidden folder that is being filled. It is removed unless it [replaces](Self::replace) another.
 #[derive(Debug)]
 pub struct AtomicFolder {
     // In this order: it is removed, then taken off the list.
@@ -213,11 +216,11 @@ pub struct AtomicFolder {
 }
 
 impl AtomicFolder {
-    /// Begins a folder in another, which is made if it is not there.
+    /// Begins a folder inside `folder`, which is made if it is not there.
     ///
     /// # Errors
     ///
-    /// Where nothing can be written there.
+    /// The system's error if nothing can be written there.
     pub fn within(folder: &Path) -> io::Result<Self> {
         fs::create_dir_all(folder)?;
         let mut list = unfinished();
@@ -237,26 +240,26 @@ impl AtomicFolder {
     ///
     /// # Errors
     ///
-    /// Where nothing can be written there.
+    /// The system's error if nothing can be written there.
     pub fn beside(folder: &Path) -> io::Result<Self> {
         Self::within(&folder_of(&behind_links(folder)))
     }
 
-    /// Where it is filled.
+    /// The folder's path while it is filled.
     pub fn path(&self) -> &Path {
         self.folder.path()
     }
 
-    /// Whether a name is that of a folder that is being filled, or of one that a process left that was killed.
+    /// Whether a name is that of a folder that is being filled, or of one left by a process that was killed.
     pub fn is_hidden(name: &str) -> bool {
         name.starts_with(BEGIN) && name.ends_with(END)
     }
 
-    /// Puts it in the place of another, or where there is none; nothing of the other is left.
+    /// Puts this folder in the place of another, or where there is none; nothing of the other is left.
     ///
     /// # Errors
     ///
-    /// Where that cannot be; the other is as it was then.
+    /// The system's error if that fails; the other folder is then unchanged.
     pub fn replace(self, other: &Path) -> io::Result<()> {
         let other = &behind_links(other);
         if !other.exists() {

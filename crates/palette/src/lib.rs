@@ -1,6 +1,6 @@
 //! The palette of recordings, figures and page: colours by learner, and a map for values.
 
-/// The learners that scenarios have in common: each has the slot of its place here, in every comparison.
+/// The learners that scenarios have in common, in the order of their slots.
 const KNOWN: [&str; 7] = ["active", "random", "global", "gradient", "human", "unscented", "nominal"];
 
 /// The colour of the truth: grey.
@@ -37,10 +37,10 @@ const VIRIDIS: [[u8; 3]; 10] = [
     [0xFD, 0xE7, 0x25],
 ];
 
-/// The slot of every learner of a comparison: what its colour, its line and its mark go by.
+/// The slot of every learner of a comparison, which decides its colour, line and marker.
 ///
-/// It depends on the name, not on the place: a learner looks the same in every comparison. Names that are not known
-/// take a slot by a hash of theirs; if it is taken, the next one that is free. Only more than twelve share slots.
+/// The slot depends on the name, not on the place in the list: a learner looks the same in every comparison. An unknown
+/// name takes a slot by its hash, or the next free one. Slots are shared only among more than twelve learners.
 pub fn learner_slots<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<usize> {
     let names: Vec<&str> = names.into_iter().collect();
     let known = |name: &str| KNOWN.iter().position(|known| *known == name);

@@ -1,4 +1,4 @@
-//! What can go wrong when the paper is rerun.
+//! Errors of rerunning the paper.
 
 use std::{io, path::PathBuf};
 
@@ -7,17 +7,17 @@ use body_schema_engine::optimize::DirectError;
 use body_schema_experiment::ExperimentError;
 use body_schema_scenario::ScenarioError;
 
-/// Why the paper could not be rerun. What was measured before is kept.
+/// Why the paper could not be rerun. What was measured before the error is kept.
 #[derive(Debug, thiserror::Error)]
 pub enum PaperError {
     /// There is no such experiment.
     #[error("there is no experiment `{id}`{}; the experiments are {}", suggestion(suggested.as_deref()), known.join(", "))]
     UnknownExperiment {
-        /// What was asked for.
+        /// The name that was asked for.
         id: String,
-        /// What was probably meant.
+        /// The name that was probably meant.
         suggested: Option<String>,
-        /// What there is.
+        /// The known names.
         known: Vec<&'static str>,
     },
     /// A scenario is not what the experiment needs.
@@ -74,7 +74,7 @@ pub enum PaperError {
 }
 
 impl PaperError {
-    /// Whether the error lies in what was asked, and not in carrying it out.
+    /// Whether the error lies in the request rather than in carrying it out.
     pub fn is_bad_input(&self) -> bool {
         matches!(self, Self::UnknownExperiment { .. })
     }

@@ -9,7 +9,7 @@ pub struct PaperExperiment {
     pub figure: &'static str,
     /// What is run.
     pub title: &'static str,
-    /// The built-in scenario that stands for it.
+    /// The built-in scenario that it runs.
     pub scenario: &'static str,
     /// The learners compared.
     pub learners: &'static [&'static str],
@@ -29,7 +29,7 @@ pub enum Kind {
         /// Movements with `--quick`.
         quick_steps: u64,
     },
-    /// The same at several values of one key of the scenario.
+    /// A comparison at each of several values of one key of the scenario.
     Sweep {
         /// The key, as `selection.epsilon`.
         key: &'static str,
@@ -78,7 +78,7 @@ impl Kind {
     }
 }
 
-/// The paper's own.
+/// The paper's learners.
 const THREE: &[&str] = &["active", "random", "gradient"];
 
 /// All of them, in the order of the paper.

@@ -8,7 +8,7 @@
 //! | `outcomes/{id}.json` | what an experiment gave, with the fingerprint of what it was run with |
 //! | `{id}.svg`, `{id}.png` | the figures |
 //! | `paper.json` | a [`Report`]: one row per number or remark |
-//! | `paper.md` | the same as a table, made from `paper.json` [alone](markdown) |
+//! | `paper.md` | a table, made from `paper.json` [alone](markdown) |
 //!
 //! Experiments, claims and their texts are data; figures measured are never written down in code.
 
@@ -42,19 +42,19 @@ use store::{Fingerprint, Store};
 use body_schema_chart as chart;
 use body_schema_scenario::{BUILTIN, Scenario, builtin};
 
-/// What is to be run, and where its outcomes go.
+/// The experiments to run, and the folder of their outcomes.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Few seeds and short runs.
+    /// Whether to run few seeds and short runs.
     pub quick: bool,
-    /// Run only the experiments of these names; of the others only what is kept is shown. All if empty.
+    /// The names of the experiments to run; of the others, only kept outcomes are shown. Empty for all.
     pub only: Vec<String>,
     /// The folder of outcomes, figures and tables.
     pub out: PathBuf,
 }
 
 impl Plan {
-    /// The seeds of all experiments but those that are a single run.
+    /// The seeds of all experiments that run over seeds.
     pub fn seeds(&self) -> RangeInclusive<u64> {
         1..=if self.quick { 4 } else { 20 }
     }
@@ -87,7 +87,7 @@ impl Plan {
 
 /// Follows a run.
 pub trait Progress: Sync {
-    /// An experiment begins; [`tick`](Self::tick) will be called so many times.
+    /// An experiment begins, for which [`tick`](Self::tick) will be called `ticks` times.
     fn start(&self, experiment: &PaperExperiment, ticks: u64);
     /// One movement of all learners of one seed was made.
     fn tick(&self);
@@ -107,6 +107,11 @@ pub enum Ending {
 }
 
 /// Runs what the plan holds, writes figures and tables, and returns the report.
+///
+/// # Errors
+///
+/// [`PaperError`] if the plan names an unknown experiment, a scenario or a run fails, a figure cannot be drawn, or a
+/// file cannot be read or written.
 pub fn run(plan: &Plan, progress: &dyn Progress) -> Result<Report, PaperError> {
     plan.check()?;
     let store = Store::open(&plan.out)?;
@@ -189,7 +194,7 @@ fn report(plan: &Plan, figures: Vec<FigureEntry>, outcomes: &BTreeMap<&'static s
     }
 }
 
-/// Where a plan's files go: `paper`, or `paper/quick` so that the short form never replaces the full one.
+/// The folder of a plan's files: `paper`, or `paper/quick`, so that the short form never replaces the full one.
 pub fn default_folder(quick: bool) -> PathBuf {
     let folder = Path::new("paper");
     if quick { folder.join("quick") } else { folder.to_owned() }

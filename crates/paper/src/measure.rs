@@ -1,4 +1,4 @@
-//! Carries experiments out.
+//! Carrying experiments out.
 
 use rayon::prelude::*;
 
@@ -25,7 +25,7 @@ pub struct Measurement<'a> {
 }
 
 impl Measurement<'_> {
-    /// Runs the experiment, on all cores; the outcome does not depend on how many there are, but for times.
+    /// Runs the experiment on all cores. The outcome, times excepted, does not depend on their number.
     pub fn run(&self) -> Result<Outcome, PaperError> {
         match self.experiment.kind {
             Kind::Comparison { .. } => {

@@ -1,19 +1,19 @@
-//! What an experiment gave: all that tables and figures are made from.
+//! The outcome of an experiment, from which all tables and figures are made.
 
 use serde::{Deserialize, Serialize};
 
 use body_schema_engine::{optimize::HullPoint, selection::Partition};
 use body_schema_wire::{Comparison, LearnerComparison};
 
-/// What one experiment gave.
+/// The outcome of an experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// Of one comparison, or of several at values of a key.
+    /// One comparison, or one for each value of a key.
     Trials(Vec<Trial>),
-    /// How long choosing took.
+    /// The time of choosing.
     Timing(Timing),
-    /// What DIRECT did, in both variants.
+    /// The searches of DIRECT, in both variants.
     Searches(Vec<Search>),
 }
 
@@ -37,7 +37,7 @@ pub struct LearnedJoint {
     pub index: usize,
 }
 
-/// How long it takes to choose one movement.
+/// The time it takes to choose one movement.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// Median, milliseconds.
@@ -46,7 +46,7 @@ pub struct Timing {
     pub p95_ms: f64,
     /// Evaluations of the criterion for one choice, median.
     pub evaluations: usize,
-    /// How many choices were timed.
+    /// The number of choices that were timed.
     pub choices: usize,
 }
 
@@ -85,7 +85,7 @@ impl Outcome {
     }
 }
 
-/// Whether curves keep the point after so many movements: all at first, then every fiftieth part of the way.
+/// Whether curves keep the point after `movements`: all at first, then every fiftieth part of the way.
 pub fn is_kept(movements: u64, last: u64) -> bool {
     const DENSE: u64 = 50;
     if movements <= DENSE || movements == last || movements.is_multiple_of(100) {

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 pub struct Report {
     /// Version of body-schema.
     pub version: String,
-    /// Whether this is the short form, with few seeds and short runs: a check that everything works, no finding.
+    /// Whether this is the short form, with few seeds and short runs: it checks that everything works, and finds
+    /// nothing.
     pub quick: bool,
     /// The seeds, first and last.
     pub seeds: [u64; 2],
@@ -31,7 +32,7 @@ pub struct FigureEntry {
 /// One number or remark of the paper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// Its name.
+    /// Its identifier.
     pub id: String,
     /// Where the paper says it.
     pub figure: String,
@@ -41,7 +42,7 @@ pub struct Row {
     pub paper: String,
     /// The paper's number, in `unit`; null for a remark.
     pub paper_value: Option<f64>,
-    /// Our number, in `unit`; null if there is none, as where the median run does not converge.
+    /// Our number, in `unit`; null if there is none, for example if the median run does not converge.
     pub ours: Option<f64>,
     /// What we measured, in words.
     pub ours_text: String,
@@ -49,7 +50,7 @@ pub struct Row {
     pub unit: String,
     /// Whether we agree; null if it was not measured.
     pub agrees: Option<Agreement>,
-    /// Why we say so, or why it was not measured.
+    /// The reason for the verdict, or why it was not measured.
     pub why: String,
     /// The experiment behind it; null if there is none yet.
     pub experiment: Option<String>,
@@ -57,26 +58,26 @@ pub struct Row {
     pub scenario: Option<String>,
     /// The seeds, as the command takes them.
     pub seeds: Option<String>,
-    /// How many runs of each learner.
+    /// The number of runs of each learner.
     pub runs: Option<u64>,
     /// The command that repeats the measurement.
     pub command: Option<String>,
 }
 
-/// Whether our measurement bears the paper out.
+/// Whether our measurement confirms the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Agreement {
-    /// It does.
+    /// It confirms the paper.
     Yes,
-    /// In part.
+    /// It confirms the paper in part.
     Partly,
-    /// It does not.
+    /// It contradicts the paper.
     No,
 }
 
 impl Agreement {
-    /// Its name.
+    /// The name in JSON and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Yes => "yes",

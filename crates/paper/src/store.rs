@@ -1,7 +1,7 @@
 //! Outcomes on disk, so that an interrupted run continues and nothing is measured twice.
 //!
 //! Every outcome lies beside the fingerprint of what it was measured with: the scenario's text, learners, movements,
-//! seeds, and the very program. It is reused if all of that still holds, and measured again otherwise. A file that
+//! seeds, and the program itself. It is reused if all of that still holds, and measured again otherwise. A file that
 //! cannot be read counts as absent.
 
 use std::{
@@ -17,13 +17,13 @@ use super::{PaperError, Plan, experiments::PaperExperiment, outcome::Outcome};
 use body_schema_files as atomic;
 use body_schema_scenario::Scenario;
 
-/// What an outcome depends on.
+/// The fingerprint of an outcome: everything that it depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fingerprint {
     /// Version of body-schema.
     pub version: String,
-    /// The program itself: a hash of the executable, so that an engine that was changed reuses nothing of the one
-    /// before, whatever its version says. `None`, where the executable cannot be read, fits nothing.
+    /// The program itself: a hash of the executable, so that a changed engine does not reuse outcomes of an earlier one
+    /// with the same version. `None` if the executable cannot be read; it then matches nothing.
     pub build: Option<String>,
     /// Version of the form in which outcomes are kept.
     pub format: u32,
@@ -41,7 +41,7 @@ pub struct Fingerprint {
     pub scenario: String,
 }
 
-/// Raise this when outcomes mean something else than before.
+/// The version of the stored form; raise it when outcomes change their meaning.
 const FORMAT: u32 = 2;
 
 impl Fingerprint {
@@ -62,8 +62,8 @@ impl Fingerprint {
     }
 }
 
-/// What this program is told from others by, if its file can be read. It depends on every byte of it: a build that only
-/// moved a comment measures again, one with another engine never passes for this one.
+/// A hash of this program's file, if it can be read. It depends on every byte: a build that only moved a comment
+/// measures again, and a build with another engine never passes for this one.
 pub fn build() -> Option<String> {
     digest(fs::File::open(std::env::current_exe().ok()?).ok()?).ok()
 }
@@ -105,7 +105,7 @@ impl Store {
         (fingerprint.build.is_some() && kept.fingerprint == *fingerprint).then_some(kept.outcome)
     }
 
-    /// Keeps an outcome.
+    /// Stores an outcome.
     pub fn save(&self, fingerprint: &Fingerprint, outcome: &Outcome) -> Result<(), PaperError> {
         let text = serde_json::to_string(&Kept { fingerprint, outcome })?;
         let path = self.path(&fingerprint.experiment);

@@ -1,4 +1,4 @@
-//! How a viewer arranges a recording when it opens it.
+//! The arrangement of views that a viewer shows when it opens a recording.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -27,10 +27,10 @@ use body_schema_wire::{Description, LearnerDescription};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Theme {
-    /// Dark on light ground.
+    /// Dark on a light background.
     #[default]
     Light,
-    /// Light on dark ground.
+    /// Light on a dark background.
     Dark,
 }
 
@@ -38,15 +38,15 @@ pub enum Theme {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Shape {
-    /// Rather wide than high: the learners stand beside one another.
+    /// Wider than high: the learners stand side by side.
     #[default]
     Wide,
-    /// Rather high than wide: they stand behind one another, seen from above.
+    /// Higher than wide: the learners stand one behind the other, seen from above.
     Tall,
 }
 
 impl Shape {
-    /// A view's width in heights.
+    /// The width of the view in heights.
     pub fn aspect(self) -> f64 {
         match self {
             Self::Wide => 1.4,
@@ -73,10 +73,10 @@ impl Theme {
     }
 }
 
-/// Arranges the views of one recording.
+/// The arranger of the views of one recording.
 pub(super) struct Arranger {
     pub(super) description: Description,
-    /// The roots of the learners.
+    /// The root entities of the learners.
     pub(super) roots: Vec<EntityPath>,
     pub(super) stage: Stage,
     /// The recording.
@@ -86,7 +86,7 @@ pub(super) struct Arranger {
 }
 
 impl Arranger {
-    /// For a file: the scene above; below, the curves, DIRECT's partition and the note.
+    /// The arrangement for a file: the scene above; below, the curves, DIRECT's partition and the note.
     pub(super) fn whole(&self) -> Result<Vec<LogMsg>, RecordingError> {
         let scene = self.view(Theme::default(), Shape::default().aspect(), true).into();
         let mut below = self.charts();
@@ -97,7 +97,7 @@ impl Arranger {
         root.messages(self.store(), Time::Shown)
     }
 
-    /// For a page that has controls and curves of its own: the scene alone, to look at and to turn.
+    /// The arrangement for a page with controls and curves of its own: the scene alone, to look at and to turn.
     pub(super) fn scene(&self, theme: Theme, aspect: f64) -> Result<Vec<LogMsg>, RecordingError> {
         let scene: Part = self.view(theme, aspect, false).into();
         Container::tabs([scene]).messages(self.store(), Time::Led)
@@ -108,8 +108,8 @@ impl Arranger {
         arrangement(&self.recording, self.arranged.fetch_add(1, Ordering::Relaxed))
     }
 
-    /// All learners in one view. With `details` it can be asked what is what, there is a key to the colours, and the arms
-    /// at θ = 0 can be switched on.
+    /// One view of all learners. With `details` hovering names entities, there is a key to the colours, and the arms at θ
+    /// = 0 can be switched on.
     fn view(&self, theme: Theme, aspect: f64, details: bool) -> View {
         let [target, eye] = self.stage.camera(aspect).map(|point| single(point.coords.into()));
         let (ground, labels): (_, &[&str]) = match theme {
@@ -161,7 +161,7 @@ impl Arranger {
         Some(chart(TRACE.0, self.roots.iter().flat_map(of_learner).chain([format!("+ /{BEST_DESIGN}")]), None))
     }
 
-    /// How far readings are from the estimates, and where a learner weighs them, how likely they are outliers.
+    /// The residuals of readings, and for a learner that weighs them the probability that they are outliers.
     fn readings(&self) -> Vec<Part> {
         let series = |kind: &'static str| self.roots.iter().map(move |root| format!("+ {root}/readings/{kind}/**"));
         let mut views = vec![chart("Residual per reading (σ)", series("residuals"), None)];
@@ -171,7 +171,8 @@ impl Arranger {
         views
     }
 
-    /// The partitions of those who have any: the joint box is divided by DIRECT, recorded movements are tried one by one.
+    /// The partitions of the learners that have one: DIRECT divides the joint box, while recorded movements are tried one
+    /// by one.
     fn partitions(&self) -> Vec<Part> {
         let is_box = self.description.movements_available.is_none();
         let divides = |learner: &LearnerDescription| is_box && learner.policy.starts_with("active");
@@ -210,7 +211,7 @@ pub(super) fn calibration(stage: &Stage, recording: &StoreId, unit: Unit) -> Res
     Container::vertical([above.into(), below.into()], [2.0, 1.0]).messages(arrangement(recording, 0), Time::Shown)
 }
 
-/// Curves; the vertical axis shows `range`, or what it takes.
+/// A chart of curves; the vertical axis shows `range`, or fits the data.
 fn chart(title: &str, contents: impl IntoIterator<Item = String>, range: Option<[f64; 2]>) -> Part {
     let view = View::new("TimeSeries", title, &EntityPath::root())
         .with_contents(contents)

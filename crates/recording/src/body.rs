@@ -1,4 +1,4 @@
-//! What stands around an arm: a human figure, or a pedestal.
+//! The body around an arm: a human figure, or a pedestal.
 
 use nalgebra::{Point3, Vector3};
 
@@ -6,31 +6,31 @@ use super::solid::Capsule;
 use body_schema_engine::model::State;
 use body_schema_wire::{Description, JointDescription};
 
-/// The colour of a body: lighter than the true arm, and to be seen on light and on dark ground.
+/// The colour of a body: lighter than the true arm, and visible on light and on dark backgrounds.
 const BODY: [u8; 3] = [0xD6, 0xDA, 0xE0];
-/// Opacity of a trunk that is part of the learned chain: the joints within it are to be seen.
+/// Opacity of a trunk that is part of the learned chain, such that the joints within it are visible.
 const GLASS: u8 = 70;
-/// Joints whose names begin so are in the trunk.
+/// The beginnings of names of joints that are in the trunk.
 const TRUNK: [&str; 2] = ["torso", "chest"];
 
 /// A body, in the frame of the measurements; lengths in metres.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Figure {
-    /// What stays where it is.
+    /// The fixed parts.
     pub(super) fixed: Vec<Capsule>,
-    /// What a pedestal stands on.
+    /// The base under a pedestal.
     pub(super) base: Option<Capsule>,
-    /// What moves with the true arm's trunk …
+    /// The parts that move with the true arm's trunk …
     pub(super) trunk: Vec<Capsule>,
-    /// … after so many joints.
+    /// … after this many joints.
     pub(super) carried_by: usize,
-    /// Where the arm begins.
+    /// The point where the arm begins.
     pub(super) shoulder: Point3<f64>,
-    /// From there to the marker along the outstretched arm.
+    /// The distance from there to the marker along the outstretched arm.
     pub(super) reach_m: f64,
     /// Height of the ground.
     pub(super) ground_m: f64,
-    /// Where the name stands.
+    /// The place of the name.
     pub(super) name: Point3<f64>,
 }
 
@@ -49,7 +49,7 @@ impl Figure {
         Self::beginning(joints, arm).pedestal()
     }
 
-    /// Where an arm of these joints begins, and how far it reaches.
+    /// The point where an arm of these joints begins, and its reach.
     fn beginning(joints: &[JointDescription], arm: &State) -> Self {
         let name = |index: usize| joints.get(index).map_or("", |joint| joint.name.as_str());
         let carried_by =
@@ -117,7 +117,7 @@ impl Figure {
         self
     }
 
-    /// A robot that is its arm: a foot below its first joint.
+    /// A pedestal below the first joint, for a robot that is only an arm.
     fn pedestal(mut self) -> Self {
         let Self { shoulder, reach_m: a, .. } = self;
         let [red, green, blue] = BODY;

@@ -1,8 +1,7 @@
-//! A calibration as a recording: row by row the robot as it was calibrated, and by how much it misses what was measured,
-//! beside the robot as it was described.
+//! A calibration as a recording: for each row the calibrated robot with its residuals, beside the robot as described.
 //!
-//! On the timeline `step`: step k is row k of the table, counted from 1. Positions are in metres (f32), below `/robot` in
-//! the frame of the measurements, which stands so that the calibrated base is at the origin.
+//! On the timeline `step`: step k is row k of the table, counted from 1. Positions are in metres (f32), below `/robot` in the frame of the
+//! measurements, which stands so that the calibrated base is at the origin.
 //!
 //! | entity | archetype | content |
 //! |---|---|---|
@@ -15,8 +14,8 @@
 //! | `/outliers` | Scalars, SeriesPoints | the probability that a row is an outlier, of rows that were learned from |
 //! | `/report` | TextDocument, static | the report |
 //!
-//! As described is the chain of the URDF with base, targets, cameras and sockets fitted to all rows that are learned from.
-//! Of more than [`MOST_ROWS`] rows so many are recorded, spread evenly.
+//! As described is the chain of the URDF with base, targets, cameras and sockets fitted to all rows that are learned from. Of more than
+//! [`MOST_ROWS`] rows so many are recorded, spread evenly.
 
 use body_schema_palette::learner_color;
 use std::{collections::BTreeMap, path::Path};
@@ -47,21 +46,22 @@ use body_schema_calibration::{Calibration, Case, Reading, Residual, Unit};
 use body_schema_engine::model::State;
 use body_schema_wire::ModelReport;
 
-/// Rows that are recorded at most.
+/// The most rows that are recorded.
 pub const MOST_ROWS: usize = 2000;
-/// How long the usual error of the description is drawn, as a part of the arm's reach.
+/// The drawn length of a typical error of the description, as a part of the arm's reach.
 const ERROR: f64 = 0.15;
 /// Radii of a measured point and of the line of an error, as parts of the arm's reach.
 const POINT: f64 = 0.022;
 const LINE: f64 = 0.009;
-/// Opacity of the clouds.
+/// The opacity of the ellipsoids.
 const CLOUD: u8 = 70;
 
 /// Writes a calibration to a file, by convention `.rrd`; `report` in Markdown goes with it.
 ///
 /// # Errors
 ///
-/// [`RecordingError`] where the file cannot be written.
+/// [`RecordingError::Create`] or [`RecordingError::Write`] if the file cannot be written, [`RecordingError::Encode`] if
+/// the data cannot be encoded.
 pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &str) -> Result<(), RecordingError> {
     let name = &found.report.scenario;
     let application = ApplicationId::new_or_unknown(format!("body-schema-calibration-{name}"));
@@ -147,7 +147,7 @@ struct Scene {
     /// Where its base is, in the frame of the measurements.
     base: Isometry3<f64>,
     stage: Stage,
-    /// So many times as long errors are drawn as they are; `None` where no place was measured.
+    /// The factor by which errors are magnified; `None` where no place was measured.
     magnified: Option<f64>,
 }
 
@@ -168,7 +168,7 @@ impl Scene {
         Self { arm, model, base: state.base, stage, magnified }
     }
 
-    /// What stays the same.
+    /// Logs what is the same in every row.
     fn begin(&self, rows: &mut Rows) {
         let place = self.base.inverse();
         let transform = Transform3D::from_translation(single(place.translation.vector.into()))
@@ -193,7 +193,7 @@ impl Scene {
         rows.always(&EntityPath::from("key"), &[&label]);
     }
 
-    /// The robot in the posture of a row, and how far predictions are from what was measured there.
+    /// Logs the robot in the posture of a row, and the residuals there.
     fn log(
         &self,
         rows: &mut Rows,
@@ -235,12 +235,12 @@ fn look() -> ArmLook {
     ArmLook { links: [red, green, blue, 150], pins: [red, green, blue, 255], girth: TRUE_ARM.girth }
 }
 
-/// The place that a reading tells, of a position or a pose.
+/// The place in a reading, for a position or a pose.
 fn place(reading: &[f64]) -> Option<Point3<f64>> {
     matches!(reading.len(), 3 | 6).then(|| Point3::from_slice(&reading[..3]))
 }
 
-/// The nearest of 1, 2, 5, 10, 20, … below a number; 1 at least.
+/// The largest of 1, 2, 5, 10, 20, … that is not above `x`; at least 1.
 fn round_number(x: f64) -> f64 {
     let power = 10_f64.powf(x.max(1.0).log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|digit| digit * power).find(|round| *round <= x.max(1.0)).unwrap_or(1.0)

@@ -10,7 +10,7 @@ pub(super) const CHARTS: [(&str, &str); 3] = [
     ("Prediction error, mean (m)", "prediction_mean_m"),
 ];
 
-/// The same where no truth is known.
+/// Titles and metrics of the curves where no truth is known.
 pub(super) const CHARTS_WITHOUT_TRUTH: [(&str, &str); 2] =
     [("Prediction error, mean (m)", "prediction_mean_m"), ("Trace of the covariance, tr(W P)", "trace")];
 

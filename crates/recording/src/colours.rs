@@ -7,16 +7,16 @@ pub(super) fn tint(colour: [u8; 3], amount: f64) -> [u8; 3] {
     mix(colour, [0xFF; 3], amount)
 }
 
-/// A colour as a label on light ground takes it: the viewer writes labels in their entity's colour.
+/// A colour darkened for labels on a light background: the viewer writes labels in their entity's colour.
 pub(super) fn label_on_light(colour: [u8; 3]) -> [u8; 3] {
-    /// So far towards black even the palest can be read.
+    /// The share of black at which even the palest colour can be read.
     const DARKER: f64 = 0.4;
     mix(colour, [0; 3], DARKER)
 }
 
-/// The same on dark ground.
+/// A colour lightened for labels on a dark background.
 pub(super) fn label_on_dark(colour: [u8; 3]) -> [u8; 3] {
-    /// So far towards white even the darkest can be read.
+    /// The share of white at which even the darkest colour can be read.
     const LIGHTER: f64 = 0.6;
     tint(colour, LIGHTER)
 }
@@ -27,8 +27,8 @@ mod tests {
 
     use super::*;
 
-    /// What is behind labels before the scene's background, as measured in screenshots: the viewer lays a veil of its own
-    /// theme behind them.
+    /// The colours behind labels, as measured in screenshots: the viewer lays a veil of its own theme between them and
+    /// the scene's background.
     const LABEL_GROUNDS: [[u8; 3]; 2] = [[0xEA, 0xEA, 0xEB], [0x24, 0x24, 0x26]];
 
     #[test]

@@ -1,4 +1,4 @@
-//! Puts the many small chunks of a live session together.
+//! Compaction: putting the many small chunks of a live session together.
 
 use std::{collections::BTreeMap, io::Cursor};
 
@@ -8,12 +8,12 @@ use super::{
     rows::by_steps,
 };
 
-/// What of a live recording is kept.
+/// The part of a live recording that is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Keep {
-    /// All of it.
+    /// All of it, with the motion between steps.
     Motion,
-    /// What a recording in a file has: the steps.
+    /// The steps, as in a recording in a file.
     Steps,
 }
 
@@ -27,7 +27,7 @@ enum Place {
     Complete,
 }
 
-/// The messages of a stream, with the chunks of each entity put together; what is static comes first.
+/// The messages of a stream, with the chunks of each entity put together; static ones come first.
 pub(super) fn put_together(stream: Vec<u8>, keep: Keep) -> Result<Vec<LogMsg>, RecordingError> {
     let mut messages = Vec::new();
     let last = EntityPath::from(COMPLETE);
@@ -62,9 +62,9 @@ pub(super) fn put_together(stream: Vec<u8>, keep: Keep) -> Result<Vec<LogMsg>, R
     Ok(messages)
 }
 
-/// Beyond this many rows chunks are no longer put together: viewers load by chunk.
+/// The most rows of a chunk that is put together: viewers load by chunk.
 const ROWS: usize = 1024;
-/// Nor beyond so many bytes, where they are followed: each reader holds one message at a time.
+/// The most bytes of a chunk that is followed live: each reader holds one message at a time.
 const FOLLOWED_BYTES: u64 = 1 << 18;
 
 impl Keep {

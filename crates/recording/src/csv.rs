@@ -1,4 +1,4 @@
-//! Runs and comparisons as csv.
+//! Runs and comparisons as CSV.
 
 use std::io;
 
@@ -7,7 +7,7 @@ use body_schema_engine::kinematics::JointKind;
 use body_schema_table::{Component, Title, Writer};
 use body_schema_wire::{Comparison, Description, Quantiles, StepReport};
 
-/// Writes one row per step and learner. Units stand in the names of the columns; what is null is empty.
+/// A writer of one row per step and learner. Units stand in the names of the columns; null is an empty cell.
 pub struct StepsCsv<W: io::Write> {
     writer: Writer<W>,
     joints: usize,
@@ -16,6 +16,10 @@ pub struct StepsCsv<W: io::Write> {
 impl<W: io::Write> StepsCsv<W> {
     /// Writes the header: `step`, `learner`, the metrics, the configuration as `q_{joint}_rad` or `q_{joint}_m`, the
     /// marker as measured and as predicted before the measurement.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Csv`] if the output refuses the header.
     pub fn new(description: &Description, output: W) -> Result<Self, RecordingError> {
         let mut table = Self::without_header(description, output);
         let mut header: Vec<String> =
@@ -32,12 +36,16 @@ impl<W: io::Write> StepsCsv<W> {
         Ok(table)
     }
 
-    /// Goes on with a table whose header is written elsewhere.
+    /// A writer that continues a table whose header is written elsewhere.
     pub fn without_header(description: &Description, output: W) -> Self {
         Self { writer: Writer::new(output), joints: description.joints.len() }
     }
 
     /// Writes the rows of one step.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Csv`] if the output refuses a row.
     pub fn write(&mut self, report: &StepReport) -> Result<(), RecordingError> {
         let cell = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
         for learner in &report.learners {
@@ -56,7 +64,11 @@ impl<W: io::Write> StepsCsv<W> {
         Ok(())
     }
 
-    /// Passes everything on to the output.
+    /// Flushes all rows to the output.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Csv`] if the output cannot be flushed.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.writer.flush().map_err(|source| RecordingError::Csv(source.into()))
     }
@@ -64,6 +76,10 @@ impl<W: io::Write> StepsCsv<W> {
 
 /// Writes the curves of a comparison in long format, one row per learner, number of movements and metric, over the
 /// seeds; metrics without a value have no row.
+///
+/// # Errors
+///
+/// [`RecordingError::Csv`] if the output refuses a row.
 pub fn comparison_csv(comparison: &Comparison, output: impl io::Write) -> Result<(), RecordingError> {
     let mut writer = Writer::new(output);
     writer.write(["learner", "movements", "metric", "mean", "median", "q25", "q75"])?;

@@ -1,4 +1,4 @@
-//! Recordings read back, message by message.
+//! Reading recordings back, message by message.
 
 use std::{
     any::Any,
@@ -12,7 +12,7 @@ use re_log_encoding::{DecodeError, DecoderApp};
 
 use super::{rerun::LogMsg, stream::Frames};
 
-/// The messages of a recording up to the first that cannot be read, and why it cannot.
+/// The messages of a recording up to the first unreadable one, and then the reason.
 pub(super) fn messages(stream: impl BufRead) -> impl Iterator<Item = Result<LogMsg, String>> {
     let mut decoded = Some(DecoderApp::decode_lazy(Frames::new(stream)));
     std::iter::from_fn(move || {
@@ -38,8 +38,8 @@ thread_local! {
     static IS_GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What reads Arrow's buffers panics where a damaged message tells lengths beyond its end. That is told as damage, and by nobody
-/// else.
+/// Runs `work` and returns a panic as an error: Arrow's reader of buffers panics where a damaged message states lengths beyond
+/// its end.
 fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-/// How large the ellipsoids of a recording are.
+/// The size of the ellipsoids of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, utoipa::ToSchema)]
 pub enum EllipsoidSize {
     /// One standard deviation along each principal axis.
@@ -15,7 +15,7 @@ pub enum EllipsoidSize {
     #[serde(rename = "2-sigma")]
     #[value(name = "2-sigma")]
     TwoSigma,
-    /// Holds 95 % of the normal distribution.
+    /// The ellipsoid that holds 95 % of the normal distribution.
     #[serde(rename = "95-percent")]
     #[value(name = "95-percent")]
     NinetyFivePercent,
@@ -35,7 +35,7 @@ impl EllipsoidSize {
         }
     }
 
-    /// As it stands in labels and notes.
+    /// The size as text for labels and notes.
     pub fn label(self) -> &'static str {
         match self {
             Self::OneSigma => "1σ",
@@ -45,23 +45,23 @@ impl EllipsoidSize {
     }
 }
 
-/// A direction without variance is drawn with this part of the largest half-size: a disc that can be seen edge-on.
+/// The thickness of a direction without variance, as a part of the largest half-size: a disc that can be seen edge-on.
 const FLATNESS: f64 = 0.02;
 
-/// Eigenvalues below this part of the largest count as none: what rounding leaves of a rank-2 covariance.
+/// The part of the largest eigenvalue below which one counts as zero: what rounding leaves of a rank-2 covariance.
 const NO_VARIANCE: f64 = 1e-9;
 
-/// What is drawn for a covariance.
+/// The ellipsoid drawn for a covariance.
 #[derive(Clone, Debug)]
 pub(super) struct Ellipsoid {
     /// Multiples of the standard deviations along the axes, largest first at the first step.
     pub(super) half_sizes: [f64; 3],
-    /// Turns x, y, z into the axes.
+    /// The rotation of x, y, z onto the axes.
     pub(super) rotation: UnitQuaternion<f64>,
 }
 
-/// The axes that an ellipsoid had at the last step. Eigenvalues change their order, and eigenvectors their signs; taken
-/// as they come, an ellipsoid would flip between steps that hardly differ.
+/// The axes that an ellipsoid had at the last step. Eigenvalues change their order and eigenvectors their signs, so an
+/// ellipsoid would otherwise flip between steps that hardly differ.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Axes(Option<Matrix3<f64>>);
 

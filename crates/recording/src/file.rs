@@ -11,11 +11,12 @@ use re_log_encoding::{CrateVersion, EncodeError, Encoder, EncodingOptions};
 use super::{RecordingError, rerun::LogMsg};
 use body_schema_files::AtomicFile;
 
-/// An .rrd file that is being written. Its footer, the index, is written at the end; dropping it tries to.
+/// An .rrd file that is being written. Its footer, the index, is written at the end; dropping the file tries to write
+/// it.
 pub(super) struct RrdFile {
     path: PathBuf,
     encoder: Encoder<BufWriter<File>>,
-    /// What gives it its name once it is whole; `None` where it grows in its place.
+    /// The pending name of a file that gets it once it is whole; `None` for a file that grows in its place.
     whole: Option<AtomicFile>,
     /// Whether a write has failed; nothing is written after that.
     broken: bool,
@@ -43,7 +44,7 @@ impl RrdFile {
         Ok(Self { path: path.to_owned(), encoder, whole, broken: false })
     }
 
-    /// Leaves no file, unless it was none: a device stays.
+    /// Removes the file, unless it is a device.
     pub(super) fn discard(mut self) {
         self.encoder.do_not_emit_footer();
         if self.whole.is_none() {
@@ -62,7 +63,7 @@ impl RrdFile {
         self.whole.take().map_or(Ok(()), AtomicFile::commit).map_err(|source| self.unwritten(source))
     }
 
-    /// The same of a file that replaces none.
+    /// Writes the footer, and gives the file its name unless a file of that name exists.
     pub(super) fn finish_new(&mut self) -> Result<(), RecordingError> {
         self.attempt(Encoder::finish)?;
         self.whole.take().map_or(Ok(()), AtomicFile::commit_new).map_err(|source| self.unwritten(source))
@@ -72,7 +73,7 @@ impl RrdFile {
         RecordingError::Unwritten { path: self.path.clone(), source }
     }
 
-    /// Puts a finished recording in its place, whatever became of what was written before.
+    /// Puts a finished recording in this file's place, whatever was written before.
     pub(super) fn replace(&self, recording: &[u8]) -> Result<(), RecordingError> {
         let failed = |source| RecordingError::Write { path: self.path.clone(), source };
         // A device holds nothing that could be replaced.

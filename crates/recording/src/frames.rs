@@ -1,4 +1,4 @@
-//! The way from one step's posture to the next, for those who watch live.
+//! The motion from one step's posture to the next, for live viewers.
 
 use super::{
     MOTION_PER_STEP,
@@ -12,7 +12,7 @@ use super::{
 };
 use body_schema_engine::model::State;
 
-/// What a step left to see.
+/// What a step left visible.
 pub(super) struct Shown {
     pub(super) step: u64,
     pub(super) configuration: Vec<f64>,
@@ -25,8 +25,8 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    /// Logs the postures between this step and the next, whose configuration is `to`: poses alone, as links are rigid
-    /// while nothing is learned. The estimate is the one that chose the movement.
+    /// Logs the postures between this step and the next, whose configuration is `to`: only poses, because links are
+    /// rigid while nothing is learned. The estimate is the one that chose the movement.
     pub(super) fn log_way(
         &self,
         rows: &mut Rows,

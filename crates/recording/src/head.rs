@@ -1,4 +1,4 @@
-//! The head that watches: what its lens takes in, where it can turn, and where it looks.
+//! The head that watches: the field of its lens, the range of its turns, and its gaze.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
@@ -14,7 +14,7 @@ use body_schema_wire::{GazeReport, HeadDescription};
 const LENGTH_M: f64 = 0.35;
 /// Corners of the polygon that stands for a circle.
 const CORNERS: usize = 24;
-/// The colour of the head; no learner's.
+/// The colour of the head, which no learner has.
 const HEAD: [u8; 3] = [0x8C, 0x93, 0xA0];
 
 /// The cone at rest, and the line that the look direction draws along the limits of pan and tilt.
@@ -53,7 +53,7 @@ fn head(description: &HeadDescription) -> Head {
     }
 }
 
-/// Its rim, and four lines from the apex to the rim.
+/// A cone as lines: its rim, and four lines from the apex to the rim.
 fn cone(apex: &Point3<f64>, direction: &UnitVector3<f64>, half_angle: f64) -> Vec<Vec<[f64; 3]>> {
     let aside = if direction.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
     let u = direction.cross(&aside).normalize();

@@ -1,4 +1,4 @@
-//! Views in containers, and the blueprint that they make: what Rerun's own builders write through a stream, as messages.
+//! Views in containers, and their blueprint as messages, which Rerun's own builders would write through a stream.
 //!
 //! A blueprint is a store beside the recording's. Views and containers are entities of it, `view/{uuid}` and
 //! `container/{uuid}`; a container names its contents by their paths, and `viewport` names the outermost one.
@@ -22,12 +22,12 @@ use super::{
     },
 };
 
-/// Who moves the time.
+/// Who controls the time.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Time {
     /// The visitor, from step to step; at first it follows what comes.
     Shown,
-    /// The page, which has controls of its own.
+    /// The page, which has its own controls.
     Led,
 }
 
@@ -45,7 +45,7 @@ pub(super) struct View {
 }
 
 impl View {
-    /// A view of a class of Rerun's, `3D` say, with a title.
+    /// A view of one of Rerun's classes, such as `3D`, with a title.
     pub(super) fn new(class: &str, title: &str, origin: &EntityPath) -> Self {
         Self {
             archetype: ViewBlueprint::new(class).with_display_name(title).with_space_origin(origin.to_string()),
@@ -54,7 +54,7 @@ impl View {
         }
     }
 
-    /// Shows what these rules say, instead of all that is below the origin.
+    /// Shows what these rules select, instead of everything below the origin.
     pub(super) fn with_contents(mut self, rules: impl IntoIterator<Item = String>) -> Self {
         self.contents = rules.into_iter().collect();
         self
@@ -74,7 +74,7 @@ impl View {
     }
 }
 
-/// Views and containers side by side, or one behind the other.
+/// A container of views and containers, side by side or in tabs.
 pub(super) struct Container {
     archetype: ContainerBlueprint,
     contents: Vec<Part>,
@@ -89,7 +89,7 @@ impl Container {
         Self::new(ContainerKind::Horizontal, contents)
     }
 
-    /// One above the other; `shares` are their parts of the height.
+    /// A container of parts one above the other; `shares` are their parts of the height.
     pub(super) fn vertical<const N: usize>(contents: [Part; N], shares: [f32; N]) -> Self {
         let mut container = Self::new(ContainerKind::Vertical, contents);
         container.archetype = container.archetype.with_row_shares(shares);
@@ -132,7 +132,7 @@ impl From<Container> for Part {
     }
 }
 
-/// A blueprint's store as it is written.
+/// A blueprint's store while it is written.
 struct Blueprint {
     store: StoreId,
     messages: Vec<LogMsg>,
@@ -141,7 +141,7 @@ struct Blueprint {
     parts: u128,
 }
 
-/// A view or a container that is written.
+/// A view or a container that has been written.
 struct Written {
     id: Uuid,
     path: EntityPath,
@@ -183,7 +183,7 @@ impl Blueprint {
         Ok(())
     }
 
-    /// Whole: a viewer may take it up.
+    /// The finished blueprint, with the command that activates it.
     fn activated(mut self) -> Vec<LogMsg> {
         let command = BlueprintActivationCommand { blueprint_id: self.store, make_active: true, make_default: true };
         self.messages.push(command.into());

@@ -1,4 +1,4 @@
-//! What one learner's reports become.
+//! The entities of one learner, logged from its reports.
 
 use std::{cell::RefCell, collections::HashMap};
 
@@ -27,16 +27,16 @@ use body_schema_wire::{ChannelReading, Description, LearnerReport, MovementRepor
 /// The true arm: grey.
 pub(super) const TRUE_ARM: ArmLook =
     ArmLook { links: [0x84, 0x88, 0x90, 255], pins: [0x5C, 0x60, 0x68, 255], girth: 1.0 };
-/// A posture that is tried out: amber.
+/// The colour of a posture that is tried out: amber.
 const GHOST: [u8; 4] = [0xE6, 0xA1, 0x22, 110];
-/// How much thicker the estimated arm is than the true one, which is to be seen within it, and its opacity.
+/// How much thicker the estimated arm is drawn than the true one, which is visible inside it, and its opacity.
 const ESTIMATE: (f64, u8) = (1.22, 150);
-/// Opacity of what a learner believes of its uncertainty, for an arm of six joints: those of more lie more densely.
+/// Opacity of a learner's own ellipsoids, for an arm of six joints: those of longer arms lie more densely.
 const CLOUD: f64 = 48.0;
-/// Opacity of what its data allow.
+/// Opacity of the ellipsoids that its data allow.
 const ALLOWED: u8 = 150;
 
-/// What all learners are drawn with.
+/// The scenery that all learners share.
 pub(super) struct Scenery<'a> {
     pub(super) description: &'a Description,
     pub(super) stage: &'a Stage,
@@ -44,39 +44,39 @@ pub(super) struct Scenery<'a> {
     pub(super) truth: Option<&'a State>,
     /// Length of the arrows at θ = 0.
     pub(super) arrow_m: f64,
-    /// So many postures between two steps.
+    /// The number of postures drawn between two steps.
     pub(super) frames: u64,
 }
 
-/// The entities of one learner, and what they carry from step to step.
+/// The entities of one learner, with what they carry from step to step.
 pub(super) struct LearnerEntities {
     pub(super) colour: [u8; 3],
     pub(super) root: EntityPath,
     pub(super) metrics: Vec<EntityPath>,
-    /// Those below the root that were asked for: making a path takes longer than to log what stands there.
+    /// The paths below the root that were used so far: making a path takes longer than logging a row.
     paths: RefCell<HashMap<&'static str, EntityPath>>,
     uncertainty: Uncertainty,
     readings: Readings,
-    /// Its place in the row.
+    /// The learner's place in the row.
     index: usize,
-    /// Where the robot's base was thought to be at first, if it is learned: there bodies are drawn.
+    /// The first estimate of the robot's base, if the base is learned: bodies are drawn there.
     base: Option<Isometry3<f64>>,
-    /// What has moved it since.
+    /// The motion of the base since then.
     moved: Isometry3<f64>,
     /// What slices show: chosen at the first partition and kept, so that the picture does not jump from step to step.
     plane: Option<Plane>,
-    /// What the last step left to see.
+    /// What the last step left visible.
     shown: Option<Shown>,
     /// Whether a posture that was tried out is drawn.
     has_ghost: bool,
-    /// What its name says.
+    /// The label of its name.
     label: String,
     stopped: bool,
     failed: bool,
 }
 
 impl LearnerEntities {
-    /// Those of a learner, in its colour.
+    /// The entities of a learner, in its colour.
     pub(super) fn new(
         (index, colour, name): (usize, [u8; 3], &str),
         description: &Description,
@@ -103,7 +103,7 @@ impl LearnerEntities {
         }
     }
 
-    /// What no view of the arrangement shows, and the series behind the tabs.
+    /// The entities that no view of the arrangement shows, and the series behind the tabs.
     pub(super) fn hidden(&self) -> impl Iterator<Item = EntityPath> {
         let series = self.metrics.iter().zip(metrics::NAMES).filter(|(_, name)| !charts::shows(name));
         let others = ["direct/leaves", "zero/links", "zero/axes", "zero/directions"];
@@ -121,7 +121,7 @@ impl LearnerEntities {
         ArmLook { links: [red, green, blue, alpha], pins: [red, green, blue, 255], girth }
     }
 
-    /// Logs what stays: the place of the learner in the row, and its body. With a base that is learned, `base`, the place is
+    /// Logs what does not change: the learner's place in the row, and its body. With a learned base, `base`, the place is
     /// that of the first step.
     pub(super) fn begin(
         &mut self,
@@ -159,7 +159,7 @@ impl LearnerEntities {
         }
     }
 
-    /// Logs what a report says of the learner.
+    /// Logs a report of the learner.
     pub(super) fn log(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
         if std::mem::take(&mut self.has_ghost) {
             rows.after(step - 1, 1, &self.entity("arm/ghost"), &[&solid(&[])]);
@@ -180,7 +180,8 @@ impl LearnerEntities {
         }
     }
 
-    /// Where the robot stands, if that is learned: it stays in its place in the row, and the frame of the measurements moves.
+    /// Logs where the robot stands, if that is learned: the robot stays in its place in the row, and the frame of the
+    /// measurements moves.
     fn log_base(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
         let Some(first) = self.base else { return };
         let Some(base) = report.estimate.base_frame() else { return };
@@ -195,13 +196,13 @@ impl LearnerEntities {
         }
     }
 
-    /// The way from the last step to this one, as it was believed and as it was.
+    /// Logs the motion from the last step to this one, as believed and as it was.
     fn log_between(&self, rows: &mut Rows, step: u64, movement: Option<&MovementReport>, scenery: &Scenery<'_>) {
         let (Some(shown), Some(movement)) = (&self.shown, movement) else { return };
         shown.log_way(rows, step, &movement.configuration, scenery, self);
     }
 
-    /// The arm at θ = 0.
+    /// Logs the arm at θ = 0.
     fn log_at_zero(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
         let (colour, joints, arrow_m) = (self.colour, scenery.description.joints.as_slice(), scenery.arrow_m);
         let model = &report.estimate;
@@ -215,7 +216,8 @@ impl LearnerEntities {
         }
     }
 
-    /// The true and the estimated arm in the configuration of the movement, and how uncertain the estimate is there.
+    /// Logs the true and the estimated arm in the configuration of the movement, and the uncertainty of the estimate
+    /// there.
     fn log_arms(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
         let (joints, reach_m) = (scenery.description.joints.as_slice(), scenery.stage.figure.reach_m);
         let model = &report.estimate;
@@ -272,7 +274,7 @@ impl LearnerEntities {
         self.shown = Some(Shown { step, configuration, estimate, points, allowed, has_outlier });
     }
 
-    /// The trunk, if joints of the chain carry it; so many ticks after the step.
+    /// Logs the trunk, if joints of the chain carry it, at `ticks` after the step.
     pub(super) fn log_trunk(&self, rows: &mut Rows, step: u64, ticks: u64, posture: &Posture, stage: &Stage) {
         let Some(link) = posture.links.get(stage.figure.carried_by).filter(|_| !stage.figure.trunk.is_empty()) else {
             return;
@@ -353,7 +355,7 @@ fn transform(pose: &Isometry3<f64>) -> Transform3D {
         .with_quaternion(quaternion(&pose.rotation))
 }
 
-/// Opacity of the clouds of an arm of so many joints.
+/// The opacity of the ellipsoids of an arm with so many joints.
 fn opacity(joints: usize) -> u8 {
     (CLOUD * (6.0 / joints.max(6) as f64).powf(0.7)) as u8
 }

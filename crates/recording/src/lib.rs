@@ -1,4 +1,4 @@
-//! Runs kept for later: as Rerun recordings (.rrd), live or in a file, and as csv.
+//! Recordings of runs: as Rerun recordings (.rrd), live or in a file, and as CSV.
 //!
 //! A [`Recorder`] observes the [`Description`](body_schema_wire::Description) and every
 //! [`StepReport`](body_schema_wire::StepReport) of an experiment, and reads nothing else. It writes to a file, to a
@@ -6,9 +6,9 @@
 //!
 //! # Entities
 //!
-//! All on the timeline `step`, a sequence. Positions are in metres (f32), below `/{learner}` in the frame of the
-//! measurements, which stands beside those of the others; scalars are f64. `{learner}` is the learner's name in the
-//! scenario. "As shown" means in the configuration of the step's movement; at step 0, as near to θ = 0 as limits allow.
+//! All on the timeline `step`, a sequence. Positions are in metres (f32), below `/{learner}` in the frame of the measurements, which stands
+//! beside those of the others; scalars are f64. `{learner}` is the learner's name in the scenario. "As shown" means in the configuration of
+//! the step's movement; at step 0, as near to θ = 0 as limits allow.
 //!
 //! | entity | archetype | what |
 //! |---|---|---|
@@ -48,17 +48,16 @@
 //! | `/limits/best_design_trace` | Scalars, SeriesLines | the best designs of 5, 10, 20, … movements, beside the traces; only with `run --limits` |
 //! | `/{learner}/failure` | TextLog | why the learner stopped, once, if it did |
 //!
-//! The ellipsoid entities also carry the covariances themselves as `covariances`: nine f64 per instance, row by row, as
-//! shown (those of directions at θ = 0). Where a report holds null nothing is logged. `/` holds the view coordinates,
-//! `/__properties` the name of the recording.
+//! The ellipsoid entities also carry the covariances themselves as `covariances`: nine f64 per instance, row by row, as shown (those of
+//! directions at θ = 0). Where a report holds null nothing is logged. `/` holds the view coordinates, `/__properties` the name of the
+//! recording.
 //!
 //! # Live
 //!
-//! A [`LiveLog`] has a second timeline, `motion`, on which step k is at [`MOTION_PER_STEP`] k. Between two steps it may
-//! hold postures on the way from one to the next (`arm/…`, the ellipsoids and `body/trunk` moved, the markers empty), and
-//! after a step `/{learner}/arm/ghost`, a posture that is tried out. The timeline `complete` reaches k as soon as all rows
-//! of step k have come: a viewer that goes there earlier shows one learner's arm and another's last one. None of this is in
-//! files and downloads.
+//! A [`LiveLog`] has a second timeline, `motion`, on which step k is at [`MOTION_PER_STEP`] k. Between two steps it may hold postures on
+//! the way from one to the next (`arm/…`, the ellipsoids and `body/trunk` moved, the markers empty), and after a step
+//! `/{learner}/arm/ghost`, a posture that is tried out. The timeline `complete` reaches k as soon as all rows of step k have come: a viewer
+//! that goes there earlier shows one learner's arm and another's last one. None of this is in files and downloads.
 //!
 //! # Compatibility
 //!
@@ -132,8 +131,8 @@ pub const MOTION: &str = "motion";
 /// The timeline of a live recording, and the entity on it, that tells up to which step it is whole.
 pub const COMPLETE: &str = "complete";
 
-/// So many ticks of [`MOTION`] are from one step to the next.
+/// The number of ticks of [`MOTION`] from one step to the next.
 pub const MOTION_PER_STEP: u64 = 32;
 
-/// At most so many postures are drawn between two steps.
+/// The most postures that are drawn between two steps.
 pub const MOST_FRAMES: u64 = 30;

@@ -1,4 +1,4 @@
-//! A recording that is followed while it grows.
+//! A recording that can be followed while it grows.
 
 use std::{
     io::Write,
@@ -18,14 +18,14 @@ use super::{
     rerun::LogMsg,
 };
 
-/// How large a part is that is put together of others.
+/// The most bytes of a part that is put together.
 const MOST_TOGETHER_BYTES: usize = 1 << 18;
-/// So many bytes of parts are taken apart at a time, to be put together: decoded they take some ten times as much.
+/// The most bytes of parts that are decoded at a time for compaction; decoded they take some ten times as much.
 const TAKEN_APART_BYTES: usize = 4 << 20;
 
 /// A growing log of encoded parts, in memory, for any number of readers at any speed. Clones share one log.
 ///
-/// Part 0 is the 12-byte header of an .rrd stream; every further part is one message, but for one that holds all
+/// Part 0 is the 12-byte header of an .rrd stream; every further part is one message, except the one that holds all
 /// messages of the arrangement of views. The parts in order are a valid stream at every moment, without a footer; a
 /// reader that takes single parts puts the header before each. Reader loops hold the index of their next part:
 ///
@@ -58,12 +58,12 @@ struct Shared {
 #[derive(Default)]
 struct State {
     parts: Vec<Bytes>,
-    /// The arrangement of views: its part, and what a page that has curves of its own takes in its place.
+    /// The arrangement of views: its part, and the replacement for a page that has curves of its own.
     scene: Option<(usize, Bytes)>,
-    /// What arranges the views of a page anew.
+    /// The arranger of the views of a page.
     arranger: Option<Arc<Arranger>>,
     bytes: usize,
-    /// Steps wait that it would have if anybody had followed it.
+    /// Whether steps wait that would have been written if anybody had followed the log.
     behind: bool,
     closed: bool,
 }
@@ -102,12 +102,12 @@ impl LiveLog {
         state.parts.get(index..end).map(<[Bytes]>::to_vec).unwrap_or_default()
     }
 
-    /// The same for a page that has curves of its own: the views are arranged for the scene alone.
+    /// The parts from `index` on, with the views arranged for the scene alone, for a page that has curves of its own.
     pub fn scene_parts_from(&self, index: usize) -> Vec<Bytes> {
         self.scene_batch_from(index, usize::MAX)
     }
 
-    /// The same, at most `most` of them.
+    /// The parts from `index` on, at most `most` of them, with the views arranged for the scene alone.
     pub fn scene_batch_from(&self, index: usize, most: usize) -> Vec<Bytes> {
         let mut parts = self.batch_from(index, most);
         if let Some((place, scene)) = &self.state().scene
@@ -129,16 +129,16 @@ impl LiveLog {
         self.state().bytes
     }
 
-    /// Is woken when parts are appended and when the log is closed; its value is the number of parts. Whoever holds it
-    /// follows the log.
+    /// A receiver that is woken when parts are appended and when the log is closed; its value is the number of parts.
+    /// Whoever holds it follows the log.
     pub fn subscribe(&self) -> watch::Receiver<usize> {
         // Under the lock: who comes after steps were left waiting sees that they were.
         let _state = self.state();
         self.shared.length.subscribe()
     }
 
-    /// Whether steps may wait because nobody follows the log. It is then said to be [behind](Self::is_behind) until the
-    /// recorder has written all that views show.
+    /// Whether steps may wait because nobody follows the log. The log then counts as [behind](Self::is_behind) until
+    /// the recorder has written everything that views show.
     pub fn may_wait(&self) -> bool {
         let mut state = self.state();
         let may_wait = self.shared.length.receiver_count() == 0;
@@ -147,7 +147,7 @@ impl LiveLog {
         may_wait
     }
 
-    /// Says that nothing waits any more, after all that did was appended or could not be.
+    /// Marks that no step waits any more: each was appended or could not be.
     pub(super) fn catch_up(&self) {
         if std::mem::take(&mut self.state().behind) {
             self.shared.length.send_modify(|_| ());
@@ -159,7 +159,7 @@ impl LiveLog {
         self.state().behind
     }
 
-    /// Waits until it is not [behind](Self::is_behind), or closed. Cancelling loses nothing.
+    /// Waits until the log is not [behind](Self::is_behind), or is closed. Cancelling loses nothing.
     pub async fn caught_up(&self) {
         if self.is_behind() {
             let mut length = self.subscribe();
@@ -168,7 +168,7 @@ impl LiveLog {
         }
     }
 
-    /// Says that nothing more will come, so that readers end. What is there stays readable.
+    /// Closes the log, so that readers end. Its parts stay readable.
     pub fn close(&self) {
         self.state().closed = true;
         self.shared.length.send_modify(|_| ());
@@ -179,14 +179,18 @@ impl LiveLog {
         self.state().closed
     }
 
-    /// Encodes messages and appends them, one part each; on an error none. A closed log ignores them.
+    /// Encodes messages and appends them, one part each. A closed log ignores them.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if a message cannot be encoded; then none is appended.
     pub fn append(&self, messages: &[LogMsg]) -> Result<(), RecordingError> {
         let parts = messages.iter().map(encode).collect::<Result<Vec<_>, _>>()?;
         self.push(parts, None);
         Ok(())
     }
 
-    /// Appends the arrangement of views, as one part: the whole one, and that of the scene alone.
+    /// Appends the arrangement of views as one part, with the replacement of the scene alone.
     pub(super) fn append_arrangement(&self, whole: &[LogMsg], arranger: Arranger) -> Result<(), RecordingError> {
         let (whole, scene) = (encode_all(whole)?, encode_all(&arranger.scene(Theme::Light, Shape::Wide.aspect())?)?);
         self.state().arranger = Some(Arc::new(arranger));
@@ -194,8 +198,12 @@ impl LiveLog {
         Ok(())
     }
 
-    /// An arrangement of views for a page: the scene alone, in light or dark, for a view this many times as wide as high. A stream of its
-    /// own, which a viewer that has the recording takes up whatever became of its last one. `None` before step 0.
+    /// An arrangement of views for a page: the scene alone, in light or dark, for a view this many times as wide as high. It is a stream
+    /// of its own, which a viewer that has the recording adopts whatever its last arrangement was. `None` before step 0.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if the arrangement cannot be encoded.
     pub fn blueprint(&self, theme: Theme, aspect: f64) -> Result<Option<Bytes>, RecordingError> {
         let arranger = self.state().arranger.clone();
         let Some(arranger) = arranger else { return Ok(None) };
@@ -203,7 +211,7 @@ impl LiveLog {
         Ok(Some([self.header(), messages].concat().into()))
     }
 
-    /// Appends parts, the first of which a page may take otherwise. A closed log ignores them.
+    /// Appends parts; `scene` replaces the first for a page with curves of its own. A closed log ignores them.
     fn push(&self, parts: Vec<Bytes>, scene: Option<Bytes>) {
         let mut state = self.state();
         if state.closed {
@@ -218,26 +226,26 @@ impl LiveLog {
         self.shared.length.send_replace(state.parts.len());
     }
 
-    /// Everything so far as a finished .rrd file: the many small chunks of a live session put together, the steps alone,
-    /// with a footer.
+    /// Everything so far as a finished .rrd file with a footer: only the steps, with the many small chunks of a live
+    /// session put together.
     ///
-    /// Takes about as long as it took to encode the session: run it where it may block.
+    /// This takes about as long as it took to encode the session; run it where it may block.
     ///
     /// # Errors
     ///
-    /// [`RecordingError`] where it cannot be encoded.
+    /// [`RecordingError::Encode`] if a part cannot be decoded or encoded again.
     pub fn complete(&self) -> Result<Vec<u8>, RecordingError> {
         let mut bytes = Vec::new();
         self.complete_to(&mut bytes, self.len())?;
         Ok(bytes)
     }
 
-    /// The same, of the first `parts`, written as it is put together: however long the recording, little more of it is in memory than
-    /// there is anyway.
+    /// Writes the first `parts` as a finished .rrd file, as [`complete`](Self::complete) does, while they are put together: memory
+    /// use hardly grows with the recording's length.
     ///
     /// # Errors
     ///
-    /// [`RecordingError`] where it cannot be encoded or written.
+    /// [`RecordingError`] if a part cannot be decoded or encoded again, or the output refuses it.
     pub fn complete_to(&self, writer: impl Write, parts: usize) -> Result<(), RecordingError> {
         let failed = |source| failure(Path::new("that is put together"), false, source);
         let encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, writer);
@@ -251,11 +259,15 @@ impl LiveLog {
         encoder.finish().map_err(failed)
     }
 
-    /// Some of its parts, without the header, as few: the many small chunks of a live session put together. Readers that are
-    /// far behind take in a few large parts much faster than a thousand small ones. Each is of whole messages, and has about
-    /// 256 KiB at most unless a single row is larger.
+    /// Puts some of its parts, without the header, together into a few: readers that are far behind read a few large parts
+    /// much faster than a thousand small ones. Each consists of whole messages, and has at most about 256 KiB unless a
+    /// single row is larger.
     ///
-    /// Takes about as long as it took to encode the parts: run it where it may block.
+    /// This takes about as long as it took to encode the parts; run it where it may block.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError`] if the parts cannot be decoded or encoded again.
     pub fn put_together(&self, parts: &[Bytes]) -> Result<Vec<Bytes>, RecordingError> {
         let mut together: Vec<Vec<u8>> = Vec::new();
         for few in in_few(parts) {
@@ -282,7 +294,7 @@ impl Default for LiveLog {
     }
 }
 
-/// The parts in groups, each of so few bytes that it may be taken apart at once.
+/// The parts in groups with so few bytes that each group may be decoded at once.
 fn in_few(parts: &[Bytes]) -> impl Iterator<Item = &[Bytes]> {
     let mut rest = parts;
     std::iter::from_fn(move || {

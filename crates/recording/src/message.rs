@@ -1,8 +1,8 @@
 //! Messages of a recording or a blueprint, made without Rerun's stream.
 //!
-//! A `RecordingStream` comes with threads of its own, which those with a memory sink leave behind, reports errors to a
-//! log, and falls silent when the environment says `RERUN=off`. A recording here is asked for by name, so that it is
-//! made of the messages themselves.
+//! A `RecordingStream` starts threads, which one with a memory sink leaves behind, reports errors to a log, and writes
+//! nothing when the environment says `RERUN=off`. Recordings here must be written whenever they are asked for, so they
+//! are made of the messages themselves.
 
 use super::{
     RecordingError,
@@ -10,7 +10,7 @@ use super::{
     rerun::{Chunk, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource},
 };
 
-/// The first message of a store: what it is.
+/// The first message of a store, which describes it.
 pub(super) fn store_info(store: &StoreId) -> LogMsg {
     let info = StoreInfo::new(store.clone(), StoreSource::Other("body-schema".to_owned()));
     SetStoreInfo { row_id: *RowIds::of_store(store), info }.into()

@@ -1,4 +1,4 @@
-//! The series of a learner: every metric, and what is known of the choice of its movement.
+//! The series of a learner: every metric, and the figures of its choice of movement.
 
 use body_schema_wire::LearnerReport;
 

@@ -13,7 +13,7 @@ pub(super) fn links(points_m: &[[f64; 3]]) -> Vec<Cell> {
     vec![(LineStrips3D::descriptor_strips(), line)]
 }
 
-/// How such lines look.
+/// The look of such lines.
 pub(super) fn links_look(colour: [u8; 3]) -> LineStrips3D {
     LineStrips3D::update_fields().with_colors([Color::from(colour)]).with_radii([Radius::new_ui_points(2.0)])
 }
@@ -28,7 +28,7 @@ pub(super) fn axes(model: &ModelReport, length_m: f64) -> Vec<Cell> {
     ]
 }
 
-/// How such arrows look.
+/// The look of such arrows.
 pub(super) fn axes_look(joints: &[JointDescription], colour: [u8; 3]) -> Arrows3D {
     Arrows3D::update_fields()
         .with_colors([Color::from(colour)])
@@ -37,7 +37,7 @@ pub(super) fn axes_look(joints: &[JointDescription], colour: [u8; 3]) -> Arrows3
         .with_show_labels(false)
 }
 
-/// Where the arrows stand. A prismatic joint has no point: its arrow stands at the next joint's, or at the marker.
+/// The places of the arrows. A prismatic joint has no point: its arrow stands at the next joint's, or at the marker.
 pub(super) fn origins(model: &ModelReport) -> Vec<[f64; 3]> {
     let mut next = model.marker_m;
     let mut origins: Vec<[f64; 3]> = (model.joints.iter().rev())

@@ -1,4 +1,4 @@
-//! What a step showed: the marker as predicted, as seen, and how far apart.
+//! The markers of a step: predicted, measured, and the error between them.
 
 use std::sync::Arc;
 
@@ -9,14 +9,14 @@ use super::{
 };
 use body_schema_wire::{ChannelReading, MovementReport};
 
-/// The colour of a measurement; no learner's, and it shows on dark and on light ground.
+/// The colour of a measurement, which no learner has and which shows on dark and on light backgrounds.
 pub(super) const MEASURED: [u8; 3] = [0xE6, 0xB4, 0x22];
 /// The colour of an error, and of a marker that was not seen.
 pub(super) const ERROR: [u8; 3] = [0xD6, 0x3B, 0x3B];
 /// Radius of a marker and of the line of an error, as parts of the arm's reach.
 const MARKER: f64 = 0.048;
 const LINE: f64 = 0.011;
-/// What markers are labelled with, the last for all to see.
+/// The labels of markers, the last for all to see.
 pub(super) const PREDICTED: &str = "predicted";
 pub(super) const SEEN: &str = "seen";
 pub(super) const NOT_SEEN: &str = "not seen";
@@ -27,7 +27,7 @@ const CROSS: f64 = 0.1;
 pub(super) struct Movement {
     pub(super) predicted: [Cell; 1],
     pub(super) measured: [Cell; 1],
-    /// From the one to the other, labelled with its length.
+    /// The line from the predicted to the measured marker, labelled with its length.
     pub(super) error: [Cell; 2],
     /// A cross where the learner takes what was measured for an outlier; `None` if it weighs no readings.
     pub(super) outlier: Option<LineStrips3D>,
@@ -36,7 +36,7 @@ pub(super) struct Movement {
 }
 
 impl Movement {
-    /// Of a report; `None` for a learner that has stopped, or whose arm is on its way.
+    /// The entities of a report; empty for a learner that has stopped, or whose arm is moving.
     pub(super) fn of(report: Option<&MovementReport>, reach_m: f64) -> Self {
         let predicted = report.map(|report| report.predicted_marker_m).filter(finite);
         let measured = report.and_then(|report| report.measured_marker_m);
@@ -66,7 +66,7 @@ impl Movement {
     }
 }
 
-/// How a marker looks.
+/// The look of a marker.
 pub(super) fn marker_look(colour: [u8; 3], label: &str, reach_m: f64) -> Points3D {
     Points3D::update_fields()
         .with_colors([Color::from(colour)])
@@ -75,7 +75,7 @@ pub(super) fn marker_look(colour: [u8; 3], label: &str, reach_m: f64) -> Points3
         .with_show_labels(label == NOT_SEEN)
 }
 
-/// How the line of an error looks.
+/// The look of the line of an error.
 pub(super) fn error_look(colour: [u8; 3], reach_m: f64) -> LineStrips3D {
     LineStrips3D::update_fields()
         .with_colors([Color::from(colour)])
@@ -83,7 +83,7 @@ pub(super) fn error_look(colour: [u8; 3], reach_m: f64) -> LineStrips3D {
         .with_show_labels(true)
 }
 
-/// Three lines that cross.
+/// A cross of three lines.
 fn cross(place: Option<[f64; 3]>, reach_m: f64) -> LineStrips3D {
     let arm = CROSS * reach_m;
     let strips = place.into_iter().flat_map(|place| {
@@ -100,7 +100,7 @@ fn finite(point: &[f64; 3]) -> bool {
     point.iter().all(|x| x.is_finite())
 }
 
-/// A distance as people say it.
+/// A distance in a unit that reads well.
 fn off(distance_m: f64) -> String {
     if distance_m < 1.0 { format!("{:.0} mm off", distance_m * 1e3) } else { format!("{distance_m:.1} m off") }
 }

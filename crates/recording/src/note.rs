@@ -1,4 +1,4 @@
-//! The note that goes with a recording: what it shows, and how to make it again.
+//! The note of a recording: what it shows, and how to reproduce it.
 
 use body_schema_palette::{hex, learner_color, learner_slots};
 use std::fmt::Write as _;
@@ -35,7 +35,7 @@ const LIMITS: &str = "- **Limits** beside the trace: `bound_trace`, pale, is the
 const ALLOWED: &str = "- **Small, more solid clouds** within the pale ones: what the data allow. The learner's own covariance is \
                        kept larger by its stabilising noise.\n";
 
-/// What the colours mean, as a label in the scene.
+/// The key to the colours, as a label in the scene.
 pub(super) fn key(description: &Description, place: Point3<f64>) -> Points3D {
     let truth = description.truth.as_ref().map(|_| "grey: the true arm");
     let learners = ["colour: the arm as believed", "cloud: how unsure", "yellow: the hand as seen"];
@@ -47,7 +47,7 @@ pub(super) fn key(description: &Description, place: Point3<f64>) -> Points3D {
         .with_show_labels(true)
 }
 
-/// The note, in markdown.
+/// The note, in Markdown.
 pub(super) fn note(description: &Description, ellipsoids: EllipsoidSize) -> TextDocument {
     TextDocument::new(markdown(description, ellipsoids)).with_media_type(MediaType::markdown())
 }

@@ -1,4 +1,4 @@
-//! DIRECT's partition of the joint box: a slice to look at, and all of it as data.
+//! DIRECT's partition of the joint box: a slice as a picture, and all of it as data.
 
 use super::{
     rerun::{
@@ -24,10 +24,10 @@ const CHOSEN: [u8; 3] = [0xD5, 0x5E, 0x00];
 /// Pixels along each side of the picture of a slice: sides trisected up to four times fit exactly.
 const PIXELS: usize = 81;
 
-/// How bright the fill of a face is beside its outline.
+/// The brightness of the fill of a face relative to its outline.
 const FILL: f64 = 0.5;
 
-/// Where the box that was searched is in a slice of the joint box: its least corner and its sides, of the square's 1.
+/// The place of the searched box in a slice of the joint box: its least corner and its sides, as parts of the square's.
 struct Window {
     plane: Plane,
     corner: [f64; 2],
@@ -85,7 +85,7 @@ pub(super) fn frame(plane: Plane, joints: &[JointDescription]) -> [Box<dyn AsCom
     ]
 }
 
-/// What is drawn of a slice.
+/// The drawing of a slice.
 pub(super) struct Slice {
     fill: Vec<Cell>,
     outlines: Vec<Cell>,
@@ -94,7 +94,7 @@ pub(super) struct Slice {
 }
 
 impl Slice {
-    /// The slice of a partition through its chosen rectangle, in the joint box; `None` if it has none.
+    /// The slice of a partition through its chosen rectangle, in the joint box; `None` without a chosen one.
     pub(super) fn of(partition: &Partition, plane: Plane, joints: &[JointDescription]) -> Option<Self> {
         let chosen = partition.leaves.get(partition.chosen)?;
         let (window, colour) = (Window::of(partition, plane, joints), scale(partition));
@@ -148,7 +148,7 @@ impl Slice {
     }
 }
 
-/// A rectangle as it is drawn.
+/// A rectangle in the drawing.
 struct Face<'a> {
     leaf: &'a Leaf,
     /// Its centre and half-sizes in the slice.
@@ -178,7 +178,7 @@ fn fill(faces: impl Iterator<Item = (([f32; 2], [f32; 2]), [u8; 3])>) -> Vec<u8>
     pixels
 }
 
-/// Puts the picture of a slice on the unit square.
+/// The transform that puts the picture of a slice on the unit square.
 pub(super) fn fill_transform() -> Transform3D {
     let pixel = 1.0 / PIXELS as f32;
     Transform3D::from_scale([pixel, pixel, 1.0])

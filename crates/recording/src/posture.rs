@@ -1,4 +1,4 @@
-//! An arm in one configuration: where its joints are, and how its links have turned.
+//! An arm in one configuration: the places of its joints, and the motions of its links.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -7,26 +7,26 @@ use body_schema_engine::model::State;
 
 /// Radius of the first link, as a part of the arm's reach; links taper towards the hand.
 const GIRTH: f64 = 0.042;
-/// How much thinner the last link is.
+/// How much thinner the last link is than the first.
 const TAPER: f64 = 0.4;
 /// Half the length and the radius of the pin that shows a joint's axis, in radii of the link.
 const PIN: [f64; 2] = [1.75, 0.5];
 
-/// How an arm is drawn.
+/// The look of an arm.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ArmLook {
-    /// Of the links.
+    /// The colour of the links.
     pub(super) links: [u8; 4],
-    /// Of the pins.
+    /// The colour of the pins.
     pub(super) pins: [u8; 4],
     /// How thick it is, 1 for the true arm.
     pub(super) girth: f64,
 }
 
-/// An arm as it stands.
+/// An arm at a posture.
 #[derive(Clone, Debug)]
 pub(super) struct Posture {
-    /// What the joints before link i have done to it; link 0 is the base.
+    /// The motion of each link i by the joints before it; link 0 is the base.
     pub(super) links: Vec<Isometry3<f64>>,
     /// A point on the axis of every joint, and its direction. A prismatic joint has no point: it stands at the next
     /// joint's, or at the marker.
@@ -80,7 +80,7 @@ pub(super) fn bare(points_m: &[[f64; 3]], reach_m: f64, colour: [u8; 4]) -> Vec<
     points_m.windows(2).map(link).collect()
 }
 
-/// Between two configurations, `time` in 0..=1 of the way: slow at both ends.
+/// The configuration between two others, at `time` in 0..=1 of the way, slow at both ends.
 pub(super) fn between(from: &[f64], to: &[f64], time: f64) -> Vec<f64> {
     let way = time * time * (3.0 - 2.0 * time);
     from.iter().zip(to).map(|(from, to)| from + way * (to - from)).collect()

@@ -1,4 +1,4 @@
-//! The series of readings: how far each is from the estimate, and how likely an outlier.
+//! The series of readings: their residuals, and the probability that they are outliers.
 
 use super::{
     rerun::{Color, EntityPath, EntityPathPart, SeriesLines},
@@ -12,7 +12,7 @@ pub(super) struct Readings {
 }
 
 impl Readings {
-    /// Below the root of a learner.
+    /// The series below the root of a learner.
     pub(super) fn new(root: &EntityPath, description: &Description) -> Self {
         let series = |name: &str| {
             ["residuals", "outliers"].map(|kind| {
@@ -29,7 +29,7 @@ impl Readings {
         self.channels.iter().flatten()
     }
 
-    /// Logs how the series look: in the learner's colour, named by it, and where there are several by their channel.
+    /// Logs the look of the series: in the learner's colour, named by it, and where there are several by their channel.
     pub(super) fn begin(&self, rows: &mut Rows, name: &str, colour: [u8; 3], description: &Description) {
         for (series, channel) in self.channels.iter().zip(&description.channels) {
             let name = match description.channels.as_slice() {
@@ -41,7 +41,7 @@ impl Readings {
         }
     }
 
-    /// Logs what there was to read; nothing for a miss.
+    /// Logs the readings of a step; nothing for a miss.
     pub(super) fn log(&self, rows: &mut Rows, step: u64, readings: &[ChannelReading]) {
         for (reading, [residuals, outliers]) in
             readings.iter().filter_map(|it| Some((it, self.channels.get(it.channel)?)))

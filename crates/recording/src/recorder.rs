@@ -1,4 +1,4 @@
-//! The observer that records.
+//! The recorder of an experiment.
 
 use body_schema_palette::{learner_color, learner_slots};
 use std::{collections::HashSet, sync::atomic::AtomicU64, time::Duration};
@@ -24,55 +24,56 @@ use super::{
 use body_schema_engine::{design::BestDesign, model::State};
 use body_schema_wire::{Description, LearnerDescription, ModelReport, StepReport};
 
-/// So many steps are written at once unless somebody flushes earlier: a message costs more than the rows in it …
+/// The most steps that are gathered before they are written: a message costs more than the rows in it. They are written
+/// earlier when flushed, …
 const BATCH_STEPS: usize = 256;
 
-/// … or so many rectangles of partitions, some tens of megabytes, …
+/// … when so many rectangles of partitions have gathered, some tens of megabytes, …
 const BATCH_RECTANGLES: usize = 200_000;
 
-/// … or steps take so long that a process that is killed would lose a while.
+/// … or when this time has passed, so that a process that is killed loses little.
 const BATCH_TIME: Duration = Duration::from_secs(2);
 
-/// Of an entity with large rows, as pictures are, so many bytes are written at once: the memory is used again while the
-/// processor's cache still holds it, and a server has many recorders.
+/// The bytes of an entity with large rows, such as pictures, at which they are written at once: the memory is used
+/// again while the processor's cache still holds it, and a server has many recorders.
 const LARGE_BYTES: usize = 1 << 18;
 
 /// Length of the arrows at θ = 0, as a part of the reach of the arm.
 const ARROW: f64 = 0.22;
-/// By how much farther out than believed a hand that nobody knows has room, as a part of the reach.
+/// How much farther out than believed a hand of unknown place may be, as a part of the reach.
 const FARTHER: f64 = 0.6;
 
 /// Records an experiment, as the module's documentation lists it.
 ///
 /// Steps are gathered and written 256 at a time, at least every other second, or when [`flush`](Self::flush) is called. A live
 /// view that wants to be up to date calls [`flush_shown`](Self::flush_shown). [`finish`](Self::finish) writes what is left and
-/// the file's footer (its index); dropping the recorder does the same, but has nobody to tell of errors.
+/// the file's footer (its index); dropping the recorder does so too, but cannot report errors.
 ///
-/// If the process is killed, the file holds everything up to the last batch. Viewers open it; `rerun rrd verify`
-/// complains of the missing footer, which `rerun rrd optimize` adds.
+/// If the process is killed, the file holds everything up to the last batch. Viewers open it; `rerun rrd verify` complains of
+/// the missing footer, which `rerun rrd optimize` adds.
 ///
 /// # The partition
 ///
-/// `/{learner}/direct/leaves` holds all rectangles of a step as components of plain numbers: `dimension` n, then for
-/// each rectangle `centres` (n f64 in the unit cube), `levels` (n u8, side i is 3^−levelᵢ long), `values` (f64, NaN if
-/// the criterion was not finite), `generations` (u32), `potentially_optimal` (bool); `chosen` is the index of the
-/// rectangle whose centre is the chosen configuration.
+/// `/{learner}/direct/leaves` holds all rectangles of a step as components of plain numbers: `dimension` n, then for each
+/// rectangle `centres` (n f64 in the unit cube), `levels` (n u8, side i is 3^−levelᵢ long), `values` (f64, NaN if the
+/// criterion was not finite), `generations` (u32), `potentially_optimal` (bool); `chosen` is the index of the rectangle whose
+/// centre is the chosen configuration.
 ///
-/// The slice in `direct/boxes` is the plane through the chosen configuration along two joints, in units of their
-/// limits: x = centre of the one, y = 1 − centre of the other, because Rerun draws y downwards and upper limits belong
-/// on top. The two are the joints that the first partition divides most, and stay the same over the recording.
+/// The slice in `direct/boxes` is the plane through the chosen configuration along two joints, in units of their limits: x =
+/// centre of the one, y = 1 − centre of the other, because Rerun draws y downwards and upper limits belong on top. The two are
+/// the joints that the first partition divides most, and stay the same over the recording.
 pub struct Recorder {
     description: Description,
     store: StoreId,
     rows: Rows,
-    /// What the arrangement of views does not show at first.
+    /// The entities that the arrangement of views does not show at first.
     hidden: HashSet<EntityPath>,
     file: Option<RrdFile>,
-    /// Why the file lacks what the log has.
+    /// The error because of which the file lacks steps that the log has.
     file_failure: Option<String>,
     live: Option<LiveLog>,
     learners: Vec<LearnerEntities>,
-    /// Where all stand; known from the first report on.
+    /// The places of all learners; known from the first report on.
     stage: Option<Stage>,
     /// The true arm, where it is known.
     truth: Option<State>,
@@ -85,7 +86,12 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Opens the target and records what stays the same.
+    /// Opens the target and records the static entities.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Create`] if the file cannot be created, [`RecordingError::Encode`] if the static entities
+    /// cannot be encoded.
     pub fn new(description: &Description, target: Target) -> Result<Self, RecordingError> {
         let Target { file, grows, live, recording_id, ellipsoids } = target;
         let create = if grows { RrdFile::create_growing } else { RrdFile::create };
@@ -136,11 +142,21 @@ impl Recorder {
     }
 
     /// Records a step. Steps come in order; the first one is step 0.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if the step cannot be encoded; [`RecordingError::Write`] if the file cannot be
+    /// written and there is no live log.
     pub fn log(&mut self, report: &StepReport) -> Result<(), RecordingError> {
         self.log_moving(report, 0)
     }
 
-    /// Records a step, and for those who watch live so many postures on the way to it (at most [`MOST_FRAMES`]).
+    /// Records a step, and for live viewers `frames` postures on the way to it (at most [`MOST_FRAMES`]).
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if the step cannot be encoded; [`RecordingError::Write`] if the file cannot be
+    /// written and there is no live log.
     pub fn log_moving(&mut self, report: &StepReport, frames: u64) -> Result<(), RecordingError> {
         let stage = match self.stage.take() {
             Some(stage) => stage,
@@ -166,7 +182,7 @@ impl Recorder {
         if is_full || self.flushed.elapsed() >= BATCH_TIME { self.flush() } else { self.write_large() }
     }
 
-    /// Writes the rows of entities of which much waits.
+    /// Writes the rows of entities with many waiting bytes.
     fn write_large(&mut self) -> Result<(), RecordingError> {
         if !self.rows.has_large(LARGE_BYTES) {
             return Ok(());
@@ -183,8 +199,12 @@ impl Recorder {
         self.settle(file).and(live)
     }
 
-    /// Draws an arm through these points (axis points in order, then the marker, metres) beside the learner's, for those
-    /// who watch live: a posture that is tried out after `step`. `None` clears it, and so does the learner's next step.
+    /// Draws an arm through these points (axis points in order, then the marker, metres) beside the learner's, for live
+    /// viewers: a posture that is tried out after `step`. `None` clears it, and so does the learner's next step.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if the drawing cannot be encoded for the live log.
     pub fn log_ghost(
         &mut self,
         step: u64,
@@ -197,8 +217,13 @@ impl Recorder {
         self.flush_shown()
     }
 
-    /// Records the best designs of several lengths, each at the step at which as many movements are made. At any time
-    /// before the end.
+    /// Records the best designs of several lengths, each at the step at which as many movements are made. It may be
+    /// called at any time before the end.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if the curve cannot be encoded; [`RecordingError::Write`] if the file cannot be
+    /// written and there is no live log.
     pub fn log_best_designs(&mut self, designs: &[BestDesign]) -> Result<(), RecordingError> {
         if designs.is_empty() {
             return Ok(());
@@ -213,7 +238,12 @@ impl Recorder {
         self.flush()
     }
 
-    /// Writes the steps that wait. When this returns they are in the log, and with the operating system.
+    /// Writes the waiting steps to the log, and hands them to the operating system.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if a step cannot be encoded; [`RecordingError::Write`] if the file cannot be written
+    /// and there is no live log.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         (self.waiting_steps, self.waiting_rectangles, self.flushed) = (0, 0, Instant::now());
         let live = self.publish(&HashSet::new());
@@ -228,10 +258,13 @@ impl Recorder {
         self.settle(file).and(live)
     }
 
-    /// Brings those who watch live up to date with what the arrangement of views shows at first; the rest, and the file, wait
-    /// for the next [`flush`](Self::flush), at most 256 steps or two seconds of them. Every message costs about a kilobyte, and
-    /// most entities are series that no view shows: a live view that is up to date at every step needs half the messages
-    /// this way, and the file has few large ones.
+    /// Writes the rows that live views show at first; the rest, and the file, wait for the next [`flush`](Self::flush), at most
+    /// 256 steps or two seconds of them. Every message costs about a kilobyte, and most entities are series that no view shows:
+    /// a live view that is up to date at every step needs half the messages this way, and the file has few large ones.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Encode`] if a step cannot be encoded for the live log.
     pub fn flush_shown(&mut self) -> Result<(), RecordingError> {
         let hidden = std::mem::take(&mut self.hidden);
         let published = self.publish(&hidden);
@@ -239,7 +272,7 @@ impl Recorder {
         published
     }
 
-    /// Writes to the log what it does not have yet, but for what is hidden.
+    /// Writes to the log what it does not have yet, except for hidden entities.
     fn publish(&mut self, hidden: &HashSet<EntityPath>) -> Result<(), RecordingError> {
         let Self { rows, incomplete, store, file, live, .. } = self;
         let Some(live) = live else { return Ok(()) };
@@ -251,12 +284,13 @@ impl Recorder {
         news
     }
 
-    /// Why the file lacks steps that the log has: it could not be written. [`seal`](Self::seal) writes it anew.
+    /// The error because of which the file lacks steps that the log has. [`seal`](Self::seal) writes the file anew.
     pub fn file_failure(&self) -> Option<&str> {
         self.file_failure.as_deref()
     }
 
-    /// Whether a file was written. Beside a log one that was not costs no step: it is remembered, and all is in the log.
+    /// Handles the result of writing the file. Beside a live log a failure is remembered rather than returned, because
+    /// the log has everything.
     fn settle(&mut self, written: Result<(), RecordingError>) -> Result<(), RecordingError> {
         match written {
             Err(error) if self.live.is_some() => {
@@ -268,11 +302,15 @@ impl Recorder {
     }
 
     /// Writes what is left, ends the file with its footer, and closes the log.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError`] if what is left cannot be encoded, or the file can be written neither as it grew nor anew.
     pub fn finish(mut self) -> Result<(), RecordingError> {
         self.end()
     }
 
-    /// Gives the recording up: no file is left of it, and the log is closed.
+    /// Discards the recording: no file is left of it, and the log is closed.
     pub fn discard(mut self) {
         self.rows = Rows::of(&self.store);
         (self.finished, self.incomplete) = (true, None);
@@ -283,6 +321,10 @@ impl Recorder {
 
     /// Writes what is left and ends the file with its footer: nothing is recorded after it. A file that could not be written
     /// as it grew is written anew from the log. After an error it may be tried again, and steps may be recorded.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError`] if what is left cannot be encoded, or the file can be written neither as it grew nor anew.
     pub fn seal(&mut self) -> Result<(), RecordingError> {
         if self.finished {
             return Ok(());
@@ -312,7 +354,7 @@ impl Recorder {
         sealed
     }
 
-    /// To both targets, whatever happens to the other.
+    /// Sends messages to both targets, whatever happens to the other.
     fn send(&mut self, messages: &[LogMsg]) -> Result<(), RecordingError> {
         let live = self.live.as_ref().map_or(Ok(()), |live| live.append(messages));
         let file = self.file.as_mut().map_or(Ok(()), |file| file.append(messages));
@@ -342,7 +384,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// The true arm at θ = 0 from a step on; at all times without a step.
+    /// Logs the true arm at θ = 0 from a step on; at all times without a step.
     fn log_truth(&mut self, step: Option<u64>, truth: &ModelReport, arrow_m: f64) {
         let axes_look = model::axes_look(&self.description.joints, TRUTH_COLOR);
         let links = [model::links(&truth.skeleton_m()), cells([&model::links_look(TRUTH_COLOR) as _])].concat();
@@ -358,7 +400,7 @@ impl Recorder {
         }
     }
 
-    /// What needs the size of the arm: places, bodies, the truth's arrows and the cameras.
+    /// Logs what depends on the size of the arm: places, bodies, the truth's arrows and the cameras.
     fn arrange(&mut self, first: &StepReport) -> Result<Stage, RecordingError> {
         let first_estimate = first.learners.first().map(|learner| &learner.estimate);
         let believed = || first_estimate.and_then(ModelReport::state);

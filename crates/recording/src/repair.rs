@@ -1,4 +1,4 @@
-//! Recordings that broke off, as where a process was killed or a disk was full.
+//! Repairing recordings that broke off because a process was killed or a disk was full.
 
 use std::{
     fs::File,
@@ -10,17 +10,17 @@ use re_log_encoding::StreamFooter;
 
 use super::{RecordingError, decoded::messages, file::RrdFile, rerun::LogMsg, stream::is_end};
 
-/// So many messages are held at a time.
+/// The number of messages that are held at a time.
 const BATCH: usize = 64;
 
-/// How much of a recording can be read.
+/// The readable part of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Condition {
-    /// Messages, from the first to the last before anything that cannot be read.
+    /// The number of messages before anything that cannot be read.
     pub messages: u64,
-    /// Whether it has its footer, and nothing that cannot be read.
+    /// Whether it has its footer, and everything can be read.
     pub is_complete: bool,
-    /// Why reading ended, if not at the end.
+    /// The reason why reading ended early, if it did.
     pub damage: Option<String>,
 }
 
@@ -28,17 +28,18 @@ pub struct Condition {
 ///
 /// # Errors
 ///
-/// [`RecordingError::Read`] where the file cannot be read, [`RecordingError::NoRecording`] where it is none.
+/// [`RecordingError::Read`] if the file cannot be read, [`RecordingError::NoRecording`] if it is none.
 pub fn examine(path: &Path) -> Result<Condition, RecordingError> {
     read(path, |_| Ok(()))
 }
 
-/// Writes all of a recording that can be read to a new file, with a footer, so that viewers open it. The recording itself is
+/// Writes the readable part of a recording to a new file, with a footer, so that viewers open it. The recording itself is
 /// left as it is.
 ///
 /// # Errors
 ///
-/// The same, and [`RecordingError::Create`] where there is a file at `out`, or it cannot be written.
+/// [`RecordingError::Read`] if the recording cannot be read, [`RecordingError::NoRecording`] if it is none,
+/// [`RecordingError::Create`] if there is a file at `out` or it cannot be written.
 pub fn restore(path: &Path, out: &Path) -> Result<Condition, RecordingError> {
     // Before anything is created: what is no recording leaves no file.
     examine(path)?;
@@ -63,7 +64,8 @@ fn read(path: &Path, take: impl FnMut(&[LogMsg]) -> Result<(), RecordingError>) 
     Ok(Condition { messages, is_complete: has_footer && damage.is_none(), damage })
 }
 
-/// Takes every message up to the first that cannot be read. Tells how many there were, and why that one cannot.
+/// Passes every message up to the first unreadable one to a function, and returns their number and why that one cannot
+/// be read.
 pub(super) fn with_messages(
     stream: impl BufRead,
     mut take: impl FnMut(&[LogMsg]) -> Result<(), RecordingError>,

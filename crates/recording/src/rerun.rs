@@ -1,6 +1,6 @@
-//! What recordings are made of, from the crates that Rerun's own are made of.
+//! The parts of Rerun's crates that recordings are made of.
 //!
-//! Those that speak with Rerun's servers, sign in there or gather statistics are left out: nothing here can reach another
+//! Crates that contact Rerun's servers, sign in there or gather statistics are left out: nothing here can reach another
 //! machine.
 
 pub(super) use ::rerun::{

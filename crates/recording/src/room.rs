@@ -1,4 +1,4 @@
-//! The room that an arm takes: where it may be seen, over all that it can do.
+//! The room of an arm: the space in which it may be seen over all of its postures.
 
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -8,11 +8,11 @@ use super::{body::Figure, posture::Posture};
 use body_schema_engine::model::State;
 use body_schema_wire::Description;
 
-/// Postures, uniform in the joint limits, by which the room is judged; the same for every run.
+/// The number of postures, uniform in the joint limits, that define the room; equal for every run.
 const POSTURES: usize = 200;
-/// So large a part of them is to be in sight whole.
+/// The share of them that must be entirely in view.
 const IN_SIGHT: f64 = 0.97;
-/// Where an arm mostly is, from its shoulder, in lengths of the arm. x is ahead, y to the left, z up.
+/// The usual positions of an arm, from its shoulder, in lengths of the arm. x is ahead, y to the left, z up.
 const MOSTLY: [[f64; 3]; 7] = [
     [0.8, -0.1, 0.2],
     [0.5, -0.55, 0.7],
@@ -23,17 +23,17 @@ const MOSTLY: [[f64; 3]; 7] = [
     [0.0, 0.55, -0.6],
 ];
 
-/// What is to be in sight of one learner, from its shoulder, metres.
+/// The points that must be in view of one learner, from its shoulder, metres.
 #[derive(Clone, Debug)]
 pub(super) struct Room {
-    /// Always.
+    /// The points that are always there.
     always: Vec<Vector3<f64>>,
-    /// Posture by posture.
+    /// The points of each posture.
     postures: Vec<Vec<Vector3<f64>>>,
 }
 
 impl Room {
-    /// Of an arm in its figure, with the cameras and targets that stand beside it.
+    /// The room of an arm in its figure, with the cameras and targets that stand beside it.
     pub(super) fn of(arm: &State, figure: &Figure, description: &Description) -> Self {
         let mut room = Self::around(figure);
         let mut rng = ChaCha8Rng::seed_from_u64(0);
@@ -58,7 +58,7 @@ impl Room {
         room
     }
 
-    /// The same where the hand may be farther out than it is believed to be.
+    /// This room for a hand that may be farther out than it is believed to be.
     pub(super) fn with_hand(mut self, beyond_m: f64) -> Self {
         for posture in &mut self.postures {
             let hand = posture.last().copied().filter(|hand| hand.norm() > 0.0);
@@ -67,20 +67,20 @@ impl Room {
         self
     }
 
-    /// Of a figure whose arm takes these postures alone, by the points on its axes and its marker.
+    /// The room of a figure whose arm takes only these postures, given by the points on its axes and its marker.
     pub(super) fn of_postures(figure: &Figure, postures: Vec<Vec<Point3<f64>>>) -> Self {
         let from_shoulder = |posture: Vec<Point3<f64>>| posture.iter().map(|point| point - figure.shoulder).collect();
         let name = figure.name - figure.shoulder;
         Self { always: vec![name], postures: postures.into_iter().map(from_shoulder).collect() }
     }
 
-    /// Of a figure whose arm is where arms mostly are.
+    /// The room of a figure whose arm is in the usual positions.
     pub(super) fn around(figure: &Figure) -> Self {
         let mostly = MOSTLY.iter().map(|offset| Vector3::from(*offset) * figure.reach_m);
         Self { always: mostly.chain([figure.name - figure.shoulder]).collect(), postures: Vec::new() }
     }
 
-    /// How large `need` is at most, but for the postures that need most.
+    /// The most that `need` requires over the room, except for the most demanding postures.
     pub(super) fn needs(&self, need: impl Fn(&Vector3<f64>) -> f64) -> f64 {
         let most = |points: &[Vector3<f64>]| points.iter().map(&need).fold(f64::NEG_INFINITY, f64::max);
         let mut postures: Vec<f64> = self.postures.iter().map(|points| most(points)).collect();

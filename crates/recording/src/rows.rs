@@ -1,7 +1,8 @@
 //! Rows that wait to be written, one sheet per entity.
 //!
 //! Rerun's own stream batches in a thread and writes in another, where errors go to a log. Here rows are gathered and
-//! handed over when the recorder says so: many steps make one chunk per entity, and every error has a caller.
+//! handed over when the recorder asks for them: many steps make one chunk per entity, and every error is returned to a
+//! caller.
 
 use std::{
     collections::{HashMap, hash_map::Entry},
@@ -21,23 +22,23 @@ use super::{
 
 /// Rows by entity.
 ///
-/// They have up to two readers: who watches live takes [`news`](Self::news), a file takes [`steps`](Self::steps). Rows wait
+/// They have up to two readers: the live log takes [`news`](Self::news), a file takes [`steps`](Self::steps). Rows wait
 /// until both have them.
 pub(super) struct Rows {
     // Rows of different timelines cannot share a chunk.
     sheets: Vec<Sheet>,
     index: HashMap<(EntityPath, When), usize>,
-    /// How entities look since their last row that said so.
+    /// The look of each entity since its last row with one.
     looks: HashMap<(EntityPath, ComponentIdentifier), Values>,
-    /// What of a look depends on the data, see [`drawn`](Self::drawn).
+    /// The part of a look that depends on the data; see [`drawn`](Self::drawn).
     kinds: HashMap<EntityPath, u64>,
     step: Timeline,
     motion: Timeline,
     ids: RowIds,
 }
 
-/// Components that say how something looks. They hold until they are logged again, and each costs some 300 bytes in
-/// every message: rows repeat them only when they change.
+/// Components of an entity's look. They hold until they are logged again, and each costs some 300 bytes in every
+/// message, so rows repeat them only when they change.
 const LOOKS: [&str; 8] =
     ["colors", "draw_order", "fill_mode", "labels", "lengths", "line_radii", "radii", "show_labels"];
 
@@ -54,26 +55,26 @@ impl Rows {
         self.always_plain(entity, cells(what.iter().copied()));
     }
 
-    /// The same where components are told one by one.
+    /// Adds what holds at all times, component by component.
     pub(super) fn always_plain(&mut self, entity: &EntityPath, cells: Vec<Cell>) {
         let id = self.ids.next();
         self.sheet(entity, When::Always).push((id, 0), cells);
     }
 
-    /// What holds from a step on, until the entity's next row.
+    /// Adds what holds from a step on, until the entity's next row.
     pub(super) fn at(&mut self, step: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
         self.plain(step, entity, cells(what.iter().copied()));
     }
 
-    /// The same where components are told one by one.
+    /// Adds what holds from a step on, component by component.
     pub(super) fn plain(&mut self, step: u64, entity: &EntityPath, mut cells: Vec<Cell>) {
         self.drop_looks(entity, &mut cells);
         let id = self.ids.next();
         self.sheet(entity, When::Step).push((id, motion(step, 0)), cells);
     }
 
-    /// The same for what is drawn again and again: its look is asked for when the entity has no row yet, or its last one was
-    /// of another kind.
+    /// Adds what is drawn again and again: its look is asked for when the entity has no row yet, or when its last row was of
+    /// another kind.
     pub(super) fn drawn<L: AsComponents>(
         &mut self,
         step: u64,
@@ -88,13 +89,14 @@ impl Rows {
         self.plain(step, entity, what);
     }
 
-    /// A number of a series at a step.
+    /// Adds a number of a series at a step.
     pub(super) fn number(&mut self, step: u64, series: &EntityPath, number: f64) {
         let id = self.ids.next();
         self.sheet(series, When::Step).push_number((id, motion(step, 0)), number);
     }
 
-    /// What holds so many ticks after a step, until the entity's next row. Whoever sees steps alone does not see it.
+    /// Adds what holds from `ticks` after a step until the entity's next row. Readers that see only steps do not see
+    /// it.
     pub(super) fn after(&mut self, step: u64, ticks: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
         let id = self.ids.next();
         self.sheet(entity, When::Between).push((id, motion(step, ticks)), cells(what.iter().copied()));
@@ -126,16 +128,15 @@ impl Rows {
         });
     }
 
-    /// For those who watch live: what they do not have yet of the sheets that are `wanted`; one chunk per entity and kind
-    /// of time. It is `kept` for [`steps`](Self::steps), or forgotten.
+    /// The rows of `wanted` sheets that live readers do not have yet; one chunk per entity and kind of time. They are
+    /// `kept` for [`steps`](Self::steps), or forgotten.
     pub(super) fn news(&mut self, wanted: impl Fn(&Sheet) -> bool, kept: bool) -> Result<Vec<Chunk>, RecordingError> {
         let named = Timelines { step: self.step, motion: Some(self.motion) };
         let wanted = self.sheets.iter_mut().filter(|sheet| wanted(sheet));
         wanted.filter_map(|sheet| sheet.news(&named, kept).transpose()).collect()
     }
 
-    /// What a recording in a file has of the sheets that are `wanted`, since it was last asked for; one chunk per entity. It
-    /// is forgotten.
+    /// The rows of `wanted` sheets for a file since the last call; one chunk per entity. They are forgotten.
     pub(super) fn steps(&mut self, wanted: impl Fn(&Sheet) -> bool) -> Result<Vec<Chunk>, RecordingError> {
         let named = Timelines { step: self.step, motion: None };
         let wanted = self.sheets.iter_mut().filter(|sheet| wanted(sheet));
@@ -158,7 +159,7 @@ impl Rows {
     }
 }
 
-/// What a recording in a file has of a chunk; `None` if it is between steps.
+/// The part of a chunk for a file; `None` if the chunk is between steps.
 pub(super) fn by_steps(chunk: &Chunk) -> Option<Chunk> {
     let step = TIMELINE.into();
     let is_wanted = chunk.is_static() || chunk.timelines().contains_key(&step);

@@ -1,7 +1,7 @@
 //! The rows of one entity, column by column.
 //!
-//! Rerun's own builder of chunks takes rows. Kept by columns from the start, a row costs no more than its arrays, and a
-//! number of a series no array at all.
+//! Rerun's own builder of chunks takes rows. Here rows are kept by columns from the start, so that a row costs no more
+//! than its arrays, and a number of a series no array at all.
 
 use std::{mem::discriminant, ops::Range, sync::Arc};
 
@@ -19,14 +19,14 @@ use super::{
     values::{Cell, Values},
 };
 
-/// On which timelines rows stand.
+/// The timelines on which rows stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum When {
-    /// On none: they hold at all times.
+    /// No timeline: they hold at all times.
     Always,
-    /// At a step.
+    /// The timeline of steps.
     Step,
-    /// Between two steps.
+    /// The timeline of motion alone, between two steps.
     Between,
 }
 
@@ -35,20 +35,20 @@ pub(super) struct Sheet {
     entity: EntityPath,
     when: When,
     ids: Vec<RowId>,
-    /// Where each row stands on the timeline of motion.
+    /// The place of each row on the timeline of motion.
     ticks: Vec<u64>,
     columns: Vec<Column>,
     /// The numbers of a series, which has no other components: one in each row.
     numbers: Vec<f64>,
-    /// So many rows were handed out and are still needed.
+    /// The number of rows that were handed out and are still needed.
     handed_out: usize,
     bytes: usize,
 }
 
-/// What the rows say of one component: rows that say nothing of it have no cell.
+/// The cells of one component; rows without it have no cell.
 struct Column {
     descriptor: ComponentDescriptor,
-    /// Rows, and how many values each has.
+    /// The row of each cell, and its number of values.
     cells: Vec<(usize, usize)>,
     values: Values,
 }
@@ -79,7 +79,7 @@ impl Sheet {
         }
     }
 
-    /// How many bytes the components hold that wait.
+    /// The number of bytes in components that wait.
     pub(super) fn bytes(&self) -> usize {
         self.bytes
     }
@@ -95,7 +95,7 @@ impl Sheet {
         self.ids.len() - 1
     }
 
-    /// The rows that were not handed out yet, on the timelines `named`; forgotten, unless they are `kept` for another reader.
+    /// The rows that were not handed out yet, on the timelines `named`. They are forgotten, unless `kept` for another reader.
     pub(super) fn news(&mut self, named: &Timelines, kept: bool) -> Result<Option<Chunk>, RecordingError> {
         let rows = self.handed_out..self.ids.len();
         let chunk = self.chunk(rows, named);
@@ -106,7 +106,7 @@ impl Sheet {
         chunk
     }
 
-    /// All rows, on the timelines `named`; forgotten.
+    /// All rows, on the timelines `named`. They are forgotten.
     pub(super) fn all(&mut self, named: &Timelines) -> Result<Option<Chunk>, RecordingError> {
         let chunk = self.chunk(0..self.ids.len(), named);
         self.forget();
@@ -122,7 +122,7 @@ impl Sheet {
         (*handed_out, *bytes) = (0, 0);
     }
 
-    /// `None` if there are no rows, or none on these timelines.
+    /// A chunk of these rows; `None` if there are no rows, or none on these timelines.
     fn chunk(&self, rows: Range<usize>, named: &Timelines) -> Result<Option<Chunk>, RecordingError> {
         let timelines = named.of(self.when, &self.ticks[rows.clone()]);
         if rows.is_empty() || (timelines.is_empty() && self.when != When::Always) {
@@ -144,7 +144,7 @@ impl Sheet {
 }
 
 impl Column {
-    /// The cells of these rows, a list a row; `None` if they have none.
+    /// The cells of these rows, one list per row; `None` if there are none.
     fn list(&self, rows: &Range<usize>) -> Result<Option<ListArray>, RecordingError> {
         let first = self.cells.partition_point(|(row, _)| *row < rows.start);
         let cells = &self.cells[first..];
@@ -170,7 +170,7 @@ fn list(lengths: OffsetBuffer<i32>, values: ArrayRef, nulls: Option<NullBuffer>)
 /// The timelines on which chunks stand.
 pub(super) struct Timelines {
     pub(super) step: Timeline,
-    /// Of those who watch live.
+    /// The timeline of motion, for live readers.
     pub(super) motion: Option<Timeline>,
 }
 

@@ -1,4 +1,4 @@
-//! What cameras see: their pictures' planes, the known points of targets, and the rays from one to the other.
+//! The view of cameras: their pictures' planes, the known points of targets, and the rays from one to the other.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -13,14 +13,14 @@ use super::{
 use body_schema_engine::model::State;
 use body_schema_wire::MovementReport;
 
-/// The colour of rays: that of what was measured.
+/// The colour of rays, which is that of measurements.
 const RAY: [u8; 4] = [0xE6, 0xB4, 0x22, 150];
-/// How far before the camera its picture is drawn, and the radius of a known point, as parts of the arm's reach.
+/// The drawn distance from a camera to its picture, and the radius of a known point, as parts of the arm's reach.
 const DEPTH: f64 = 0.16;
 const POINT: f64 = 0.012;
-/// Targets of at most so many points are outlined: of more, the order of the points is no outline.
+/// The most points of a target that is outlined: with more, their order is no outline.
 const OUTLINED: usize = 4;
-/// Two frames closer than this, metres and radians, are one.
+/// The distance, metres and radians, below which two frames count as equal.
 const SAME: f64 = 1e-9;
 
 type Strip = Vec<[f32; 3]>;
@@ -81,7 +81,7 @@ impl Sight {
         strips
     }
 
-    /// From every camera to the points that it saw.
+    /// The rays from every camera to the points that it saw.
     fn rays(&self, movement: &MovementReport, scenery: &Scenery<'_>) -> Vec<Strip> {
         let seen = movement.readings.iter().filter(|reading| reading.residual_sigmas.is_some());
         let channels = seen.filter_map(|reading| scenery.description.channels.get(reading.channel));
@@ -93,8 +93,8 @@ impl Sight {
     }
 }
 
-/// Logs cameras and targets, true and believed, so many ticks after a step; with a movement, also what was seen in it. An
-/// arm that is on its way has seen nothing yet.
+/// Logs cameras and targets, true and believed, at `ticks` after a step; with a movement, also what was seen in it. An
+/// arm that is moving has seen nothing yet.
 pub(super) fn log(
     rows: &mut Rows,
     (step, ticks): (u64, u64),

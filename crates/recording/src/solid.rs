@@ -1,4 +1,4 @@
-//! Solid shapes: what arms and bodies are made of.
+//! Solid shapes, for arms and bodies.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
@@ -7,12 +7,12 @@ use super::{
     values::{Cell, Values},
 };
 
-/// A point as Rerun takes it.
+/// A point in Rerun's form.
 pub(super) fn single([x, y, z]: [f64; 3]) -> [f32; 3] {
     [x as f32, y as f32, z as f32]
 }
 
-/// A rotation as Rerun takes it.
+/// A rotation in Rerun's form.
 pub(super) fn quaternion(rotation: &UnitQuaternion<f64>) -> Quaternion {
     let [x, y, z, w]: [f64; 4] = rotation.coords.into();
     Quaternion::from_xyzw([x as f32, y as f32, z as f32, w as f32])
@@ -37,7 +37,7 @@ impl Capsule {
         single(self.from.coords.into()).into()
     }
 
-    /// Rerun's capsules lie along z.
+    /// The rotation of the capsule: Rerun's capsules lie along z.
     fn rotation(&self) -> RotationQuat {
         let turn = UnitQuaternion::rotation_between(&Vector3::z(), &(self.to - self.from));
         // Only a half turn is left open: about which axis makes no difference to a rod.
@@ -52,7 +52,7 @@ pub(super) fn solid(capsules: &[Capsule]) -> Capsules3D {
     Capsules3D { translations, quaternions, ..look(capsules) }.with_lengths(capsules.iter().map(Capsule::length))
 }
 
-/// How long they are, and where.
+/// The lengths and poses of capsules.
 pub(super) fn shapes(capsules: &[Capsule]) -> Vec<Cell> {
     let translations = capsules.iter().map(|capsule| capsule.translation().0.0).collect();
     let rotations = capsules.iter().map(|capsule| capsule.rotation().0.0).collect();
@@ -64,7 +64,7 @@ pub(super) fn shapes(capsules: &[Capsule]) -> Vec<Cell> {
     ]
 }
 
-/// How they look. It is the same for an arm in all its postures.
+/// The look of capsules, which is the same for an arm in all its postures.
 pub(super) fn look(capsules: &[Capsule]) -> Capsules3D {
     let colours =
         capsules.iter().map(|Capsule { colour: [r, g, b, a], .. }| Color::from_unmultiplied_rgba(*r, *g, *b, *a));
@@ -83,7 +83,7 @@ pub(super) fn drum(rod: &Capsule) -> Cylinders3D {
         .with_fill_mode(FillMode::Solid)
 }
 
-/// The same capsules elsewhere: their poses alone.
+/// Capsules at other poses: the poses alone.
 pub(super) fn moved(capsules: &[Capsule]) -> Capsules3D {
     Capsules3D::update_fields()
         .with_translations(capsules.iter().map(Capsule::translation))

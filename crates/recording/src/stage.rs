@@ -1,4 +1,4 @@
-//! Where everything stands in a view, and from where it is looked at.
+//! The stage: the places of everything in a view, and the camera.
 
 use nalgebra::{Point3, Vector3};
 
@@ -14,18 +14,18 @@ use super::{
 /// one's direction; the tall one looks along the row from above, so that they stand one above the other.
 const WIDE: [f64; 2] = [-0.95, 0.2];
 const TALL: [f64; 2] = [-0.35, 0.5];
-/// Narrower views than this, in widths per height, are tall.
+/// The aspect, in widths per height, below which a view is tall.
 const TALL_BELOW: f64 = 0.8;
-/// From one learner to the next, in lengths of the arm.
+/// The distance from one learner to the next, in lengths of the arm.
 const SPACING: f64 = 1.3;
 /// The viewer's vertical field of view, radians.
 const FIELD_OF_VIEW: f64 = 0.96;
-/// What of it is left free at the edges, as a part of its half: at either side for half a label, above for its height, below
-/// for the page's legend.
+/// The free part of the field of view at the edges, as a part of its half: at either side for half a label, above for its
+/// height, below for the page's legend.
 const SIDES: f64 = 0.12;
 const ABOVE: f64 = 0.06;
 const BELOW: f64 = 0.25;
-/// From one line of the ground to the next, and how far they go beyond the row, in lengths of the arm.
+/// The distance between lines of the ground, and how far they go beyond the row, in lengths of the arm.
 const GROUND: [f64; 2] = [0.5, 3.0];
 /// The entities of the lines of the ground, for light and for dark views.
 pub(super) const GROUNDS: [&str; 2] = ["ground/light", "ground/dark"];
@@ -43,14 +43,14 @@ impl Stage {
         Self { figure, room, learners }
     }
 
-    /// Where the frame of a learner's measurements stands, metres: the row is centred, the first one on the left.
+    /// The place of the frame of a learner's measurements, metres: the row is centred, the first one on the left.
     pub(super) fn place(&self, learner: usize) -> Vector3<f64> {
         let (sin, cos) = WIDE[0].sin_cos();
         let right = Vector3::new(-sin, cos, 0.0);
         right * (SPACING * self.figure.reach_m * (learner as f64 - 0.5 * (self.learners.max(1) - 1) as f64))
     }
 
-    /// The point that the camera looks at, and where it stands, metres: as near as it can be for a view of this shape
+    /// The point that the camera looks at, and the camera's place, metres: as near as possible for a view of this shape
     /// (its width in heights).
     pub(super) fn camera(&self, aspect: f64) -> [Point3<f64>; 2] {
         let [azimuth, elevation] = if aspect < TALL_BELOW { TALL } else { WIDE };
@@ -93,7 +93,7 @@ impl Stage {
         LineStrips3D::new(strips).with_colors([Color::from(colour)]).with_radii([Radius::new_ui_points(1.0)])
     }
 
-    /// Where the key to the colours stands: on the ground, before the middle.
+    /// The place of the key to the colours: on the ground, before the middle.
     pub(super) fn key(&self) -> Point3<f64> {
         let Figure { shoulder, reach_m, ground_m, .. } = self.figure;
         let (sin, cos) = WIDE[0].sin_cos();

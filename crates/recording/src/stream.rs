@@ -1,8 +1,8 @@
-//! The frames of a recording (.rrd), as far as what they say of themselves can be true.
+//! The frames of a recording (.rrd), with their stated lengths checked.
 //!
-//! Rerun's decoder makes room for as many bytes as a message says that it has: as it stands in the file, uncompressed, and in each of
-//! Arrow's messages within. Of a damaged one these may be more than there is memory, which ends the process. So every length is
-//! held against what there is before the decoder sees it.
+//! Rerun's decoder allocates as many bytes as a message states: for the frame in the file, uncompressed, and for each of Arrow's
+//! messages within. In a damaged file these may exceed the memory, which ends the process. So every length is compared with what is
+//! there before the decoder sees it.
 
 use std::io::{self, BufRead, Read};
 
@@ -12,21 +12,21 @@ use re_log_encoding::{
 };
 use re_protos::{common::v1alpha1::Compression, log_msg::v1alpha1::ArrowMsg};
 
-/// Bytes of a message at most.
+/// The most bytes of a message.
 const MOST: u64 = 1 << 30;
-/// LZ4 makes no more bytes of one than this.
+/// The most bytes that LZ4 makes of one.
 const LZ4_RATIO: u64 = 255;
 
-/// A stream whose frames are read one by one, and end with the first that cannot be whole, which is an error.
+/// A stream whose frames are read one by one. It ends with an error at the first frame that cannot be whole.
 pub(super) struct Frames<R> {
     stream: R,
     next: Next,
     frame: Vec<u8>,
-    /// How much of the frame was read.
+    /// The number of bytes of the frame that were read.
     taken: usize,
 }
 
-/// What stands next in the stream.
+/// The next item of the stream.
 enum Next {
     Header,
     Message,
@@ -35,7 +35,7 @@ enum Next {
 }
 
 impl<R: BufRead> Frames<R> {
-    /// From the header on.
+    /// A stream from its header on.
     pub fn new(stream: R) -> Self {
         Self { stream, next: Next::Header, frame: Vec::new(), taken: 0 }
     }
@@ -87,18 +87,19 @@ impl<R: BufRead> Frames<R> {
         Ok(if kind == MessageKind::End { Next::Footer } else { Next::Message })
     }
 
-    /// Reads so many bytes more into the frame, or as many as there are; how many.
+    /// Reads `count` more bytes into the frame, or as many as there are, and returns their number.
     fn read_on(&mut self, count: u64) -> io::Result<u64> {
         self.stream.by_ref().take(count).read_to_end(&mut self.frame).map(|found| found as u64)
     }
 }
 
-/// Whether these bytes are those of a stream's end.
+/// Whether these bytes are a stream's end.
 pub(super) fn is_end(bytes: &[u8]) -> bool {
     entries(bytes) <= 1 && StreamFooter::from_rrd_bytes(bytes).is_ok()
 }
 
-/// How many footers the end of a stream names, in its last bytes: Rerun's decoder takes them for there, and writes one.
+/// The number of footers that the end of a stream names in its last bytes: Rerun's decoder trusts them, and Rerun
+/// writes one.
 fn entries(end: &[u8]) -> u32 {
     end.last_chunk().map_or(0, |count| u32::from_le_bytes(*count))
 }
@@ -107,7 +108,8 @@ fn damaged(why: String) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, why)
 }
 
-/// Whether what is in a message of Arrow's can be as long as it says; what cannot be read at all the decoder will tell.
+/// Checks that the content of one of Arrow's messages can be as long as it states. What cannot be read at all is left
+/// to the decoder.
 fn hold_arrow(bytes: &[u8]) -> Result<(), String> {
     let Ok(message) = ArrowMsg::from_rrd_bytes(bytes) else { return Ok(()) };
     if message.compression() != Compression::Lz4 {
@@ -123,7 +125,7 @@ fn hold_arrow(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// The same of Arrow's own messages, a schema and batches, one behind the other:
+/// Checks the stated lengths of Arrow's own messages, a schema and batches, one after the other:
 ///
 /// ```text
 /// ff ff ff ff │ length of the metadata │ metadata, with the length of the body │ body

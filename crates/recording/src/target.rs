@@ -1,10 +1,10 @@
-//! Where a recording goes, and how it is made.
+//! The target of a recording, and its settings.
 
 use std::path::PathBuf;
 
 use super::{EllipsoidSize, LiveLog};
 
-/// Where a recording goes.
+/// The target of a recording.
 #[derive(Clone, Default)]
 pub struct Target {
     pub(super) file: Option<PathBuf>,
@@ -16,7 +16,7 @@ pub struct Target {
 }
 
 impl Target {
-    /// A file, by convention `.rrd`. It has its name only once it is finished, and replaces then what was there.
+    /// A file, by convention `.rrd`. It gets its name only once it is finished, and then replaces a file of that name.
     pub fn file(path: impl Into<PathBuf>) -> Self {
         Self { file: Some(path.into()), ..Self::default() }
     }
@@ -26,14 +26,14 @@ impl Target {
         Self { live: Some(log), ..Self::default() }
     }
 
-    /// Also a file, which grows in its place: what was written outlives the process. It is replaced if it exists.
+    /// Adds a file that grows in its place, so that what was written outlives the process. It replaces an existing one.
     pub fn and_file(mut self, path: impl Into<PathBuf>) -> Self {
         (self.file, self.grows) = (Some(path.into()), true);
         self
     }
 
-    /// Sets the recording's id. Viewers take two recordings of one id for one: a server that runs a scenario and seed
-    /// twice gives each run an id of its own. Otherwise it is made of scenario and seed.
+    /// Sets the recording's id; by default it is made of scenario and seed. Viewers take two recordings with one id for
+    /// one, so a server that runs a scenario and seed twice gives each run its own id.
     pub fn with_recording_id(mut self, id: impl Into<String>) -> Self {
         self.recording_id = Some(id.into());
         self

@@ -1,4 +1,4 @@
-//! How uncertain a learner is of its arm, as ellipsoids that move with it.
+//! The uncertainty of a learner about its arm, as ellipsoids that move with it.
 
 use nalgebra::{Isometry3, Matrix3, Point3};
 
@@ -11,13 +11,13 @@ use super::{
 };
 use body_schema_wire::{JointDescription, ModelReport};
 
-/// A learner's own covariance is drawn beside what its data allow where its standard deviations are so much larger.
+/// The ratio of standard deviations above which a learner's covariance is drawn beside what its data allow.
 const KEPT_LARGE: f64 = 1.5;
 
 /// The ellipsoids of one learner, continuous from step to step.
 pub(super) struct Uncertainty {
     size: EllipsoidSize,
-    /// So many times as large those of points are drawn.
+    /// The factor by which the ellipsoids of points are magnified.
     magnified: f64,
     points: Vec<Axes>,
     allowed: Vec<Axes>,
@@ -29,9 +29,9 @@ pub(super) struct Uncertainty {
 #[derive(Clone, Debug)]
 pub(super) struct Cloud {
     centre: Point3<f64>,
-    /// Which joint it belongs to; the number of joints for the marker.
+    /// The index of its joint; the number of joints for the marker.
     part: usize,
-    /// So many joints are before it.
+    /// The number of joints before it.
     link: usize,
     covariance: Matrix3<f64>,
     ellipsoid: Ellipsoid,
@@ -50,7 +50,7 @@ impl Cloud {
         Some(Self { centre: centre.into(), part, link, covariance, ellipsoid })
     }
 
-    /// Where it is when the links are there.
+    /// Its place and rotation when the links have these motions.
     fn at(&self, links: &[Isometry3<f64>]) -> (Point3<f64>, RotationQuat) {
         let link = links.get(self.link).copied().unwrap_or_default();
         (link * self.centre, quaternion(&(link.rotation * self.ellipsoid.rotation)).into())
@@ -58,7 +58,7 @@ impl Cloud {
 }
 
 impl Uncertainty {
-    /// For an arm of so many joints.
+    /// The ellipsoids of an arm with `joints` joints.
     pub(super) fn new(joints: usize, size: EllipsoidSize) -> Self {
         let axes = vec![Axes::default(); joints];
         Self {
@@ -71,12 +71,12 @@ impl Uncertainty {
         }
     }
 
-    /// The same with the points' ellipsoids so many times as large.
+    /// These ellipsoids with those of points magnified by `times`.
     pub(super) fn magnified(self, times: f64) -> Self {
         Self { magnified: times, ..self }
     }
 
-    /// The points on the axes, then the marker. `None` if the learner keeps no covariance of any.
+    /// The ellipsoids of the points on the axes, then of the marker. `None` if the learner keeps no covariance.
     pub(super) fn of_points(&mut self, model: &ModelReport) -> Option<Vec<Cloud>> {
         let mut any = false;
         let points = model.joints.iter().zip(&mut self.points).enumerate().filter_map(|(link, (joint, axes))| {
@@ -94,7 +94,8 @@ impl Uncertainty {
         any.then_some(clouds)
     }
 
-    /// What data allow of the points whose own covariance is kept larger. `None` where that is not known.
+    /// The ellipsoids that data allow, for the points whose own covariance is much larger. `None` where that is not
+    /// known.
     pub(super) fn of_allowed(&mut self, model: &ModelReport) -> Option<Vec<Cloud>> {
         let mut any = false;
         let trace = |rows: &[[f64; 3]; 3]| (0..3).map(|i| rows[i][i]).sum::<f64>();
@@ -109,7 +110,8 @@ impl Uncertainty {
         any.then_some(clouds)
     }
 
-    /// The directions, at the tips of arrows `length_m` long at θ = 0. `None` if the learner keeps no covariance of any.
+    /// The ellipsoids of directions, at the tips of arrows `length_m` long at θ = 0. `None` if the learner keeps no
+    /// covariance.
     pub(super) fn of_directions(&mut self, model: &ModelReport, length_m: f64) -> Option<Vec<Cloud>> {
         let mut any = false;
         let origins = origins(model);
@@ -124,7 +126,7 @@ impl Uncertainty {
         any.then_some(clouds)
     }
 
-    /// Which clouds these are, and how they look in a colour with an opacity; `what` they are goes into their labels.
+    /// The look of these ellipsoids, in a colour with an opacity; `what` they are goes into their labels.
     pub(super) fn look(
         &self,
         clouds: &[Cloud],
@@ -148,7 +150,7 @@ impl Uncertainty {
     }
 }
 
-/// Ellipsoids where the links carry them, and the covariances they are drawn from.
+/// The ellipsoids where the links carry them, with the covariances that they show.
 pub(super) fn drawn(clouds: &[Cloud], links: &[Isometry3<f64>]) -> Vec<Cell> {
     let poses = clouds.iter().map(|cloud| cloud.at(links));
     let (centres, turns) = poses.map(|(centre, turn)| (single(centre.coords.into()), turn.0.0)).unzip();
@@ -167,7 +169,7 @@ pub(super) fn drawn(clouds: &[Cloud], links: &[Isometry3<f64>]) -> Vec<Cell> {
     ]
 }
 
-/// The same clouds on an arm that moves: their poses alone.
+/// The ellipsoids on an arm that moves: their poses alone.
 pub(super) fn carried(clouds: &[Cloud], links: &[Isometry3<f64>]) -> Ellipsoids3D {
     let poses: Vec<_> = clouds.iter().map(|cloud| cloud.at(links)).collect();
     Ellipsoids3D::update_fields()

@@ -1,4 +1,4 @@
-//! Values of components, as rows wait with them.
+//! Values of components in rows that wait.
 
 use std::sync::Arc;
 
@@ -16,10 +16,10 @@ use super::rerun::{
     },
 };
 
-/// What a row says of a component.
+/// A row's values of a component.
 pub(super) type Cell = (ComponentDescriptor, Values);
 
-/// Values of a component. Numbers stand one after the other: an array for each row would cost ten times what is in it.
+/// Values of a component. Numbers stand one after the other: an array for each row would cost ten times its content.
 #[derive(Clone, PartialEq)]
 pub(super) enum Values {
     Singles(Vec<f32>),
@@ -34,13 +34,13 @@ pub(super) enum Values {
     /// Counts, and colours as Rerun writes them.
     Words(Vec<u32>),
     Flags(Vec<bool>),
-    /// Values that are lists themselves, as lines are lists of points: how long each is, and what stands in them all.
+    /// Values that are lists themselves, such as lines of points: the length of each, and all their contents.
     Lists(Vec<usize>, Box<Self>),
-    /// All others, an array for each row.
+    /// All other values, an array for each row.
     Arrays(Vec<ArrayRef>),
 }
 
-/// Does the same with the vector of any values but lists and arrays, which come last.
+/// Applies an expression to the vector of any values except lists and arrays, which come last.
 macro_rules! each {
     ($values:expr, $all:ident => $what:expr, $($other:tt)*) => {
         match $values {
@@ -63,7 +63,7 @@ impl Values {
         Self::Lists(vec![points.len()], Box::new(Self::Triples(points)))
     }
 
-    /// How many values there are.
+    /// The number of values.
     pub(super) fn len(&self) -> usize {
         each!(self, all => all.len(),
             Self::Lists(lengths, _) => lengths.len(),
@@ -71,7 +71,7 @@ impl Values {
         )
     }
 
-    /// How much memory they hold.
+    /// The memory that they hold, bytes.
     pub(super) fn bytes(&self) -> usize {
         each!(self, all => size_of_val(all.as_slice()),
             Self::Lists(lengths, values) => size_of_val(lengths.as_slice()) + values.bytes(),
@@ -110,7 +110,7 @@ impl Values {
         );
     }
 
-    /// One array of all but the first cells, which hold so many values.
+    /// One array of all but the first cells, which hold `skipped` values.
     pub(super) fn array(&self, cells: usize, skipped: usize) -> Result<ArrayRef, ArrowError> {
         let fixed = |numbers: &[f32], width: i32| -> Result<ArrayRef, ArrowError> {
             let item = Arc::new(Field::new("item", DataType::Float32, false));
@@ -147,7 +147,7 @@ impl From<SerializedComponentBatch> for Values {
     }
 }
 
-/// What archetypes say.
+/// The cells of archetypes.
 pub(super) fn cells<'a>(what: impl IntoIterator<Item = &'a dyn AsComponents>) -> Vec<Cell> {
     let batches = what.into_iter().flat_map(|archetype| archetype.as_serialized_batches());
     batches.map(|batch| (batch.descriptor.clone(), batch.into())).collect()

@@ -1,4 +1,4 @@
-//! What a report says, in the order in which a reader asks.
+//! The contents of a report, in the order of a reader's questions.
 
 use super::{
     document::{Document, Part},
@@ -6,9 +6,9 @@ use super::{
 };
 use body_schema_calibration::{Case, Coverage, Figures, Placement, Reading, Report, SocketDistance, Unit};
 
-/// Readings listed at most; of more the worst.
+/// The most readings that are listed; of more, the worst are.
 const LISTED: usize = 200;
-/// Points of the error by number of rows that are listed.
+/// The most points listed of the error by number of rows.
 const SHOWN: usize = 12;
 
 pub fn document(report: &Report, case: &Case<'_>) -> Document {
@@ -46,7 +46,7 @@ pub(super) fn number(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2}"))
 }
 
-/// A sentence with a capital at its beginning and a full stop at its end.
+/// `said` as a sentence: with a capital and a full stop.
 pub(super) fn sentence(said: &str) -> String {
     let mut letters = said.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
@@ -179,7 +179,7 @@ fn outliers(document: &mut Document, report: &Report) {
     document.table(0, ["row", "line of the file", "probability"], report.outliers.iter().map(row));
 }
 
-/// A line of the file; of which, where there is more than one.
+/// A line of the file, named where there is more than one file.
 fn line(number: usize, file: Option<&str>) -> String {
     file.map_or_else(|| number.to_string(), |file| format!("{number} of {file}"))
 }
@@ -341,7 +341,7 @@ fn folds(document: &mut Document, report: &Report) {
     document.table(0, ["fold", "rows held out", &described, "calibrated", "fuller model"], folds.iter().map(row));
 }
 
-/// What calibrated.urdf holds.
+/// A sentence on what calibrated.urdf holds.
 fn origins(report: &Report) -> String {
     let about = if report.joints.iter().any(|joint| joint.offset.is_some()) {
         "The learned offsets of readings are in these origins already: frames are turned or shifted by them along and about their axes, \

@@ -1,4 +1,4 @@
-//! A document in parts, whatever it is written as.
+//! A document in parts, independent of the format it is written in.
 
 /// A part of a document.
 #[derive(Clone, Debug, PartialEq)]
@@ -7,7 +7,7 @@ pub enum Part {
     Heading(String),
     /// A paragraph.
     Text(String),
-    /// What comes first and counts most.
+    /// The lead paragraph, which matters most.
     Lead(String),
     /// Points in a list.
     List(Vec<String>),
@@ -15,11 +15,11 @@ pub enum Part {
     Table(Table),
     /// A drawing as SVG, with what it shows.
     Figure {
-        /// The name of its file, without an end.
+        /// The name of its file, without an extension.
         name: String,
         /// The drawing.
         svg: String,
-        /// What it shows.
+        /// Its caption.
         caption: String,
     },
 }
@@ -27,11 +27,11 @@ pub enum Part {
 /// A table.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// How many columns are aligned to the left, as words are; the others to the right, as numbers.
+    /// The number of left-aligned columns, which hold words; the others hold numbers and are aligned to the right.
     pub words: usize,
-    /// Titles of the columns.
+    /// The titles of the columns.
     pub head: Vec<String>,
-    /// Cells by row.
+    /// The cells, row by row.
     pub rows: Vec<Vec<String>>,
 }
 
@@ -42,7 +42,7 @@ pub struct Document {
     pub title: String,
     /// One line below it.
     pub subtitle: String,
-    /// What follows.
+    /// Its parts.
     pub parts: Vec<Part>,
 }
 

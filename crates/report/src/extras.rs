@@ -1,10 +1,10 @@
-//! What adding to the axes changes.
+//! The section on what correcting more than axes changes.
 
 use super::{
     contents::{number, sentence},
     document::{Document, Part},
 };
-use body_schema_calibration::{Extra, GivesWay, Report, Trial};
+use body_schema_calibration::{Extra, JointCompliance, Report, Trial};
 use body_schema_engine::model::listed;
 
 pub(super) fn write(document: &mut Document, report: &Report) {
@@ -55,7 +55,7 @@ fn compliance(document: &mut Document, report: &Report) {
          of {}), up being [{x:.3}, {y:.3}, {z:.3}]:",
         compliance.elbow
     ));
-    let row = |term: &GivesWay| {
+    let row = |term: &JointCompliance| {
         [
             term.joint.clone(),
             term.load.clone(),
@@ -65,7 +65,7 @@ fn compliance(document: &mut Document, report: &Report) {
     };
     let head = ["joint", "load at the", "deg per N·m", "at its greatest load (deg)"];
     document.table(2, head, compliance.terms.iter().map(row));
-    let rises = |term: &&GivesWay| term.deg_per_nm < -2.0 * term.sd_deg_per_nm;
+    let rises = |term: &&JointCompliance| term.deg_per_nm < -2.0 * term.sd_deg_per_nm;
     let rising: Vec<String> =
         compliance.terms.iter().filter(rises).map(|term| format!("{} at the {}", term.joint, term.load)).collect();
     if !rising.is_empty() {

@@ -1,4 +1,4 @@
-//! A document as one HTML file: no script, nothing from the network, made to be printed.
+//! A document as one HTML file for print, without scripts and without anything from the network.
 
 use std::fmt::Write;
 
@@ -6,7 +6,7 @@ use super::document::{Document, Part, Table};
 
 const STYLE: &str = include_str!("report.css");
 
-/// A cell with more letters has several lines.
+/// The number of letters beyond which a cell has several lines.
 const LONG: usize = 36;
 
 /// The text of `report.html`.

@@ -10,7 +10,7 @@ mod plots;
 use body_schema_calibration::{Calibration, Case, File};
 use document::Part;
 
-/// The report in Markdown without drawings: for where there are others beside it.
+/// The report in Markdown without drawings, to stand beside other drawings.
 pub fn markdown(calibration: &Calibration, case: &Case<'_>) -> String {
     let mut document = contents::document(&calibration.report, case);
     document.parts.retain(|part| !matches!(part, Part::Figure { .. }));

@@ -34,7 +34,7 @@ fn rows(table: &Table) -> String {
     format!("{}| {} |\n{rows}", line(&table.head), rule.join(" | "))
 }
 
-/// What Markdown would take for its own: names come from files.
+/// Text with the characters escaped that Markdown would interpret: names come from files.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {

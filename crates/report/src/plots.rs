@@ -5,10 +5,10 @@ use body_schema_calibration::{ActivePoint, Reading, Report, Unit};
 use body_schema_chart::{Axis, Chart, Colour, Layer, Marker, Panel, Style};
 use body_schema_palette::learner_color;
 
-/// Points of one plot at most: of more, the greatest in every stretch of rows is drawn.
+/// The most points of a plot: of more, the greatest in every stretch of rows is drawn.
 const POINTS: usize = 1200;
 
-/// All drawings that there is something to draw for.
+/// All drawings for which there are data.
 pub fn plots(report: &Report) -> Vec<Part> {
     [residuals(report), corrections(report)].into_iter().flatten().collect()
 }
@@ -104,7 +104,7 @@ fn by_row(report: &Report, unit: Unit) -> Option<Panel> {
     })
 }
 
-/// The greatest residual of every stretch of rows, where there are many.
+/// The readings to draw: where there are many, the greatest residual of every stretch of rows.
 fn thinned(readings: &[Reading], unit: Unit) -> Vec<&Reading> {
     let length = readings.len().div_ceil(POINTS).max(1);
     let size = |reading: &&Reading| unit.of_reading(reading).unwrap_or(0.0);

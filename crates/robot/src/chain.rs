@@ -28,7 +28,7 @@ pub enum SegmentKind {
 }
 
 impl SegmentKind {
-    /// Whether it turns or slides, if it moves.
+    /// Whether the joint turns or slides; `None` for a fixed joint.
     pub fn moves(self) -> Option<JointKind> {
         match self {
             Self::Revolute | Self::Continuous => Some(JointKind::Revolute),
@@ -45,34 +45,34 @@ pub struct Segment {
     pub name: String,
     /// The link that it carries.
     pub link: String,
-    /// What it can do.
+    /// Its kind.
     pub kind: SegmentKind,
     /// The joint's frame in that of the link before it.
     pub origin: Isometry3<f64>,
     /// The axis in the joint's frame.
     pub axis: UnitVector3<f64>,
-    /// Rad or m; none of a fixed joint, of a continuous one, and of a revolute one whose limits are 1e4 or more to both sides, which
-    /// stand for none. To one side alone they are ±∞.
+    /// Limits, rad or m; `None` for a fixed joint, a continuous one, and a revolute one whose limits are 1e4 or more to both sides,
+    /// which stand for no limits. Without a limit on one side that one is ±∞.
     pub limits: Option<(f64, f64)>,
-    /// What moves it, if it moves: `θ = multiplier · q + offset`, q a [`Reading`] by index.
+    /// The reading that moves it, if it moves: `θ = multiplier · q + offset`, q a [`Reading`] by index.
     pub follows: Option<Follows>,
-    /// Which joint of the description it is.
+    /// The index of its joint in the description.
     pub(super) element: usize,
 }
 
-/// How a joint's position comes of a reading.
+/// How a joint's position follows from a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Follows {
     /// Index of the reading.
     pub reading: usize,
-    /// 1 but for joints that mimic another.
+    /// 1 unless the joint mimics another.
     pub multiplier: f64,
-    /// Rad or m; 0 but for joints that mimic another.
+    /// Rad or m; 0 unless the joint mimics another.
     pub offset: f64,
 }
 
 impl Segment {
-    /// What the joint does at a position (rad or m), in its own frame.
+    /// The joint's motion at a position (rad or m), in its own frame.
     pub fn motion(&self, position: f64) -> Isometry3<f64> {
         match self.kind.moves() {
             Some(JointKind::Revolute) => {
@@ -84,8 +84,8 @@ impl Segment {
         }
     }
 
-    /// The positions that it is asked to take, rad or m: those between its limits, of a joint that turns those within a turn to
-    /// either side; half a turn to each side where it turns without end.
+    /// The range of positions that it is asked to take, rad or m: its limits, for a joint that turns at most a turn to either
+    /// side; half a turn to each side for a joint that turns without end.
     fn range(&self) -> (f64, f64) {
         // As limits are rounded.
         const ABOUT_A_TURN: f64 = TAU + 0.01;
@@ -105,14 +105,14 @@ impl Segment {
     }
 }
 
-/// What a robot reports of itself: the position of a joint that follows no other.
+/// A reading of the robot: the position of a joint that follows no other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
     /// The joint's name, by which tables of measurements know it.
     pub name: String,
     /// Radians or metres.
     pub kind: JointKind,
-    /// Rad or m; none of a joint that turns without end, ±∞ where there is none to one side.
+    /// Limits, rad or m; `None` for a joint that turns without end, ±∞ where there is none to one side.
     pub limits: Option<(f64, f64)>,
 }
 
@@ -123,7 +123,7 @@ pub struct Chain {
     pub base: String,
     /// All joints, fixed ones too, the one nearest the base first; the last carries the tip link.
     pub segments: Vec<Segment>,
-    /// What moves them, in the order in which the chain needs it.
+    /// The readings that move them, in the order in which the chain needs them.
     pub readings: Vec<Reading>,
 }
 
@@ -143,17 +143,17 @@ impl Chain {
         self.moving().map(|segment| segment.name.clone()).collect()
     }
 
-    /// The limits of the joints that move, rad or m; half a turn to each side where a joint turns without end. Where one turns further
-    /// than that, no more than a turn to either side: beyond there is nothing that is not to be seen within.
+    /// The limits of the joints that move, rad or m; half a turn to each side where a joint turns without end. A joint that turns
+    /// further is limited to a turn on either side, within which it reaches every orientation.
     ///
     /// # Errors
     ///
-    /// [`JointBoxError`] where limits are so far apart that their difference is no number.
+    /// [`JointBoxError`] if limits are so far apart that their difference is not finite.
     pub fn limits(&self) -> Result<JointBox, JointBoxError> {
         JointBox::new(self.moving().map(Segment::range).collect())
     }
 
-    /// The positions of the joints that move (rad or m) at so many [`readings`](Self::readings).
+    /// The positions of the joints that move (rad or m) at `readings`, in the order of [`readings`](Self::readings).
     pub fn positions(&self, readings: &[f64]) -> Vec<f64> {
         debug_assert_eq!(readings.len(), self.readings.len());
         self.moving()
@@ -174,7 +174,8 @@ impl Chain {
         links
     }
 
-    /// Of every link, from the base to the tip: how many joints before it move, and its frame at θ = 0 in the base link's.
+    /// For every link, from the base to the tip: how many joints before it move, and its frame at θ = 0 in the base
+    /// link's.
     pub fn frames(&self) -> Vec<(usize, Isometry3<f64>)> {
         let mut moving = 0;
         let counted = std::iter::once(0).chain(self.segments.iter().map(|segment| {
@@ -190,8 +191,8 @@ impl Chain {
         self.links(positions).pop().unwrap_or_default()
     }
 
-    /// The robot of this description: its axes at θ = 0 in the base link's frame, its pivots where the description has the
-    /// joints' origins, its only target the tip link's frame.
+    /// The kinematic model of this description: its axes at θ = 0 in the base link's frame, its pivots at the joints'
+    /// origins, its only target the tip link's frame.
     pub fn state(&self) -> State {
         let frames = self.links(&vec![0.0; self.moving().count()]);
         let joints = self.segments.iter().zip(&frames[1..]).filter_map(|(segment, frame)| {
@@ -213,7 +214,8 @@ impl Urdf {
     ///
     /// # Errors
     ///
-    /// [`UrdfError`] where there is no such chain, nothing on it moves, or one of its joints is not what a chain can have.
+    /// [`UrdfError`] if there is no such chain, nothing on it moves, or one of its joints is of a kind that a chain cannot
+    /// have.
     pub fn chain(&self, base: &str, tip: &str) -> Result<Chain, UrdfError> {
         let (from, to) = (self.link(base)?, self.link(tip)?);
         let mut elements = Vec::new();
@@ -266,7 +268,7 @@ impl Urdf {
         Err(self.error(self.start, format!("this robot has no link `{name}`"), mend))
     }
 
-    /// `tip` does not hang on `base`; `elements` are the joints that it hangs on.
+    /// The error that `tip` does not hang on `base`; `elements` are the joints that it hangs on.
     fn apart(&self, base: &str, tip: &str, elements: &[usize]) -> UrdfError {
         let above = elements.iter().map(|joint| self.links[self.joints[*joint].parent].as_str());
         let mend = match elements {
@@ -310,7 +312,7 @@ impl Urdf {
     }
 }
 
-/// A list that stays readable.
+/// The names as a list, shortened so that it stays readable.
 fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
     const SHOWN: usize = 20;
     let names: Vec<&str> = names.collect();

@@ -10,15 +10,16 @@ use super::{
     values::{EXPAND, error, is_expression, number, numbers, only_child, required},
 };
 
-/// What a joint's element says besides its name and its links.
+/// The content of a joint's element besides its name and its links.
 #[derive(Clone, Debug)]
 pub struct Body {
     pub kind: SegmentKind,
     pub origin: Isometry3<f64>,
     pub text: OriginText,
-    /// In the joint's frame; x of a fixed joint.
+    /// The axis in the joint's frame; x for a fixed joint.
     pub axis: UnitVector3<f64>,
-    /// Rad or m; none of a fixed joint and of one that turns without end. To one side, too, there may be none: ±∞.
+    /// Limits, rad or m; `None` for a fixed joint and for one that turns without end. A missing limit on one side is
+    /// ±∞.
     pub limits: Option<(f64, f64)>,
     pub mimic: Option<Mimic>,
 }
@@ -33,7 +34,7 @@ pub struct Mimic {
     pub at: usize,
 }
 
-/// Where in the text a joint's origin stands.
+/// The places in the text where a joint's origin is written.
 #[derive(Clone, Debug)]
 pub struct OriginText {
     /// The bytes of the value of `xyz`.
@@ -42,11 +43,11 @@ pub struct OriginText {
     pub rotation: Option<Range<usize>>,
     /// Roll, pitch and yaw as written; `None` where a quaternion is.
     pub rpy: Option<[f64; 3]>,
-    /// Where what is missing belongs.
+    /// The place for what is missing.
     pub insert: Insert,
 }
 
-/// Where a text goes that is not there yet.
+/// A place for text that is not there yet.
 #[derive(Clone, Debug)]
 pub enum Insert {
     /// Attributes, behind the name of the element.
@@ -161,7 +162,7 @@ fn axis(joint: Node, kind: SegmentKind) -> Result<UnitVector3<f64>, UrdfError> {
     })
 }
 
-/// Limits from which on nobody means an angle, radians, or a length, metres: they stand for none.
+/// The magnitude, radians or metres, from which on a limit stands for none.
 const PLACEHOLDER: f64 = 1e4;
 
 fn limits(joint: Node, kind: SegmentKind, follows: bool) -> Result<Option<(f64, f64)>, UrdfError> {
@@ -218,7 +219,7 @@ fn limit(node: Node, name: &str) -> Result<f64, UrdfError> {
     }
 }
 
-/// What a joint is called.
+/// The joint's name.
 fn name_of<'a>(joint: Node<'a, '_>) -> &'a str {
     joint.attribute("name").unwrap_or_default()
 }

@@ -1,21 +1,21 @@
-//! What can be wrong with a description, said so that it can be mended.
+//! Errors in a description: what is wrong, where, and what to do.
 
-/// What is wrong in a URDF, where, and how to mend it.
+/// An error in a URDF: what is wrong, where, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}, column {column}: {what}; {mend}")]
 pub struct UrdfError {
-    /// Counted from 1.
+    /// The line, counted from 1.
     pub line: usize,
-    /// In characters, counted from 1.
+    /// The column in characters, counted from 1.
     pub column: usize,
     /// What was found.
     pub what: String,
-    /// How to mend it.
+    /// What to do about it.
     pub mend: String,
 }
 
 impl UrdfError {
-    /// An error at a byte of `text`.
+    /// An error at byte `byte` of `text`.
     pub(super) fn at(text: &str, byte: usize, what: impl Into<String>, mend: impl Into<String>) -> Self {
         let before = text.get(..byte).unwrap_or(text);
         let line_start = before.rfind('\n').map_or(0, |end| end + 1);
@@ -31,26 +31,28 @@ impl UrdfError {
 /// Why a state cannot be written as the description of a chain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Unwritable {
-    /// Not the chain's joints.
-    #[error("the chain has {wanted} moving joints and the state {found}, or not of the same kinds")]
+    /// The state's joints are not the chain's.
+    #[error(
+        "the state does not fit the chain: it has {found} joints, the chain {wanted} that move, and their kinds must agree"
+    )]
     Joints {
         /// Joints of the state.
         found: usize,
         /// Moving joints of the chain.
         wanted: usize,
     },
-    /// A reading that is corrected by more than an offset.
+    /// A reading has a correction beyond an offset.
     #[error("a URDF has no place for the ratio or the eccentricity of joint `{joint}`: fit it without")]
     Correction {
         /// The joint.
         joint: String,
     },
-    /// An axis that points the other way.
+    /// An axis points the other way.
     #[error("the axis of joint `{joint}` has turned by {turned_deg:.0} deg: is its sign reversed?")]
     Turned {
         /// The joint.
         joint: String,
-        /// By how much, degrees.
+        /// The angle by which it is turned, degrees.
         turned_deg: f64,
     },
 }

@@ -1,4 +1,4 @@
-//! A chain with the axes that were learned.
+//! A chain with learned axes.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
@@ -8,29 +8,29 @@ use body_schema_engine::{
     model::{Correction, State},
 };
 
-/// What differs by less (metres, radians) is the same: what rounding does to products of frames.
+/// The difference (metres, radians) below which two numbers count as equal: what rounding does to products of frames.
 const SAME: f64 = 1e-12;
 
-/// What a state makes of a description.
+/// A description with the axes of a state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fitted {
     /// The chain with the state's axes and offsets. With the state's joints, `e^{ξ₁θ₁} … e^{ξₙθₙ} frames[n]` is the tip's
-    /// pose at readings q, the same as [`Chain::tip_at`] of it at q, where θ = q + offset.
+    /// pose at readings q, equal to [`Chain::tip_at`] of this chain at q, where θ = q + offset.
     pub chain: Chain,
-    /// By link of the state, 0 the base: the frame that is fixed to it, at θ = 0 in the base link's frame. The frame of
-    /// the base is the identity, that of the last link the tip's.
+    /// The frame fixed to each link of the state, link 0 the base, at θ = 0 in the base link's frame. The base's frame
+    /// is the identity, the last link's is the tip's.
     pub frames: Vec<Isometry3<f64>>,
 }
 
 impl Chain {
-    /// The chain of which `state`, whose joints are this chain's moving ones, is the model, in the gauge that the
+    /// The chain whose kinematic model is `state`, whose joints are this chain's moving ones, in the gauge that the
     /// [module](super) describes. [`State::base`] and targets are not part of it: a target's place on link i is
     /// `frames[i]⁻¹ place` in the frame that is fixed to that link.
     ///
     /// # Errors
     ///
-    /// [`Unwritable`] where the state has other joints, a reading that is corrected by more than an offset, or an axis
-    /// more than a right angle from the description's.
+    /// [`Unwritable::Joints`] if the state has other joints, [`Unwritable::Correction`] if a reading is corrected by
+    /// more than an offset, [`Unwritable::Turned`] if an axis is more than a right angle from the description's.
     pub fn fitted(&self, state: &State) -> Result<Fitted, Unwritable> {
         let nominal = self.state();
         let (wanted, found) = (nominal.joints.len(), state.joints.len());
@@ -82,7 +82,7 @@ fn moved(segment: &Segment, described: &Joint, learned: &Joint) -> Result<Isomet
     Ok(Translation3::from(nearest - from.point) * Isometry3::rotation_wrt_point(rotation, from.point))
 }
 
-/// The offset of a reading, rad or m, if that is all that corrects it.
+/// The offset of a reading, rad or m, if the reading has no other correction.
 fn offset(segment: &Segment, correction: &Correction) -> Result<f64, Unwritable> {
     let Correction { offset, .. } = *correction;
     if *correction == (Correction { offset, ..Correction::default() }) {

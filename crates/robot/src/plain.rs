@@ -1,24 +1,24 @@
-//! A text that a strict reader of XML takes, byte by byte where the description has it.
+//! A text turned into strict XML, with every byte that is kept at its place.
 //!
-//! Readers of URDFs are lenient: a prefix of a namespace that nobody declares is a part of a name to them, and what stands before the
-//! declaration does not matter. Here a description becomes strict XML before it is parsed, and no byte moves, so that the places that
-//! the parser tells are places in the description.
+//! Readers of URDFs are lenient: to them a prefix of an undeclared namespace is a part of a name, and text before the declaration
+//! does not matter. Here a description becomes strict XML before it is parsed, and no byte moves, so that places reported by the
+//! parser are places in the description.
 
 use std::borrow::Cow;
 
-/// What stands in names for the colon of a prefix: a letter of names that hardly any name has.
+/// The character that stands in names for the colon of a prefix: a name character that hardly any name has.
 pub const COLON: char = '.';
 
 /// The byte order mark.
 const MARK: char = '\u{feff}';
 
-/// The text with [`COLON`] for the colons in names of elements and attributes, with blanks for the declaration of XML, for a
-/// `<!DOCTYPE>` without entities and for byte order marks behind the first, and without the hyphens in comments. Every byte of the rest is what and where it was, and so are
-/// all ends of lines.
+/// The text with [`COLON`] for the colons in names of elements and attributes, with blanks for the declaration of XML, for a `<!DOCTYPE>`
+/// without entities and for byte order marks behind the first, and without the hyphens in comments. Every byte of the rest is what and
+/// where it was, and so are all ends of lines.
 ///
 /// # Errors
 ///
-/// Where a tag begins that has more than `most` attributes: a parser compares each with all others.
+/// The place (a byte) of a tag that has more than `most` attributes: a parser compares each with all others.
 pub fn plain(text: &str, most: usize) -> Result<Cow<'_, str>, usize> {
     let mut plain = String::with_capacity(text.len());
     let (mut done, mut is_within) = (0, false);
@@ -65,7 +65,8 @@ pub fn plain(text: &str, most: usize) -> Result<Cow<'_, str>, usize> {
     Ok(if plain == text { Cow::Borrowed(text) } else { Cow::Owned(plain) })
 }
 
-/// What stands between markup before the first element. A byte order mark that begins the text is left to the parser.
+/// Cleans the text between markup before the first element. A byte order mark that begins the text is left to the
+/// parser.
 fn before_root(text: &str, is_start: bool, plain: &mut String) {
     for (at, c) in text.char_indices() {
         if c == MARK && !(is_start && at == 0) {
@@ -76,12 +77,12 @@ fn before_root(text: &str, is_start: bool, plain: &mut String) {
     }
 }
 
-/// Blanks for all but the ends of lines.
+/// Writes blanks for everything but the ends of lines.
 fn blanks(text: &str, plain: &mut String) {
     text.bytes().for_each(|byte| plain.push(if matches!(byte, b'\n' | b'\r') { byte.into() } else { ' ' }));
 }
 
-/// A <!DOCTYPE>, which says nothing of a robot: blanks, unless it defines entities, which the parser refuses; how long it is.
+/// Blanks out a <!DOCTYPE>, unless it defines entities, which the parser refuses; returns its length.
 fn doctype(text: &str, plain: &mut String) -> usize {
     let end = text.find('>').map_or(text.len(), |end| end + 1);
     let (found, is_whole) = (&text[..end], text[..end].ends_with('>'));
@@ -93,7 +94,7 @@ fn doctype(text: &str, plain: &mut String) -> usize {
     end
 }
 
-/// A comment: two hyphens end one, and are found within many.
+/// Writes a comment without the hyphens inside it: two hyphens end a comment.
 fn comment(text: &str, plain: &mut String) {
     match text.strip_prefix("<!--").and_then(|inner| inner.strip_suffix("-->")) {
         Some(inner) => {
@@ -105,7 +106,7 @@ fn comment(text: &str, plain: &mut String) {
     }
 }
 
-/// A tag, up to the `>` that ends it; how long it is, and how many attributes it has.
+/// Writes a tag, up to the `>` that ends it; returns its length and the number of its attributes.
 fn tag(text: &str, plain: &mut String) -> (usize, usize) {
     let (mut quote, mut attributes) = (None, 0);
     for (at, c) in text.char_indices() {

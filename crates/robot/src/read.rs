@@ -1,4 +1,4 @@
-//! From the text of a description to its links and joints.
+//! Reading a description: from its text to links and joints.
 
 use std::{collections::HashMap, ops::Range};
 
@@ -12,25 +12,25 @@ use super::{
 };
 use body_schema_engine::{kinematics::JointKind, similar::similar};
 
-/// More elements than any robot has.
+/// The most elements of a description: more than any robot has.
 const MOST_NODES: u32 = 2_000_000;
-/// Attributes of an element.
+/// The most attributes of an element.
 const MOST_ATTRIBUTES: usize = 200;
-/// Bytes of a link's or a joint's name: it is told with every reading.
+/// The most bytes of a link's or a joint's name: it is repeated with every reading.
 const MOST_NAME_BYTES: usize = 300;
 
 /// A robot's description with its text.
 ///
-/// Links and the joints between them are checked as a whole; what a joint says of itself, only where a chain contains it,
-/// so that a gripper that nobody asked for may be as odd as it likes.
+/// Links and the joints between them are checked as a whole; the content of a joint is checked only where a chain
+/// contains it, so that an odd gripper that is not asked for does no harm.
 #[derive(Clone, Debug)]
 pub struct Urdf {
     pub(super) text: String,
-    /// What the robot calls itself; empty if it does not.
+    /// The robot's name; empty if the description has none.
     pub(super) name: String,
     pub(super) links: Vec<String>,
     pub(super) joints: Vec<JointElement>,
-    /// By link: the joint that carries it.
+    /// The joint that carries each link.
     pub(super) carried_by: Vec<Option<usize>>,
     /// Where `<robot>` begins, as a byte.
     pub(super) start: usize,
@@ -40,7 +40,7 @@ pub struct Urdf {
 #[derive(Clone, Debug)]
 pub(super) struct JointElement {
     pub name: String,
-    /// Indices of links.
+    /// The indices of the links.
     pub parent: usize,
     pub child: usize,
     /// Its type as written.
@@ -50,7 +50,7 @@ pub(super) struct JointElement {
     pub body: Result<Body, UrdfError>,
 }
 
-/// A joint for those who look for a chain.
+/// A joint with its links, for the search for a chain.
 #[derive(Clone, Copy, Debug)]
 pub struct JointEnds<'a> {
     /// Its name.
@@ -61,16 +61,16 @@ pub struct JointEnds<'a> {
     pub child: &'a str,
     /// Its type as written.
     pub kind: &'a str,
-    /// What it is on a chain, or why it is not.
+    /// Its content, or why it cannot be on a chain.
     body: Result<&'a Body, &'a UrdfError>,
 }
 
 impl JointEnds<'_> {
-    /// How it moves on a chain, if it does.
+    /// How it moves on a chain; `None` if it is fixed.
     ///
     /// # Errors
     ///
-    /// Why it cannot be part of a chain.
+    /// The reason why it cannot be part of a chain.
     pub fn moves(&self) -> Result<Option<JointKind>, &UrdfError> {
         self.body.map(|body| body.kind.moves())
     }
@@ -82,12 +82,12 @@ impl JointEnds<'_> {
 }
 
 impl Urdf {
-    /// Reads a description. Unknown elements and attributes are passed over, those of other namespaces too, whether these are
-    /// declared or not. Blanks, comments, a byte order mark and a `<!DOCTYPE>` without entities may stand before it.
+    /// Reads a description. Unknown elements and attributes are ignored, and so are those of other namespaces, declared or
+    /// not. Blanks, comments, a byte order mark and a `<!DOCTYPE>` without entities may stand before it.
     ///
     /// # Errors
     ///
-    /// [`UrdfError`] where the text is no XML, its links and joints are xacro, or they form no tree.
+    /// [`UrdfError`] if the text is no XML, if links and joints are unexpanded xacro, or if they form no tree.
     pub fn parse(text: &str) -> Result<Self, UrdfError> {
         let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
         let strict = plain(text, MOST_ATTRIBUTES).map_err(|at| {
@@ -128,7 +128,7 @@ impl Urdf {
         Ok(Self { text: text.to_owned(), name, links: links.names, joints, carried_by, start })
     }
 
-    /// What the robot calls itself; empty if it does not.
+    /// The robot's name; empty if the description has none.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -154,7 +154,7 @@ impl Urdf {
         (0..self.links.len()).filter(is_leaf).map(|link| self.links[link].as_str())
     }
 
-    /// By link, whether others hang on it.
+    /// Whether others hang on each link.
     fn carries(&self) -> Vec<bool> {
         let mut carries = vec![false; self.links.len()];
         self.joints.iter().for_each(|joint| carries[joint.parent] = true);
@@ -244,8 +244,8 @@ fn as_written(name: &str) -> String {
     name.replace(COLON, ":")
 }
 
-/// Refuses xacro where kinematics is: between links and joints, and in joints. What is left of a template elsewhere, as a colour in
-/// a `<visual>`, says nothing of how the robot moves.
+/// Refuses unexpanded xacro where the kinematics are: between links and joints, and in joints. What is left of a template
+/// elsewhere, such as a colour in a `<visual>`, does not affect how the robot moves.
 fn refuse_xacro(robot: Node) -> Result<(), UrdfError> {
     let declared = |prefix: &str| {
         let mut attributes = robot.attributes();

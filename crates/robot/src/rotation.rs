@@ -9,9 +9,9 @@ use body_schema_engine::elementary::{atan2, hypot};
 /// Below this cosine of the pitch, roll and yaw turn about the same axis as far as digits tell.
 const LOCKED: f64 = 1e-13;
 
-/// The roll, pitch and yaw of a rotation, of all that there are those nearest to `near`, radians.
+/// The roll, pitch and yaw of a rotation (radians) that are nearest to `near` among all that give it.
 ///
-/// They give the rotation back to 1e-12 rad however near to gimbal lock: whatever error yaw has, roll takes it back.
+/// They give the rotation back to 1e-12 rad however near to gimbal lock: roll takes back whatever error yaw has.
 pub fn rpy(rotation: &UnitQuaternion<f64>, near: [f64; 3]) -> [f64; 3] {
     let matrix = rotation.to_rotation_matrix();
     let yaw =

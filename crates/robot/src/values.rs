@@ -10,7 +10,7 @@ use body_schema_engine::{
     similar::similar,
 };
 
-/// How xacro files are turned into what can be read here.
+/// The instruction for turning xacro files into URDF.
 pub const EXPAND: &str = "expand it first: `xacro robot.urdf.xacro > robot.urdf` (part of ROS; without it, `pip install \
                           xacro`)";
 
@@ -19,12 +19,12 @@ pub fn error(node: Node, byte: usize, what: impl Into<String>, mend: impl Into<S
     UrdfError::at(node.document().input_text(), byte, what, mend)
 }
 
-/// Whether a value is what xacro is to fill in.
+/// Whether a value is a placeholder that xacro should fill in.
 pub fn is_expression(value: &str) -> bool {
     value.contains("${") || value.contains("$(")
 }
 
-/// An attribute that must be there.
+/// A required attribute, and its place.
 pub fn required<'a>(node: Node<'a, '_>, name: &str) -> Result<(&'a str, Range<usize>), UrdfError> {
     if let Some(attribute) = node.attribute_node(name) {
         return Ok((attribute.value(), attribute.range_value()));
@@ -37,7 +37,7 @@ pub fn required<'a>(node: Node<'a, '_>, name: &str) -> Result<(&'a str, Range<us
     Err(error(node, node.range().start, format!("<{tag}> has no `{name}`"), mend))
 }
 
-/// The child of that name, if there is one. Several are refused: readers differ in which of them they take.
+/// The only child of that name, if there is one. Several are refused, because readers differ in which one they take.
 pub fn only_child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Result<Option<Node<'a, 'i>>, UrdfError> {
     let mut found = node.children().filter(|child| child.is_element() && child.tag_name().name() == name);
     let first = found.next();

@@ -1,4 +1,4 @@
-//! The same text with other origins.
+//! Writing a description with other origins.
 
 use std::ops::Range;
 
@@ -11,9 +11,9 @@ use super::{
 };
 
 impl Urdf {
-    /// This description with the origins of `chain`, a chain of it: byte for byte the same but for the values of `xyz`, and
-    /// of `rpy` or `quat_xyzw`, of those joints' `<origin>` that differ. Where there was no attribute or no element, it is
-    /// added. Numbers are the shortest that read back exactly.
+    /// This description with the origins of `chain`, a chain of it. Only the values of `xyz`, and of `rpy` or `quat_xyzw`,
+    /// change in those joints' `<origin>` that differ; every other byte stays. Missing attributes and elements are added.
+    /// Numbers are the shortest that read back exactly.
     pub fn written(&self, chain: &Chain) -> String {
         let mut edits: Vec<(Range<usize>, String)> = Vec::new();
         for segment in &chain.segments {

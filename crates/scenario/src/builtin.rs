@@ -1,4 +1,4 @@
-//! The scenarios that are embedded in the program.
+//! The scenarios that are built into the program.
 
 use super::{Scenario, ScenarioError, error::similar};
 
@@ -17,7 +17,7 @@ macro_rules! builtins {
     };
 }
 
-/// All of them, simplest first.
+/// All built-in scenarios, simplest first.
 pub const BUILTIN: &[Builtin] = builtins![
     "arm-6dof",
     "arm-6dof-doubled-error",
@@ -73,6 +73,10 @@ const DATA: &[(&str, &str)] = files![
 ];
 
 /// The built-in scenario of that name.
+///
+/// # Errors
+///
+/// [`ScenarioError::UnknownScenario`] if no built-in scenario has that name.
 pub fn builtin(name: &str) -> Result<Scenario, ScenarioError> {
     let names = || BUILTIN.iter().map(|builtin| builtin.name);
     let Some(found) = BUILTIN.iter().find(|builtin| builtin.name == name) else {

@@ -10,21 +10,21 @@ use body_schema_table::{Columns, Table, TableError, Titles};
 pub struct Measurements {
     /// Joint positions, rad or m per joint that moves.
     pub configurations: Vec<Vec<f64>>,
-    /// What was observed: the readings of the scenario's rig. That something was held in a socket is one of them, unless
-    /// nobody learns from that socket.
+    /// The observations: the readings of the scenario's rig. That something was held in a socket is one of them, unless
+    /// the socket is held out.
     pub observations: Vec<Observation>,
     /// The line of its file that each row stands on, counted from 1.
     pub lines: Vec<usize>,
-    /// By row its file; empty where all rows are from one.
+    /// The file of each row; empty where all rows are from one.
     pub files: Vec<Arc<str>>,
-    /// By row its number in its file, from 0; lines on which nothing was measured are counted.
+    /// The number of each row in its file, from 0; lines without a measurement are counted.
     pub numbers: Vec<usize>,
-    /// By row the socket in which a target was held: its number among the robot's sockets, those that are held out after the
-    /// others. Empty where there are none.
+    /// The socket in which a target was held in each row: its number among the robot's sockets, held-out ones after the
+    /// others. Empty without sockets.
     pub sockets: Vec<Option<usize>>,
     /// Columns of text by their titles, row by row.
     pub labels: BTreeMap<String, Vec<String>>,
-    /// What is known before any movement, as the distance between two sockets.
+    /// Observations from before any movement, such as the distance between two sockets.
     pub beforehand: Option<Observation>,
     /// The titles of the joints' columns.
     pub columns: Vec<String>,
@@ -35,9 +35,14 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// Reads the columns that `wanted` finds among the titles of a CSV text: columns are separated by commas, and a number has
-    /// a decimal point if anything (`0.03`, `.03`, `3e-2`). Titles may end with a unit (see [`table`](body_schema_table)). A line on
-    /// which nothing was measured, in a table without labels, is passed over. An error says which line or column is at fault.
+    /// Reads the columns that `wanted` finds among the titles of a CSV text: columns are separated by commas, and a number has a
+    /// decimal point if anything (`0.03`, `.03`, `3e-2`). Titles may end with a unit (see [`table`](body_schema_table)). A line
+    /// without a measurement is skipped, in a table without labels.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError`], which names line and column, if `wanted` does not find its columns, a cell is no number, or no line holds a
+    /// measurement.
     pub fn from_csv(
         text: &str,
         wanted: impl FnOnce(&Titles) -> Result<Columns, TableError>,
@@ -86,12 +91,12 @@ impl Measurements {
         Ok(measurements)
     }
 
-    /// How many rows there are.
+    /// The number of rows.
     pub fn rows(&self) -> usize {
         self.configurations.len()
     }
 
-    /// Adds the rows of another file with the same columns; the two are called so.
+    /// Adds the rows of another file with the same columns; `names` are the two files' names.
     pub(super) fn append(&mut self, other: Self, names: [&str; 2]) {
         let [first, second] = names.map(Arc::from);
         self.files = [vec![first; self.rows()], vec![second; other.rows()]].concat();

@@ -3,7 +3,11 @@
 use toml::{Table, Value};
 
 /// The TOML `text` with the value at each dotted path replaced, say `filter.measurement_variance_m2`. A path leads
-/// through tables that exist; its last key may be new. Comments are lost. An error says which path leads nowhere.
+/// through tables that exist; its last key may be new. Comments are lost.
+///
+/// # Errors
+///
+/// A sentence that says why `text` is no TOML, or which part of a path is no table.
 pub fn edited(text: &str, values: &[(String, Value)]) -> Result<String, String> {
     let mut document: Table = text.parse().map_err(|error: toml::de::Error| error.message().to_owned())?;
     for (path, value) in values {

@@ -1,4 +1,4 @@
-//! What can be wrong with a scenario, said so that it can be mended.
+//! Errors in a scenario: what is wrong, where, and what to do.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ pub(super) use body_schema_engine::similar::similar;
 use body_schema_engine::{estimation::EstimationError, model::PriorError};
 use body_schema_experiment::ExperimentError;
 
-/// One thing that is wrong in a scenario file.
+/// A single problem in a scenario file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     /// Line in the file, counted from 1.
@@ -15,7 +15,7 @@ pub struct Problem {
     pub key: String,
     /// What is wrong.
     pub what: String,
-    /// How to mend it.
+    /// What to do about it.
     pub mend: String,
 }
 
@@ -41,9 +41,9 @@ pub enum ScenarioError {
     UnknownScenario {
         /// The name asked for.
         name: String,
-        /// A similar name.
+        /// The name that was probably meant.
         suggested: Option<String>,
-        /// All names.
+        /// The known names.
         known: Vec<String>,
     },
     /// The scenario offers no such learner.
@@ -57,9 +57,9 @@ pub enum ScenarioError {
         scenario: String,
         /// The name asked for.
         name: String,
-        /// What was probably meant.
+        /// The name that was probably meant.
         suggested: Option<String>,
-        /// All names.
+        /// The known names.
         known: Vec<String>,
     },
     /// The parts of a composed learner do not fit.
@@ -67,9 +67,9 @@ pub enum ScenarioError {
     Misfit {
         /// The name asked for.
         name: String,
-        /// Why not.
+        /// The reason.
         what: String,
-        /// The nearest that there is.
+        /// The nearest learner that fits.
         fitting: String,
     },
     /// A learner is named twice.
@@ -78,7 +78,7 @@ pub enum ScenarioError {
     /// No learner is named.
     #[error("no learner is named; leave the list out to take the scenario's own")]
     NoLearner,
-    /// The prior is none.
+    /// The prior is not a positive definite covariance.
     #[error("scenario `{scenario}`: {source}")]
     Prior {
         /// The scenario.
@@ -86,8 +86,8 @@ pub enum ScenarioError {
         /// Why.
         source: PriorError,
     },
-    /// A learner cannot take in what is known before any movement.
-    #[error("scenario `{scenario}`: what is known before any movement: {source}")]
+    /// A learner cannot absorb the observations from before any movement.
+    #[error("scenario `{scenario}`: the readings known before any movement cannot be learned from: {source}")]
     Beforehand {
         /// The scenario.
         scenario: String,

@@ -1,4 +1,4 @@
-//! What is doubtful in a scenario's data, and in its prior.
+//! Diagnostics of a scenario's data, and the check of its prior.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,8 @@ use body_schema_engine::{
     sensing::{Observation, Occasion},
 };
 
-/// How far a target may be from where the file has it, and a base of which the file says no more than that, for all that is known before any row is looked at, metres.
+/// The assumed deviation, metres, of a target from where the file has it before any row is looked at; also of a base of which the file says
+/// no more.
 const TARGET_M: f64 = 0.3;
 
 impl Scenario {
@@ -58,7 +59,7 @@ impl Scenario {
         Some(found)
     }
 
-    /// Equations of all that was measured. The first row in a socket says where that is, and no more.
+    /// The number of equations of all measurements. The first row in a socket only places the socket, and adds none.
     fn equations(&self, measurements: &Measurements) -> usize {
         let channels = self.rig.channels();
         let always = |observation: &Observation| -> usize {
@@ -74,7 +75,7 @@ impl Scenario {
         measured + 3 * (held.len() - places.len()) + beforehand.map(Vec::len).sum::<usize>()
     }
 
-    /// Where the base is said to be, and how well.
+    /// The stated pose of the base, and its deviations.
     fn base_said(&self) -> Option<Base> {
         let at = self.robot.state.base;
         match (self.robot.layout.block(Block::Base), self.prior.of(Block::Base)) {
@@ -86,7 +87,7 @@ impl Scenario {
         }
     }
 
-    /// Where targets on the last link were seen.
+    /// The measured positions of targets on the last link.
     fn seen(&self, measurements: &Measurements) -> Vec<Seen> {
         let state = &self.robot.state;
         let channels = self.rig.channels().iter().zip(&measurements.readings).enumerate();
@@ -115,8 +116,11 @@ impl Scenario {
         seen.collect()
     }
 
-    /// Whether learners can begin from the prior, without building any: the standard deviations may be so small or so
-    /// large that their squares are none.
+    /// Checks, without building any learner, that learners can begin from the prior.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError::Prior`] if the square of a standard deviation, or its reciprocal, underflows or overflows.
     pub fn check_prior(&self) -> Result<(), ScenarioError> {
         let deviations = self.prior.standard_deviations(&self.robot.layout);
         if deviations.iter().all(|sd| (sd * sd).is_normal() && (sd * sd).recip().is_normal()) {

@@ -1,4 +1,4 @@
-//! Which rows of a table nobody learns from.
+//! The choice of rows that are held out.
 
 use rand::seq::SliceRandom;
 
@@ -6,43 +6,45 @@ use super::{Scenario, ScenarioError};
 use body_schema_diagnostics::postures;
 use body_schema_experiment::Stream;
 
-/// Which rows of a table are held out: they say how good a model is on data that it has not seen, and touch nothing else.
+/// The rows of a table that are held out. They measure how well a model predicts data that it has not seen, and serve
+/// nothing else.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HeldOut {
-    /// Rows of the table.
+    /// The number of rows of the table.
     pub rows: usize,
-    /// Which of them.
+    /// The rule by which rows are held out.
     pub rule: HeldOutRule,
-    /// By row, its [posture](fn@body_schema_diagnostics::postures): rows of one are held out together, unless they are listed.
+    /// The [posture](fn@body_schema_diagnostics::postures) of each row: rows of one posture are held out together, unless they
+    /// are listed.
     pub postures: Vec<usize>,
 }
 
-/// How the rows that are held out are told.
+/// The rule by which rows are held out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HeldOutRule {
-    /// None are.
+    /// No row is held out.
     Nothing,
-    /// So many, drawn by seed; fewer, where whole postures do not add up to them.
+    /// This many rows, drawn by seed; fewer, where whole postures do not add up to them.
     Count(usize),
-    /// Fold f of so many holds out postures f, f + K, …, which are rows f, f + K, … where no row repeats another; the seed says
-    /// which fold. There are no more folds than postures.
+    /// One of this many folds: fold f holds out postures f, f + K, …, which are rows f, f + K, … where no row repeats another;
+    /// the seed decides which fold. There are no more folds than postures.
     Folds(usize),
-    /// These, counted from 0, in ascending order.
+    /// These rows, counted from 0, in ascending order.
     Rows(Vec<usize>),
 }
 
 impl HeldOut {
-    /// Of rows with these joint positions.
+    /// The rule applied to rows with these joint positions.
     pub fn new(rule: HeldOutRule, configurations: &[Vec<f64>]) -> Self {
         Self { rows: configurations.len(), rule, postures: postures(configurations) }
     }
 
-    /// How many postures there are.
+    /// The number of postures.
     pub fn count_postures(&self) -> usize {
         self.postures.iter().max().map_or(0, |last| last + 1)
     }
 
-    /// How many rows there are to learn from at least, whatever the seed.
+    /// The least number of training rows over all seeds.
     pub fn fewest_training(&self) -> usize {
         match self.rule {
             HeldOutRule::Count(count) => self.rows.saturating_sub(count),
@@ -68,7 +70,7 @@ impl HeldOut {
         }
     }
 
-    /// Every split that there is: one per fold, or the only one; that of seed 0, where seeds draw it.
+    /// All splits: one per fold, or the only one; the split of seed 0, where seeds draw it.
     pub fn folds(&self) -> Vec<(Vec<usize>, Vec<usize>)> {
         match &self.rule {
             HeldOutRule::Folds(folds) => (0..self.count_folds(*folds) as u64).map(|fold| self.split(fold)).collect(),
@@ -102,12 +104,12 @@ impl HeldOut {
 }
 
 impl Scenario {
-    /// The same with its table held out in so many folds, whatever its file holds out; sockets that nobody learned from are
-    /// learned from in most folds then.
+    /// This scenario with its table held out in so many folds, in place of the file's rule. Held-out sockets are learned
+    /// from in most folds then.
     ///
     /// # Errors
     ///
-    /// Where the table has fewer rows than folds, or there is no table.
+    /// [`ScenarioError`] if the table has fewer rows than folds, or there is no table.
     pub fn in_folds(&self, folds: usize) -> Result<Self, ScenarioError> {
         let (mut document, file) =
             (self.source.parse::<toml::Table>().unwrap_or_default(), format!("{}.toml", self.name));

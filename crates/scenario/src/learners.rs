@@ -21,14 +21,14 @@ pub struct LearnerSpec {
     pub stabilising: bool,
     /// Whether its smoother takes the scenario's loss; otherwise least squares.
     pub robust: bool,
-    /// Whether it takes the axes for what the description says, and learns the rest.
+    /// Whether it takes the axes from the description, and learns the rest.
     pub holds_axes: bool,
     /// Whether it runs when no learner is named.
     pub by_default: bool,
 }
 
 impl LearnerSpec {
-    /// A pair that no file names: with all the settings of the scenario.
+    /// A pair of estimator and policy that no file names, with all the settings of the scenario.
     fn composed(name: &str, estimator: EstimatorKind, policy: PolicyKind) -> Self {
         Self {
             name: name.to_owned(),
@@ -59,7 +59,7 @@ pub enum EstimatorKind {
 }
 
 impl EstimatorKind {
-    /// All of them.
+    /// All estimators.
     pub const ALL: [Self; 5] = [Self::Rls, Self::Unscented, Self::RlsSixNumbers, Self::Gradient, Self::Smoother];
 
     /// Its name in files and reports.
@@ -73,7 +73,7 @@ impl EstimatorKind {
         }
     }
 
-    /// Whether it knows how sure it is: what active selection chooses by, and a learner calls itself settled by.
+    /// Whether it keeps a covariance, by which active selection chooses and a learner settles.
     pub fn keeps_covariance(self) -> bool {
         matches!(self, Self::Rls | Self::Unscented | Self::Smoother)
     }
@@ -83,28 +83,28 @@ impl EstimatorKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PolicyKind {
-    /// Minimises the A-criterion; where a head watches, weighed by the chance of being seen.
+    /// Minimises the A-criterion; where a head watches, weighted by the chance of being seen.
     Active,
-    /// The same, but where a head watches with blind faith in the predicted marker: a comparison.
+    /// Minimises the A-criterion as if the predicted marker were always seen: a comparison where a head watches.
     ActiveNaive,
-    /// Plans the movements that are still needed together; what `active` is for a smoother.
+    /// Plans several movements together, as many as are still needed; `active` with a smoother.
     ActivePlanned,
-    /// As `active`, but by original DIRECT, whatever the scenario's variant.
+    /// Like `active`, but by original DIRECT, whatever the scenario's variant.
     ActiveDirect,
-    /// As `active`, but the best of as many random configurations: the floor of every search.
+    /// Like `active`, but by the best of as many random configurations: the baseline of every search.
     ActiveRandomSearch,
-    /// As `active`, but by Bayesian optimisation with as many evaluations.
+    /// Like `active`, but by Bayesian optimisation with as many evaluations.
     ActiveBayesian,
-    /// As `active`, but with the expectation of (7) by Monte Carlo over the posterior.
+    /// Like `active`, but with the expectation of (7) by Monte Carlo over the posterior.
     ActiveMonteCarlo,
     /// Draws uniformly.
     Random,
-    /// Waits for a person to choose. No file names it: it is offered in every simulated scenario.
+    /// Waits for a person to choose. No file names it: every simulated scenario offers it.
     Human,
 }
 
 impl PolicyKind {
-    /// All of them.
+    /// All policies.
     pub const ALL: [Self; 9] = [
         Self::Active,
         Self::ActiveNaive,
@@ -132,7 +132,7 @@ impl PolicyKind {
         }
     }
 
-    /// Whether it is `Active` but for how a box of joint limits is searched; over recorded rows they are all the same.
+    /// Whether it is `Active` with another search of the joint box; over recorded rows these are all equal.
     pub(super) fn varies_the_search(self) -> bool {
         matches!(
             self,
@@ -145,7 +145,7 @@ impl PolicyKind {
     }
 }
 
-/// Stands between estimator and policy in the name of a composed learner.
+/// The separator between estimator and policy in the name of a composed learner.
 const SEPARATOR: char = ':';
 
 /// The learner for which a person chooses, unless another estimator is named.
@@ -156,6 +156,12 @@ impl Scenario {
     ///
     /// A name is one of the scenario's, or an estimator and a policy, as in `smoother:random`: with the settings of the
     /// scenario, and the stabilising noise if it has any. `human` is `rls:human`.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError::NoLearner`] if the list is empty, [`ScenarioError::RepeatedLearner`] if a learner is in it
+    /// twice, [`ScenarioError::UnknownLearner`] or [`ScenarioError::Misfit`] if a name is none or its policy does not
+    /// fit.
     pub fn chosen(&self, names: Option<&[String]>) -> Result<Vec<LearnerSpec>, ScenarioError> {
         let Some(names) = names else {
             return Ok(self.learners.iter().filter(|spec| spec.by_default).cloned().collect());
@@ -177,7 +183,8 @@ impl Scenario {
         Ok(chosen)
     }
 
-    /// What else can be compared here: every estimator with every policy that fits it, but for what the scenario names.
+    /// The other learners that can be compared here: every estimator with every policy that fits it, except those that
+    /// the scenario names.
     pub fn compositions(&self) -> Vec<LearnerSpec> {
         let pairs =
             EstimatorKind::ALL.into_iter().flat_map(|estimator| PolicyKind::ALL.map(|policy| (estimator, policy)));
@@ -236,7 +243,7 @@ impl Scenario {
         Setting::of(&self.robot, Some(&self.rig), self.world.kind())
     }
 
-    /// The name of the pair nearest to these two that fits.
+    /// The name of the nearest pair that fits.
     fn fitting(&self, mut estimator: EstimatorKind, mut policy: PolicyKind) -> String {
         while let Some(misfit) = misfit(estimator, policy, self.setting()) {
             (estimator, policy) = misfit.instead;
@@ -244,7 +251,7 @@ impl Scenario {
         composed(estimator, policy)
     }
 
-    /// What was probably meant by the name of a learner that is not there: one of the scenario's, or two halves.
+    /// The learner that was probably meant by an unknown name: one of the scenario's, or two halves.
     fn similar_learner(&self, name: &str) -> Option<String> {
         let Some((estimator, policy)) = name.split_once(SEPARATOR) else {
             return similar(name, self.learners.iter().map(|spec| spec.name.as_str())).map(str::to_owned);

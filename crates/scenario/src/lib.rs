@@ -1,8 +1,8 @@
 //! Scenario files: what robot, what world, what learners.
 //!
-//! A scenario is TOML, read in two stages: `raw` says which keys there are, and `validate` turns them into a
-//! [`Scenario`] whose values can be relied on. Every problem names the file, the line, the key and the mend. From a
-//! scenario and a seed, [`assembly`] draws an experiment.
+//! A scenario is TOML, read in two stages: `raw` says which keys there are, and `validate` turns them into a [`Scenario`] whose
+//! values can be relied on. Every problem names the file, the line, the key, and what to do. From a scenario and a seed,
+//! [`assembly`] draws an experiment.
 //!
 //! The robot is written joint by joint, or is that of a URDF; the world is simulated, or a table of measurements. Where both are
 //! files, whatever a scenario leaves out is taken from `measured.toml`, and from the table's titles.
@@ -53,13 +53,14 @@ pub struct Scenario {
     pub name: String,
     /// One line about it.
     pub title: String,
-    /// Steps of a run unless told otherwise.
+    /// The steps of a run, unless stated otherwise.
     pub steps: u64,
     /// The robot.
     pub robot: Robot,
-    /// Where it moves.
+    /// The world in which the robot moves.
     pub world: WorldSpec,
-    /// What is measured, with the sensors' own noise; with what the filter assumes where measurements are replayed.
+    /// The measurement model, with the sensors' own noise; with the noise that the filter assumes where measurements
+    /// are replayed.
     pub rig: Arc<Rig>,
     /// Prior standard deviations.
     pub prior: Prior,
@@ -69,21 +70,21 @@ pub struct Scenario {
     pub unscented: Filter,
     /// Values of the smoother.
     pub smoother: SmootherSpec,
-    /// Rate η of the stochastic gradient; [`GRADIENT_RATE`](Self::GRADIENT_RATE) where the file has no learner by it and
-    /// says nothing.
+    /// Rate η of the stochastic gradient; [`GRADIENT_RATE`](Self::GRADIENT_RATE) where the file has no learner that uses
+    /// it and states none.
     pub gradient_rate: f64,
-    /// How movements are chosen actively.
+    /// The settings of active selection.
     pub selection: SelectionSpec,
-    /// What movements are bound to, if to anything.
+    /// The constraints on movements, if there are any.
     pub constraints: Option<Constraints>,
-    /// Thresholds of `converged_at`; [`THRESHOLDS`](Self::THRESHOLDS) where measurements are replayed and the file says
-    /// nothing.
+    /// Thresholds of `converged_at`; [`THRESHOLDS`](Self::THRESHOLDS) where measurements are replayed and the file
+    /// states none.
     pub thresholds: Thresholds,
     /// Expected prediction error below which a learner calls itself settled, metres.
     pub settled_below_m: f64,
-    /// The learners it offers.
+    /// The learners that it offers.
     pub learners: Vec<LearnerSpec>,
-    /// The number of movements within which a learner promises to converge; what the convergence tests hold it to.
+    /// The number of movements within which each learner promises to converge; the convergence tests check it.
     pub promises: BTreeMap<String, u64>,
     /// The text it was read from.
     pub source: String,
@@ -92,10 +93,11 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// The rate η of a gradient that is composed, as in `gradient:random`, where the file has no `[gradient]`.
+    /// The rate η of a composed gradient learner, such as `gradient:random`, where the file has no `[gradient]`.
     pub const GRADIENT_RATE: f64 = 0.1;
 
-    /// What recorded measurements would be judged by, were the truth known: 5° and 2 cm.
+    /// The default thresholds for recorded measurements: 5° and 2 cm. They are reported only; without a truth nothing
+    /// is judged by them.
     pub const THRESHOLDS: Thresholds = Thresholds { orientation_deg: 5.0, location_m: 0.02 };
 
     /// The weights of the criterion.
@@ -105,6 +107,10 @@ impl Scenario {
     }
 
     /// The text of a data file that this scenario has already read.
+    ///
+    /// # Errors
+    ///
+    /// A clause that continues the file's name, if this scenario has not read such a file.
     pub fn data_file(&self, file: &str) -> Result<String, String> {
         let found = self.data.iter().find(|(name, _)| name == file).map(|(_, text)| text.clone());
         found.ok_or_else(|| "is not a data file of this scenario".to_owned())
@@ -122,28 +128,28 @@ pub struct Robot {
     pub layout: Layout,
     /// Joint limits.
     pub limits: JointBox,
-    /// What it is drawn as.
+    /// Its shape in drawings.
     pub body: Option<Body>,
-    /// How well targets and cameras that are learned are known.
+    /// The prior knowledge of learned targets and cameras.
     pub known: Vec<(Block, Known)>,
-    /// What its sensors can name.
+    /// The targets and cameras that its sensors can name.
     pub equipment: Equipment,
     /// The sockets in which targets are held, in the order of the state's.
     pub sockets: Vec<SocketSpec>,
-    /// Those that nobody learns from.
+    /// The held-out sockets.
     pub held_out_sockets: Vec<SocketSpec>,
-    /// What is known of distances between sockets.
+    /// The known distances between sockets.
     pub spacings: Vec<Spacing>,
     /// Whether predictions are judged after the rigid motion that fits best.
     pub up_to_motion: bool,
-    /// How its load pulls at its joints.
+    /// The direction of gravity, and the joint of the elbow.
     pub gravity: Gravity,
-    /// The description that the joints are from, if they are not written in the scenario.
+    /// The description that the joints come from, if they are not written in the scenario.
     pub described: Option<Arc<Described>>,
 }
 
 impl Robot {
-    /// What everything that can be learned is called.
+    /// The names of everything that can be learned.
     pub fn called(&self) -> Names {
         Names {
             joints: self.names.clone(),
@@ -153,22 +159,22 @@ impl Robot {
         }
     }
 
-    /// What the joints of such a robot bear, as `described`.
+    /// The loads on the joints of such a robot, described as `described`.
     pub fn loads(&self, described: &State) -> Arc<Loads> {
         Arc::new(Loads::new(described, self.gravity.up, self.gravity.elbow))
     }
 }
 
-/// What is known of how a robot's load pulls.
+/// The direction of gravity, and the joint of the elbow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gravity {
-    /// Away from the ground, in the frame of the base.
+    /// The upward direction, in the frame of the base.
     pub up: UnitVector3<f64>,
     /// The joint at whose origin the elbow is; the middle one that turns if none is named.
     pub elbow: Option<usize>,
 }
 
-/// A robot's description, and what of it the scenario is about.
+/// A robot's description, and the chain that the scenario uses.
 #[derive(Clone, Debug)]
 pub struct Described {
     /// The file, as the scenario names it.
@@ -182,24 +188,25 @@ pub struct Described {
 /// A place beside the robot in which a target is held.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SocketSpec {
-    /// Its name, among those of one place.
+    /// Its name, among the sockets of one place.
     pub name: String,
-    /// The place where it stands, with others.
+    /// The place where it stands, if sockets are grouped by place.
     pub place: Option<String>,
     /// The target.
     pub target: usize,
-    /// Where it truly is, frame of the measurements, metres.
+    /// Its true position, frame of the measurements, metres.
     pub at: Point3<f64>,
-    /// A posture that holds the target there; of sockets that are learned from the first movement, which everybody is told.
+    /// A posture that holds the target there; for sockets that are learned from the first movement, a posture that every
+    /// learner is given.
     pub posture: Vec<f64>,
-    /// Whether there is a guess of where it is. Otherwise it is taken to be where the guessed robot has the target in `posture`.
+    /// Whether its position is guessed. Otherwise it is taken to be where the guessed robot has the target in `posture`.
     pub is_guessed: bool,
-    /// What play and the noise of the joints amount to at the target, metres per coordinate.
+    /// The noise at the target from play and from the joints, metres per coordinate.
     pub sigma_m: f64,
 }
 
 impl SocketSpec {
-    /// Its place and its name.
+    /// Its place and its name, as one label.
     pub fn label(&self) -> String {
         self.place.as_ref().map_or_else(|| self.name.clone(), |place| format!("{place}/{}", self.name))
     }
@@ -210,28 +217,28 @@ impl SocketSpec {
 pub enum WorldSpec {
     /// The robot is the truth; the initial estimate is drawn around it.
     Simulated {
-        /// How wrong the initial estimate is.
+        /// The error of the initial estimate.
         initial_error: InitialError,
         /// The head that watches, if the marker is not always seen.
         watch: Option<Watch>,
-        /// How the body changes during a run, if it does.
+        /// The change of the body during a run, if there is one.
         change: Option<Box<ChangeSpec>>,
-        /// Readings that have nothing to do with the robot, if there are any.
+        /// The outliers among readings, if there are any.
         outliers: Option<Outliers>,
     },
     /// A recorded data set is replayed; the initial estimate is the nominal robot, wherever it may stand.
     Measured {
         /// The rows.
         measurements: Measurements,
-        /// Which of them are held out.
+        /// The rule by which rows are held out.
         held_out: HeldOut,
     },
-    /// A robot elsewhere, which is told where to move and tells what was observed; the initial estimate is its description,
+    /// A robot elsewhere, which is asked to move and reports what was observed; the initial estimate is its description,
     /// wherever it may stand.
     Outside {
-        /// What is known to be seen, where sensors see some postures only.
+        /// A posture known to be seen, where sensors see some postures only.
         watch: Option<Watch>,
-        /// What is known before any movement, as the distance between two sockets.
+        /// Observations from before any movement, such as the distance between two sockets.
         beforehand: Option<Observation>,
     },
 }
@@ -245,10 +252,10 @@ pub struct ChangeSpec {
     pub truth: State,
 }
 
-/// How the error of the initial estimate is drawn.
+/// The distribution of the initial estimate's error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InitialError {
-    /// Uniform up to the size, or exactly the size with random signs.
+    /// Whether it is uniform up to the size, or exactly the size with random signs.
     pub draw: ErrorDraw,
     /// Size of each of the three Euler angles that turn an axis, radians.
     pub angle_rad: f64,
@@ -266,25 +273,24 @@ pub enum ErrorDraw {
     UpTo,
     /// Minus or plus the size, with equal chance.
     Exactly,
-    /// No guess at all: directions uniform on the sphere, points uniform within plus and minus the size around the
-    /// origin. Nothing in it comes from the truth.
+    /// No guess: directions uniform on the sphere, points uniform within plus and minus the size around the origin. The
+    /// truth does not enter.
     Anywhere,
 }
 
-/// How well a block other than an axis is known before any measurement: how wrong the initial estimate is, and what the prior
-/// says of it.
+/// The prior knowledge of a block other than an axis: the error of the initial estimate, and the prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Known {
     /// Uniform up to these sizes per coordinate, which are also the prior's standard deviations.
     Within {
-        /// Of lengths, metres.
+        /// The size for lengths, metres.
         length_m: f64,
-        /// Of angles, radians.
+        /// The size for angles, radians.
         angle_rad: f64,
-        /// Of pixels and of plain numbers.
+        /// The size for pixels and plain numbers.
         other: f64,
     },
-    /// Nothing but that it is within so many metres of the origin, turned in any way.
+    /// Anywhere within so many metres of the origin, with any rotation.
     Anywhere {
         /// The bound, metres.
         within_m: f64,
@@ -292,31 +298,31 @@ pub enum Known {
 }
 
 impl Known {
-    /// How well what is said to be known, or held, is known: in metres, radians or as a number.
+    /// The standard deviation of what is taken to be known exactly: in metres, radians or as a number.
     pub(crate) const EXACTLY: f64 = 1e-6;
 }
 
 /// Prior standard deviations in tangent coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
-    /// Of a direction, radians.
+    /// The standard deviation of a direction, radians.
     pub direction_rad: f64,
-    /// Of a point, metres.
+    /// The standard deviation of a point, metres.
     pub point_m: f64,
-    /// Of the marker, metres.
+    /// The standard deviation of the marker, metres.
     pub marker_m: f64,
-    /// Of the zeros of the readings of a described robot's joints: of those that turn, radians.
+    /// The standard deviation of the zeros of a described robot's joints that turn, radians.
     pub zero_rad: f64,
-    /// Of those that slide, metres.
+    /// The standard deviation of the zeros of joints that slide, metres.
     pub zero_m: f64,
-    /// Of how much a joint gives way, rad per N·m with which gravity pulls at 1 kg.
+    /// The standard deviation of a joint's compliance, rad per N·m with which gravity pulls at 1 kg.
     pub compliance_rad_per_nm: f64,
-    /// Of other blocks, where they are learned.
+    /// The knowledge of other learned blocks.
     pub known: BTreeMap<Block, Known>,
 }
 
 impl Prior {
-    /// What is known of a block that is neither an axis nor the marker of the robot.
+    /// The prior knowledge of a block that is neither an axis nor the marker of the robot.
     pub fn of(&self, block: Block) -> Option<Known> {
         self.known.get(&block).copied()
     }
@@ -355,7 +361,7 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// σ of the first channel as the filter assumes it; the other channels' in proportion.
+    /// σ of the first channel as the filter assumes it; those of other channels change in proportion.
     pub fn sigma(&self) -> f64 {
         self.variance.sqrt()
     }
@@ -364,25 +370,25 @@ impl Filter {
 /// Values of the smoother.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SmootherSpec {
-    /// σ of the first channel as it assumes it: the sensor's own unless the file says otherwise.
+    /// σ of the first channel as the smoother assumes it: the sensor's own unless the file says otherwise.
     pub sigma: f64,
-    /// How many hypotheses it keeps and searches.
+    /// The number of hypotheses that are kept and searched.
     pub hypotheses: HypothesisSettings,
-    /// What a reading costs that is far from its prediction.
+    /// The cost of a reading, as a function of its distance from the prediction.
     pub loss: Loss,
-    /// Whether it is not told how much noise there is, so that the sensors' σ are units alone.
+    /// Whether the size of the noise is unknown, so that the sensors' σ are only units.
     pub noise_unknown: bool,
-    /// Whether it is not told how far the joints' readings are off, and learns it.
+    /// Whether the noise of the joints' readings is unknown, so that it is learned.
     pub joints_unknown: bool,
 }
 
-/// How movements are chosen actively.
+/// The settings of active selection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SelectionSpec {
     /// DIRECT's variant, ε and budget.
     pub search: Settings,
     /// The units of the criterion.
     pub units: CriterionUnits,
-    /// How movements are planned ahead, by learners that plan.
+    /// The settings of planning ahead, for learners that plan.
     pub planning: Planning,
 }

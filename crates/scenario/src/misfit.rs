@@ -1,9 +1,9 @@
-//! Which learners fit a scenario, and why others do not.
+//! The check of which learners fit a scenario, with reasons.
 
 use super::{EstimatorKind, PolicyKind, Robot, WorldKind};
 use body_schema_engine::{model::Block, sensing::Rig};
 
-/// What of a scenario decides which learners fit it.
+/// The properties of a scenario that decide which learners fit it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setting {
     /// Whether the marker is learned.
@@ -21,7 +21,7 @@ pub(super) struct Setting {
 }
 
 impl Setting {
-    /// Of a robot whose sensors are known, unless they are at fault themselves.
+    /// The setting of a robot whose sensors are known, unless they are wrong themselves.
     pub(super) fn of(robot: &Robot, rig: Option<&Rig>, world: WorldKind) -> Self {
         let mut channels = rig.into_iter().flat_map(Rig::channels);
         Self {
@@ -35,23 +35,23 @@ impl Setting {
     }
 }
 
-/// What of a learner is at fault.
+/// The part of a learner that does not fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fault {
     Estimator,
     Policy,
 }
 
-/// Why an estimator cannot learn by a policy, or not here.
+/// The reason why an estimator cannot learn by a policy, or not in this scenario.
 #[derive(Clone, Debug)]
 pub(super) struct Misfit {
     pub fault: Fault,
     pub what: String,
-    /// The same with the fault mended.
+    /// The pair with the fault corrected.
     pub instead: (EstimatorKind, PolicyKind),
 }
 
-/// Why an estimator cannot learn by a policy in such a scenario, if it cannot.
+/// The misfit of an estimator and a policy in such a scenario, if there is one.
 pub(super) fn misfit(estimator: EstimatorKind, policy: PolicyKind, setting: Setting) -> Option<Misfit> {
     if policy != PolicyKind::Random && !estimator.keeps_covariance() {
         let what = format!("`{}` keeps no covariance to choose by", estimator.name());

@@ -1,4 +1,4 @@
-//! What a scenario tells of itself to those who choose among scenarios.
+//! The summary of a scenario, for choosing among scenarios.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,20 +20,21 @@ pub struct ScenarioSummary {
     pub joints: Vec<JointDescription>,
     /// Number of learned parameters in tangent coordinates.
     pub parameters: usize,
-    /// Steps of a run unless told otherwise.
+    /// The steps of a run, unless stated otherwise.
     pub steps: u64,
-    /// The learners it offers.
+    /// The learners that it offers.
     pub learners: Vec<LearnerDescription>,
-    /// What else can be compared: every estimator with every policy that fits it, by names such as `smoother:random`.
+    /// The other learners that can be compared: every estimator with every policy that fits it, by names such as
+    /// `smoother:random`.
     pub compositions: Vec<LearnerDescription>,
-    /// The learners that a page compares unless told otherwise: those of `active`, `random` and `global` that it has, or where
-    /// it has none of them its defaults.
+    /// The learners that a page compares unless stated otherwise: those of `active`, `random` and `global` that it has, or
+    /// else its defaults.
     pub explorer: Vec<String>,
     /// The thresholds of `converged_at`.
     pub thresholds: Thresholds,
 }
 
-/// Where movements are made.
+/// The kind of world in which movements are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
@@ -42,12 +43,12 @@ pub enum WorldKind {
     Simulated,
     /// A recorded data set without a known truth.
     Measured,
-    /// A robot of one's own, which is asked to move and tells what was observed.
+    /// A robot elsewhere, which is asked to move and reports what was observed.
     Outside,
 }
 
 impl WorldSpec {
-    /// What kind it is.
+    /// The kind of this world.
     pub fn kind(&self) -> WorldKind {
         match self {
             Self::Simulated { .. } => WorldKind::Simulated,
@@ -57,7 +58,7 @@ impl WorldSpec {
     }
 }
 
-/// The learners that tell most beside each other, in the order in which a page shows them.
+/// The learners that are most instructive side by side, in the order in which a page shows them.
 const SHOWN: [&str; 3] = ["active", "random", "global"];
 
 impl ScenarioSummary {
@@ -113,7 +114,7 @@ impl super::Robot {
         learned.chain(self.held_out_sockets.iter().map(|socket| of(socket, true))).collect()
     }
 
-    /// The joints as the page and recordings are told of them.
+    /// The descriptions of the joints for the page and recordings.
     pub fn joint_descriptions(&self) -> Vec<JointDescription> {
         self.joint_settings().iter().map(JointDescription::from).collect()
     }

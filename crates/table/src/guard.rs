@@ -1,12 +1,12 @@
-//! What is read without end, or is no text, is refused while it is read.
+//! A reader that refuses endless or binary input while it is read.
 
 use std::io::{self, Read};
 
 /// The longest table that is read, in bytes: a million rows of twenty columns.
 pub const MOST_BYTES: u64 = 512 << 20;
 
-/// A reader that fails at the first byte that no text has, and after so many bytes. The error continues a sentence that
-/// begins with the file's name.
+/// A reader that fails at the first byte that no text contains, and after a given number of bytes. The error continues
+/// a sentence that begins with the file's name.
 #[derive(Debug)]
 pub struct Guard<R> {
     inner: R,

@@ -1,7 +1,7 @@
 //! Tables of measurements: CSV in, rows of joint positions and readings out.
 //!
-//! A table is read as it streams by: what is kept is what its reader keeps. It has a line of titles, then one line per
-//! movement. Columns stand in any order and are found by title; those that nobody asks for are passed over.
+//! A table is read as a stream: nothing is kept but what the caller keeps. It has a line of titles, then one line per movement. Columns
+//! stand in any order and are found by title; columns that are not asked for are ignored.
 //!
 //! ```
 //! use body_schema_table::{Columns, Layout, Quantity, Table};
@@ -23,15 +23,15 @@
 //!
 //! # Units
 //!
-//! Inside there are metres and radians only. A title's end says what its numbers are: `_m`, `_cm`, `_mm`, `_um` or `_in`, `_rad` or
-//! `_deg`, `_px`; without one they are metres, radians or pixels, as in a URDF. Words (`_inches`), capitals and brackets
-//! (`x (mm)`) say the same; another unit, as in `x_ft`, is refused. A joint's column is titled with the joint's name.
+//! Inside there are metres and radians only. The end of a title is the unit of its numbers: `_m`, `_cm`, `_mm`, `_um` or `_in`, `_rad` or
+//! `_deg`, `_px`; without one they are metres, radians or pixels, as in a URDF. Words (`_inches`), capitals and brackets (`x (mm)`) say the
+//! same; another unit, as in `x_ft`, is refused. A joint's column is titled with the joint's name.
 //!
 //! # Readings
 //!
-//! Titles begin with the name of the target (`hand` here), for pixels with the camera's and the target's (`cam_hand`);
-//! with nothing before them where there is no doubt; capitals count for nothing. Titles of other kinds can be named one by one:
-//! where they are names of components, as `qw`, these say which number is which, in any order, and else their order does.
+//! Titles begin with the name of the target (`hand` here), for pixels with the camera's and the target's (`cam_hand`); the name may be left
+//! out where there is no ambiguity; capitals do not matter. Titles of other kinds can be named one by one: where they are names of
+//! components, as `qw`, these say which number is which, in any order, and else their order does.
 //!
 //! | layout | titles | a line |
 //! |---|---|---|
@@ -44,13 +44,13 @@
 //! | [`Distance`](Layout::Distance) | `elbow,hand_distance_mm` | `0.5,742.5` |
 //! | labels, as of sockets | `elbow,place,socket` | `0.5,front left,1` |
 //!
-//! Where a sensor had no reading its cells are empty, all of them, or say so: `nan`, `NA`, `N/A`, `None`, `null` or `-`, in any case.
-//! A joint was always somewhere: where its cell says nothing, the line is refused.
+//! Where a sensor had no reading its cells are empty, all of them, or say so: `nan`, `NA`, `N/A`, `None`, `null` or `-`, in any case. A
+//! joint always has a position: a line with an empty joint cell is refused.
 //!
 //! # Errors
 //!
-//! [`TableError`] names line and column. What is no text, what is longer than [`MOST_BYTES`] or has more than [`MOST_ROWS`], two columns with one title, a
-//! line with too few or too many cells, and what is no finite number are refused as soon as they are seen.
+//! [`TableError`] names line and column. Input that is no text, is longer than [`MOST_BYTES`] or has more than [`MOST_ROWS`], two columns
+//! with one title, a line with too few or too many cells, and a cell that is no finite number are each refused as soon as they are seen.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 

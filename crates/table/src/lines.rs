@@ -1,4 +1,4 @@
-//! Line ends of any kind as one kind, so that lines can be counted.
+//! Line endings of any kind, read as one kind, so that lines can be counted.
 
 use std::io::{self, Read};
 

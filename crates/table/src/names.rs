@@ -1,8 +1,8 @@
-//! The names of columns: which number of a reading a title says that a column holds, and in which unit. Whatever reads or
-//! writes such names does it here.
+//! The names of columns: which component of a reading a column holds, and in which unit. All reading and writing of such
+//! names happens here.
 //!
-//! A title is what is measured, the [`Component`], and the unit: `hand_x_mm`, `Hand X (mm)`, `cam_tag_u1`, `qw`. Capitals
-//! count for nothing.
+//! A title consists of what is measured, the [`Component`], and the unit: `hand_x_mm`, `Hand X (mm)`, `cam_tag_u1`, `qw`.
+//! Capitals do not matter.
 
 use std::fmt;
 
@@ -11,35 +11,35 @@ use super::Quantity;
 /// A number of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Component {
-    /// A coordinate.
+    /// The x coordinate.
     X,
-    /// A coordinate.
+    /// The y coordinate.
     Y,
-    /// A coordinate.
+    /// The z coordinate.
     Z,
-    /// Of a rotation vector.
+    /// The x component of a rotation vector.
     Rx,
-    /// Of a rotation vector.
+    /// The y component of a rotation vector.
     Ry,
-    /// Of a rotation vector.
+    /// The z component of a rotation vector.
     Rz,
-    /// The angle about x, of three about fixed axes.
+    /// The angle about the fixed x axis, applied first.
     Roll,
-    /// The angle about y, behind it.
+    /// The angle about the fixed y axis, applied second.
     Pitch,
-    /// The angle about z, behind both.
+    /// The angle about the fixed z axis, applied last.
     Yaw,
-    /// Of a quaternion.
+    /// The x component of a quaternion.
     Qx,
-    /// Of a quaternion.
+    /// The y component of a quaternion.
     Qy,
-    /// Of a quaternion.
+    /// The z component of a quaternion.
     Qz,
-    /// The scalar of a quaternion.
+    /// The scalar component of a quaternion.
     Qw,
-    /// To the right in a picture.
+    /// The coordinate to the right in a picture.
     U,
-    /// Down in a picture.
+    /// The coordinate downwards in a picture.
     V,
     /// A length between two points.
     Distance,
@@ -53,7 +53,7 @@ impl Component {
     /// The coordinates of a position.
     pub const PLACE: [Self; 3] = [X, Y, Z];
 
-    /// What titles call it: what is written first, then what is read too.
+    /// The component's names in titles: first the one that is written, then others that are read.
     fn spellings(self) -> &'static [&'static str] {
         match self {
             X => &["x"],
@@ -75,12 +75,12 @@ impl Component {
         }
     }
 
-    /// What titles call it.
+    /// The component's name in titles.
     pub fn name(self) -> &'static str {
         self.spellings()[0]
     }
 
-    /// What it measures.
+    /// The quantity that it measures.
     pub fn quantity(self) -> Quantity {
         match self {
             X | Y | Z | Distance => Quantity::Length,
@@ -101,21 +101,21 @@ const QUATERNIONS: [&str; 3] = ["q", "quat", "quaternion"];
 const VECTORS: [&str; 3] = ["r", "rvec", "rotvec"];
 const EITHER: [&str; 4] = ["rot", "rotation", "ori", "orientation"];
 
-/// What a title says.
+/// A title, taken apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Title<'a> {
-    /// What stands before the component: a target, or a camera and a target. Empty where nothing does.
+    /// The part before the component: a target, or a camera and a target. Empty where there is none.
     pub before: &'a str,
-    /// Which number it is.
+    /// The component.
     pub component: Component,
     /// The digits behind the component: `1` of `u1`. Empty where there are none.
     pub number: &'a str,
-    /// The word at its end that says a unit; empty where there is none.
+    /// The word for the unit at its end; empty where there is none.
     pub unit: &'a str,
 }
 
 impl<'a> Title<'a> {
-    /// What a title says; `None` where it ends with no component's name.
+    /// The parts of a title; `None` if it ends with no component's name.
     pub fn parse(title: &'a str) -> Option<Self> {
         let (stem, unit) = split(title);
         let (before, last) = last_word(stem);
@@ -123,7 +123,7 @@ impl<'a> Title<'a> {
         Some(Self { before, component: Component::called(bare)?, number: &last[bare.len()..], unit })
     }
 
-    /// Whether it is of what is called `name`.
+    /// Whether the title is about `name`.
     pub fn is_of(&self, name: &str) -> bool {
         self.before.eq_ignore_ascii_case(name.trim_end_matches(is_gap))
     }
@@ -137,8 +137,8 @@ impl fmt::Display for Title<'_> {
     }
 }
 
-/// The component that a title of a list says, where the list says the rest: `x_tool`, `rot_x` and `tx` are understood too.
-/// `all` are the lower-case last words of the list.
+/// The component that a title in a list names, where the list says the rest: `x_tool`, `rot_x` and `tx` are understood
+/// too. `all` are the lower-case last words of the list.
 pub(super) fn listed(title: &str, all: &[String]) -> Option<Component> {
     let is_quaternion = all.len() == 7;
     let stem = split(title).0;
@@ -185,7 +185,7 @@ fn is_gap(c: char) -> bool {
     matches!(c, '_' | ' ' | '.')
 }
 
-/// A stem before its last word, and that word.
+/// A stem without its last word, and that word.
 fn last_word(stem: &str) -> (&str, &str) {
     match stem.rfind(is_gap) {
         Some(at) => (stem[..at].trim_end_matches(is_gap), &stem[at + 1..]),
@@ -196,7 +196,7 @@ fn last_word(stem: &str) -> (&str, &str) {
 /// A unit, by the words at the end of a title that say it.
 struct Unit {
     quantity: Quantity,
-    /// What is multiplied by it becomes metres, radians or pixels.
+    /// The factor that turns numbers in this unit into metres, radians or pixels.
     factor: f64,
     words: &'static [&'static str],
 }
@@ -224,7 +224,7 @@ const UNITS: [Unit; 8] = [
     Unit { quantity: Quantity::Angle, factor: DEGREE, words: &["deg", "degs", "degree", "degrees", "°"] },
     Unit { quantity: Quantity::Pixels, factor: 1.0, words: &["px", "pixel", "pixels"] },
 ];
-/// Words that say a unit which nothing is read in.
+/// Words for units that are not supported.
 const FOREIGN: [&str; 46] = [
     "ft",
     "foot",
@@ -305,7 +305,7 @@ fn is_foreign(word: &str) -> bool {
 }
 
 impl Quantity {
-    /// What numbers in the unit of this word are multiplied by; that of no word is 1. `None` where it is no unit of it.
+    /// The factor for the unit of this word; 1 for no word, `None` for a word that is no unit of this quantity.
     pub(super) fn factor(self, word: &str) -> Option<f64> {
         if word.is_empty() {
             return Some(1.0);
@@ -313,12 +313,12 @@ impl Quantity {
         unit(word).filter(|unit| unit.quantity == self).map(|unit| unit.factor)
     }
 
-    /// Whether a title ends with a unit of it.
+    /// Whether a title ends with a unit of this quantity.
     pub fn is_in(self, title: &str) -> bool {
         self.factor(split(title).1).is_some()
     }
 
-    /// How titles may end, in words.
+    /// The allowed endings of titles, in words.
     pub(super) fn ends(self) -> String {
         let units = UNITS.iter().filter(|unit| unit.quantity == self);
         let ends: Vec<String> = units.map(|unit| format!("_{}", unit.words[0])).collect();
@@ -331,7 +331,7 @@ impl Quantity {
     }
 }
 
-/// The word with which names end that say no unit: `plug_in` is no inch.
+/// The word at the end of names that means no unit: `plug_in` is no inch.
 pub(super) const NAME: &str = "in";
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Which columns make a reading.
+//! The columns that make up a reading.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -7,27 +7,27 @@ use super::{
     names::{last_words, listed},
 };
 
-/// What a sensor's reading looks like in a table.
+/// The layout of a sensor's reading in a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// x, y, z.
     Position,
     /// x, y, z and a rotation: a rotation vector, roll, pitch and yaw, or a quaternion.
     Pose,
-    /// u, v of so many points.
+    /// u, v of this many points.
     Pixels(usize),
     /// A length.
     Distance,
 }
 
 impl Layout {
-    /// The titles under which a reading of what is called `before` is written, in metres, radians and pixels; a rotation as its
-    /// vector.
+    /// The titles under which a reading called `before` is written, in metres, radians and pixels, a rotation as its vector.
     pub fn titles(self, before: &str) -> Vec<String> {
         self.titles_with(before, Rotation::Vector)
     }
 
-    /// The same, with a rotation written so.
+    /// The titles under which a reading called `before` is written, in metres, radians and pixels, with rotations in
+    /// the given form.
     pub fn titles_with(self, before: &str, rotation: Rotation) -> Vec<String> {
         let title = |component: Component, number: &str| Title { before, component, number, unit: "" }.to_string();
         let place = Component::PLACE.map(|component| title(component, ""));
@@ -49,7 +49,7 @@ impl Layout {
 /// The coordinates of a point in a picture.
 const PICTURE: [Component; 2] = [Component::U, Component::V];
 
-/// How a rotation is written.
+/// The form in which a rotation is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rotation {
     /// As its vector: axis times angle.
@@ -60,14 +60,14 @@ pub enum Rotation {
     Quaternion,
 }
 
-/// How far the length of a quaternion may be from 1.
+/// The most by which the length of a quaternion may differ from 1.
 const UNIT_TOLERANCE: f64 = 0.01;
 
 impl Rotation {
-    /// All of them.
+    /// All forms.
     pub const ALL: [Self; 3] = [Self::Vector, Self::RollPitchYaw, Self::Quaternion];
 
-    /// Its numbers, in order.
+    /// The components of this form, in order.
     pub fn components(self) -> &'static [Component] {
         use Component::*;
         match self {
@@ -77,7 +77,8 @@ impl Rotation {
         }
     }
 
-    /// The rotation vector of numbers in that order; `None` where they are too few or too many, or a quaternion that is none.
+    /// The rotation vector from numbers in the order of [`components`](Self::components); `None` if their count is wrong or
+    /// the quaternion is not of unit length.
     pub fn read(self, numbers: &[f64]) -> Option<Vector3<f64>> {
         match (self, numbers) {
             (Self::Vector, &[x, y, z]) => Some(Vector3::new(x, y, z)),
@@ -93,7 +94,7 @@ impl Rotation {
         }
     }
 
-    /// The numbers of a rotation vector, in that order.
+    /// The numbers of this form for a rotation vector, in the order of [`components`](Self::components).
     pub fn write(self, vector: Vector3<f64>) -> Vec<f64> {
         let rotation = UnitQuaternion::from_scaled_axis(vector);
         match self {
@@ -107,17 +108,18 @@ impl Rotation {
 /// The columns of one sensor's readings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
-    /// In the order of the layout: x, y, z, and of a quaternion x, y, z, w.
+    /// The columns in the order of the layout: x, y, z, and for a quaternion x, y, z, w.
     pub columns: Vec<Column>,
     rotation: Option<Rotation>,
 }
 
 impl Titles {
-    /// The columns of a reading whose titles begin with `prefix` (and `_`); without one they begin with nothing.
+    /// The columns of a reading whose titles begin with `prefix` and `_`; with an empty prefix they begin with the
+    /// component.
     ///
     /// # Errors
     ///
-    /// [`TableError`] where one of them is missing or there twice, or in a unit that is not known.
+    /// [`TableError`] if a column is missing, is there twice, or has an unknown unit.
     pub fn reading(&self, layout: Layout, prefix: &str) -> Result<Reading, TableError> {
         let all = |components: &[Component], number: &str| -> Result<Vec<Column>, TableError> {
             components.iter().map(|component| self.component(prefix, *component, number)).collect()
@@ -142,11 +144,12 @@ impl Titles {
         Ok(Reading { columns, rotation })
     }
 
-    /// The same, with nothing before the titles where none begin with `prefix`.
+    /// The columns of a reading whose titles begin with `prefix`; if none do, those whose titles begin with the
+    /// component.
     ///
     /// # Errors
     ///
-    /// [`TableError`] as there.
+    /// [`TableError`] if a column is missing, is there twice, or has an unknown unit.
     pub fn reading_of(&self, layout: Layout, prefix: &str) -> Result<Reading, TableError> {
         let named = self.reading(layout, prefix);
         let Err(error) = named else { return named };
@@ -163,12 +166,12 @@ impl Titles {
         self.reading(layout, "").map_err(|bare| if is_bare { bare } else { error })
     }
 
-    /// Whether the titles that begin with `prefix` say a position, in whatever unit.
+    /// Whether there is a position under titles that begin with `prefix`, in any unit.
     pub fn has_position(&self, prefix: &str) -> bool {
         Component::PLACE.iter().all(|component| self.has(prefix, *component, ""))
     }
 
-    /// Whether they say a rotation too.
+    /// Whether there is a rotation too under titles that begin with `prefix`.
     pub fn has_pose(&self, prefix: &str) -> bool {
         let has = |kind: &Rotation| kind.components().iter().all(|component| self.has(prefix, *component, ""));
         self.has_position(prefix) && Rotation::ALL.iter().any(has)
@@ -179,15 +182,15 @@ impl Titles {
         self.all().iter().any(|title| Title::parse(title).is_some_and(is_it))
     }
 
-    /// The columns of a reading by their titles. Names of components among them say which number is which, in any order:
-    /// `qw` is the scalar of a quaternion wherever it stands, and of points in pictures each has its u and its v. Other names
-    /// keep their position in the list, which is that of the layout: of a pose six end with a rotation vector, unless they are
+    /// The columns of a reading by their titles. Names of components among them say which number is which, in any order: `qw`
+    /// is the scalar of a quaternion wherever it stands, and of points in pictures each has its u and its v. Other names keep
+    /// their position in the list, which is that of the layout: of a pose six end with a rotation vector, unless they are
     /// titled as roll, pitch and yaw, and seven with a quaternion x, y, z, w.
     ///
     /// # Errors
     ///
-    /// [`TableError`] where one of them is missing, there are too few or too many for the layout, they contradict each
-    /// other, or one is in a unit that is not known.
+    /// [`TableError`] if a title is missing, their number does not fit the layout, they contradict each other, or one has an
+    /// unknown unit.
     pub fn reading_titled(&self, layout: Layout, titles: &[String]) -> Result<Reading, TableError> {
         let (counts, said) = match layout {
             Layout::Position => (3..=3, "3".to_owned()),
@@ -221,13 +224,13 @@ impl Titles {
     }
 }
 
-/// A list of titles whose names contradict each other.
+/// The error for a list of titles whose names contradict each other.
 fn contradiction(titles: &[String], what: impl std::fmt::Display, mend: &str) -> TableError {
     let what = format!("the columns {} contradict each other: {what}", titles.join(", "));
     TableError::new(what, mend)
 }
 
-/// What a list must name.
+/// A sentence on what a list must name.
 fn expected(titles: &[String]) -> String {
     let place = "x, y and z";
     let turned = match titles.len() {
@@ -238,7 +241,7 @@ fn expected(titles: &[String]) -> String {
     format!("name {place}, and {turned}, each once; a quaternion takes seven columns, other rotations six")
 }
 
-/// By title its place in the layout of a position or a pose, and how the rotation is written, if there is one.
+/// The place of each title in the layout of a position or a pose, and the form of the rotation, if there is one.
 fn in_space(titles: &[String]) -> Result<(Vec<usize>, Rotation), TableError> {
     // What is complete as it stands needs no guess: a target may be called `q` or `rot`.
     let plain: Vec<Option<Component>> = titles.iter().map(|title| Some(Title::parse(title)?.component)).collect();
@@ -299,7 +302,8 @@ fn in_space(titles: &[String]) -> Result<(Vec<usize>, Rotation), TableError> {
     Ok((slots, rotation))
 }
 
-/// By title its place among the points in a picture: points in the order in which they are first named, u before v.
+/// The place of each title among the points in a picture: points in the order in which they are first named, u before
+/// v.
 fn in_pictures(titles: &[String]) -> Result<Vec<usize>, TableError> {
     let coordinate = |title: &String| {
         Title::parse(title).and_then(|it| match it.component {
@@ -355,7 +359,7 @@ fn is_numbered(titles: &[String], found: &[Option<Component>]) -> bool {
 
 impl Reading {
     /// A sensor's own numbers (see [`Observation`](body_schema_engine::sensing::Observation)) from those of its columns; `None` for a
-    /// quaternion that is none.
+    /// quaternion that is not of unit length.
     pub(super) fn of(&self, mut numbers: Vec<f64>) -> Option<Vec<f64>> {
         if let (Some(rotation), Some(turned)) = (self.rotation, numbers.get(3..)) {
             let vector = rotation.read(turned)?;
@@ -365,7 +369,7 @@ impl Reading {
         Some(numbers)
     }
 
-    /// The cells that a sensor's own numbers are written as: by column its index, and what stands there.
+    /// The cells in which a sensor's own numbers are written: the index of each column, and its number.
     pub fn cells(&self, reading: &[f64]) -> Vec<(usize, f64)> {
         let mut numbers = reading.to_vec();
         if let (Some(rotation), Some(&[x, y, z])) = (self.rotation, reading.get(3..)) {

@@ -25,36 +25,36 @@ pub struct Table<R> {
     titles: Titles,
 }
 
-/// What is wanted of every row.
+/// The columns that are read from every row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
-    /// By joint.
+    /// The joints' columns.
     pub joints: Vec<Column>,
-    /// By channel, in the order of a [`Rig`](body_schema_engine::sensing::Rig).
+    /// The readings' columns by channel, in the order of a [`Rig`](body_schema_engine::sensing::Rig).
     pub readings: Vec<Reading>,
-    /// Columns of text, as `place` and `socket`, by index.
+    /// The indices of columns of text, such as `place` and `socket`.
     pub labels: Vec<usize>,
 }
 
-/// A row.
+/// A row of the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// The line of the file that it begins on, counted from 1.
+    /// The line of the file on which it begins, counted from 1.
     pub line: usize,
-    /// By joint, rad or m.
+    /// The joints' positions, rad or m.
     pub positions: Vec<f64>,
     /// What was measured.
     pub observation: Observation,
-    /// By column of text.
+    /// The cells of the columns of text.
     pub labels: Vec<String>,
 }
 
 impl<R: Read> Table<R> {
-    /// Reads the titles. White space around cells counts for nothing.
+    /// Reads the titles. White space around cells does not matter.
     ///
     /// # Errors
     ///
-    /// [`TableError`] if there are none, or one of them twice.
+    /// [`TableError`] if there are no titles, or if two are equal.
     pub fn open(source: R) -> Result<Self, TableError> {
         // Lengths of rows are checked here, where their lines are known.
         let mut builder = csv::ReaderBuilder::new();
@@ -77,25 +77,25 @@ impl<R: Read> Table<R> {
     }
 }
 
-/// Reads rows; see [`Table::rows`].
+/// An iterator over rows; see [`Table::rows`].
 #[derive(Debug)]
 pub struct Rows<R> {
     reader: csv::Reader<Lines<Guard<R>>>,
     titles: Titles,
     columns: Columns,
     record: csv::StringRecord,
-    /// By column.
+    /// One trace per column.
     traces: Vec<Trace>,
     rows: usize,
     failed: bool,
 }
 
-/// What is left of a column that has streamed by.
+/// The trace of a column that has been read.
 #[derive(Clone, Debug, Default)]
 struct Trace {
-    /// Of all its cells so far.
+    /// A hash of all its cells so far.
     hash: u64,
-    /// Of its last cell.
+    /// A hash of its last cell.
     last: u64,
     rows: u64,
     varies: bool,
@@ -114,8 +114,8 @@ impl Trace {
 }
 
 impl<R: Read> Rows<R> {
-    /// Pairs of columns whose cells have been the same in every row so far, and not always the same cell: the later one
-    /// first, then that which it repeats.
+    /// Pairs of columns whose cells were equal in every row so far, and not constant: the later column first, then the
+    /// one that it repeats.
     pub fn repeated_columns(&self) -> Vec<(String, String)> {
         let mut first: HashMap<u64, usize> = HashMap::new();
         let mut repeated = Vec::new();
@@ -128,7 +128,7 @@ impl<R: Read> Rows<R> {
         repeated
     }
 
-    /// The line that the last record begins on. The reader's own account begins with the empty lines before it.
+    /// The line on which the last record begins. The CSV reader counts the empty lines before it as part of it.
     fn line(&self) -> usize {
         let within: usize = self.record.iter().map(|cell| cell.matches('\n').count()).sum();
         (self.reader.position().line() as usize).saturating_sub(1 + within)

@@ -1,4 +1,4 @@
-//! The titles of a table, and the columns that are found by them.
+//! The titles of a table, and the search for columns by title.
 
 use std::collections::HashMap;
 
@@ -15,21 +15,21 @@ use body_schema_engine::{
     similar::similar,
 };
 
-/// What a column's numbers measure.
+/// The quantity that a column measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Radians inside.
+    /// An angle, held in radians.
     Angle,
-    /// Metres inside.
+    /// A length, held in metres.
     Length,
     /// Pixels.
     Pixels,
-    /// Without a unit.
+    /// A number without a unit.
     Number,
 }
 
 impl Quantity {
-    /// What the readings of a joint measure.
+    /// The quantity that a joint's readings measure.
     pub fn of(kind: JointKind) -> Self {
         match kind {
             JointKind::Revolute => Self::Angle,
@@ -50,9 +50,9 @@ impl Quantity {
 /// A column of numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Column {
-    /// Counted from 0.
+    /// Its index, counted from 0.
     pub index: usize,
-    /// What its numbers are multiplied by to be metres or radians.
+    /// The factor that turns its numbers into metres or radians.
     pub factor: f64,
 }
 
@@ -67,11 +67,11 @@ impl Titles {
         Self::listed(record.iter().map(|title| unguarded(title).to_owned()).collect())
     }
 
-    /// Of a list of titles.
+    /// Titles from a list.
     ///
     /// # Errors
     ///
-    /// [`TableError`] if there are none, or one of them twice.
+    /// [`TableError`] if there are none, or if two are equal.
     pub fn listed(titles: Vec<String>) -> Result<Self, TableError> {
         let mut seen = HashMap::new();
         // Spreadsheets leave columns without a title at the end.
@@ -100,7 +100,7 @@ impl Titles {
     ///
     /// # Errors
     ///
-    /// [`TableError`] where there is none, or more than one, or where its unit is not known.
+    /// [`TableError`] if there is none or more than one, or if its unit is unknown.
     pub fn find(&self, name: &str, quantity: Quantity) -> Result<Column, TableError> {
         let is_named = |title: &&String| *title == name || split(title).0 == name;
         let named: Vec<&String> = self.titles.iter().filter(is_named).collect();
@@ -122,11 +122,11 @@ impl Titles {
         }
     }
 
-    /// The column of a component of what is called `before`, with `number` behind it.
+    /// The column of a component of `before`, with `number` behind the component.
     ///
     /// # Errors
     ///
-    /// [`TableError`] where there is none, or more than one, or where its unit is not known.
+    /// [`TableError`] if there is none or more than one, or if its unit is unknown.
     pub(super) fn component(&self, before: &str, component: Component, number: &str) -> Result<Column, TableError> {
         let of = |title: &&String| {
             let is_it = |it: &Title<'_>| it.component == component && it.number == number && it.is_of(before);
@@ -149,11 +149,11 @@ impl Titles {
         }
     }
 
-    /// The column with exactly this title, whose end says the unit.
+    /// The column with exactly this title, which ends with the unit.
     ///
     /// # Errors
     ///
-    /// [`TableError`] where there is none, or where its unit is not known.
+    /// [`TableError`] if there is none, or if its unit is unknown.
     pub fn titled(&self, title: &str, quantity: Quantity) -> Result<Column, TableError> {
         if split(title).1 == NAME && quantity != Quantity::Length && Title::parse(title).is_none() {
             return Ok(Column { index: self.label(title)?, factor: 1.0 });
@@ -170,7 +170,7 @@ impl Titles {
         Ok(Column { index, factor })
     }
 
-    /// The same; where no title is spelt so, that which differs in capitals alone.
+    /// The column with exactly this title, or, if there is none, the one whose title differs in capitals alone.
     pub(super) fn titled_in_any_case(&self, title: &str, quantity: Quantity) -> Result<Column, TableError> {
         let mut alike = self.titles.iter().filter(|given| given.eq_ignore_ascii_case(title));
         match (self.titles.iter().any(|given| given == title), alike.next(), alike.next()) {
@@ -179,22 +179,22 @@ impl Titles {
         }
     }
 
-    /// What stands before the titles that end with x, alone or with a unit: targets whose positions may be there.
+    /// The prefixes of the titles that end with x, alone or with a unit: targets whose positions may be there.
     pub fn prefixes(&self) -> Vec<&str> {
         let found = self.titles.iter().filter_map(|title| Title::parse(title));
         found.filter(|it| it.component == Component::X && it.number.is_empty()).map(|it| it.before).collect()
     }
 
-    /// The index of the column with exactly this title, of any text.
+    /// The index of the text column with exactly this title.
     ///
     /// # Errors
     ///
-    /// [`TableError`] where there is none.
+    /// [`TableError`] if there is none.
     pub fn label(&self, title: &str) -> Result<usize, TableError> {
         self.titles.iter().position(|given| given == title).ok_or_else(|| self.unknown(title))
     }
 
-    /// What is wrong where columns are separated by something else than commas.
+    /// The error for columns that are separated by something other than commas.
     pub fn separated(&self) -> Option<TableError> {
         let filled: Vec<&String> = self.titles.iter().filter(|title| !title.is_empty()).collect();
         // Words may well stand in one title among several.
@@ -211,7 +211,7 @@ impl Titles {
         Some(TableError::new(what, "write commas between columns, and a decimal point in numbers: 1.5, not 1,5"))
     }
 
-    /// These titles without some, so that what is found is another column.
+    /// These titles without some, so that another column is found.
     pub fn besides(&self, taken: &[&String]) -> Self {
         let kept = |title: &String| if taken.contains(&title) { String::new() } else { title.clone() };
         Self { titles: self.titles.iter().map(kept).collect() }
@@ -230,13 +230,14 @@ impl Titles {
     }
 }
 
-/// What to do about a joint's cell that holds nothing.
+/// What to do about an empty cell of a joint.
 pub(super) const JOINT: &str = "write where the joint was, as 0.03, or remove the line";
-/// What to do where some cells of a reading hold nothing and others do not.
+/// What to do if some cells of a reading are empty and others are not.
 pub(super) const READING: &str =
     "write a number such as 0.03, or leave all cells of this reading empty, or remove the line";
 
-/// A finite number; `absent` says what to do where there is none. A comma in it is refused: it may separate decimals or thousands.
+/// A finite number; `absent` says what to do where there is none. A number with a comma is refused: the comma may separate
+/// decimals or thousands.
 pub(super) fn number(text: &str, absent: &str, place: &dyn Fn() -> String) -> Result<f64, TableError> {
     match text.parse::<f64>() {
         Ok(value) if is_usable(value) => Ok(value),

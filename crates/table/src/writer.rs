@@ -1,16 +1,16 @@
-//! Tables that are written: no spreadsheet takes what stands in them for a formula.
+//! Writing tables in which no spreadsheet takes text for a formula.
 //!
-//! Text that begins as a formula does gets an apostrophe before it, as spreadsheets write it themselves; whoever reads a table
-//! [here](super::Table) takes it away again.
+//! Text that begins like a formula gets an apostrophe before it, as spreadsheets write it themselves; [`Table`](super::Table)
+//! takes it away again.
 
 use std::{borrow::Cow, io};
 
-/// Writes a table in CSV.
+/// A writer of tables in CSV.
 #[derive(Debug)]
 pub struct Writer<W: io::Write>(csv::Writer<W>);
 
 impl<W: io::Write> Writer<W> {
-    /// To `output`, from the line of titles on.
+    /// A writer to `output`, which begins with the line of titles.
     pub fn new(output: W) -> Self {
         Self(csv::Writer::from_writer(output))
     }
@@ -19,7 +19,7 @@ impl<W: io::Write> Writer<W> {
     ///
     /// # Errors
     ///
-    /// Where `output` takes nothing, or the line has not as many cells as the first.
+    /// The output's error, or that the line has not as many cells as the first.
     pub fn write(&mut self, cells: impl IntoIterator<Item = impl AsRef<str>>) -> csv::Result<()> {
         for cell in cells {
             self.0.write_field(guarded(cell.as_ref()).as_bytes())?;
@@ -31,22 +31,22 @@ impl<W: io::Write> Writer<W> {
     ///
     /// # Errors
     ///
-    /// Where it takes nothing.
+    /// The output's error.
     pub fn flush(&mut self) -> io::Result<()> {
         self.0.flush()
     }
 
-    /// The output, with everything in it.
+    /// The output, with everything written to it.
     ///
     /// # Errors
     ///
-    /// Where it takes nothing.
+    /// The output's error.
     pub fn into_inner(self) -> io::Result<W> {
         self.0.into_inner().map_err(csv::IntoInnerError::into_error)
     }
 }
 
-/// Whether a spreadsheet takes a text for a formula. A number is none.
+/// Whether a spreadsheet would take a text for a formula. A number is none.
 fn is_formula(text: &str) -> bool {
     text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err()
 }
@@ -55,7 +55,7 @@ fn guarded(text: &str) -> Cow<'_, str> {
     if is_formula(text) { format!("'{text}").into() } else { text.into() }
 }
 
-/// A cell as it was before it was written.
+/// The cell as it was before it was guarded against formulas.
 pub(super) fn unguarded(cell: &str) -> &str {
     cell.strip_prefix('\'').filter(|text| is_formula(text)).unwrap_or(cell)
 }

@@ -1,4 +1,4 @@
-//! What came out of a session, to take away.
+//! The results of a session, for download.
 
 use std::{convert::Infallible, sync::Arc};
 

@@ -42,7 +42,7 @@ pub use sessions::SessionList;
 
 use super::{
     App, Limits,
-    aside::aside,
+    blocking::run_blocking,
     metrics::OPEN_METRICS,
     problem::{Kind, PROBLEM_JSON, Problem},
 };
@@ -135,7 +135,7 @@ pub(super) fn routes(limits: &Limits) -> (Router<Arc<App>>, Bytes) {
     (router, document.to_pretty_json().unwrap_or_default().into())
 }
 
-/// Says once for all routes what any of them may refuse, and that problems have their own media type.
+/// Describes once for all routes what any of them may refuse, and the media type of problems.
 fn describe_what_holds_for_all(document: &mut utoipa::openapi::OpenApi) {
     for item in document.paths.paths.values_mut() {
         for operation in [&mut item.get, &mut item.post, &mut item.put, &mut item.delete].into_iter().flatten() {
@@ -157,7 +157,7 @@ fn describe_what_holds_for_all(document: &mut utoipa::openapi::OpenApi) {
     }
 }
 
-/// A parameter may be absent, but what is there is a number or a text: the null of JSON cannot be written.
+/// Removes null from a parameter's types: it may be absent, but JSON's null cannot be written.
 fn never_null(schema: &mut Schema) {
     match schema {
         Schema::Object(Object { schema_type: SchemaType::Array(types), .. }) => types.retain(|of| *of != Type::Null),
@@ -168,7 +168,7 @@ fn never_null(schema: &mut Schema) {
     }
 }
 
-/// Says how much this server takes where that is not said with the type.
+/// Describes this server's limits where the types do not.
 fn describe_limits(document: &mut utoipa::openapi::OpenApi, limits: &Limits) {
     let steps = document.components.as_mut().and_then(|components| components.schemas.get_mut("StepRequest"));
     if let Some(RefOr::T(Schema::Object(request))) = steps
@@ -178,7 +178,8 @@ fn describe_limits(document: &mut utoipa::openapi::OpenApi, limits: &Limits) {
     }
 }
 
-/// Server-sent events are no JSON and no string: OpenAPI 3.1 has no word for them. What each carries is said as 3.2 says it.
+/// Describes server-sent events: they are neither JSON nor a string, and OpenAPI 3.1 has no word for them. Their content is
+/// described as OpenAPI 3.2 does.
 fn describe_events(document: &mut utoipa::openapi::OpenApi) {
     let operations = document.paths.paths.values_mut().filter_map(|item| item.get.as_mut());
     let responses = operations.flat_map(|operation| operation.responses.responses.values_mut());
@@ -227,9 +228,9 @@ fn attachment(name: &str, content_type: &'static str, content: impl Into<Body>) 
     (headers, content.into()).into_response()
 }
 
-/// A JSON response, written aside.
+/// A JSON response, serialised where it blocks no other request.
 async fn json<T: Serialize + Send + 'static>(value: T) -> Result<Response, Problem> {
-    let bytes = aside(move || {
+    let bytes = run_blocking(move || {
         serde_json::to_vec(&value).map_err(|error| Problem::new(Kind::Internal, format!("no JSON: {error}")))
     });
     Ok(([(header::CONTENT_TYPE, JSON)], Body::from(bytes.await?)).into_response())

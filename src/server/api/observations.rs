@@ -1,4 +1,4 @@
-//! What a robot elsewhere tells after its movements.
+//! Observations that a robot elsewhere reports after its movements.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use body_schema_ask_tell::{Answer, Observation, Status, Told};
 /// All observations of a session.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct ObservationList {
-    /// In the order in which they were told.
+    /// The observations, in the order in which they were received.
     observations: Vec<ToldObservation>,
 }
 
@@ -35,7 +35,7 @@ pub(super) struct ToldObservation {
     number: u64,
     /// As it was told.
     told: Observation,
-    /// What was answered then.
+    /// The answer that was given then.
     answer: Answer,
     /// Whether it counts for nothing.
     excluded: bool,
@@ -121,7 +121,7 @@ pub(super) async fn get(
     let told = standing.observations.iter().find(|told| told.answer.observation == number);
     let unknown = || {
         let detail = format!(
-            "there is no observation {number}; {} were told so far, counted from 1",
+            "there is no observation {number}; {} were received so far, counted from 1",
             standing.observations.len()
         );
         Problem::new(Kind::UnknownObservation, detail).field("n")

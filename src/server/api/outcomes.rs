@@ -1,4 +1,4 @@
-//! What the observations of a robot elsewhere come to, to take away.
+//! The results of a session with a robot elsewhere, for download.
 //!
 //! The robot's description is quick to make. The report judges it on data that it has not seen, which takes longer: it is made
 //! when it is first asked for, and kept until something changes.
@@ -35,7 +35,7 @@ pub(super) async fn urdf(State(app): State<Arc<App>>, Path(id): Path<String>) ->
     Ok(attachment("model.urdf", "application/xml", file))
 }
 
-/// The same origins of joints as YAML, as `ros_calibration`s and drivers take them.
+/// The origins of joints with what was learned, as YAML, in the form of `ros_calibration`s and drivers.
 #[utoipa::path(get, path = "/v1/sessions/{id}/kinematics.yaml", tag = "results", operation_id = "getKinematics",
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
@@ -63,7 +63,7 @@ pub(super) async fn report_json(State(app): State<Arc<App>>, Path(id): Path<Stri
     Ok(([(header::CONTENT_TYPE, "application/json")], report).into_response())
 }
 
-/// The same report to be read, with its figures.
+/// The report of `calibrate` as a page to read, with its figures.
 #[utoipa::path(get, path = "/v1/sessions/{id}/report.html", tag = "results", operation_id = "getReportPage",
     params(("id" = String, Path, description = "The session's id", format = "uuid")),
     responses(
@@ -151,7 +151,7 @@ fn description(session: &Session) -> Result<Vec<File>, Problem> {
     Ok(session.results()?.description()?)
 }
 
-/// The files of the report; those of one revision are made once, by whoever asks first.
+/// The files of the report; those of one revision are made once, by the first request.
 async fn report(app: &App, id: &str) -> Result<Arc<[File]>, Problem> {
     let session = app.sessions.get(id).await?.watch();
     let mut kept = session.report().lock().await;

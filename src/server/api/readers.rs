@@ -1,5 +1,5 @@
-//! Readers of a session. Each holds an index and goes at its own pace: it is given nothing before it has taken what
-//! came before, and a slow one holds up nobody.
+//! Readers of a session. Each holds an index and goes at its own pace: it gets nothing before it has taken what came
+//! before, and a slow one delays no other.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use tokio::sync::watch;
 use crate::server::session::{Kept, Session, Together, Watching};
 use body_schema_recording::LiveLog;
 
-/// How many reports are taken from the history, and parts from the recording, at a time.
+/// The most reports that are taken from the history, and parts from the recording, at a time.
 const BATCH: usize = 64;
 
 /// Reads reports from an index on.
@@ -46,12 +46,12 @@ impl Reports {
         }
     }
 
-    /// Why the session's engine has failed, if it has.
+    /// The failure of the session's engine, if it has failed.
     pub(super) fn failure(&self) -> Option<String> {
         self.session.failure()
     }
 
-    /// Whether the history ended because it has to be made anew.
+    /// Whether the history ended because it is being rewritten.
     pub(super) fn is_rewritten(&self) -> bool {
         self.session.is_rewritten()
     }
@@ -91,7 +91,7 @@ impl Parts {
         }
     }
 
-    /// Those that are there already, or some of them.
+    /// The next parts that are there already, or some of them.
     pub(super) fn ready(&mut self) -> Vec<Bytes> {
         let batch = (self.read)(self.session.live(), self.next, BATCH);
         self.next += batch.len();
@@ -113,8 +113,8 @@ impl Parts {
         self.session.live().len()
     }
 
-    /// The recording from its beginning in few parts, after which this goes on with what has come since; `None` if it was not at
-    /// the beginning, or there are not many.
+    /// The recording from its beginning in few parts, after which this reader continues with later ones; `None` if the reader
+    /// was not at the beginning, or there are not many parts.
     pub(super) async fn together(&mut self) -> Option<(Bytes, Arc<Together>)> {
         if self.next > 0 {
             return None;

@@ -11,7 +11,7 @@ use super::JSON;
 
 type Refusals = BTreeMap<String, RefOr<Response>>;
 
-/// Of every route, by what holds for every request.
+/// Refusals of every route.
 pub(super) struct OfAll;
 
 impl IntoResponses for OfAll {
@@ -27,7 +27,7 @@ impl IntoResponses for OfAll {
     }
 }
 
-/// Of a route with a body.
+/// Refusals of a route with a body.
 pub(super) struct OfBodies;
 
 impl IntoResponses for OfBodies {
@@ -41,7 +41,7 @@ impl IntoResponses for OfBodies {
     }
 }
 
-/// Of a stream.
+/// Refusals of a stream.
 pub(super) struct OfStreams;
 
 impl IntoResponses for OfStreams {
@@ -50,7 +50,7 @@ impl IntoResponses for OfStreams {
     }
 }
 
-/// Of a route that an engine of a robot elsewhere answers.
+/// Refusals of a route that the engine of a robot elsewhere answers.
 pub(super) struct OfEngines;
 
 impl IntoResponses for OfEngines {
@@ -63,7 +63,7 @@ impl IntoResponses for OfEngines {
     }
 }
 
-/// Of a route that shows how a session with a robot elsewhere stands.
+/// Refusals of a route that shows the status of a session with a robot elsewhere.
 pub(super) struct OfRobots;
 
 impl IntoResponses for OfRobots {

@@ -1,4 +1,4 @@
-//! What experiments there are.
+//! The built-in scenarios.
 
 use std::sync::OnceLock;
 
@@ -12,7 +12,7 @@ use body_schema_scenario::ScenarioSummary;
     (status = 200, description = "All built-in scenarios, simplest first", body = ScenarioList)
 ))]
 pub(super) async fn list() -> Result<Json<ScenarioList>, Problem> {
-    Ok(Json(ScenarioList { scenarios: aside(summaries).await? }))
+    Ok(Json(ScenarioList { scenarios: run_blocking(summaries).await? }))
 }
 
 /// They are part of the program: those that have been read once need not be read again.

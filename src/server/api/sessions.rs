@@ -22,9 +22,9 @@ use crate::server::{
 };
 use body_schema_backend::{MadeSteps, StepRequest};
 
-/// How many sessions are listed at a time.
+/// The most sessions that are listed at a time.
 const MOST_LISTED: u64 = 1000;
-/// So many reports are put together at once; of more, aside.
+/// The most reports that are put together at once; more are handled where they block no other request.
 const FEW_REPORTS: usize = 16;
 
 /// Sessions.
@@ -72,7 +72,7 @@ pub(super) async fn list(State(app): State<Arc<App>>, RawQuery(query): RawQuery)
     json(SessionList { sessions, damaged, next: next.map(|id| id.to_string()) }).await
 }
 
-/// What a session is made from: a scenario of ours, or a robot elsewhere.
+/// The request for a session: a scenario of ours, or a robot elsewhere.
 #[derive(ToSchema)]
 #[schema(as = OpenSession)]
 #[serde(untagged)]
@@ -149,10 +149,10 @@ pub(super) async fn get(State(app): State<Arc<App>>, Path(id): Path<String>) -> 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Condition {
-    /// In any case.
+    /// End it in any case.
     #[default]
     Always,
-    /// If no stream follows it.
+    /// End it only if no stream follows it.
     Unwatched,
 }
 
@@ -191,7 +191,7 @@ pub(super) async fn delete(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Does it whole, also for a client that goes away meanwhile.
+/// Completes the work, even for a client that goes away meanwhile.
 async fn to_its_end<T: Send + 'static>(
     work: impl Future<Output = Result<T, Problem>> + Send + 'static,
 ) -> Result<T, Problem> {

@@ -39,21 +39,21 @@ use body_schema_wire::{Description, StepReport};
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// How long a client may take to hear that its session has ended.
 const END_WITHIN: Duration = Duration::from_secs(1);
-/// What a WebSocket holds of what it writes, beyond the message that it is at …
+/// The bytes that a WebSocket buffers beyond the message that it is writing …
 const WRITE_BUFFER_BYTES: usize = 8 << 10;
 /// … and with it. No message comes near that: parts have one row, or some 256 KiB.
 const MOST_BUFFERED_BYTES: usize = 64 << 20;
-/// Clients have nothing to say; what they say must not fill the memory.
+/// The read buffer: clients have nothing to say, and what they say must not fill the memory.
 const READ_BUFFER_BYTES: usize = 1 << 10;
-/// Why the WebSocket was closed: the session was deleted …
+/// The code of a close because the session was deleted …
 const CLOSE_DELETED: u16 = 4404;
-/// … or its history was rewritten, so that whoever follows it begins anew …
+/// … because its history was rewritten, so that its followers begin anew …
 const CLOSE_REWRITTEN: u16 = 4409;
-/// … or its engine has failed …
+/// … because its engine has failed …
 const CLOSE_FAILED: u16 = 4500;
-/// … or the server is going away.
+/// … and because the server is ending.
 const CLOSE_GOING_AWAY: u16 = 1001;
-/// A reason holds 123 bytes at most, and a character takes up to four.
+/// The most characters of a reason, which holds 123 bytes: a character takes up to four.
 const CLOSE_REASON_CHARS: usize = 30;
 
 /// A text message of the WebSocket.
@@ -71,7 +71,7 @@ pub(super) enum LiveEvent {
         /// Its index.
         next: usize,
     },
-    /// With a robot elsewhere: how it stands, at first and whenever that changes.
+    /// The status of a session with a robot elsewhere, at first and whenever it changes.
     #[schema(value_type = Standing)]
     Status(Arc<Standing>),
 }

@@ -24,21 +24,21 @@ use body_schema_ask_tell::{Ask, Enough, Outcome, Suggestion, Suggestions};
 /// All suggestions of a session.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct AllSuggestions {
-    /// In the order in which they were chosen.
+    /// The suggestions, in the order in which they were chosen.
     #[schema(value_type = Vec<Suggestion>)]
     suggestions: Vec<Arc<Suggestion>>,
-    /// There once no more are needed.
+    /// Present once no more observations are needed.
     #[serde(skip_serializing_if = "Option::is_none")]
     enough: Option<Enough>,
 }
 
-/// What became of a suggestion that is not carried out.
+/// The report that a suggestion is not carried out.
 #[derive(Clone, Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NewOutcome {
     /// Whether the robot cannot go there, or nobody asks it to.
     state: Outcome,
-    /// The same in words, for people.
+    /// The reason in words, for people.
     #[serde(default)]
     #[schema(max_length = 1000)]
     reason: Option<String>,

@@ -1,4 +1,4 @@
-//! The stream of a connection, which gives up on a client that takes nothing of what is written to it.
+//! The stream of a connection, which ends when a client takes nothing of what is written to it.
 
 use std::{
     future::Future,
@@ -17,8 +17,8 @@ use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 
 use super::Place;
 
-/// A TCP stream with its place among the connections. It fails when nothing of what is to be written was taken for a while, and
-/// when all connections are broken off; a WebSocket that takes it over keeps both.
+/// A TCP stream with its place among the connections. It fails when nothing that is written was taken for a while, and when all
+/// connections are cancelled; a WebSocket that takes it over keeps both.
 pub(super) struct Stream {
     tcp: TcpStream,
     write_timeout: Duration,
@@ -30,10 +30,10 @@ pub(super) struct Stream {
     place: Place,
 }
 
-/// How long the rest of a refused request is taken, so that whoever sends it comes to read the answer: were the connection closed with
-/// something unread, the answer would be taken back.
+/// How long the rest of a refused request is read, so that its sender comes to read the answer: if the connection were closed with
+/// something unread, the answer would be lost.
 const DRAINED_WITHIN: Duration = Duration::from_secs(2);
-/// So much of it at a time.
+/// The bytes of it that are read at a time.
 const DRAINED_BYTES: usize = 16 << 10;
 
 impl Stream {
@@ -48,7 +48,7 @@ impl Stream {
         }
     }
 
-    /// Writes, and minds the time.
+    /// Handles a write and its time limit.
     fn written<T>(
         &mut self,
         cx: &mut Context<'_>,

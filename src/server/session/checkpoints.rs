@@ -1,4 +1,4 @@
-//! What a session with a robot elsewhere has come to, kept so that nobody need wait until all of it has been replayed.
+//! Checkpoints of sessions with robots elsewhere, kept so that opening one need not replay all of it.
 
 use uuid::Uuid;
 
@@ -11,14 +11,15 @@ use body_schema_ask_tell as ask_tell;
 use body_schema_ask_tell::{Checkpoint, Event, ReplayError, Setup};
 use body_schema_wire::Description;
 
-/// The steps since the latest checkpoint, of which there is none in the store yet.
+/// The steps since the latest checkpoint, none of which is in the store yet.
 #[derive(Default)]
 pub(super) struct Since {
     reports: Vec<Kept>,
 }
 
 impl Since {
-    /// Takes in a step, after so many observations were told; a checkpoint where one is due. `learned` tells what was learned up to it.
+    /// Adds a step, after `told` observations were received, and returns a checkpoint where one is due. `learned` gives what was
+    /// learned up to it.
     pub(super) fn step(
         &mut self,
         report: &Kept,
@@ -35,7 +36,7 @@ impl Since {
         Some(Saved { step: report.step, told, state, reports: packed(reports.iter().map(|kept| kept.json.get())) })
     }
 
-    /// The same, and the store keeps it, if it can.
+    /// Adds a step and keeps the checkpoint in the store, if possible.
     pub(super) fn keep(
         &mut self,
         (store, id): (&Store, Uuid),
@@ -48,7 +49,7 @@ impl Since {
     }
 }
 
-/// The store keeps checkpoints, if it can.
+/// Keeps checkpoints in the store, if possible.
 pub(super) fn keep_all((store, id): (&Store, Uuid), saved: &[Saved]) {
     let Some(build) = build() else { return };
     for saved in saved {
@@ -60,7 +61,7 @@ pub(super) fn keep_all((store, id): (&Store, Uuid), saved: &[Saved]) {
     }
 }
 
-/// From where a stored session goes on.
+/// The point from which a stored session goes on.
 pub(super) struct GoesOn {
     pub(super) checkpoint: Checkpoint,
     /// The reports of the steps until there, JSON by lines.
@@ -68,7 +69,7 @@ pub(super) struct GoesOn {
 }
 
 impl GoesOn {
-    /// From the latest checkpoint on that serves these events; `None` where all of them must be replayed.
+    /// The latest checkpoint that serves these events; `None` if all of them must be replayed.
     pub(super) fn of(store: &Store, id: Uuid, events: &[Event]) -> Option<Self> {
         let saved = store.saved(id, build()?).ok()?;
         let (index, checkpoint) = latest(&saved, events)?;
@@ -78,7 +79,7 @@ impl GoesOn {
         (steps as u64 == checkpoint.step() + 1).then_some(Self { checkpoint, reports })
     }
 
-    /// The reports of the steps until there; `None` where they are not all of them.
+    /// The reports of the steps until there; `None` if some are missing.
     pub(super) fn reports(&self, description: &Description) -> Option<Vec<Kept>> {
         let lines = self.reports.iter().flat_map(|text| text.lines());
         let kept: Vec<Kept> = lines.map(|line| Kept::read(line, description)).collect::<Option<_>>()?;
@@ -87,7 +88,7 @@ impl GoesOn {
     }
 }
 
-/// The latest checkpoint of before an observation that serves these events.
+/// The latest checkpoint before an observation that serves these events.
 pub(super) fn before(store: &Store, id: Uuid, observation: u64, events: &[Event]) -> Option<Checkpoint> {
     let mut saved = store.saved(id, build()?).ok()?;
     saved.retain(|saved| saved.told < observation);
@@ -101,7 +102,7 @@ fn latest(saved: &[Saved], events: &[Event]) -> Option<(usize, Checkpoint)> {
     })
 }
 
-/// The checkpoints that a replay comes by.
+/// The checkpoints that a replay passes.
 #[derive(Default)]
 pub(super) struct ComeBy {
     since: Since,
@@ -109,7 +110,7 @@ pub(super) struct ComeBy {
 }
 
 impl ComeBy {
-    /// Takes in a step, and tells its report; `None` where that cannot be written.
+    /// Adds a step, and returns its report; `None` if that cannot be written.
     pub(super) fn hear(&mut self, step: &ask_tell::Replayed<'_>, metrics: &Metrics) -> Option<Kept> {
         if step.step() > 0 {
             metrics.replayed.inc();
@@ -123,10 +124,10 @@ impl ComeBy {
 /// A session that was replayed.
 pub(super) struct Replayed {
     pub(super) session: ask_tell::Session,
-    /// All of its history.
+    /// The whole history.
     pub(super) reports: Vec<Kept>,
     pub(super) since: Since,
-    /// Checkpoints that it has come by.
+    /// The checkpoints that it has passed.
     pub(super) saved: Vec<Saved>,
 }
 
@@ -156,17 +157,17 @@ impl Replayed {
     }
 }
 
-/// How far a replay has got, for everyone to read.
+/// The progress of a replay, for everyone to read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Replaying {
-    /// Events done …
+    /// The events that are done …
     pub(super) done: usize,
-    /// … of so many.
+    /// … of this many.
     pub(super) of: usize,
 }
 
 impl Replaying {
-    /// In words.
+    /// The progress in words.
     pub(super) fn told(self) -> String {
         let Self { done, of } = self;
         format!(

@@ -1,4 +1,4 @@
-//! What time it is.
+//! The clock of sessions.
 
 use std::{
     sync::Mutex,
@@ -7,13 +7,13 @@ use std::{
 
 use super::lock;
 
-/// Seconds since 1970, of a clock that goes on where that of the machine is set back.
+/// Seconds since 1970, by a clock that never goes back, even where that of the machine is set back.
 pub(in crate::server) fn now_s() -> f64 {
     let told = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
     never_before(told)
 }
 
-/// The clock from now on: it has come to this time, if it was behind.
+/// Advances the clock to this time, if it was behind, and returns its time.
 fn never_before(told: f64) -> f64 {
     static LATEST: Mutex<Option<(Instant, f64)>> = Mutex::new(None);
     let mut latest = lock(&LATEST);

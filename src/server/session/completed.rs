@@ -1,5 +1,4 @@
-//! The recording so far as a file, for all who take it away: it is written once, to the disk, and no reader holds more of it than a
-//! piece.
+//! The recording so far as a file for downloads: it is written once, to the disk, and no reader holds more of it than a piece.
 
 use std::{
     fs::File,
@@ -14,37 +13,37 @@ use tokio::{sync::Mutex as AsyncMutex, task::spawn_blocking};
 
 use super::{Session, lock};
 use crate::server::{
-    aside::{Jobs, Wanted},
+    blocking::{Jobs, Wanted},
     problem::{Kind, Problem},
 };
 use body_schema_recording::{LiveLog, RecordingError};
 
-/// So much of it is read at a time.
+/// The bytes of it that are read at a time.
 const PIECE_BYTES: usize = 256 << 10;
 
-/// A recording of so few bytes is put together in memory where the disk has no room.
+/// The most bytes of a recording that is put together in memory where the disk has no room.
 const MOST_IN_MEMORY: usize = 16 << 20;
 
 /// A complete recording.
 pub(in crate::server) struct Completed {
-    /// How many parts of the recording are in it.
+    /// The number of parts of the recording that are in it.
     parts: usize,
     whole: Whole,
     pub(in crate::server) bytes: u64,
 }
 
-/// Where it is.
+/// The place of the recording.
 enum Whole {
-    /// It has no name any more, and goes with its last reader.
+    /// A file without a name, which is removed with its last reader.
     File(Mutex<File>),
     Memory(Bytes),
 }
 
-/// What was written last.
+/// The recording that was written last.
 pub(super) type Kept = AsyncMutex<Option<Arc<Completed>>>;
 
 impl Session {
-    /// All of the recording so far; whoever asks while it is written waits for the same file.
+    /// All of the recording so far; requests that come while it is written wait for the same file.
     pub(in crate::server) async fn completed(&self, jobs: &Jobs) -> Result<Arc<Completed>, Problem> {
         let mut kept = self.completed.lock().await;
         let (live, folder) = (self.live().clone(), self.shared.scratch.clone());
@@ -81,7 +80,7 @@ impl Completed {
         Ok(Self { parts, bytes: whole.len() as u64, whole: Whole::Memory(whole.into()) })
     }
 
-    /// It, piece by piece.
+    /// The recording, piece by piece.
     pub(in crate::server) fn body(self: Arc<Self>) -> Body {
         Body::from_stream(unfold((self, 0), |(completed, from)| async move {
             if from >= completed.bytes {
@@ -109,7 +108,7 @@ impl Completed {
     }
 }
 
-/// Writes as long as anybody waits for it.
+/// A writer that stops when nobody waits for the result any longer.
 struct WhileWanted<'a, W> {
     writer: W,
     wanted: &'a Wanted,

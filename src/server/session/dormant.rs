@@ -26,7 +26,7 @@ use super::{
     registry::{END_WITHIN, no_engine, spawn},
 };
 use crate::server::{
-    aside::aside,
+    blocking::run_blocking,
     problem::{Kind, Problem},
     requests,
     store::{Shown, Store, StoreError, Stored},
@@ -36,45 +36,45 @@ use body_schema_ask_tell::{ChannelShape, MOST_EVENTS, ReplayError, Setup, Status
 use body_schema_scenario::WorldKind;
 use body_schema_wire::Description;
 
-/// So often a request is tried again whose session left memory just before it came.
+/// The number of retries of a request whose session left memory just before it came.
 const ATTEMPTS: usize = 3;
-/// How long a request waits for a session that comes or goes …
+/// The time that a request waits for a session that is being moved …
 const MOVED_WITHIN: Duration = Duration::from_secs(20);
-/// … and one that needs room for the engine of another that is to leave.
+/// … and that a request which needs room waits for another engine to leave.
 const LEFT_WITHIN: Duration = Duration::from_secs(2);
-/// At so many sessions, and then for so long, a list looks whether they are as they were written.
+/// The number of sessions, and then the time, for which a list checks that they are as they were written.
 const LOOKED_AT_FIRST: usize = 8;
 const LOOKED_AT_WITHIN: Duration = Duration::from_millis(20);
-/// How often it is looked for sessions that nobody asks for, at most.
+/// The least interval between searches for idle sessions.
 const LOOK_EVERY: Duration = Duration::from_secs(60);
 
 /// A session that is in the store.
 pub(super) struct Known {
     id: Uuid,
     made_s: f64,
-    /// Held while it comes or goes, so that it is never in memory twice. Within: the end of an engine that was told to end, and may
-    /// write until then.
+    /// Held while the session is moved, so that it is never in memory twice. It contains the end of an engine that was told to end,
+    /// and may write until then.
     moving: AsyncMutex<Option<CancellationToken>>,
-    /// As it was when it left memory, or without its status as it was described at first.
+    /// The session as it was when it left memory; without its status as it was described at first.
     resource: Mutex<Option<SessionResource>>,
-    /// What is wrong with it, once it was looked at.
+    /// The damage of the session, once it was checked.
     damage: OnceLock<Option<String>>,
 }
 
-/// Some of all sessions.
+/// A part of the list of all sessions.
 #[derive(Default)]
 pub(in crate::server) struct Listed {
     pub(in crate::server) sessions: Vec<SessionResource>,
-    /// Those that cannot be taken up.
+    /// Those that cannot be loaded.
     pub(in crate::server) damaged: Vec<DamagedSession>,
-    /// After which there are more.
+    /// The id after which there are more.
     pub(in crate::server) next: Option<Uuid>,
 }
 
 /// A session in memory, or one that is in the store alone.
 type InMemory = Result<Arc<Session>, Arc<Known>>;
 
-/// What a list shows of a session, beside what changes.
+/// The constant part of a session's entry in a list.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Summary {
     description: Description,
@@ -99,7 +99,7 @@ impl Known {
 }
 
 impl Known {
-    /// Waits until nobody else moves it, and its last engine has ended.
+    /// Waits until the session is not being moved, and its last engine has ended.
     async fn still(&self) -> Result<MutexGuard<'_, Option<CancellationToken>>, Problem> {
         let still = timeout(MOVED_WITHIN, async {
             let mut moving = self.moving.lock().await;
@@ -141,7 +141,7 @@ impl Sessions {
         lock(&self.known).iter().find(|known| known.id == id).cloned()
     }
 
-    /// Brings a session back to memory, whether or not whoever asked still waits.
+    /// Loads a session into memory, whether or not the caller still waits.
     pub(super) async fn wake(self: &Arc<Self>, id: Uuid) -> Result<Arc<Session>, Problem> {
         let all = self.clone();
         let waking = async move { all.bring_back(id).await };
@@ -193,7 +193,7 @@ impl Sessions {
         }))
     }
 
-    /// A place in memory, if need be that of the one that was not asked for longest.
+    /// A place in memory, if necessary that of the session that was not asked for longest.
     async fn place(&self) -> Result<OwnedSemaphorePermit, Problem> {
         if let Ok(permit) = self.places.clone().try_acquire_owned() {
             return Ok(permit);
@@ -210,8 +210,7 @@ impl Sessions {
         })
     }
 
-    /// Takes a session out of memory, unless somebody watches it, it is at something, or it comes or goes already. Tells whether
-    /// it has left.
+    /// Removes a session from memory, unless it is followed, at work, or being moved already. Returns whether it has left.
     async fn put_to_sleep(&self, session: &Arc<Session>) -> bool {
         let Some(known) = self.known(session.id) else { return false };
         let Ok(mut moving) = known.moving.try_lock() else { return false };
@@ -227,7 +226,7 @@ impl Sessions {
         has_left
     }
 
-    /// Takes sessions out of memory that nobody asks for, now and then, for ever.
+    /// Removes idle sessions from memory, now and then, for ever.
     pub(in crate::server) async fn watch_over(&self) {
         let known = lock(&self.known).clone();
         for known in known {
@@ -246,7 +245,7 @@ impl Sessions {
         let _moving = known.still().await?;
         let (store, id) = (self.store.clone(), known.id);
         self.known(id).ok_or_else(|| Problem::unknown_session(id))?;
-        aside(move || store.delete(id)).await?;
+        run_blocking(move || store.delete(id)).await?;
         lock(&self.known).retain(|other| other.id != id);
         tracing::info!(request = requests::id(), session = %id, "a session was deleted");
         if let Some(session) = self.leave(id) {
@@ -257,7 +256,7 @@ impl Sessions {
         Ok(())
     }
 
-    /// Has something done by the engine of a robot elsewhere, which comes back to memory for it if need be.
+    /// Runs work on the engine of a robot elsewhere, which is loaded for it if necessary.
     pub(in crate::server) async fn tell<T: Send + 'static>(
         self: &Arc<Self>,
         id: &str,
@@ -273,8 +272,7 @@ impl Sessions {
         }
     }
 
-    /// An observation counts for nothing from now on, or counts again, whether or not whoever asked still waits. Tells how the session
-    /// stands then.
+    /// Excludes an observation or includes it again, whether or not the caller still waits, and returns the new status.
     pub(in crate::server) async fn mark(
         self: &Arc<Self>,
         id: &str,
@@ -287,14 +285,14 @@ impl Sessions {
         done_anyway(marking, later).await
     }
 
-    /// How a session with a robot elsewhere stands, also while its engine is busy.
+    /// The status of a session with a robot elsewhere, also while its engine is busy.
     pub(in crate::server) async fn standing(self: &Arc<Self>, id: &str) -> Result<Arc<Standing>, Problem> {
         let session = self.get(id).await?;
         let standing = session.standing().borrow().clone();
         standing.ok_or_else(|| Problem::not_outside(id))
     }
 
-    /// The sessions after that of an id, oldest first and so many at most; those among them that cannot be taken up; and the id of the
+    /// The sessions after the given id, oldest first and at most `most`; those among them that cannot be loaded; and the id of the
     /// last, if there are more.
     pub(in crate::server) async fn list(&self, after: Option<Uuid>, most: usize) -> Result<Listed, Problem> {
         let all = self.all().clone();
@@ -340,13 +338,13 @@ impl Sessions {
         Ok(listed)
     }
 
-    /// Sessions as they can be shown without replaying them, or why they cannot be taken up.
+    /// Sessions as they can be shown without replaying them, or the reasons why they cannot be loaded.
     async fn described(
         &self,
         asleep: &[Arc<Known>],
     ) -> Result<BTreeMap<Uuid, Result<SessionResource, String>>, Problem> {
         let (store, asleep) = (self.store.clone(), asleep.to_vec());
-        aside(move || {
+        run_blocking(move || {
             let mut shown = BTreeMap::new();
             for known in asleep {
                 let remembered = lock(&known.resource).clone();
@@ -369,7 +367,7 @@ impl Sessions {
         .await
     }
 
-    /// Looks at those that nobody has looked at, at few of many: at the others it is looked in the background.
+    /// Checks sessions that were not checked yet: a few of many; the others are checked in the background.
     async fn look_at_some(&self, asleep: &[Arc<Known>]) {
         let begun = Instant::now();
         let new = asleep.iter().filter(|known| known.damage.get().is_none());
@@ -381,7 +379,7 @@ impl Sessions {
         }
     }
 
-    /// Finds out whether a session is as it was written.
+    /// Checks whether a session is as it was written.
     async fn look_at(&self, known: &Arc<Known>) {
         if known.damage.get().is_some() {
             return;
@@ -401,11 +399,12 @@ impl Sessions {
 
     async fn load(&self, id: Uuid) -> Result<Option<Stored>, Problem> {
         let store = self.store.clone();
-        aside(move || store.load(id)).await
+        run_blocking(move || store.load(id)).await
     }
 }
 
-/// What is done whether or not whoever asked still waits; who waits too long is told what is to be said then.
+/// Runs work to its end whether or not the caller still waits; a caller that waits too long gets a problem that says
+/// `later`.
 async fn done_anyway<T: Send + 'static>(
     work: impl Future<Output = Result<T, Problem>> + Send + 'static,
     later: &'static str,
@@ -416,7 +415,7 @@ async fn done_anyway<T: Send + 'static>(
     }
 }
 
-/// A session in the store as it can be shown; `None` if it is not there any more.
+/// A session in the store as it can be shown; `None` if it is no longer there.
 fn summed_up(store: &Store, id: Uuid) -> Result<Option<SessionResource>, String> {
     let told = |error: StoreError| Problem::from(error).into_detail();
     let noted = store.summary(id).map_err(told)?;

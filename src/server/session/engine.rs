@@ -20,72 +20,72 @@ use body_schema_backend::Steps;
 use body_schema_recording::{RecordingError, Target};
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult};
 
-/// Within a long command, what was made is published this often.
+/// How often the results of a long command are published.
 const PUBLISH_EVERY: Duration = Duration::from_millis(200);
-/// What the arrangement of views does not show is written when nothing was asked for so long: while steps are made one
-/// by one, every message counts.
+/// How long nothing must have been asked before the hidden entities are written: while steps are made one by one, every
+/// message counts.
 pub(super) const COMPLETE_AFTER: Duration = Duration::from_millis(500);
 
-/// What a session is made from.
+/// The parts of which a session is made.
 pub(super) struct Setup {
-    /// Also the recording's id, so that viewers tell two sessions of one seed apart.
+    /// The session's id, and also the recording's, so that viewers distinguish two sessions of one seed.
     pub(super) id: Uuid,
     pub(super) new: NewSession,
     /// The recording's file, if one is kept.
     pub(super) file: Option<PathBuf>,
-    /// How many steps it makes at most.
+    /// The most steps that it makes.
     pub(super) most_steps: u64,
     pub(super) shared: Arc<Shared>,
-    /// Held until the thread ends, so that ending sessions still count.
+    /// A permit held until the thread ends, so that ending sessions still count.
     pub(super) permit: OwnedSemaphorePermit,
 }
 
-/// What a session can be asked. A dropped `reply` means that the engine is no more; a dropped receiver, that nobody
-/// waits for the answer any longer.
+/// A request to the engine. A dropped `reply` means that the engine is gone; a dropped receiver means that nobody waits
+/// for the answer any longer.
 pub(super) enum Command {
     Step {
         count: u64,
         expected: Option<u64>,
-        /// So many postures are drawn on the way to each.
+        /// The number of postures drawn on the way to each step.
         frames: u64,
         reply: Reply<Vec<Kept>>,
     },
     Result {
         reply: Reply<RunResult>,
     },
-    /// How a learner's last movement was chosen.
+    /// Asks how a learner's last movement was chosen.
     Choice {
         learner: String,
         reply: Reply<Choice>,
     },
-    /// What another movement would have taught it.
+    /// Asks what another movement would have taught a learner.
     Appraise {
         learner: String,
         configuration: Vec<f64>,
         reply: Reply<AppraisalReport>,
     },
-    /// Sets the next movement of a learner for which a person chooses, and tells what it is expected to teach.
+    /// Sets the next movement of a learner for which a person chooses, and asks what it is expected to teach.
     SetConfiguration {
         learner: String,
         configuration: Vec<f64>,
         reply: Reply<AppraisalReport>,
     },
-    /// The movement that was set for the next step.
+    /// Asks for the movement that was set for the next step.
     Configuration {
         learner: String,
         reply: Reply<Option<Vec<f64>>>,
     },
-    /// Somebody begins to follow the recording: brings it up to date.
+    /// Brings the recording up to date for a new follower.
     Show,
     /// Completes the recording so far.
     Flush {
         reply: Reply<()>,
     },
-    /// Completes the recording's file and ends the engine, or tells why it cannot and goes on.
+    /// Completes the recording's file and ends the engine, or returns why it cannot, and goes on.
     End {
         reply: Reply<()>,
     },
-    /// Makes the engine look whether it is to end.
+    /// Makes the engine check whether it should end.
     Wake,
     #[cfg(test)]
     Panic,
@@ -93,7 +93,7 @@ pub(super) enum Command {
 
 pub(super) type Reply<T> = oneshot::Sender<Result<T, Problem>>;
 
-/// The body of the thread. `opened` hears of the description once the session stands.
+/// The body of the thread. `opened` receives the description once the session exists.
 pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply<Description>) {
     let Setup { id, new, file, most_steps, shared, permit } = setup;
     let open = || -> Result<(Steps, Kept), Problem> {
@@ -199,7 +199,7 @@ impl Engine<'_> {
         Ok(appraisal)
     }
 
-    /// Why the session goes on although it was to end.
+    /// The problem that the session goes on although it should have ended.
     fn unsealed(&self, error: &RecordingError) -> Problem {
         self.shared.interrupted.store(false, Ordering::Relaxed);
         self.shared.note_recording(Some(error.to_string()));

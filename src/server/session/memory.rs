@@ -1,4 +1,4 @@
-//! What sessions keep, counted: all of them together stay within one budget.
+//! The memory of sessions, counted: all of them together stay within one budget.
 
 use std::sync::{
     Arc,
@@ -26,7 +26,7 @@ impl Budget {
         self.used() < self.limit
     }
 
-    /// That there is room.
+    /// Checks that there is room.
     pub(super) fn check(&self) -> Result<(), Problem> {
         match self.has_room() {
             true => Ok(()),
@@ -37,7 +37,7 @@ impl Budget {
         }
     }
 
-    /// What is taken of it, bytes.
+    /// The bytes in use.
     pub(super) fn used(&self) -> usize {
         self.used.load(Ordering::Relaxed)
     }
@@ -51,7 +51,7 @@ impl Budget {
     }
 }
 
-/// So much of a budget, until it is dropped.
+/// A share of a budget, returned when it is dropped.
 pub(in crate::server) struct Taken {
     budget: Arc<Budget>,
     bytes: usize,
@@ -70,7 +70,7 @@ impl Drop for Taken {
     }
 }
 
-/// Bytes that count among what sessions keep, as long as anyone has them.
+/// Bytes that count in the budget as long as anyone holds them.
 pub(in crate::server) struct Counted {
     bytes: Vec<u8>,
     _taken: Taken,

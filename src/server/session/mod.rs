@@ -51,41 +51,41 @@ use body_schema_calibration::File;
 use body_schema_recording::LiveLog;
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult};
 
-/// A session: its engine's command line, and all that it has left to read.
+/// A session: the channel to its engine, and everything that it has left to read.
 pub(super) struct Session {
     id: Uuid,
     description: Description,
     file: Option<String>,
-    /// When it was made, seconds since 1970.
+    /// When the session was made, seconds since 1970.
     made_s: f64,
     engine: Engine,
     shared: Arc<Shared>,
     /// When it was last asked for anything.
     used: Mutex<Instant>,
-    /// How many watch it …
+    /// The number of followers and readers …
     watchers: AtomicUsize,
-    /// … and how many of them by a stream.
+    /// … and how many of them follow by a stream.
     streams: AtomicUsize,
-    /// The recording for those who come late.
+    /// The recording, put together for late followers.
     together: together::Kept,
-    /// The recording to take away.
+    /// The recording for downloads.
     completed: completed::Kept,
-    /// Of a robot elsewhere.
+    /// The report of a robot elsewhere.
     report: AsyncMutex<Option<ReportFiles>>,
 }
 
 /// The files of a report, which take a while to make.
 pub(super) struct ReportFiles {
-    /// How many events the session had.
+    /// The number of events that the session had.
     pub(super) revision: usize,
     pub(super) files: Arc<[File]>,
 }
 
-/// The way to the thread that computes.
+/// The channel to the thread that computes.
 enum Engine {
-    /// Learners in a world of ours.
+    /// An engine of learners in a simulated or recorded world.
     Steps(mpsc::Sender<Command>),
-    /// A robot elsewhere.
+    /// An engine of a robot elsewhere.
     Elsewhere(mpsc::Sender<outside::Job>),
 }
 
@@ -98,7 +98,7 @@ impl Session {
         &self.description
     }
 
-    /// Why the engine has failed, if it has.
+    /// The failure of the engine, if it has failed.
     pub(super) fn failure(&self) -> Option<String> {
         lock(&self.shared.failure).clone()
     }
@@ -123,7 +123,7 @@ impl Session {
         &self.shared.live
     }
 
-    /// Brings the recording up to date for one who has begun to follow it: steps that nobody watched may wait.
+    /// Brings the recording up to date for a new follower: steps that nobody watched may wait.
     pub(super) fn show(&self) {
         // An engine of the other kind leaves nothing waiting, and one that has ended left nothing.
         if let Engine::Steps(commands) = &self.engine
@@ -133,32 +133,32 @@ impl Session {
         }
     }
 
-    /// How many steps are left; `None` without an end.
+    /// The number of steps that are left; `None` without an end.
     pub(super) fn remaining(&self) -> Option<u64> {
         Some(self.shared.remaining.load(Ordering::Relaxed)).filter(|left| *left != u64::MAX)
     }
 
-    /// Resolves when nothing more is coming.
+    /// A token that is cancelled when nothing more is coming.
     pub(super) fn ended(&self) -> &CancellationToken {
         &self.shared.ended
     }
 
-    /// How a session with a robot elsewhere stands, and to wait on; `None` for all others.
+    /// The snapshot of a session with a robot elsewhere, as a value to wait on; `None` for all others.
     pub(super) fn standing(&self) -> watch::Receiver<Option<Arc<Standing>>> {
         self.shared.standing.subscribe()
     }
 
-    /// Whether its history was rewritten, so that whoever follows it has to begin anew.
+    /// Whether its history was rewritten, so that its followers must begin anew.
     pub(super) fn is_rewritten(&self) -> bool {
         self.shared.rewritten.load(Ordering::Relaxed)
     }
 
-    /// How often its history was rewritten before it was as it is.
+    /// How often its history has been rewritten.
     pub(super) fn rewritten(&self) -> u64 {
         self.shared.rewritings.load(Ordering::Relaxed)
     }
 
-    /// Of a robot elsewhere: the files of its report, as they were made last.
+    /// The files of the latest report of a robot elsewhere.
     pub(super) fn report(&self) -> &AsyncMutex<Option<ReportFiles>> {
         &self.report
     }
@@ -167,7 +167,7 @@ impl Session {
         matches!(self.engine, Engine::Elsewhere(_))
     }
 
-    /// Makes `count` steps, after whatever the session is busy with, and draws so many postures on the way to each.
+    /// Makes `count` steps, after the engine's present work, with `frames` postures drawn on the way to each.
     pub(super) async fn make_steps(
         &self,
         count: u64,
@@ -177,7 +177,7 @@ impl Session {
         self.ask(|reply| Command::Step { count, expected, frames, reply }).await
     }
 
-    /// The outcome so far, after whatever the session is busy with.
+    /// The result so far, after the engine's present work.
     pub(super) async fn result(&self) -> Result<RunResult, Problem> {
         if self.is_elsewhere() {
             return self.tell(|robot| Ok(RunResult::of(robot.experiment()))).await;
@@ -185,7 +185,7 @@ impl Session {
         self.ask(|reply| Command::Result { reply }).await
     }
 
-    /// How a learner's last movement was chosen, after whatever the session is busy with.
+    /// How a learner's last movement was chosen, after the engine's present work.
     pub(super) async fn choice(&self, learner: String) -> Result<Choice, Problem> {
         if self.is_elsewhere() {
             return self.tell(move |robot| Ok(Choice::of(robot.experiment(), &learner)?)).await;
@@ -193,7 +193,7 @@ impl Session {
         self.ask(|reply| Command::Choice { learner, reply }).await
     }
 
-    /// What another movement would have taught a learner, after whatever the session is busy with.
+    /// What another movement would have taught a learner, after the engine's present work.
     pub(super) async fn appraise(&self, learner: String, configuration: Vec<f64>) -> Result<AppraisalReport, Problem> {
         if self.is_elsewhere() {
             return self
@@ -203,7 +203,7 @@ impl Session {
         self.ask(|reply| Command::Appraise { learner, configuration, reply }).await
     }
 
-    /// Sets the next movement of a learner for which a person chooses, after whatever the session is busy with.
+    /// Sets the next movement of a learner for which a person chooses, after the engine's present work.
     pub(super) async fn set_configuration(
         &self,
         learner: String,
@@ -217,8 +217,8 @@ impl Session {
         self.ask(|reply| Command::Configuration { learner, reply }).await
     }
 
-    /// Completes the recording so far, after the step that is being made, or with a robot elsewhere after whatever the session is
-    /// busy with. That of a failed engine is complete.
+    /// Completes the recording so far, after the step that is being made, or with a robot elsewhere after the engine's present
+    /// work. The recording of a failed engine is complete.
     pub(super) async fn flush(&self) -> Result<(), Problem> {
         if self.is_elsewhere() {
             return self.tell(|robot| robot.complete()).await;
@@ -227,7 +227,7 @@ impl Session {
         if self.failure().is_some() { Ok(()) } else { flushed }
     }
 
-    /// Completes the recording's file and ends the engine. On a problem nothing has ended.
+    /// Completes the recording's file and ends the engine. If that fails nothing has ended.
     async fn end(&self) -> Result<(), Problem> {
         self.shared.interrupted.store(true, Ordering::Relaxed);
         let ended = self.ask(|reply| Command::End { reply }).await;
@@ -239,7 +239,7 @@ impl Session {
         Ok(())
     }
 
-    /// Asks the engine of a world of ours.
+    /// Sends a command to the engine of learners in a world, and awaits the answer.
     async fn ask<T>(&self, command: impl FnOnce(engine::Reply<T>) -> Command) -> Result<T, Problem> {
         let Engine::Steps(commands) = &self.engine else { return Err(Problem::never_steps(self.id)) };
         let (reply, answer) = oneshot::channel();
@@ -253,7 +253,7 @@ impl Session {
         Err(self.why_ended().await)
     }
 
-    /// Has something done by the engine of a robot elsewhere, after whatever it is busy with.
+    /// Runs work on the engine of a robot elsewhere, after its present work.
     pub(super) async fn tell<T: Send + 'static>(
         &self,
         work: impl FnOnce(&mut Elsewhere) -> Result<T, Problem> + Send + 'static,
@@ -307,7 +307,7 @@ impl Session {
         }
     }
 
-    /// Asks the engine to end after the step it is making.
+    /// Asks the engine to end after the step that it is making.
     pub(super) fn stop(&self) {
         self.shared.stop.cancel();
         // An engine that waits for commands must wake; one that has ended needs nothing.
@@ -325,12 +325,12 @@ impl Session {
         *lock(&self.used)
     }
 
-    /// Whether nobody watches it, and its engine is at nothing.
+    /// Whether nobody watches the session, and its engine is idle.
     fn is_idle(&self) -> bool {
         self.watchers.load(Ordering::Relaxed) == 0 && self.shared.jobs.load(Ordering::Relaxed) == 0
     }
 
-    /// The recording's file with what it lacks, if it is not complete.
+    /// The recording's file and what it lacks, if it is incomplete.
     fn unfinished(&self) -> Option<String> {
         let file = self.file.as_deref()?;
         match lock(&self.shared.recording_failure).as_deref() {
@@ -349,7 +349,7 @@ impl Session {
     }
 }
 
-/// Something that an engine is at, or will be.
+/// A job of an engine, running or waiting.
 struct Job(Arc<Shared>);
 
 impl Job {

@@ -1,7 +1,7 @@
 //! A robot elsewhere: one thread that owns its session, and does one thing at a time.
 //!
-//! Whatever changes the session is prepared, written to the store, and only then made: an answer never tells of what a crash
-//! could take back, and what could not be written has not happened.
+//! Every change of the session is prepared, written to the store, and only then made: no answer reports a change that a
+//! crash could undo, and a change that could not be written has not happened.
 
 use std::{
     collections::BTreeMap,
@@ -34,44 +34,44 @@ use body_schema_experiment::Experiment;
 use body_schema_recording::{Recorder, RecordingError, Target};
 use body_schema_wire::Description;
 
-/// How soon at least, and how late at most, it is looked again whether the time of a suggestion has run out, seconds.
+/// The least and the greatest interval, seconds, between checks whether the time of a suggestion has run out.
 const LOOK_AGAIN_S: [f64; 2] = [0.5, 3600.0];
 
-/// Steps that are recorded at a time, before it is looked whether anything is asked for.
+/// The most steps that are recorded before requests are looked at again.
 const AT_ONCE: usize = 64;
 
-/// Whoever asks is told that a replay is being made once it has taken so long.
+/// The time after which callers are told that a replay is running.
 const TOLD_AFTER: Duration = Duration::from_millis(200);
 
-/// Bytes that a session takes for each of its setup: the text as it was sent and as it is read, names and places in it.
+/// The bytes that a session takes for each byte of its setup: the text as sent and as read, with names and places.
 const SETUP_TAKES: usize = 4;
 
-/// Something to be done by the engine. What it returns tells whoever asked.
+/// A job for the engine. It returns a function that answers the caller.
 pub(super) type Job = Box<dyn FnOnce(&mut Elsewhere) -> Reply + Send>;
 type Reply = Box<dyn FnOnce() + Send>;
 
-/// Where a session comes from.
+/// The origin of a session.
 pub(super) enum Origin {
-    /// With what happened in it so far.
+    /// A new session, with the events that it begins with.
     New(Setup, Shown, Vec<ask_tell::Event>),
     Store(Stored),
 }
 
-/// What an engine is made from.
+/// The parts of which an engine is made.
 pub(super) struct Beginning {
     pub(super) id: Uuid,
     pub(super) origin: Origin,
-    /// When it was made, seconds since 1970.
+    /// When the session was made, seconds since 1970.
     pub(super) made_s: f64,
     pub(super) store: Arc<Store>,
-    /// How large a new one may be.
+    /// The limits of a new session.
     pub(super) most: Most,
     pub(super) shared: Arc<Shared>,
-    /// Held until the thread ends, so that ending sessions still count.
+    /// A permit held until the thread ends, so that ending sessions still count.
     pub(super) permit: OwnedSemaphorePermit,
 }
 
-/// The body of the thread. `opened` hears of the description once the session stands, and is in the store.
+/// The body of the thread. `opened` receives the description once the session exists, and is in the store.
 pub(super) fn run(
     beginning: Beginning,
     jobs: &mpsc::Receiver<Job>,
@@ -101,22 +101,23 @@ pub(in crate::server) struct Elsewhere {
     id: Uuid,
     session: ask_tell::Session,
     channels: Arc<[ChannelShape]>,
-    /// By `Idempotency-Key` the number of its observation.
+    /// The number of each observation by its `Idempotency-Key`.
     keys: BTreeMap<String, u64>,
     recorder: Recorder,
-    /// So many steps are recorded. Those of a session that has come back are while nothing else is asked for.
+    /// The number of steps that are recorded. Those of a session that has come back are recorded while nothing else is
+    /// asked for.
     recorded: usize,
     /// The steps since the latest checkpoint.
     since: Since,
     store: Arc<Store>,
     shared: Arc<Shared>,
-    /// What was told counts otherwise than it did: the history has to be made anew.
+    /// Whether the history must be made anew, because other observations count than before.
     is_rewritten: bool,
-    /// Whoever asked for what is being done waits for it no longer.
+    /// Cancelled when the caller of the present job no longer waits.
     given_up: CancellationToken,
-    /// What the session is about takes memory as long as it is there.
+    /// The memory of the setup.
     _setup: Taken,
-    /// By so much the clock is behind what it was when the session was last used, seconds.
+    /// How far the clock is behind the time at which the session was last used, seconds.
     ahead_s: f64,
 }
 
@@ -183,7 +184,7 @@ impl Elsewhere {
         Ok(robot)
     }
 
-    /// Records steps of before it came back to memory, so many at most.
+    /// Records up to `most` steps from before the session came back to memory.
     fn catch_up(&mut self, most: usize) -> Result<(), RecordingError> {
         for kept in self.shared.reports_from(self.recorded, most) {
             // Read once more instead of being held in memory until now.
@@ -204,7 +205,7 @@ impl Elsewhere {
         self.recorded < self.shared.steps()
     }
 
-    /// The next job; until it comes, what is left to be recorded is.
+    /// The next job. Until it comes, the remaining steps are recorded.
     fn next(&mut self, jobs: &mpsc::Receiver<Job>) -> Result<Job, mpsc::RecvError> {
         while self.is_behind() && !self.shared.stop.is_cancelled() {
             if let Ok(job) = jobs.try_recv() {
@@ -240,13 +241,13 @@ impl Elsewhere {
         }
     }
 
-    /// The same, at something that is wanted until then.
+    /// This engine at a job whose caller waits until `given_up`.
     pub(super) fn for_whoever_waits(&mut self, given_up: CancellationToken) -> &mut Self {
         self.given_up = given_up;
         self
     }
 
-    /// Waits for the next job, and ends suggestions whose time runs out meanwhile.
+    /// Waits for the next job, and expires suggestions whose time runs out meanwhile.
     fn idle(&mut self, jobs: &mpsc::Receiver<Job>) -> Result<Job, mpsc::RecvError> {
         loop {
             let due = self.session.pending().filter_map(|suggestion| suggestion.expires_at_s).min_by(f64::total_cmp);
@@ -275,7 +276,7 @@ impl Elsewhere {
         self.commit(prepared, None)
     }
 
-    /// A suggestion is not carried out.
+    /// Marks a suggestion as not going to be carried out.
     pub(in crate::server) fn outcome(
         &mut self,
         id: u64,
@@ -288,7 +289,8 @@ impl Elsewhere {
         self.commit(prepared, None)
     }
 
-    /// Takes in an observation, or answers again what was answered to the one that came with this key. Tells which.
+    /// Absorbs an observation, or repeats the answer to the one that came with this key, and returns which of the two
+    /// it was.
     pub(in crate::server) fn observe(
         &mut self,
         told: &Observation,
@@ -322,7 +324,7 @@ impl Elsewhere {
         Ok((answer, false))
     }
 
-    /// From now on an observation counts for nothing, or counts again. Tells how the session stands then.
+    /// Excludes an observation, or includes it again, and returns the new status.
     pub(in crate::server) fn mark(&mut self, number: u64, excluded: bool) -> Result<Status, Problem> {
         let now = Some(self.now_s());
         let (store, shared, id) = (&self.store, &self.shared, self.id);
@@ -352,23 +354,23 @@ impl Elsewhere {
         Ok(self.session.status())
     }
 
-    /// Ends the pending suggestions whose time has run out.
+    /// Expires the pending suggestions whose time has run out.
     pub(in crate::server) fn expire(&mut self) -> Result<(), Problem> {
         let prepared = self.session.prepare_expire(self.now_s())?;
         self.commit(prepared, None)
     }
 
-    /// How many events there are.
+    /// The number of events.
     pub(in crate::server) fn revision(&self) -> usize {
         self.session.events().len()
     }
 
-    /// A copy as it is now, to work on elsewhere.
+    /// A copy of the session as it is now, for work elsewhere.
     pub(in crate::server) fn copy(&self) -> ask_tell::Session {
         self.session.clone()
     }
 
-    /// Seconds since 1970, and never before what has happened.
+    /// Seconds since 1970, never before the latest event.
     fn now_s(&self) -> f64 {
         now_s() + self.ahead_s
     }
@@ -392,12 +394,12 @@ impl Elsewhere {
         self.session.observations().get(index).map(AsRef::as_ref)
     }
 
-    /// Writes a prepared change, makes it, and shows it.
+    /// Writes a prepared change, commits it, and shows it.
     fn commit<A>(&mut self, prepared: Prepared<A>, key: Option<&str>) -> Result<A, Problem> {
         self.commit_by(prepared, |store, id, revision, events| store.append(id, revision, events, key))
     }
 
-    /// The same, written in this way.
+    /// Writes a prepared change by `write`, commits it, and shows it.
     fn commit_by<A>(
         &mut self,
         prepared: Prepared<A>,
@@ -428,7 +430,7 @@ impl Elsewhere {
         Ok(answer)
     }
 
-    /// Records what is new.
+    /// Records new steps, and returns them.
     fn record(&mut self) -> Result<Vec<Kept>, RecordingError> {
         let mut reports = Vec::new();
         if self.is_rewritten {
@@ -450,7 +452,7 @@ impl Elsewhere {
         Ok(reports)
     }
 
-    /// Draws the posture that is suggested next, as a ghost of the arm.
+    /// Draws the next suggested posture, as a ghost of the arm.
     fn show(&mut self) -> Result<(), RecordingError> {
         let next = self.session.pending().next();
         let joints = &self.session.experiment().setting().joints;
@@ -481,7 +483,7 @@ impl Elsewhere {
     }
 }
 
-/// Why a new session cannot be, blamed on what was sent.
+/// The problem of a new session that cannot be opened, attributed to the request.
 fn unusable(error: ReplayError) -> Problem {
     match error {
         ReplayError::Setup(error) => error.into(),

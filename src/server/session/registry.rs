@@ -17,7 +17,7 @@ use uuid::Uuid;
 use super::{Budget, Engine, NewSession, Session, Shared, clock::now_s, dormant::Known, engine, lock};
 use crate::server::{
     Limits,
-    aside::aside,
+    blocking::run_blocking,
     metrics::{Metrics, Present},
     problem::{Kind, Problem},
     requests,
@@ -25,34 +25,34 @@ use crate::server::{
 };
 use body_schema_scenario::WorldKind;
 
-/// How long a session may take to end after it was told to …
+/// The time that a session may take to end after it was told to …
 pub(super) const END_WITHIN: Duration = Duration::from_secs(10);
-/// … and when the server ends with it.
+/// … and when the server ends.
 const SHUT_DOWN_WITHIN: Duration = Duration::from_secs(4);
 
 /// What is kept of sessions, and where.
 pub(in crate::server) struct Keeping {
     /// The sessions with robots elsewhere.
     pub(in crate::server) store: Store,
-    /// Where the recordings of all others are kept as files, if they are.
+    /// The folder of the recordings of all others, if they are kept as files.
     pub(in crate::server) recordings: Option<PathBuf>,
-    /// Where files without a name are made.
+    /// The folder for files without a name.
     pub(in crate::server) scratch: Option<PathBuf>,
-    /// How much there may be of them.
+    /// The limits.
     pub(in crate::server) limits: Limits,
 }
 
 /// All sessions of a server.
 ///
-/// Nobody waits for one of its locks while holding another, nor for any without end.
+/// No caller waits for one of its locks while holding another, nor for any without end.
 pub(in crate::server) struct Sessions {
-    /// Those in memory, in the order in which they came there; few enough to search one by one.
+    /// The sessions in memory, in the order in which they came there; few enough for a linear search.
     all: Mutex<Vec<Arc<Session>>>,
-    /// Those in the store, oldest first.
+    /// The sessions in the store, oldest first.
     pub(super) known: Mutex<Vec<Arc<Known>>>,
-    /// One for each session that makes steps, also while it ends.
+    /// A permit for each session that makes steps, also while it ends.
     permits: Arc<Semaphore>,
-    /// One for each session with a robot elsewhere that is in memory.
+    /// A permit for each session with a robot elsewhere that is in memory.
     pub(super) places: Arc<Semaphore>,
     pub(super) budget: Arc<Budget>,
     pub(super) metrics: Arc<Metrics>,
@@ -87,7 +87,7 @@ impl Sessions {
         }))
     }
 
-    /// Opens a session: a thread, an experiment, its recording.
+    /// Opens a session, with its thread, its experiment and its recording.
     pub(in crate::server) async fn open(&self, new: NewSession) -> Result<Arc<Session>, Problem> {
         self.has_room_for_recordings().await?;
         let permit = self.permit().await?;
@@ -126,17 +126,17 @@ impl Sessions {
         Ok(self.enter(session))
     }
 
-    /// What the engine of a session is to leave.
+    /// The shared state of a new session.
     pub(super) fn shared(&self, id: Uuid) -> Shared {
         let counters = (self.budget.clone(), self.metrics.clone());
         Shared::new(id, self.shutdown.child_token(), counters, self.scratch.clone())
     }
 
-    /// Whether one more recording may be kept as a file.
+    /// Checks that one more recording may be kept as a file.
     async fn has_room_for_recordings(&self) -> Result<(), Problem> {
         let Some(directory) = self.recordings.clone() else { return Ok(()) };
         let (most, used) =
-            (self.limits.recordings_bytes, aside(move || Ok::<_, Problem>(recordings_bytes(&directory))).await?);
+            (self.limits.recordings_bytes, run_blocking(move || Ok::<_, Problem>(recordings_bytes(&directory))).await?);
         match used < most {
             true => Ok(()),
             false => Err(Problem::new(
@@ -157,14 +157,14 @@ impl Sessions {
         session
     }
 
-    /// The sessions in memory. A robot elsewhere whose engine has ended is there no longer: it comes back from the store.
+    /// The sessions in memory. A robot elsewhere whose engine has ended is not among them: it comes back from the store.
     pub(super) fn all(&self) -> MutexGuard<'_, Vec<Arc<Session>>> {
         let mut all = lock(&self.all);
         all.retain(|session| !(session.is_elsewhere() && session.ended().is_cancelled()));
         all
     }
 
-    /// A place for one more session, if need be that of the one that has been idle longest.
+    /// A permit for one more session, if necessary that of the one that has been idle longest.
     async fn permit(&self) -> Result<OwnedSemaphorePermit, Problem> {
         self.check_open()?;
         if let Ok(permit) = self.permits.clone().try_acquire_owned() {
@@ -188,8 +188,8 @@ impl Sessions {
         }
     }
 
-    /// The sessions in memory that were not asked for so long, are at nothing and nobody watches; first that which was not
-    /// asked for longest.
+    /// The sessions in memory that have been idle for this long and that nobody watches; first the one that was not asked
+    /// for longest.
     pub(super) fn idle(&self, wanted: impl Fn(&Session) -> bool, idle: Duration) -> Vec<Arc<Session>> {
         let is_idle = |session: &&Arc<Session>| wanted(session) && session.is_idle() && session.used().elapsed() > idle;
         let mut found: Vec<Arc<Session>> = self.all().iter().filter(is_idle).cloned().collect();
@@ -201,7 +201,7 @@ impl Sessions {
         self.shutdown.is_cancelled()
     }
 
-    /// The session of that id, from the store if it is not in memory.
+    /// The session with this id, from the store if it is not in memory.
     pub(in crate::server) async fn get(self: &Arc<Self>, id: &str) -> Result<Arc<Session>, Problem> {
         let known = Uuid::parse_str(id).map_err(|_| Problem::unknown_session(id))?;
         let session = match self.in_memory(known) {
@@ -212,7 +212,7 @@ impl Sessions {
         Ok(session)
     }
 
-    /// One that is in memory.
+    /// The session with this id, if it is in memory.
     pub(super) fn in_memory(&self, id: Uuid) -> Option<Arc<Session>> {
         self.all().iter().find(|session| session.id == id).cloned()
     }
@@ -222,7 +222,7 @@ impl Sessions {
         self.in_memory(id).is_some_and(|session| session.streams.load(Ordering::Relaxed) > 0)
     }
 
-    /// Ends a session and forgets it; its recording's file is complete afterwards, or its events are in the store no more.
+    /// Ends a session and removes it. Its recording's file is then complete, or its events are no longer in the store.
     pub(in crate::server) async fn close(&self, id: Uuid) -> Result<(), Problem> {
         if let Some(known) = self.known(id) {
             return self.forget(&known).await;
@@ -246,14 +246,14 @@ impl Sessions {
         self.leave(id).map(drop).ok_or_else(|| Problem::unknown_session(id))
     }
 
-    /// Takes a session out of memory.
+    /// Removes a session from memory.
     pub(super) fn leave(&self, id: Uuid) -> Option<Arc<Session>> {
         let mut all = self.all();
         let index = all.iter().position(|session| session.id == id)?;
         Some(all.remove(index))
     }
 
-    /// What there is at the moment, beside so many open connections.
+    /// The server's state at the moment, with this many open connections.
     pub(in crate::server) fn present(&self, connections: usize) -> Present {
         let stored_sessions = lock(&self.known).len();
         let all = self.all();
@@ -267,7 +267,8 @@ impl Sessions {
         }
     }
 
-    /// Ends all sessions and waits, within bounds, until their recordings are complete. Tells which are not, and why.
+    /// Ends all sessions and waits, within limits, until their recordings are complete. Returns those that are not, and
+    /// why.
     pub(in crate::server) async fn close_all(&self) -> Vec<String> {
         let all = self.all().clone();
         for session in &all {
@@ -283,14 +284,15 @@ impl Sessions {
     }
 }
 
-/// How much the recordings in a directory take. What cannot be looked at counts for nothing: the recording itself will tell.
+/// The size of the recordings in a directory, bytes. What cannot be examined counts as zero: writing the recording itself
+/// will report the error.
 fn recordings_bytes(directory: &Path) -> u64 {
     let files = std::fs::read_dir(directory).into_iter().flatten().flatten();
     let recordings = files.filter(|file| file.path().extension().is_some_and(|extension| extension == "rrd"));
     recordings.filter_map(|file| Some(file.metadata().ok()?.len())).sum()
 }
 
-/// Begins the thread of a session.
+/// Starts the thread of a session.
 pub(super) fn spawn(body: impl FnOnce() + Send + 'static) -> Result<(), Problem> {
     let spawned = thread::Builder::new().name("session".to_owned()).spawn(body);
     spawned.map(drop).map_err(|error| Problem::new(Kind::Internal, format!("no thread for the session: {error}")))

@@ -7,7 +7,7 @@ use super::{Session, SessionResource, lock};
 use body_schema_scenario::WorldKind;
 
 impl Session {
-    /// Where its movements are made.
+    /// The kind of its world.
     pub(super) fn world(&self) -> WorldKind {
         match self.description.movements_available {
             _ if self.is_elsewhere() => WorldKind::Outside,
@@ -34,7 +34,7 @@ impl Session {
     }
 }
 
-/// A session that was kept, and is not as it was written.
+/// A kept session that is not as it was written.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct DamagedSession {
     /// Its id.

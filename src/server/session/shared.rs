@@ -1,4 +1,4 @@
-//! What an engine leaves for everyone to read.
+//! The state that an engine shares with its readers.
 
 use std::{
     path::PathBuf,
@@ -16,7 +16,7 @@ use super::{Budget, Kept, Standing, checkpoints::Replaying, lock};
 use crate::server::metrics::Metrics;
 use body_schema_recording::LiveLog;
 
-/// What an engine leaves for everyone to read.
+/// The state that an engine shares with its readers.
 pub(super) struct Shared {
     id: Uuid,
     /// One report per step, from step 0.
@@ -25,35 +25,35 @@ pub(super) struct Shared {
     pub(super) reports: watch::Sender<usize>,
     /// The recording, as encoded bytes.
     pub(super) live: LiveLog,
-    /// `u64::MAX` stands for no end.
+    /// The number of steps left; `u64::MAX` stands for no end.
     pub(super) remaining: AtomicU64,
     pub(super) failure: Mutex<Option<String>>,
-    /// Why the recording's file lacks steps.
+    /// Why the recording's file lacks steps, if it does.
     pub(super) recording_failure: Mutex<Option<String>>,
-    /// How a session with a robot elsewhere stands, and to wait on; `None` for all others.
+    /// The snapshot of a session with a robot elsewhere, to wait on; `None` for all others.
     pub(super) standing: watch::Sender<Option<Arc<Standing>>>,
-    /// The history is another than it was: whoever follows it begins anew.
+    /// Whether the history was rewritten, so that its followers begin anew.
     pub(super) rewritten: AtomicBool,
-    /// How often it was before it was as it is.
+    /// How often the history has been rewritten.
     pub(super) rewritings: AtomicU64,
-    /// What the engine of a robot elsewhere is at, and what waits for it.
+    /// The number of jobs of a robot elsewhere, running and waiting.
     pub(super) jobs: AtomicUsize,
-    /// How far a replay has got that takes long; nothing else can be asked of the engine meanwhile.
+    /// The progress of a long replay; nothing else can be asked of the engine meanwhile.
     pub(super) replaying: watch::Sender<Option<Replaying>>,
-    /// Asks the engine to leave off the command that it is at.
+    /// Asks the engine to stop its present command.
     pub(super) interrupted: AtomicBool,
     /// Asks the engine to end.
     pub(super) stop: CancellationToken,
-    /// The engine has ended: nothing more is coming and the recording's file is complete.
+    /// Cancelled when the engine has ended: nothing more is coming and the recording's file is complete.
     pub(super) ended: CancellationToken,
     pub(super) budget: Arc<Budget>,
-    /// Counts what engines do.
+    /// The counters of what engines do.
     pub(super) metrics: Arc<Metrics>,
-    /// Where files without a name are made; where the operating system has them if there is none.
+    /// The folder for files without a name; the operating system's if there is none.
     pub(super) scratch: Option<PathBuf>,
-    /// What this session has taken of the budget …
+    /// The bytes of the budget that this session has taken …
     taken: AtomicUsize,
-    /// … and how much of it for reports.
+    /// … and how many of them for reports.
     reported: AtomicUsize,
 }
 
@@ -88,7 +88,7 @@ impl Shared {
         }
     }
 
-    /// So many steps there are to be read, step 0 among them.
+    /// The number of steps that can be read, step 0 among them.
     pub(super) fn steps(&self) -> usize {
         *self.reports.borrow()
     }

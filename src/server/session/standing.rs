@@ -1,4 +1,4 @@
-//! What a session with a robot elsewhere is made from, and how it stands.
+//! The request for a session with a robot elsewhere, and the snapshot of its state.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 use body_schema_ask_tell::{Answer, ChannelShape, Event, Status, Suggestion, Told};
 use body_schema_recording::EllipsoidSize;
 
-/// What a session with a robot elsewhere is made from.
+/// The request for a session with a robot elsewhere.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewOutsideSession {
@@ -18,7 +18,7 @@ pub struct NewOutsideSession {
     /// The keys of a calibration file as JSON, with the text of the URDF as `robot.urdf` and without measurements.
     #[schema(value_type = Object)]
     pub calibration: Value,
-    /// What happened so far, as `session.json` of another session or a saved one has it; nothing if absent.
+    /// The events so far, in the form of `session.json` of another session or of a saved one; none if absent.
     #[serde(default)]
     #[schema(value_type = Vec<Object>)]
     pub events: Vec<Event>,
@@ -28,10 +28,10 @@ pub struct NewOutsideSession {
     /// The learner that decides; `global`, unless the calibration lists others, if absent or null.
     #[serde(default)]
     pub agent: Option<String>,
-    /// Seed of all that is drawn.
+    /// The seed of all random draws.
     #[serde(default, deserialize_with = "body_schema_ask_tell::whole::whole")]
     pub seed: u64,
-    /// How large the ellipsoids of its recording are.
+    /// The size of the ellipsoids of its recording.
     #[serde(default)]
     pub ellipsoids: EllipsoidSize,
 }
@@ -40,24 +40,24 @@ pub struct NewOutsideSession {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum OutsideWorld {
-    /// A robot that is not ours.
+    /// A robot elsewhere.
     Outside,
 }
 
-/// How a session stands, for everyone to read while its engine is busy. Followers are told of its status and what is pending.
+/// A snapshot of a session, for everyone to read while its engine is busy. Followers receive its status and what is pending.
 #[derive(Debug, Serialize, ToSchema)]
 pub(in crate::server) struct Standing {
-    /// How it stands.
+    /// The status.
     pub(in crate::server) status: Status,
-    /// The suggestions that wait to be carried out, of all clients, in the order in which they were chosen.
+    /// The pending suggestions of all clients, in the order in which they were chosen.
     #[schema(value_type = Vec<Suggestion>)]
     pub(in crate::server) pending: Vec<Arc<Suggestion>>,
-    /// What was answered to the latest observation; null before any.
+    /// The answer to the latest observation; null before any.
     pub(in crate::server) last: Option<Answer>,
-    /// All that were ever made, by id.
+    /// All suggestions ever made, by id.
     #[serde(skip)]
     pub(in crate::server) suggestions: Vec<Arc<Suggestion>>,
-    /// All that were ever told, by number.
+    /// All observations ever received, by number.
     #[serde(skip)]
     pub(in crate::server) observations: Vec<Arc<Told>>,
     /// The id of its recording.

@@ -1,4 +1,4 @@
-//! Who watches a session keeps it in memory.
+//! Watchers of a session, which keep it in memory.
 
 use std::{
     ops::Deref,
@@ -8,14 +8,14 @@ use std::{
 use super::Session;
 use crate::server::problem::{Kind, Problem};
 
-/// One who watches a session.
+/// A watcher of a session.
 pub(in crate::server) struct Watching(Arc<Session>);
 
-/// One who follows a session by a stream.
+/// A watcher that follows a session by a stream.
 pub(in crate::server) struct Following(Watching);
 
 impl Session {
-    /// Counts the caller among those who follow, of whom there are at most so many.
+    /// Counts the caller among the followers, of whom there are at most `most`.
     pub(in crate::server) fn follow(self: &Arc<Self>, most: usize) -> Result<Following, Problem> {
         let one_more = |streams| (streams < most).then_some(streams + 1);
         self.streams.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_more).map_err(|_| {
@@ -25,7 +25,7 @@ impl Session {
         Ok(Following(self.watch()))
     }
 
-    /// Counts the caller among those who watch, as long as it keeps the answer.
+    /// Counts the caller among the watchers, as long as it keeps the returned value.
     pub(in crate::server) fn watch(self: &Arc<Self>) -> Watching {
         self.watchers.fetch_add(1, Ordering::Relaxed);
         Watching(self.clone())

@@ -1,4 +1,4 @@
-//! What sessions have come to after some of their steps: what may be lost, since replaying finds it out again.
+//! Checkpoints of sessions. They may be lost, since replaying computes them again.
 
 use std::{
     fs::File,
@@ -13,25 +13,25 @@ use uuid::Uuid;
 
 use super::{Event, Store, StoreError, append_events, schema};
 
-/// Steps between one checkpoint and the next.
+/// The steps between one checkpoint and the next.
 pub const EVERY: u64 = 50;
-/// Of the latest steps all checkpoints keep what was learned, and of those before …
+/// The number of latest steps of which all checkpoints keep what was learned; of earlier steps …
 const LATEST: u64 = 4 * EVERY;
-/// … one in so many steps.
+/// … one in this many does.
 const SPARSE: u64 = 8 * EVERY;
-/// Bytes that the reports of a checkpoint may have, unpacked.
+/// The most bytes of the reports of a checkpoint, unpacked.
 const MOST_UNPACKED: u64 = 1 << 28;
 
-/// What a session has come to after a step.
+/// A checkpoint of a session after a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Saved {
     /// The step.
     pub step: u64,
-    /// How many observations had been told, those that do not count among them.
+    /// The number of observations received until then, excluded ones included.
     pub told: u64,
     /// [What was learned](body_schema_ask_tell::Checkpoint) up to it; empty where that is not kept any more.
     pub state: Vec<u8>,
-    /// The reports since the checkpoint before, packed.
+    /// The reports since the previous checkpoint, packed.
     pub reports: Vec<u8>,
 }
 
@@ -44,7 +44,7 @@ impl Saved {
     }
 }
 
-/// Texts without line breaks, one after the other in little room.
+/// Packs texts without line breaks, one after the other.
 pub fn packed<'a>(mut texts: impl Iterator<Item = &'a str>) -> Vec<u8> {
     let mut packed = DeflateEncoder::new(Vec::new(), Compression::fast());
     let written = texts.try_for_each(|text| writeln!(packed, "{text}"));
@@ -52,18 +52,19 @@ pub fn packed<'a>(mut texts: impl Iterator<Item = &'a str>) -> Vec<u8> {
     written.and_then(|()| packed.finish()).unwrap_or_default()
 }
 
-/// The lines of what was packed.
+/// Unpacks the lines of what was packed.
 ///
 /// # Errors
 ///
-/// Where it is not as it was written.
+/// The unpacker's error if the bytes are not as they were written.
 pub fn unpacked(packed: &[u8]) -> io::Result<String> {
     let mut text = String::new();
     DeflateDecoder::new(packed).take(MOST_UNPACKED).read_to_string(&mut text)?;
     Ok(text)
 }
 
-/// Tells this build from all others: what one has learned another must learn by itself. `None` where the program cannot read itself.
+/// An identifier of this build: another build must learn by itself what this one has learned. `None` if the program cannot read
+/// itself.
 pub fn build() -> Option<&'static str> {
     static BUILD: OnceLock<Option<String>> = OnceLock::new();
     let read = || {
@@ -75,29 +76,29 @@ pub fn build() -> Option<&'static str> {
     BUILD.get_or_init(read).as_deref()
 }
 
-/// The program that runs, though another may have taken its name since.
+/// The running program's file, even if another has taken its name since.
 fn program() -> io::Result<File> {
     if cfg!(target_os = "linux") { File::open("/proc/self/exe") } else { File::open(std::env::current_exe()?) }
 }
 
 impl Store {
-    /// Keeps what a session has come to. It is kept by nobody's order: without room for it nothing is lost but time.
+    /// Stores a checkpoint. It is optional: without room for it nothing is lost but time.
     ///
     /// # Errors
     ///
-    /// [`StoreError`]: it is not kept then.
+    /// [`StoreError`] if it cannot be written; it is then not stored.
     pub fn save(&self, id: Uuid, build: &str, saved: &Saved) -> Result<(), StoreError> {
         let mut connection = self.connection();
         self.can_grow(&connection)?;
         self.written(&mut connection, |transaction| insert(transaction, id, build, saved))
     }
 
-    /// What a session had come to, by this build, oldest first: those that are as they were written, up to the first that is not. None
-    /// of a store of an earlier version.
+    /// The checkpoints of a session by this build, oldest first: those that are as they were written, up to the first that is not.
+    /// Empty for a store of an earlier version.
     ///
     /// # Errors
     ///
-    /// [`StoreError`] where they cannot be read.
+    /// [`StoreError`] if they cannot be read.
     pub fn saved(&self, id: Uuid, build: &str) -> Result<Vec<Saved>, StoreError> {
         if self.version < schema::CHECKPOINTS {
             return Ok(Vec::new());
@@ -121,12 +122,12 @@ impl Store {
         Ok(rows.take_while(|(saved, sum)| saved.checksum() == *sum).map(|(saved, _)| saved).collect())
     }
 
-    /// Appends events to a session that has `revision` of them, by which an observation counts otherwise than it did. What the session
-    /// had come to since is forgotten, and what it has come to now is kept.
+    /// Appends events to a session that has `revision` of them, which exclude an observation or include it again. Later
+    /// checkpoints are dropped, and the new ones are stored.
     ///
     /// # Errors
     ///
-    /// [`StoreError`]: nothing has happened then.
+    /// [`StoreError`] if they cannot be written; nothing has changed then.
     pub fn rewrite(
         &self,
         id: Uuid,
@@ -149,7 +150,7 @@ impl Store {
     }
 }
 
-/// Writes one, and drops what was learned up to earlier ones but for a few.
+/// Writes a checkpoint, and drops what was learned up to earlier ones except for a few.
 fn insert(transaction: &Transaction<'_>, id: Uuid, build: &str, saved: &Saved) -> rusqlite::Result<()> {
     let Some(session) = number(transaction, id)? else { return Ok(()) };
     transaction.execute("DELETE FROM checkpoint WHERE session = ?1 AND build != ?2", params![session, build])?;

@@ -1,10 +1,10 @@
-//! Whether what is read is what was written, and where.
+//! Checks that what is read is what was written, and where.
 
 use std::path::Path;
 
 use flate2::Crc;
 
-/// Of texts that are written side by side.
+/// The checksum of texts that are written side by side.
 pub(super) fn checksum<const N: usize>(texts: [&str; N]) -> u32 {
     let mut crc = Crc::new();
     for text in texts {
@@ -15,12 +15,12 @@ pub(super) fn checksum<const N: usize>(texts: [&str; N]) -> u32 {
     crc.sum()
 }
 
-/// Which file a path leads to.
+/// The identity of the file that a path leads to.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Place(u64, u64);
 
 impl Place {
-    /// `None` where there is no file, and on platforms that do not let go of a file's name while it is open.
+    /// The identity; `None` if there is no file, and on platforms that do not release a file's name while it is open.
     pub(super) fn of(path: &Path) -> Option<Self> {
         #[cfg(unix)]
         {

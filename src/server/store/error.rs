@@ -1,4 +1,4 @@
-//! Why sessions cannot be kept.
+//! Errors of keeping sessions.
 
 use std::{io, path::PathBuf};
 
@@ -40,7 +40,7 @@ pub enum StoreError {
         /// The latest known.
         known: u32,
     },
-    /// The file is that of another program.
+    /// The file belongs to another program.
     #[error("{} is no store of body-schema; name another folder with --data-dir", path.display())]
     Foreign {
         /// The file.
@@ -55,7 +55,7 @@ pub enum StoreError {
         what: String,
     },
     /// The file was moved or removed while it was in use: what is written to it would be lost.
-    #[error("{} is not there any more; put it back, or start the server again", path.display())]
+    #[error("{} has disappeared; put it back, or start the server again", path.display())]
     Gone {
         /// The file.
         path: PathBuf,
@@ -68,11 +68,11 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
-    /// As many sessions as may be.
-    #[error("{0} sessions are kept already, the most that there may be; delete some")]
+    /// The store holds as many sessions as it may.
+    #[error("{0} sessions are kept already, as many as allowed; delete some")]
     Full(usize),
     /// The file is as large as it may be.
-    #[error("the sessions that are kept take {0} bytes, the most that they may; delete some")]
+    #[error("the kept sessions take {0} bytes, as many as allowed; delete some")]
     Large(u64),
     /// SQLite has failed.
     #[error("{}: {source}", path.display())]
@@ -85,7 +85,7 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// Whether what failed is to write, as on a full disk: it may succeed later.
+    /// Whether a write failed for want of space: it may succeed later.
     pub fn is_for_want_of_space(&self) -> bool {
         if matches!(self, Self::Gone { .. } | Self::Changed { .. }) {
             return true;
@@ -97,7 +97,7 @@ impl StoreError {
         )
     }
 
-    /// Whether the session to which something was appended is no more.
+    /// Whether the session to which something was appended no longer exists.
     pub fn is_for_want_of_a_session(&self) -> bool {
         let Self::Sqlite { source, .. } = self else { return false };
         source.sqlite_error_code() == Some(ErrorCode::ConstraintViolation)

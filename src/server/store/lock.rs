@@ -1,4 +1,4 @@
-//! One process at a time.
+//! Locks that let one process at a time use a data directory.
 
 use std::{
     fs::{File, OpenOptions, TryLockError},
@@ -8,14 +8,14 @@ use std::{
 
 use super::{StoreError, checks::Place};
 
-/// The file that is locked; it stays, and means nothing by itself.
+/// The name of the lock file; it stays, and means nothing by itself.
 const FILE: &str = "sessions.lock";
 
-/// A data directory held: the operating system lets go of it when the process ends, however it does.
+/// A held data directory. The operating system releases it when the process ends, however it ends.
 pub(super) struct Lock {
     path: PathBuf,
     place: Option<Place>,
-    /// It is locked as long as it is open.
+    /// The lock file, locked as long as it is open.
     _file: File,
 }
 
@@ -25,7 +25,7 @@ impl Lock {
         Self::of(path, directory)
     }
 
-    /// That of the file itself in which sessions are kept: who removes the other lock admits nobody by that.
+    /// A lock on the file in which sessions are kept: removing the other lock admits nobody.
     pub(super) fn of_file(file: &Path, directory: &Path) -> Result<Self, StoreError> {
         Self::of(file.to_owned(), directory)
     }
@@ -40,13 +40,13 @@ impl Lock {
         }
     }
 
-    /// Whether it still keeps others away: whoever removes it and makes another would be let in.
+    /// Whether it still keeps others away: if the lock file was removed and made anew, others would be let in.
     pub(super) fn is_held(&self) -> bool {
         self.place.is_none() || Place::of(&self.path) == self.place
     }
 }
 
-/// What is no file, as a pipe, would be waited for without end.
+/// Refuses a path that is no file, such as a pipe, which would be waited for without end.
 pub(super) fn refuse_what_is_no_file(path: &Path) -> io::Result<()> {
     match std::fs::metadata(path) {
         Ok(found) if !found.is_file() => Err(io::Error::other(format!("{} is no file; move it away", path.display()))),
@@ -54,7 +54,7 @@ pub(super) fn refuse_what_is_no_file(path: &Path) -> io::Result<()> {
     }
 }
 
-/// A file of ours, made if need be, that nobody else on this machine may read.
+/// Opens a file of ours, made if necessary, that nobody else on this machine may read.
 pub(super) fn open(path: &Path) -> io::Result<File> {
     refuse_what_is_no_file(path)?;
     let mut options = OpenOptions::new();

@@ -1,8 +1,7 @@
 //! Sessions with robots elsewhere, kept: one SQLite file in the data directory.
 //!
-//! A session is its setup and its events, and they are all that is written. Whoever appends is told once they are on the
-//! disk (rollback journal, full synchronisation); an error means that nothing was written. There is one file to lose: what is written
-//! is in it, and in no log beside it.
+//! A session is its setup and its events, and only these are written. Appending returns once they are on the disk (rollback journal,
+//! full synchronisation); an error means that nothing was written. Everything is in one file, and in no log beside it.
 
 mod checkpoints;
 mod checks;
@@ -34,53 +33,53 @@ pub use repair::{Finding, Held, State};
 use body_schema_ask_tell::{Event, Happened, Setup, VERSION};
 use body_schema_recording::EllipsoidSize;
 
-/// The file within the data directory.
+/// The name of the file within the data directory.
 const FILE: &str = "sessions.sqlite";
-/// How large a store in memory may be.
+/// The most bytes of a store in memory.
 const MOST_MEMORY_BYTES: i64 = 1 << 30;
 
-/// What is kept of all sessions.
+/// The store of all sessions.
 pub struct Store {
     connection: Mutex<Connection>,
-    /// What errors call it.
+    /// The path in errors.
     path: PathBuf,
-    /// Where the file was when it was opened.
+    /// The identity of the file when it was opened.
     place: Option<Place>,
     /// The version of its form.
     version: u32,
-    /// How many sessions are kept at most.
+    /// The most sessions that are kept.
     most: usize,
-    /// How large the file may be, bytes.
+    /// The most bytes of the file.
     most_bytes: u64,
-    /// What was found damaged when it was opened.
+    /// The damage found when it was opened.
     damage: Vec<String>,
-    /// How large the file was left, bytes.
+    /// The size of the file after the last write, bytes.
     left: AtomicU64,
-    /// Held as long as the store is, that of the folder and that of the file.
+    /// The locks of the folder and of the file, held as long as the store exists.
     locks: Vec<Lock>,
 }
 
 /// A session as it was kept.
 #[derive(Debug)]
 pub struct Stored {
-    /// What it is about.
+    /// Its setup.
     pub setup: Setup,
-    /// How it is shown.
+    /// Its display options.
     pub shown: Shown,
-    /// What happened.
+    /// Its events.
     pub events: Vec<Event>,
-    /// By `Idempotency-Key` the number of the observation that came with it.
+    /// The number of each observation that came with an `Idempotency-Key`, by that key.
     pub keys: BTreeMap<String, u64>,
 }
 
 impl Stored {
-    /// How many of its observations count.
+    /// The number of its observations that count.
     pub fn counted(&self) -> u64 {
         counted(&self.events).max(0).unsigned_abs()
     }
 }
 
-/// How a session is shown, which has no bearing on what is computed.
+/// The display options of a session, which have no bearing on what is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Shown {
     /// How large the ellipsoids of its recording are.
@@ -89,11 +88,11 @@ pub struct Shown {
 }
 
 impl Store {
-    /// One that keeps nothing beyond its own life.
+    /// A store in memory, which keeps nothing beyond its own life.
     ///
     /// # Errors
     ///
-    /// [`StoreError::Sqlite`] without memory.
+    /// [`StoreError::Sqlite`] if there is no memory.
     pub fn in_memory() -> Result<Self, StoreError> {
         let path = PathBuf::from("memory");
         let told = |source| StoreError::Sqlite { path: path.clone(), source };
@@ -103,13 +102,14 @@ impl Store {
         Self::ready(connection, path, Vec::new())
     }
 
-    /// That of a data directory, which is made if need be, for this process alone until it ends.
+    /// Opens the store of a data directory, which is made if necessary, for this process alone until it ends.
     ///
-    /// A damaged file is put aside under another name, and what can be read of it is kept; [`damage`](Self::damage) tells of it.
+    /// A damaged file is put aside under another name, and what can be read of it is kept; [`damage`](Self::damage) describes
+    /// it.
     ///
     /// # Errors
     ///
-    /// [`StoreError`] where the directory cannot be written, another process holds it, or a later version has written it.
+    /// [`StoreError`] if the directory cannot be written, another process holds it, or a later version has written it.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         let folder = |source| StoreError::Folder { path: directory.to_owned(), source };
         std::fs::create_dir_all(directory).map_err(folder)?;
@@ -137,11 +137,11 @@ impl Store {
         Ok(Self { damage, ..store })
     }
 
-    /// That of a data directory for reading alone, also while a server holds it.
+    /// Opens the store of a data directory for reading only, also while a server holds it.
     ///
     /// # Errors
     ///
-    /// [`StoreError`] where there is none, or a later version has written it.
+    /// [`StoreError`] if there is no store, or a later version has written it.
     pub fn read(directory: &Path) -> Result<Self, StoreError> {
         let path = directory.join(FILE);
         let told = |source| StoreError::Sqlite { path: path.clone(), source };
@@ -165,21 +165,21 @@ impl Store {
         Self { connection, path, place, version, most, most_bytes, damage, left, locks }
     }
 
-    /// What was found damaged when it was opened, in words.
+    /// The damage found when it was opened, in words.
     pub fn damage(&self) -> &[String] {
         &self.damage
     }
 
-    /// The same, but that it takes in no session beyond so many, and nothing once its file has so many bytes.
+    /// This store with limits: it accepts at most this many sessions, and nothing once its file has this many bytes.
     pub fn holding(self, most: usize, most_bytes: u64) -> Self {
         Self { most, most_bytes, ..self }
     }
 
-    /// Keeps a new session, and what happened in it so far.
+    /// Stores a new session, with its events so far.
     ///
     /// # Errors
     ///
-    /// [`StoreError`]: it is not kept then.
+    /// [`StoreError`] if it cannot be written; it is then not stored.
     pub fn insert(
         &self,
         id: Uuid,
@@ -203,22 +203,22 @@ impl Store {
         })
     }
 
-    /// Appends events to a session that has `revision` of them. A `key` is that of the observation among them.
+    /// Appends events to a session that has `revision` of them. `key` is that of the observation among them.
     ///
     /// # Errors
     ///
-    /// [`StoreError`]: none is appended then.
+    /// [`StoreError`] if they cannot be written; none is then appended.
     pub fn append(&self, id: Uuid, revision: usize, events: &[Event], key: Option<&str>) -> Result<(), StoreError> {
         let mut connection = self.connection();
         self.can_grow(&connection)?;
         self.written(&mut connection, |transaction| append_events(transaction, id, revision, events, key))
     }
 
-    /// A session as it was kept; `None` if there is none of that id.
+    /// Loads a session; `None` if there is none with this id.
     ///
     /// # Errors
     ///
-    /// [`StoreError`] where it cannot be read, or is not as it was written: half a session is none.
+    /// [`StoreError`] if it cannot be read, or is not as it was written: half a session is none.
     pub fn load(&self, id: Uuid) -> Result<Option<Stored>, StoreError> {
         let Some((stored, damage)) = self.load_so_far(id)? else { return Ok(None) };
         match damage {
@@ -227,7 +227,7 @@ impl Store {
         }
     }
 
-    /// A session up to where it is damaged, and how.
+    /// Loads a session up to where it is damaged, with the damage.
     fn load_so_far(&self, id: Uuid) -> Result<Option<(Stored, Option<String>)>, StoreError> {
         let connection = self.connection();
         let (checked, damage) = match self.version >= schema::CHECKED {
@@ -285,12 +285,12 @@ impl Store {
         Ok(Some((stored, damage)))
     }
 
-    /// The ids of all sessions and when they were made, seconds since 1970, oldest first. One without a readable id cannot be
-    /// asked for, and [`Held::repair`] tells of it.
+    /// The ids of all sessions and when they were made, seconds since 1970, oldest first. A session without a readable id
+    /// cannot be asked for; [`Held::repair`] reports it.
     ///
     /// # Errors
     ///
-    /// [`StoreError`] where they cannot be read.
+    /// [`StoreError`] if they cannot be read.
     pub fn all(&self) -> Result<Vec<(Uuid, f64)>, StoreError> {
         let connection = self.connection();
         let rows = (|| {
@@ -302,12 +302,12 @@ impl Store {
         Ok(rows.filter_map(|(id, made_s)| Some((Uuid::parse_str(&id).ok()?, made_s))).collect())
     }
 
-    /// How a list shows a session, as it was [noted](Self::note), and how many of its observations count; `None` where that is not
-    /// known, or there is no such session.
+    /// The list entry of a session, as it was [noted](Self::note), and the number of its observations that count; `None` if it is
+    /// not known, or there is no such session.
     ///
     /// # Errors
     ///
-    /// [`StoreError`] where it cannot be read.
+    /// [`StoreError`] if it cannot be read.
     pub fn summary(&self, id: Uuid) -> Result<Option<(String, u64)>, StoreError> {
         if self.version < schema::SUMMED_UP {
             return Ok(None);
@@ -320,11 +320,11 @@ impl Store {
         Ok(found.map(|(summary, counted)| (summary, counted.max(0).unsigned_abs())))
     }
 
-    /// Notes how a list is to show a session that has these events.
+    /// Notes the list entry of a session that has these events.
     ///
     /// # Errors
     ///
-    /// [`StoreError`]: nothing is lost then but the time to find it out again.
+    /// [`StoreError`] if it cannot be written; nothing is lost but the time to compute it again.
     pub fn note(&self, id: Uuid, summary: &str, events: &[Event]) -> Result<(), StoreError> {
         let connection = self.connection();
         self.is_there()?;
@@ -335,11 +335,11 @@ impl Store {
         noted.map(drop).map_err(self.told())
     }
 
-    /// Forgets a session and all its events.
+    /// Deletes a session and all its events.
     ///
     /// # Errors
     ///
-    /// [`StoreError`]: it is kept then.
+    /// [`StoreError`] if that cannot be written; the session is then kept.
     pub fn delete(&self, id: Uuid) -> Result<(), StoreError> {
         let connection = self.connection();
         self.is_there()?;
@@ -353,7 +353,7 @@ impl Store {
         self.connection.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Does what is to be written, all of it or nothing.
+    /// Writes in a transaction: everything or nothing.
     fn written(
         &self,
         connection: &mut Connection,
@@ -381,8 +381,8 @@ impl Store {
         Ok(count.map_err(self.told())? as usize)
     }
 
-    /// Whether what is written now would still be found: the file is where it was and as long as it was left, and nobody else was let
-    /// in. Called by whoever holds the connection.
+    /// Checks that what is written now would be found later: the file is where it was and as long as it was left, and nobody else was
+    /// let in. To be called by the holder of the connection.
     fn is_there(&self) -> Result<(), StoreError> {
         let path = || self.path.clone();
         match &self.place {
@@ -395,7 +395,7 @@ impl Store {
         }
     }
 
-    /// Remembers how large the file is, whatever became of what was to be written.
+    /// Remembers the size of the file, whatever became of the write.
     fn is_left(&self) {
         if self.place.is_some() {
             self.left.store(length(&self.path), Ordering::Relaxed);
@@ -431,7 +431,7 @@ fn connected(path: &Path) -> Result<Connection, StoreError> {
     opened.map_err(|source| StoreError::Sqlite { path: path.to_owned(), source })
 }
 
-/// How many observations more count after these events.
+/// The change in the number of counting observations by these events.
 fn counted(events: &[Event]) -> i64 {
     let by = |event: &Event| match event.happened {
         Happened::Observed { .. } | Happened::Included { .. } => 1,
@@ -441,7 +441,7 @@ fn counted(events: &[Event]) -> i64 {
     events.iter().map(by).sum()
 }
 
-/// Bytes of a file; 0 where there is none.
+/// The size of a file, bytes; 0 if there is none.
 fn length(path: &Path) -> u64 {
     std::fs::metadata(path).map_or(0, |found| found.len())
 }
@@ -469,7 +469,7 @@ fn insert_events(
     Ok(())
 }
 
-/// The same of a session that is there, which counts its observations.
+/// Appends events in a transaction to a session that exists, and counts its observations.
 fn append_events(
     transaction: &Transaction<'_>,
     id: Uuid,
@@ -486,7 +486,7 @@ fn append_events(
     Ok(())
 }
 
-/// What is kept holds numbers, texts and lists alone, so that it can be written.
+/// JSON of a kept value, which holds only numbers, texts and lists, so that it can always be written.
 fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }

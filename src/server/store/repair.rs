@@ -1,4 +1,4 @@
-//! Mends a store: whole sessions are left alone, and of the others what can be relied on is kept.
+//! Repairing a store: whole sessions are left alone, and of the others the reliable part is kept.
 
 use std::path::{Path, PathBuf};
 
@@ -9,24 +9,24 @@ use uuid::Uuid;
 use super::{FILE, Store, StoreError, lock::Lock, salvage};
 use body_schema_ask_tell::{ReplayError, Session};
 
-/// A data directory that no server uses while this lives.
+/// A data directory that no server uses while this exists.
 pub struct Held {
     directory: PathBuf,
     lock: Option<Lock>,
 }
 
-/// What was found of one thing.
+/// A finding about one file or session.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// A file or a session.
     pub name: String,
-    /// How it is.
+    /// Its state.
     pub state: State,
-    /// The same in words.
+    /// The finding in words.
     pub detail: String,
 }
 
-/// How something is that may have been damaged.
+/// The state of something that may have been damaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
@@ -34,14 +34,14 @@ pub enum State {
     Whole,
     /// It is damaged, and was left as it is.
     Damaged,
-    /// It was damaged, and what can be relied on is there again.
+    /// It was damaged, and its reliable part is restored.
     Mended,
     /// It is damaged, and nothing can be done.
     Lost,
 }
 
 impl Finding {
-    /// What is told of `name`.
+    /// A finding about `name`.
     pub fn new(name: impl Into<String>, state: State, detail: impl Into<String>) -> Self {
         Self { name: name.into(), state, detail: detail.into() }
     }
@@ -52,19 +52,19 @@ impl Held {
     ///
     /// # Errors
     ///
-    /// [`StoreError::Held`] while one does.
+    /// [`StoreError::Held`] while a server does.
     pub fn take(directory: &Path) -> Result<Self, StoreError> {
         let is_kept = directory.join(FILE).exists();
         let lock = is_kept.then(|| Lock::take(directory)).transpose()?;
         Ok(Self { directory: directory.to_owned(), lock })
     }
 
-    /// Looks at all sessions that are kept there, and mends them unless it is only to `look`: a copy of the file is put aside
-    /// first. Of a damaged session the events before the first damaged one are kept.
+    /// Examines all sessions that are kept there, and repairs them unless it is only to `look`: a copy of the file is put
+    /// aside first. Of a damaged session the events before the first damaged one are kept.
     ///
     /// # Errors
     ///
-    /// [`StoreError`] where the file is another program's, cannot be read, or cannot be written.
+    /// [`StoreError`] if the file belongs to another program, cannot be read, or cannot be written.
     pub fn repair(self, look: bool) -> Result<Vec<Finding>, StoreError> {
         let path = self.directory.join(FILE);
         let Some(lock) = self.lock else { return Ok(Vec::new()) };
@@ -128,7 +128,7 @@ impl Store {
         Ok(Finding::new(name, State::Mended, format!("{fault}; the {kept} events before it are kept")))
     }
 
-    /// Forgets all events of a session but the first ones.
+    /// Deletes all events of a session except the first `kept`.
     fn truncate(&self, id: Uuid, kept: usize) -> Result<(), StoreError> {
         let mut connection = self.connection();
         let written = (|| {

@@ -1,4 +1,4 @@
-//! A damaged file: what can be read of it is kept, and the file itself put aside.
+//! Salvaging a damaged file: what can be read of it is kept, and the file itself is put aside.
 
 use std::{
     ffi::OsString,
@@ -10,12 +10,13 @@ use rusqlite::{Connection, ErrorCode, params};
 
 use super::{StoreError, connected, schema};
 
-/// What stands beside a file for a while, as its name ends.
+/// The endings of the names of temporary files beside the store.
 const LOGS: [&str; 3] = ["-wal", "-shm", "-journal"];
-/// So many faults of a file are told.
+/// The most faults of a file that are reported.
 const MOST_FAULTS: u32 = 3;
 
-/// Mends the file at `path` if it is damaged. Tells what is, in words; nothing where it is whole, or not there.
+/// Repairs the file at `path` if it is damaged, and returns the damage in words; nothing if the file is whole or does
+/// not exist.
 pub(super) fn salvage(path: &Path) -> Result<Vec<String>, StoreError> {
     let Some(fault) = fault(path, "quick_check")? else { return Ok(Vec::new()) };
     let aside = put_aside(path, "damaged")?;
@@ -38,7 +39,7 @@ pub(super) fn salvage(path: &Path) -> Result<Vec<String>, StoreError> {
     Ok(told)
 }
 
-/// What is wrong with a file; `None` if it is whole, not there, or that of another program.
+/// The fault of a file; `None` if it is whole, does not exist, or belongs to another program.
 pub(super) fn fault(path: &Path, check: &str) -> Result<Option<String>, StoreError> {
     if !path.exists() {
         return Ok(None);
@@ -60,7 +61,7 @@ fn is_damage(error: &rusqlite::Error) -> bool {
     matches!(error.sqlite_error_code(), Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase))
 }
 
-/// A copy of a file under a name that is free, with its log.
+/// Copies a file, with its log, to a free name.
 pub(super) fn put_aside(path: &Path, why: &str) -> Result<PathBuf, StoreError> {
     let names = (1..).map(|number: u32| beside(path, &format!(".{why}-{number}")));
     let mut free = names.filter(|name| !name.exists());
@@ -93,7 +94,7 @@ fn remove_file(path: &Path) -> Result<(), StoreError> {
     }
 }
 
-/// Copies whatever can be read. A session that lacks events is marked, so that nobody takes it for whole.
+/// Copies whatever can be read. A session that lacks events is marked, so that it is not taken for whole.
 fn copied(old: &Connection, new: &Connection, path: &Path) -> Result<Vec<String>, StoreError> {
     let told = |source| StoreError::Sqlite { path: path.to_owned(), source };
     let mut report = Vec::new();
@@ -136,7 +137,7 @@ fn words(value: &Value) -> &str {
     if let Value::Text(text) = value { text } else { "without an id" }
 }
 
-/// A row of `session`, of whatever version.
+/// A row of `session`, in any version.
 fn session(row: &rusqlite::Row<'_>) -> rusqlite::Result<Row<7>> {
     let maybe = |name| row.get::<_, Value>(name).unwrap_or(Value::Null);
     let [id, made_s, form, setup, shown] =

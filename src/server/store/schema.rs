@@ -1,4 +1,4 @@
-//! The tables, and how those of earlier versions become them.
+//! The tables, and their migration from earlier versions.
 
 use std::path::Path;
 
@@ -6,10 +6,10 @@ use rusqlite::{Connection, TransactionBehavior};
 
 use super::StoreError;
 
-/// Says whose file it is: `body` in ASCII.
+/// The application id of our files: `body` in ASCII.
 const APPLICATION: u32 = 0x626f_6479;
 
-/// The step from each version to the next. The version is in `user_version`; an empty file is of version 0.
+/// The migration from each version to the next. The version is in `user_version`; an empty file has version 0.
 const MIGRATIONS: [&str; 4] = [
     "
     CREATE TABLE session (
@@ -57,12 +57,12 @@ const MIGRATIONS: [&str; 4] = [
 pub(super) const KNOWN: u32 = MIGRATIONS.len() as u32;
 /// The first version with checksums.
 pub(super) const CHECKED: u32 = 2;
-/// The first version with what a list shows.
+/// The first version with list entries.
 pub(super) const SUMMED_UP: u32 = 3;
 /// The first version with checkpoints.
 pub(super) const CHECKPOINTS: u32 = 4;
 
-/// Refuses the file of another program, and one of a later version. Tells the version.
+/// Refuses the file of another program, and one of a later version. Returns the version.
 pub(super) fn check(connection: &Connection, path: &Path) -> Result<u32, StoreError> {
     let told = |source: rusqlite::Error| match source.sqlite_error_code() {
         Some(rusqlite::ErrorCode::NotADatabase) => StoreError::Foreign { path: path.to_owned() },
@@ -81,7 +81,7 @@ pub(super) fn check(connection: &Connection, path: &Path) -> Result<u32, StoreEr
     Ok(found)
 }
 
-/// Brings an earlier version up to this one: all of it or nothing.
+/// Migrates an earlier version to this one: everything or nothing.
 pub(super) fn migrate(connection: &mut Connection, path: &Path) -> Result<(), StoreError> {
     let found = check(connection, path)?;
     let migrated = (|| {

@@ -1,14 +1,14 @@
-//! What there is to draw over the steps, and its scales.
+//! The charts over the steps, and their scales.
 
 use egui_plot::{GridInput, GridMark};
 
 use crate::{history::Row, panel::Panel};
 
-/// What a chart shows.
+/// A chart.
 pub(super) struct Chart {
     pub(super) title: &'static str,
     pub(super) unit: &'static str,
-    /// What the number means.
+    /// An explanation of the number.
     pub(super) tip: &'static str,
     pub(super) logarithmic: bool,
     /// Whether convergence is marked on it.

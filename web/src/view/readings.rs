@@ -1,4 +1,4 @@
-//! What was read after the movement that is shown, and how far it is from what each learner believes since.
+//! The readings of the shown movement, and their residuals for each learner.
 
 use body_schema_wire::{ChannelDescription, ChannelReading};
 use egui::{Label, RichText, Ui};

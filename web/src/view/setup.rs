@@ -1,4 +1,4 @@
-//! What is compared: scenario, seed, learners.
+//! The choice of scenario, seed and learners.
 
 use body_schema_scenario::{ScenarioSummary, WorldKind};
 use body_schema_wire::LearnerDescription;

@@ -1,16 +1,16 @@
-//! What can be taken away: the address, files, and the command that computes the same again.
+//! The downloads: the address, files, and the command that computes the same again.
 
 use egui::{RichText, Ui};
 
 use crate::{host::Command, panel::Panel, settings::ELLIPSOIDS};
 
-/// What there is of every session to take away, and what it is.
+/// The files of every session, and what each is.
 const OF_ALL: [(&str, &str); 3] = [
     ("recording.rrd", "The recording, to open with Rerun 0.36"),
     ("steps.csv", "Every metric of every learner at every step"),
     ("result.json", "The outcome and the learned models"),
 ];
-/// The same of one with a robot elsewhere alone.
+/// The files of a session with a robot elsewhere, and what each is.
 const OF_A_ROBOT: [(&str, &str); 6] = [
     ("model.urdf", "The robot's description with what was learned"),
     ("kinematics.yaml", "The same as joint origins, as driver packages of arms take them"),

@@ -1,4 +1,4 @@
-//! What to try: stories first, every scenario one click further.
+//! The stories to try first, with every scenario one click further.
 
 use egui::{Button, RichText, Ui};
 

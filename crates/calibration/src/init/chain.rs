@@ -1,10 +1,10 @@
-//! Which chain of a description a table's columns move.
+//! The search for the chain of a description that a table's columns move.
 
 use super::{InitError, Sources, columns};
 use body_schema_engine::kinematics::JointKind;
 use body_schema_robot::{Chain, Follows, JointEnds, Urdf, UrdfError};
 
-/// Looks for the chain.
+/// The search for the chain.
 pub struct Search<'a> {
     pub sources: &'a Sources<'a>,
     pub urdf: &'a Urdf,
@@ -13,11 +13,12 @@ pub struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The chain that was asked for, or else the one that the columns move; how it was found goes to `guesses`.
+    /// The chain that was asked for, or else the one that the columns move; how it was found is added to `guesses`.
     ///
     /// # Errors
     ///
-    /// [`InitError`] where there is none, where several are as good, or where columns of joints behind it would be passed over.
+    /// [`InitError`] if there is no such chain, if several are equally good, or if columns of joints behind it would be
+    /// ignored.
     pub fn chain(&self, guesses: &mut Vec<String>) -> Result<Chain, InitError> {
         let Some(tip) = self.sources.tip else { return self.longest(guesses) };
         let base = match (self.sources.base, self.urdf.carriers(tip).last()) {
@@ -49,8 +50,8 @@ impl Search<'_> {
         })
     }
 
-    /// The chain with the most joints of which all have columns; of those that move by the same the one whose tip nothing
-    /// hangs on, if it is the only one, else the link behind the last joint.
+    /// The chain with the most joints that all have columns. Of chains with the same joints, the one whose tip carries
+    /// nothing is taken, if there is only one, otherwise the one that ends at the link behind the last joint.
     fn longest(&self, guesses: &mut Vec<String>) -> Result<Chain, InitError> {
         let bases: Vec<&str> = match self.sources.base {
             Some(base) => vec![base],
@@ -91,7 +92,7 @@ impl Search<'_> {
         Ok(chosen.clone())
     }
 
-    /// Of chains that move by the same, shortest first, that which is taken, and why.
+    /// The chain to take among those with the same joints, shortest first, and the reason.
     fn end<'c>(&self, alike: &[&'c Chain]) -> (&'c Chain, &'static str) {
         let leaves: Vec<&str> = self.urdf.leaves().collect();
         let at_end: Vec<&&Chain> = alike.iter().filter(|chain| leaves.contains(&chain.tip())).collect();
@@ -113,7 +114,7 @@ impl Search<'_> {
         }
     }
 
-    /// Chains that move by different joints, as many each.
+    /// The error that chains move by different joints, equally many.
     fn tie(&self, ends: &[&Chain], of_bases: bool) -> InitError {
         let of = |chain: &&Chain| {
             let base = if of_bases { format!("from `{}` ", chain.base) } else { String::new() };
@@ -136,7 +137,8 @@ impl Search<'_> {
         }
     }
 
-    /// The last link that chains have in common, where most joints come before it: the hand that carries two fingers, say.
+    /// The last link that chains have in common, if most joints come before it: for example the hand that carries two
+    /// fingers.
     fn parting(ends: &[&Chain]) -> Option<String> {
         let (first, others) = ends.split_first()?;
         let is_shared = |name: &String| others.iter().all(|other| other.segments.iter().any(|it| it.name == *name));
@@ -146,7 +148,8 @@ impl Search<'_> {
         Some(shared.last()?.link.clone())
     }
 
-    /// The joints beside a chain that have columns. Those behind it would make it longer if nothing was wrong with them.
+    /// The joints beside a chain that have columns. One behind it would have made the chain longer, so something is
+    /// wrong with it.
     fn beside(&self, chosen: &Chain) -> Result<Vec<JointEnds<'_>>, InitError> {
         let on_chain: Vec<&str> = chosen.segments.iter().map(|segment| segment.name.as_str()).collect();
         let is_reading = |joint: &JointEnds| chosen.readings.iter().any(|reading| reading.name == joint.name);
@@ -176,7 +179,7 @@ impl Search<'_> {
         Ok(beside)
     }
 
-    /// Why no chain moves by joints that have columns.
+    /// The error that no chain moves by joints that have columns.
     fn none_fits(&self, bases: &[&str]) -> InitError {
         let below = |joint: &JointEnds| {
             let carriers = self.urdf.carriers(joint.child);
@@ -212,7 +215,7 @@ impl Search<'_> {
         }
     }
 
-    /// What to do about a chain of which joints lack columns: where they come before all others they may have stood still.
+    /// The advice for a chain with joints without columns: those before all others may have stood still.
     fn behind_missing(&self, chain: &Chain) -> String {
         let mend = "title a column with each joint's name (`_deg` and `_mm` at its end say the unit)";
         let missing = self.without_column(chain);
@@ -232,7 +235,7 @@ impl Search<'_> {
         }
     }
 
-    /// What to say where no title is a joint's name.
+    /// The message for a table in which no title is a joint's name.
     fn no_title(&self, bases: &[&str]) -> (String, String) {
         let file = self.sources.table_file;
         let what = format!(
@@ -264,7 +267,7 @@ impl Search<'_> {
         (what, mend)
     }
 
-    /// Why there is no chain: a joint that floats by its name, with what to do.
+    /// The error that there is no chain: with advice on a joint that floats, by name.
     fn refused(&self, base: &str, link: &str, error: UrdfError) -> InitError {
         let carriers = self.urdf.carriers(link);
         let to_base = carriers.iter().position(|carrier| carrier.parent == base).map_or(0, |last| last + 1);
@@ -281,14 +284,14 @@ impl Search<'_> {
         }
     }
 
-    /// The names of a chain's readings that have no column.
+    /// The names of a chain's readings without a column.
     fn without_column<'c>(&self, chain: &'c Chain) -> Vec<&'c str> {
         let readings = chain.readings.iter();
         let missing = readings.filter(|reading| columns::of_joint(self.titles, &reading.name, reading.kind).is_none());
         missing.map(|reading| reading.name.as_str()).collect()
     }
 
-    /// The joints that have columns and could move.
+    /// The joints with columns that could move.
     fn with_columns(&self) -> impl Iterator<Item = JointEnds<'_>> {
         self.urdf.joints().filter(|joint| joint.kind != "fixed" && self.has_column(joint))
     }
@@ -299,7 +302,7 @@ impl Search<'_> {
     }
 }
 
-/// The readings of a chain.
+/// The names of a chain's readings.
 fn names(chain: &Chain) -> Vec<&str> {
     chain.readings.iter().map(|reading| reading.name.as_str()).collect()
 }

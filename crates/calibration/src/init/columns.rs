@@ -1,16 +1,16 @@
-//! What the columns of a table are, by their titles.
+//! Recognising the columns of a table by their titles.
 
 use body_schema_engine::kinematics::JointKind;
 use body_schema_table::{Component, Layout, Quantity, Rotation, Title, split};
 
-/// What is measured beside the joints.
+/// The measurements beside the joints.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Measured {
-    /// Targets of which something is.
+    /// The sensors.
     pub sensors: Vec<Sensor>,
     /// The columns of place and socket.
     pub sockets: Option<(String, String)>,
-    /// Columns that are nothing of this.
+    /// The columns that belong to neither.
     pub others: Vec<String>,
 }
 
@@ -21,16 +21,16 @@ pub struct Sensor {
     pub name: String,
     /// Its channel.
     pub channel: &'static str,
-    /// The camera in whose picture it is, if it is in one.
+    /// The camera of its picture, if it is a picture.
     pub camera: Option<String>,
     /// The titles of its columns.
     pub columns: Vec<String>,
-    /// The lines of its σ.
+    /// The lines of its σ, as TOML.
     pub sigmas: &'static str,
 }
 
 impl Sensor {
-    /// What its readings look like in a table.
+    /// The layout of its readings in a table.
     pub fn layout(&self) -> Layout {
         match self.channel {
             "pose" => Layout::Pose,
@@ -41,20 +41,20 @@ impl Sensor {
     }
 }
 
-/// The first title that says this component of what another says one of.
+/// The first title with this component that otherwise reads like `of`.
 fn find(titles: &[String], of: &Title<'_>, component: Component) -> Option<String> {
     let is_it = |it: &Title<'_>| it.component == component && it.is_of(of.before) && it.number == of.number;
     titles.iter().find(|title| Title::parse(title).is_some_and(|it| is_it(&it))).cloned()
 }
 
-/// The column of a joint: that with its name alone, or else with a unit of its kind behind it.
+/// The column of a joint: the one with its name alone, otherwise one with a unit of its kind behind the name.
 pub fn of_joint<'t>(titles: &'t [String], joint: &str, kind: JointKind) -> Option<&'t String> {
     let quantity = Quantity::of(kind);
     let exact = titles.iter().find(|title| *title == joint);
     exact.or_else(|| titles.iter().find(|title| split(title).0 == joint && quantity.is_in(title)))
 }
 
-/// What the columns that belong to no joint are. `joints` are the titles of those that do.
+/// Recognises the columns that belong to no joint. `joints` are the titles of those that do.
 pub fn measured(titles: &[String], joints: &[String]) -> Measured {
     let is_joint = |title: &&String| joints.contains(title);
     let mut others: Vec<String> =
@@ -76,8 +76,8 @@ pub fn measured(titles: &[String], joints: &[String]) -> Measured {
     measured
 }
 
-/// The first columns that are called u and v alike: a point in a picture. What stands before them is the camera and the target, as in
-/// `cam_tag_u`; of points with numbers, as in `cam_tag_u1`, each is a target of its own.
+/// The first columns u and v with the same prefix: a point in a picture. The prefix is the camera and the target, as in `cam_tag_u`;
+/// points with numbers, as in `cam_tag_u1`, are targets of their own.
 fn first_picture(titles: &[String]) -> Option<Sensor> {
     titles.iter().find_map(|title| {
         let it = Title::parse(title).filter(|it| it.component == Component::U)?;
@@ -94,7 +94,7 @@ fn first_picture(titles: &[String]) -> Option<Sensor> {
     })
 }
 
-/// The first column that is called a distance.
+/// The first column of a distance.
 fn first_distance(titles: &[String]) -> Option<Sensor> {
     titles.iter().find_map(|title| {
         let it = Title::parse(title).filter(|it| it.component == Component::Distance && it.number.is_empty())?;
@@ -108,7 +108,7 @@ fn first_distance(titles: &[String]) -> Option<Sensor> {
     })
 }
 
-/// The first columns that are called x, y and z alike, with those of a rotation that begin alike.
+/// The first columns x, y and z with the same prefix, with those of a rotation that share it.
 fn first_place(titles: &[String]) -> Option<Sensor> {
     titles.iter().find_map(|title| {
         let it = Title::parse(title).filter(|it| it.component == Component::X)?;

@@ -1,7 +1,7 @@
 //! A first calibration file, from a URDF and the titles of a table.
 //!
-//! What the two say is matched: columns that are called as joints are, and what the other columns measure. Everything that
-//! had to be guessed is said, in the file and to whoever asked.
+//! Columns are matched with the joints of the same names, and the other columns with what they measure. Everything that
+//! had to be guessed is reported, in the file and to the caller.
 
 mod chain;
 mod columns;
@@ -19,28 +19,28 @@ use columns::Measured;
 use places::Held;
 use written::{Sockets, written};
 
-/// Two files, as the calibration file is to name them, and what they hold.
+/// The two sources, under the names that the calibration file gives them, and their content.
 #[derive(Clone, Copy, Debug)]
 pub struct Sources<'a> {
     /// The name of the calibration.
     pub name: &'a str,
-    /// How the calibration file names the URDF.
+    /// The URDF's name in the calibration file.
     pub urdf_file: &'a str,
     /// The URDF.
     pub urdf: &'a str,
-    /// How it names the table.
+    /// The table's name in the calibration file.
     pub table_file: &'a str,
-    /// The table.
+    /// The table's text.
     pub table: &'a str,
     /// The link that stands still, if it is known.
     pub base: Option<&'a str>,
     /// The link that carries the targets, if it is known.
     pub tip: Option<&'a str>,
-    /// How far the two sockets of every place are apart, if it is known, metres.
+    /// The known distance between the two sockets of every place, metres, if any.
     pub socket_distance_m: Option<f64>,
 }
 
-/// A calibration file, and what was guessed.
+/// A new calibration file, with the guesses behind it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Begun {
     /// The file, TOML with comments.
@@ -49,7 +49,7 @@ pub struct Begun {
     pub guesses: Vec<String>,
 }
 
-/// Why no file can be begun.
+/// Why a calibration file cannot be begun.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InitError {
     /// The description cannot be used.
@@ -68,12 +68,12 @@ pub enum InitError {
         /// Why.
         source: TableError,
     },
-    /// The two do not fit.
+    /// The description and the table do not fit.
     #[error("{what}; {mend}")]
     Misfit {
-        /// What does not.
+        /// What does not fit.
         what: String,
-        /// How to mend it.
+        /// What to do about it.
         mend: String,
     },
 }
@@ -82,8 +82,8 @@ pub enum InitError {
 ///
 /// # Errors
 ///
-/// [`InitError`] where a file cannot be read, no chain moves by joints that the table has columns for, several do that are as
-/// long, or its other columns measure nothing.
+/// [`InitError::Urdf`] or [`InitError::Table`] if a file cannot be read; [`InitError::Misfit`] if no chain moves by joints
+/// that have columns, several equally long ones do, or the other columns measure nothing.
 pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     let of_urdf = |source| InitError::Urdf { file: sources.urdf_file.to_owned(), source };
     let of_table = |source| InitError::Table { file: sources.table_file.to_owned(), source };

@@ -1,20 +1,21 @@
-//! How large the pictures are that a table's points lie in.
+//! The sizes of the pictures in which a table's points lie.
 
 use super::columns::Sensor;
 use body_schema_table::{Columns, Table, TableError};
 
-/// A camera, with width and height of its picture, pixels.
+/// A camera, with the width and height of its picture, pixels.
 pub type Picture = (String, [u32; 2]);
 
 /// Common sizes of pictures, pixels.
 const COMMON: [[u32; 2]; 7] =
     [[640, 480], [848, 480], [1280, 720], [1280, 1024], [1920, 1080], [2448, 2048], [4096, 3072]];
 
-/// By camera the smallest common size that holds all of its points; one that just does, where none of these is large enough.
+/// For each camera the smallest common size that holds all of its points, or a size that just does, if no common one is
+/// large enough.
 ///
 /// # Errors
 ///
-/// [`TableError`] where a row cannot be read.
+/// [`TableError`] if a row cannot be read.
 pub fn sizes(sensors: &[Sensor], table: &str) -> Result<Vec<Picture>, TableError> {
     let seen: Vec<(&String, &Sensor)> = sensors.iter().filter_map(|it| Some((it.camera.as_ref()?, it))).collect();
     let mut extents: Vec<(String, [f64; 2])> = Vec::new();

@@ -1,8 +1,8 @@
 //! Sockets that a table names: at which place to learn, and how far two of them are apart.
 //!
-//! Rows of one place are learned from, those of all others are predicted: the place is taken whose rows leave least of the expected
-//! scatter at the others, by design alone. Rows of sockets hold nothing but joints' readings, so that nothing by which the calibration is
-//! judged later decides here.
+//! Rows of one place are learned from, and those of all others are predicted. The place is chosen whose rows leave the least expected
+//! scatter at the others, by design alone: rows of sockets hold only joints' readings, so that nothing by which the calibration is judged
+//! later enters the choice.
 
 use std::io::Read;
 
@@ -16,14 +16,14 @@ pub struct Held {
     places: Vec<(String, Vec<String>)>,
 }
 
-/// What learning at a place is expected to leave.
+/// The expected result of learning at a place.
 struct Outlook<'h> {
     place: &'h str,
-    /// Scatter expected at all other places, root mean square, millimetres.
+    /// The scatter expected at all other places, root mean square, millimetres.
     scatter_mm: f64,
 }
 
-/// A calibration file that learns at a place, with a distance of sockets in metres.
+/// A function that writes a calibration file that learns at a place, with a distance of sockets in metres.
 type Written<'w> = &'w dyn Fn(Option<&str>, Option<f64>) -> Option<Scenario>;
 
 impl Held {
@@ -31,7 +31,7 @@ impl Held {
     ///
     /// # Errors
     ///
-    /// [`TableError`] where a column is not there or a line cannot be read.
+    /// [`TableError`] if a column is missing or a line cannot be read.
     pub fn read<R: Read>(table: Table<R>, [place, socket]: [&str; 2]) -> Result<Self, TableError> {
         let labels = vec![table.titles().label(place)?, table.titles().label(socket)?];
         let mut held = Self::default();
@@ -49,7 +49,7 @@ impl Held {
         Ok(held)
     }
 
-    /// The place to learn at, if there are several. What was guessed, and what is missing, goes to `guesses`, the latter first.
+    /// The place to learn at, if there are several. Guesses and missing knowledge are added to `guesses`, the latter first.
     pub fn choose(&self, distance_m: Option<f64>, written: Written<'_>, guesses: &mut Vec<String>) -> Option<String> {
         let trained = match self.places.as_slice() {
             [] | [_] => {
@@ -74,7 +74,7 @@ impl Held {
         trained
     }
 
-    /// The place whose rows are expected to tell most about all others, and how much that is.
+    /// The place whose rows are expected to tell most about all others, with a sentence on how much.
     fn best(&self, written: Written<'_>) -> Option<(&str, String)> {
         let outlook =
             |(place, _): &'_ (String, Vec<String>)| Case::new(&written(Some(place), None)?).ok()?.scatter_mm();
@@ -93,7 +93,7 @@ impl Held {
         Some((best.place, if outlooks.len() > 1 { why } else { String::new() }))
     }
 
-    /// What is not told of the sockets, what that costs, and what to do.
+    /// A sentence on what is missing about the sockets, what that costs, and what to do.
     fn missing(&self, size: &dyn Fn(Option<f64>) -> Option<f64>) -> String {
         let costs = size(None).map(|mm| format!(", a span of 1 m is known to ± {mm:.1} mm alone")).unwrap_or_default();
         if !self.places.iter().any(|(_, sockets)| sockets.len() == 2) {
@@ -110,7 +110,7 @@ impl Held {
     }
 }
 
-/// A distance that sockets may have: what one tells hardly depends on it.
+/// A usual distance between sockets, metres: what a known distance is worth hardly depends on it.
 const USUAL_M: f64 = 0.05;
 
 /// The standard deviation of a span of 1 m, millimetres.

@@ -1,19 +1,19 @@
-//! The calibration file that is begun.
+//! The text of the calibration file.
 
 use super::{Sources, columns::Sensor, pictures::Picture};
 use body_schema_robot::Chain;
 
-/// What is said of sockets.
+/// The sockets, as the file describes them.
 pub struct Sockets<'a> {
     /// The columns of place and socket.
     pub columns: &'a (String, String),
     /// The place whose rows are learned from, where there are several.
     pub trained: Option<&'a str>,
-    /// How far the two of a place are apart, metres.
+    /// The distance between the two sockets of a place, metres.
     pub distance_m: Option<f64>,
 }
 
-/// The file.
+/// The text of the file.
 pub fn written(
     sources: &Sources<'_>,
     chain: &Chain,
@@ -83,7 +83,7 @@ pub fn written(
     text
 }
 
-/// A sensor, as the file has it.
+/// The keys of a sensor, as text.
 fn measures(sensor: &Sensor) -> String {
     let Sensor { name, channel, camera, columns, sigmas } = sensor;
     let camera = camera.as_ref().map(|camera| format!("camera = {}\n", quoted(camera))).unwrap_or_default();

@@ -15,7 +15,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::Problem;
 
-/// Movements with their shares.
+/// A design: movements with their shares.
 pub(super) struct Shares<'a> {
     problem: &'a Problem,
     /// N.
@@ -25,7 +25,7 @@ pub(super) struct Shares<'a> {
     shares: DVector<f64>,
 }
 
-/// What shares come to.
+/// The value of a design's shares.
 pub struct Standing {
     /// tr(W M⁻¹).
     pub trace: f64,
@@ -45,19 +45,19 @@ impl Standing {
     }
 }
 
-/// Of what a step promises to first order, how much it must keep: Newton's keeps half of it.
+/// The share of a promised first-order decrease that a step must keep; Newton's step keeps half of it.
 const KEPT: f64 = 0.1;
-/// The least that is put on the diagonal, as a fraction of its mean: poses that teach the same leave it singular.
+/// The least damping on the diagonal, as a fraction of its mean: poses that teach the same leave the Hessian singular.
 const DAMPING: f64 = 1e-10;
 /// Solutions within a step, and how many of them in a row may leave as many shares on the wrong side.
 const PIVOTS: usize = 40;
 const PATIENCE: usize = 3;
 const STEPS: usize = 60;
-/// Poses with a smaller share leave the design.
+/// The share below which a pose leaves the design.
 const NEGLIGIBLE: f64 = 1e-5;
 
 impl<'a> Shares<'a> {
-    /// Of the given poses.
+    /// The shares of the given poses.
     pub fn new(problem: &'a Problem, movements: f64, poses: &[Vec<f64>], shares: Vec<f64>) -> Self {
         let rows = DMatrix::zeros(problem.layout.dimension(), 0);
         let mut new = Self { problem, movements, rows, shares: DVector::zeros(0) };
@@ -66,7 +66,7 @@ impl<'a> Shares<'a> {
         new
     }
 
-    /// Adds poses, without a share at first.
+    /// Adds poses, at first without a share.
     pub fn join(&mut self, poses: &[Vec<f64>]) {
         let (d, before) = (self.problem.rig.equations(), self.rows.ncols());
         let rows = std::mem::replace(&mut self.rows, DMatrix::zeros(0, 0));
@@ -86,7 +86,7 @@ impl<'a> Shares<'a> {
         self.shares.as_slice()
     }
 
-    /// What these shares come to; `None` if they leave something open.
+    /// The value of these shares; `None` if they leave a direction undetermined.
     pub fn standing(&self) -> Option<Standing> {
         self.standing_at(&self.shares)
     }
@@ -111,8 +111,8 @@ impl<'a> Shares<'a> {
         Some(Standing { trace: weights.trace(&inverse), sensitivity, mean, inverse, values })
     }
 
-    /// Balances the shares until no φᵢ exceeds their mean by more than `tolerance` of the trace, and drops poses without one:
-    /// whether each pose is kept, and what they come to.
+    /// Balances the shares until no φᵢ exceeds their mean by more than `tolerance` of the trace, and drops poses without a
+    /// share. Returns whether each pose is kept, and the value of the shares.
     pub fn balance(&mut self, tolerance: f64) -> Option<(Vec<bool>, Standing)> {
         let mut standing = self.standing()?;
         let mut damping = DAMPING;
@@ -156,7 +156,7 @@ impl<'a> Shares<'a> {
         self.go(standing, favoured, 1e-6)
     }
 
-    /// Goes as far in a direction as the trace falls as promised, by half and half, but not less than `shortest` of the way.
+    /// Follows a direction until the trace falls as promised, halving the step down to `shortest` of the way.
     fn go(&mut self, standing: &Standing, direction: DVector<f64>, shortest: f64) -> Option<Standing> {
         let promised = standing.values.dot(&direction);
         let mut length = 1.0;

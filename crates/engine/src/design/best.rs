@@ -10,14 +10,14 @@ use super::Problem;
 pub struct BestDesign {
     /// The step of a run after which a learner has made them.
     pub step: u64,
-    /// Its movements: since the start, or since the change of the body.
+    /// The number of movements: since the start, or since the change of the body.
     pub movements: u64,
     /// tr(W M⁻¹), what these data allow (see [`design`](crate::design)), in the units of the criterion: beside
     /// `bound_trace` of an experiment's metrics.
     pub best_design_trace: f64,
-    /// By how much that may exceed the optimum, as a fraction of it: the gap of the equivalence theorem.
+    /// How far that may exceed the optimum, as a fraction of it: the gap of the equivalence theorem.
     pub gap: f64,
-    /// How many parameters it is for: who learns fewer cannot be compared with it.
+    /// The number of parameters that the design determines; a learner of fewer cannot be compared with it.
     #[serde(default)]
     pub parameters: usize,
 }

@@ -17,7 +17,7 @@ const BESIDE: [f64; 4] = [0.01, 0.03, 0.1, 0.3];
 const DRAWS: usize = 20;
 
 impl Problem {
-    /// The same without the channels that see nothing at any candidate; `None` if there are none of those.
+    /// This problem without the channels that see nothing at any candidate; `None` if there are no such channels.
     pub(super) fn sighted(&self) -> Option<Self> {
         if !self.rig.has_view() || self.rig.channels().len() < 2 {
             return None;
@@ -30,7 +30,8 @@ impl Problem {
         is_some.then(|| Self { rig: Arc::new(self.rig.limited_to(&sighted)), ..self.clone() })
     }
 
-    /// At most `count` poses that `is_wanted`, beside those known to be and the one at which something is said to be seen.
+    /// At most `count` poses that `is_wanted`, drawn beside known ones and beside the one at which something is known to
+    /// be seen.
     fn beside(
         &self,
         count: usize,

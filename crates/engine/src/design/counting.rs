@@ -17,13 +17,13 @@ use crate::{
 pub struct General {
     /// The channels that read there.
     pub rig: Rig,
-    /// Joint positions, rad or m.
+    /// The joint positions, rad or m.
     pub posture: Vec<f64>,
 }
 
-/// Movements that stand for all, twice as many as there can be need of: to postures anywhere in the joint box; where targets are
-/// held in sockets, anywhere on their manifolds in turn. Where not everything is in `view`, to postures at
-/// which something is, and of every camera to as many that it sees. What is known before any movement comes first, as if it were one.
+/// General movements: twice as many as can be needed, to postures anywhere in the joint box; where targets are held in sockets,
+/// anywhere on their manifolds in turn. Where not everything is in `view`, the postures are such that something is seen, and every
+/// camera sees as many. What is known before any movement comes first, as if it were one.
 pub fn general_movements(
     state: &State,
     layout: &Layout,

@@ -1,6 +1,7 @@
 //! Designs: which movements teach most, and what data allow.
 //!
-//! For judges, at the true parameters, but for the observability, which is told before anything is known of them.
+//! Everything here is evaluated at the true parameters, for judges; only the observability is computed before anything is known of
+//! them.
 //!
 //! * *What the data allow.* With F = Λ₀ + Σ HᵀH (H whitened), the information of the prior and of the data collected,
 //!   linearised at the truth, F⁻¹ is the covariance that a learner with this prior and these data would have if the model
@@ -53,7 +54,7 @@ use crate::{
     sensing::{Head, Rig},
 };
 
-/// What a design is sought for: the truth, and what may be done there.
+/// A design problem: the truth, and the movements that are possible there.
 #[derive(Clone, Debug)]
 pub struct Problem {
     /// The true state.
@@ -75,7 +76,7 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// HᵀH, the information of one movement at the truth: of the channels that see something there, and nothing of the others.
+    /// HᵀH, the information of one movement at the truth, from the channels that see something there.
     pub fn information(&self, configuration: &[f64]) -> DMatrix<f64> {
         match self.seen(configuration) {
             Some(rows) => &rows * rows.transpose(),
@@ -88,7 +89,7 @@ impl Problem {
         self.rig.visible_jacobian(self.head.as_ref(), &self.truth, &self.layout, configuration)
     }
 
-    /// By channel, whether it reads.
+    /// Whether each channel reads.
     fn visible(&self, configuration: &[f64]) -> Vec<bool> {
         self.rig.visible(self.head.as_ref(), &self.truth, configuration)
     }

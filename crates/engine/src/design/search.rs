@@ -23,10 +23,10 @@ pub struct Design {
     pub shares: Vec<f64>,
     /// tr(W M⁻¹).
     pub trace: f64,
-    /// By how much the trace may exceed the optimum, as a fraction of it: the gap of the equivalence theorem over 4500
+    /// The most by which the trace exceeds the optimum, as a fraction of it: the gap of the equivalence theorem over 4500
     /// candidates, the best third of them and the poses of the design polished. Some maxima draw from nearby alone: climbing from
-    /// 100 000 other poses finds up to 0.01 more. Where not everything is in view, the polish cannot follow the border of what is:
-    /// there more candidates are polished, and 0.07 more was found where a head watches.
+    /// 100 000 other poses finds up to 0.01 more. Where some poses are out of view, the polish cannot follow the border of view:
+    /// more candidates are polished there, and 0.07 more was found where a head watches.
     pub gap: f64,
 }
 
@@ -43,9 +43,9 @@ const STARTING: usize = 100;
 /// How far shares are balanced, as a fraction of the last excess.
 const UNBALANCED: f64 = 0.1;
 const EXCHANGES: usize = 60;
-/// To a hundredth of the gap that is usually asked for.
+/// The polish of candidates, to a hundredth of the gap that is usually asked for.
 const CLIMB: Polish = Polish { steps: 40, tolerance: 1e-4 };
-/// Of the best poses that slopes lead to so many follow the border of what is in view, by so many steps at most; the first step and
+/// The number of the best poses found by ascent that then follow the border of view, and the most steps of each; the first step and
 /// the last, in sides of the cube.
 const FOLLOWED: usize = 40;
 const FOLLOWING: usize = 250;
@@ -59,7 +59,8 @@ impl Problem {
         self.best_design_from(movements, gap, None)
     }
 
-    /// The same, from a design of another number of movements: where data outweigh the prior the two are nearly alike.
+    /// The best design of `movements` movements, searched from a design of another number of movements: where data
+    /// outweigh the prior the two are nearly alike. `None` as for [`best_design`](Self::best_design).
     pub fn best_design_from(&self, movements: usize, gap: f64, start: Option<&Design>) -> Option<Design> {
         // What never sees anything is left out: it would change the last digits of all sums, and so the way that a search takes.
         if let Some(sighted) = self.sighted() {
@@ -98,7 +99,7 @@ fn excess(found: &[(Vec<f64>, f64)], standing: &Standing) -> f64 {
     found.first().map_or(0.0, |(_, sensitivity)| *sensitivity) - standing.mean
 }
 
-/// A design on its way.
+/// A design that is being searched.
 pub struct Search<'a> {
     problem: &'a Problem,
     sensitivity: Sensitivity<'a>,
@@ -109,7 +110,7 @@ pub struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Begins with a design, or with one of candidates.
+    /// Begins with a given design, or with one made of candidates.
     pub fn new(problem: &'a Problem, movements: usize, start: Option<&Design>) -> Self {
         let candidates = candidates(problem);
         let (poses, shares) = match start {
@@ -125,7 +126,7 @@ impl<'a> Search<'a> {
         Self { problem, sensitivity: Sensitivity::new(problem), candidates, poses, shares }
     }
 
-    /// Balances the shares to so much of the trace; `None` if the information is singular.
+    /// Balances the shares to `tolerance` of the trace; `None` if the information is singular.
     pub fn balance(&mut self, tolerance: f64) -> Option<Standing> {
         let (kept, standing) = self.shares.balance(tolerance)?;
         let mut keep = kept.into_iter();
@@ -189,7 +190,7 @@ impl<'a> Search<'a> {
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
     }
 
-    /// Adds those that are favoured more than the design's own, each once.
+    /// Adds the poses that are favoured more than the design's own, each once.
     fn join(&mut self, found: Vec<(Vec<f64>, f64)>, standing: &Standing) {
         let mut joining: Vec<Vec<f64>> = Vec::new();
         for (point, sensitivity) in found {

@@ -17,15 +17,15 @@ use crate::{
     optimize::Slopes,
 };
 
-/// H at the truth, of any movement.
+/// H at the truth, for any movement.
 pub(super) struct Sensitivity<'a> {
     problem: &'a Problem,
     points: Option<Points>,
     level: Level,
 }
 
-/// Of differences, rad or m. What they leave out is below 10⁻¹⁰ of H where what is measured changes over centimetres, and
-/// rounding takes 10⁻¹².
+/// The half-width of differences, rad or m. What they leave out is below 10⁻¹⁰ of H where what is measured changes over
+/// centimetres, and rounding takes 10⁻¹².
 const DIFFERENCE: f64 = 1e-4;
 
 impl<'a> Sensitivity<'a> {
@@ -40,7 +40,7 @@ impl<'a> Sensitivity<'a> {
         self.evaluate(s, poses, None)
     }
 
-    /// The same with derivatives by the positions of all joints, per rad or m.
+    /// φ of every pose (rad or m) for the matrix S, with its derivatives by the positions of all joints, per rad or m.
     pub fn slopes(&self, s: &DMatrix<f64>, poses: &[Vec<f64>]) -> Slopes {
         let mut gradients = vec![0.0; poses.len() * self.problem.limits.dimension()];
         let values = self.evaluate(s, poses, Some(&mut gradients));
@@ -98,7 +98,7 @@ impl<'a> Sensitivity<'a> {
     }
 }
 
-/// A group at a time, so that its rows and products stay in the nearest cache.
+/// Computes a group at a time, so that its rows and products stay in the nearest cache.
 #[inline(always)]
 fn in_lanes<S: Simd>(
     simd: S,

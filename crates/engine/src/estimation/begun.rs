@@ -1,8 +1,8 @@
-//! A filter that begins where a smoother has got to.
+//! A filter with a warm start: a smoother absorbs the first measurements, then a filter takes over.
 //!
-//! A filter linearises every measurement once, where it stands, and from a guess that is a metre and a radian off it gets
-//! nowhere. So the first measurements are smoothed, until they determine the blocks that nothing was known of; there the
-//! filter takes over, with the smoother's estimate and covariance.
+//! A filter linearises every measurement once, at its estimate of that moment; from a guess that is a metre and a radian
+//! off it does not converge. So the first measurements are smoothed until they determine the blocks of which nothing was
+//! known. There the filter takes over, with the smoother's estimate and covariance.
 
 use std::sync::Arc;
 
@@ -14,32 +14,32 @@ use crate::{
     sensing::{Observation, Rig},
 };
 
-/// What begins a filter from a belief with a covariance.
+/// A function that starts a filter from a belief with a covariance.
 pub type Begin = Arc<dyn Fn(Belief, DMatrix<f64>) -> Box<dyn Estimator> + Send + Sync>;
 
-/// A smoother, and after it a filter.
+/// A smoother that is followed by a filter.
 #[derive(Clone)]
 pub struct Begun {
     smoother: Smoother,
-    /// What the first measurements must determine.
+    /// The blocks that the first measurements must determine.
     blocks: Vec<Block>,
-    /// Where the robot was when it was seen, and what of it.
+    /// The movements so far: readings of the joints, and the observation.
     seen: Vec<(Vec<f64>, Observation)>,
     rig: Arc<Rig>,
     begin: Begin,
     filter: Option<Box<dyn Estimator>>,
 }
 
-/// Equations wanted for each unknown: with just enough the fit takes up all their noise.
+/// Equations wanted for each unknown; with just enough of them the fit would absorb all their noise.
 const MARGIN: usize = 2;
 
 impl Begun {
-    /// Smooths until `blocks` are determined, and goes on with what `begin` makes of the belief, whitened by `rig`.
+    /// A smoother until `blocks` are determined, then what `begin` makes of its belief, whitened by `rig`.
     pub fn new(smoother: Smoother, blocks: Vec<Block>, rig: Arc<Rig>, begin: Begin) -> Self {
         Self { smoother, blocks, seen: Vec::new(), rig, begin, filter: None }
     }
 
-    /// Whether what was seen so far determines the blocks, everything else held.
+    /// Whether the observations so far determine the blocks when everything else is held.
     fn is_determined(&self) -> bool {
         let Belief { state, layout, rig, .. } = self.smoother.belief();
         let columns: Vec<usize> = self.blocks.iter().filter_map(|block| layout.block(*block)).flatten().collect();

@@ -10,54 +10,54 @@ use crate::{
     sensing::{Observation, Refused, Rig},
 };
 
-/// What an estimator believes: a state, and the covariance of its learned parameters in the chart at that state.
+/// A belief: an estimated state, and the covariance of its learned parameters in the chart at that state.
 #[derive(Clone, Debug)]
 pub struct Belief {
     /// The estimated state, the origin of the chart.
     pub state: State,
     /// Which parameters are learned, and their order in the covariance.
     pub layout: Arc<Layout>,
-    /// How the estimator takes measurements to be made, whitened by the noise that it assumes. That may differ from the
-    /// sensors' own.
+    /// The measurement model that the estimator assumes, whitened by the noise that it assumes. That may differ from
+    /// the sensors' own.
     pub rig: Arc<Rig>,
     /// P (m × m), symmetric and positive, in the products of the coordinates' units. `None` for an estimator that keeps
     /// none.
     pub covariance: Option<DMatrix<f64>>,
     /// Other states that explain what was seen, the likeliest first; empty if the estimator keeps one hypothesis.
     pub alternatives: Vec<Alternative>,
-    /// By how much predictions of the hand are off, beyond what the covariance says, since no parameter explains it: root mean
-    /// square, metres.
+    /// The model error: how far predictions of the hand are off beyond what the covariance says, because no parameter explains
+    /// it; root mean square, metres.
     pub model_error_m: f64,
 }
 
 /// A rival of the estimate: another mode of the posterior.
 #[derive(Clone, Debug)]
 pub struct Alternative {
-    /// Its probability. The estimate's own is what all alternatives leave of 1.
+    /// Its probability. The estimate's own is 1 minus the sum of all alternatives'.
     pub weight: f64,
     /// The state.
     pub state: State,
-    /// Its covariance, in the chart at it.
+    /// The covariance, in the chart at the state.
     pub covariance: DMatrix<f64>,
 }
 
 impl Belief {
-    /// Of one hypothesis without a covariance.
+    /// A belief with one hypothesis and without a covariance.
     pub fn new(state: State, layout: Arc<Layout>, rig: Arc<Rig>) -> Self {
         Self { state, layout, rig, covariance: None, alternatives: Vec::new(), model_error_m: 0.0 }
     }
 
-    /// The same with a covariance.
+    /// This belief with a covariance.
     pub fn with_covariance(self, covariance: DMatrix<f64>) -> Self {
         Self { covariance: Some(covariance), ..self }
     }
 
-    /// The probability of the estimate, as against its alternatives.
+    /// The probability of the estimate among its alternatives.
     pub fn weight(&self) -> f64 {
         1.0 - self.alternatives.iter().map(|alternative| alternative.weight).sum::<f64>()
     }
 
-    /// Forgets all but the `count` heaviest hypotheses, the estimate included; the others' weights are shared out among
+    /// Drops all but the `count` heaviest hypotheses, the estimate included, and shares out the others' weights among
     /// those that stay, in proportion.
     pub fn truncate(&mut self, count: usize) {
         let own = self.weight();
@@ -68,7 +68,7 @@ impl Belief {
         }
     }
 
-    /// The same seen through the channels that read while a target is held in `socket`; itself, where none is.
+    /// This belief with the channels that read while a target is held in `socket`; unchanged if none is.
     pub fn held_in(&self, socket: Option<usize>) -> Cow<'_, Self> {
         match socket {
             None => Cow::Borrowed(self),
@@ -76,8 +76,12 @@ impl Belief {
         }
     }
 
-    /// Whether an observation after a movement to `positions` (rad or m) can be taken in: it fits the rig, whose noise can be
-    /// divided by, and how far it is from what is believed can be computed.
+    /// Checks that an observation after a movement to `positions` (rad or m) can be absorbed.
+    ///
+    /// # Errors
+    ///
+    /// [`Refused`] if it does not fit the rig (see [`Observation::check`]), if a channel's noise cannot be divided by, or, as
+    /// [`Refused::Absurd`], if its distance from the prediction is not finite.
     pub fn accepts(&self, positions: &[f64], observation: &Observation) -> Result<(), Refused> {
         observation.check(&self.rig, self.state.joints.len(), positions)?;
         self.rig.check_noise()?;
@@ -107,8 +111,8 @@ impl Belief {
         Some(spread.fixed_view::<3, 3>(0, 0).into_owned())
     }
 
-    /// The mean over a workspace of √(tr(H P Hᵀ) + e²), e what no parameter explains: the prediction error that the belief itself
-    /// expects, metres.
+    /// The prediction error that the belief itself expects, metres: the mean over a workspace of √(tr(H P Hᵀ) + e²), with e the
+    /// model error.
     pub fn expected_error_m(&self, workspace: &Workspace) -> Option<f64> {
         let variances = self.prediction_variances_m2(workspace)?;
         let floor = self.model_error_m * self.model_error_m;
@@ -116,7 +120,7 @@ impl Belief {
         (!variances.is_empty()).then(|| sum / variances.len() as f64)
     }
 
-    /// Whether what no parameter explains makes predictions over a workspace worse than what is not known of the parameters.
+    /// Whether, over a workspace, the model error makes predictions worse than the uncertainty of the parameters does.
     pub fn model_error_prevails(&self, workspace: &Workspace) -> bool {
         let floor = self.model_error_m * self.model_error_m;
         floor > 0.0
@@ -177,7 +181,7 @@ impl Belief {
         Some(rotation.matrix() * chart::basis(&self.state.joints.get(joint)?.direction()))
     }
 
-    /// How an unknown base moves a point (m), or turns a vector.
+    /// The columns by which an unknown base moves a point (m), or turns a vector.
     fn base_columns(&self, x: &nalgebra::Vector3<f64>, is_point: bool) -> Matrix3xX<f64> {
         let mut h = Matrix3xX::zeros(self.layout.dimension());
         if let Some(range) = self.layout.block(Block::Base) {
@@ -196,11 +200,11 @@ impl Belief {
     }
 }
 
-/// What a filter makes of an observation.
+/// The result of a filter's update by an observation.
 pub(super) struct Revision {
     /// The state after it.
     pub state: State,
-    /// P, in the chart there.
+    /// P, in the chart at that state.
     pub covariance: DMatrix<f64>,
     /// The normalised innovation squared and its degrees of freedom.
     pub nis: (f64, usize),
@@ -215,7 +219,7 @@ pub(super) fn innovation_covariance(covariance: &DMatrix<f64>, rows: &DMatrix<f6
     (s, numerator)
 }
 
-/// Whether all are finite numbers.
+/// Whether all entries are finite.
 pub(super) fn is_finite(vector: &DVector<f64>, matrix: &DMatrix<f64>) -> bool {
     vector.iter().chain(matrix.iter()).all(|x| x.is_finite())
 }

@@ -1,36 +1,35 @@
-//! Noticing that the body has changed.
+//! The detector of changes of the body.
 //!
-//! As long as a belief is honest, the normalised innovations squared are χ² distributed with as many degrees of freedom
-//! as equations were seen, and so is the sum over the last k of them, with their sum. A change shows in sums that no
-//! chance explains:
+//! As long as a belief is honest, the normalised innovations squared are χ² distributed with as many degrees of freedom as equations were
+//! seen, and so is the sum over the last k of them, with their sum. A change shows in sums that no chance explains:
 //!
 //! ```text
 //! Σ NIS over the last k > χ² quantile of their degrees of freedom,    k = 1 … 5
 //! ```
 //!
-//! with the quantile by Wilson and Hilferty (1931) at z standard deviations. So far out their approximation errs on the
-//! quiet side: with three equations a movement chance exceeds it with a probability of 2.2·10⁻⁸ (k = 1) to 6.1·10⁻⁸
-//! (k = 5), and never by more than the 10⁻⁷ that it stands for.
+//! with the quantile by Wilson and Hilferty (1931) at z standard deviations. So far out their approximation errs on the quiet side: with
+//! three equations a movement chance exceeds it with a probability of 2.2·10⁻⁸ (k = 1) to 6.1·10⁻⁸ (k = 5), and never by more than the 10⁻⁷
+//! that it stands for.
 //!
-//! A filter that assumes another noise than the sensor's, and is never at rest, has innovations of another scale and
-//! with heavier tails. For it the mean per degree of freedom of the last eight is compared with that of forty before:
-//! four times as much is a change. (On `body-change`, seeds 1001 to 1012, that ratio reaches 3.7 for `active` and 2.8 for `random` before the
-//! change, 4.3 to 10 and 2.8 to 5.1 after it.)
+//! A filter that assumes another noise than the sensor's, and is never at rest, has innovations of another scale and with heavier tails.
+//! For it the mean per degree of freedom of the last eight is compared with that of forty before: four times as much is a change. (On
+//! `body-change`, seeds 1001 to 1012, that ratio reaches 3.7 for `active` and 2.8 for `random` before the change, 4.3 to 10 and 2.8 to 5.1
+//! after it.)
 
 use std::collections::VecDeque;
 
-/// Innovations summed at most, where they are honest.
+/// The most innovations that are summed, for honest beliefs.
 const WINDOW: usize = 5;
 /// z.
 const DEVIATIONS: f64 = 5.2;
-/// Innovations compared with those before, where they are not.
+/// The number of latest innovations that are compared with those before, for other beliefs.
 const RECENT: usize = 8;
 const BASELINE: usize = 40;
 const RATIO: f64 = 4.0;
-/// A filter's first innovations fall steeply and say nothing.
+/// The number of a filter's first innovations that are ignored: they fall steeply.
 const SILENT: usize = 100;
 
-/// Watches normalised innovations squared for a change.
+/// A detector that watches normalised innovations squared for a change.
 #[derive(Clone, Debug)]
 pub struct ChangeDetector {
     relative: bool,
@@ -42,18 +41,18 @@ pub struct ChangeDetector {
 }
 
 impl ChangeDetector {
-    /// For an estimator whose innovations are χ² distributed: at most one false alarm in two
-    /// million movements; with three equations a movement one in 4.4 million.
+    /// A detector for an estimator whose innovations are χ² distributed: at most one false alarm in two million
+    /// movements; with three equations a movement one in 4.4 million.
     pub fn honest() -> Self {
         Self { relative: false, deviations: DEVIATIONS, recent: VecDeque::new(), observed: 0 }
     }
 
-    /// For a filter that assumes another noise than the sensor's.
+    /// A detector for a filter that assumes a noise other than the sensor's.
     pub fn relative() -> Self {
         Self { relative: true, ..Self::honest() }
     }
 
-    /// Takes in a normalised innovation squared and its degrees of freedom, and says whether the body has changed.
+    /// Adds a normalised innovation squared and its degrees of freedom, and returns whether the body has changed.
     pub fn observe(&mut self, nis: f64, degrees: usize) -> bool {
         self.recent.push_front((nis, degrees as f64));
         self.recent.truncate(RECENT + BASELINE);
@@ -91,7 +90,7 @@ impl ChangeDetector {
     }
 }
 
-/// The quantile of χ² with so many degrees of freedom that lies `deviations` standard deviations out.
+/// The quantile of χ² with `degrees` of freedom that lies `deviations` standard deviations out.
 pub(super) fn quantile(degrees: f64, deviations: f64) -> f64 {
     let variance = 2.0 / (9.0 * degrees);
     degrees * (1.0 - variance + deviations * variance.sqrt()).powi(3)

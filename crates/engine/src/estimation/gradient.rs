@@ -18,7 +18,8 @@ use nalgebra::DVector;
 use super::{Belief, EstimationError, Estimator, Update};
 use crate::sensing::Observation;
 
-/// A step beyond this many metres or radians has nothing to do with a robot any more. (A NaN is not below it.)
+/// The greatest plausible step, metres or radians; a greater one means that the search has diverged. (A NaN is not
+/// below it.)
 const LARGEST_STEP: f64 = 1e6;
 
 /// Steepest descent on one observation at a time, with a constant rate.

@@ -3,8 +3,8 @@
 //! * [`Belief`]: the estimated state and its covariance in minimal tangent coordinates.
 //! * [`Estimator`]: takes a movement and its observation, revises the belief.
 //! * [`Rls`]: recursive least squares, (2)–(5) of the paper: an extended Kalman filter with a constant state.
-//! * [`UnscentedRls`]: the same by the unscented transform, without linearisation.
-//! * [`SixNumbers`]: the same in the paper's over-parameterised coordinates, for comparison.
+//! * [`UnscentedRls`]: recursive least squares by the unscented transform, without linearisation.
+//! * [`SixNumbers`]: recursive least squares in the paper's over-parameterised coordinates, for comparison.
 //! * [`Gradient`]: the stochastic gradient, the paper's baseline.
 //! * [`Smoother`]: maximum a posteriori over all measurements, with several hypotheses.
 //! * [`ChangeDetector`]: notices from the innovations that the body has changed.
@@ -31,57 +31,68 @@ pub use unscented::UnscentedRls;
 
 use crate::sensing::{Observation, Refused};
 
-/// Revises a belief after each movement.
+/// An estimator: it revises a belief after each movement.
 pub trait Estimator: Send + Sync {
-    /// A copy, to try an observation on.
+    /// A copy, on which an observation can be tried.
     fn boxed(&self) -> Box<dyn Estimator>;
 
-    /// What is believed now.
+    /// The present belief.
     fn belief(&self) -> &Belief;
 
-    /// Takes in what was observed after moving to `positions` (rad or m, one per joint), which
-    /// the belief [accepts](Belief::accepts). An estimator that diverges keeps the belief that it had.
+    /// Absorbs what was observed after moving to `positions` (rad or m, one per joint), which the belief
+    /// [accepts](Belief::accepts). An estimator that diverges keeps the belief that it had.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimationError::Diverged`] if the update leaves the range of numbers; [`EstimationError::Refused`] if the
+    /// estimator cannot read the observation.
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError>;
 
-    /// What it makes of every reading so far; empty for an estimator that weighs none.
+    /// A report on every reading so far; empty for an estimator that does not weigh readings.
     fn readings(&self) -> Vec<ReadingReport> {
         Vec::new()
     }
 
-    /// What it makes of the readings of the latest movement, the `movement`-th; without a look at those before.
+    /// A report on the readings of the latest movement, the `movement`-th, without a look at those before.
     fn latest_readings(&self, movement: u64) -> Vec<ReadingReport> {
         self.readings().into_iter().filter(|reading| reading.movement == movement).collect()
     }
 
-    /// The scales of noise that it learns, by kind of noise; empty for an estimator that is told them all.
+    /// The learned scales of noise, by kind of noise; empty for an estimator that learns none.
     fn noise(&self) -> Vec<NoiseReport> {
         Vec::new()
     }
 
-    /// What the readings so far say that the model and its noise do not allow; `None` while all is well, and for an estimator that
-    /// does not look.
+    /// The misfit of the readings so far: what they show that the model and its noise do not allow. `None` while there is none,
+    /// and for an estimator that does not look.
     fn misfit(&self) -> Option<Misfit> {
         None
     }
 
-    /// How far joints' readings are off, where it learns that: one standard deviation each, rad or m.
+    /// The learned standard deviations of the joints' readings, one each, rad or m; empty if they are not learned.
     fn reading_sigmas(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// All that it has learned, for [`restored`](Self::restored) of the same build; `None` for one that learns it again as fast.
+    /// Everything learned so far, as bytes for [`restored`](Self::restored) in the same build; `None` for an estimator that
+    /// learns it again as fast.
     fn stored(&self) -> Option<Vec<u8>> {
         None
     }
 
-    /// One like this, which has learned nothing yet, where it has learned what is [stored](Self::stored): from there on the two
-    /// are the same to the last bit. `None` where that was stored of another.
+    /// An estimator like this one, which must have learned nothing yet, with what is [stored](Self::stored): from there on the
+    /// two are equal to the last bit. `None` if that was stored by another kind of estimator.
     fn restored(&self, _stored: &[u8]) -> Option<Box<dyn Estimator>> {
         None
     }
 
-    /// As [`correct`](Self::correct), for observations that nobody has looked at: what does not fit is refused, and
-    /// nothing is changed by it.
+    /// Checks an observation, then absorbs it as [`correct`](Self::correct) does: an observation that does not fit is
+    /// refused, and changes nothing.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimationError::Refused`] if the belief does not [accept](Belief::accepts) the observation; otherwise the errors
+    /// of [`correct`](Self::correct).
     fn update(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         self.belief().accepts(positions, observation)?;
         self.correct(positions, observation)
@@ -94,7 +105,7 @@ impl Clone for Box<dyn Estimator> {
     }
 }
 
-/// What an estimator makes of one reading, by its belief.
+/// What an estimator makes of one reading.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ReadingReport {
@@ -102,33 +113,33 @@ pub struct ReadingReport {
     pub movement: u64,
     /// The channel, counted from 0.
     pub channel: usize,
-    /// Its equations.
+    /// The number of its equations.
     pub equations: usize,
-    /// How far it is from what the belief predicts, in standard deviations of its noise.
+    /// Its distance from what the belief predicts, in standard deviations of its noise.
     pub residual_sigmas: f64,
     /// The weight of its equations; 1 for least squares.
     pub weight: f64,
-    /// The probability that it is an outlier; null for a loss that knows of none.
+    /// The probability that it is an outlier; null for a loss without outliers.
     pub outlier_probability: Option<f64>,
 }
 
-/// That readings are not explained as they should be.
+/// A misfit: readings that the model does not explain as it should.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Misfit {
-    /// The first movement that speaks of it, counted from 1.
+    /// The first movement that shows it, counted from 1.
     pub since: u64,
-    /// What explains it best.
+    /// The cause that explains it best.
     pub cause: MisfitCause,
 }
 
-/// What explains a misfit best.
+/// The causes of a misfit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum MisfitCause {
     /// The body may have changed: what was measured since does not fit what was measured before.
     ChangedBody,
-    /// More readings are outliers than are to be expected.
+    /// More readings are outliers than expected.
     Outliers,
-    /// Nothing that is known of: the model does not hold.
+    /// No known cause: the model does not hold.
     Unexplained,
 }
 
@@ -138,9 +149,9 @@ pub enum MisfitCause {
 pub struct NoiseReport {
     /// The channel, counted from 0.
     pub channel: usize,
-    /// The first of its equations that this noise is of.
+    /// The first of the equations that have this noise.
     pub first: usize,
-    /// Its standard deviation in nominal ones.
+    /// Its standard deviation as a multiple of the nominal one.
     pub scale: f64,
 }
 
@@ -149,19 +160,19 @@ pub struct NoiseReport {
 pub struct NoiseFit {
     /// The channel, counted from 0.
     pub channel: usize,
-    /// The first of its equations that this noise is of.
+    /// The first of the equations that have this noise.
     pub first: usize,
     /// Σ w ‖r‖² in nominal standard deviations: χ², outliers not counted.
     pub squared: f64,
-    /// Σ w d: how many equations.
+    /// Σ w d: the number of equations.
     pub equations: f64,
-    /// How many of them the parameters account for.
+    /// The number of them that the parameters absorb.
     pub absorbed: f64,
-    /// The standard deviation that is assumed, in nominal ones.
+    /// The standard deviation that is assumed, as a multiple of the nominal one.
     pub scale: f64,
 }
 
-/// What an update found before it changed the belief.
+/// What an update found, measured before the belief changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Update {
     /// Normalised innovation squared, `eᵀ S⁻¹ e` with `S = H P Hᵀ + I` of whitened equations, and its degrees of freedom,
@@ -171,10 +182,10 @@ pub struct Update {
     pub change_noticed: bool,
 }
 
-/// Why an estimator could not take in an observation. Its belief stays as it was.
+/// Why an estimator could not absorb an observation. Its belief stays as it was.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EstimationError {
-    /// The observation is none of this robot's; the estimator goes on.
+    /// The observation does not fit this robot; the estimator goes on.
     #[error("the measurement was refused: {0}")]
     Refused(#[from] Refused),
     /// The update left the range of numbers; the estimator cannot go on.

@@ -26,7 +26,7 @@ pub struct StabilisingNoise {
     pub variance: f64,
     /// The first movement after which it is added, counted from 1.
     pub first_step: u64,
-    /// It is added again after every so many movements.
+    /// The number of movements between additions.
     pub every: u64,
 }
 
@@ -66,7 +66,7 @@ impl StabilisingNoise {
 /// let elbow = rls.belief().state.joints[1].line().expect("it turns");
 /// assert!(elbow.distance_to(&Point3::new(0.31, 0.0, 0.0)) < 1e-3);
 ///
-/// // What is none of this robot's is refused, and changes nothing.
+/// // An observation that does not fit this robot is refused, and changes nothing.
 /// assert!(rls.update(&[0.0], &Observation::seen(marker)).is_err());
 /// # Ok(())
 /// # }
@@ -87,8 +87,8 @@ impl Rls {
         Self { belief, covariance, stabilising, step: 0, changes: ChangeDetector::relative() }
     }
 
-    /// The update (2)–(4) with what was seen, the covariance before (5), and the normalised innovation squared; `None` if
-    /// nothing was.
+    /// The update (2)–(4) by an observation, with the covariance before (5), and the normalised innovation squared;
+    /// `None` if nothing was seen.
     fn corrected(&self, positions: &[f64], observation: &Observation) -> Result<Option<Revision>, EstimationError> {
         let (state, layout, p) = (&self.belief.state, &self.belief.layout, &self.covariance);
         let equations = self.belief.rig.equations_of(state, layout, positions, observation);

@@ -12,12 +12,12 @@
 //! with J the change of chart. ŷ and C are those of the unscented transform with κ = 3 − m, its authors' choice for a
 //! normal distribution: the points stay at √3 standard deviations however many parameters there are, where a fixed κ
 //! would send them to √(m + κ), half a turn away for an arm that is hardly known. The weight of the centre is negative
-//! then, and S could be indefinite; in the form above (the divided differences of Nørgaard, Poulsen and Ravn 2000,
-//! their second-order filter) it never is.
+//! then, and S could be indefinite; in the form above (the divided differences of Nørgaard, Poulsen and Ravn 2000, their
+//! second-order filter) it never is.
 //!
 //! The second moments see the bend of rotations: where the belief is wide S is larger than H P Hᵀ + I, and the filter is
-//! less sure of itself than the linearised one. The name is kept from the paper's recursive least squares: the state
-//! does not move.
+//! less confident than the linearised one. The name is kept from the paper's recursive least squares: the state does not
+//! move.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -47,8 +47,8 @@ impl UnscentedRls {
         Self { belief, covariance, stabilising, step: 0, changes: ChangeDetector::relative() }
     }
 
-    /// The state and covariance after what was seen, before the stabilising noise, and the normalised innovation squared;
-    /// `None` if nothing was.
+    /// The update by an observation: state and covariance before the stabilising noise, and the normalised innovation
+    /// squared; `None` if nothing was seen.
     fn corrected(&self, positions: &[f64], observation: &Observation) -> Result<Option<Revision>, EstimationError> {
         let Belief { state, layout, rig, .. } = &self.belief;
         let m = layout.dimension();

@@ -110,8 +110,9 @@ pub fn point_transport(w: &UnitVector3<f64>, w_new: &UnitVector3<f64>) -> Matrix
     basis(w_new).transpose() * basis(w)
 }
 
-/// The derivative of the change of chart from `line` to `there`, by the coordinates at `there`: of `local_line(line, L)`
-/// as L moves away from `there`. With c = w·w', s the distance along w' from the pivot of `there` to the plane of `line`,
+/// The derivative (4 × 4) of the change of chart from `line` to `there`, by the coordinates at `there`: that of
+/// `local_line(line, L)` as the line L moves away from `there`; `None` outside the chart. With c = w·w', and s the
+/// distance (m) along w' from the pivot of `there` to the plane of `line`,
 ///
 /// ```text
 /// ∂(a, d)/∂(a', d') = [ E, s E ; 0, T⁻¹ ],     E = Bᵀ (I − w' wᵀ/c) B',   T = direction_transport

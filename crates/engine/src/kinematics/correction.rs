@@ -1,4 +1,4 @@
-//! From what a joint reads to where it is.
+//! A joint's correction: the map from its reading to its position.
 //!
 //! ```text
 //! θ = offset + ratio q + sine sin q + cosine cos q + compliance·τ
@@ -11,21 +11,21 @@ use serde::{Deserialize, Serialize};
 
 use super::{Numbers, Plain};
 
-/// How many loads a joint can give way to.
+/// How many loads can bend a joint.
 pub const LOADS: usize = 2;
 
-/// What makes a joint's position θ of its reading q.
+/// The coefficients that turn a joint's reading q into its position θ.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Correction {
-    /// Rad or m.
+    /// The offset, rad or m.
     pub offset: f64,
-    /// Without a unit.
+    /// The factor of the reading, without a unit.
     pub ratio: f64,
-    /// Of an encoder that is mounted off its centre, rad.
+    /// The factor of sin q, for an encoder that is mounted off its centre, rad.
     pub sine: f64,
-    /// As `sine`.
+    /// The factor of cos q, rad.
     pub cosine: f64,
-    /// By load, how much the joint gives way, rad per N·m of 1 kg.
+    /// Compliance by load: how much the joint gives way, rad per N·m of 1 kg.
     pub compliance: [f64; LOADS],
 }
 
@@ -35,10 +35,10 @@ impl Default for Correction {
     }
 }
 
-/// A reading q, its sine and its cosine; the last two are not to be used where nothing needs them.
+/// A reading q with sin q and cos q; where no term needs sine and cosine, those two numbers mean nothing.
 pub type Reading<N> = [<N as Numbers>::Number; 3];
 
-/// Looks up sine and cosine of a reading, if they are needed.
+/// Looks up the sine and cosine of a reading where they are needed.
 #[inline(always)]
 pub fn read<N: Numbers>(reading: N::Number, needs_sine: bool) -> Reading<N> {
     if !needs_sine {
@@ -49,12 +49,12 @@ pub fn read<N: Numbers>(reading: N::Number, needs_sine: bool) -> Reading<N> {
 }
 
 impl Correction {
-    /// Whether θ depends on the sine and the cosine of the reading.
+    /// Whether θ depends on sin q or cos q.
     pub fn needs_sine(&self) -> bool {
         self.sine != 0.0 || self.cosine != 0.0
     }
 
-    /// θ at a reading without load, rad or m.
+    /// θ at a reading without load (rad or m), for any kind of numbers.
     #[inline(always)]
     pub fn unloaded<N: Numbers>(&self, numbers: N, [reading, sin, cos]: Reading<N>) -> N::Number {
         let proportional = reading * numbers.number(self.ratio) + numbers.number(self.offset);
@@ -64,7 +64,7 @@ impl Correction {
         N::sum([proportional, sin * numbers.number(self.sine), cos * numbers.number(self.cosine)])
     }
 
-    /// ∂θ/∂q at a reading without load.
+    /// ∂θ/∂q at a reading without load, for any kind of numbers.
     #[inline(always)]
     pub fn rate<N: Numbers>(&self, numbers: N, [_, sin, cos]: Reading<N>) -> N::Number {
         if !self.needs_sine() {
@@ -90,7 +90,7 @@ impl Correction {
     }
 }
 
-/// One of the numbers of a [`Correction`], by what it multiplies.
+/// A coefficient of a [`Correction`], by the function that it multiplies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Term {
     /// f = 1.
@@ -101,7 +101,7 @@ pub enum Term {
     Sine,
     /// f = cos q.
     Cosine,
-    /// f = the torque of a load.
+    /// f = τ, the torque of the load of this number, N·m per kg.
     Torque(usize),
 }
 
@@ -111,7 +111,7 @@ impl Term {
         matches!(self, Self::Sine | Self::Cosine)
     }
 
-    /// f and ∂f/∂q at a reading; of a torque, which is told in N·m per kg, the derivative is left out.
+    /// f and ∂f/∂q at a reading. For a torque (N·m per kg, as given) the derivative is left out.
     #[inline(always)]
     pub fn factor<N: Numbers>(
         self,

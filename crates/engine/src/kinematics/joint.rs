@@ -25,7 +25,7 @@ impl Line {
         self.direction.cross(&(point - self.point)).norm()
     }
 
-    /// The same line written with its pivot moved by `length` metres along the axis.
+    /// This line written with its pivot moved by `length` metres along the axis.
     pub fn slid(&self, length: f64) -> Self {
         Self { point: self.point + self.direction.into_inner() * length, ..*self }
     }
@@ -109,7 +109,7 @@ impl Joint {
         }
     }
 
-    /// The same joint seen from another frame: `transform` carries the frame of `self` into the new one.
+    /// This joint written in another frame, into which `transform` carries the frame of `self`.
     pub fn transformed(&self, transform: &Isometry3<f64>) -> Self {
         let turn = |w: &UnitVector3<f64>| UnitVector3::new_normalize(transform * w.into_inner());
         match self {

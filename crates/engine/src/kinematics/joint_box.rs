@@ -42,8 +42,8 @@ pub struct JointBoxError {
 }
 
 impl JointBox {
-    /// The share of a joint's range that [`is_within`](Self::is_within) may forgive to whoever rounds positions for
-    /// people: half a thousandth.
+    /// How far beyond its limits [`is_within`](Self::is_within) may let a joint be, as a share of its range: half a
+    /// thousandth, for positions that were rounded for people.
     pub const ROUNDING: f64 = 5e-4;
 
     /// The box of `(lower, upper)` per joint, rad or m.
@@ -73,7 +73,7 @@ impl JointBox {
     ///
     /// # Panics
     ///
-    /// Like an index, if there is no such joint.
+    /// If there is no such joint.
     pub fn lower(&self, joint: usize) -> f64 {
         self.joints[joint].0
     }
@@ -82,7 +82,7 @@ impl JointBox {
     ///
     /// # Panics
     ///
-    /// Like an index, if there is no such joint.
+    /// If there is no such joint.
     pub fn upper(&self, joint: usize) -> f64 {
         self.joints[joint].1
     }
@@ -105,7 +105,7 @@ impl JointBox {
         configuration
     }
 
-    /// The same, written to `configuration`.
+    /// Writes to `configuration` what [`from_unit`](Self::from_unit) returns.
     pub(crate) fn write_from_unit(&self, point: &[f64], configuration: &mut [f64]) {
         debug_assert_eq!(point.len(), self.dimension(), "one coordinate per joint");
         for (joint, (position, x)) in configuration.iter_mut().zip(point).enumerate() {
@@ -126,12 +126,12 @@ impl JointBox {
             && configuration.iter().enumerate().all(|(joint, &position)| self.is_within(joint, position, 0.0))
     }
 
-    /// Whether one joint's position (rad or m) is within its limits, or beyond them by at most the share `slack` of
-    /// its range, as [`ROUNDING`](Self::ROUNDING). A number that is not finite is outside.
+    /// Whether one joint's position (rad or m) is within its limits, or beyond them by at most the share `slack` of its
+    /// range, as [`ROUNDING`](Self::ROUNDING). A number that is not finite is outside.
     ///
     /// # Panics
     ///
-    /// Like an index, if there is no such joint.
+    /// If there is no such joint.
     pub fn is_within(&self, joint: usize, position: f64, slack: f64) -> bool {
         let (lower, upper) = self.joints[joint];
         let slack = slack * (upper - lower);

@@ -25,7 +25,7 @@ pub type Placed = (Matrix3<f64>, Vector3<f64>);
 #[derive(Clone, Debug)]
 pub struct Kernel {
     tree: Tree,
-    /// That of the robot in the frame of the measurements.
+    /// The pose of the robot's base in the frame of the measurements.
     base: Isometry3<f64>,
     joints: Vec<Step>,
 }
@@ -34,17 +34,17 @@ pub struct Kernel {
 struct Step {
     kind: JointKind,
     correction: Correction,
-    /// Whether somebody wants the sine and the cosine of the reading.
+    /// Whether the sine and cosine of the reading are needed.
     needs_sine: bool,
-    /// B and v.
+    /// B and v of the joint's axis.
     rest: Placed,
-    /// BᵀB⁺ and Bᵀ(v⁺ − v) from the joint that carries it; E and q if that is none.
+    /// BᵀB⁺ and Bᵀ(v⁺ − v) from the joint that carries it; E and q if the base carries it.
     from: Placed,
 }
 
 impl Kernel {
-    /// The joints of a robot whose base is at `base`, each with its correction. `needs_sine` tells of which joints the sine and the
-    /// cosine of the reading are wanted beside what the correction needs.
+    /// The joints of a robot whose base is at `base`, each with its correction. `needs_sine` marks the joints whose readings need
+    /// sine and cosine for more than the correction.
     pub fn new(
         tree: &Tree,
         base: &Isometry3<f64>,
@@ -85,8 +85,8 @@ impl Kernel {
         &self.joints[joint].correction
     }
 
-    /// A point (metres, where it is at θ = 0) and the axes of its link, as [`Walk::place`] takes them: in the frame of the joint that
-    /// carries the link, or where they are for good on the base.
+    /// A point (metres, at θ = 0) and the axes of its link in the frame of the joint that carries the link, as [`Walk::place`] takes
+    /// them; on the base, where both are for good.
     pub fn fixed(&self, link: usize, x: &Point3<f64>) -> Placed {
         match link.checked_sub(1).and_then(|joint| self.joints.get(joint)) {
             None => (*self.base.rotation.to_rotation_matrix().matrix(), (self.base * x).coords),
@@ -102,13 +102,13 @@ impl Kernel {
     }
 }
 
-/// A pass along the tree at a few postures, which has come to some joint.
+/// A pass along the tree at a few postures, up to some joint.
 pub struct Walk<'a, N: Numbers> {
     kernel: &'a Kernel,
     numbers: N,
-    /// The joints that it passed.
+    /// The joints passed so far.
     pub passed: Passed<N>,
-    /// F and q of the last of them.
+    /// F and q of the last joint passed.
     frame: N::Rotation,
     pivot: N::Vector,
 }
@@ -141,7 +141,8 @@ impl<N: Numbers> Walk<'_, N> {
         self.passed.push(&turned);
     }
 
-    /// Where something that is [fixed](Kernel::fixed) to the link of the last joint is (metres), and the axes of that link.
+    /// The position (metres) of something that is [fixed](Kernel::fixed) to the link of the last joint, and the axes of
+    /// that link.
     #[inline(always)]
     pub fn place(&self, (axes, x): &Placed) -> (N::Vector, N::Rotation) {
         if self.passed.count == 0 {
@@ -152,7 +153,7 @@ impl<N: Numbers> Walk<'_, N> {
 }
 
 impl Step {
-    /// Turns or slides a joint's frame, which is before the joint, to a reading.
+    /// Turns or slides a joint's frame E to a reading.
     #[inline(always)]
     fn turn<N: Numbers>(
         &self,

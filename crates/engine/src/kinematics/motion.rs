@@ -1,6 +1,6 @@
 //! A rigid motion as a matrix and a shift, and the twists by which a joint and its axis move what is behind them.
 //!
-//! A twist is told by the velocity of the point that is at the origin and the angular velocity: a point at x moves by
+//! A twist is written as the velocity of the point at the origin and the angular velocity: a point at x moves by
 //! `linear + angular × x`.
 
 use nalgebra::{Isometry3, Matrix3, Matrix3x2, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -45,13 +45,14 @@ impl Motion {
         self.rotation * x + self.translation
     }
 
-    /// The same as a pose.
+    /// This motion as a pose.
     pub fn pose(&self) -> Isometry3<f64> {
         let rotation = Rotation3::from_matrix_unchecked(self.rotation);
         Isometry3::from_parts(Translation3::from(self.translation), UnitQuaternion::from_rotation_matrix(&rotation))
     }
 
-    /// The motion of the link behind a joint at a position (rad or m), where this is that of the link before it.
+    /// The motion of the link behind a joint at position `theta` (rad or m), where `self` is the motion of the link
+    /// before it.
     #[inline]
     pub fn behind(&self, joint: &Joint, theta: f64) -> Self {
         match joint {
@@ -66,7 +67,8 @@ impl Motion {
         }
     }
 
-    /// `Ad ξ`: how the link behind a joint moves with the joint's position, where this is the motion of the link before it.
+    /// `Ad ξ`: how the link behind a joint moves per unit of the joint's position, where `self` is the motion of the link
+    /// before it.
     #[inline]
     pub fn joint_twist(&self, joint: &Joint) -> Twist {
         let along = self.rotation * joint.direction().into_inner();
@@ -76,9 +78,9 @@ impl Motion {
         }
     }
 
-    /// How the link `behind` a joint at a position moves with the joint's axis, by tangent coordinate, where this is the motion of the
-    /// link before it and `basis` is that of the axis' chart. Of an axis (v, w), with D = (R − R⁺)\[b₁ b₂\] = \[d₁ d₂\] and the
-    /// pivot at q,
+    /// The twists of the link `behind` a joint, one for each tangent coordinate of the joint's axis. `self` is the motion of the link
+    /// before the joint, and `basis` that of the axis' chart. For an axis (v, w), with D = (R − R⁺)\[b₁ b₂\] = \[d₁ d₂\] and the pivot
+    /// at q,
     ///
     /// ```text
     /// point        (d₁, 0), (d₂, 0)

@@ -10,22 +10,22 @@ use crate::{
     lanes::{self, Frame, Lanes, Vector},
 };
 
-/// Numbers, vectors and rotations of one posture or of several beside each other.
+/// Numbers, vectors and rotations of one posture or of several postures side by side.
 pub trait Numbers: Copy {
-    /// A number of each posture.
+    /// A number for each posture.
     type Number: Copy + Add<Output = Self::Number> + Mul<Output = Self::Number> + Neg<Output = Self::Number>;
-    /// A vector of each.
+    /// A vector for each posture.
     type Vector: Copy + Add<Output = Self::Vector> + Sub<Output = Self::Vector>;
-    /// A rotation of each.
+    /// A rotation for each posture.
     type Rotation: Copy;
     /// How many postures there are.
     const COUNT: usize;
 
-    /// The same number in all.
+    /// The number `x` for every posture.
     fn number(self, x: f64) -> Self::Number;
-    /// The same vector in all.
+    /// The vector `v` for every posture.
     fn vector(self, v: &Vector3<f64>) -> Self::Vector;
-    /// The same rotation in all.
+    /// The rotation `r` for every posture.
     fn rotation(self, r: &Matrix3<f64>) -> Self::Rotation;
     /// The vectors whose components begin at these places.
     fn load(self, numbers: &[f64], at: [usize; 3]) -> Self::Vector;
@@ -45,9 +45,9 @@ pub trait Numbers: Copy {
     fn columns(r: &Self::Rotation) -> [Self::Vector; 3];
     /// The rotation with these columns.
     fn of_columns(columns: [Self::Vector; 3]) -> Self::Rotation;
-    /// R v, for the same v in all.
+    /// R v, for one v at every posture.
     fn times(r: &Self::Rotation, v: &Vector3<f64>) -> Self::Vector;
-    /// R C, for the same C in all.
+    /// R C, for one C at every posture.
     fn then(r: &Self::Rotation, c: &Matrix3<f64>) -> Self::Rotation;
     /// R turned about its own third axis by an angle of these sines and cosines.
     fn turned(r: &Self::Rotation, sin: Self::Number, cos: Self::Number) -> Self::Rotation;

@@ -3,7 +3,8 @@
 use super::{Numbers, correction::Reading};
 use crate::lanes::Aligned;
 
-/// A joint at a few postures: d₁, d₂, f₃ and q; of a prismatic joint θ e₁ and θ e₂ in place of d₁ and d₂.
+/// A joint's axes and pivot at a few postures: d₁, d₂, f₃ and q; for a prismatic joint θ e₁ and θ e₂ take the place of
+/// d₁ and d₂.
 pub struct Turned<N: Numbers> {
     pub swept: [N::Vector; 2],
     pub axis: N::Vector,
@@ -14,14 +15,14 @@ pub struct Turned<N: Numbers> {
     pub reading: Reading<N>,
 }
 
-/// Vectors of it, the reading being one.
+/// How many vectors are stored per joint; its reading counts as one.
 const VECTORS: usize = 7;
 
 /// The joints that a walk along the tree has passed, at a few postures.
 pub struct Passed<N: Numbers> {
     of: N,
     numbers: Aligned,
-    /// How many there are.
+    /// The number of joints passed.
     pub count: usize,
 }
 
@@ -32,13 +33,13 @@ fn at<N: Numbers>(vector: usize) -> [usize; 3] {
 }
 
 impl<N: Numbers> Passed<N> {
-    /// None, with room for so many.
+    /// No joints yet, with room for `joints` of them.
     #[inline(always)]
     pub fn with_room(numbers: N, joints: usize) -> Self {
         Self { of: numbers, numbers: Aligned::of_any(joints * 3 * VECTORS * N::COUNT), count: 0 }
     }
 
-    /// Adds the next one.
+    /// Adds the next joint.
     #[inline(always)]
     pub fn push(&mut self, turned: &Turned<N>) {
         let numbers = &mut self.numbers[self.count * 3 * VECTORS * N::COUNT..][..3 * VECTORS * N::COUNT];
@@ -53,7 +54,7 @@ impl<N: Numbers> Passed<N> {
         self.count += 1;
     }
 
-    /// One of them.
+    /// The joint at an index.
     #[inline(always)]
     pub fn at(&self, index: usize) -> Turned<N> {
         let numbers = &self.numbers[index * 3 * VECTORS * N::COUNT..][..3 * VECTORS * N::COUNT];
@@ -66,7 +67,7 @@ impl<N: Numbers> Passed<N> {
         }
     }
 
-    /// F and q of one of them.
+    /// F and q of the joint at an index.
     #[inline(always)]
     pub fn frame(&self, index: usize) -> (N::Rotation, N::Vector) {
         let Turned { axis, basis: [f1, f2], pivot, .. } = self.at(index);

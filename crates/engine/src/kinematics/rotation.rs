@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::elementary::{cos, sin};
 
-/// J(ω).
+/// The left Jacobian J(ω) (3 × 3), ω in radians.
 pub fn left_jacobian(omega: &Vector3<f64>) -> Matrix3<f64> {
     let squared = omega.norm_squared();
     let cross = omega.cross_matrix();

@@ -37,10 +37,10 @@ struct Branches {
     moves: Vec<bool>,
 }
 
-/// Why parents make no tree.
+/// Why a list of parents is no tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TreeError {
-    /// A joint hangs on one that does not come before it.
+    /// A joint's parent does not come before it.
     #[error("joint {joint} hangs on joint {parent} (counted from 0): put a parent before its children")]
     Order {
         /// The joint, counted from 0.
@@ -56,7 +56,7 @@ pub enum TreeError {
         /// How many parents were given.
         parents: usize,
     },
-    /// Something is fixed to a link that is not there.
+    /// Something is fixed to a link that does not exist.
     #[error("link {link} does not exist: a robot of {joints} joints has the links 0 (the base) to {joints}")]
     Link {
         /// The link as given.
@@ -91,7 +91,7 @@ impl Tree {
         Ok(Self { branches: Some(Arc::new(Branches { parents, moves })) })
     }
 
-    /// Whether it is an arm: every joint hangs on the one before it.
+    /// Whether the tree is an arm: every joint hangs on the one before it.
     pub fn is_serial(&self) -> bool {
         self.branches.is_none()
     }
@@ -127,7 +127,7 @@ impl Tree {
         std::iter::successors(link.checked_sub(1), |joint| self.parent(*joint))
     }
 
-    /// The motions of all links, the base first: what `behind` makes of each joint and of the motion of the link that carries it.
+    /// What `behind` computes for every link, the base first: from each joint and the value of the link that carries it.
     pub fn sweep<T>(&self, base: T, joints: usize, mut behind: impl FnMut(usize, &T) -> T) -> Vec<T> {
         let mut links = Vec::with_capacity(joints + 1);
         links.push(base);
@@ -138,14 +138,14 @@ impl Tree {
         links
     }
 
-    /// The motions of all links, `base e^{ξθ} …` along the path to each: what is fixed to a link goes by them from where it is at
-    /// θ = 0 into the frame that the base is in. `theta` tells the position of each joint, rad or m.
+    /// The motions of all links, `base e^{ξθ} …` along the path to each. Each carries what is fixed to its link from where that
+    /// is at θ = 0 into the frame that the base is in. `theta` gives the position of each joint, rad or m.
     pub fn links(&self, base: Isometry3<f64>, joints: &[Joint], theta: impl Fn(usize) -> f64) -> Vec<Isometry3<f64>> {
         self.sweep(base, joints.len(), |joint, before| before * joints[joint].exp(theta(joint)))
     }
 
-    /// What is fixed to a link, carried from where it is at θ = 0 to where the joints before it bring it, in the frame of the
-    /// robot. `theta` tells the position of each joint, rad or m.
+    /// What is fixed to a link, carried from where it is at θ = 0 by the joints before it, in the frame of the robot. `theta`
+    /// gives the position of each joint, rad or m.
     pub fn carried<T: Carried>(&self, joints: &[Joint], link: usize, theta: impl Fn(usize) -> f64, fixed: T) -> T {
         self.path(link).fold(fixed, |fixed, joint| fixed.carried(&joints[joint], theta(joint)))
     }
@@ -153,7 +153,7 @@ impl Tree {
 
 /// What a joint can carry.
 pub trait Carried {
-    /// The same after a joint moved it to a position, rad or m.
+    /// This thing after a joint has moved to position `theta`, rad or m.
     fn carried(self, joint: &Joint, theta: f64) -> Self;
 }
 

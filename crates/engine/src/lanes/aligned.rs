@@ -8,16 +8,17 @@ use std::{
 /// As many numbers as a cache line holds.
 const LINE: usize = 8;
 
-/// How many buffers a thread keeps for whoever comes next, and how large they are at most, numbers.
+/// How many buffers a thread keeps for the next caller, and the largest size kept, in numbers.
 const KEPT: usize = 6;
 const LARGEST: usize = 1 << 16;
 
 thread_local! {
-    /// Buffers that nobody uses. To have the allocator find one for a few microseconds' work costs a good part of that.
+    /// Buffers that are not in use. Allocating one costs a good part of the few microseconds that the work takes.
     static SPARE: RefCell<Vec<Vec<f64>>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Numbers of which every eighth begins a cache line: a register that is read from two lines costs twice as much.
+/// A buffer of numbers of which every eighth begins a cache line: reading a register from two lines costs twice as
+/// much.
 #[derive(Debug, Default)]
 pub struct Aligned {
     numbers: Vec<f64>,
@@ -26,14 +27,14 @@ pub struct Aligned {
 }
 
 impl Aligned {
-    /// So many zeros.
+    /// A buffer of `len` zeros.
     pub fn zeros(len: usize) -> Self {
         let mut zeros = Self::of_any(len);
         zeros.fill(0.0);
         zeros
     }
 
-    /// So many numbers, each of which will be written before it is read.
+    /// A buffer of `len` numbers with any values; each must be written before it is read.
     pub fn of_any(len: usize) -> Self {
         let spare = || SPARE.with_borrow_mut(|spare| spare.pop());
         let mut any =
@@ -42,7 +43,7 @@ impl Aligned {
         any
     }
 
-    /// Makes so many of them: zeros where there was no room for so many, else what they were.
+    /// Resizes the buffer to `len` numbers: zeros if it had no room for them, otherwise whatever they were.
     pub fn ensure(&mut self, len: usize) {
         if self.numbers.len() < len + LINE {
             self.numbers = vec![0.0; (len + LINE).next_power_of_two()];

@@ -1,4 +1,4 @@
-//! Which instructions are used.
+//! The vector instructions that are used.
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -7,20 +7,20 @@ use fearless_simd::Level;
 /// Instructions of a processor, from the plainest to the widest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Instructions {
-    /// Those that every processor of the kind has: SSE2 on `x86_64`.
+    /// The instructions that every processor of the architecture has: SSE2 on `x86_64`.
     Baseline,
-    /// SSE 4.2, where there is that.
+    /// SSE 4.2, where the processor has it.
     Sse4_2,
-    /// AVX2, where there is that.
+    /// AVX2, where the processor has it.
     Avx2,
-    /// The widest that there are.
+    /// The widest instructions that the processor has.
     Widest,
 }
 
 static MOST: AtomicU8 = AtomicU8::new(Instructions::Widest as u8);
 
-/// Uses no wider instructions from now on, in the whole process. Results are the same to the last bit, and that is what this is for:
-/// to show it.
+/// Uses no wider instructions from now on, in the whole process. Results are the same to the last bit; this function exists to show
+/// that.
 pub fn use_at_most(instructions: Instructions) {
     MOST.store(instructions as u8, Ordering::Relaxed);
 }

@@ -1,13 +1,13 @@
 //! Several candidates at a time, one in each lane of a vector register.
 //!
-//! Where the same is computed of many candidates, lanes run across candidates: nothing is summed across lanes, so that a value
-//! does not depend on which others it is computed with. The widest instructions that the processor has are chosen at run time,
-//! by [`dispatch!`](fearless_simd::dispatch), in safe code. A function is compiled for those instructions only where it is
+//! Where one quantity is computed for many candidates, lanes run across candidates: nothing is summed across lanes, so that a
+//! value does not depend on which others it is computed with. The widest instructions that the processor has are chosen at run
+//! time, by [`dispatch!`](fearless_simd::dispatch), in safe code. A function is compiled for those instructions only where it is
 //! inlined into the dispatched one: hence `#[inline(always)]` throughout, and loops instead of closures that are handed lanes.
 //! Nothing is multiplied and added at once, and no sum is parted by the width of a register: every processor gives the same bits.
 //!
-//! In memory candidates stand in groups of [`GROUP`], whatever the width of a register: of each number of a group one candidate
-//! beside the other.
+//! In memory, candidates stand in groups of [`GROUP`], whatever the width of a register: for each number of a group, the values
+//! of its candidates stand side by side.
 
 mod aligned;
 mod level;
@@ -32,19 +32,19 @@ pub type Lanes<S> = <S as Simd>::f64s;
 /// Candidates of a group: the lanes of the widest register that there is.
 pub const GROUP: usize = 8;
 
-/// The same number in all lanes.
+/// The number `x` in all lanes.
 #[inline(always)]
 pub fn splat<S: Simd>(simd: S, x: f64) -> Lanes<S> {
     Lanes::<S>::splat(simd, x)
 }
 
-/// A register full of what begins at `first`.
+/// A register filled with the numbers from `first` on.
 #[inline(always)]
 pub fn load<S: Simd>(simd: S, numbers: &[f64], first: usize) -> Lanes<S> {
     Lanes::<S>::from_slice(simd, &numbers[first..first + Lanes::<S>::LEN])
 }
 
-/// Puts a register where `first` is.
+/// Stores a register at `first`.
 #[inline(always)]
 pub fn store<S: Simd>(lanes: Lanes<S>, numbers: &mut [f64], first: usize) {
     lanes.store_slice(&mut numbers[first..first + Lanes::<S>::LEN]);
@@ -58,13 +58,13 @@ pub struct GroupSum<S: Simd>([Lanes<S>; SLOTS]);
 const SLOTS: usize = GROUP / 2;
 
 impl<S: Simd> GroupSum<S> {
-    /// Nothing yet.
+    /// A sum of nothing yet.
     #[inline(always)]
     pub fn zero(simd: S) -> Self {
         Self([splat(simd, 0.0); SLOTS])
     }
 
-    /// Adds a × b of a register that begins at `first`.
+    /// Adds a × b, where a register's numbers begin at `first` of their group.
     #[inline(always)]
     pub fn add_product(&mut self, first: usize, a: Lanes<S>, b: Lanes<S>) {
         let sum = &mut self.0[first % GROUP / Lanes::<S>::LEN];
@@ -83,9 +83,9 @@ impl<S: Simd> GroupSum<S> {
     }
 }
 
-/// Groups of candidates that are computed alike.
+/// A run of groups that are computed alike.
 pub struct Run {
-    /// The instructions that serve best.
+    /// The instructions that suit these groups best.
     pub level: Level,
     /// Which groups.
     pub groups: Range<usize>,
@@ -93,8 +93,8 @@ pub struct Run {
     pub candidates: usize,
 }
 
-/// All groups of so many candidates: those that are full, and the last one, of which half may be empty. A register of half the
-/// width is enough for what is in that, and gives the same bits.
+/// The runs of groups that hold `candidates`: the full groups, and the last one, which may be half empty. For at most half a
+/// group, registers of half the width are enough and give the same bits.
 pub fn runs(level: Level, candidates: usize) -> impl Iterator<Item = Run> {
     let (full, left) = (candidates / GROUP, candidates % GROUP);
     let full_ones = Run { level, groups: 0..full, candidates: GROUP };
@@ -102,7 +102,7 @@ pub fn runs(level: Level, candidates: usize) -> impl Iterator<Item = Run> {
     [full_ones, last].into_iter().filter(|run| !run.groups.is_empty())
 }
 
-/// The same instructions, on no more lanes than so many candidates need.
+/// The level narrowed to no more lanes than `candidates` need.
 #[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables))]
 pub fn narrowed(level: Level, candidates: usize) -> Level {
     #[cfg(target_arch = "x86_64")]

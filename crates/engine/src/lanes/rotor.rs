@@ -25,7 +25,7 @@ pub fn sin_cos<S: Simd>(x: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
     (one_by_one::<S>(x, sine, elementary::sin), one_by_one::<S>(x, cosine, elementary::cos))
 }
 
-/// The same of angles that are not too far.
+/// Sine and cosine of angles up to [`FAR`], radians.
 #[inline(always)]
 fn reduced<S: Simd>(x: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
     let simd = x.token();
@@ -43,7 +43,7 @@ fn reduced<S: Simd>(x: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
     (sine * of_cosine + cosine * of_sine, cosine * of_cosine - sine * of_sine)
 }
 
-/// Of these coefficients, the highest power first.
+/// The polynomial with these coefficients, the highest power first.
 #[inline(always)]
 fn polynomial<S: Simd>(z: Lanes<S>, coefficients: &[f64; 6]) -> Lanes<S> {
     let simd = z.token();

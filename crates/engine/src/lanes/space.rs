@@ -7,12 +7,12 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{Lanes, load, splat, store};
 
-/// A vector of each candidate: three components.
+/// A vector (three components) for each candidate.
 #[derive(Clone, Copy)]
 pub struct Vector<S: Simd>(pub [Lanes<S>; 3]);
 
 impl<S: Simd> Vector<S> {
-    /// The same vector in all lanes.
+    /// The vector `v` in all lanes.
     #[inline(always)]
     pub fn splat(simd: S, v: &Vector3<f64>) -> Self {
         Self([splat(simd, v.x), splat(simd, v.y), splat(simd, v.z)])
@@ -68,7 +68,7 @@ impl<S: Simd> Vector<S> {
         x * a + (y * b + z * c)
     }
 
-    /// A v, for the same A in all lanes.
+    /// A v, for one A in all lanes.
     #[inline(always)]
     pub fn through(self, a: &Matrix3<f64>) -> Self {
         let [x, y, z] = self.0;
@@ -108,19 +108,19 @@ impl<S: Simd> Neg for Vector<S> {
     }
 }
 
-/// A rotation of each candidate: the columns of its matrix.
+/// A rotation for each candidate: the columns of its matrix.
 #[derive(Clone, Copy)]
 pub struct Frame<S: Simd>(pub [Vector<S>; 3]);
 
 impl<S: Simd> Frame<S> {
-    /// The same rotation in all lanes.
+    /// The rotation in all lanes.
     #[inline(always)]
     pub fn splat(simd: S, rotation: &Matrix3<f64>) -> Self {
         let [a, b, c] = columns(rotation);
         Self([Vector::splat(simd, &a), Vector::splat(simd, &b), Vector::splat(simd, &c)])
     }
 
-    /// R v, for the same v in all lanes.
+    /// R v, for one v in all lanes.
     #[inline(always)]
     pub fn times(&self, v: &Vector3<f64>) -> Vector<S> {
         let ([a, b, c], simd) = (self.0, self.0[0].0[0].token());
@@ -134,14 +134,14 @@ impl<S: Simd> Frame<S> {
         a.scaled_onto(x, b.scaled_onto(y, c.scaled_onto(z, sum)))
     }
 
-    /// R C, for the same C in all lanes.
+    /// R C, for one C in all lanes.
     #[inline(always)]
     pub fn then(&self, c: &Matrix3<f64>) -> Self {
         let [x, y, z] = columns(c);
         Self([self.times(&x), self.times(&y), self.times(&z)])
     }
 
-    /// The same turned about its own third axis by an angle of these sines and cosines.
+    /// This rotation followed by one about its own third axis, by an angle with this sine and cosine.
     #[inline(always)]
     pub fn turned(&self, sine: Lanes<S>, cosine: Lanes<S>) -> Self {
         let [a, b, c] = self.0;

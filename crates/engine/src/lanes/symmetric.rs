@@ -18,7 +18,7 @@ pub fn times(level: Level, [d, candidates]: [usize; 2], rows: &[f64], p: &[f64])
     found
 }
 
-/// The same, written to `found`; every group holds so many candidates.
+/// Writes to `found` what [`times`] returns; every group holds `candidates`.
 #[inline(always)]
 pub fn write_times<S: Simd>(simd: S, [d, candidates]: [usize; 2], (rows, p): (&[f64], &[f64]), found: &mut [f64]) {
     let (m, stride) = (p.len().isqrt(), d * GROUP);
@@ -89,7 +89,7 @@ impl Strip {
     }
 }
 
-/// P x of a few x alone, which stand in `columns` one behind the other, m numbers each: lanes run along P's columns.
+/// P x for a few vectors x, which stand in `columns` one after the other, m numbers each: lanes run along P's columns.
 pub fn times_few(level: Level, columns: &[f64], p: &[f64], m: usize) -> Vec<f64> {
     let mut found = vec![0.0; columns.len()];
     let together = 3 * m.max(1);
@@ -146,7 +146,7 @@ fn sums_from<S: Simd, const E: usize, const W: usize>(
     }
 }
 
-/// P + c Σ x xᵀ of a few x, which stand in `columns` one behind the other, m numbers each.
+/// P + c Σ x xᵀ for a few vectors x, which stand in `columns` one after the other, m numbers each.
 pub fn add_few_squares(level: Level, columns: &[f64], c: f64, p: &mut [f64]) {
     let m = p.len().isqrt().max(1);
     dispatch!(level, simd => {

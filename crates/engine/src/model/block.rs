@@ -12,13 +12,13 @@ pub enum Block {
     Base,
     /// The axis of a joint.
     Axis(usize),
-    /// What is added to a joint's reading, rad or m.
+    /// The offset of a joint's reading, rad or m.
     Offset(usize),
-    /// What a joint's reading is multiplied by.
+    /// The factor of a joint's reading.
     Ratio(usize),
-    /// Sine and cosine of a joint's reading, rad.
+    /// The eccentricity of a joint's encoder: the coefficients of sine and cosine of its reading, rad.
     Eccentricity(usize),
-    /// By how much a joint gives way to a load, rad per N·m of 1 kg; see [`Loads`](super::Loads).
+    /// The compliance of a joint to a load, rad per N·m of 1 kg; see [`Loads`](super::Loads).
     Compliance(usize, Load),
     /// The place of a target on its link.
     Target(usize),
@@ -26,7 +26,7 @@ pub enum Block {
     Device(usize),
     /// Focal lengths and principal point of a camera.
     Intrinsics(usize),
-    /// A place beside the robot.
+    /// A place beside the robot at which a target can be held.
     Socket(usize),
 }
 
@@ -48,7 +48,7 @@ impl Block {
         }
     }
 
-    /// Its value in a state that has it.
+    /// The block's value in a state that has it.
     pub fn of(&self, state: &State) -> Element {
         let numbers = |numbers: &[f64]| Element::Numbers(DVector::from_column_slice(numbers));
         match *self {
@@ -68,7 +68,7 @@ impl Block {
         }
     }
 
-    /// Gives it another value of the same kind.
+    /// Gives the block another value of the same kind.
     pub fn put(&self, state: &mut State, element: Element) {
         match (*self, element) {
             (Self::Base, Element::Pose(pose)) => state.base = pose,
@@ -92,7 +92,7 @@ impl Block {
         }
     }
 
-    /// What each of its tangent coordinates measures.
+    /// What each tangent coordinate of the block measures.
     pub fn quantities(&self, state: &State) -> Vec<Quantity> {
         use Quantity::{Angle, Compliance, Length, Pixels, Ratio};
         let turns = |joint: usize| state.joints[joint].kind() == JointKind::Revolute;

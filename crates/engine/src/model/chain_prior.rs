@@ -1,8 +1,8 @@
-//! The prior of a robot as a description has it: errors are local, and carry everything behind them.
+//! The prior of a described robot: each joint's errors are local, and move everything behind the joint.
 //!
-//! A description places every joint's frame relative to the one before. What is wrong there, an origin that was measured badly
-//! or a zero that was set badly, moves all that the joint carries. With ε_i the twist (v, ω) by which the origin o_i of joint i
-//! is off, and z_i the error of the zero of its reading, to first order
+//! A description places every joint's frame relative to the one before. What is wrong there, an origin that was measured badly or a zero
+//! that was set badly, moves all that the joint carries. With ε_i the twist (v, ω) by which the origin o_i of joint i is off, and z_i the
+//! error of the zero of its reading, to first order
 //!
 //! ```text
 //! δ = Σᵢ Jᵢ εᵢ + Kᵢ zᵢ,       ε ~ N(0, diag(σₚ², σ_d²)),   z ~ N(0, σ_z²)
@@ -16,18 +16,18 @@
 //! | axis of joint j, in its own chart | j ≥ i | j > i |
 //! | target or device on link l | l > i | l > i |
 //!
-//! with joints counted from 0, and link l behind joint l − 1. D holds the variances of what is no error of the chain: where the
-//! base stands, where on its link a target is. A target that is known to a millimetre *on its link* so moves with the chain; of one
-//! of which little is known D is all that counts. Where the zeros are blocks of their own ([`Block::Offset`]) they are not counted
-//! among the axes a second time.
+//! with joints counted from 0, and link l behind joint l − 1. D holds the variances of what is no error of the chain: where the base
+//! stands, where on its link a target is. So a target that is known to a millimetre *on its link* moves with the chain; for a target of
+//! which little is known D dominates. Where the zeros are blocks of their own ([`Block::Offset`]) they are not counted among the axes a
+//! second time.
 //!
-//! Origins have a scale, and so has every single zero: σₚ stands for s σₚ, σ_d for s σ_d, σ_z for s_i σ_z, see [`Scales`]. What is stated is s = 1. How large the errors of one description are tells the evidence of measurements,
-//! with a weak prior of the scales themselves (a spike and a slab, on a [grid](ChainPrior::GRID)): with probability w there is next to
-//! no error of the kind, else ln s ~ N(0, d²). Origins come off one machine and share their scale; a zero is set by hand, and
-//! one that is off says nothing of the others.
+//! Origins have a scale, and so has every single zero: σₚ stands for s σₚ, σ_d for s σ_d, σ_z for s_i σ_z, see [`Scales`]. The stated
+//! deviations are s = 1. How large the errors of one description are is learned from the evidence of the measurements, with a weak prior of
+//! the scales (a spike and a slab, on a [grid](ChainPrior::GRID)): with probability w there is next to no error of the kind, else ln s ~
+//! N(0, d²). Origins come off one machine and share their scale; a zero is set by hand, and one that is off says nothing of the others.
 //!
-//! *Held axes.* An axis that is not learned is right where it is, in the frame of the base. So P₀ is conditioned on it: of all errors
-//! along the chain those count that leave it there, to [`HELD`](ChainPrior::HELD).
+//! *Held axes.* An axis that is not learned is taken to be exact in the frame of the base. So P₀ is conditioned on it: only errors along
+//! the chain that leave it in place, to [`HELD`](ChainPrior::HELD), count.
 
 use std::sync::OnceLock;
 
@@ -39,40 +39,41 @@ use crate::{
     kinematics::{Joint, chart},
 };
 
-/// What is known of errors along a chain, as standard deviations per coordinate.
+/// The errors along a chain, as standard deviations per coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChainErrors {
-    /// σₚ: of a joint's origin in the frame before it, metres.
+    /// σₚ: the deviation of a joint's origin in the frame before it, metres.
     pub point_m: f64,
-    /// σ_d: of how that frame is turned, radians.
+    /// σ_d: the deviation of that frame's rotation, radians.
     pub direction_rad: f64,
-    /// σ_z: of the zero of a joint that turns, radians.
+    /// σ_z: the deviation of the zero of a joint that turns, radians.
     pub zero_rad: f64,
-    /// The same of a joint that slides, metres.
+    /// σ_z: the deviation of the zero of a joint that slides, metres.
     pub zero_m: f64,
 }
 
-/// By how much errors along a chain are larger than stated.
+/// The factors by which errors along a chain are larger than stated.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Scales {
-    /// s: of how origins are shifted and turned.
+    /// s: the factor of shifts and turns of origins.
     pub origins: f64,
-    /// s_i: of the zero of every reading.
+    /// s_i: the factor of each reading's zero.
     pub zeros: Vec<f64>,
 }
 
 /// A covariance of tangent coordinates as a function of the scales of two kinds of error.
 #[derive(Clone, Debug)]
 pub struct ChainPrior {
-    /// Of origins and of zeros: a root of its part of P₀, m × k, at a scale of 1; the rows of what is held stand last.
+    /// The roots of P₀'s parts for origins and for zeros, m × k, at a scale of 1; the rows of held coordinates stand
+    /// last.
     roots: [DMatrix<f64>; 2],
-    /// D, with (1e-6)² of what is held.
+    /// D, with (1e-6)² for held coordinates.
     own: DVector<f64>,
     /// How many of the rows are held: the last ones.
     held: usize,
-    /// Learned coordinates of which the deviation is so small that they are held, too.
+    /// Learned coordinates whose deviation is so small that they are held too.
     fixed: Vec<usize>,
-    /// By place on the grid: found when it is asked for first.
+    /// P₀⁻¹ by place on the grid, computed when it is first asked for.
     inverted: Vec<OnceLock<Option<Inverted>>>,
 }
 
@@ -90,7 +91,7 @@ impl Inverted {
         Some(Self { information: factor.inverse(), log_determinant })
     }
 
-    /// The same with a covariance that is larger by K diag(v) Kᵀ, K of m rows (Woodbury).
+    /// P₀⁻¹ after the covariance has grown by K diag(v) Kᵀ, K of m rows (Woodbury).
     pub fn with(&self, columns: &DMatrix<f64>, variances: &[f64]) -> Option<Self> {
         let off: Vec<usize> = (0..variances.len()).filter(|k| variances[*k] > NONE * NONE).collect();
         if off.is_empty() {
@@ -108,24 +109,24 @@ impl Inverted {
     }
 }
 
-/// A scale at which there is next to no error.
+/// The scale that stands for next to no error.
 const NONE: f64 = 1e-3;
 
 impl ChainPrior {
-    /// How well what is held is known, m or rad.
+    /// The standard deviation of held coordinates, m or rad.
     pub const HELD: f64 = 1e-6;
-    /// The scales that are looked at. The first stands for no error at all.
+    /// The scales that are tried; the first stands for no error at all.
     pub const GRID: &'static [f64] = &[NONE, 0.1, 0.16, 0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0];
-    /// w: how probable it is that origins are not off, and that a zero is not.
+    /// w: the probability that origins are right, and that a zero is right.
     const RIGHT: [f64; 2] = [0.6, 0.8];
-    /// d: the deviation of the logarithm of a scale.
+    /// d: the standard deviation of the logarithm of a scale, for origins and for zeros.
     const SPREAD: [f64; 2] = [1.0, 1.5];
 
     /// The prior of `layout` around `guess`, the joints' origins being where `origins` has them (frame of the guess at θ = 0,
-    /// metres). Joints whose zeros go together, one following the other, are one of `readings`: (joint, multiplier) each.
+    /// metres). Joints that share a zero, one following the other, make up one entry of `readings`: (joint, multiplier) each.
     ///
-    /// `own` are the deviations of what is no error of the chain, one per coordinate; of axes they count only where they are
-    /// [`HELD`](Self::HELD) or less.
+    /// `own` holds the deviations that are no errors of the chain, one per coordinate; those of axes count only where they
+    /// are [`HELD`](Self::HELD) or less.
     pub fn new(
         guess: &State,
         layout: &Layout,
@@ -198,7 +199,7 @@ impl ChainPrior {
         Self { roots: [of_origins, of_zeros], own: variances, held, fixed, inverted }
     }
 
-    /// The scales of what is stated.
+    /// The scales of the stated deviations, all 1.
     pub fn stated(&self) -> Scales {
         Scales { origins: 1.0, zeros: vec![1.0; self.roots[1].ncols()] }
     }
@@ -243,8 +244,8 @@ impl ChainPrior {
         self.inverted[origins].get_or_init(invert).as_ref()
     }
 
-    /// How every zero that is off by one deviation moves what is learned, one column each, at some scale of origins. The columns are
-    /// those of the roots, but where axes are held.
+    /// The change (one column each) that a zero off by one deviation makes to the learned coordinates, at some scale of origins.
+    /// Where no axis is held, these are the columns of the roots.
     pub(crate) fn zeros(&self, origins: f64) -> DMatrix<f64> {
         let columns = self.roots[1].ncols();
         let learned = self.own.len() - self.held;
@@ -269,7 +270,7 @@ impl ChainPrior {
         found
     }
 
-    /// Of origins and of a zero, by place on the [grid](Self::GRID): ln of the probability of a scale before any measurement.
+    /// ln of the prior probability of each scale on the [grid](Self::GRID), for origins and for a zero.
     pub(crate) fn log_probabilities() -> [Vec<f64>; 2] {
         [0, 1].map(|kind| {
             let slab = |scale: &f64| exp(-0.5 * (ln(*scale) / Self::SPREAD[kind]).powi(2));
@@ -280,7 +281,7 @@ impl ChainPrior {
         })
     }
 
-    /// Of every coordinate its standard deviation, at scales of 1.
+    /// The standard deviation of every coordinate, at scales of 1.
     pub fn deviations(&self) -> DVector<f64> {
         self.covariance(&self.stated()).diagonal().map(|variance| variance.max(0.0).sqrt())
     }
@@ -338,7 +339,7 @@ mod tests {
         model::{Place, Target, random::random_direction},
     };
 
-    /// A chain as a description has it: by joint its frame in the one before, and its axis there.
+    /// A described chain: for each joint its frame in the one before, and its axis there.
     struct Described {
         origins: Vec<Isometry3<f64>>,
         axes: Vec<UnitVector3<f64>>,

@@ -39,15 +39,16 @@ pub enum Element {
     Numbers(DVector<f64>),
 }
 
-/// How far an element is from a guess, in coordinates that hold everywhere, not only where a chart at the guess does.
+/// How far an element is from a guess, in coordinates that are defined everywhere, not only inside the chart at the
+/// guess.
 #[derive(Clone, Debug)]
 pub struct Displacement {
     /// r, zero at the guess, and to first order the tangent coordinates there.
     pub value: DVector<f64>,
     /// ∂r/∂δ in the chart at the element.
     pub derivative: DMatrix<f64>,
-    /// The same without the curvature of the sphere, which grows without bound towards the antipode of a direction: what
-    /// serves as Gauss and Newton's approximation.
+    /// ∂r/∂δ without the curvature of the sphere, which grows without bound towards the antipode of a direction; for the
+    /// Gauss–Newton approximation.
     pub slope: DMatrix<f64>,
 }
 
@@ -139,8 +140,8 @@ impl Element {
         self.transport(&delta.rows(0, delta.len())).try_inverse()
     }
 
-    /// How far `other` is from the guess `self`. A line counts by the distance of its own pivot from the guess's; write
-    /// it with the pivot nearest to that first.
+    /// The displacement of `other` from the guess `self`. For a line it is measured from the line's own pivot; write
+    /// the line with the pivot nearest to the guess's first.
     ///
     /// For a line (v, w) and the guess (v₀, w₀), Q the parallel transport from w to w₀ along their great circle and B₀
     /// the basis at w₀,
@@ -190,7 +191,8 @@ fn half_turned(omega: &Vector3<f64>) -> Matrix3<f64> {
     nalgebra::Rotation3::from_scaled_axis(-0.5 * omega).into_inner()
 }
 
-/// The angle from one direction to another; opposite ones are π apart, along which great circle is anybody's choice.
+/// The signed coordinates of the rotation from one direction to another. Opposite directions are π apart, along an
+/// arbitrary great circle.
 fn turned(w0: &UnitVector3<f64>, w: &UnitVector3<f64>) -> Vector2<f64> {
     chart::local_direction(w0, w).unwrap_or_else(|| Vector2::new(std::f64::consts::PI, 0.0))
 }

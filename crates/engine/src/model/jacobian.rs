@@ -1,8 +1,8 @@
 //! How the joints' readings move a robot's links, at one posture.
 //!
 //! A joint j moves what is fixed to a link by its twist, if the link is behind it (see [`Tree`](crate::kinematics::Tree)): the Jacobian
-//! has the column `Ad ξⱼ ∂θⱼ/∂qⱼ`, and 0 where j moves another branch. What of one frame is measured from another moves by the difference
-//! of the twists of the two, so that a joint which carries both of them does not count.
+//! has the column `Ad ξⱼ ∂θⱼ/∂qⱼ`, and 0 where j moves another branch. A frame measured from another moves by the difference of their two
+//! twists, so a joint that carries both does not count.
 
 use nalgebra::{Const, Dyn, Isometry3, Matrix3xX, Matrix6xX, OMatrix, Point3, Vector3};
 
@@ -33,8 +33,8 @@ impl State {
         self.frame_at(seen_from, positions).inverse() * self.frame_at(frame, positions)
     }
 
-    /// How the readings of all joints move a frame as it is seen from another, as [`frame_jacobian`](Self::frame_jacobian) but in the
-    /// frame `seen_from`.
+    /// The Jacobian (6 × n) of a frame as seen from another: like [`frame_jacobian`](Self::frame_jacobian), but relative to and in
+    /// the frame `seen_from`.
     pub fn relative_jacobian(&self, frame: Frame, seen_from: Frame, positions: &[f64]) -> Matrix6xX<f64> {
         let at = Point3::from(self.frame_at(frame, positions).translation.vector);
         let mut apart = self.twists_at(frame, &at, positions) - self.twists_at(seen_from, &at, positions);
@@ -75,7 +75,7 @@ impl State {
         }
     }
 
-    /// The same derivative by the readings, of one by the joints' positions: `J ∂θ/∂q`.
+    /// Turns a derivative by the joints' positions into one by their readings: `J ∂θ/∂q`.
     fn by_readings<const R: usize>(
         &self,
         jacobian: &OMatrix<f64, Const<R>, Dyn>,

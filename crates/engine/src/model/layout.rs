@@ -16,10 +16,10 @@ use crate::kinematics::Term;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
     entries: Vec<(Block, Range<usize>)>,
-    /// By joint: where its axis stands.
+    /// The place of each joint's axis.
     axes: Vec<Option<Range<usize>>>,
     quantities: Vec<Quantity>,
-    /// Of the hand: whose place is the marker's.
+    /// The block that places the hand, which is the marker's.
     hand: Block,
 }
 
@@ -30,7 +30,7 @@ pub enum Quantity {
     Length,
     /// Radians.
     Angle,
-    /// Without a unit.
+    /// A number without a unit.
     Ratio,
     /// Radians per N·m with which gravity pulls at 1 kg.
     Compliance,
@@ -69,7 +69,7 @@ impl Layout {
         Self::new(state, axes.chain(learn_marker.then_some(Block::Target(0))))
     }
 
-    /// By joint, what corrects its readings and is learned: the places of the coordinates, and what they multiply.
+    /// The learned corrections of each joint: the places of their coordinates, and what they multiply.
     pub(crate) fn corrections(&self) -> Vec<Vec<(usize, Term)>> {
         let mut corrections = vec![Vec::new(); self.joints()];
         for (block, range) in self.blocks() {
@@ -85,7 +85,7 @@ impl Layout {
         corrections
     }
 
-    /// Whether by how much a joint gives way to a load is learned.
+    /// Whether any joint's compliance is learned.
     pub(crate) fn has_compliance(&self) -> bool {
         self.entries.iter().any(|(block, _)| matches!(block, Block::Compliance(..)))
     }
@@ -105,7 +105,7 @@ impl Layout {
         self.entries.iter().cloned()
     }
 
-    /// Where a block stands, if it is learned.
+    /// The place of a block, if it is learned.
     pub fn block(&self, block: Block) -> Option<Range<usize>> {
         self.entries.iter().find(|(known, _)| *known == block).map(|(_, range)| range.clone())
     }
@@ -115,19 +115,19 @@ impl Layout {
         self.axes.get(index).is_some_and(Option::is_some)
     }
 
-    /// Where the point of joint `index` stands (a learned revolute joint only): two coordinates.
+    /// The place of joint `index`'s point, two coordinates; for learned revolute joints only.
     pub fn point(&self, index: usize) -> Option<Range<usize>> {
         let range = self.axes.get(index)?.as_ref()?;
         (range.len() == 4).then(|| range.start..range.start + 2)
     }
 
-    /// Where the direction of joint `index` stands (a learned joint only): two coordinates.
+    /// The place of joint `index`'s direction, two coordinates; for learned joints only.
     pub fn direction(&self, index: usize) -> Option<Range<usize>> {
         let range = self.axes.get(index)?.as_ref()?;
         Some(range.end - 2..range.end)
     }
 
-    /// Where the marker on the hand stands if it is learned: three coordinates of its origin.
+    /// The place of the marker on the hand, three coordinates of its origin, if it is learned.
     pub fn marker(&self) -> Option<Range<usize>> {
         self.block(self.hand).map(|range| range.start..range.start + 3)
     }

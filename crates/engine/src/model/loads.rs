@@ -1,4 +1,4 @@
-//! What gravity does to a robot whose joints give way.
+//! The torques of gravity on joints that give way.
 //!
 //! Joint i turns by c τᵢ more than its reading says, τᵢ being the torque about it with which gravity pulls at a mass of 1 kg:
 //!
@@ -18,7 +18,7 @@ use crate::kinematics::{Joint, JointKind, Tree, correction::LOADS};
 /// g, m/s².
 pub const GRAVITY: f64 = 9.81;
 
-/// What pulls at the joints.
+/// A load that pulls at the joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Load {
     /// A mass at the hand's target.
@@ -28,10 +28,10 @@ pub enum Load {
 }
 
 impl Load {
-    /// Both, in the order of [`Correction::compliance`](super::Correction).
+    /// All loads, in the order of [`Correction::compliance`](super::Correction).
     pub const ALL: [Self; LOADS] = [Self::Target, Self::Elbow];
 
-    /// Its name.
+    /// The load's name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Target => "target",
@@ -45,32 +45,32 @@ impl Load {
 pub struct Mass {
     /// The link that carries it: 0 is the base, i what moves with the i-th joint.
     pub link: usize,
-    /// Where it is at θ = 0, in the frame of the base, metres.
+    /// Its position at θ = 0, in the frame of the base, metres.
     pub place: Point3<f64>,
 }
 
-/// An axis in a posture.
+/// An axis at a posture.
 struct Placed {
     pivot: Point3<f64>,
     w: Vector3<f64>,
 }
 
-/// The robot as it is described, and the masses at which gravity pulls.
+/// The described robot, and the masses at which gravity pulls.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loads {
     /// The axes at θ = 0, in the frame of the base.
     pub joints: Vec<Joint>,
     /// Which joint carries which.
     pub tree: Tree,
-    /// Away from the ground, in the frame of the base.
+    /// The upward direction, in the frame of the base.
     pub up: UnitVector3<f64>,
-    /// By load.
+    /// The masses, by load.
     pub masses: [Mass; LOADS],
 }
 
 impl Loads {
-    /// Those of a robot as it is described: a mass at its hand, and one where the axis of the revolute joint `elbow` is written to
-    /// be; of the middle revolute joint (the earlier of two) if none is named.
+    /// The loads of a described robot: a mass at its hand, and one at the written pivot of the revolute joint `elbow`; of the
+    /// middle revolute joint (the earlier of two) if none is named.
     pub fn new(described: &State, up: UnitVector3<f64>, elbow: Option<usize>) -> Self {
         let link = described.hand_link();
         let elbow = elbow.or_else(|| middle(&described.joints)).unwrap_or(0);
@@ -89,7 +89,7 @@ impl Loads {
         self.tree.moves(joint, self.mass(load).link) && self.joints[joint].kind() == JointKind::Revolute
     }
 
-    /// By joint, the torque of every load at readings (rad or m), N·m per kg.
+    /// The torque of every load about every joint at readings (rad or m), N·m per kg.
     pub fn torques(&self, readings: &[f64]) -> Vec<[f64; 2]> {
         let (axes, places) = self.posture(readings);
         let torque = |joint: usize, Placed { pivot, w }: &Placed| {
@@ -119,7 +119,7 @@ impl Loads {
         })
     }
 
-    /// Where the axes and the masses are.
+    /// The axes and the masses at readings.
     fn posture(&self, readings: &[f64]) -> (Vec<Placed>, [Point3<f64>; LOADS]) {
         let links = self
             .tree

@@ -14,7 +14,7 @@ use rand::Rng;
 use super::{State, eigen};
 use crate::kinematics::JointBox;
 
-/// The postures within joint limits in which a target of a robot is at a place.
+/// The postures within joint limits at which a target of a robot is at a given place.
 #[derive(Clone, Copy, Debug)]
 pub struct Manifold<'a> {
     state: &'a State,
@@ -25,23 +25,24 @@ pub struct Manifold<'a> {
 
 /// A posture counts as on the manifold when its target is this near to the place, metres.
 const LANDED_M: f64 = 1e-10;
-/// Nearer than this rounding lets nobody come, metres.
+/// The distance below which rounding ends the search, metres.
 const EXACT_M: f64 = 1e-13;
 /// Steps of one projection.
 const STEPS: usize = 100;
 /// The longest step of a joint, rad or m.
 const LONGEST_STEP: f64 = 0.5;
-/// A joint this near to its limit is at it, rad or m: rounding leaves it a hair within.
+/// The distance from a limit, rad or m, below which a joint counts as being at it, because rounding leaves it a hair
+/// within.
 const TOUCHING: f64 = 2e-9;
-/// λ at first and at most, m².
+/// λ, at first and at most, m².
 const DAMPING: f64 = 1e-4;
 const STUCK: f64 = 1e4;
-/// Steps towards the nearest posture, and when they are too short to go on, rad or m.
+/// The most steps towards the nearest posture, and the length of a step (rad or m) below which they end.
 const SLIDES: usize = 1000;
 const STILL: f64 = 1e-11;
 
 impl<'a> Manifold<'a> {
-    /// Of the postures of `state` within `limits` in which `target` is at `place` (metres, frame of the measurements).
+    /// The manifold of `state` within `limits` on which `target` is at `place` (metres, frame of the measurements).
     pub fn new(state: &'a State, target: usize, place: Point3<f64>, limits: &'a JointBox) -> Self {
         Self { state, target, place, limits }
     }
@@ -125,7 +126,8 @@ impl<'a> Manifold<'a> {
         if columns.is_empty() { DMatrix::zeros(positions.len(), 0) } else { DMatrix::from_columns(&columns) }
     }
 
-    /// A posture drawn uniformly within the limits and projected; drawn again until one lands, but not for ever.
+    /// A posture drawn uniformly within the limits and projected; draws are repeated a limited number of times until
+    /// one lands.
     pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> Option<Vec<f64>> {
         const PATIENCE: usize = 200;
         (0..PATIENCE).find_map(|_| self.project(&self.limits.draw(rng)))
@@ -147,7 +149,7 @@ impl<'a> Manifold<'a> {
         .filter(|step| step.amax() > 0.0)
     }
 
-    /// What of a way leads along the tangent.
+    /// The part of `way` that leads along the tangent.
     fn slide(&self, jacobian: &Matrix3xX<f64>, way: &DVector<f64>, positions: &[f64]) -> DVector<f64> {
         let along = self.unpressed(positions, |free| {
             let free = masked(jacobian, free);

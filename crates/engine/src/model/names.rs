@@ -1,4 +1,4 @@
-//! What blocks and their coordinates are called, and what is said of those that nothing determines.
+//! The names of blocks and their coordinates, and sentences about those that no measurement determines.
 
 use std::ops::Range;
 
@@ -13,18 +13,18 @@ const NAMED: f64 = 0.05;
 /// The names of everything that can be learned.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names {
-    /// Of joints.
+    /// The joints' names.
     pub joints: Vec<String>,
-    /// Of targets.
+    /// The targets' names.
     pub targets: Vec<String>,
-    /// Of cameras.
+    /// The cameras' names.
     pub cameras: Vec<String>,
-    /// Of sockets.
+    /// The sockets' names.
     pub sockets: Vec<String>,
 }
 
 impl Names {
-    /// A block, as the object of a sentence.
+    /// The block as the object of a sentence.
     pub fn block(&self, block: Block) -> String {
         let of = |names: &[String], index: usize| names.get(index).cloned().unwrap_or_else(|| format!("{}", index + 1));
         match block {
@@ -46,7 +46,7 @@ impl Names {
         }
     }
 
-    /// By tangent coordinate of a layout: what it is.
+    /// The name of every tangent coordinate of a layout.
     pub fn coordinates(&self, layout: &Layout, state: &State) -> Vec<String> {
         let ends = |block: Block| -> &'static [&'static str] {
             match block {
@@ -69,7 +69,8 @@ impl Names {
         layout.blocks().flat_map(named).collect()
     }
 
-    /// What the directions in the columns of `free` (m × k, orthonormal) are, which `by` does not tell; `None` without any.
+    /// A sentence that names the directions in the columns of `free` (m × k, orthonormal), which `by` does not determine;
+    /// `None` without any.
     pub fn untold(&self, layout: &Layout, free: &DMatrix<f64>, by: &str) -> Option<String> {
         let count = free.ncols();
         if count == 0 {
@@ -87,7 +88,7 @@ impl Names {
     }
 }
 
-/// "a, b and c".
+/// The names as a list in words: "a, b and c".
 pub fn listed(mut names: Vec<String>) -> String {
     match names.pop() {
         Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),

@@ -30,38 +30,38 @@ struct Column {
 /// A frame that parameters move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Frame {
-    /// Of a link.
+    /// The frame of a link.
     Link(usize),
-    /// Of a target.
+    /// The frame of a target.
     Target(usize),
-    /// Of a device.
+    /// The frame of a device.
     Device(usize),
 }
 
-/// Links and twists of one state at one posture after another.
+/// The links and twists of one state, computed at one posture after another.
 #[derive(Clone, Debug)]
 pub struct Pass<'a> {
     state: &'a State,
     layout: &'a Layout,
-    /// By joint: the coordinates of its corrections, and f.
+    /// The coordinates of each joint's corrections, and f.
     corrections: Vec<Vec<(usize, Term)>>,
-    /// By joint: where its axis stands (usize::MAX if it is not learned), and its basis.
+    /// The place of each joint's axis (usize::MAX if it is not learned), and its basis.
     axes: Vec<(usize, Matrix3x2<f64>)>,
-    /// Where joints give way, or may be learned to.
+    /// The loads, where joints give way or their compliance is learned.
     loads: Option<&'a Loads>,
-    /// By joint: what it bears, N·m per kg; empty without loads.
+    /// The torques on each joint, N·m per kg; empty without loads.
     torques: Vec<[f64; 2]>,
-    /// Where it stands.
+    /// The readings of the present posture.
     positions: Vec<f64>,
     links: Vec<Motion>,
-    /// Of base, axes and corrections, joint by joint.
+    /// The columns of base, axes and corrections, joint by joint.
     columns: Vec<Column>,
 }
 
 const HELD: usize = usize::MAX;
 
 impl<'a> Pass<'a> {
-    /// At no posture yet: [`at`](Self::at) comes first.
+    /// A pass at no posture yet: call [`at`](Self::at) first.
     pub fn new(state: &'a State, layout: &'a Layout) -> Self {
         let corrections = layout.corrections();
         let loads = if layout.has_compliance() { state.loads.as_deref() } else { state.bending() };
@@ -76,17 +76,17 @@ impl<'a> Pass<'a> {
         Self { state, layout, corrections, axes, loads, torques: Vec::new(), positions, links, columns }
     }
 
-    /// The state.
+    /// The state that is passed.
     pub fn state(&self) -> &'a State {
         self.state
     }
 
-    /// What of it is learned.
+    /// The layout of what is learned.
     pub fn layout(&self) -> &'a Layout {
         self.layout
     }
 
-    /// The readings where it stands, rad or m, one per joint.
+    /// The readings of the present posture, rad or m, one per joint.
     pub fn positions(&self) -> &[f64] {
         &self.positions
     }
@@ -151,12 +151,12 @@ impl<'a> Pass<'a> {
         moving.map(|column| (column.coordinate, &column.twist))
     }
 
-    /// Where a link is: the motion from θ = 0 in the robot's frame into the frame of the measurements.
+    /// The motion of a link: from θ = 0 in the robot's frame into the frame of the measurements.
     pub fn link(&self, link: usize) -> &Motion {
         &self.links[link]
     }
 
-    /// Where a target is, metres.
+    /// The position of a target, metres.
     #[inline]
     pub fn target(&self, target: usize) -> Vector3<f64> {
         let target = &self.state.targets[target];
@@ -178,7 +178,7 @@ impl<'a> Pass<'a> {
         x
     }
 
-    /// Where a frame is.
+    /// The pose of a frame.
     pub fn pose(&self, frame: Frame) -> Isometry3<f64> {
         match frame {
             Frame::Link(link) => self.links[link].pose(),
@@ -215,7 +215,7 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// The twist (linear at the frame's own origin, then angular; 6 × m) by which every parameter moves a frame.
+    /// The twist (6 × m; linear at the frame's own origin, then angular) by which every parameter moves a frame.
     pub fn frame_twists(&self, frame: Frame) -> Matrix6xX<f64> {
         let mut columns = Matrix6xX::zeros(self.layout.dimension());
         let origin = self.pose(frame).translation.vector;
@@ -226,8 +226,8 @@ impl<'a> Pass<'a> {
         columns
     }
 
-    /// The twist (linear at the frame's own origin, then angular; 6 × m; in the frame `seen_from`) by which every parameter moves a
-    /// frame as it is seen from another: the difference of the twists of the two.
+    /// The twist (6 × m; linear at the frame's own origin, then angular; in the frame `seen_from`) by which every parameter moves a
+    /// frame as seen from another: the difference of the two frames' twists.
     pub fn relative_twists(&self, frame: Frame, seen_from: Frame) -> Matrix6xX<f64> {
         let mut columns = Matrix6xX::zeros(self.layout.dimension());
         let [x, observer] = [frame, seen_from].map(|frame| self.pose(frame));
@@ -242,8 +242,8 @@ impl<'a> Pass<'a> {
         columns
     }
 
-    /// The adjoint of [`frame_twists`](Self::frame_twists): what the derivatives of a value by the motion of a frame (by the velocity
-    /// of its origin, then by its angular velocity) make of the derivatives by all coordinates (m).
+    /// The adjoint of [`frame_twists`](Self::frame_twists): turns the derivative of a value by the frame's motion (by the velocity of
+    /// its origin, then by its angular velocity) into its derivative by all coordinates (m).
     pub fn adjoint(&self, frame: Frame, by_twist: &Vector6<f64>) -> DVector<f64> {
         let mut slope = DVector::zeros(self.layout.dimension());
         let (force, torque) = (by_twist.fixed_rows::<3>(0), by_twist.fixed_rows::<3>(3));

@@ -36,17 +36,17 @@ pub struct Points {
     joints: Vec<Learned>,
     /// Tangent coordinates, m.
     dimension: usize,
-    /// In the order of their links.
+    /// The points, in the order of their links.
     places: Vec<Place>,
 }
 
-/// What of a joint is learned.
+/// The learned parameters of a joint.
 #[derive(Clone, Debug)]
 struct Learned {
     kind: JointKind,
-    /// Where its axis stands, if that is learned.
+    /// The place of its axis, if that is learned.
     axis: Option<usize>,
-    /// Where corrections of θ stand, and what they are multiplied by.
+    /// The places of its corrections, and what they multiply.
     terms: Vec<(usize, Term)>,
 }
 
@@ -55,13 +55,13 @@ struct Learned {
 struct Place {
     /// The link that carries it.
     link: usize,
-    /// The point and the axes of its link, as the kernel has them.
+    /// The point and the axes of its link, as the kernel holds them.
     fixed: Placed,
-    /// Where its own coordinates stand, if they are learned.
+    /// The place of its own coordinates, if they are learned.
     own: Option<usize>,
-    /// What columns are multiplied by.
+    /// The whitening of its columns.
     whitening: Whitening,
-    /// Which of the points it is.
+    /// Its index among the points.
     index: usize,
 }
 
@@ -74,18 +74,18 @@ pub enum Whitening {
     Full(Matrix3<f64>),
 }
 
-/// What is wanted of postures beside the places of points.
+/// An output that is asked for beside the positions of points.
 enum Wanted<'a> {
-    /// The rows of each group.
+    /// The Jacobian's rows of each group.
     Rows(&'a mut [f64]),
-    /// Of what multiplies the rows of each group, the derivatives of the product.
+    /// The derivatives of the Jacobian's rows of each group, multiplied by given numbers.
     Slopes(&'a [f64], &'a mut [f64]),
     /// The rows of each group, and its joints.
     Centres(&'a mut [f64], &'a mut [f64]),
 }
 
-/// Where the rows of one point at a few postures of a group are put: of each tangent coordinate all equations, of each of them
-/// one candidate beside the other.
+/// The output for the rows of one point at a few postures of a group: for each tangent coordinate all equations, for each
+/// equation its candidates side by side.
 struct Columns<'a> {
     /// The rows of the group, `equations × GROUP` numbers for each coordinate; all zero at first.
     rows: &'a mut [f64],
@@ -138,7 +138,7 @@ impl Points {
         Some(Self { base, kernel, joints, dimension: layout.dimension(), places })
     }
 
-    /// Equations of a candidate: three for each point.
+    /// The number of equations of a candidate: three for each point.
     pub fn equations(&self) -> usize {
         3 * self.places.len()
     }
@@ -201,7 +201,7 @@ impl Points {
         self.joints.iter().enumerate().take(link).filter(move |(joint, _)| tree.moves(*joint, link))
     }
 
-    /// Puts the rows of a point at x, whose link has these axes.
+    /// Writes the Jacobian's rows of a point at x, whose link has these axes.
     #[inline(always)]
     fn put<S: Simd>(
         &self,

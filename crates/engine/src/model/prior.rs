@@ -40,18 +40,18 @@ use crate::{
 pub struct Prior {
     guess: State,
     blocks: Vec<(Block, Range<usize>, Knowledge)>,
-    /// P₀; of blocks that may be anywhere the variance of such a draw, on the diagonal.
+    /// P₀; for blocks that may be anywhere, the variance of a uniform draw, on the diagonal.
     #[serde(with = "crate::as_numbers")]
     covariance: DMatrix<f64>,
-    /// P₀⁻¹ of the blocks around the guess; nothing of the others.
+    /// P₀⁻¹ of the blocks around the guess; zero for the others.
     #[serde(with = "crate::as_numbers")]
     information: DMatrix<f64>,
     /// L with L Lᵀ = P₀.
     #[serde(with = "crate::as_numbers")]
     root: DMatrix<f64>,
-    /// Pairs of blocks around the guess, by their places, whose information is not zero, but for those of lines alone.
+    /// Pairs of blocks around the guess, by their places, that share information; lines alone excluded.
     coupled: Vec<(usize, usize)>,
-    /// By block: the information of a line whose errors have nothing to do with those of any other block.
+    /// By block: the information of a line whose errors are independent of those of every other block.
     #[serde(with = "crate::as_numbers")]
     lines: Vec<Option<Matrix4<f64>>>,
 }
@@ -59,7 +59,7 @@ pub struct Prior {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 enum Knowledge {
     Around,
-    /// Within ± so many metres.
+    /// Anywhere within ± this many metres.
     Anywhere(f64),
 }
 
@@ -86,18 +86,31 @@ type Slopes = (DMatrix<f64>, DMatrix<f64>);
 pub type Derivatives<'a> = (&'a mut DMatrix<f64>, &'a mut DVector<f64>);
 
 impl Prior {
-    /// Around `guess` with the covariance P₀ (m × m) of its tangent coordinates.
+    /// A prior around `guess` with the covariance P₀ (m × m) of its tangent coordinates.
+    ///
+    /// # Errors
+    ///
+    /// [`PriorError::NotPositive`] if the covariance is not m × m, symmetric and positive definite.
     pub fn around(guess: State, layout: &Layout, covariance: DMatrix<f64>) -> Result<Self, PriorError> {
         Self::new(guess, layout, covariance, |_| None)
     }
 
-    /// Around `guess` with independent standard deviations, one per tangent coordinate.
+    /// A prior around `guess` with independent standard deviations, one per tangent coordinate.
+    ///
+    /// # Errors
+    ///
+    /// [`PriorError::NotPositive`] if there are not m deviations, or a square of one is not positive.
     pub fn with_deviations(guess: State, layout: &Layout, deviations: &DVector<f64>) -> Result<Self, PriorError> {
         Self::around(guess, layout, DMatrix::from_diagonal(&deviations.map(|sd| sd * sd)))
     }
 
-    /// As [`around`](Self::around), but blocks for which `within` tells a bound (metres) may be anywhere within it: of
-    /// what the guess and the covariance say of them nothing counts.
+    /// A prior whose blocks lie around `guess` with this covariance (m × m), but for those to which `within` gives a
+    /// bound (metres): they may be anywhere within ± that bound, and their part of guess and covariance is ignored.
+    ///
+    /// # Errors
+    ///
+    /// [`PriorError::NotPositive`] if the covariance is not m × m, symmetric and positive definite;
+    /// [`PriorError::Unbounded`] if `within` bounds a block of plain numbers.
     pub fn new(
         guess: State,
         layout: &Layout,

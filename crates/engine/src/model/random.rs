@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{Block, Correction, Device, Load, Loads, Place, State, Target};
 use crate::kinematics::{Joint, Line, Tree};
 
-/// A direction anywhere.
+/// A direction drawn uniformly.
 pub fn random_direction(rng: &mut ChaCha8Rng) -> UnitVector3<f64> {
     loop {
         let v = Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));
@@ -17,7 +17,7 @@ pub fn random_direction(rng: &mut ChaCha8Rng) -> UnitVector3<f64> {
     }
 }
 
-/// A point in a cube of two metres.
+/// A point drawn from a cube of two metres.
 pub fn random_point(rng: &mut ChaCha8Rng) -> Point3<f64> {
     Point3::from(Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0)))
 }
@@ -42,7 +42,7 @@ pub fn random_arm(rng: &mut ChaCha8Rng, joints: usize) -> State {
     State::arm(joints, random_point(rng))
 }
 
-/// An arm with everything that there is: a base, corrections, targets and devices on any link, sockets.
+/// An arm with every kind of block: a base, corrections, targets and devices on any link, sockets.
 pub fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
     let mut state = random_arm(rng, joints);
     state.base = random_pose(rng);
@@ -73,7 +73,7 @@ pub fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
     state
 }
 
-/// The same robot with its joints on branches.
+/// `state` with its joints rearranged on branches.
 pub fn branched(state: State, rng: &mut ChaCha8Rng) -> State {
     let parent = |joint: usize| match rng.random_range(0..4) {
         0 => None,
@@ -85,7 +85,7 @@ pub fn branched(state: State, rng: &mut ChaCha8Rng) -> State {
     State { tree, loads, ..state }
 }
 
-/// The same where no joint gives way to loads, and all its blocks but those of loads.
+/// A random state whose joints do not give way to loads, and all its blocks but those of loads.
 pub fn random_stiff_state(rng: &mut ChaCha8Rng, joints: usize) -> (State, Vec<Block>) {
     stiff(random_state(rng, joints))
 }

@@ -1,12 +1,11 @@
-//! How many independent equations there are, and what they leave open.
+//! The number of independent equations, and the directions that they leave open.
 
 use nalgebra::{DMatrix, DVector, Dyn, SVD, SymmetricEigen};
 
 /// Iterations of a decomposition for each row, at most: some five are enough.
 const ITERATIONS: usize = 1000;
 
-/// Eigenvalues and eigenvectors of a symmetric matrix; `None` where a number in it is none, on which the search for them would not
-/// end.
+/// Eigenvalues and eigenvectors of a symmetric matrix; `None` if an entry is not finite, on which the search would not end.
 pub fn eigen(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     if !matrix.iter().all(|x| x.is_finite()) {
         return None;
@@ -18,7 +17,7 @@ pub fn eigen(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     SymmetricEigen::try_new(matrix, f64::EPSILON, ITERATIONS * rows)
 }
 
-/// The singular value decomposition, with U if asked for; `None` where a number in the matrix is none, or there is no number.
+/// The singular value decomposition, with U if asked for; `None` if an entry is not finite or the matrix is empty.
 pub fn singular(matrix: DMatrix<f64>, with_u: bool) -> Option<SVD<f64, Dyn, Dyn>> {
     if matrix.is_empty() || !matrix.iter().all(|x| x.is_finite()) {
         return None;

@@ -7,48 +7,48 @@ use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3};
 use super::{Block, Frame, Layout, Loads};
 use crate::kinematics::{Correction, Joint, Tree, TreeError};
 
-/// Everything that can be learned: joints from base to hand, and what is placed on links or beside the robot.
+/// The state: everything that can be learned, from joints (base to hand) to what is placed on links or beside the robot.
 ///
-/// Axes, and places on links, are written where they are at θ = 0, in the frame of the nominal base; `base` carries that
-/// into the frame of the measurements. Where axes are all free the two frames are taken to be one, and the base is known
-/// to be the identity.
+/// Axes and places on links are written where they are at θ = 0, in the frame of the nominal base; `base` carries that
+/// frame into the one of the measurements. Where all axes are free the two frames are taken to be one, and the base is
+/// the identity.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
-    /// Carries the robot's frame into that of the measurements.
+    /// The pose of the robot's frame in the frame of the measurements.
     #[serde(with = "crate::as_numbers")]
     pub base: Isometry3<f64>,
     /// The joints in order, those nearer to the base first.
     pub joints: Vec<Joint>,
-    /// Which joint carries which; of an arm each the next, which is stored as no parents at all.
+    /// Which joint carries which. In an arm each carries the next, which is stored as no parents at all.
     #[serde(rename = "parents", default)]
     pub tree: Tree,
-    /// By joint: what its readings are corrected by.
+    /// The correction of each joint's readings.
     pub corrections: Vec<Correction>,
-    /// What joints that give way bear; without it none does. Not stored with the rest: it belongs to the robot.
+    /// The loads on joints that give way; without it none gives way. Not stored with the rest: it belongs to the robot.
     #[serde(skip)]
     pub loads: Option<Arc<Loads>>,
-    /// What is looked at; the first is the marker.
+    /// The targets that are measured; the first is the marker.
     pub targets: Vec<Target>,
-    /// What looks on: cameras, anchors of cables.
+    /// The devices that measure: cameras, anchors of cables.
     pub devices: Vec<Device>,
     /// Places beside the robot, in the frame of the measurements, metres.
     #[serde(with = "crate::as_numbers")]
     pub sockets: Vec<Point3<f64>>,
-    /// What the robot is asked to bring somewhere: the marker.
+    /// The part of the robot whose place is asked for: usually the marker.
     pub hand: Hand,
 }
 
-/// What of a robot is its hand, so that predictions are of it.
+/// The hand: what predictions are about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Hand {
     /// The origin of a target.
     Target(usize),
-    /// The origin of a device, as of a camera that the hand carries.
+    /// The origin of a device, such as a camera that the hand carries.
     Device(usize),
 }
 
 impl Hand {
-    /// Its frame.
+    /// The hand's frame.
     pub fn frame(self) -> Frame {
         match self {
             Self::Target(target) => Frame::Target(target),
@@ -56,7 +56,7 @@ impl Hand {
         }
     }
 
-    /// Its block.
+    /// The hand's block.
     pub fn block(self) -> Block {
         match self {
             Self::Target(target) => Block::Target(target),
@@ -70,24 +70,24 @@ impl Hand {
 pub struct Thetas<'a> {
     corrections: &'a [Correction],
     readings: &'a [f64],
-    /// Empty where no joint gives way.
+    /// The torques by joint; empty where no joint gives way.
     torques: Vec<[f64; 2]>,
 }
 
 impl Thetas<'_> {
-    /// A joint's, rad or m.
+    /// The position of a joint, rad or m.
     pub fn of(&self, joint: usize) -> f64 {
         let torques = self.torques.get(joint).copied().unwrap_or_default();
         self.corrections[joint].loaded(self.readings[joint], &torques)
     }
 }
 
-/// Something fixed to a link.
+/// A target: something fixed to a link that can be measured.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Target {
     /// The link: 0 is the base, i what moves with the i-th joint.
     pub link: usize,
-    /// Where it is at θ = 0.
+    /// Its place at θ = 0.
     pub place: Place,
 }
 
@@ -101,7 +101,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// The point, or the body's origin, metres.
+    /// The point itself, or the body's origin, metres.
     pub fn origin(&self) -> Point3<f64> {
         match self {
             Self::Point(point) => *point,
@@ -109,7 +109,7 @@ impl Place {
         }
     }
 
-    /// Its own frame; that of a point is not turned.
+    /// The target's own frame; a point's frame has no rotation.
     pub fn frame(&self) -> Isometry3<f64> {
         match self {
             Self::Point(point) => Translation3::from(point.coords).into(),
@@ -210,7 +210,7 @@ impl State {
         }
     }
 
-    /// The same with the marker at another place, metres.
+    /// This robot with its marker at another place, metres.
     pub fn with_marker(mut self, marker: Point3<f64>) -> Self {
         match self.hand {
             Hand::Device(device) => self.devices[device].pose.translation = marker.coords.into(),
@@ -226,12 +226,12 @@ impl State {
         self
     }
 
-    /// The link that carries the hand; that of a device beside the robot is the base.
+    /// The link that carries the hand; the base for a device beside the robot.
     pub fn hand_link(&self) -> usize {
         self.link_of(self.hand.frame()).unwrap_or(0)
     }
 
-    /// The link that carries a frame; `None` for one beside the robot, or that is not there.
+    /// The link that carries a frame; `None` if it stands beside the robot or does not exist.
     pub(super) fn link_of(&self, frame: Frame) -> Option<usize> {
         match frame {
             Frame::Link(link) => Some(link),
@@ -246,15 +246,15 @@ impl State {
         Thetas { corrections: &self.corrections, readings: positions, torques }
     }
 
-    /// The loads, where a joint gives way to them.
+    /// The loads, if any joint gives way to them.
     pub fn bending(&self) -> Option<&Loads> {
         let loads = self.loads.as_deref()?;
         let gives_way = |correction: &Correction| correction.compliance.iter().any(|by| *by != 0.0);
         self.corrections.iter().any(gives_way).then_some(loads)
     }
 
-    /// What the joints do to each link, `base e^{ξθ} …` along the path to it: the i-th carries what is fixed to link i (0 is the
-    /// base) from where it is at θ = 0 into the frame of the measurements.
+    /// The motion of each link, `base e^{ξθ} …` along the path to it: the i-th carries what is fixed to link i (0 is the base)
+    /// from where it is at θ = 0 into the frame of the measurements.
     pub fn links(&self, positions: &[f64]) -> Vec<Isometry3<f64>> {
         let thetas = self.thetas(positions);
         self.tree.links(self.base, &self.joints, |joint| thetas.of(joint))
@@ -272,7 +272,7 @@ impl State {
         points
     }
 
-    /// The same robot with its axes and places in the frame of the measurements, so that the base is the identity.
+    /// This robot with its axes and places in the frame of the measurements, so that the base is the identity.
     pub fn measured(&self) -> Cow<'_, Self> {
         if self.base == Isometry3::identity() {
             return Cow::Borrowed(self);
@@ -280,7 +280,7 @@ impl State {
         Cow::Owned(Self { base: Isometry3::identity(), ..self.carried(&self.base, |_| true) })
     }
 
-    /// The robot with what hangs on some links carried by a motion of its own frame, as everything is placed at θ = 0.
+    /// This robot with everything on some links moved by `motion` in its own frame, at θ = 0.
     pub fn carried(&self, motion: &Isometry3<f64>, is_moved: impl Fn(usize) -> bool) -> Self {
         let mut state = self.clone();
         for (index, joint) in
@@ -300,15 +300,15 @@ impl State {
         state
     }
 
-    /// The same robot with the point of every axis slid to where it is nearest to the axis point of `reference`: the
-    /// same kinematics, drawn comparably.
+    /// This robot with the point of every axis slid to where it is nearest to the axis point of `reference`: the
+    /// kinematics are unchanged, and drawings are comparable.
     pub fn slid_towards(&self, reference: &Self) -> Self {
         let mut state = self.clone();
         state.slide_towards(reference);
         state
     }
 
-    /// The same in place.
+    /// Slides the points of this robot's axes in place, as [`slid_towards`](Self::slid_towards) does.
     pub(crate) fn slide_towards(&mut self, reference: &Self) {
         for (joint, reference) in self.joints.iter_mut().zip(&reference.joints) {
             if let (Joint::Revolute(line), Some(other)) = (joint, reference.line()) {

@@ -1,12 +1,13 @@
-//! Where predictions count: the configurations over which the hand is predicted.
+//! The workspace: the configurations over which predictions of the hand count.
 //!
-//! Measurements may leave open where the whole robot stands (a camera on the hand that sees a board at an unknown place). Then
-//! only the shape of what is predicted counts, and errors are taken after the rigid motion that fits best. To first order that
-//! takes the part of every column of the stacked Jacobian away that one rigid motion of all predicted points explains:
-//! J − Q Qᵀ J, with Q an orthonormal basis of the six motions.
+//! Measurements may leave open where the whole robot stands (a camera on the hand that sees a board at an unknown place). Then only the
+//! shape of what is predicted counts, and errors are taken after the rigid motion that fits best. To first order this removes from every
+//! column of the stacked Jacobian the part that one rigid motion of all predicted points explains: J − Q Qᵀ J, with Q an orthonormal
+//! basis of the six motions.
 //!
-//! Or nothing counts but that the hand is at one place in several postures, wherever that is (a ball in a socket). Then errors are taken
-//! from their mean over the postures of the place: Jᵢ − J̄, with J̄ the mean over those. A robot that is everywhere larger has none.
+//! Or only the scatter of the hand counts over several postures in which it is at one place, wherever that is (a ball in a socket). Then
+//! errors are taken from their mean over the postures of the place: Jᵢ − J̄, with J̄ the mean over those. An error that makes the robot
+//! larger everywhere causes no such scatter.
 
 use std::{collections::BTreeMap, ops::SubAssign};
 
@@ -14,14 +15,14 @@ use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Rotation3, SVD, Translation3
 
 use super::{Layout, State, jacobian, singular};
 
-/// Configurations, and what an error there is.
+/// Configurations, and how errors over them are measured.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Workspace {
     /// Joint positions, rad or m.
     pub configurations: Vec<Vec<f64>>,
     /// Whether errors are taken after the rigid motion that fits best.
     pub up_to_motion: bool,
-    /// By configuration the number of its place, where errors are taken from their mean over those of one place; empty otherwise.
+    /// The number of each configuration's place, where errors are taken from their mean over one place; empty otherwise.
     pub places: Vec<usize>,
 }
 
@@ -32,8 +33,8 @@ impl From<Vec<Vec<f64>>> for Workspace {
 }
 
 impl Workspace {
-    /// Of postures by the number of the place that each is at, where errors are taken from their mean over each place. Of one posture
-    /// there is nothing to compare.
+    /// A workspace of postures, each with the number of its place, where errors are taken from their mean over each place. A place
+    /// with a single posture leaves nothing to compare.
     pub fn at_places<'a>(postures: impl IntoIterator<Item = (usize, &'a [f64])>) -> Self {
         let postures: Vec<(usize, &[f64])> = postures.into_iter().collect();
         let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
@@ -48,13 +49,13 @@ impl Workspace {
         self.configurations.iter().map(|theta| state.marker_at(theta)).collect()
     }
 
-    /// Whether nothing counts but that the hand is at one place in several postures.
+    /// Whether only the scatter over postures at one place counts.
     fn meets_itself(&self) -> bool {
         !self.places.is_empty()
     }
 
-    /// The Jacobians of the predicted hand, one upon the other (3N × m), without what a rigid motion of all explains if that
-    /// does not count, or without their mean over each place.
+    /// The stacked Jacobians (3N × m) of the predicted hand, without what a rigid motion of all explains if that does not
+    /// count, or without their mean over each place.
     pub fn jacobian(&self, state: &State, layout: &Layout) -> DMatrix<f64> {
         let count = self.configurations.len();
         let up_to_motion = self.up_to_motion && !self.meets_itself();
@@ -121,7 +122,7 @@ impl Workspace {
     }
 }
 
-/// The rigid motion that brings points nearest to others, in the sum of squares (Kabsch 1976).
+/// The rigid motion that brings points nearest to others in least squares (Kabsch 1976).
 pub fn best_motion(from: &[Point3<f64>], to: &[Point3<f64>]) -> Isometry3<f64> {
     let centre = |points: &[Point3<f64>]| {
         points.iter().map(|point| point.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64

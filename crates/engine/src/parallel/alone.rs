@@ -1,11 +1,11 @@
-//! One batch after the other on this thread: what [`batches`](super) is without the feature `parallel`.
+//! Batches evaluated one after the other on this thread: the form of [`batches`](super) without the feature `parallel`.
 
-/// Evaluates batches.
+/// An evaluator of batches.
 pub struct Batches<'a, C> {
     evaluate: &'a (dyn Fn(&[C]) -> Vec<f64> + Sync),
 }
 
-/// Does `work` with what evaluates batches by `evaluate`, `candidates` in all.
+/// Calls `work` with an evaluator of batches that uses `evaluate`, for `candidates` in all.
 pub fn shared<C, R>(
     evaluate: &(dyn Fn(&[C]) -> Vec<f64> + Sync),
     _candidates: usize,

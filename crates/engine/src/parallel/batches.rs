@@ -11,56 +11,56 @@ use std::{
 use super::pool;
 use crate::lanes::GROUP;
 
-/// Candidates are handed out in so many: as many as the narrower registers of a group hold.
+/// Candidates are shared in portions of this size: the lanes of the narrower registers of a group.
 const SHARE: usize = GROUP / 2;
 
-/// Who helps at most: batches are small.
+/// The most helpers of a batch: batches are small.
 const HELPERS: usize = 3;
 
-/// How often one who waits looks again before it lets others go first.
+/// How often a waiting thread looks again before it lets others go first.
 const LOOKS: usize = 200;
 
-/// Seconds of work for which it pays to call others: it takes them a tenth of this to wake up.
+/// Seconds of work for which waking helpers pays: that takes them a tenth of this.
 const WORTH_A_CALL: f64 = 5e-4;
 
 /// Seconds of work in a batch for which it pays to hand over a part.
 const WORTH_SHARING: f64 = 5e-6;
 
-/// Candidates by which it is judged what one costs.
+/// The number of candidates from which the cost of one is estimated.
 const JUDGED: usize = 24;
 
-/// Evaluates batches, each in parts where others help.
+/// An evaluator of batches, each divided among helpers where there are any.
 pub struct Batches<'a, C> {
     evaluate: &'a (dyn Fn(&[C]) -> Vec<f64> + Sync),
     helpers: Vec<Helper<C>>,
-    /// Calls them, as soon as it is known that it pays.
+    /// How to call helpers, once it is known that they pay.
     call: Option<Call<'a, C>>,
-    /// How many candidates a batch must have to be shared.
+    /// The least number of candidates for which a batch is shared.
     fewest: usize,
 }
 
-/// What is known before others are called.
+/// The state before helpers are called.
 struct Call<'a, C> {
     helpers: &'a dyn Fn() -> Vec<Helper<C>>,
-    /// How many candidates are still to come.
+    /// The number of candidates still to come.
     to_come: usize,
-    /// How many have been evaluated, and in how many seconds.
+    /// The number of candidates evaluated so far, and the seconds that they took.
     evaluated: usize,
     seconds: f64,
 }
 
-/// One who helps, seen from here.
+/// A helper, seen from the calling thread.
 struct Helper<C> {
     /// It may begin late, or never while others have more to do.
     is_there: bool,
     asked: Sender<Vec<C>>,
-    /// Candidates with their values; at first none, to say that it is there.
+    /// Candidates with their values; at first an empty message, which says that the helper is there.
     told: Receiver<(Vec<C>, Vec<f64>)>,
 }
 
-/// Does `work` with what evaluates batches by `evaluate`, `candidates` in all: on threads of the pool, too, that
-/// have nothing else to do, for as long as the work lasts, where there is enough of it. `evaluate` says of every candidate what
-/// it says of it in any other company, so that values do not depend on who helps.
+/// Calls `work` with an evaluator of batches that uses `evaluate`, for `candidates` in all. Where there is enough work, idle
+/// threads of the pool help for as long as it lasts. `evaluate` must give a candidate the same value in any batch, so that
+/// values do not depend on who helps.
 pub fn shared<C: Send, R>(
     evaluate: &(dyn Fn(&[C]) -> Vec<f64> + Sync),
     candidates: usize,
@@ -94,7 +94,7 @@ fn help<C>(evaluate: &(dyn Fn(&[C]) -> Vec<f64> + Sync), asks: &Receiver<Vec<C>>
     }
 }
 
-/// What comes next, looked for without falling asleep; `None` once nothing will.
+/// The next message, awaited without falling asleep; `None` once there will be none.
 fn next<T>(from: &Receiver<T>) -> Option<T> {
     let mut looks = 0;
     loop {

@@ -7,7 +7,8 @@ use crate::lanes::GROUP;
 
 pub use batches::{Batches, shared};
 
-/// `of` of every item, in order: on several cores with the feature `parallel`. The results do not depend on how many.
+/// Applies `of` to every item, in order; on several cores with the feature `parallel`. The results do not depend on the
+/// number of cores.
 pub fn mapped<T: Sync, R: Send>(items: &[T], of: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     #[cfg(feature = "parallel")]
     if let Some(_pool) = pool::taken() {
@@ -20,7 +21,8 @@ pub fn mapped<T: Sync, R: Send>(items: &[T], of: impl Fn(&T) -> R + Sync + Send)
 /// Candidates per batch product at most: enough to fill the matrix kernel, few enough for the caches and to share among cores.
 const CHUNK: usize = 16;
 
-/// Into chunks of which size so many candidates are divided: alike, as a small one costs nearly as much as a large one.
+/// The chunk size for so many candidates: chunks of nearly equal size, as a small one costs nearly as much as a large
+/// one.
 fn chunk(candidates: usize) -> usize {
     candidates.div_ceil(candidates.div_ceil(CHUNK)).next_multiple_of(GROUP)
 }
@@ -37,7 +39,7 @@ pub fn in_chunks<C: Sync>(candidates: &[C], evaluate: impl Fn(&[C]) -> Vec<f64> 
     in_turn(candidates, evaluate)
 }
 
-/// The values of all candidates, in order, a chunk at a time, here.
+/// The values of all candidates, in order, a chunk at a time, on this thread.
 pub fn in_turn<C>(candidates: &[C], evaluate: impl Fn(&[C]) -> Vec<f64>) -> Vec<f64> {
     match candidates.len() {
         0 => Vec::new(),
@@ -51,21 +53,21 @@ pub fn in_turn<C>(candidates: &[C], evaluate: impl Fn(&[C]) -> Vec<f64>) -> Vec<
 mod pool {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    /// How many who have come from elsewhere work there.
+    /// How many callers from other threads are at work there.
     static TAKEN: AtomicUsize = AtomicUsize::new(0);
 
-    /// The place of one who has come from elsewhere, until it is dropped; one of the pool's own threads needs none.
+    /// The place of a caller from another thread in the pool, until it is dropped; the pool's own threads need none.
     pub struct Place {
         is_counted: bool,
     }
 
-    /// How many places there are: with two threads for each nobody waits long.
+    /// The number of places: with two threads for each nobody waits long.
     pub fn places() -> usize {
         (rayon::current_num_threads() / 2).max(1)
     }
 
-    /// A place in the pool, or `None` while all are taken: one who has little to do does not wait behind those who have much, as
-    /// the sessions of a server would, but works alone meanwhile.
+    /// Takes a place in the pool; `None` while all are taken. A caller with little to do then works alone rather than wait
+    /// behind those with much, as the sessions of a server would.
     pub fn taken() -> Option<Place> {
         if rayon::current_thread_index().is_some() {
             return Some(Place { is_counted: false });

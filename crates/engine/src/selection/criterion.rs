@@ -86,6 +86,10 @@ pub(super) fn points(belief: &Belief, state: &State) -> Option<Arc<Points>> {
 
 impl<'a> Criterion<'a> {
     /// The A-criterion at `belief`, which must hold a covariance.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::NoCovariance`] if the belief holds no covariance.
     pub fn new(belief: &'a Belief, weights: &'a Weights) -> Result<Self, SelectionError> {
         let covariance = belief.covariance.as_ref().ok_or(SelectionError::NoCovariance)?;
         Ok(Self::over(belief, &belief.state, covariance, weights))
@@ -258,6 +262,11 @@ impl<'a> Criterion<'a> {
     }
 
     /// The criterion of one candidate and what it rests on; an error if it is no number.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::NoFiniteCriterion`] if the criterion at the candidate is not finite, unless the marker is
+    /// certainly out of view there.
     pub fn appraise(&self, candidate: &[f64]) -> Result<Appraisal, SelectionError> {
         let value = self.evaluate(&[candidate]).first().copied().unwrap_or(f64::NAN);
         self.appraisal(candidate, self.value, value)

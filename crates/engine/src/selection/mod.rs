@@ -195,7 +195,7 @@ pub enum SelectionError {
     #[error("DIRECT: {0}")]
     Search(DirectError),
     /// Not a position for every joint.
-    #[error("a configuration of {0} positions is none of this robot")]
+    #[error("this robot does not have {0} joints; give one position for each of its joints")]
     NoConfiguration(usize),
     /// A person chooses, and has not chosen yet.
     #[error("a person chooses it, and has not chosen yet; set a configuration first, then step")]
@@ -207,7 +207,7 @@ pub enum SelectionError {
     #[error("no configuration is feasible: {0}")]
     Infeasible(#[from] Infeasible),
     /// No socket can be reached.
-    #[error("no posture within the limits and constraints brings a target to its socket, as far as is believed")]
+    #[error("by the present estimate, no posture within the limits and constraints brings a target to its socket")]
     OutOfReach,
     /// No configuration has a finite criterion.
     #[error("no configuration has a finite criterion: the belief has diverged")]
@@ -218,10 +218,20 @@ pub enum SelectionError {
 /// choice.
 pub trait Policy: Send + Sync {
     /// Chooses; `rng` is for this choice alone.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError`] if no movement can be chosen: none is left, none is feasible or within reach, a person has not
+    /// chosen yet, or the criterion is not finite.
     fn select(&self, situation: &Situation<'_>, rng: &mut ChaCha8Rng) -> Result<Selection, SelectionError>;
 
     /// What a movement to `configuration` would teach, within `limits` (recorded movements have some too), by the criterion
     /// that this policy chooses by; at the estimate, where it chooses by samples of the posterior.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::NoCovariance`] or [`SelectionError::NoFiniteCriterion`] if the criterion cannot be computed at
+    /// `configuration`.
     fn appraise(
         &self,
         situation: &Situation<'_>,
@@ -231,6 +241,10 @@ pub trait Policy: Send + Sync {
 
     /// How the criterion of the next movement looks over the joint box, for a policy whose own search was for something
     /// else: a search of it by DIRECT.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError`] if the criterion cannot be computed or searched.
     fn explain(&self, _situation: &Situation<'_>, _limits: &JointBox) -> Result<Option<Search>, SelectionError> {
         Ok(None)
     }

@@ -61,6 +61,10 @@ pub(super) struct Expected {
 impl<'a> Outlook<'a> {
     /// The criterion at `belief`, which must hold a covariance, under all its hypotheses; `workspace` serves criterion I
     /// alone. [`Belief::truncate`] leaves the heaviest.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::NoCovariance`] if the belief holds no covariance.
     pub fn new(
         belief: &'a Belief,
         weights: &'a Weights,
@@ -167,6 +171,11 @@ impl<'a> Outlook<'a> {
     }
 
     /// The criterion of one candidate and what it rests on; the marker is predicted by the estimate.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::NoFiniteCriterion`] if the criterion at the candidate is not finite, unless the marker is
+    /// certainly out of view there.
     pub fn appraise(&self, candidate: &[f64]) -> Result<Appraisal, SelectionError> {
         let (_, estimate) = self.hypotheses.first().ok_or(SelectionError::NoCovariance)?;
         let value = self.evaluate(&[candidate]).first().copied().unwrap_or(f64::NAN);

@@ -67,6 +67,11 @@ impl Plan {
     }
 
     /// How many directions in parameter space, weighted as the criterion does, have a standard deviation above `unknown`.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::NoCovariance`] without a covariance; [`SelectionError::NoFiniteCriterion`] if the weighted
+    /// covariance is not finite.
     pub fn unknown(&self, weights: &Weights, unknown: f64) -> Result<usize, SelectionError> {
         let covariance = self.after.covariance.as_ref().ok_or(SelectionError::NoCovariance)?;
         let root = weights.roots();

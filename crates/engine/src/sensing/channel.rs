@@ -9,8 +9,9 @@ use crate::model::{Pass, State, Whitening};
 /// One kind of reading: what a model predicts for it, and how predictions differ from what was measured.
 ///
 /// A channel whitens: what it hands out are equations, differences divided by its own standard deviation σ (or multiplied
-/// by L⁻¹, where the covariance of its noise is L Lᵀ). Behind it R = I. Adding one takes a file here, a line in the list of
-/// this folder, and the keys that it wants in [`Keys`](super::Keys); the laws of `laws.rs` hold for all in the list.
+/// by L⁻¹, where the covariance of its noise is L Lᵀ). Behind it R = I. To add a channel takes a file here, a line in the
+/// list of this folder, and the keys that it wants in [`Keys`](super::Keys); the laws of `laws.rs` hold for all in the
+/// list.
 pub trait Channel: fmt::Debug + Send + Sync {
     /// Equations of one reading, d; as many as numbers of a reading.
     fn equations(&self) -> usize;
@@ -18,10 +19,10 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// σ, in the unit of the reading: the nominal standard deviation of its noise.
     fn sigma(&self) -> f64;
 
-    /// The same channel with another σ, and other noises in proportion.
+    /// This channel with another σ, and its other noises in proportion.
     fn with_sigma(&self, sigma: f64) -> Arc<dyn Channel>;
 
-    /// The same channel with every noise so many times as large; one factor for each of [`noises`](Self::noises).
+    /// This channel with each kind of noise multiplied by its factor, one for each of [`noises`](Self::noises).
     fn scaled(&self, factors: &[f64]) -> Arc<dyn Channel> {
         self.with_sigma(self.sigma() * factors.first().copied().unwrap_or(1.0))
     }
@@ -46,8 +47,8 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// zero at first. False where there is none; the rows then stay zero.
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool;
 
-    /// What is read where `reading` would be without noise: y = h ⊕ L v, with v standard normal (d numbers); h + σ v unless a
-    /// channel says otherwise.
+    /// Adds noise to a noise-free `reading`: y = h ⊕ L v, with v standard normal (d numbers); h + σ v unless a channel says
+    /// otherwise.
     fn disturb(&self, reading: &mut [f64], v: &[f64]) {
         reading.iter_mut().zip(v).for_each(|(reading, v)| *reading += self.sigma() * v);
     }
@@ -71,7 +72,7 @@ pub trait Channel: fmt::Debug + Send + Sync {
         None
     }
 
-    /// Whether [`clearance`](Self::clearance) is ever told.
+    /// Whether [`clearance`](Self::clearance) ever returns a number.
     fn has_view(&self) -> bool {
         false
     }
@@ -81,13 +82,14 @@ pub trait Channel: fmt::Debug + Send + Sync {
         Some((self.target()?, Point3::from_slice(reading.get(..3)?)))
     }
 
-    /// How far two readings are apart, for whoever reads of it: nothing of what is known to be 0.
+    /// The residual between two readings in physical units, for reports. It is `None` for kinds of quantity that the channel
+    /// does not measure.
     fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
         let _ = (y, h);
         Apart::default()
     }
 
-    /// The camera and the target whose known points are in its picture, two equations each, if that is what is read.
+    /// The camera and the target whose known points it pictures, two equations each, if the channel reads those.
     fn sight(&self) -> Option<(usize, usize)> {
         None
     }
@@ -97,8 +99,8 @@ pub trait Channel: fmt::Debug + Send + Sync {
         None
     }
 
-    /// The target of whose origin a reading is the three coordinates, in the frame of the measurements, and L⁻¹ of the noise;
-    /// `None` of a reading that is anything else.
+    /// The target and L⁻¹ of the noise, if a reading is the three coordinates of the target's origin in the frame of the
+    /// measurements; `None` for any other reading.
     fn point(&self) -> Option<(usize, Whitening)> {
         None
     }
@@ -114,14 +116,14 @@ pub trait Channel: fmt::Debug + Send + Sync {
     }
 }
 
-/// How far two readings of a channel are apart.
+/// The residual between two readings of a channel, in physical units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Apart {
-    /// Metres, of what is a place or a length.
+    /// The distance of places or the difference of lengths, metres.
     pub length_m: Option<f64>,
-    /// Radians, of what is a rotation.
+    /// The angle between rotations, radians.
     pub angle_rad: Option<f64>,
-    /// Pixels, mean over the points of a picture.
+    /// The distance in the picture, pixels, mean over its points.
     pub pixels: Option<f64>,
 }
 
@@ -135,7 +137,7 @@ impl Apart {
 /// When a channel has a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Occasion {
-    /// After every movement of which it sees what it measures.
+    /// After every movement at which it sees its target.
     Always,
     /// After a movement that holds a target in a socket.
     Held {
@@ -161,6 +163,11 @@ macro_rules! channels {
 
         impl Keys {
             /// The channel that these keys describe, of a robot with this equipment.
+            ///
+            /// # Errors
+            ///
+            /// [`KeyError`] if no channel has that name, or if the channel's own keys do not fit each other or the
+            /// equipment.
             pub fn channel(&self, equipment: &Equipment) -> Result<std::sync::Arc<dyn Channel>, KeyError> {
                 match self.channel.as_deref().unwrap_or(CHANNELS[0]) {
                     $(stringify!($module) => {
@@ -175,7 +182,7 @@ macro_rules! channels {
             }
         }
 
-        /// One of each, for the laws.
+        /// One example of each channel, for the laws.
         #[cfg(test)]
         pub(crate) fn examples(rng: &mut rand_chacha::ChaCha8Rng, state: &crate::model::State)
             -> Vec<std::sync::Arc<dyn Channel>> {

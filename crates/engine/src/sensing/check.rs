@@ -1,37 +1,37 @@
-//! The law that every channel keeps, to test one's own by.
+//! The law that every channel keeps, as a check for channels of your own.
 
 use nalgebra::DVector;
 
 use super::Channel;
 use crate::model::{Layout, Pass, State};
 
-/// What of a channel does not hold.
+/// A part of the law that a channel violates.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ChannelFault {
-    /// `rows` and `extended` do not agree whether there is a prediction.
+    /// `rows` and `extended` disagree on whether there is a prediction.
     #[error(
         "`rows` and `extended` do not agree on whether there is a prediction; both return false where there is none"
     )]
     Seen,
-    /// `predict` says something else than `extended`.
+    /// `predict` and `extended` give different predictions.
     #[error(
         "equation {equation}: `predict` gives {predicted}, `extended` {extended}; where there is a prediction they are equal"
     )]
     Continuation {
-        /// Counted from 0.
+        /// The equation, counted from 0.
         equation: usize,
-        /// By `predict`.
+        /// The value that `predict` gives.
         predicted: f64,
-        /// By `extended`.
+        /// The value that `extended` gives.
         extended: f64,
     },
-    /// `rows` writes another reading than `extended`.
+    /// `rows` and `extended` write different readings.
     #[error("`rows` predicts a reading that is {sigmas} standard deviations from that of `extended`")]
     Prediction {
-        /// How far they are apart.
+        /// Their difference, in standard deviations.
         sigmas: f64,
     },
-    /// There is no prediction, and rows that are not zero.
+    /// `rows` wrote numbers other than zero where there is no prediction.
     #[error("there is no prediction, but `rows` has written rows; leave them zero")]
     Left,
     /// A row is not the derivative of the whitened reading.
@@ -40,13 +40,13 @@ pub enum ChannelFault {
          rows are L⁻¹ ∂h/∂δ, whitened"
     )]
     Row {
-        /// Counted from 0.
+        /// The equation, counted from 0.
         equation: usize,
-        /// Its place in the tangent vector.
+        /// The coordinate's place in the tangent vector.
         coordinate: usize,
-        /// As `rows` has it.
+        /// The value that `rows` wrote.
         found: f64,
-        /// As central differences have it.
+        /// The value that central differences give.
         wanted: f64,
     },
 }
@@ -56,8 +56,9 @@ const STEP: f64 = 1e-6;
 /// How far a row may be off, beside the largest.
 const TOLERANCE: f64 = 1e-5;
 
-/// Whether a channel keeps the law of channels at a state and `positions` (rad or m per joint): that its whitened rows are the
-/// derivative of its whitened prediction, `L⁻¹ ∂h/∂δ`, in all coordinates of `layout`, and that all its ways to predict agree.
+/// Checks that a channel keeps the law of channels at a state and `positions` (rad or m per joint): that its whitened rows are
+/// the derivative of its whitened prediction, `L⁻¹ ∂h/∂δ`, in all coordinates of `layout`, and that all its ways to predict
+/// agree.
 ///
 /// ```
 /// use body_schema_engine::{
@@ -76,7 +77,7 @@ const TOLERANCE: f64 = 1e-5;
 ///
 /// # Errors
 ///
-/// [`ChannelFault`] names the equation and the coordinate.
+/// [`ChannelFault`] of the first part of the law that does not hold, with its equation and coordinate.
 pub fn check_channel(
     channel: &dyn Channel,
     state: &State,

@@ -11,7 +11,7 @@ use crate::model::{Pass, State};
 /// The distance of a target from a point whose place is known, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distance {
-    /// Which target.
+    /// The index of the target.
     pub target: usize,
     /// a, in the frame of the measurements, metres.
     pub to: Point3<f64>,

@@ -1,4 +1,4 @@
-//! The joints are measured too: what their readings are off by, as by a servo's play or an encoder's noise.
+//! The noise of the joints' readings, such as a servo's play or an encoder's noise.
 //!
 //! The robot stands at q + e where its joints say q, with `e ~ N(0, Σ)`, Σ = diag(σ_j²), drawn anew at every posture. To first
 //! order all readings of that posture are moved together,
@@ -16,9 +16,9 @@
 //! k = V j/√c,   ê ← ê + k r,   B ← B + k hᵀ,   V ← V − k kᵀ
 //! ```
 //!
-//! That costs n (n + m) for each of d equations, and no matrix is ever d × d. What one learns from is left out or counts less
-//! by its weight: an outlier says nothing of e, and so spoils no other reading. J is taken at q, not at q + ê: what that leaves
-//! out is of the order of e² times a length, 0.05 mm for 1 deg and 0.3 m.
+//! That costs n (n + m) for each of d equations, and no matrix is ever d × d. A reading of low weight, such as an outlier, also
+//! counts less for e, and so spoils no other reading. J is taken at q, not at q + ê: what that leaves out is of the order of e²
+//! times a length, 0.05 mm for 1 deg and 0.3 m.
 
 use std::sync::Arc;
 
@@ -33,18 +33,18 @@ use crate::{
 const USUAL_RAD: f64 = std::f64::consts::PI / 180.0;
 const USUAL_M: f64 = 0.002;
 
-/// How far joints' readings are off: independent, normal, anew at every posture.
+/// The deviations of the joints' readings: independent, normal, drawn anew at every posture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointNoise {
     /// σ_j, rad or m.
     sigmas: Vec<f64>,
-    /// The offset of every joint.
+    /// The layout of every joint's offset.
     layout: Arc<Layout>,
 }
 
 impl JointNoise {
-    /// Of the joints of `state`, with one standard deviation each (rad or m); `None` where all are 0, which is as if joints
-    /// were exact, or where they are no deviations of this robot's joints.
+    /// The noise of the joints of `state`, with one standard deviation each (rad or m); `None` where all are 0, so that
+    /// joints are exact, or where they are not deviations of this robot's joints.
     pub fn new(state: &State, sigmas: Vec<f64>) -> Option<Self> {
         let are_deviations = sigmas.iter().all(|sigma| sigma.is_finite() && *sigma >= 0.0);
         if sigmas.len() != state.joints.len() || !are_deviations || sigmas.iter().all(|sigma| *sigma == 0.0) {
@@ -54,8 +54,8 @@ impl JointNoise {
         Some(Self { sigmas, layout })
     }
 
-    /// What is taken for usual where nobody says how far readings are off, and where learning it begins: 1 deg, 2 mm. That is
-    /// more than most joints have: what is too wide at first takes no reading for an outlier.
+    /// The usual noise, assumed where none is stated and as the start of learning it: 1 deg, 2 mm. That is more than most
+    /// joints have: with noise that is at first too wide no reading is taken for an outlier.
     pub fn usual(state: &State) -> Option<Self> {
         let usual = |joint: &Joint| match joint.kind() {
             JointKind::Revolute => USUAL_RAD,
@@ -69,18 +69,18 @@ impl JointNoise {
         &self.sigmas
     }
 
-    /// The same so many times as large.
+    /// This noise multiplied by `factor`.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self { sigmas: self.sigmas.iter().map(|sigma| sigma * factor).collect(), layout: self.layout.clone() }
     }
 
-    /// By what J is found: the offset of every joint.
+    /// The layout of every joint's offset, in which J is computed.
     pub(crate) fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// Makes derivatives by readings of those by offsets (columns of n numbers).
+    /// Turns derivatives by offsets (columns of n numbers) into derivatives by readings.
     pub(super) fn by_readings(&self, state: &State, positions: &[f64], rows: &mut [f64]) {
         let slopes = state.corrections.iter().zip(positions).map(|(correction, reading)| correction.slope(*reading));
         let slopes: Vec<f64> = slopes.collect();
@@ -112,13 +112,13 @@ impl JointNoise {
     }
 }
 
-/// What is known of the errors of one posture's joints: e ~ N(ê − B δ, V), of m coordinates δ.
+/// The estimate of the errors of one posture's joints: e ~ N(ê − B δ, V), for m coordinates δ.
 #[derive(Clone, Debug)]
 pub(crate) struct JointErrors {
     m: usize,
     /// ê.
     mean: Vec<f64>,
-    /// B, joint by joint m numbers.
+    /// B: m numbers for each joint.
     slopes: Vec<f64>,
     /// V, n × n, symmetric.
     covariance: Vec<f64>,
@@ -127,7 +127,7 @@ pub(crate) struct JointErrors {
 }
 
 impl JointErrors {
-    /// Before any reading.
+    /// The estimate before any reading.
     pub fn new(sigmas: &[f64], m: usize) -> Self {
         let n = sigmas.len();
         let mut covariance = vec![0.0; n * n];
@@ -192,7 +192,7 @@ impl JointErrors {
         }
     }
 
-    /// What an equation says whose variance is c = 1/`root`², given V j.
+    /// Updates the estimate by an equation whose variance is c = 1/`root`², given V j.
     fn learn(&mut self, root: f64, row: &[f64], residual: f64) {
         let n = self.gain.len();
         self.gain.iter_mut().for_each(|gain| *gain *= root);
@@ -210,12 +210,12 @@ impl JointErrors {
         &self.mean
     }
 
-    /// B of a joint.
+    /// B of a joint (m numbers).
     pub fn slopes(&self, joint: usize) -> &[f64] {
         &self.slopes[joint * self.m..(joint + 1) * self.m]
     }
 
-    /// V by row and column.
+    /// An entry of V.
     pub fn covariance(&self, row: usize, column: usize) -> f64 {
         self.covariance[row * self.mean.len() + column]
     }

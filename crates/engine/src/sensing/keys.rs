@@ -1,4 +1,4 @@
-//! What a scenario may say of a sensor.
+//! The keys of a sensor in a scenario.
 
 use nalgebra::{Matrix3, Point3};
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use crate::magnitude::{are_usable, is_not_negative};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Keys {
-    /// Which channel; `position` unless told otherwise.
+    /// The channel's name; `position` unless stated otherwise.
     pub channel: Option<String>,
     /// The name of the target that is measured; the first unless told otherwise.
     pub target: Option<String>,
@@ -33,9 +33,9 @@ pub struct Keys {
 /// What sensors can name: targets and cameras, in the order of the [`State`](crate::model::State) they belong to.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Equipment {
-    /// What can be looked at.
+    /// The targets that can be measured.
     pub targets: Vec<TargetKind>,
-    /// What looks.
+    /// The cameras that can measure.
     pub cameras: Vec<CameraKind>,
 }
 
@@ -46,7 +46,7 @@ pub struct TargetKind {
     pub name: String,
     /// The known points of a rigid body in its own frame, metres; the origin alone for a point.
     pub points: Vec<Point3<f64>>,
-    /// From where it can be seen; from everywhere, if it does not say.
+    /// The directions from which it can be seen; any if absent.
     pub facing: Option<Facing>,
 }
 
@@ -59,7 +59,7 @@ pub struct CameraKind {
     pub size_px: [f64; 2],
 }
 
-/// What is wrong with the keys of a sensor.
+/// A sensor key that is wrong.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("`{key}`: {what}")]
 pub struct KeyError {
@@ -67,7 +67,7 @@ pub struct KeyError {
     pub key: String,
     /// What is wrong.
     pub what: String,
-    /// How to mend it.
+    /// What to do about it.
     pub mend: String,
 }
 
@@ -112,14 +112,14 @@ impl Keys {
         if is_symmetric { Ok(Some(matrix)) } else { Err(KeyError::new("covariance_m2", "it is not symmetric", mend)) }
     }
 
-    /// Which target is meant, and what is known of it.
+    /// The target that the keys name, with what is known of it.
     pub(super) fn target<'a>(&self, equipment: &'a Equipment) -> Result<(usize, &'a TargetKind), KeyError> {
         let names = equipment.targets.iter().map(|target| target.name.as_str());
         let index = named("target", self.target.as_deref(), names)?;
         Ok((index, &equipment.targets[index]))
     }
 
-    /// Which camera is meant, and what is known of it.
+    /// The camera that the keys name, with what is known of it.
     pub(super) fn camera<'a>(&self, equipment: &'a Equipment) -> Result<(usize, &'a CameraKind), KeyError> {
         let names = equipment.cameras.iter().map(|camera| camera.name.as_str());
         let index = named("camera", self.camera.as_deref(), names)?;
@@ -147,7 +147,7 @@ fn sigma(key: &str, given: Option<f64>, unit: &str) -> Result<f64, KeyError> {
     holds.then_some(sigma).ok_or_else(error)
 }
 
-/// The index of what is named, the first unless told otherwise.
+/// The index of the named thing; of the first if no name is given.
 fn named<'a>(key: &str, name: Option<&str>, names: impl Iterator<Item = &'a str> + Clone) -> Result<usize, KeyError> {
     let found = match name {
         Some(name) => names.clone().position(|known| known == name),

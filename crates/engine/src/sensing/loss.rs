@@ -1,4 +1,4 @@
-//! What a reading costs that is far from its prediction.
+//! Losses: the cost of a reading that is far from its prediction.
 //!
 //! With s = ‖L⁻¹ (y ⊖ h)‖², the squared whitened residual of a reading of d equations, and z = √s:
 //!
@@ -8,37 +8,38 @@
 //! | Huber | s/2 up to z = k, then k z − k²/2 | min(1, k/z) |
 //! | mixture | −ln((1 − ε) e^{−s/2} + ε ((1 − φ) κ^{−d} e^{−s/2κ²} + φ (100 κ)^{−d})) + constant | q + p/κ² |
 //!
-//! The mixture takes a share ε of readings to be outliers. Most of them have κ times the deviations of the others, with
-//! probability p; a share φ = 10 % may be anywhere: their density is flat, so that a reading says nothing however far off it is.
-//! 1 − q is the probability that a reading is an outlier of either kind, and the constant makes ρ(0) = 0. Huber's k is where 95 % of normal readings lie within. A loss enters a
-//! least squares problem as the weight of the reading's equations (iteratively reweighted least squares), and the answer as ρ.
+//! The mixture takes a share ε of readings to be outliers. Most of them have κ times the deviations of the others, with probability p; a
+//! share φ = 10 % may be anywhere: their density is flat, so that a reading says nothing however far off it is. 1 − q is the probability
+//! that a reading is an outlier of either kind, and the constant makes ρ(0) = 0. Huber's k is where 95 % of normal readings lie within. A
+//! loss enters a least squares problem as the weight of the reading's equations (iteratively reweighted least squares), and the answer as
+//! ρ.
 
 use crate::elementary::{exp, ln, ln_1p};
 
 /// φ, the share of outliers that may be anywhere.
 const ANYWHERE: f64 = 0.1;
-/// Where these are, in deviations of the others.
+/// The deviation of those outliers, in deviations of normal readings.
 const FAR: f64 = 100.0;
 
-/// What a reading costs that is far from its prediction, as a function of the whitened residual.
+/// The cost of a reading as a function of its whitened residual.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Loss {
-    /// Least squares: readings are all of the same kind.
+    /// Least squares: all readings have the same noise.
     #[default]
     None,
     /// Huber's: beyond what 95 % of normal readings keep within, the cost grows linearly.
     Huber,
-    /// Normal readings, and among them outliers.
+    /// Normal readings mixed with outliers.
     Mixture {
-        /// ε, the share of outliers before anything is known of a reading; above 0, below 1.
+        /// ε, the prior share of outliers; above 0, below 1.
         fraction: f64,
-        /// κ, the deviation of most outliers in those of a normal reading; above 1.
+        /// κ, the deviation of most outliers as a multiple of a normal reading's; above 1.
         spread: f64,
     },
 }
 
 impl Loss {
-    /// The mixture unless told otherwise: one reading in twenty, most of them fifty times as far off.
+    /// The usual mixture: one reading in twenty is an outlier, most of them with fifty times the deviation.
     pub const MIXTURE: Self = Self::Mixture { fraction: 0.05, spread: 50.0 };
 
     /// ρ(s) of a reading of d equations.
@@ -71,29 +72,29 @@ impl Loss {
         }
     }
 
-    /// 1 − q, the probability that a reading is an outlier; `None` for a loss that knows of none.
+    /// 1 − q, the probability that a reading is an outlier; `None` for a loss without outliers.
     pub fn outlier(&self, s: f64, d: usize) -> Option<f64> {
         let [near, far] = self.outlying(s, d)?;
         let odds = log_sum(near, far) + 0.5 * s;
         Some(1.0 / (1.0 + exp(-odds)))
     }
 
-    /// The logarithms of ε (1 − φ) κ^{−d} e^{−s/2κ²} and of ε φ (100 κ)^{−d}, by 1 − ε.
+    /// The logarithms of ε (1 − φ) κ^{−d} e^{−s/2κ²} and of ε φ (100 κ)^{−d}, relative to 1 − ε.
     fn outlying(&self, s: f64, d: usize) -> Option<[f64; 2]> {
         let Self::Mixture { fraction, spread } = *self else { return None };
         let near = log_odds(fraction, spread, d) + ln_1p(-ANYWHERE) - 0.5 * s / (spread * spread);
         Some([near, log_odds(fraction, FAR * spread, d) + ln(ANYWHERE)])
     }
 
-    /// Whether one reading that fits nothing is taken to be the reading's fault.
+    /// Whether the loss lets a single reading be wrong without moving the estimate.
     pub fn is_robust(&self) -> bool {
         *self != Self::None
     }
 }
 
-/// A loss seen from `width` times as far: `τ² ρ(s/τ²)`. Near 0 it is least squares like the loss itself, but it gives a
-/// reading up only τ times as far out: a fit that is still on its way does not take half of the readings for outliers.
-/// Searches go from wide to 1 (graduated non-convexity, Blake and Zisserman 1987).
+/// A loss widened by τ: `τ² ρ(s/τ²)`. Near 0 it is least squares like the loss itself, but it gives a reading up only τ
+/// times as far out, so that a fit which is still on its way does not take half of the readings for outliers. Searches
+/// go from wide to 1 (graduated non-convexity, Blake and Zisserman 1987).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Graduated {
     /// ρ.
@@ -115,7 +116,7 @@ impl Graduated {
         square * self.loss.cost(s / square, d)
     }
 
-    /// The probability that a reading is a normal one; its weight, by a loss that knows of no outliers.
+    /// The probability that a reading is normal; for a loss without outliers, its weight.
     pub fn normal(&self, s: f64, d: usize) -> f64 {
         let square = self.width * self.width;
         self.loss.outlier(s / square, d).map_or_else(|| self.weight(s, d), |outlier| 1.0 - outlier)
@@ -127,7 +128,8 @@ impl Graduated {
     }
 }
 
-/// Where 95 % of normal readings of d equations lie within, standard deviations: √ of the χ² quantile (Wilson and Hilferty).
+/// Huber's k for d equations, standard deviations: 95 % of normal readings lie within it. √ of the χ² quantile (Wilson and
+/// Hilferty).
 fn huber(d: usize) -> f64 {
     let variance = 2.0 / (9.0 * d.max(1) as f64);
     (d.max(1) as f64 * (1.0 - variance + 1.645 * variance.sqrt()).powi(3)).sqrt()

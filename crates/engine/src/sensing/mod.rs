@@ -1,4 +1,4 @@
-//! What is measured after a movement, and with what noise.
+//! Sensors: what is measured after a movement, and with what noise.
 //!
 //! * [`Channel`]: one kind of reading, whitened at the source; the list below names all there are.
 //! * [`Occasion`]: when a channel reads: always, while a target is held in a socket, or before any movement.
@@ -39,16 +39,16 @@ pub use rig::{Equations, Noise, Rig};
 pub use visible::InView;
 
 channel::channels! {
-    /// Where a target is, three coordinates.
+    /// The position of a target, three coordinates.
     position::Position,
-    /// Where a target is and how it is turned, six numbers.
+    /// The position and rotation of a target, six numbers.
     pose::Pose,
-    /// Where the points of a target are in a camera's picture.
+    /// The points of a target in a camera's picture.
     pixels::Pixels,
-    /// How far a target is from a fixed point.
+    /// The distance of a target from a fixed point.
     distance::Distance;
-    /// That a target is held in a socket.
+    /// The contact of a target held in a socket.
     socket::Socket,
-    /// How far two sockets are apart.
+    /// The distance between two sockets.
     spacing::Spacing,
 }

@@ -1,12 +1,12 @@
-//! Whether noise is noise: the one place that looks at every entry of every noise model before a decomposition does. σ = 0 makes
-//! equations infinitely sharp, and no search among infinite numbers ends.
+//! The check of noise models: the one place that looks at every entry of every noise model before a decomposition does. σ = 0
+//! makes equations infinitely sharp, and a search among infinite numbers does not end.
 
 use nalgebra::Matrix3;
 
 use super::{Channel, Rig};
 use crate::magnitude::is_positive;
 
-/// A standard deviation that none can be.
+/// A standard deviation that readings cannot be divided by.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("the noise of channel {channel} (counted from 0) is {sigma} {unit}, not a number from 1e-18 to 1e12")]
 pub struct UnusableNoise {
@@ -14,7 +14,7 @@ pub struct UnusableNoise {
     pub channel: usize,
     /// Its equation, counted from 0.
     pub equation: usize,
-    /// σ.
+    /// σ, the deviation itself.
     pub sigma: f64,
     /// Its unit: m, rad or px.
     pub unit: &'static str,
@@ -25,11 +25,11 @@ pub struct UnusableNoise {
 const THINNEST: f64 = 1e-6;
 
 impl Rig {
-    /// Whether every σ is a number above 0 by which readings can be divided.
+    /// Checks that every σ is a number above 0 by which readings can be divided.
     ///
     /// # Errors
     ///
-    /// The first that is not.
+    /// [`UnusableNoise`] with the first σ that is not.
     pub fn check_noise(&self) -> Result<(), UnusableNoise> {
         for (channel, sensor) in self.channels().iter().enumerate() {
             check(channel, sensor.as_ref(), is_positive)?;
@@ -38,7 +38,8 @@ impl Rig {
     }
 }
 
-/// Whether a channel has noise everywhere, or nowhere, as in a world without any: half of it would be infinitely sharp.
+/// Whether a channel has noise in every equation or in none, as in a noise-free world: noise in half of them would
+/// leave the other half infinitely sharp.
 pub(super) fn is_all_or_nothing(sensor: &dyn Channel) -> bool {
     check(0, sensor, is_positive).is_ok() || check(0, sensor, |sigma| sigma == 0.0).is_ok()
 }

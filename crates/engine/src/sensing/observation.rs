@@ -1,4 +1,4 @@
-//! What came of a movement.
+//! The observation of a movement.
 
 use nalgebra::Point3;
 
@@ -8,14 +8,14 @@ use crate::magnitude::is_usable;
 /// The readings of one movement, one entry per channel of its [`Rig`]; `None` where the channel had none.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Observation {
-    /// In the order of the rig's channels, each in its channel's own units.
+    /// The readings in the order of the rig's channels, each in its channel's own units.
     pub readings: Vec<Option<Vec<f64>>>,
 }
 
 /// Why an observation was refused. Nothing was changed by it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Refused {
-    /// Not as many positions as joints.
+    /// The number of positions is not the number of joints.
     #[error("{found} joint positions were given; this robot has {wanted} joints")]
     Joints {
         /// Positions given.
@@ -28,10 +28,10 @@ pub enum Refused {
     Position {
         /// The joint.
         joint: usize,
-        /// What was given.
+        /// The number given.
         value: f64,
     },
-    /// Not as many readings as channels.
+    /// The number of readings is not the number of channels.
     #[error("{found} readings were given; there are {wanted} channels (write none where a channel saw nothing)")]
     Channels {
         /// Readings given.
@@ -49,24 +49,24 @@ pub enum Refused {
         /// Numbers of its readings.
         wanted: usize,
     },
-    /// Readings whose noise is none.
+    /// A channel's noise cannot be divided by.
     #[error("nothing can be learned from these sensors: {0}")]
     Noise(#[from] UnusableNoise),
-    /// A reading so far from what is believed that the distance is no number.
-    #[error("the readings are farther from what is expected than numbers reach")]
+    /// A reading is so far from its prediction that the distance is not finite.
+    #[error("the readings are too far from their prediction to compute with; check their units")]
     Absurd,
     /// A reading that is no finite number.
     #[error("the reading of channel {channel} (counted from 0) is {value}, not a number from -1e12 to 1e12")]
     Reading {
         /// The channel.
         channel: usize,
-        /// What was given.
+        /// The number given.
         value: f64,
     },
 }
 
 impl Observation {
-    /// A reading of the only channel.
+    /// An observation with one reading, of the only channel.
     pub fn of(reading: impl Into<Vec<f64>>) -> Self {
         Self { readings: vec![Some(reading.into())] }
     }
@@ -76,7 +76,7 @@ impl Observation {
         Self::of(position.coords.as_slice())
     }
 
-    /// No reading of any of so many channels. The movement counts all the same.
+    /// An observation without a reading from any of `channels`. The movement counts all the same.
     pub fn missed(channels: usize) -> Self {
         Self { readings: vec![None; channels] }
     }
@@ -86,7 +86,7 @@ impl Observation {
         self.readings.iter().all(Option::is_none)
     }
 
-    /// Equations that it brings.
+    /// The number of its equations.
     pub fn equations(&self) -> usize {
         self.readings.iter().flatten().map(Vec::len).sum()
     }
@@ -97,7 +97,7 @@ impl Observation {
         Some(Point3::new(*reading.first()?, *reading.get(1)?, *reading.get(2)?))
     }
 
-    /// Where a target was measured to be, by the first channel of `rig` whose reading says so, metres.
+    /// The measured position of a target, metres, from the first channel of `rig` whose reading gives it.
     pub fn position(&self, rig: &Rig, target: usize) -> Option<Point3<f64>> {
         let mut positions = rig
             .channels()
@@ -107,7 +107,12 @@ impl Observation {
         positions.find_map(|(of, position)| (of == target).then_some(position))
     }
 
-    /// Whether it can be an observation of `rig` after a movement of so many `joints` to `positions`.
+    /// Checks that `rig` can give this observation after a movement of so many `joints` to `positions` (rad or m).
+    ///
+    /// # Errors
+    ///
+    /// [`Refused::Joints`], [`Refused::Channels`] or [`Refused::Length`] if a count does not fit; [`Refused::Position`]
+    /// or [`Refused::Reading`] if a number is not finite or too large to compute with.
     pub fn check(&self, rig: &Rig, joints: usize, positions: &[f64]) -> Result<(), Refused> {
         if positions.len() != joints {
             return Err(Refused::Joints { found: positions.len(), wanted: joints });

@@ -6,12 +6,12 @@
 //! u = fx x/z + cx,   v = fy y/z + cy        (pixels)
 //! ```
 //!
-//! The camera stands beside the robot or is carried by a link, and so does the target: of both the twists of all parameters
-//! are known, so that hand–eye and a fixed camera are one channel. Poses and lenses are blocks of the model.
+//! Camera and target each stand beside the robot or are carried by a link. The twists of both are known, so hand–eye and a fixed camera
+//! are one channel. Poses and lenses are blocks of the model.
 //!
-//! *Out of view.* A target is seen whole or not at all: in front of the camera, inside its picture, and facing it. An estimate
-//! that has a point behind the camera which was seen must find its way to the front, so for searches and filters the depth goes on
-//! below [`NEAR`] as `z̄ = z₀²/(2 z₀ − z)`: positive everywhere, with a continuous slope. It is no prediction: there is none of a point
+//! *Out of view.* A target is seen whole or not at all: in front of the camera, inside its picture, and facing it. An estimate that has
+//! a point behind the camera which was seen must find its way to the front, so for searches and filters the depth goes on below
+//! [`NEAR`] as `z̄ = z₀²/(2 z₀ − z)`: positive everywhere, with a continuous slope. It is no prediction: there is none of a point
 //! behind the camera.
 
 use std::sync::Arc;
@@ -24,21 +24,21 @@ use crate::{elementary::{asin, hypot}, model::{Block, Frame, Pass, State}};
 /// A camera's view of a target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pixels {
-    /// Which camera, by its number among the devices.
+    /// The camera, by its index among the devices.
     pub camera: usize,
-    /// Which target.
+    /// The index of the target.
     pub target: usize,
     /// The known points in the target's frame, metres.
     pub points: Arc<[Point3<f64>]>,
     /// Width and height of the picture, pixels.
     pub size_px: [f64; 2],
-    /// From where the target can be seen.
+    /// The directions from which the target can be seen.
     pub facing: Option<Facing>,
     /// Standard deviation of the noise per coordinate, pixels.
     pub sigma_px: f64,
 }
 
-/// From where a target can be seen: within an angle of a direction that it faces.
+/// The cone of directions from which a target can be seen: within an angle of the direction that it faces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facing {
     /// The direction, in the target's frame.
@@ -85,7 +85,8 @@ impl Pixels {
         Seen { at: Vector3::new(at.x, at.y, depth), slope, picture }
     }
 
-    /// Writes the picture, continued behind the camera, and tells how far the nearest point is in front of it, metres.
+    /// Writes the picture, continued behind the camera, and returns how far the nearest point is in front of the
+    /// camera, metres.
     fn project(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> f64 {
         let (camera, target) = self.frames(state, positions);
         let (lens, place) = (self.lens(state), camera.inverse() * target);

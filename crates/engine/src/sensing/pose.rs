@@ -19,7 +19,7 @@ use crate::{kinematics::rotation, model::{Frame, Pass, State}};
 /// A tracker of a target's pose, in the frame of the measurements: x, y, z in metres, then a rotation vector in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Which target; a rigid body.
+    /// The index of the target, a rigid body.
     pub target: usize,
     /// Standard deviation of the noise of the position per coordinate, metres.
     pub sigma_m: f64,

@@ -10,26 +10,26 @@ use crate::model::{Pass, State, Whitening};
 /// A tracker of a target's position in space, metres, in the frame of the measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Position {
-    /// Which target.
+    /// The index of the target.
     pub target: usize,
-    /// Standard deviation of the noise per coordinate, metres; of a full covariance √(tr/3).
+    /// Standard deviation of the noise per coordinate, metres; √(tr/3) of a full covariance.
     pub sigma_m: f64,
     /// L/σ, lower triangular, and its inverse, if the noise is not the same in all directions.
     shape: Option<(Matrix3<f64>, Matrix3<f64>)>,
 }
 
 impl Position {
-    /// The tracker of the marker, the first target.
+    /// A tracker of the marker, the first target.
     pub fn of_marker(sigma_m: f64) -> Self {
         Self::of(0, sigma_m)
     }
 
-    /// The tracker of a target.
+    /// A tracker of a target.
     pub fn of(target: usize, sigma_m: f64) -> Self {
         Self { target, sigma_m, shape: None }
     }
 
-    /// The tracker of a target with noise of this covariance (m²); `None` if it is not symmetric and positive.
+    /// A tracker of a target with noise of this covariance (m²); `None` if it is not symmetric and positive definite.
     pub fn with_covariance(target: usize, covariance: &Matrix3<f64>) -> Option<Self> {
         let sigma_m = (covariance.trace() / 3.0).sqrt();
         let root = root(covariance)? / sigma_m;

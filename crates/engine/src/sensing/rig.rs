@@ -1,4 +1,4 @@
-//! The channels of a robot together.
+//! The measurement model: all channels of a robot together.
 
 use std::{ops::Range, sync::Arc};
 
@@ -7,39 +7,39 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use super::{Channel, JointErrors, JointNoise, Observation, Occasion, Position};
 use crate::model::{Layout, Pass, State, Whitening};
 
-/// All channels through which a robot is observed. What it hands out is whitened: R = I.
+/// All channels through which a robot is observed. All readings that it returns are whitened: R = I.
 #[derive(Clone, Debug)]
 pub struct Rig {
     channels: Vec<Arc<dyn Channel>>,
-    /// Where each channel's equations stand among all.
+    /// The range of each channel's equations among all.
     places: Vec<Range<usize>>,
     /// All kinds of noise, channel by channel.
     noises: Vec<Noise>,
     marker: Option<usize>,
-    /// What the joints' readings are off by; `None` where they are exact.
+    /// The noise of the joints' readings; `None` where they are exact.
     joints: Option<Arc<JointNoise>>,
 }
 
-/// One kind of noise of a channel: the equations that share a σ.
+/// One kind of noise of a channel, shared by a range of its equations.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Noise {
     /// The channel.
     pub channel: usize,
-    /// Its equations among those of the channel.
+    /// The range of its equations among those of the channel.
     pub part: Range<usize>,
 }
 
-/// What an observation says of a state: `residual ≈ H δ + v`, `v ~ N(0, I)`.
+/// An observation linearised at a state: `residual ≈ H δ + v`, `v ~ N(0, I)`.
 #[derive(Clone, Debug)]
 pub struct Equations {
-    /// Hᵀ (m × d), whitened; d equations, those of the readings that there were.
+    /// Hᵀ (m × d), whitened; d equations of the readings that are present.
     pub rows: DMatrix<f64>,
     /// L⁻¹ (y ⊖ h), d numbers.
     pub residual: DVector<f64>,
 }
 
 impl Rig {
-    /// Of these channels.
+    /// A rig of these channels.
     pub fn new(channels: Vec<Arc<dyn Channel>>) -> Self {
         let mut places = Vec::with_capacity(channels.len());
         let mut start = 0;
@@ -57,18 +57,18 @@ impl Rig {
         Self { channels, places, noises, marker, joints: None }
     }
 
-    /// The same where the joints' readings are off by `joints`: all readings after one movement err together, and what is
-    /// handed out is whitened by `I + J Σ Jᵀ`. See [`JointNoise`].
+    /// This rig with joints' readings that err by `joints`: all readings after one movement err together, and are
+    /// whitened by `I + J Σ Jᵀ`. See [`JointNoise`].
     pub fn with_joint_noise(self, joints: Option<Arc<JointNoise>>) -> Self {
         Self { joints, ..self }
     }
 
-    /// What the joints' readings are off by; `None` where they are exact.
+    /// The noise of the joints' readings; `None` where they are exact.
     pub fn joint_noise(&self) -> Option<&Arc<JointNoise>> {
         self.joints.as_ref()
     }
 
-    /// A tracker of the marker alone, with so much noise per coordinate (metres).
+    /// A rig with one tracker of the marker, with noise of `sigma_m` per coordinate (metres).
     pub fn tracker(sigma_m: f64) -> Self {
         Self::new(vec![Arc::new(Position::of_marker(sigma_m))])
     }
@@ -78,7 +78,7 @@ impl Rig {
         &self.channels
     }
 
-    /// The channels that read after a movement: all for which there is an occasion when a target is held in `socket`, or in none.
+    /// The channels that read after a movement that holds a target in `socket`, or in none.
     pub fn held_in(&self, socket: Option<usize>) -> Self {
         let reads = |channel: &&Arc<dyn Channel>| match channel.occasion() {
             Occasion::Always => true,
@@ -103,8 +103,8 @@ impl Rig {
         (!channels.is_empty()).then(|| Self::new(channels))
     }
 
-    /// What is known before any movement of a robot's equipment that is as `state` says, with `v` (d standard normal numbers)
-    /// as noise; `None` if nothing is.
+    /// An observation of what is known before any movement, for a robot whose equipment is as `state` says, with `v` (d
+    /// standard normal numbers) as noise; `None` if nothing is known.
     pub fn beforehand(&self, state: &State, v: &[f64]) -> Option<Observation> {
         // It has nothing to do with the robot's posture.
         let anywhere = vec![0.0; state.joints.len()];
@@ -127,7 +127,7 @@ impl Rig {
         &self.noises
     }
 
-    /// The same channels with each kind of noise so many times as large.
+    /// This rig with each kind of noise multiplied by its factor.
     pub fn scaled(&self, factors: &[f64]) -> Self {
         let of = |index: usize| {
             let of_channel = self.noises.iter().zip(factors).filter(|(noise, _)| noise.channel == index);
@@ -142,12 +142,13 @@ impl Rig {
         self.channels.iter().any(|channel| channel.has_view())
     }
 
-    /// Equations of a movement of which nothing is missed, d.
+    /// d, the number of equations of a movement with all readings.
     pub fn equations(&self) -> usize {
         self.places.last().map_or(0, |place| place.end)
     }
 
-    /// The points that are measured, where nothing else is (see [`Channel::point`]) and each errs by itself.
+    /// The points that are measured, if nothing else is measured (see [`Channel::point`]) and their errors are
+    /// independent.
     pub fn points(&self) -> Option<Vec<(usize, Whitening)>> {
         if self.joints.is_some() {
             return None;
@@ -160,7 +161,7 @@ impl Rig {
         self.marker
     }
 
-    /// σ of the channel that measures the marker's position, metres; not a number if there is none.
+    /// σ of the channel that measures the marker's position, metres; NaN if there is none.
     pub fn marker_sigma(&self) -> f64 {
         self.marker.map_or(f64::NAN, |channel| self.channels[channel].sigma())
     }
@@ -170,7 +171,7 @@ impl Rig {
         self.channels.first().map_or(0.0, |channel| channel.sigma())
     }
 
-    /// The same channels with σ of the first as `sigma`, and those of the others changed in proportion.
+    /// This rig with σ of the first channel as `sigma`, and those of the others changed in proportion.
     pub fn assuming(&self, sigma: f64) -> Self {
         // Channels without noise are all alike.
         let factor = if self.sigma() > 0.0 { sigma / self.sigma() } else { f64::INFINITY };
@@ -181,15 +182,16 @@ impl Rig {
         Self::new(scaled.collect()).with_joint_noise(self.joints.clone())
     }
 
-    /// H P Hᵀ of the marker's position (m²), of the whitened spread of all equations; `None` if no channel measures it.
+    /// H P Hᵀ of the marker's position (m²), computed from the whitened spread of all equations; `None` if no channel
+    /// measures it.
     pub fn marker_spread(&self, spread: impl Fn(usize, usize) -> f64) -> Option<Matrix3<f64>> {
         let channel = self.marker?;
         let (start, variance) = (self.places[channel].start, self.channels[channel].sigma().powi(2));
         Some(Matrix3::from_fn(|row, column| spread(start + row, start + column) * variance))
     }
 
-    /// Whitens the marker's three equations by what joints' readings are off, which are whitened by the sensor's noise already;
-    /// what is exact changes nothing.
+    /// Whitens the marker's three equations, whitened already by the sensor's noise, by the noise of the joints; exact joints
+    /// change nothing.
     pub fn whiten_marker(&self, state: &State, positions: &[f64], rows: &mut [f64], residual: &mut [f64]) {
         if let (Some(joints), Some(place)) = (&self.joints, self.marker_place()) {
             let by_joints = self.joint_rows(joints, state, positions);
@@ -198,7 +200,7 @@ impl Rig {
         }
     }
 
-    /// Where the marker's predicted position stands among all predicted readings.
+    /// The range of the marker's predicted position among all predicted readings.
     pub fn marker_place(&self) -> Option<Range<usize>> {
         Some(self.places[self.marker?].clone())
     }
@@ -223,7 +225,7 @@ impl Rig {
         rows
     }
 
-    /// As [`rows`](Self::rows), but whitened by the sensors' noise alone.
+    /// Like [`rows`](Self::rows), but whitened by the sensors' noise alone.
     #[inline]
     pub fn rows_apart(&self, pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
         let m = rows.len() / readings.len().max(1);
@@ -235,7 +237,7 @@ impl Rig {
         }
     }
 
-    /// Hᵀ, whitened, of a movement of which nothing is missed (m × d); zero where a channel has no prediction.
+    /// Hᵀ (m × d), whitened, of a movement with all readings; zero where a channel has no prediction.
     pub fn jacobian(&self, state: &State, layout: &Layout, positions: &[f64]) -> DMatrix<f64> {
         let mut pass = Pass::new(state, layout);
         let mut rows = DMatrix::zeros(layout.dimension(), self.equations());
@@ -255,7 +257,7 @@ impl Rig {
         }
     }
 
-    /// What an observation says of the state, linearised there. A reading without a prediction says nothing.
+    /// The equations of an observation, linearised at a state. A reading without a prediction contributes none.
     pub fn equations_of(
         &self,
         state: &State,
@@ -275,9 +277,8 @@ impl Rig {
         Equations { rows: rows.select_columns(&told), residual: residual.select_rows(&told) }
     }
 
-    /// Writes Hᵀ (columns of m numbers, all zero at first) and the residual of an observation where `pass` stands, and
-    /// returns how many equations those are. A reading without a prediction says nothing: its rows stay zero in their place, and its
-    /// residual is no number.
+    /// Writes Hᵀ (columns of m numbers, all zero at first) and the residual of an observation at the posture of `pass`, and returns
+    /// the number of equations. A reading without a prediction contributes nothing: its rows stay zero, and its residual is NaN.
     pub fn linearise(
         &self,
         pass: &Pass<'_>,
@@ -294,7 +295,7 @@ impl Rig {
         found
     }
 
-    /// J of the readings of an observation that have a prediction, as [`joint_rows`](Self::joint_rows).
+    /// J of those readings of an observation that have a prediction, laid out as in [`joint_rows`](Self::joint_rows).
     pub fn joint_rows_of(
         &self,
         joints: &JointNoise,
@@ -311,15 +312,17 @@ impl Rig {
         rows
     }
 
-    /// Writes J of a reading of one channel (columns of n numbers, all zero at first), as [`joint_rows`](Self::joint_rows), where
-    /// a `pass` of the layout of `joints` stands; they stay zero where it has no prediction.
+    /// Writes J of one channel's reading (columns of n numbers, all zero at first), laid out as in
+    /// [`joint_rows`](Self::joint_rows), at the posture of a `pass` of the layout of `joints`; the columns stay zero where there
+    /// is no prediction.
     pub fn joint_rows_in(&self, joints: &JointNoise, pass: &Pass<'_>, channel: usize, rows: &mut [f64]) {
         let (channel, mut scratch) = (&self.channels[channel], Scratch::default());
         channel.rows(pass, scratch.take(channel.equations()), rows);
         joints.by_readings(pass.state(), pass.positions(), rows);
     }
 
-    /// As [`linearise_apart`](Self::linearise_apart) of one channel's reading; false where it has no prediction.
+    /// Linearises one channel's reading, as [`linearise_apart`](Self::linearise_apart) does; false where it has no
+    /// prediction.
     pub fn linearise_reading(
         &self,
         pass: &Pass<'_>,
@@ -337,7 +340,7 @@ impl Rig {
         is_predicted
     }
 
-    /// As [`linearise`](Self::linearise), but whitened by the sensors' noise alone.
+    /// Like [`linearise`](Self::linearise), but whitened by the sensors' noise alone.
     pub fn linearise_apart(
         &self,
         pass: &Pass<'_>,
@@ -368,7 +371,7 @@ impl Rig {
         self.residual_near(state, state, positions, observation)
     }
 
-    /// The same with L that of another state near this one, as of the centre of several.
+    /// L⁻¹ (y ⊖ h) of an observation, with L taken at another state near this one, such as the centre of several.
     pub fn residual_near(
         &self,
         centre: &State,
@@ -387,7 +390,7 @@ impl Rig {
         residual
     }
 
-    /// The same whitened by the sensors' noise alone.
+    /// The [residual](Self::residual) of an observation, whitened by the sensors' noise alone.
     pub fn residual_apart(&self, state: &State, positions: &[f64], observation: &Observation) -> DVector<f64> {
         let mut residual = Vec::with_capacity(observation.equations());
         for (channel, reading) in self.channels.iter().zip(&observation.readings) {
@@ -411,8 +414,8 @@ impl Rig {
         sum
     }
 
-    /// Hands L⁻¹ (y ⊖ h) of every reading that there is to `each`, with its channel: given the readings before it, where they
-    /// err together.
+    /// Passes L⁻¹ (y ⊖ h) of every reading that is present to `each`, with its channel; given the readings before it, where
+    /// they err together.
     pub fn residuals(
         &self,
         state: &State,
@@ -439,7 +442,7 @@ impl Rig {
         });
     }
 
-    /// The same whitened by the sensors' noise alone.
+    /// The [residuals](Self::residuals) of an observation, whitened by the sensors' noise alone.
     pub fn residuals_apart(
         &self,
         state: &State,
@@ -458,8 +461,8 @@ impl Rig {
         }
     }
 
-    /// The same of readings (d numbers, as [`rows`](Self::rows) writes them) that are predicted already, none of which is
-    /// missing.
+    /// The [residuals](Self::residuals_apart) of an observation from predicted readings (d numbers, as
+    /// [`rows`](Self::rows) writes them), none of which is missing.
     pub fn residuals_of(&self, predicted: &[f64], observation: &Observation, mut each: impl FnMut(usize, &[f64])) {
         let mut whitened = Scratch::default();
         for (index, (channel, reading)) in self.channels.iter().zip(&observation.readings).enumerate() {
@@ -470,8 +473,8 @@ impl Rig {
         }
     }
 
-    /// What is observed of a robot that is as `state` says: its readings at `positions` of what is in view, with `v` (d standard normal
-    /// numbers) as noise.
+    /// Simulates the observation at `positions` of a robot that is as `state` says: readings of what is in view, with `v` (d standard
+    /// normal numbers) as noise.
     pub fn observe(&self, state: &State, positions: &[f64], v: &[f64]) -> Observation {
         let visible = self.visible(None, state, positions);
         let reading = |((channel, place), visible): ((&Arc<dyn Channel>, &Range<usize>), bool)| {
@@ -484,8 +487,8 @@ impl Rig {
         Observation { readings: self.channels.iter().zip(&self.places).zip(visible).map(reading).collect() }
     }
 
-    /// As [`observe`](Self::observe), after a movement that holds a target in `socket`, or in none: that it is there is read of
-    /// its socket, and nothing of the others.
+    /// Simulates the observation after a movement that holds a target in `socket`, or in none, like [`observe`](Self::observe):
+    /// the contact is read for that socket, and for no other.
     pub fn observe_in(&self, socket: Option<usize>, state: &State, positions: &[f64], v: &[f64]) -> Observation {
         let mut observation = self.observe(state, positions, v);
         for (channel, reading) in self.channels.iter().zip(&mut observation.readings) {

@@ -8,13 +8,13 @@ use nalgebra::Vector3;
 use super::{Channel, Occasion};
 use crate::model::{Block, Pass, State};
 
-/// That a target is in a socket, as far as play and the joints' readings let it be. A reading is where the target is, seen from
-/// the socket, metres: 0.
+/// The contact of a target with its socket, as far as play and the joints' readings allow. A reading is the target's position
+/// relative to the socket, metres: 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Socket {
-    /// Which target.
+    /// The index of the target.
     pub target: usize,
-    /// Which socket, s.
+    /// s, the index of the socket.
     pub socket: usize,
     /// Standard deviation of the noise per coordinate, metres: what play, and the noise of the joints, amount to at the target.
     pub sigma_m: f64,

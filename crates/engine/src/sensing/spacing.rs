@@ -6,12 +6,12 @@ use std::sync::Arc;
 use super::{Channel, Occasion};
 use crate::model::{Block, Pass, State};
 
-/// How far two sockets are apart, metres: of a tool that was measured once.
+/// The distance between two sockets, metres, such as that of a tool measured once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spacing {
-    /// Which two sockets.
+    /// The indices of the two sockets.
     pub sockets: [usize; 2],
-    /// Standard deviation of what is known of it, metres.
+    /// Standard deviation of the known distance, metres.
     pub sigma_m: f64,
 }
 

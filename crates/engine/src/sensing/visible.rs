@@ -1,5 +1,5 @@
-//! What is in view: which channels read at a posture of a robot that is in some state. Designs, bounds, gauges, worlds and judges ask
-//! here alone, so that nobody counts what nobody sees.
+//! Visibility: which channels read at a posture of a robot in a given state. Designs, bounds, gauges, worlds and judges all ask here,
+//! so that no reading counts that cannot be seen.
 //!
 //! ```text
 //! channel c reads at θ   ⟺   min(clearance_c(x, θ), clearance_head(p(x, θ))) ≥ 0
@@ -12,17 +12,17 @@ use nalgebra::DMatrix;
 use super::{Head, Observation, Rig};
 use crate::model::{Layout, State};
 
-/// Whether it can be told of a state what is in view.
+/// How visibility is judged at a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InView<'a> {
-    /// It cannot: the state is a guess, and cameras stand elsewhere. Everything may be seen.
+    /// Not at all: the state is a guess, and cameras stand elsewhere. Everything may be seen.
     Unknown,
     /// The state is the truth, of which a head, if one watches, and the sensors see a part.
     By(Option<&'a Head>),
 }
 
 impl InView<'_> {
-    /// By channel of `rig`, whether it reads at `positions`.
+    /// Whether each channel of `rig` reads at `positions`.
     pub fn visible(self, rig: &Rig, state: &State, positions: &[f64]) -> Vec<bool> {
         match self {
             Self::Unknown => vec![true; rig.channels().len()],
@@ -37,7 +37,7 @@ impl InView<'_> {
 }
 
 impl Rig {
-    /// Writes for every channel how far what it measures is inside what it can see, and the marker inside what `head` can see,
+    /// Writes for every channel how far its target is inside what it can see, and the marker inside what `head` can see,
     /// radians; infinite where everything is seen.
     pub fn clearances(&self, head: Option<&Head>, state: &State, positions: &[f64], clearances: &mut [f64]) {
         let of_head = head.map_or(f64::INFINITY, |head| head.clearance(&state.marker_at(positions)));
@@ -46,8 +46,8 @@ impl Rig {
         }
     }
 
-    /// By channel, whether it reads at `positions` of a robot that is as `state` says; where `head` watches, none reads unless it sees
-    /// the marker. Whether there is an [occasion](super::Occasion) is not asked.
+    /// Whether each channel reads at `positions` of a robot that is as `state` says; where `head` watches, none reads unless it sees
+    /// the marker. The [occasion](super::Occasion) is not considered.
     pub fn visible(&self, head: Option<&Head>, state: &State, positions: &[f64]) -> Vec<bool> {
         let mut clearances = vec![0.0; self.channels().len()];
         self.clearances(head, state, positions, &mut clearances);
@@ -59,7 +59,7 @@ impl Rig {
         head.is_some() || self.has_view()
     }
 
-    /// Hᵀ, whitened, of a movement as it is seen (m × d): zero where a channel does not read; `None` where none does.
+    /// Hᵀ (m × d), whitened, of a movement as it is seen: zero where a channel does not read; `None` where none does.
     pub fn visible_jacobian(
         &self,
         head: Option<&Head>,
@@ -75,14 +75,14 @@ impl Rig {
         })
     }
 
-    /// Hᵀ, whitened, of a movement as it would be seen of a robot that is as `state` says (m × d): zero where a channel would not read;
-    /// of all where none would, for who believes in such a state with a chance alone.
+    /// Hᵀ (m × d), whitened, of a movement as a robot that is as `state` says would be seen: zero where a channel would not read. Where
+    /// none would, the rows of all channels: a belief in such a state is uncertain.
     pub fn believed_jacobian(&self, state: &State, layout: &Layout, positions: &[f64]) -> DMatrix<f64> {
         let seen = self.visible_jacobian(None, state, layout, positions);
         seen.unwrap_or_else(|| self.jacobian(state, layout, positions))
     }
 
-    /// Makes the rows (d columns of m numbers) of all channels zero that are not `visible`.
+    /// Zeroes the rows (d columns of m numbers) of all channels that are not `visible`.
     pub fn hide(&self, visible: &[bool], rows: &mut [f64]) {
         let m = rows.len() / self.equations().max(1);
         let mut start = 0;
@@ -95,14 +95,14 @@ impl Rig {
         }
     }
 
-    /// The channels that are `visible`.
+    /// The rig of the channels that are `visible`.
     pub fn limited_to(&self, visible: &[bool]) -> Self {
         let seen = self.channels().iter().zip(visible).filter(|(_, visible)| **visible);
         Self::new(seen.map(|(channel, _)| channel.clone()).collect())
     }
 
-    /// What is observed after a movement that holds a target in `socket`, or in none, where `head` may watch: see
-    /// [`observe_in`](Self::observe_in).
+    /// Simulates the observation after a movement that holds a target in `socket`, or in none, where `head` may watch;
+    /// see [`observe_in`](Self::observe_in).
     pub fn observe_watched(
         &self,
         head: Option<&Head>,

@@ -1,10 +1,10 @@
-//! What a claim is judged by, and the verdict.
+//! The evidence for a claim, and the verdict.
 
 use crate::{experiments::PaperExperiment, outcome::Outcome, report::Agreement};
 use body_schema_scenario::Scenario;
 use body_schema_wire::{Curve, LearnerComparison, Quantiles};
 
-/// The outcome of an experiment, and what was run.
+/// The outcome of an experiment, with what was run.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence<'a> {
     /// The experiment.
@@ -17,7 +17,7 @@ pub struct Evidence<'a> {
     pub outcome: &'a Outcome,
 }
 
-/// A verdict and what it rests on.
+/// A verdict, with its reasons.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
     /// Our number, if there is one.
@@ -30,9 +30,9 @@ pub struct Finding {
     pub why: String,
 }
 
-/// Numbers agree within this factor,
+/// The factor within which numbers agree.
 const CLOSE: f64 = 1.5;
-/// and in part within this one.
+/// The factor within which numbers agree in part.
 const SAME_ORDER: f64 = 3.0;
 
 impl Evidence<'_> {
@@ -41,7 +41,7 @@ impl Evidence<'_> {
         self.outcome.learner(name)
     }
 
-    /// A learner's errors after so many movements, or the nearest number kept.
+    /// A learner's errors after `movements`, or at the nearest number that was kept.
     pub fn curve_at(&self, learner: &str, movements: u64) -> Option<&Curve> {
         self.learner(learner)?.curve.iter().min_by_key(|point| point.movements.abs_diff(movements))
     }

@@ -46,7 +46,7 @@ pub const CLAIMS: &[Claim] = &[
     },
 ];
 
-/// Orientation and location of each joint in one number: each in units of its threshold, added.
+/// The error of each joint in one number: orientation and location, each in units of its threshold, added.
 fn errors(evidence: &Evidence<'_>, point: &Curve) -> Option<Vec<(String, f64)>> {
     let thresholds = evidence.scenario.thresholds;
     let error = |joint: &LearnedJoint| {

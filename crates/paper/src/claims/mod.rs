@@ -21,7 +21,7 @@ use super::{
 /// One number or remark of the paper.
 #[derive(Clone, Copy, Debug)]
 pub struct Claim {
-    /// Its name.
+    /// Its identifier.
     pub id: &'static str,
     /// Where the paper says it.
     pub figure: &'static str,
@@ -42,11 +42,11 @@ pub struct Claim {
 pub enum Test {
     /// By the outcome of the experiment of this name.
     By(&'static str, Judge),
-    /// Not yet; this is missing.
+    /// Not yet; the text says what is missing.
     Missing(&'static str),
 }
 
-/// Judges a claim by the outcome of its experiment; `None` if the outcome does not hold what it takes.
+/// A function that judges a claim by the outcome of its experiment; `None` if the outcome lacks the data.
 type Judge = fn(&Evidence<'_>) -> Option<Finding>;
 
 /// All claims, in the order of the paper.
@@ -57,7 +57,7 @@ pub fn claims() -> impl Iterator<Item = &'static Claim> {
 }
 
 impl Claim {
-    /// The claim beside its evidence; an error says why there is none.
+    /// The row of the report: the claim beside its evidence; an error says why there is no evidence.
     pub fn row(&self, plan: &Plan, evidence: Option<Result<Evidence<'_>, String>>) -> Row {
         let Test::By(id, judge) = self.test else {
             let missing = if let Test::Missing(missing) = self.test { missing } else { "" };

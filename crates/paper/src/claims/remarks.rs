@@ -1,4 +1,4 @@
-//! What the paper also says.
+//! The paper's remarks.
 
 use super::{
     Claim, Test,

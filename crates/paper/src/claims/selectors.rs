@@ -1,4 +1,4 @@
-//! Other ways to choose a movement, and to write a joint down.
+//! Claims on other ways to choose a movement, and to parameterise a joint.
 
 use super::{
     Claim, Test,

@@ -1,4 +1,4 @@
-//! What was run, beside what the paper ran.
+//! Claims on the setup: what was run, beside what the paper ran.
 
 use super::{
     Claim, Test,

@@ -1,4 +1,4 @@
-//! How soon learners converge.
+//! Claims on how soon learners converge.
 
 use super::{
     Claim, Test,

@@ -1,4 +1,4 @@
-//! What any learner could reach, drawn beside what the learners did.
+//! The least error that any learner could reach, drawn beside what the learners reached.
 
 use super::Source;
 use body_schema_chart::{Axis, Layer, Panel, Style};
@@ -19,14 +19,14 @@ pub fn legend() -> [(String, Style); 2] {
     ]
 }
 
-/// As many movements as there are equations to solve: a place on the horizontal axis.
+/// A mark on the horizontal axis at the number of movements with as many equations as unknowns.
 pub fn counting(comparison: &Comparison) -> Layer {
     let count = comparison.movements_by_counting;
     Layer::Event { x: count as f64, label: format!("counting: {count}"), colour: TRUTH_COLOR, dashes: "1 3" }
 }
 
-/// The trace that every learner believes in, the least that its data allow, and the least that any data allow. `None`
-/// where no truth is known.
+/// A panel with the trace that every learner believes, the least that its data allow, and the least that any data
+/// allow. `None` where no truth is known.
 pub fn panel(
     source: Source<'_>,
     comparison: &Comparison,

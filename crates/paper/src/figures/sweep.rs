@@ -1,4 +1,4 @@
-//! A key of the scenario against how soon learners converge, and how near they come.
+//! The figure of a sweep: a key of the scenario against how soon learners converge, and how near they come.
 
 use super::{Figure, Source};
 use crate::experiments::Kind;

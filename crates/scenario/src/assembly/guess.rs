@@ -1,4 +1,4 @@
-//! What learners begin with: the truth, wrong by as much as the scenario says.
+//! The learners' initial estimate: the truth with an error of the size that the scenario states.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use rand::RngExt;
@@ -78,7 +78,7 @@ impl Scenario {
 }
 
 impl Known {
-    /// An element with an error uniform up to what it is known to.
+    /// An element with an error uniform up to the stated size.
     fn displaced(self, element: &Element, rng: &mut ChaCha8Rng) -> Element {
         let Self::Within { length_m, angle_rad, other } = self else { return element.clone() };
         let mut vector = |size: f64| Vector3::from_fn(|_, _| size * rng.random_range(-1.0..=1.0));

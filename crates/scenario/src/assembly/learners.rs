@@ -1,4 +1,4 @@
-//! A learner as a scenario specifies it: its estimator, its policy, and what it is told.
+//! Assembling a learner as a scenario specifies it: its estimator, its policy, and its prior.
 
 use std::sync::Arc;
 
@@ -94,8 +94,8 @@ impl Scenario {
         Ok(estimator)
     }
 
-    /// Learned places of which next to nothing is known, so that a filter cannot begin at the guess: all that an unknown base
-    /// carries, or what may be anywhere.
+    /// The learned places of which next to nothing is known, so that a filter cannot begin at the guess: everything that an
+    /// unknown base carries, or that may be anywhere.
     fn unknown_places(&self, layout: &Layout) -> Vec<Block> {
         let has_base = layout.block(Block::Base).is_some();
         let is_unknown = |block: &Block| match block {
@@ -108,7 +108,7 @@ impl Scenario {
         layout.blocks().map(|(block, _)| block).filter(is_unknown).collect()
     }
 
-    /// A smoother that takes σ of the first channel for `sigma`, for a unit alone if the noise is unknown.
+    /// A smoother that takes `sigma` for σ of the first channel, or only as a unit if the noise is unknown.
     fn smoother(
         &self,
         spec: &LearnerSpec,
@@ -153,8 +153,8 @@ impl Scenario {
         Ok(if is_recorded { smoother.never_forgetting() } else { smoother })
     }
 
-    /// The sensors as the smoother takes them to be, with σ of the first as `sigma`: where it learns how far joints' readings are
-    /// off, it begins with what is usual.
+    /// The measurement model that the smoother assumes, with `sigma` for σ of the first sensor. Where it learns the noise of the
+    /// joints' readings, it begins with the usual one.
     pub fn smoother_rig(&self, sigma: f64) -> Rig {
         let rig = self.rig.assuming(sigma);
         if !self.smoother.joints_unknown {

@@ -1,4 +1,4 @@
-//! From a scenario and a seed to an experiment: everything that is drawn is drawn here.
+//! Assembling an experiment from a scenario and a seed. All random draws happen here.
 
 mod guess;
 mod learners;
@@ -19,16 +19,17 @@ use body_schema_engine::{
 };
 use body_schema_experiment::{Agent, Change, Evaluation, Experiment, Setting, Stream, World, channels};
 
-/// Configurations over which the prediction error is judged in a simulated world.
+/// The number of configurations over which the prediction error is judged in a simulated world.
 const EVALUATION_SIZE: usize = 200;
-/// Configurations over which a learner judges itself, and by which criterion I chooses. Over few it learns what predicts these few
-/// best: with 32 a Panda of 31 parameters ends with errors a twentieth greater than with 64, and with more than that no smaller ones.
+/// The number of configurations over which a learner judges itself, and by which criterion I chooses. With few of them it learns what
+/// predicts these few best: with 32 a Panda of 31 parameters ends with errors a twentieth greater than with 64, and with more than
+/// that no smaller ones.
 const WORKSPACE_SIZE: usize = 64;
 
-/// What learners are told at the start. Nothing in it comes from the truth but through the drawn initial estimate.
+/// The information that learners are given at the start. The truth enters it only through the drawn initial estimate.
 struct Briefing {
     initial: State,
-    /// What is learned.
+    /// The learned parameters.
     layout: Arc<Layout>,
     /// W.
     weights: Weights,
@@ -37,12 +38,12 @@ struct Briefing {
     actions: Actions,
     workspace: Workspace,
     watch: Option<Watch>,
-    /// What is known before any movement, with its error.
+    /// The readings known before any movement, with their error.
     beforehand: Option<Observation>,
 }
 
 impl Briefing {
-    /// The same for a learner that takes the axes for what the description says.
+    /// This briefing for a learner that takes the axes from the description.
     fn holding_axes(&self, scenario: &Scenario) -> Self {
         let others = self.layout.blocks().map(|(block, _)| block).filter(|block| !matches!(block, Block::Axis(_)));
         let layout = Layout::new(&self.initial, others);
@@ -60,26 +61,35 @@ impl Briefing {
 }
 
 impl Scenario {
-    /// The experiment of a seed with the named learners; with all of the scenario's if none are named.
+    /// The experiment of a seed with the named learners; with the scenario's default learners if none are named.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError`] if the names do not choose learners (see [`chosen`](Scenario::chosen)), or if the prior of one
+    /// is not positive definite.
     pub fn experiment(&self, seed: u64, learners: Option<&[String]>) -> Result<Experiment, ScenarioError> {
         let (world, evaluation, briefing) = self.draw(seed);
         self.assemble(seed, &self.chosen(learners)?, world, evaluation, &briefing)
     }
 
-    /// The agent of a learner, told what the learners of this seed are told: what has no world to live in, but a robot of
+    /// The agent of a learner, with the same briefing as the learners of this seed, but without a world: for a robot of
     /// its own.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError`] if the prior is not positive definite.
     pub fn agent(&self, learner: &LearnerSpec, seed: u64) -> Result<Agent, ScenarioError> {
         let (.., briefing) = self.draw(seed);
         self.agent_of(learner, seed, &briefing)
     }
 
-    /// What designs are sought for here; `None` where no truth is known, a sensor has no noise or targets are held in
-    /// sockets.
+    /// The design problem of this scenario; `None` where no truth is known, a sensor has no noise or targets are held
+    /// in sockets.
     pub fn design_problem(&self) -> Option<Problem> {
         self.design_problem_of(self.robot.layout.clone())
     }
 
-    /// The same for one who learns these parameters and knows all others.
+    /// The design problem of a learner that learns these parameters and knows all others.
     fn design_problem_of(&self, layout: Layout) -> Option<Problem> {
         let WorldSpec::Simulated { watch, .. } = &self.world else { return None };
         // Designs are sought for in the joint box, of which sockets leave a part without a volume.
@@ -99,18 +109,18 @@ impl Scenario {
         })
     }
 
-    /// Λ₀ of these parameters.
+    /// Λ₀ of these parameters, the information of the prior.
     fn information(&self, layout: &Layout) -> DMatrix<f64> {
         DMatrix::from_diagonal(&self.prior.standard_deviations(layout).map(|sd| sd.powi(-2)))
     }
 
-    /// W of these parameters.
+    /// W of these parameters, the weights of the criterion.
     fn weights_of(&self, layout: &Layout) -> Weights {
         Weights::new(self.selection.units, layout, &self.prior.standard_deviations(layout))
     }
 
-    /// The same along a run of so many steps, one stretch before a change of the body and one after it; empty where no
-    /// truth is known or a sensor has no noise.
+    /// The design problems along a run of so many steps: one stretch before a change of the body and one after it;
+    /// empty where no truth is known or a sensor has no noise.
     pub fn design_stretches(&self, steps: u64) -> Vec<Stretch> {
         let Some(problem) = self.design_problem() else { return Vec::new() };
         let change = match &self.world {
@@ -183,12 +193,13 @@ impl Scenario {
         Workspace { configurations, up_to_motion: self.robot.up_to_motion, ..Workspace::default() }
     }
 
-    /// What one measurement of the marker is worth, metres: of the tracker, or where none sees it of the first sensor.
+    /// σ of a measurement of the marker, metres: of the tracker, or if nothing measures the marker of the first sensor.
     fn marker_sigma(&self) -> f64 {
         self.rig.marker_channel().map_or(self.rig.sigma(), |_| self.rig.marker_sigma())
     }
 
-    /// Holds rows out; learners begin with the robot's description, and find where it stands from the rows that they choose.
+    /// Holds rows out. Learners begin with the robot's description, and learn from the rows that they choose where it
+    /// stands.
     fn draw_measured(
         &self,
         seed: u64,
@@ -272,7 +283,7 @@ impl Scenario {
     }
 }
 
-/// Draws before giving up on finding more configurations that are wanted.
+/// The number of draws after which the search for more wanted configurations ends.
 const PATIENCE: usize = 100_000;
 
 /// Up to `count` configurations, uniform among those in the box that are `wanted`.

@@ -1,4 +1,4 @@
-//! What there is to know of a scenario's robot before anything is measured.
+//! The observability problem of a scenario: its robot before anything is measured.
 
 use std::sync::Arc;
 
@@ -13,11 +13,11 @@ use body_schema_engine::{
     selection::Watch,
 };
 
-/// Postures drawn before it is given up to find one in which something is in view.
+/// The number of postures drawn before the search for one with something in view ends.
 const PATIENCE: usize = 20_000;
 
 impl Scenario {
-    /// The robot as the file describes it, with its sensors, limits and constraints: what was recorded does not count.
+    /// The robot as the file describes it, with its sensors, limits and constraints; recorded measurements are ignored.
     pub fn prospect(&self) -> Prospect {
         let layout = self.robot.layout.clone();
         let mut state = self.robot.state.clone();
@@ -54,9 +54,9 @@ impl Scenario {
         }
     }
 
-    /// Moves targets of unknown places off where the file happens to put them, often the origin of the flange and so the axis of the
-    /// last joint, which could then not be told: by half of what they are known to, in no direction that an axis is likely to have.
-    /// Sockets that nobody has guessed follow.
+    /// Moves targets of unknown place away from where the file has them, which is often the origin of the flange and so the axis of
+    /// the last joint, an axis that could then not be determined. They move by half of their prior deviation, in a direction that no
+    /// axis is likely to have. Sockets without a guess follow.
     fn unline(&self, state: &mut State) {
         for (block, _) in self.robot.layout.blocks() {
             let (Block::Target(index), Some(Known::Within { length_m, .. })) = (block, self.prior.of(block)) else {
@@ -73,7 +73,8 @@ impl Scenario {
         }
     }
 
-    /// Who watches; where sensors see some postures only and the file names none in view, one in which something is.
+    /// The head that watches; where sensors see some postures only and the file names none in view, a posture at which
+    /// something is seen.
     fn watch(&self, state: &State) -> Option<Watch> {
         if let WorldSpec::Simulated { watch: Some(watch), .. } | WorldSpec::Outside { watch: Some(watch), .. } =
             &self.world

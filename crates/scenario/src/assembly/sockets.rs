@@ -1,4 +1,4 @@
-//! What the sockets of a scenario become: actions, what is known beforehand, and what is held out.
+//! The sockets of a scenario as actions, prior observations, and held-out postures.
 
 use rand::RngExt;
 
@@ -15,7 +15,7 @@ use body_schema_experiment::{HeldInSocket, Stream};
 const HELD_OUT_SIZE: usize = 30;
 
 impl Scenario {
-    /// What learners may do in a simulated world.
+    /// The movements that learners may make in a simulated world.
     pub(super) fn actions(&self) -> Actions {
         let Robot { limits, sockets, .. } = &self.robot;
         if sockets.is_empty() {
@@ -24,14 +24,14 @@ impl Scenario {
         Actions::Sockets(Sockets::new(limits.clone(), sockets.iter().map(|socket| socket.posture.clone()).collect()))
     }
 
-    /// What is known of a simulated robot's equipment before any movement: with an error that is drawn by its σ.
+    /// An observation of a simulated robot's equipment before any movement, with an error drawn by its σ.
     pub(super) fn beforehand(&self, seed: u64) -> Option<Observation> {
         let mut rng = Stream::Beforehand.rng(seed);
         let v: Vec<f64> = (0..self.rig.equations()).map(|_| rng.sample(StandardNormal)).collect();
         self.rig.beforehand(&self.robot.state, &v)
     }
 
-    /// Postures that truly hold the target in every socket that is held out, anywhere within the limits.
+    /// Postures that truly hold the target in every held-out socket, anywhere within the limits.
     pub(super) fn held_out(&self, seed: u64) -> Vec<HeldInSocket> {
         let mut rng = Stream::HeldOutSockets.rng(seed);
         let Robot { state, limits, held_out_sockets, .. } = &self.robot;
@@ -43,7 +43,8 @@ impl Scenario {
         held_out_sockets.iter().map(of).collect()
     }
 
-    /// The held-out rows of a table in which a target was held in one socket; of a single row there is nothing to compare.
+    /// The held-out rows of a table in which a target was held in one socket. A socket with a single row is left out:
+    /// there is nothing to compare.
     pub(super) fn held_out_rows(&self, measurements: &Measurements, rows: &[usize]) -> Vec<HeldInSocket> {
         let Robot { sockets, held_out_sockets, .. } = &self.robot;
         let of = |(number, socket): (usize, &SocketSpec)| {
@@ -55,8 +56,8 @@ impl Scenario {
         sockets.iter().chain(held_out_sockets).enumerate().filter_map(of).collect()
     }
 
-    /// What learners are asked about where nothing is measured but that targets meet themselves: how far the predicted target scatters in
-    /// sockets of the rows that are held out, by their postures alone. `None` where something else is measured, or there are none.
+    /// The workspace of learners whose only measurement is that targets meet themselves: how far the predicted target scatters in the
+    /// sockets of held-out rows, given their postures alone. `None` where something else is measured, or there are no such rows.
     pub(super) fn asked_about(&self, measurements: &Measurements, rows: &[usize]) -> Option<Workspace> {
         if self.rig.channels().iter().any(|channel| channel.occasion() == Occasion::Always) {
             return None;

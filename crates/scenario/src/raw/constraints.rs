@@ -7,7 +7,7 @@ use toml::Spanned;
 
 use super::Exactly;
 
-/// What movements are bound to.
+/// The constraints on movements.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Constraints {

@@ -1,4 +1,4 @@
-//! What a file leaves out whose robot is a URDF.
+//! The defaults of a file whose robot is a URDF.
 
 use toml::{
     Spanned,
@@ -7,13 +7,13 @@ use toml::{
 
 use super::Source;
 
-/// What is said where such a file says nothing, key by key.
+/// The defaults of a file with a table, or about a robot elsewhere, key by key.
 const MEASURED: &str = include_str!("../measured.toml");
-/// What is said of any robot that a description tells: whoever has one asks where the hand will be.
+/// The defaults for any robot with a description: its user asks where the hand will be.
 const DESCRIBED: &str = "[selection]\ncriterion = \"i\"\n";
 
-/// Adds to a document whose robot is a URDF what it leaves out: the list of joints, which the description has, the criterion, and
-/// where its measurements are a table, or it stands elsewhere, the keys of [`MEASURED`].
+/// Adds the defaults to a document whose robot is a URDF: the list of joints from the description, the criterion, and, for a
+/// table or a robot elsewhere, the keys of [`MEASURED`].
 pub(super) fn complete(document: &mut DeTable<'_>, source: Source) -> Result<(), Error> {
     let Some(DeValue::Table(robot)) = document.get_mut("robot").map(Spanned::get_mut) else { return Ok(()) };
     let Some(urdf) = robot.get("urdf").map(Spanned::span) else { return Ok(()) };
@@ -30,7 +30,7 @@ pub(super) fn complete(document: &mut DeTable<'_>, source: Source) -> Result<(),
     Ok(())
 }
 
-/// Adds what is missing, in tables too.
+/// Adds missing keys, in nested tables too.
 fn add<'a>(to: &mut DeTable<'a>, from: DeTable<'a>) {
     for (key, value) in from {
         match (to.get_mut(&key).map(Spanned::get_mut), value.get_ref()) {

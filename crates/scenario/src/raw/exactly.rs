@@ -7,13 +7,13 @@ use serde::{
     de::{Error, SeqAccess, Visitor},
 };
 
-/// A list of exactly `N` values. An array of serde's own would drop in silence what a file holds beyond them.
+/// A list of exactly `N` values. Serde's own array would silently drop further values of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exactly<T, const N: usize>(pub [T; N]);
 
-/// What a list can hold.
+/// A type of element of such a list.
 pub trait Element {
-    /// What several of them are called.
+    /// The plural of the element's name.
     const PLURAL: &'static str;
 }
 

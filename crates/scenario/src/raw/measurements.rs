@@ -1,4 +1,4 @@
-//! The keys of what was measured: the table, what is held out of it, and sockets.
+//! The keys of measurements: the table, its held-out rows, and sockets.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -10,12 +10,12 @@ use super::Exactly;
 #[serde(deny_unknown_fields)]
 pub struct Measurements {
     pub file: Spanned<String>,
-    /// Where nothing but a marker was measured, and no `[[sensor]]` says how.
+    /// The columns of the marker, where only a marker was measured and no `[[sensor]]` describes it.
     pub marker_columns_m: Option<Spanned<Exactly<String, 3>>>,
     pub held_out: Option<Spanned<usize>>,
 }
 
-/// Which rows are held out; one of the keys.
+/// The held-out rows; exactly one of the keys.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeldOut {
@@ -27,7 +27,7 @@ pub struct HeldOut {
     pub file: Option<Spanned<String>>,
 }
 
-/// That a target was held in sockets, which columns tell.
+/// The columns that tell in which socket a target was held.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sockets {

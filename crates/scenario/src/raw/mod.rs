@@ -186,7 +186,7 @@ pub struct Socket {
     pub held_out: bool,
 }
 
-/// Where the robot stands in the frame of the measurements.
+/// The pose of the robot in the frame of the measurements.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Base {
@@ -196,7 +196,7 @@ pub struct Base {
     pub known: Known,
 }
 
-/// How well a place is known; without any of these it is known exactly.
+/// The prior knowledge of a place; without any of these keys it is known exactly.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Known {
@@ -301,14 +301,14 @@ pub struct Smoother {
     pub loss: Option<Loss>,
     pub outlier_fraction: Option<Spanned<f64>>,
     pub outlier_spread: Option<Spanned<f64>>,
-    /// Also written `sigma = "unknown"`.
+    /// The knowledge of the noise; also written `sigma = "unknown"`.
     #[serde(alias = "sigma")]
     pub noise: Option<NoiseKnowledge>,
-    /// Whether it is told how far the joints' readings are off.
+    /// The knowledge of the joints' readings' noise.
     pub reading_sigma: Option<NoiseKnowledge>,
 }
 
-/// Whether the smoother is told how much noise there is.
+/// Whether the size of a noise is stated or to be learned.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseKnowledge {

@@ -1,4 +1,4 @@
-//! Reading the keys, and the errors of it.
+//! Reading the keys of a file, and its errors.
 
 use std::ops::Range;
 
@@ -7,12 +7,12 @@ use toml::de::DeTable;
 use super::{Scenario, defaults::complete};
 use crate::error::{Problem, similar};
 
-/// What a text is.
+/// The kind of a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A scenario file.
     File,
-    /// What is known of a robot elsewhere.
+    /// A description of a robot elsewhere.
     Outside,
 }
 
@@ -32,7 +32,8 @@ pub fn line_of(text: &str, offset: usize) -> usize {
     text.as_bytes().iter().take(offset).filter(|&&byte| byte == b'\n').count() + 1
 }
 
-/// Where `key` is given a value in the table that begins at `table`; the table itself if that is not to be seen.
+/// The place where `key` is given a value in the table that begins at `table`; the table itself if that cannot be
+/// found.
 pub fn key_in(text: &str, table: Range<usize>, key: &str) -> Range<usize> {
     let mut at = text[..table.start].rfind('\n').map_or(0, |end| end + 1);
     for (index, line) in text[at..].split_inclusive('\n').enumerate() {
@@ -47,7 +48,7 @@ pub fn key_in(text: &str, table: Range<usize>, key: &str) -> Range<usize> {
     table
 }
 
-/// Drops what `Spanned` adds to paths, but for the index of a sequence.
+/// A path without what `Spanned` adds, except for the index of a sequence.
 fn readable_path(path: &str) -> String {
     let mut readable = String::new();
     for part in path.split('.') {
@@ -113,11 +114,11 @@ fn problem(text: &str, path: &str, error: &toml::de::Error) -> Problem {
     }
 }
 
-/// What to do with a lens that bends lines: points are read as a pinhole sees them.
+/// The advice for a lens with distortion: points are read as a pinhole sees them.
 const UNDISTORT: &str = "undistort the points first (for example with OpenCV's undistortPoints, with P set to the camera matrix) \
                          and leave this key out";
 
-/// Whether a key says how a lens bends lines.
+/// Whether a key describes a lens's distortion.
 fn bends(key: &str) -> bool {
     const COEFFICIENTS: [&str; 11] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "d", "k", "coeffs"];
     let key = key.to_ascii_lowercase();
@@ -136,7 +137,7 @@ fn unit(key: &str) -> &'static str {
     }
 }
 
-/// The number around a byte offset whose first digit is missing, as `.03`.
+/// The number around a byte offset whose first digit is missing, such as `.03`.
 fn without_zero(text: &str, offset: usize) -> Option<&str> {
     let is_part = |c: char| c.is_ascii_alphanumeric() || "+-.".contains(c);
     let start = offset - text.get(..offset)?.rsplit(|c| !is_part(c)).next()?.len();

@@ -10,7 +10,7 @@ use toml::Spanned;
 
 use body_schema_engine::sensing::Keys;
 
-/// `[sensor]` or as many `[[sensor]]` as there are.
+/// One `[sensor]`, or any number of `[[sensor]]`.
 #[derive(Debug)]
 pub struct Sensors(pub Vec<Spanned<Keys>>);
 

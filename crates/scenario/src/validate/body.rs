@@ -141,7 +141,7 @@ impl Check<'_> {
         Some(robot)
     }
 
-    /// What a joint's readings are truly corrected by.
+    /// The true correction of a joint's readings.
     fn correction(&mut self, index: usize, raw: &raw::Joint) -> Correction {
         let key = |field: &str| format!("robot.joint[{index}].{field}");
         let mut correction = Correction { compliance: self.compliance(index, raw), ..Correction::default() };

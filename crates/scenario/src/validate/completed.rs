@@ -1,5 +1,5 @@
-//! What a table's titles say by themselves, where a scenario with a URDF says nothing: which targets there are, what measures
-//! them, and what is known of their places.
+//! Completing a scenario with a URDF from the titles of its table: its targets, the sensors that measure them, and the prior
+//! of their places.
 
 use std::ops::Range;
 
@@ -9,19 +9,19 @@ use super::raw;
 use body_schema_engine::sensing::Keys;
 use body_schema_table::Titles;
 
-/// What nothing is known of where the robot stands.
+/// The prior deviation of an unknown base, metres.
 const BASE_M: f64 = 1.0;
-/// The same of angles: a radian.
+/// The prior deviation of an unknown angle, degrees: a radian.
 const RADIAN_DEG: f64 = 57.3;
-/// Where a target may be, from the frame of its link.
+/// The prior deviation of a target from the frame of its link.
 const TARGET_M: f64 = 0.3;
-/// Units of noise, where it is learned: of lengths, of rotations and of pictures.
+/// The units of learned noise: of lengths, of rotations and of pictures.
 const SIGMA_M: f64 = 0.001;
 const SIGMA_DEG: f64 = 0.1;
 const SIGMA_PX: f64 = 1.0;
 
-/// Completes a scenario whose robot is a URDF and whose measurements are a table with these titles; or one of a robot
-/// elsewhere, where there are no titles, whose targets' positions are measured unless it says otherwise.
+/// Completes a scenario whose robot is a URDF and whose measurements are a table with these titles; or, without titles,
+/// one of a robot elsewhere, whose targets' positions are measured unless it says otherwise.
 pub(super) fn complete(raw: &mut raw::Scenario, titles: Option<&Titles>) {
     let span = raw.measurements.as_ref().map_or(0..0, Spanned::span);
     let has_sockets = titles.map_or(!raw.sockets.is_empty(), |titles| titles.label("socket").is_ok());
@@ -54,7 +54,7 @@ pub(super) fn complete(raw: &mut raw::Scenario, titles: Option<&Titles>) {
     }
 }
 
-/// The targets that titles name: what stands before x, y and z.
+/// The targets that titles name: the part before x, y and z.
 fn prefixes(titles: &Titles) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for prefix in titles.prefixes() {
@@ -67,7 +67,7 @@ fn prefixes(titles: &Titles) -> Vec<String> {
     found
 }
 
-/// A sensor of a target's pose where its titles have a rotation, or else of its position.
+/// A sensor of a target's pose if its titles have a rotation, otherwise of its position.
 fn keys_of(target: String, titles: Option<&Titles>) -> Keys {
     let has_pose = |prefix: &&str| titles.is_some_and(|titles| titles.has_pose(prefix));
     let is_pose = ["", &target].iter().any(has_pose);
@@ -87,7 +87,7 @@ fn sigmas(keys: &mut Keys) {
     }
 }
 
-/// The targets that sensors and sockets name, on the tip; and of those that are nowhere said to be, that little is known.
+/// Adds the targets that sensors and sockets name, on the tip. Targets whose place is nowhere stated get a wide prior.
 fn targets(raw: &mut raw::Scenario, span: &Range<usize>) {
     let sensors: Vec<Keys> =
         raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0).map(|keys| keys.get_ref().clone()).collect();

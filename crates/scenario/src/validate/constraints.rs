@@ -1,4 +1,4 @@
-//! What movements are bound to.
+//! The constraints on movements.
 
 use std::cmp::Ordering;
 
@@ -12,7 +12,7 @@ use body_schema_engine::{
 };
 
 impl Check<'_> {
-    /// The constraints of a robot, and that they leave it something to do.
+    /// The constraints of a robot, checked to leave feasible movements.
     pub(super) fn constraints(
         &mut self,
         spanned: &Spanned<raw::Constraints>,
@@ -151,7 +151,7 @@ impl Check<'_> {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Whether there is anything to do: an allowed posture, a recorded row, or what draws come upon.
+/// Checks that there is a feasible movement: an allowed posture, a recorded row, or one found by draws.
 fn feasible(constraints: &Constraints, world: Option<&WorldSpec>) -> Result<(), Infeasible> {
     let from = constraints.start.as_deref();
     match (world, &constraints.allowed) {

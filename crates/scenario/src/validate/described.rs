@@ -13,7 +13,7 @@ use body_schema_engine::{
 };
 use body_schema_robot::{Chain, Urdf, UrdfError};
 
-/// What links are called: by the joints that move them, or by a description.
+/// The names of links: by the joints that move them, or by a description.
 #[derive(Clone, Copy)]
 pub(super) struct Links<'a> {
     pub joints: &'a [String],
@@ -21,13 +21,13 @@ pub(super) struct Links<'a> {
 }
 
 impl Links<'_> {
-    /// The last link, with the frame in which places on it are written, at θ = 0.
+    /// The last link, and the frame in which places on it are written, at θ = 0.
     pub fn last(&self) -> (usize, Isometry3<f64>) {
         let frame = self.described.and_then(|described| described.chain.frames().pop());
         (self.joints.len(), frame.map_or_else(Isometry3::identity, |(_, frame)| frame))
     }
 
-    /// The link of a name, with that frame.
+    /// The link with this name, and the frame in which places on it are written, at θ = 0.
     pub fn find(&self, name: &str) -> Option<(usize, Isometry3<f64>)> {
         let Some(described) = self.described else {
             let joint = self.joints.iter().position(|joint| joint == name).map(|index| index + 1);
@@ -44,7 +44,7 @@ impl Links<'_> {
         on_chain(chain).or_else(|| on_chain(&beside()?))
     }
 
-    /// The names that there are.
+    /// The known names.
     pub fn names(&self) -> Vec<&str> {
         match self.described {
             Some(Described { chain, .. }) => {
@@ -56,7 +56,7 @@ impl Links<'_> {
     }
 }
 
-/// What of an axis is held.
+/// The held parts of an axis.
 #[derive(Clone, Copy, Default)]
 struct HeldParts {
     direction: bool,
@@ -64,7 +64,7 @@ struct HeldParts {
 }
 
 impl Check<'_> {
-    /// The description that a scenario names instead of joints; `None` where it names none, or that has left a problem behind.
+    /// The description that a scenario names instead of joints; `None` if it names none, or if it has left a problem behind.
     pub(super) fn described(&mut self, scenario: &raw::Scenario) -> Option<Arc<Described>> {
         let raw = &scenario.robot;
         let Some(file) = &raw.urdf else {
@@ -119,7 +119,7 @@ impl Check<'_> {
         Some(Arc::new(Described { file: name, urdf, chain }))
     }
 
-    /// The joints of a description whose readings are off by an offset that is learned, and how well that is known.
+    /// The joints of a description whose readings have a learned offset, with its prior deviation.
     pub(super) fn offsets(
         &mut self,
         scenario: &raw::Scenario,
@@ -160,8 +160,8 @@ impl Check<'_> {
         offsets
     }
 
-    /// By joint, whether it is learned: all that are not held. An axis of which `joint.direction` or `joint.point` is held is
-    /// learned, with that known.
+    /// Whether each joint is learned: all that are not held. An axis with only `joint.direction` or `joint.point` held is
+    /// learned, with that part known.
     pub(super) fn learned(&mut self, scenario: &raw::Scenario, names: &[String]) -> (Vec<bool>, Vec<(Block, Known)>) {
         let prior = scenario.prior.get_ref();
         let (point_m, direction_rad) = (*prior.point_m.get_ref(), *prior.direction_rad.get_ref());

@@ -1,4 +1,4 @@
-//! What a robot carries and what stands beside it: targets and cameras.
+//! The equipment of a robot: targets and cameras, carried or beside it.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use toml::Spanned;
@@ -11,10 +11,10 @@ use body_schema_engine::{
     sensing::{CameraKind, Equipment, Facing, TargetKind},
 };
 
-/// How far from the direction that it faces a target is seen, unless the file says otherwise, degrees.
+/// The angle from its facing direction within which a target is seen, unless stated otherwise, degrees.
 const FACING_WITHIN_DEG: f64 = 80.0;
 
-/// Base, targets, cameras, and how well their places are known where they are learned.
+/// Base, targets, cameras, and the prior of those that are learned.
 #[derive(Default)]
 pub(super) struct Outfit {
     pub base: Isometry3<f64>,
@@ -156,7 +156,7 @@ impl Check<'_> {
         outfit.equipment.cameras.push(CameraKind { name: raw.name.get_ref().clone(), size_px });
     }
 
-    /// How well a place is known; `None` if it is known exactly, so that it is not learned.
+    /// The prior knowledge of a place; `None` if it is known exactly, so that it is not learned.
     pub(super) fn known<T>(&mut self, key: &str, raw: &raw::Known, spanned: &Spanned<T>) -> Option<Known> {
         let field = |field: &str| format!("{key}.{field}");
         if let Some(within) = &raw.anywhere_m {
@@ -186,7 +186,7 @@ impl Check<'_> {
         }
     }
 
-    /// The link of a name, with the frame in which places on it are written.
+    /// The link with this name, and the frame in which places on it are written.
     fn link(&mut self, key: &str, name: &Spanned<String>, links: Links<'_>) -> Option<(usize, Isometry3<f64>)> {
         let found = links.find(name.get_ref());
         if found.is_none() {
@@ -210,7 +210,7 @@ impl Check<'_> {
         UnitQuaternion::from_euler_angles(roll, pitch, yaw)
     }
 
-    /// What the hand is: the target or camera of a name.
+    /// The hand: the target or camera with this name.
     pub(super) fn hand(&mut self, key: &str, name: &Spanned<String>, equipment: &Equipment) -> Option<Hand> {
         let target = equipment.targets.iter().position(|kind| kind.name == *name.get_ref()).map(Hand::Target);
         let camera = || equipment.cameras.iter().position(|kind| kind.name == *name.get_ref()).map(Hand::Device);
@@ -226,7 +226,7 @@ impl Check<'_> {
 }
 
 impl Outfit {
-    /// Hands its things to a robot.
+    /// Adds the equipment to a robot.
     pub fn equip(&self, state: &mut State) {
         if !self.targets.is_empty() {
             state.targets.clone_from(&self.targets);

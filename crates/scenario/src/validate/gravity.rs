@@ -1,4 +1,4 @@
-//! How a robot gives way under its load.
+//! The compliance of a robot under its load.
 
 use nalgebra::Vector3;
 
@@ -10,7 +10,7 @@ use body_schema_engine::{
 };
 
 impl Check<'_> {
-    /// Where up is, and which joint is the elbow.
+    /// The upward direction, and the joint of the elbow.
     pub(super) fn gravity(&mut self, raw: &raw::Robot, names: &[String], joints: &[Joint]) -> Gravity {
         let up = raw.up.as_ref().and_then(|up| self.unit("robot.up", up)).unwrap_or_else(Vector3::z_axis);
         let elbow = raw.elbow.as_ref().and_then(|given| {
@@ -33,7 +33,7 @@ impl Check<'_> {
         Gravity { up, elbow }
     }
 
-    /// By how much a joint truly gives way to the loads at the target and at the elbow, rad per N·m of 1 kg.
+    /// The true compliance of a joint to the loads at the target and at the elbow, rad per N·m of 1 kg.
     pub(super) fn compliance(&mut self, index: usize, raw: &raw::Joint) -> [f64; 2] {
         let key = |field: &str| format!("robot.joint[{index}].{field}");
         let given = raw.compliance_deg_per_nm.as_ref();

@@ -14,12 +14,13 @@ use body_schema_engine::{
     sensing::{Head, Rig},
 };
 
-/// The limits of pan and tilt unless told otherwise, degrees.
+/// The limits of pan and tilt, unless stated otherwise, degrees.
 const SERVO_DEG: f64 = 15.0;
-/// So many robots are drawn to judge whether a pose may be in view, and one in so many has to be seen.
+/// The number of robots drawn to judge whether a pose may be in view, and the share of them, one in so many, that must
+/// be seen.
 const DRAWS: usize = 2000;
 const LEAST_SEEN: usize = 200;
-/// The half-angle of the lens unless told otherwise, degrees.
+/// The half-angle of the lens, unless stated otherwise, degrees.
 const LENS_DEG: f64 = 20.0;
 
 impl Check<'_> {
@@ -65,8 +66,8 @@ impl Check<'_> {
         Some(Watch { head: Some(head), visible_pose })
     }
 
-    /// What is known to be seen without a head: a posture in view of a sensor that sees some postures only. Of a robot elsewhere nobody
-    /// knows exactly where things are; `prior` says how well.
+    /// A posture in view, without a head: one at which a sensor that sees some postures only sees something. For a robot elsewhere
+    /// places are uncertain, as `prior` says.
     pub(super) fn view(
         &mut self,
         spanned: &Spanned<raw::View>,
@@ -124,15 +125,15 @@ impl Check<'_> {
     }
 }
 
-/// How far the channel that sees most is inside what it can see, radians.
+/// The greatest clearance of any channel, radians: how far it is inside what it can see.
 fn clearance(rig: &Rig, state: &State, pose: &[f64]) -> f64 {
     let mut clearances = vec![0.0; rig.channels().len()];
     rig.clearances(None, state, pose, &mut clearances);
     clearances.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Whether something may be in view at a pose of a robot that is known as `prior` says: whether it is of one robot in [`LEAST_SEEN`]
-/// that are drawn from the prior.
+/// Whether something may be in view at a pose of a robot with this prior: whether it is for one robot in [`LEAST_SEEN`] drawn from
+/// the prior.
 fn may_be_seen(rig: &Rig, robot: &Robot, prior: &Prior, pose: &[f64]) -> bool {
     let layout = &robot.layout;
     let deviations = prior.standard_deviations(layout);

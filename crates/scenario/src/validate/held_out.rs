@@ -1,4 +1,4 @@
-//! Which rows of a table are held out.
+//! The held-out rows of a table.
 
 use std::ops::Range;
 
@@ -8,14 +8,14 @@ use super::{Check, raw};
 use crate::{HeldOut, HeldOutRule, Measurements};
 use body_schema_table::TableError;
 
-/// Folds, where a scenario does not say what is held out.
+/// The number of folds where a scenario does not state what is held out.
 const FOLDS: usize = 5;
-/// Base and marker take four rows at least.
+/// The least number of rows: base and marker take four.
 const LEAST: usize = 4;
 
 impl Check<'_> {
-    /// What is held out of `rows`; the rows of a second file, which `read` reads, are added to them. `None` has left a problem
-    /// behind.
+    /// The rule for holding out of `rows`; the rows of a second file, read by `read`, are added to them. `None` has left a
+    /// problem behind.
     pub(super) fn held_out(
         &mut self,
         raw: &raw::Scenario,
@@ -61,7 +61,7 @@ impl Check<'_> {
         self.whole(HeldOut::new(rule, &rows.configurations), spanned.span())
     }
 
-    /// That rows which are held out leave none behind in their postures.
+    /// Checks that held-out rows leave none of their postures behind.
     fn whole(&mut self, held_out: HeldOut, span: Range<usize>) -> Option<HeldOut> {
         let postures = held_out.count_postures();
         let mut sizes = vec![0; postures];
@@ -130,7 +130,7 @@ impl Check<'_> {
         Some(HeldOutRule::Rows(held_out))
     }
 
-    /// Rows as they are numbered in the file; those on which nothing was measured count, and hold nothing out.
+    /// Rows as they are numbered in the file; those without a measurement are counted, and hold nothing out.
     fn told(&mut self, held_out: &Spanned<Vec<usize>>, numbers: &[usize]) -> Option<HeldOutRule> {
         let told = held_out.get_ref();
         let count = numbers.last().map_or(0, |last| last + 1);

@@ -1,4 +1,4 @@
-//! The learners, and how often they promise to converge.
+//! The learners of a file, and the movements within which they promise to converge.
 
 use std::collections::BTreeMap;
 
@@ -103,7 +103,7 @@ impl Check<'_> {
     }
 }
 
-/// Names that mean something else: to recordings, and to those who compare learners.
+/// Names with another meaning: in recordings, and in comparisons of learners.
 const RESERVED: [&str; 2] = ["world", HUMAN];
 
 fn is_plain(name: &str) -> bool {

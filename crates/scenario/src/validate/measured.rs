@@ -10,13 +10,13 @@ use body_schema_engine::{kinematics::JointKind, sensing::Keys};
 use body_schema_robot::Urdf;
 use body_schema_table::{Column, Columns, Layout, Quantity, Reading, Table, TableError, Titles};
 
-/// Titles of the columns of sockets, unless a scenario says others.
+/// The titles of the columns of sockets, unless stated otherwise.
 const PLACE: &str = "place";
 const SOCKET: &str = "socket";
 
 /// The columns of text that tell which socket held a target.
 pub(super) struct SocketColumns {
-    /// None, where all sockets stand at one place.
+    /// The column of the place; none, where all sockets stand at one place.
     pub place: Option<String>,
     pub socket: String,
 }
@@ -42,7 +42,7 @@ impl Check<'_> {
         self.problem(file.span(), "measurements.file", format!("{} {what}", file.get_ref()), mend);
     }
 
-    /// The rows of a table and which of them are held out; the sockets that they name become the robot's.
+    /// The rows of a table and the rule for holding out; the sockets that they name become the robot's.
     pub(super) fn recorded(&mut self, raw: &raw::Scenario, robot: &mut Robot) -> Option<(Measurements, HeldOut)> {
         let measurements = raw.measurements.as_ref()?;
         let (span, measurements) = (measurements.span(), measurements.get_ref());
@@ -126,7 +126,7 @@ impl Check<'_> {
         (columns.len() == raw.robot.joints.get_ref().len()).then_some(columns)
     }
 
-    /// That either sensors say what was measured or `marker_columns_m` does.
+    /// Checks that measurements are described in one way: by sensors or by `marker_columns_m`.
     fn one_way_of_reading(
         &mut self,
         raw: &raw::Scenario,
@@ -149,16 +149,16 @@ impl Check<'_> {
     }
 }
 
-/// How the column of a joint is found.
+/// The way to find the column of a joint.
 enum JointColumn {
-    /// By exactly this title, whose end says the unit; without one it is rad or m.
+    /// By exactly this title, which ends with the unit; without one it is rad or m.
     Titled(String, JointKind),
-    /// By the joint's name, with its unit or without.
+    /// By the joint's name, with or without its unit.
     Named(String, JointKind),
 }
 
 impl JointColumn {
-    /// The column; of several that a joint's name fits that which no sensor `taken` has.
+    /// The column; among several that fit a joint's name, the one that no sensor has `taken`.
     fn find(&self, titles: &Titles, taken: &[&String]) -> Result<Column, TableError> {
         match self {
             Self::Titled(title, kind) => titles.titled(title, Quantity::of(*kind)),
@@ -176,7 +176,7 @@ fn taken(raw: &raw::Scenario) -> Vec<&String> {
     sensors.flat_map(|keys| keys.get_ref().columns.iter().flatten()).collect()
 }
 
-/// The columns of every sensor, by titles that it names, or else of those that are `beside` the joints'.
+/// The columns of every sensor: by the titles that it names, or among those `beside` the joints'.
 fn readings(raw: &raw::Scenario, robot: &Robot, titles: &Titles, beside: &Titles) -> Result<Vec<Reading>, TableError> {
     let marker = raw.measurements.as_ref().and_then(|given| given.get_ref().marker_columns_m.as_ref());
     if let Some(columns) = marker {
@@ -195,7 +195,7 @@ fn reading(keys: &Keys, robot: &Robot, titles: &Titles, beside: &Titles) -> Resu
     beside.reading_of(layout, &prefix).or_else(|_| titles.reading_of(layout, &prefix))
 }
 
-/// What a sensor's reading looks like in a table, and what its titles begin with.
+/// The layout of a sensor's reading in a table, and the prefix of its titles.
 pub(super) fn told(keys: &Keys, robot: &Robot) -> (Layout, String) {
     let equipment = &robot.equipment;
     let named = |name: &Option<String>| name.clone();
@@ -218,7 +218,7 @@ fn socket_columns(raw: &raw::Scenario, titles: &Titles) -> Option<SocketColumns>
     Some(SocketColumns { place: given(&held.place_column).or_else(usual), socket })
 }
 
-/// Rows by the joints that move, of rows by the readings that move them.
+/// Turns rows by readings into rows by the joints that they move.
 fn moved(mut rows: Measurements, robot: &Robot) -> Measurements {
     if let Some(Described { chain, .. }) = robot.described.as_deref() {
         rows.configurations.iter_mut().for_each(|readings| *readings = chain.positions(readings));

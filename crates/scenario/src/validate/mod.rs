@@ -1,4 +1,4 @@
-//! From the keys of a file to values that can be relied on.
+//! Validation: from the keys of a file to values that can be relied on.
 
 mod body;
 mod change;
@@ -40,13 +40,13 @@ use body_schema_engine::{
 };
 use body_schema_experiment::Thresholds;
 
-/// Unless a file says otherwise, a joint gives way to this torque by as much as an axis may be tilted: 1 kg half a metre out, N·m.
+/// The torque, N·m, under which a joint's default prior compliance equals the tilt of an axis: 1 kg half a metre out.
 const USUAL_TORQUE: f64 = 5.0;
-/// Unless a file says otherwise, the zeros of a described robot's joints are as good as 3 degrees, and 5 mm.
+/// The default prior deviations of the zeros of a described robot's joints: 3 degrees, and 5 mm.
 const USUAL_ZERO_RAD: f64 = 0.05;
 const USUAL_ZERO_M: f64 = 0.005;
 
-/// So many hypotheses there may be, and so many movements may be planned.
+/// The most hypotheses, and the most planned movements.
 const MOST_HYPOTHESES: u64 = 1000;
 const MOST_PLANNED: u64 = 100;
 
@@ -54,17 +54,23 @@ const MOST_PLANNED: u64 = 100;
 const UNIT_TOLERANCE: f64 = 1e-5;
 
 impl Scenario {
-    /// Reads a scenario from `text`. `file` is how errors name it; `open` returns the text of a data file that the
-    /// scenario names, or says why it cannot.
+    /// Reads a scenario from `text`. `file` is its name in errors; `open` returns the text of a data file that the
+    /// scenario names, or the reason why it cannot.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError::Invalid`] with every problem found: text that is no TOML, an unknown or missing key, a value
+    /// out of range, a data file that cannot be read.
     pub fn parse(file: &str, text: &str, open: &dyn Fn(&str) -> Result<String, String>) -> Result<Self, ScenarioError> {
         Self::parse_as(raw::Source::File, file, text, open)
     }
 
-    /// Reads what is known of a robot elsewhere, in the keys of a file that replays a table, but without one.
+    /// Reads the description of a robot elsewhere, in the keys of a file that replays a table, but without one.
     ///
     /// # Errors
     ///
-    /// As of [`parse`](Self::parse).
+    /// [`ScenarioError::Invalid`] with every problem found, as for [`parse`](Self::parse), and if the text names a
+    /// table or a simulated world.
     pub fn parse_outside(
         file: &str,
         text: &str,
@@ -91,21 +97,21 @@ impl Scenario {
     }
 }
 
-/// Where the file says nothing, σ that filters assume, in those of the first sensor: a chain has errors that no axis explains.
+/// The default σ of filters, as a multiple of the first sensor's: a chain has errors that no axis explains.
 const FILTER_SIGMAS: f64 = 2.0;
 
-/// Collects problems while it converts. A value that cannot be converted is `None` and has left a problem behind.
+/// A converter that collects problems. A value that cannot be converted is `None`, and has left a problem behind.
 struct Check<'a> {
     text: &'a str,
     open: &'a dyn Fn(&str) -> Result<String, String>,
-    /// Whether the text is about a robot elsewhere.
+    /// Whether the text describes a robot elsewhere.
     is_outside: bool,
     data: Vec<(String, String)>,
     problems: Vec<Problem>,
 }
 
 impl Check<'_> {
-    /// The text of a file that the scenario names, or why there is none.
+    /// The text of a file that the scenario names, or the reason why there is none.
     fn opened(&mut self, file: &str) -> Result<String, String> {
         if let Some((_, text)) = self.data.iter().find(|(name, _)| name == file) {
             return Ok(text.clone());
@@ -126,7 +132,7 @@ impl Check<'_> {
         self.problems.push(Problem { line, key: key.into(), what: what.into(), mend: mend.into() });
     }
 
-    /// A number that satisfies `holds`; NaN satisfies nothing.
+    /// A number that satisfies `holds`; NaN never does.
     fn number(&mut self, key: &str, value: &Spanned<f64>, holds: impl Fn(f64) -> bool, mend: &str) -> f64 {
         let number = *value.get_ref();
         if !is_usable(number) || !holds(number) {
@@ -284,7 +290,7 @@ impl Check<'_> {
         }
     }
 
-    /// What is known of targets, cameras, ratios and offsets that are learned.
+    /// The prior knowledge of learned targets, cameras, ratios and offsets.
     fn known_blocks(&mut self, raw: &raw::Scenario, robot: &Robot) -> BTreeMap<Block, Known> {
         let prior = raw.prior.get_ref();
         let joints = raw.robot.joints.get_ref().iter().enumerate();
@@ -328,7 +334,7 @@ impl Check<'_> {
         known
     }
 
-    /// The values of a filter; `usual` is the variance where there is one that need not be given.
+    /// The values of a filter; `usual` is the variance if that need not be given.
     fn filter(&mut self, section: &str, raw: &Spanned<raw::Filter>, usual: Option<f64>) -> Filter {
         let (span, raw) = (raw.span(), raw.get_ref());
         let key = |key: &str| format!("{section}.{key}");
@@ -350,7 +356,7 @@ impl Check<'_> {
         Filter { variance, stabilising }
     }
 
-    /// Every σ that an estimator takes for granted, the first sensor's as told and the others' in proportion.
+    /// Checks every σ that an estimator assumes, the first sensor's as stated and the others' in proportion.
     fn assumed_noise(&mut self, raw: &raw::Scenario, rig: &Rig, sigmas: [f64; 3]) {
         let told = sigmas.into_iter().find_map(|sigma| rig.assuming(sigma).check_noise().err());
         if let Some(error) = told {
@@ -407,7 +413,7 @@ impl Check<'_> {
         }
     }
 
-    /// The rate of the gradient. A file that has learn by it says which; others leave it to a default.
+    /// The rate of the gradient. A file with learners that use it must state it; others use a default.
     fn gradient_rate(&mut self, raw: &raw::Scenario) -> f64 {
         if let Some(gradient) = &raw.gradient {
             return self.positive("gradient.rate", &gradient.rate);
@@ -420,7 +426,7 @@ impl Check<'_> {
         Scenario::GRADIENT_RATE
     }
 
-    /// The thresholds of convergence. Where no truth is known nothing is judged by them.
+    /// The thresholds of convergence. Without a truth nothing is judged by them.
     fn thresholds(&mut self, raw: &raw::Scenario) -> Thresholds {
         if let Some(thresholds) = &raw.thresholds {
             return Thresholds {

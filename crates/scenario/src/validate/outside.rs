@@ -1,7 +1,7 @@
-//! What is known of a robot elsewhere: the keys of a file that replays a table, without the table.
+//! The description of a robot elsewhere: the keys of a file that replays a table, without the table.
 //!
 //! Sockets, which a table names in its columns, are listed: `[[socket]]` with `name`, `place` and `posture_deg`, a posture in
-//! which the target was in it. What is known of all of them stands in `[sockets]`, as it does beside a table.
+//! which the target was in it. What is common to all of them stands in `[sockets]`, as it does beside a table.
 
 use toml::Spanned;
 
@@ -16,7 +16,7 @@ use body_schema_engine::sensing::{Observation, Occasion, Rig};
 use body_schema_table::{TableError, Titles};
 
 impl Check<'_> {
-    /// That there is nothing of a table, and nothing of a simulated world; `None` has left a problem behind.
+    /// Checks that the file has no keys of a table or of a simulated world; `None` has left a problem behind.
     pub(super) fn nothing_recorded_or_simulated(&mut self, raw: &raw::Scenario) -> Option<()> {
         let found = self.problems.len();
         let simulated = "remove it; it belongs to a simulated world, and this robot is a real one";
@@ -66,7 +66,7 @@ impl Check<'_> {
         (self.problems.len() == found).then_some(())
     }
 
-    /// That a table can be written in the columns that sensors name, and read again.
+    /// Checks that a table can be written in the columns that sensors name, and read again.
     fn columns_to_write(&mut self, raw: &raw::Scenario, robot: &Robot) {
         for keys in raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0) {
             let Some(columns) = &keys.get_ref().columns else { continue };
@@ -79,7 +79,7 @@ impl Check<'_> {
         }
     }
 
-    /// Hands every socket what is known of all of them.
+    /// Gives every socket the keys that are common to all.
     pub(super) fn share_what_sockets_have_in_common(&mut self, raw: &mut raw::Scenario) {
         let Some(held) = &raw.held else { return };
         let (span, held) = (held.span(), held.get_ref());
@@ -92,7 +92,7 @@ impl Check<'_> {
         }
     }
 
-    /// Adds the distance that the two sockets of every place are apart, if it is known.
+    /// Adds the distance between the two sockets of every place, if it is known.
     pub(super) fn space_sockets(&mut self, raw: &raw::Scenario, robot: &mut Robot) {
         let Some((held, distance)) =
             raw.held.as_ref().and_then(|held| Some((held, held.get_ref().distance_m.as_ref()?)))

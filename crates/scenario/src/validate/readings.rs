@@ -1,4 +1,4 @@
-//! What the joints' own readings are off by.
+//! The noise of the joints' own readings.
 
 use std::sync::Arc;
 
@@ -11,24 +11,24 @@ use body_schema_engine::{
     sensing::{JointNoise, Occasion, Rig},
 };
 
-/// The word for what is learned.
+/// The word for noise that is learned.
 const UNKNOWN: &str = "unknown";
-/// Equations of a reading by which the joints' errors are told from the sensor's noise: more than a point in space.
+/// The least equations of a reading that tell the joints' errors from the sensor's noise: more than a point in space.
 const TELLING: usize = 4;
 
-/// What a scenario says of the joints' readings.
+/// The settings of the joints' readings.
 pub(super) struct Readings {
-    /// What is stated.
+    /// The stated noise.
     pub noise: Option<Arc<JointNoise>>,
-    /// Whether the smoother learns how far they are off.
+    /// Whether the smoother learns the noise.
     pub unknown: bool,
 }
 
 impl Check<'_> {
-    /// What `[robot]` and `[smoother]` say of the joints' readings. Where they say nothing, joints of a simulated robot are exact;
-    /// how far those of any other are off the smoother learns where a camera sees two points or more in one picture, or where a
-    /// robot elsewhere is told of poses. They are taken to be exact where nothing but points is read, from which play is hardly told
-    /// from noise, and in tables of poses.
+    /// The settings of the joints' readings in `[robot]` and `[smoother]`. By default, joints of a simulated robot are exact. For
+    /// any other robot the smoother learns their noise where a camera sees two points or more in one picture, or where a robot
+    /// elsewhere reports poses. Otherwise, with points alone, from which play can hardly be told from noise, and in tables of poses,
+    /// joints are taken to be exact.
     pub(super) fn readings(&mut self, raw: &raw::Scenario, robot: &Robot, rig: Option<&Rig>) -> Readings {
         let given = [
             ("robot.reading_sigma_deg", &raw.robot.reading_sigma_deg, JointKind::Revolute),

@@ -10,14 +10,14 @@ use body_schema_engine::{
 };
 use body_schema_table::is_absent;
 
-/// What play and the noise of the joints amount to at the target, unless a scenario says otherwise, metres.
+/// The default noise at the target from play and from the joints, metres.
 pub(super) const SIGMA_M: f64 = 2e-4;
-/// How well the distance between two sockets is known, likewise.
+/// The default standard deviation of the distance between two sockets, metres.
 pub(super) const SIGMA_DISTANCE_M: f64 = 1e-4;
 
 impl Check<'_> {
-    /// Every pair of a place and a socket is a socket of the robot's: to learn from where any fold has rows there to learn from,
-    /// or else held out.
+    /// Makes every pair of a place and a socket a socket of the robot: to learn from, where any fold has training rows there, or
+    /// else held out.
     pub(super) fn recorded_sockets(
         &mut self,
         raw: &raw::Scenario,
@@ -80,7 +80,7 @@ impl Check<'_> {
         Some(())
     }
 
-    /// The two sockets of every tool are a known distance apart.
+    /// Adds a known distance between the two sockets of every tool.
     pub(super) fn pairs(&mut self, span: std::ops::Range<usize>, robot: &mut Robot, sigma_m: f64) -> Option<()> {
         for one in 0..robot.sockets.len() {
             let place = &robot.sockets[one].place;
@@ -101,7 +101,7 @@ impl Check<'_> {
     }
 }
 
-/// Adds to every row that a target was held, and what is known beforehand, in the order of the rig: sensors, sockets, distances.
+/// Adds to every row that a target was held, and the prior observations, in the order of the rig: sensors, sockets, distances.
 fn complete_observations(rows: &mut Measurements, robot: &Robot, distance_m: f64) {
     let (sockets, spacings) = (robot.sockets.len(), robot.spacings.len());
     let sensors = rows.observations.first().map_or(0, |observation| observation.readings.len());

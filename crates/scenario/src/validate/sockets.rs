@@ -10,14 +10,15 @@ use body_schema_engine::{
     sensing::Spacing,
 };
 
-/// The prior's standard deviation, per coordinate, of a socket of which there is no guess: what is held there tells where it is.
+/// The prior's standard deviation, per coordinate, of a socket without a guess: what is held there tells where it is.
 const UNGUESSED_M: f64 = 1.0;
-/// How far from its socket a given posture may have the target: whoever pushes it in sees where it goes, metres.
+/// The most that a given posture may have the target away from its socket, metres: whoever pushes it in sees where it
+/// goes.
 const PUSHED_M: f64 = 0.02;
-/// How many of its standard deviations a distance that is told may be wrong by.
+/// The most standard deviations by which a stated distance may be wrong.
 const HONEST: f64 = 4.0;
 
-/// What is known of a socket of which there is no guess.
+/// The prior knowledge of a socket without a guess.
 pub(super) fn unguessed() -> Known {
     Known::Within { length_m: UNGUESSED_M, angle_rad: UNGUESSED_M, other: UNGUESSED_M }
 }
@@ -104,7 +105,7 @@ impl Check<'_> {
         Some(SocketSpec { name, place, target, at, posture, is_guessed: false, sigma_m })
     }
 
-    /// What is known of the distance from one socket to another.
+    /// The known distance from one socket to another.
     fn spacing(&mut self, key: &str, spanned: &Spanned<raw::Socket>, number: usize, robot: &Robot) -> Option<Spacing> {
         let raw = spanned.get_ref();
         let field = |field: &str| format!("{key}.{field}");

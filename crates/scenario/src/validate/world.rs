@@ -106,8 +106,8 @@ impl Check<'_> {
         }
     }
 
-    /// What is measured: the sensors of a simulated world; where measurements are replayed a tracker with the noise that
-    /// the filter assumes.
+    /// The measurement model: the sensors of a simulated world; where measurements are replayed, a tracker with the
+    /// noise that the filter assumes.
     pub(super) fn rig(&mut self, raw: &raw::Scenario, robot: &Robot) -> Option<Arc<Rig>> {
         let equipment = &robot.equipment;
         let held = socket_channels(robot);

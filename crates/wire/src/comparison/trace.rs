@@ -42,6 +42,10 @@ impl Trace {
     }
 
     /// Runs `experiment` for `steps` steps and calls `tick` after each.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] of the first step that fails.
     pub fn run(mut experiment: Experiment, steps: u64, mut tick: impl FnMut()) -> Result<Self, ExperimentError> {
         let mut learners: Vec<LearnerTrace> = experiment
             .learners()

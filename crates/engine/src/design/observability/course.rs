@@ -11,10 +11,10 @@ use crate::{
     sensing::Observation,
 };
 
-/// Some movements, and what is known after them.
+/// A sequence of movements, and what is known after them.
 pub(super) struct Course {
     pub movements: Vec<Movement>,
-    /// Λ: what they tell, with what is known beforehand.
+    /// Λ: the information of the movements and of what is known beforehand.
     pub information: DMatrix<f64>,
     /// P at the end.
     pub covariance: DMatrix<f64>,
@@ -22,7 +22,7 @@ pub(super) struct Course {
     pub errors_m: Vec<f64>,
 }
 
-/// Random numbers of a draw; what is told of a robot depends on no seed.
+/// The random numbers of a draw. They depend on no seed, so that a report about a robot does not either.
 pub(super) fn rng(draw: u64, stream: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(draw);
     rng.set_stream(stream);
@@ -30,7 +30,7 @@ pub(super) fn rng(draw: u64, stream: u64) -> ChaCha8Rng {
 }
 
 impl Prospect {
-    /// `count` movements as `policy` chooses them, each as if those before it had shown what was expected; with errors over the
+    /// Chooses `count` movements by `policy`, each as if those before it had shown what was expected; with errors over the
     /// postures whose stacked Jacobians `told_over` holds (3 rows each).
     pub(super) fn course(
         &self,
@@ -68,7 +68,7 @@ impl Prospect {
         Ok(course)
     }
 
-    /// What is seen after a movement of the robot as it is described; nothing that the head does not see.
+    /// The predicted observation after a movement of the described robot; empty where the head does not see the marker.
     fn seen(&self, movement: &Movement) -> Observation {
         let noise = vec![0.0; self.rig.equations()];
         let head = self.watch.as_ref().and_then(|watch| watch.head.as_ref());

@@ -8,10 +8,10 @@ use crate::{
     model::eigen,
 };
 
-/// How well a set of postures conditions an identification, by the singular values σ₁ ≥ … ≥ σₘ of its Jacobian, n postures stacked,
-/// whitened by the noise and with parameters in units of their prior standard deviations. Without a unit; all are better the
-/// greater they are. Collected and compared by Y. Sun and J. M. Hollerbach, "Observability Index Selection for Robot Calibration",
-/// ICRA 2008.
+/// Observability indices: they measure how well a set of postures conditions an identification, by the singular values σ₁ ≥ … ≥ σₘ
+/// of its Jacobian, n postures stacked, whitened by the noise and with parameters in units of their prior standard deviations.
+/// Without a unit; all are better the greater they are. Collected and compared by Y. Sun and J. M. Hollerbach, "Observability Index
+/// Selection for Robot Calibration", ICRA 2008.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Indices {
@@ -28,8 +28,8 @@ pub struct Indices {
 }
 
 impl Indices {
-    /// Of `postures` movements whose scaled information is JᵀJ (m × m), over the `rank` directions that can be determined: σ of the
-    /// others is nothing, and would make every index nothing.
+    /// The indices of `postures` movements whose scaled information is JᵀJ (m × m), over the `rank` directions that can be
+    /// determined: σ of the others is nothing, and would make every index nothing.
     pub fn of(information: &DMatrix<f64>, rank: usize, postures: usize) -> Self {
         if rank == 0 {
             return Self::default();

@@ -1,4 +1,4 @@
-//! Before any measurement: what a chain, its sensors, its limits and constraints can determine.
+//! Observability: what a chain, its sensors, its limits and constraints can determine, computed before any measurement.
 //!
 //! Everything is linearised at one state, the robot as it is described. With H the whitened rows of a movement there and Λ = Σ HᵀH the
 //! information of some movements,
@@ -7,13 +7,13 @@
 //! P = D (I + D Λ D)⁻¹ D,    D = diag(σ₀)
 //! ```
 //!
-//! is the covariance that they leave of the prior's D². What no movement tells is the null space of the Λ of many movements in
+//! is the covariance that they leave of the prior's D². What no movement determines is the null space of the Λ of many movements in
 //! general position that the constraints allow ([`null_space`]). *Best* movements are those that the planner chooses one after the
 //! other, by the scenario's criterion, as if each had been made and had shown what was expected; *random* ones are drawn as the random
-//! policy draws them, several times, and what is told of them are medians. Both keep to the constraints, and neither learns from what
-//! is out of view. The error of predictions is the mean over a workspace of √(tr(H P Hᵀ)), with postures that were not chosen by.
+//! policy draws them, several times, and medians of them are reported. Both keep to the constraints, and neither learns from what is
+//! out of view. The error of predictions is the mean over a workspace of √(tr(H P Hᵀ)), with postures that were not chosen by.
 //!
-//! Of the description itself nothing is known yet: where it is far off, the first movements tell less than is said here.
+//! The description itself is not tested: where it is far off, the first movements teach less than is said here.
 
 mod course;
 mod indices;
@@ -38,14 +38,14 @@ pub use indices::Indices;
 pub use needed::Needed;
 pub use outcome::{Accuracy, Deviation, ErrorPoint, IndexTable, Observability, ObservedParameters, Posture, Weak};
 
-/// What is to be calibrated, by what, and what may be done.
+/// A calibration that is planned: what is to be learned, with which sensors and movements.
 #[derive(Clone, Debug)]
 pub struct Prospect {
     /// The scenario's name.
     pub scenario: String,
     /// One line about it.
     pub title: String,
-    /// What everything is called.
+    /// The names of everything that is learned.
     pub names: Names,
     /// The robot as it is described.
     pub state: State,
@@ -55,15 +55,15 @@ pub struct Prospect {
     pub rig: Arc<Rig>,
     /// Joint limits.
     pub limits: JointBox,
-    /// The movements that there are.
+    /// The available movements.
     pub actions: Actions,
-    /// What they are bound to.
+    /// The constraints on movements.
     pub constraints: Option<Constraints>,
-    /// The head that watches, or a posture in view, where not everything is seen.
+    /// The head that watches, or a posture in view, where some postures are out of view.
     pub watch: Option<Watch>,
-    /// σ₀: by tangent coordinate the standard deviation before any measurement.
+    /// σ₀: the prior standard deviation of each tangent coordinate.
     pub deviations: DVector<f64>,
-    /// D P₀⁻¹ D, with D of these: the identity where errors of coordinates have nothing to do with each other.
+    /// D P₀⁻¹ D, with D of these deviations: the identity where the errors of coordinates are independent.
     pub known: DMatrix<f64>,
     /// The units of the criterion.
     pub units: CriterionUnits,
@@ -75,22 +75,22 @@ pub struct Prospect {
     pub up_to_motion: bool,
 }
 
-/// Random courses, of which medians are told.
+/// The number of random courses of which medians are reported.
 pub const DRAWS: usize = 20;
-/// Postures by which the planner chooses, and others over which its errors are told.
+/// The numbers of postures by which the planner chooses, and of others over which its errors are reported.
 const CHOSEN_OVER: usize = 64;
 const TOLD_OVER: usize = 200;
-/// Deviations that have fallen to no less than this share of the prior's are called weak, and so many directions at most.
+/// The share of the prior deviation above which a direction is called weak, and the most directions that are named.
 const WEAK: f64 = 0.5;
 const WEAKEST: usize = 4;
 
 impl Prospect {
-    /// What can be determined, and how well by `postures` movements; `tick` is called after every movement of
-    /// [`steps`](Self::steps).
+    /// Computes what can be determined, and how well, with `postures` movements; `tick` is called after every movement
+    /// of [`steps`](Self::steps).
     ///
     /// # Errors
     ///
-    /// [`SelectionError`] where no movement can be chosen, as where the constraints leave none within reach.
+    /// [`SelectionError`] if no movement can be chosen, for example because the constraints leave none within reach.
     pub fn observability(
         &self,
         postures: usize,
@@ -115,7 +115,7 @@ impl Prospect {
         Ok(self.report(&free, &best, &drawn, floor_m, accuracy_m))
     }
 
-    /// How many movements [`observability`](Self::observability) looks at.
+    /// The number of movements that [`observability`](Self::observability) looks at.
     pub fn steps(&self, postures: usize) -> usize {
         self.general() + (1 + DRAWS) * postures
     }
@@ -131,7 +131,7 @@ impl Prospect {
         Workspace { configurations, up_to_motion: self.up_to_motion, ..Workspace::default() }
     }
 
-    /// P once everything else is known: N (Nᵀ P₀⁻¹ N)⁻¹ Nᵀ.
+    /// P when everything else is known: N (Nᵀ P₀⁻¹ N)⁻¹ Nᵀ.
     fn left_of_prior(&self, free: &DMatrix<f64>) -> DMatrix<f64> {
         let m = self.layout.dimension();
         let inverse = self.deviations.map(f64::recip);

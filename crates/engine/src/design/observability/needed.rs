@@ -1,18 +1,20 @@
-//! How many postures a wanted accuracy takes.
+//! The number of postures that a wanted accuracy takes.
 
-/// How many postures bring the expected error to what is wanted.
+/// The number of postures after which the expected error is as small as wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needed {
-    /// So many of those that were looked at.
+    /// This number, among those that were looked at.
     Within(u64),
-    /// About so many: e² − f² falls with the number of postures beyond those looked at, f being what none makes smaller.
+    /// About this number: e² − f² is taken to fall with the number of postures beyond those looked at, where f is the
+    /// error that none makes smaller.
     About(u64),
-    /// No number does.
+    /// No number of postures is enough.
     Never,
 }
 
 impl Needed {
-    /// By the errors after 1, 2, … postures and by what is left with no end of them, in one unit.
+    /// Computes the number from the errors after 1, 2, … postures and the error that is left after infinitely many, all
+    /// in one unit.
     pub fn of(errors: &[f64], floor: f64, wanted: f64) -> Self {
         if let Some(index) = errors.iter().position(|error| *error <= wanted) {
             return Self::Within(index as u64 + 1);

@@ -1,4 +1,4 @@
-//! What is told of a robot before anything is measured, as JSON.
+//! The observability report, as JSON.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,13 +14,13 @@ pub struct Observability {
     pub title: String,
     /// The version of this program.
     pub version: String,
-    /// What is to be learned, and what can be.
+    /// The parameters to be learned, and those that can be determined.
     pub parameters: ObservedParameters,
-    /// Directions that can be told, and of which the best postures tell little.
+    /// Directions that can be determined, but of which the best postures tell little.
     pub weak: Vec<Weak>,
-    /// N, the postures that were looked at.
+    /// N, the number of postures that were looked at.
     pub postures: usize,
-    /// By what the best ones were chosen.
+    /// The criterion by which the best postures were chosen.
     pub criterion: String,
     /// O1 … O5 after N postures.
     pub indices: IndexTable,
@@ -34,25 +34,25 @@ pub struct Observability {
     pub best: Vec<Posture>,
 }
 
-/// What is to be learned, and what can be.
+/// The parameters to be learned, and those that can be determined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ObservedParameters {
     /// How many.
     pub learned: usize,
-    /// Directions among them that some movements determine.
+    /// The number of directions among them that some movement determines.
     pub rank: usize,
-    /// What none does, in words.
+    /// The directions that no movement determines, in words.
     pub undetermined: Vec<String>,
 }
 
-/// A direction of which little is told.
+/// A direction of which measurements tell little.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Weak {
-    /// What is left of its deviation after the best N postures, as a share of the prior's.
+    /// The deviation that is left after the best N postures, as a share of the prior's.
     pub left: f64,
-    /// What it is, in words.
+    /// The direction, in words.
     pub said: String,
 }
 
@@ -60,9 +60,9 @@ pub struct Weak {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct IndexTable {
-    /// Of the best.
+    /// The indices of the best postures.
     pub best: Indices,
-    /// Medians over random ones.
+    /// The medians of the indices over random postures.
     pub random_median: Indices,
 }
 
@@ -70,7 +70,7 @@ pub struct IndexTable {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Deviation {
-    /// What it is.
+    /// The parameter's name.
     pub parameter: String,
     /// mm, deg or px; 1 for a ratio.
     pub unit: String,
@@ -86,15 +86,15 @@ pub struct Deviation {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ErrorPoint {
-    /// How many.
+    /// The number of postures.
     pub postures: usize,
-    /// After the best, millimetres.
+    /// The error after the best postures, millimetres.
     pub best_mm: f64,
-    /// After random ones, the median, millimetres.
+    /// The median error after random postures, millimetres.
     pub random_median_mm: f64,
-    /// Their lower quartile.
+    /// The lower quartile of the error after random postures, millimetres.
     pub random_q25_mm: f64,
-    /// Their upper quartile.
+    /// The upper quartile of the error after random postures, millimetres.
     pub random_q75_mm: f64,
 }
 
@@ -102,15 +102,15 @@ pub struct ErrorPoint {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Accuracy {
-    /// What is wanted, millimetres.
+    /// The wanted accuracy, millimetres.
     pub wanted_mm: f64,
-    /// What no number of postures makes smaller, millimetres.
+    /// The error that no number of postures makes smaller, millimetres.
     pub floor_mm: f64,
-    /// Best postures that reach it; null where no number does.
+    /// The number of best postures that reach it; null if no number does.
     pub best_postures: Option<u64>,
-    /// Random ones.
+    /// The number of random postures that reach it; null if no number does.
     pub random_postures: Option<u64>,
-    /// The same in words.
+    /// A sentence that says how many postures are needed.
     pub said: String,
 }
 
@@ -118,8 +118,8 @@ pub struct Accuracy {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Posture {
-    /// By joint, degrees; of sliding joints millimetres.
+    /// The joint positions, degrees; millimetres for sliding joints.
     pub joints: Vec<f64>,
-    /// The socket that holds the target then.
+    /// The socket that holds the target at this posture.
     pub socket: Option<String>,
 }

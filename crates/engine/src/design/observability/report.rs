@@ -1,4 +1,4 @@
-//! From courses of movements to what is told of them.
+//! The report of observability, made from courses of movements.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -160,7 +160,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     quantile(&values, 0.5)
 }
 
-/// Between its neighbours, of values in order; 0 of none.
+/// A quantile of sorted values, interpolated between neighbours; 0 without values.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let at = share * sorted.len().saturating_sub(1) as f64;
     match (sorted.get(at.floor() as usize), sorted.get(at.ceil() as usize)) {

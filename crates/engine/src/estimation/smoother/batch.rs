@@ -1,8 +1,8 @@
-//! Many movements at once.
+//! Absorbing many movements at once.
 //!
-//! Who calibrates has all rows before the search begins. What explains them together is searched once, and depends on no
-//! order; one by one every row would cost a search of its own. Among many rows the modes are searched by a sample of them,
-//! spread evenly, and then followed to where all rows are explained.
+//! A calibration has all rows before the search begins. What explains them together is searched once, and depends on no
+//! order; one by one, every row would cost a search of its own. Among many rows the modes are searched with a sample of
+//! them, spread evenly, and then followed to where all rows are explained.
 
 use super::{EstimationError, Measurement, NoiseFit, Smoother, THOROUGH};
 use crate::{
@@ -11,20 +11,21 @@ use crate::{
     sensing::{Loss, Observation},
 };
 
-/// Movements by which modes are searched.
+/// The number of movements by which modes are searched.
 const SEARCHED: usize = 200;
-/// How often scales of noise are learned in turn with the modes, at most.
+/// The most rounds in which scales of noise are learned in turn with the modes.
 const ROUNDS: usize = 12;
-/// Scales that change by less than this have been found.
+/// The change of a scale below which it has converged.
 const FOUND: f64 = 1e-3;
 
 impl Smoother {
-    /// Takes in movements to `positions` (rad or m) with what was observed after them, all at once. Modes are searched from
+    /// Absorbs movements to `positions` (rad or m) with what was observed after them, all at once. Modes are searched from
     /// `starts` beside those there are, and from as many draws as after one movement.
     ///
     /// # Errors
     ///
-    /// [`EstimationError`] where a movement does not fit, or no mode is found; the belief then stays as it was.
+    /// [`EstimationError::Refused`] if a movement does not fit, [`EstimationError::Diverged`] if no mode is found; the
+    /// belief then stays as it was.
     pub fn absorb_all(
         &mut self,
         movements: &[(&[f64], &Observation)],
@@ -88,8 +89,9 @@ impl Smoother {
         }
     }
 
-    /// Where least squares with the nominal noise leads, and the scales of the noise as its residuals have them: no reading
-    /// counts as an outlier before it is known how far normal ones scatter, and what parameters explain is no noise.
+    /// Begins the scales of noise: searches by least squares with the nominal noise, and takes the scales from the
+    /// residuals there. No reading counts as an outlier before the scatter of normal ones is known, and the parameters'
+    /// share of the residuals is no noise.
     fn begin_noise_from(&mut self, starts: &[&State]) -> Vec<State> {
         if !self.learns_noise() {
             return starts.iter().map(|start| (*start).clone()).collect();
@@ -132,7 +134,7 @@ impl Smoother {
     }
 }
 
-/// At most so many of a list, spread evenly over it.
+/// At most `most` items of a list, spread evenly over it.
 fn spread<T>(all: &[T], most: usize) -> impl Iterator<Item = &T> {
     let count = all.len().min(most);
     (0..count).map(move |index| &all[index * all.len() / count])
@@ -207,8 +209,8 @@ mod tests {
             assert!(missed(&outliers) <= rows / 100, "seed {seed}: {outliers:?}");
             assert!(outliers.len() * 10 >= planted.len() * 9, "seed {seed}: {outliers:?}");
             let fit = &smoother.fits()[0];
-            let spare = fit.equations - fit.absorbed;
-            assert!(((fit.squared / spare).sqrt() / fit.scale - 1.0).abs() < 0.05, "seed {seed}: {fit:?}");
+            let degrees_of_freedom = fit.equations - fit.absorbed;
+            assert!(((fit.squared / degrees_of_freedom).sqrt() / fit.scale - 1.0).abs() < 0.05, "seed {seed}: {fit:?}");
         }
     }
 

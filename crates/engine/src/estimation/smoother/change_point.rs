@@ -1,14 +1,14 @@
-//! Since when readings come from another body.
+//! The change point: the measurement since which readings come from a changed body.
 //!
-//! Before a change the body is x, after it `x ⊕ B η`, `η ~ N(0, Q)` (see [`Jump`]). At the most probable state of all readings
-//! under one body, with whitened rows Hᵢ, residuals rᵢ and information Λ, those from the k-th on say of η
+//! Before a change the body is x, after it `x ⊕ B η`, `η ~ N(0, Q)` (see [`Jump`]). At the most probable state of all readings under
+//! one body, with whitened rows Hᵢ, residuals rᵢ and information Λ, those from the k-th on say of η
 //!
 //! ```text
 //! g = Σ_{i≥k} Bᵀ Hᵢᵀ rᵢ,    S = Bᵀ (M − M Λ⁻¹ M) B + Q⁻¹,    M = Σ_{i≥k} Hᵢᵀ Hᵢ
 //! ```
 //!
-//! so that a change lowers χ² by t = gᵀ S⁻¹ g, and its evidence is that of Laplace (a generalised likelihood ratio as of Willsky
-//! and Jones 1976, with Occam's factor in place of a threshold by degrees of freedom):
+//! so that a change lowers χ² by t = gᵀ S⁻¹ g, and its evidence is that of Laplace (a generalised likelihood ratio as of Willsky and
+//! Jones 1976, with Occam's factor in place of a threshold by degrees of freedom):
 //!
 //! ```text
 //! ln odds = ln ev(χ² − t) − ln ev(χ²) − ½ ln det(S Q) + ln P(change)
@@ -38,21 +38,21 @@ use crate::{
 
 /// The chance that a body changes at a movement.
 pub(super) const RATE: f64 = 5e-3;
-/// Latest movements at each of which a change is looked for; before these at fewer and fewer.
+/// The number of latest movements at each of which a change is looked for; before these, ever fewer are tried.
 const EACH: usize = 16;
 
-/// That the body has changed.
+/// A change of the body.
 #[derive(Clone, Debug)]
 pub(super) struct Change {
-    /// Since which of the measurements kept.
+    /// The index of the first measurement, of those kept, after the change.
     pub since: usize,
-    /// How.
+    /// How the body changed.
     pub jump: Jump,
-    /// The logarithm of its odds against one body for all.
+    /// The logarithm of its odds against one body for all measurements.
     pub log_odds: f64,
 }
 
-/// All readings at one state.
+/// All readings, linearised at one state.
 pub(super) struct Evidence {
     /// Hᵀ, whitened and weighed, of every measurement (m × d).
     pub rows: Vec<DMatrix<f64>>,
@@ -60,7 +60,7 @@ pub(super) struct Evidence {
     pub residuals: Vec<DVector<f64>>,
     /// Λ (m × m).
     pub information: DMatrix<f64>,
-    /// What tells larger noise from a change.
+    /// The evidence that tells larger noise from a change.
     pub noise: NoiseEvidence,
 }
 
@@ -83,7 +83,7 @@ fn places(count: usize, has_past: bool) -> Vec<usize> {
 }
 
 impl Evidence {
-    /// The likeliest change; `None` where there is none to be had.
+    /// The likeliest change; `None` if there is no place for one.
     pub fn likeliest(&self, jumps: &[Jump], has_past: bool) -> Option<Change> {
         let m = self.information.nrows();
         let covariance = Cholesky::new(self.information.clone())?.inverse();
@@ -131,7 +131,7 @@ impl Evidence {
 }
 
 impl Smoother {
-    /// What all readings of a posterior that are kept say at a mode of it.
+    /// The evidence of all readings that a posterior keeps, at a mode of it.
     pub(super) fn evidence(&self, posterior: &Posterior, mode: &Mode) -> Option<Evidence> {
         let layout = &self.belief.layout;
         // With the scales of noise as they are now, for which the mode need not have been searched again.

@@ -1,15 +1,15 @@
-//! What becomes of a belief when the body has changed.
+//! The belief after the body has changed.
 //!
-//! What was measured before is kept as far as it says something of the changed body: what does not change stays known as well
-//! as it was,
+//! What was measured before is kept as far as it says something of the changed body: what does not change stays known as well as it
+//! was,
 //!
 //! ```text
 //! x' ~ N(x, P + B Q Bᵀ)
 //! ```
 //!
 //! with x and P what the readings before the change say (see [`Jump`](super::jump::Jump) for B and Q). While these hardly determined
-//! the body, x' is what it was before the first movement. Either way knowledge from beforehand is the original one, however
-//! often the body has changed.
+//! the body, x' is what it was before the first movement. Either way knowledge from beforehand is the original one, however often
+//! the body has changed.
 
 use std::sync::Arc;
 
@@ -28,34 +28,37 @@ use crate::{
     model::{Prior, State},
 };
 
-/// Equations before a change, by the number of parameters, from which on they count for the changed body.
+/// The equations before a change, per parameter, from which on they count for the changed body.
 const DETERMINED: f64 = 1.5;
 
-/// How far below an alarm, in the logarithm of the odds, a belief does not call itself settled any more.
+/// How far below an alarm, in the logarithm of the odds, a belief stops calling itself settled.
 const SUSPICION: f64 = 2.0;
-/// The logarithm of the odds from which on a change is told of: to miss one costs more than to learn some parameters anew.
+/// The logarithm of the odds from which on a change is reported: to miss one costs more than to learn some parameters
+/// anew.
 const ALARM: f64 = 1.0;
-/// The same soon after a change, while it is being learned, and where noise is larger than was told.
+/// The threshold of the odds soon after a change, while it is being learned, and where noise is larger than stated.
 const ALARM_AGAIN: f64 = 3.0;
-/// The same where noise that nobody told is larger than is usual of its sensor: the model has errors then, and what it cannot
-/// explain differs from posture to posture as a change does from movement to movement.
+/// The threshold of the odds where noise that was not stated is larger than is usual for its sensor: the model has errors
+/// then, and what it cannot explain differs from posture to posture as a change does from movement to movement.
 const ALARM_OF_MODEL: f64 = 6.0;
-/// The logarithm of the odds from which on it is plain how the body has changed, and the movements after which that is taken to be so.
+/// The logarithm of the odds from which on it is clear how the body has changed, and the number of movements after which it is assumed
+/// to be.
 const PLAIN: f64 = 8.0;
 const PATIENCE: u64 = 6;
-/// What speaks for a change without a reading that may be an outlier.
+/// The logarithm of the odds that a change must have without a reading that may be an outlier.
 const SUPPORT: f64 = -4.0;
-/// The scale beyond which noise is larger than was told, or than is usual.
+/// The scale beyond which noise is larger than stated, or than usual.
 const UNUSUAL: f64 = 1.5;
 /// Standard deviations (by Wilson and Hilferty) of a squared residual that may be an outlier's.
 const OUTLYING: f64 = 5.0;
-/// Movements after a change within which another one must be plainer.
+/// The number of movements after a change within which another one needs higher odds.
 const SOON: u64 = 10;
-/// Where readings may be outliers: so many of the latest must have been rejected, the last among them, before a change is looked for.
+/// Where readings may be outliers: the number of the latest readings that must have been rejected, the last among them, before a
+/// change is looked for.
 const REJECTED: usize = 3;
 const LATEST: usize = 10;
 
-/// What is believed after a change: the prior of the changed body, and the mode of what was measured since.
+/// The belief after a change: the prior of the changed body, and the mode of what was measured since.
 struct After {
     posterior: Posterior,
     mode: Mode,
@@ -63,7 +66,7 @@ struct After {
 }
 
 impl Smoother {
-    /// Since when the body has changed and how, if the readings say so; and whether they misfit.
+    /// Looks for a change since some measurement, and notes whether readings misfit.
     pub(super) fn notices_change(&mut self) -> Option<Change> {
         self.misfit = None;
         self.told_at = self.told_at.filter(|movement| self.movements < movement + SOON);
@@ -103,12 +106,12 @@ impl Smoother {
         None
     }
 
-    /// All ways in which the body may have changed from where a mode has it.
+    /// All ways in which the body may have changed from the state of a mode.
     fn jumps(&self, mode: &Mode) -> Vec<Jump> {
         jumps(&mode.state, &self.belief.layout, &self.original_at(&mode.state))
     }
 
-    /// Of the measurements from one on that which the belief before the latest expected least, if it may be an outlier.
+    /// The measurement, from one on, that the belief before the latest expected least, if it may be an outlier.
     fn suspect(&self, since: usize) -> Option<usize> {
         let Self { posterior, belief, .. } = self;
         let squared = |index: usize| {
@@ -124,7 +127,7 @@ impl Smoother {
         (sum > quantile(equations as f64, OUTLYING)).then_some(index)
     }
 
-    /// Whether anything speaks for a change without one of the measurements.
+    /// Whether any change is supported without one of the measurements.
     fn is_supported(&self, without: usize, mode: &Mode, jumps: &[Jump]) -> bool {
         let mut others = self.posterior.clone();
         others.measurements.remove(without);
@@ -137,7 +140,7 @@ impl Smoother {
         evidence.and_then(|it| it.likeliest(jumps, others.settled.is_some())).is_some_and(|it| it.log_odds > SUPPORT)
     }
 
-    /// Whether more of the latest readings are outliers than are to be expected.
+    /// Whether more of the latest readings are outliers than expected.
     fn outliers(&self, mode: &Mode) -> Option<Misfit> {
         let seen = &self.posterior.measurements;
         let latest = &seen[seen.len().saturating_sub(LATEST)..];
@@ -152,7 +155,7 @@ impl Smoother {
         rejected
     }
 
-    /// The same where readings may be outliers: since one of the latest that were rejected.
+    /// Looks for a change where readings may be outliers: since one of the latest that were rejected.
     fn rejected_change(&self, mode: &Mode) -> Option<Change> {
         let seen = &self.posterior.measurements;
         let first = seen.len().saturating_sub(LATEST);
@@ -181,7 +184,7 @@ impl Smoother {
         best
     }
 
-    /// What the readings say that came before one of those kept.
+    /// The posterior of the readings before one of those kept, and its mode.
     fn before(&self, since: usize) -> Option<(Posterior, Mode)> {
         let mut before = self.posterior.clone();
         before.measurements.truncate(since);
@@ -191,7 +194,7 @@ impl Smoother {
         Some((before, mode))
     }
 
-    /// What is believed if the body has changed so, against `mode`, one body for all.
+    /// The belief after a given change, compared with `mode`, one body for all.
     fn after(&self, known: &Mode, change: &Change, mode: &Mode) -> Option<After> {
         let layout = &self.belief.layout;
         let Jump { directions, covariance, log_share, .. } = &change.jump;
@@ -208,8 +211,8 @@ impl Smoother {
         Some(After { posterior, mode: found, log_odds })
     }
 
-    /// Takes note of a change that has been told: what was learned before is given up once it is plain how the body has changed. The
-    /// first readings after a change often tell that there was one, but not yet of which joint.
+    /// Notes a change that was reported: what was learned before is given up once it is clear how the body has changed. The first
+    /// readings after a change often show that there was one, but not yet which joint it concerns.
     pub(super) fn noticed(&mut self, change: &Change) {
         let told = *self.told_at.get_or_insert(self.movements);
         let is_plain = self.posterior.loss.is_robust() || change.log_odds > PLAIN;
@@ -218,13 +221,13 @@ impl Smoother {
         }
     }
 
-    /// Whether it is still learning how the body has changed: what is found now is no other change, but a better account of the
-    /// last.
+    /// Whether it is still being learned how the body has changed: a change found now is no other change, but a better account
+    /// of the last.
     pub(super) fn is_revising(&self) -> bool {
         self.changed_at.is_some_and(|movement| self.movements < movement + SOON)
     }
 
-    /// Takes note that the body has changed.
+    /// Replaces the belief after the body has changed.
     fn changed(&mut self, change: &Change) {
         let layout = self.belief.layout.clone();
         self.changed_at = Some(self.movements);
@@ -256,13 +259,12 @@ impl Smoother {
             let found = self.posterior.mode_from_afar(&mode.state, &layout, THOROUGH);
             self.hypotheses.modes.extend(found);
         }
-        self.hypotheses.calm = 0;
+        self.hypotheses.stable_steps = 0;
         self.hypotheses.spawn(self.settings.spawned, &self.posterior, &layout, &mut self.rng);
         self.hypotheses.condense(self.settings.kept, &layout);
     }
 
-    /// The original prior's covariance in the chart at a state; without what correlates its parameters where the state is outside the
-    /// guess's chart.
+    /// The original prior's covariance in the chart at a state; without correlations where the state is outside the guess's chart.
     fn original_at(&self, state: &State) -> DMatrix<f64> {
         let (prior, layout) = (&self.original, &self.belief.layout);
         let change = prior.guess().change_of_chart(layout, state).and_then(|change| change.try_inverse());

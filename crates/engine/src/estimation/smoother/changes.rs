@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{CALM, HypothesisSettings, KEPT, Smoother, mode::Effort};
+use super::{HypothesisSettings, KEPT, STABLE, Smoother, mode::Effort};
 use crate::{
     estimation::{Belief, Estimator, Update},
     kinematics::{Joint, Line},
@@ -129,7 +129,7 @@ fn outliers_do_not_pile_up() {
             if index >= 100 {
                 let kept = run.smoother.posterior.measurements.len();
                 assert!(!update.change_noticed && kept <= KEPT, "seed {seed}: {kept} after {index}");
-                assert!(run.smoother.hypotheses.calm >= CALM, "seed {seed}: searched anew after {index}");
+                assert!(run.smoother.hypotheses.stable_steps >= STABLE, "seed {seed}: searched anew after {index}");
             }
         }
         assert!(run.error() < 6.0, "seed {seed}: {}", run.error());

@@ -4,9 +4,9 @@
 //! L₁₁ L₁₁ᵀ = Λ₁₁ − L₁₀ L₁₀ᵀ,     L₂₁ = (Λ₂₁ − L₂₀ L₁₀ᵀ) L₁₁⁻ᵀ
 //! ```
 //!
-//! with what is on the left found before (Golub and Van Loan, *Matrix Computations*, §4.2). All that is read lies one behind
-//! the other in columns, and every number that is read serves several products. Registers hold four numbers, however wide they
-//! could be: a corner of L is then as wide as it is high, and L no larger than it must be.
+//! with the columns on the left computed before (Golub and Van Loan, *Matrix Computations*, §4.2). All that is read lies one
+//! behind the other in columns, and every number that is read serves several products. Registers hold four numbers, however
+//! wide they could be: a corner of L is then as wide as it is high, and L no larger than it must be.
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f64x4};
 use nalgebra::{DMatrix, DVector};
@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use super::gram::squared;
 use crate::{elementary::ln, lanes::GROUP};
 
-/// Columns that are found together, and numbers of a register.
+/// The number of columns that are computed together, and of numbers in a register.
 const WIDTH: usize = 4;
 
 /// L, its columns one behind the other; rows and columns beyond the matrix are those of the identity.
@@ -30,14 +30,15 @@ pub(super) struct Factor {
 }
 
 impl Factor {
-    /// Of a symmetric matrix whose diagonal is multiplied by 1 + `damping`; `None` if that is not positive.
+    /// Factors a symmetric matrix whose diagonal is multiplied by 1 + `damping`; `None` if that is not positive
+    /// definite.
     pub fn new(level: Level, matrix: &DMatrix<f64>, damping: f64) -> Option<Self> {
         let m = matrix.nrows();
         let n = m.next_multiple_of(WIDTH);
         Self { level, m, n, l: vec![0.0; n * n] }.anew(matrix, damping)
     }
 
-    /// The same of another matrix of as many rows, in the same place.
+    /// Factors another matrix with as many rows, in the memory of this one.
     pub fn anew(mut self, matrix: &DMatrix<f64>, damping: f64) -> Option<Self> {
         let Self { level, m, n, ref mut l } = self;
         // What is above the diagonal is zero.
@@ -83,7 +84,8 @@ impl Factor {
     }
 }
 
-/// Turns the lower triangle of a matrix of `n` rows, a multiple of [`WIDTH`], into L; whether it is positive.
+/// Turns the lower triangle of a matrix of `n` rows, a multiple of [`WIDTH`], into L; returns whether it is positive
+/// definite.
 #[inline(always)]
 fn factorise<S: Simd>(simd: S, n: usize, l: &mut [f64]) -> bool {
     for start in (0..n).step_by(WIDTH) {
@@ -113,7 +115,7 @@ fn factorise<S: Simd>(simd: S, n: usize, l: &mut [f64]) -> bool {
     true
 }
 
-/// Subtracts from four columns, in two rows of lanes, what the columns on the left have of them.
+/// Subtracts from four columns, in two rows of lanes, the products of the columns on the left.
 #[inline(always)]
 fn subtract<S: Simd>(simd: S, n: usize, left: &[f64], panel: &mut [f64], start: usize, rows: [usize; 2]) {
     let mut sums = [[f64x4::splat(simd, 0.0); 2]; WIDTH];
@@ -137,7 +139,7 @@ fn subtract<S: Simd>(simd: S, n: usize, left: &[f64], panel: &mut [f64], start: 
     }
 }
 
-/// The factor of the four rows on the diagonal; whether they are positive.
+/// The factor of the four rows on the diagonal; returns whether they are positive definite.
 #[inline(always)]
 fn corner(n: usize, panel: &mut [f64], start: usize) -> bool {
     for column in 0..WIDTH {

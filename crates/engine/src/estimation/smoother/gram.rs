@@ -4,14 +4,15 @@
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f64x4};
 use nalgebra::{DMatrix, DVector};
 
-/// Numbers of a register, however wide it could be: by these sums are parted, so that they have the same bits everywhere.
+/// The number of numbers in a register, however wide it could be: sums are split by it, so that they have the same bits
+/// everywhere.
 const WIDTH: usize = 4;
 /// A tile of HᵀH: each number that is read serves several products.
 const DOWN: usize = 4;
 const ACROSS: usize = 2;
 
-/// Adds HᵀH to the lower triangle of `information`, of which what is above the diagonal means nothing from then on, and Hᵀr to
-/// `descent`; H has as many rows as `residuals`, in blocks of `length`, a multiple of [`GROUP`](crate::lanes::GROUP).
+/// Adds HᵀH to the lower triangle of `information` (the upper triangle is meaningless afterwards) and Hᵀr to `descent`; H has
+/// as many rows as `residuals`, in blocks of `length`, a multiple of [`GROUP`](crate::lanes::GROUP).
 pub(super) fn add_squares(
     level: Level,
     (rows, residuals): (&[f64], &[f64]),
@@ -37,8 +38,8 @@ pub(super) fn squared(level: Level, rows: &[f64], m: usize) -> DMatrix<f64> {
     product
 }
 
-/// Adds HᵀH to the lower triangle of `information` (m × m), of which what is above the diagonal means nothing from then on; the rows of H,
-/// m numbers each, stand one behind the other.
+/// Adds HᵀH to the lower triangle of `information` (m × m; the upper triangle is meaningless afterwards); the rows of H, m numbers each,
+/// stand one behind the other.
 pub(super) fn add_row_squares(level: Level, rows: &[f64], information: &mut DMatrix<f64>) {
     let m = information.nrows();
     if m == 0 {
@@ -47,7 +48,8 @@ pub(super) fn add_row_squares(level: Level, rows: &[f64], information: &mut DMat
     dispatch!(level, simd => row_squares(simd, rows, m, information.as_mut_slice()));
 }
 
-/// The same, by tiles of 4 columns and 8, 4 or 1 coordinates: every sum runs over the rows in their order.
+/// Adds squares row by row, by tiles of 4 columns and 8, 4 or 1 coordinates: every sum runs over the rows in their
+/// order.
 #[inline(always)]
 fn row_squares<S: Simd>(simd: S, rows: &[f64], m: usize, sums: &mut [f64]) {
     for right in (0..m).step_by(DOWN) {

@@ -20,9 +20,9 @@ use crate::{
 /// How many modes are kept, and how hard new ones are searched for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HypothesisSettings {
-    /// Modes kept at most.
+    /// The most modes that are kept.
     pub kept: usize,
-    /// Searches begun after every measurement while the belief may be ambiguous.
+    /// The searches that begin after every measurement while the belief may be ambiguous.
     pub spawned: usize,
 }
 
@@ -36,23 +36,24 @@ impl Default for HypothesisSettings {
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Hypotheses {
     pub modes: Vec<Mode>,
-    /// Steps in a row in which no new mode counted for anything.
-    pub calm: usize,
+    /// Stable steps: how many in a row found no new mode of any weight.
+    pub stable_steps: usize,
     /// Why the last mode was lost, where none is left.
     pub lost: Option<NoMode>,
 }
 
-/// Modes nearer than this (squared, in standard deviations) are one.
+/// The squared distance, in standard deviations, below which two modes are one.
 const MERGED: f64 = 0.3;
-/// A mode of a smaller share of the evidence is dropped.
+/// The share of the evidence below which a mode is dropped.
 const NEGLIGIBLE: f64 = 1e-5;
-/// Logarithm of the evidence ratio from which on another mode does not count.
+/// The logarithm of the evidence ratio beyond which another mode does not count.
 const HOPELESS: f64 = 40.0;
 
 const WARM: Effort<'_> = Effort { steps: 30, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
-/// Of what is not the estimate its share of the evidence is what counts.
+/// The effort for rivals of the estimate, of which only the share of the evidence counts.
 const RIVAL: Effort<'_> = Effort { tolerance: 1e-3, ..WARM };
-/// What is found is followed after the next measurement: until then its share of the evidence is known to a hundredth.
+/// The effort for new modes, which are followed after the next measurement: until then their share of the evidence is
+/// known to a hundredth.
 const COLD: Effort<'_> = Effort { steps: 40, tolerance: 1e-2, hopeless: f64::INFINITY, known: &[] };
 
 impl Hypotheses {
@@ -94,12 +95,12 @@ impl Hypotheses {
         self.modes.extend(found.into_iter().flatten());
     }
 
-    /// What is to be said where there is no mode.
+    /// Why there is no mode.
     pub fn why(&self) -> &'static str {
         self.lost.map_or("no hypothesis explains the measurements", NoMode::why)
     }
 
-    /// Merges, weighs, sorts and prunes.
+    /// Merges, weighs, sorts and prunes the modes.
     pub fn condense(&mut self, kept: usize, layout: &Layout) {
         // Evidence is finite: what has none is no mode.
         self.modes.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));

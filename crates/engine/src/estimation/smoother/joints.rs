@@ -1,4 +1,4 @@
-//! Measurements whose joints' readings are off: all readings after one movement err together.
+//! Measurements with noise in the joints' readings: all readings after one movement err together.
 //!
 //! With e the errors of the joints at one posture, the cost of its readings is that of r = H δ + J e + v with e left out by
 //! integration, `½ rᵀ C⁻¹ r + ½ ln det C`, C = I + J Σ Jᵀ: reading by reading, each given those before it (see [`JointNoise`]).
@@ -35,35 +35,35 @@ use crate::{
     sensing::{Graduated, JointErrors, JointNoise},
 };
 
-/// ν: how many errors t so far counts for.
+/// ν: the number of errors for which the factor t so far counts.
 const SO_FAR: f64 = 4.0;
 /// t₁, and how many errors it counts for.
 const LIKELY: [f64; 2] = [0.3, 0.2];
-/// How many times as far off a reading may be and still tell of Σ: what is an outlier by a Σ that is too small would else never
-/// show that it is.
+/// The multiple of the distance at which a reading may still inform Σ: an outlier by a Σ that is too small would otherwise
+/// never show that it is.
 const WIDE: f64 = 3.0;
 /// The least and the greatest factor of a stated σ.
 const FACTORS: [f64; 2] = [1e-3, 1e2];
 
-/// What is known of the joints' errors.
+/// The noise of the joints' readings, and what is known of it.
 #[derive(Clone, Debug)]
 pub(super) struct Joints {
-    /// As it is taken to be.
+    /// The noise as it is assumed.
     pub noise: JointNoise,
-    /// As it is stated.
+    /// The noise as it is stated.
     pub stated: JointNoise,
     /// t.
     pub factor: f64,
     /// Whether t is learned.
     pub unknown: bool,
-    /// What settled measurements said.
+    /// What settled measurements say of t.
     pub settled: Said,
 }
 
-/// What measurements say of t.
+/// The statistics of t from measurements.
 #[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Said {
-    /// Σ ê_j²/σ_j², of stated σ.
+    /// Σ ê_j²/σ_j², with stated σ.
     squares: f64,
     /// Σ (1 − V_jj/t²σ_j²).
     determined: f64,
@@ -75,9 +75,9 @@ impl Joints {
     }
 }
 
-/// The readings of one posture, whitened together, in σ as they are taken to be.
+/// The readings of one posture, whitened together, in assumed σ.
 pub(super) struct Posture {
-    /// Those that have a prediction.
+    /// The readings that have a prediction.
     pub readings: Vec<Joined>,
     /// √w L⁻¹ H, transposed, m × d.
     pub rows: DMatrix<f64>,
@@ -95,13 +95,13 @@ pub(super) struct Posture {
 pub(super) struct Joined {
     pub channel: usize,
     pub place: Range<usize>,
-    /// Where they stand among all of the observation, of which some may have no prediction.
+    /// Their place among all readings of the observation, of which some may have no prediction.
     pub start: usize,
     pub weight: f64,
 }
 
 impl Posture {
-    /// r − J ê, H − J B (transposed) and the diagonal of J V Jᵀ: what is left where the joints' errors are known as well as the
+    /// r − J ê, H − J B (transposed) and the diagonal of J V Jᵀ: what remains once the joints' errors are as well known as the
     /// readings tell.
     fn left(&self) -> (DMatrix<f64>, DVector<f64>, DVector<f64>) {
         let (rows, residual, by_joints) = &self.apart;
@@ -137,7 +137,8 @@ impl Posterior {
         rows
     }
 
-    /// The readings of a measurement where `pass` stands, whitened together by J = `by_joints`, or that of where it stands.
+    /// The readings of a measurement at the posture of `pass`, whitened together by J = `by_joints`, or by J at that
+    /// posture.
     pub fn posture(
         &self,
         noise: &JointNoise,
@@ -209,8 +210,8 @@ impl Posterior {
         Posture { readings, rows, residual, innovation, apart, errors, cost }
     }
 
-    /// As of [`Rig::residuals`](crate::sensing::Rig::residuals), in nominal σ: of readings that err together each given those
-    /// before it, none by outliers.
+    /// Passes every residual to `each`, as [`Rig::residuals`](crate::sensing::Rig::residuals) does, in nominal σ: readings
+    /// that err together are taken given those before them, none given outliers.
     pub fn residuals(&self, state: &State, seen: &Measurement, mut each: impl FnMut(usize, &[f64])) {
         let Some(joints) = &self.joints else {
             self.rig.residuals(state, &seen.positions, &seen.observation, each);
@@ -228,7 +229,7 @@ impl Posterior {
         }
     }
 
-    /// By kind of noise, how well the measurements that have not settled are fitted where joints' errors take their share.
+    /// The fit of the measurements that have not settled, by kind of noise, when the joints' errors take their share.
     pub fn joint_fit(&self, noise: &JointNoise, state: &State) -> Vec<Fit> {
         let layout = Layout::new(state, []);
         let mut pass = Pass::new(state, &layout);
@@ -247,8 +248,8 @@ impl Posterior {
         fits
     }
 
-    /// By kind of noise, how many equations of the measurements that have not settled parameters and joints' errors account for,
-    /// and what these say of Σ.
+    /// By kind of noise, the number of equations of the unsettled measurements that parameters and joints' errors absorb, and
+    /// what these say of Σ.
     pub fn joint_shares(&self, loss: Graduated, joints: &Joints, mode: &Mode, layout: &Layout) -> (Vec<f64>, Said) {
         let (mut absorbed, mut said) = (vec![0.0; self.scales.len()], Said::default());
         let covariance = mode.covariance();
@@ -269,7 +270,7 @@ impl Posterior {
         (absorbed, said)
     }
 
-    /// What the oldest `count` measurements say of Σ, before they settle.
+    /// Adds what the oldest `count` measurements say of Σ to the settled statistics, before they settle.
     pub fn settle_joints(&mut self, count: usize, mode: &Mode, layout: &Layout) {
         let Some(mut joints) = self.joints.take() else { return };
         let covariance = mode.covariance();
@@ -282,7 +283,7 @@ impl Posterior {
         self.joints = Some(joints);
     }
 
-    /// √w L⁻¹ Hᵀ and √w L⁻¹ r of some measurements, one beside the other, and what they cost; `by_joints` is J of each.
+    /// √w L⁻¹ Hᵀ and √w L⁻¹ r of some measurements, side by side, and their cost; `by_joints` is J of each.
     pub fn stacked_jointly(
         &self,
         (noise, loss): (&JointNoise, Graduated),
@@ -310,7 +311,7 @@ impl Posterior {
         (stacked, residuals, cost)
     }
 
-    /// What settled measurements add to the shares of the parameters, by kind of noise.
+    /// The settled measurements' part of the shares of the parameters, by kind of noise.
     pub fn settled_shares(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
         let Some(settled) = &self.settled else { return Some(vec![0.0; self.scales.len()]) };
         let (carried, _) = settled.carried(&mode.state, layout)?;
@@ -327,7 +328,7 @@ impl Said {
     }
 }
 
-/// What one posture says of Σ.
+/// The statistics of t from one posture.
 fn said_by(joints: &Joints, errors: &JointErrors, covariance: &DMatrix<f64>) -> Said {
     let mut said = Said::default();
     let sigmas = joints.stated.sigmas().iter().enumerate();
@@ -342,8 +343,8 @@ fn said_by(joints: &Joints, errors: &JointErrors, covariance: &DMatrix<f64>) -> 
 }
 
 impl Smoother {
-    /// The same where it is not known how far joints' readings are off: what the rig says is where it begins, for all joints in
-    /// proportion. Nothing changes where the rig says that they are exact.
+    /// This smoother with joint noise of unknown size: the rig's value is where learning begins, for all joints in proportion.
+    /// Nothing changes if the rig says that joints are exact.
     pub fn with_unknown_joint_noise(mut self, unknown: bool) -> Self {
         if let Some(joints) = &mut self.posterior.joints {
             joints.unknown = unknown;
@@ -361,7 +362,7 @@ impl Smoother {
         self.posterior.joints.as_ref().map_or(1.0, |joints| joints.factor)
     }
 
-    /// Learns Σ at the heaviest mode, with t₀ = `before`, and tells by how much it has changed.
+    /// Learns Σ at the heaviest mode, with t₀ = `before`, and returns by how much it has changed.
     pub(super) fn learn_joint_noise(&mut self, before: f64) -> f64 {
         let layout = self.belief.layout.clone();
         let Some(mode) = self.hypotheses.modes.first() else { return 0.0 };

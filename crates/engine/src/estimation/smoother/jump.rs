@@ -1,4 +1,4 @@
-//! What of a body may change at once.
+//! Jumps: the ways in which a body may change at once.
 //!
 //! A changed body is `x' = x ⊕ B η`, `η ~ N(0, Q)`: B (m × p) spans the tangent directions that change together.
 //!
@@ -21,7 +21,7 @@ use crate::{
     model::{Block, Layout, Place, Quantity, State},
 };
 
-/// One way for a body to change.
+/// A way in which a body may change.
 #[derive(Clone, Debug)]
 pub(super) struct Jump {
     /// B (m × p).
@@ -34,24 +34,26 @@ pub(super) struct Jump {
     pub log_determinant: f64,
     /// The logarithm of its share among all ways to change.
     pub log_share: f64,
-    /// Whether what is learned after a change may take it to have been this one. To notice it, a small change or one of some
-    /// coordinates may be what tells most; the others may have changed as well, and need room.
+    /// Whether this jump may be taken for the change once it is being learned. To notice a change, a small jump or one of
+    /// few coordinates may be the most telling; the other coordinates may have changed as well, and need room.
     pub has_room: bool,
 }
 
 /// The variance of what changes, in variances of the original prior.
 const VARIANCE: f64 = 0.25;
-/// How large a change may be, in such deviations: less where the prior is wide, more where it is narrow.
+/// The sizes of a change that are tried, in such deviations: smaller ones where the prior is wide, larger ones where it
+/// is narrow.
 const SIZES: [f64; 5] = [0.25, 1.0, 4.0, 16.0, 64.0];
-/// Deviations of an angle (rad) and of a length (m) beyond which no larger change is tried, and below which no smaller one.
+/// The deviations of an angle (rad) and of a length (m) beyond which no larger change is tried, and below which no smaller
+/// one.
 const WIDEST: f64 = 0.5;
 const NARROWEST: f64 = 0.05;
 /// The share of changes that change the body as a whole.
 const WHOLE: f64 = 0.2;
-/// A step for differences, rad or m.
+/// The step of differences, rad or m.
 const STEP: f64 = 1e-5;
 
-/// ln det A of the root of A.
+/// ln det A, from the Cholesky root of A.
 pub(super) fn log_determinant(root: &Cholesky<f64, Dyn>) -> f64 {
     2.0 * root.l_dirty().diagonal().map(ln).sum()
 }

@@ -1,4 +1,5 @@
-//! What is known before any movement is part of the prior: it outlives compression and changes of the body, and is listed once.
+//! Tests of prior observations: what is known before any movement is part of the prior, outlives compression and changes of the
+//! body, and is listed once.
 
 use std::{collections::HashMap, sync::Arc};
 

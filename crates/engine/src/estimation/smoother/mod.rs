@@ -68,44 +68,44 @@ pub struct Smoother {
     hypotheses: Hypotheses,
     settings: HypothesisSettings,
     rng: ChaCha8Rng,
-    /// What was known before the first movement, whatever has been dropped since.
+    /// The prior before the first movement, whatever has been dropped since.
     original: Prior,
-    /// Whether it drops what was measured before the body changed.
+    /// Whether measurements from before a change of the body are dropped.
     forgets: bool,
-    /// Movements absorbed so far, misses among them.
+    /// The number of movements absorbed so far, misses included.
     movements: u64,
-    /// What was made of readings that are no longer looked at one by one.
-    /// Shared with what a step begins from.
+    /// The reports on readings that are no longer looked at one by one. Shared with what a step begins from.
     past: Arc<Vec<ReadingReport>>,
     /// The rig with its nominal noise.
     nominal: Arc<Rig>,
-    /// By kind of noise: whether its scale is learned.
+    /// Whether the scale of each kind of noise is learned.
     unknown: Vec<bool>,
-    /// By kind of noise: equations that no parameter accounts for.
-    spare: Vec<f64>,
-    /// By kind of noise: what readings told of it that have been dropped since.
+    /// Degrees of freedom of each kind of noise: equations that no parameter absorbs.
+    degrees_of_freedom: Vec<f64>,
+    /// What dropped readings said of each kind of noise.
     remembered: Vec<Left>,
-    /// The movement at which it was noticed last that the body has changed.
+    /// The movement at which a change of the body was last noticed.
     changed_at: Option<u64>,
-    /// When a change was told of whose account is still awaited.
+    /// The movement at which a change was reported whose account is still awaited.
     told_at: Option<u64>,
     misfit: Option<Misfit>,
     /// Whether the robot may be further off than the prior says.
     doubts_prior: bool,
-    /// How many times as wide the prior of axes has become as was said, and when that was tried last.
+    /// The factor by which the prior of axes has become wider than stated, and the movement at which that was last
+    /// tried.
     widened: f64,
     prior_doubted_at: u64,
-    /// The prior along a chain whose scales are learned, if it is one.
+    /// The prior along a chain, if its scales are learned.
     scaled: Option<Scaled>,
 }
 
-/// Steps without a new hypothesis after which none are searched for any more.
-const CALM: usize = 6;
-/// The search for another body that explains what is surprising.
+/// The number of stable steps, without a new hypothesis, after which none are searched for.
+const STABLE: usize = 6;
+/// The effort of the search for another body that explains surprising readings.
 const THOROUGH: Effort<'_> = Effort { steps: 60, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
-/// The number of what is known before the first movement.
+/// The movement number of what is known before the first movement.
 const BEFOREHAND: u64 = 0;
-/// Measurements that are kept as they are; beyond these the older half is compressed.
+/// The number of measurements kept as they are; beyond it the older half is compressed.
 const KEPT: usize = 60;
 
 impl Smoother {
@@ -120,7 +120,7 @@ impl Smoother {
         let posterior_prior = prior.clone();
         let posterior = Posterior::new(prior, rig.clone());
         let (nominal, unknown) = (rig.clone(), vec![false; rig.noises().len()]);
-        let (spare, remembered) = (vec![0.0; unknown.len()], vec![Left::default(); unknown.len()]);
+        let (degrees_of_freedom, remembered) = (vec![0.0; unknown.len()], vec![Left::default(); unknown.len()]);
         let mut smoother = Self {
             belief: Belief::new(posterior.prior.guess().clone(), layout, rig),
             posterior,
@@ -133,7 +133,7 @@ impl Smoother {
             past: Arc::default(),
             nominal,
             unknown,
-            spare,
+            degrees_of_freedom,
             remembered,
             changed_at: None,
             told_at: None,
@@ -148,24 +148,26 @@ impl Smoother {
         smoother
     }
 
-    /// The same with another loss than least squares. With a robust one a surprising reading is taken for an outlier; only
-    /// several in a row that agree with each other are a changed body.
+    /// This smoother with a loss other than least squares. With a robust one a surprising reading is taken for an outlier;
+    /// only several in a row that agree with each other are a changed body.
     pub fn with_loss(mut self, loss: Loss) -> Self {
         self.posterior.loss = loss;
         self
     }
 
-    /// The same for a body that never changes: an alarm is raised as ever, but nothing is dropped.
+    /// This smoother without forgetting, for a body that never changes: alarms are still raised, but nothing is
+    /// dropped.
     pub fn never_forgetting(self) -> Self {
         Self { forgets: false, ..self }
     }
 
-    /// The same for a robot that may be further off than the prior says: this is widened where that has more evidence.
+    /// This smoother for a robot that may be further off than the prior says: the prior is widened where that has more
+    /// evidence.
     pub fn doubting_prior(self) -> Self {
         Self { doubts_prior: true, ..self }
     }
 
-    /// The same where some kinds of noise (in the order of [`Rig::noises`]) are not known: the σ of the rig is then only a unit,
+    /// This smoother with some kinds of noise unknown (in the order of [`Rig::noises`]): the σ of the rig is then only a unit,
     /// and its scale is learned with the rest.
     pub fn with_unknown_noise(mut self, unknown: Vec<bool>) -> Self {
         self.unknown = unknown;
@@ -173,7 +175,8 @@ impl Smoother {
         self
     }
 
-    /// The same with what is known before any movement, which no posture has to do with: of the robot's equipment.
+    /// This smoother with an observation of the robot's equipment that is known before any movement and depends on no
+    /// posture.
     pub fn knowing(mut self, observation: Observation) -> Self {
         let positions = vec![0.0; self.belief.state.joints.len()];
         self.posterior.known.push(Measurement { positions, observation, movement: BEFOREHAND });
@@ -217,11 +220,11 @@ impl Smoother {
 
     /// Whether one hypothesis has explained everything alone for some time.
     fn is_settled(&self) -> bool {
-        self.hypotheses.calm >= CALM
+        self.hypotheses.stable_steps >= STABLE
     }
 
-    /// Whether there are as many independent equations as parameters; where some can never be determined, twice as many
-    /// equations must do.
+    /// Whether there are as many independent equations as parameters; where some parameters can never be determined,
+    /// whether there are twice as many equations.
     fn is_determined(&self) -> bool {
         let (state, layout) = (&self.belief.state, &self.belief.layout);
         let m = layout.dimension();
@@ -229,12 +232,12 @@ impl Smoother {
         equations >= 2.0 * m as f64 || (equations >= m as f64 && self.posterior.rank(state, layout) >= m)
     }
 
-    /// Whether what the heaviest hypothesis leaves of normal readings is what noise alone explains, Σ w ‖r‖² ~ χ² with Σ w d degrees
-    /// of freedom at most: within five standard deviations.
+    /// Whether noise alone explains the residuals of normal readings at the heaviest hypothesis: Σ w ‖r‖² ~ χ² with Σ w d degrees of
+    /// freedom at most, within five standard deviations.
     ///
-    /// An outlier says nothing here: it is weighed down until its square is as large as that of a normal reading, but it is no
-    /// equation, and among many readings that would be taken for a misfit. Nor do readings that have settled, which were
-    /// explained when they did.
+    /// Outliers are left out: each is weighed down until its square is as large as that of a normal reading, but it counts for no
+    /// equation, and many of them would look like a misfit. Settled readings are left out too: they were explained when they
+    /// settled.
     fn explains(&self) -> bool {
         let (posterior, state) = (&self.posterior, &self.belief.state);
         let all = posterior.known_readings(state).chain(posterior.readings(state));
@@ -354,7 +357,7 @@ impl Smoother {
         self.publish();
         // What costs most is asked last.
         if self.belief.alternatives.is_empty() && self.explains() && self.is_determined() {
-            self.hypotheses.calm += 1;
+            self.hypotheses.stable_steps += 1;
             if self.is_settled() && self.told_at.is_none() && self.posterior.measurements.len() > KEPT {
                 let first = self.posterior.measurements[KEPT / 2].movement;
                 let settling = self.posterior.readings(&self.belief.state).take_while(|it| it.movement < first);
@@ -363,7 +366,7 @@ impl Smoother {
                 self.posterior.settle(KEPT / 2, &self.belief.state, &layout);
             }
         } else {
-            self.hypotheses.calm = 0;
+            self.hypotheses.stable_steps = 0;
         }
         Ok(Update { nis, change_noticed })
     }

@@ -21,33 +21,33 @@ pub(super) struct Mode {
     pub cost: f64,
     #[serde(with = "crate::as_numbers")]
     pub information: DMatrix<f64>,
-    /// −∂E/∂δ there, which is next to nothing.
+    /// −∂E/∂δ at the minimum, the negative gradient, which is next to nothing.
     #[serde(with = "crate::as_numbers")]
     pub descent: DVector<f64>,
     factor: Factor,
-    /// −E − ½ ln det Λ: the logarithm of its share of the evidence, but for what all modes have in common.
+    /// −E − ½ ln det Λ: the logarithm of its share of the evidence, up to a constant that all modes share.
     pub log_evidence: f64,
-    /// Its share of the evidence, once that is told.
+    /// Its share of the evidence, once that is computed.
     pub weight: f64,
 }
 
 /// Why a search found no mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(super) enum NoMode {
-    /// The equations are singular, or no equations at all: some direction is left open, or a number is none.
+    /// The equations are singular, or there are none: some direction is left open, or an entry is not finite.
     Singular,
     /// The search left the range of numbers.
     Diverged,
-    /// It would have cost too much even where it was bound for.
+    /// The cost would have been too high even at the end of the search.
     Hopeless,
-    /// It led to a mode that is known.
+    /// The search led to a mode that is known.
     Known,
-    /// It began where measurements that have settled say nothing.
+    /// The search began outside the chart of settled measurements.
     OutsideChart,
 }
 
 impl NoMode {
-    /// What is to be said where there is no other mode either.
+    /// Why there is no mode, for a message.
     pub fn why(self) -> &'static str {
         match self {
             Self::Singular => "no hypothesis explains the measurements: their equations are singular",
@@ -61,31 +61,32 @@ impl NoMode {
     }
 }
 
-/// When a search ends.
+/// The stopping criteria of a search.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effort<'a> {
-    /// Steps at most, accepted or not.
+    /// The most steps, accepted or not.
     pub steps: usize,
-    /// It has converged when a step promises to lower the cost by less than this.
+    /// The search has converged when a step promises to lower the cost by less than this.
     pub tolerance: f64,
-    /// It finds nothing new when the next step leads to one of these.
+    /// The search finds nothing new when the next step leads to one of these modes.
     pub known: &'a [Mode],
-    /// It is given up when the cost would stay above this even if a [few](FEW) steps more, or as many as are left, lowered it by as
-    /// much as the next one promises.
+    /// The search is given up when the cost would stay above this even if a [few](FEW) more steps, or as many as are left, each
+    /// lowered it by as much as the next one promises.
     pub hopeless: f64,
 }
 
-/// Steps that lead down to where the measurements are explained promise a large part of what is to be gained, and those along a
-/// valley that does not explain them hardly anything.
+/// The number of steps for which the next step's promise is trusted: steps that lead down to where the measurements are
+/// explained promise a large part of what is to be gained, and those along a valley that does not explain them hardly anything.
 const FEW: usize = 3;
 
-/// The widths of a loss through which a search goes that begins far from its end, from least squares to the loss itself.
+/// The widths of the loss through which a search goes that begins far from its end, from least squares to the loss
+/// itself.
 const WIDTHS: [f64; 2] = [10.0, 3.0];
-/// Steps at each of these.
+/// The number of steps at each of these widths.
 const STEPS_AT_WIDTH: usize = 8;
 
-/// The largest step: a turn of so many radians, a shift of as many metres; of numbers without a unit a third of that, and
-/// of pixels three hundred times as many.
+/// The largest step: a turn of this many radians or a shift of this many metres; a third of it for numbers without a
+/// unit, and three hundred times it for pixels.
 const LONGEST_STEP: f64 = 0.7;
 
 /// The length of a step, in multiples of the longest of every quantity.
@@ -109,7 +110,7 @@ impl Posterior {
         Mode::at(self.level, state, normal)
     }
 
-    /// The same from a start that may be far from where the search ends: a robust loss narrows on the way.
+    /// The local minimum reached from a start that may be far from it: a robust loss narrows on the way.
     pub fn mode_from_afar(&self, start: &State, layout: &Layout, effort: Effort<'_>) -> Result<Mode, NoMode> {
         if !self.loss.is_robust() {
             return self.mode(start, layout, effort);
@@ -124,7 +125,7 @@ impl Posterior {
         self.mode(&state, layout, effort)
     }
 
-    /// The same posterior without one to three of the measurements.
+    /// This posterior without one to three of the measurements.
     pub fn suspecting(&self, rng: &mut impl Rng) -> Self {
         let mut others = self.clone();
         for _ in 0..rng.random_range(1..=3).min(others.measurements.len()) {
@@ -147,7 +148,8 @@ impl Posterior {
         self.mode(&state, layout, effort)
     }
 
-    /// Where steps end that lead down from `start`, and the equations there: bounded by the steps of the effort, whatever the numbers.
+    /// Descends from `start`, bounded by the steps of the effort whatever the numbers, and returns where that ends with the equations
+    /// there.
     fn descend(
         &self,
         loss: Graduated,
@@ -220,7 +222,8 @@ impl Posterior {
     }
 }
 
-/// A step that leads so near to a mode (squared, in standard deviations), and promises its cost but for this, leads to it.
+/// The squared distance from a mode, in standard deviations, at which a step leads to it, if it promises the mode's cost
+/// to within this.
 const REACHED: f64 = 0.1;
 
 impl Mode {
@@ -229,13 +232,13 @@ impl Mode {
         (cost - self.cost).abs() < REACHED && self.distance(layout, state).is_some_and(|squared| squared < REACHED)
     }
 
-    /// How far `state` is from it, squared, in standard deviations; `None` outside its chart.
+    /// The squared distance of `state` from this mode, in standard deviations; `None` outside its chart.
     pub fn distance(&self, layout: &Layout, state: &State) -> Option<f64> {
         let delta = self.state.local(layout, state)?;
         Some(delta.dot(&(&self.information * &delta)))
     }
 
-    /// The Gaussian where a search has ended with these equations, unless they are not positive.
+    /// The Gaussian at the end of a search with these equations, if they are positive definite.
     pub fn at(level: Level, state: State, normal: Normal) -> Result<Self, NoMode> {
         let Normal { cost, mut information, descent } = normal;
         information.fill_upper_triangle_with_lower_triangle();

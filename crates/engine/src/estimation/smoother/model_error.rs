@@ -1,8 +1,8 @@
-//! What no parameter explains.
+//! The model error: what no parameter explains.
 //!
 //! Where the noise is not known, its nominal σ is what the sensor's maker promises. Residuals beyond that are no noise but errors of
-//! the model: encoders off their centres, links that bend. They do not average away over movements as noise does, so they are
-//! counted as a floor under every prediction,
+//! the model: encoders off their centres, links that bend. They do not average away over movements as noise does, so they are counted
+//! as a floor under every prediction,
 //!
 //! ```text
 //! e² = Σₙ dₙ eₙ² / Σₙ dₙ,    eₙ² = 3 dₙ (sₙ² − 1 − 3 √(2/νₙ))₊ / tr(TₙᵀTₙ)
@@ -15,18 +15,19 @@
 use super::Smoother;
 use crate::model::{Block, Layout, Pass};
 
-/// Deviations of sₙ² that chance alone is granted.
+/// The deviations of sₙ² that are attributed to chance.
 const CHANCE: f64 = 3.0;
-/// Latest movements at which metres are compared with σ.
+/// The number of latest movements at which metres are compared with σ.
 const LOOKED_AT: usize = 8;
 
 impl Smoother {
-    /// e, metres; 0 where the noise is known, and while there are fewer equations than parameters: what none explains cannot be told yet.
+    /// e, metres; 0 where the noise is known, and while there are fewer equations than parameters, so that the model error cannot be told
+    /// yet.
     pub(super) fn model_error_m(&self) -> f64 {
-        let excess: Vec<f64> = (self.posterior.scales.iter().zip(&self.spare).zip(&self.unknown))
-            .map(|((scale, spare), unknown)| {
-                let by_chance = 1.0 + CHANCE * (2.0 / spare).sqrt();
-                if *unknown && *spare > 0.0 { (scale * scale - by_chance).max(0.0) } else { 0.0 }
+        let excess: Vec<f64> = (self.posterior.scales.iter().zip(&self.degrees_of_freedom).zip(&self.unknown))
+            .map(|((scale, degrees_of_freedom), unknown)| {
+                let by_chance = 1.0 + CHANCE * (2.0 / degrees_of_freedom).sqrt();
+                if *unknown && *degrees_of_freedom > 0.0 { (scale * scale - by_chance).max(0.0) } else { 0.0 }
             })
             .collect();
         let (state, layout) = (&self.belief.state, &self.belief.layout);
@@ -47,7 +48,7 @@ impl Smoother {
         if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
     }
 
-    /// By kind of noise tr(TᵀT), in the mean over the latest readings, and d.
+    /// tr(TᵀT) by kind of noise, as the mean over the latest readings, and d.
     fn shifts(&self) -> (Vec<f64>, Vec<f64>) {
         let state = &self.belief.state;
         let layout = Layout::new(state, [Block::Base]);

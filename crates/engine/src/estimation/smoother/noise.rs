@@ -1,15 +1,15 @@
-//! How large noise is: one scale for each kind.
+//! The scales of noise, one for each kind.
 //!
-//! A scale that nobody tells is learned by restricted maximum likelihood. One that is told is a guess: either it holds, or it
-//! is off by a factor of which next to nothing is known,
+//! A scale that is not stated is learned by restricted maximum likelihood. A stated one is a guess: either it holds, or it is
+//! off by a factor of which next to nothing is known,
 //!
 //! ```text
 //! ln ev(holds)  = ln P(holds) − ½ χ²
 //! ln ev(is off) = ln P(is off) + ln Γ((a+ν)/2) − ln Γ(a/2) + (a/2) ln(a/2) − ((a+ν)/2) ln((a + χ²)/2),    a = 2
 //! ```
 //!
-//! with χ² the squared residuals in nominal σ and ν the equations that no parameter accounts for; the second is ½χ² with
-//! s² integrated out under an inverse χ² prior of a degrees of freedom (Gelman et al., *Bayesian Data Analysis*, 3.2).
+//! with χ² the squared residuals in nominal σ and ν the equations that no parameter accounts for; the second is ½χ² with s²
+//! integrated out under an inverse χ² prior of a degrees of freedom (Gelman et al., *Bayesian Data Analysis*, 3.2).
 
 use super::{
     Smoother,
@@ -21,19 +21,20 @@ use crate::{
     sensing::{Noise, Occasion, log_sum},
 };
 
-/// ν: how many equations the scale of the noise so far counts for.
+/// ν: the number of equations for which the scale so far counts.
 const NOISE_WEIGHT: f64 = 3.0;
-/// How often scales and modes are found in turn, at most.
+/// The most rounds in which scales and modes are found in turn.
 const NOISE_ROUNDS: usize = 4;
-/// The least scale of a noise that is not known, in nominal σ.
+/// The least scale of unknown noise, in nominal σ.
 pub(super) const LEAST_SCALE: f64 = 1e-3;
-/// A first reading is as far off at the guess as so many times what the prior expects, at most, as far as that is due to noise.
+/// The most, as a multiple of what the prior expects, by which a first reading's distance from the guess is attributed to
+/// noise.
 const EXPECTED: f64 = 3.0;
-/// P(holds): that noise is as large as is said.
+/// P(holds): the prior probability that noise is as large as stated.
 const HOLDS: f64 = 0.9;
 /// a.
 const VAGUENESS: f64 = 2.0;
-/// What was learned of noise before the body changed counts for as many equations at most.
+/// The most equations for which the noise learned before a change of the body counts.
 const REMEMBERED: f64 = 100.0;
 
 /// Squared residuals of one kind of noise, in nominal σ, and the equations that no parameter accounts for.
@@ -48,18 +49,18 @@ impl Left {
         Self { squared: self.squared + other.squared, free: self.free + other.free }
     }
 
-    /// The same for as many equations at most.
+    /// These residuals, scaled down to at most this many equations.
     fn at_most(self, most: f64) -> Self {
         let share = if self.free > most { most / self.free } else { 1.0 };
         Self { squared: self.squared * share, free: self.free * share }
     }
 
-    /// The logarithm of the evidence that noise is as said, and that it is off.
+    /// The logarithms of the evidence that noise is as stated, and that it is off.
     fn evidence(self) -> [f64; 2] {
         [ln(HOLDS) - 0.5 * self.squared, ln(1.0 - HOLDS) + log_off(self.squared, self.free)]
     }
 
-    /// s of noise that is told: 1 as far as that holds, and what the residuals say as far as it is off.
+    /// s of stated noise: 1 as far as that holds, and what the residuals say as far as it is off.
     fn scale(self) -> f64 {
         let [holds, off] = self.evidence();
         let chance = 1.0 / (1.0 + exp(off - holds));
@@ -73,17 +74,17 @@ fn log_off(squared: f64, free: f64) -> f64 {
     libm::lgamma(sum) - libm::lgamma(a) + a * ln(a) - sum * ln(0.5 * (VAGUENESS + squared))
 }
 
-/// What tells larger noise from another cause of large residuals.
+/// The evidence that tells larger noise from another cause of large residuals.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoiseEvidence {
-    /// χ² in σ as they are taken to be, and ν.
+    /// χ² in assumed σ, and ν.
     left: Left,
-    /// χ² in nominal σ by χ², and Σ ν ln s; `None` where some scale is not told.
+    /// χ² in nominal σ by χ², and Σ ν ln s; `None` where some scale is not stated.
     told: Option<(f64, f64)>,
 }
 
 impl NoiseEvidence {
-    /// What it gains of evidence when χ², in σ as they are taken to be, falls by so much.
+    /// The gain in evidence when χ², in assumed σ, falls by `lowered`.
     pub fn gain(&self, lowered: f64) -> f64 {
         let Self { left: Left { squared, free }, told } = *self;
         // Of a reading nothing but its noise is left.
@@ -99,8 +100,7 @@ impl NoiseEvidence {
 }
 
 impl Smoother {
-    /// The scale that the residuals of the first readings have at the guess: what it leaves unexplained, but not beyond what the
-    /// prior allows for.
+    /// Begins a scale with that of the first readings' residuals at the guess, but not beyond what the prior allows for.
     pub(super) fn begin_noise(&mut self) {
         let first: Vec<usize> = (0..self.unknown.len()).filter(|noise| self.is_unheard(*noise)).collect();
         if first.is_empty() {
@@ -113,7 +113,8 @@ impl Smoother {
         }
     }
 
-    /// What the guess leaves of the latest reading with a kind of noise, per equation, but not less than what is nominal; `None` where it predicts none.
+    /// The residual of the latest reading with a kind of noise at the guess, per equation, but at least the nominal one; `None` where there
+    /// is no prediction.
     fn first_scale(&self, noise: usize) -> Option<f64> {
         let (channel, part) =
             self.posterior.rig.noises().get(noise).map(|noise| (noise.channel, noise.part.clone()))?;
@@ -132,12 +133,12 @@ impl Smoother {
         Some((residual.norm_squared() / d).sqrt().clamp(1.0, EXPECTED * (1.0 + expected).sqrt()))
     }
 
-    /// Whether nobody tells a kind of noise and its first reading has just come.
+    /// Whether a kind of noise is not stated and its first reading has just come.
     fn is_unheard(&self, noise: usize) -> bool {
         self.unknown[noise] && self.remembered[noise].free == 0.0 && self.noise_seen(noise) == 1
     }
 
-    /// Readings so far with a kind of noise.
+    /// The number of readings so far with a kind of noise.
     fn noise_seen(&self, noise: usize) -> usize {
         let channel = self.nominal.noises()[noise].channel;
         let seen = self.posterior.measurements.iter();
@@ -145,12 +146,12 @@ impl Smoother {
         settled + seen.filter(|seen| seen.observation.readings.get(channel).is_some_and(Option::is_some)).count()
     }
 
-    /// By kind of noise what the heaviest mode leaves of the readings, those before the body changed included.
+    /// The residuals of the heaviest mode by kind of noise, those before the body changed included.
     fn left(&self) -> Option<Vec<Left>> {
         self.left_by(&self.posterior, self.hypotheses.modes.first()?)
     }
 
-    /// The same of a mode of another posterior.
+    /// The residuals of a mode of another posterior, by kind of noise.
     fn left_by(&self, posterior: &Posterior, mode: &Mode) -> Option<Vec<Left>> {
         let absorbed = posterior.absorbed(mode, &self.belief.layout)?;
         let fits = posterior.fit(&mode.state, &self.belief.layout);
@@ -165,14 +166,14 @@ impl Smoother {
         Some(lefts.map(of).collect())
     }
 
-    /// Keeps what is known of noise for when the readings are gone that tell it.
+    /// Keeps what the readings say of noise, for when they are dropped.
     pub(super) fn remember_noise(&mut self, before: &Posterior, mode: &Mode) {
         if let Some(left) = self.left_by(before, mode) {
             self.remembered = left.into_iter().map(|left| left.at_most(REMEMBERED)).collect();
         }
     }
 
-    /// What tells larger noise from another cause of large residuals, at a mode of a posterior.
+    /// The evidence that tells larger noise from another cause of large residuals, at a mode of a posterior.
     pub(super) fn noise_evidence(&self, posterior: &Posterior, mode: &Mode) -> NoiseEvidence {
         let lefts = self.left_by(posterior, mode).unwrap_or_default();
         let mut left = Left::default();
@@ -187,15 +188,15 @@ impl Smoother {
         NoiseEvidence { left, told: is_told.then_some((by, scales)) }
     }
 
-    /// Learns the scales of noise. Of noise that is not known by restricted maximum likelihood at the heaviest mode: what
-    /// residuals are, in their mean square over the equations that no parameter accounts for,
+    /// Learns the scales of noise. Of noise that is not known by restricted maximum likelihood at the heaviest mode: the mean
+    /// square of the residuals over the equations that no parameter absorbs,
     ///
     /// ```text
     /// s² = (Σ w ‖r‖² + ν s₀²) / (Σ w d − tr(Λₙ P) + ν),    ν = 3
     /// ```
     ///
-    /// with s₀ the scale so far, so that it does not jump while there are hardly more equations than parameters. Noise that is
-    /// told stays as told until that is unlikely, and one hypothesis explains the readings.
+    /// with s₀ the scale so far, so that it does not jump while there are hardly more equations than parameters. Stated noise
+    /// stays as stated until that is unlikely and one hypothesis explains the readings.
     pub(super) fn learn_noise(&mut self) {
         let layout = self.belief.layout.clone();
         let before = self.posterior.scales.clone();
@@ -210,7 +211,7 @@ impl Smoother {
                     if self.noise_seen(noise) == 0 {
                         continue;
                     }
-                    self.spare[noise] = free;
+                    self.degrees_of_freedom[noise] = free;
                     // With equations to spare it may change as often as the modes follow.
                     let from = if free > NOISE_WEIGHT { self.posterior.scales[noise] } else { before[noise] };
                     ((left[noise].squared + NOISE_WEIGHT * from * from) / (free + NOISE_WEIGHT)).sqrt()

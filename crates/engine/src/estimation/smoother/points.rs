@@ -1,4 +1,4 @@
-//! What the data cost and their normal equations where nothing but points is measured: as many measurements at a time as a
+//! The cost of the data and their normal equations where only points are measured: as many measurements at a time as a
 //! register holds.
 
 use fearless_simd::dispatch;
@@ -14,10 +14,10 @@ use crate::{
     sensing::Graduated,
 };
 
-/// Measurements whose rows are looked at together: few enough for the caches.
+/// The number of measurements whose rows are computed together: few enough for the caches.
 const TOGETHER: usize = 32;
 
-/// Where rows and residuals are put, step after step of a search, of one layout.
+/// A workspace for rows and residuals, reused step after step of a search of one layout.
 #[derive(Default)]
 pub(super) struct Room {
     spare: Option<Normal>,
@@ -25,7 +25,7 @@ pub(super) struct Room {
     readings: Vec<f64>,
     factors: Vec<f64>,
     residuals: Vec<f64>,
-    /// J of every measurement, where joints' readings are off: of the state that a search stood in last.
+    /// J of every measurement, where joints' readings are off: at the state at which the search stood last.
     pub(super) joints: Option<Vec<DMatrix<f64>>>,
 }
 
@@ -35,13 +35,13 @@ fn emptied(numbers: &mut Vec<f64>, count: usize) -> &mut [f64] {
     numbers
 }
 
-/// As many numbers: zero, or what was put here before and will be put here again.
+/// `count` numbers: zero, or values written here before that will be written again.
 fn kept(numbers: &mut Vec<f64>, count: usize) -> &mut [f64] {
     if numbers.len() == count { numbers } else { emptied(numbers, count) }
 }
 
 impl Room {
-    /// Sums of squares (m × m) and their kin, zero.
+    /// Zeroed sums of squares (m × m) and of products.
     pub(super) fn derivatives(&mut self, m: usize) -> (DMatrix<f64>, DVector<f64>) {
         let Some(Normal { mut information, mut descent, .. }) = self.spare.take() else {
             return (DMatrix::zeros(m, m), DVector::zeros(m));
@@ -51,14 +51,14 @@ impl Room {
         (information, descent)
     }
 
-    /// Equations that nobody needs any more.
+    /// Returns the memory of equations that are no longer needed.
     pub(super) fn put_back(&mut self, normal: Normal) {
         self.spare = Some(normal);
     }
 }
 
 impl Posterior {
-    /// Adds Σ w HᵀH/s² and Σ w Hᵀr/s² of all readings, and returns what they cost.
+    /// Adds Σ w HᵀH/s² and Σ w Hᵀr/s² of all readings, and returns their cost.
     pub(super) fn add_points(
         &self,
         loss: Graduated,
@@ -92,7 +92,7 @@ impl Posterior {
         cost
     }
 
-    /// Writes √w/s and √w (y − h)/s of all equations of some measurements, nothing where nothing was read, and returns what they
+    /// Writes √w/s and √w (y − h)/s of all equations of some measurements, zero where there is no reading, and returns their
     /// cost.
     fn weigh_points(
         &self,

@@ -28,7 +28,7 @@ use crate::{
     sensing::{Graduated, Loss, Observation, Rig},
 };
 
-/// A movement and what was seen after it.
+/// A movement and its observation.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Measurement {
     pub positions: Vec<f64>,
@@ -43,23 +43,23 @@ impl AsRef<[f64]> for Measurement {
     }
 }
 
-/// Everything that is known.
+/// The posterior: prior, likelihood and measurements.
 #[derive(Clone, Debug)]
 pub(super) struct Posterior {
     pub prior: Prior,
     pub pins: State,
     pub rig: Arc<Rig>,
-    /// The points that the rig measures, where it measures nothing else.
+    /// The points that the rig measures, if it measures nothing else.
     targets: Option<Vec<(usize, Whitening)>>,
     /// The instructions that this processor has.
     pub level: Level,
     pub loss: Loss,
     /// s, by kind of noise: 1 where it is known.
     pub scales: Vec<f64>,
-    /// What is known of the equipment before any movement: it belongs to the prior, so that it never settles and no change of the
-    /// body drops it.
+    /// Observations of the equipment from before any movement. They belong to the prior, so that they never settle and no change
+    /// of the body drops them.
     pub known: Vec<Measurement>,
-    /// What the joints' readings are off by, where they are not exact.
+    /// The noise of the joints' readings, where they are not exact.
     pub joints: Option<Joints>,
     pub measurements: Vec<Measurement>,
     pub settled: Option<Settled>,
@@ -68,12 +68,12 @@ pub(super) struct Posterior {
 /// The normal equations of the posterior at a state: `information · step = descent`.
 pub(super) struct Normal {
     pub cost: f64,
-    /// Its lower triangle; what is above the diagonal means nothing.
+    /// The information's lower triangle; the upper triangle is meaningless.
     pub information: DMatrix<f64>,
     pub descent: DVector<f64>,
 }
 
-/// How some measurements are fitted, by kind of noise: what its scale is told by.
+/// The fit of some measurements for one kind of noise, from which its scale is learned.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fit {
     /// Σ w ‖r‖² in nominal σ.
@@ -109,24 +109,24 @@ impl Posterior {
         }
     }
 
-    /// The same rig, likelihood and known equipment with another prior, and of the measurements only these.
+    /// This posterior with another prior and these measurements only.
     pub fn anew(&self, prior: Prior, measurements: Vec<Measurement>) -> Self {
         let (loss, scales, known, joints) = (self.loss, self.scales.clone(), self.known.clone(), self.joints.clone());
         Self { loss, scales, known, joints, measurements, ..Self::new(prior, self.rig.clone()) }
     }
 
-    /// What is made of every reading at `state`, but for those that have settled and what is known beforehand.
+    /// The reports on every reading at `state`, except for settled readings and what is known beforehand.
     pub fn readings(&self, state: &State) -> impl Iterator<Item = ReadingReport> {
         self.readings_of(&self.measurements, state)
     }
 
-    /// What is made at `state` of the measurements from this movement on.
+    /// The reports at `state` on the measurements from this movement on.
     pub fn readings_after(&self, movement: u64, state: &State) -> impl Iterator<Item = ReadingReport> {
         let latest = self.measurements.iter().rev().take_while(|seen| seen.movement >= movement).count();
         self.readings_of(&self.measurements[self.measurements.len() - latest..], state)
     }
 
-    /// What is made at `state` of what is known beforehand.
+    /// The reports at `state` on what is known beforehand.
     pub fn known_readings(&self, state: &State) -> impl Iterator<Item = ReadingReport> {
         self.readings_of(&self.known, state)
     }
@@ -155,25 +155,25 @@ impl Posterior {
         self.known.iter().chain(&self.measurements)
     }
 
-    /// Hands the weight of every reading of a measurement at `state` to `each`.
+    /// Passes the weight of every reading of a measurement at `state` to `each`.
     pub fn weights(&self, state: &State, seen: &Measurement, mut each: impl FnMut(f64)) {
         self.residuals(state, seen, |channel, whitened| {
             each(self.loss.weight(self.squared(channel, whitened), whitened.len()));
         });
     }
 
-    /// The measurements of which no two readings err together: what is known beforehand, and where joints are exact, all.
+    /// The measurements in which no two readings err together: what is known beforehand, and all if joints are exact.
     fn apart(&self) -> impl Iterator<Item = &Measurement> {
         self.known.iter().chain(self.measurements.iter().filter(|_| self.joints.is_none()))
     }
 
-    /// How many measurements there were.
+    /// The number of measurements so far.
     #[cfg(test)]
     pub fn count(&self) -> usize {
         self.measurements.len() + self.settled.as_ref().map_or(0, |settled| settled.count)
     }
 
-    /// How many equations they brought, those of outliers at `state` not counted.
+    /// The number of their equations, those of outliers at `state` not counted.
     pub fn equations(&self, state: &State, layout: &Layout) -> f64 {
         if !self.loss.is_robust() {
             return self.equations_by_noise().iter().sum();
@@ -181,7 +181,7 @@ impl Posterior {
         self.fit(state, layout).iter().map(|fit| fit.equations).sum()
     }
 
-    /// By kind of noise: the equations of all readings, outliers among them; those of readings that have settled but for outliers.
+    /// The number of equations of all readings by kind of noise, outliers included; settled outliers are not.
     pub fn equations_by_noise(&self) -> Vec<f64> {
         let mut equations = vec![0.0; self.scales.len()];
         for seen in self.all() {
@@ -195,8 +195,8 @@ impl Posterior {
         equations
     }
 
-    /// How many independent equations the measurements are that have not settled, outliers at `state` not counted; all settled ones
-    /// count as independent.
+    /// The number of independent equations of unsettled measurements, outliers at `state` not counted; settled equations all count
+    /// as independent.
     pub fn rank(&self, state: &State, layout: &Layout) -> usize {
         let m = layout.dimension();
         let normal: Vec<Measurement> = if self.loss.is_robust() {
@@ -234,12 +234,12 @@ impl Posterior {
         all.filter(move |(_, noise)| noise.channel == channel).map(|(index, noise)| (index, noise.part.clone()))
     }
 
-    /// What is measured at `state`, where that is the place of points and nothing else.
+    /// The points measured at `state`, if nothing else is measured.
     fn points(&self, state: &State, layout: &Layout) -> Option<Points> {
         Points::new(state, layout, self.targets.as_ref()?)
     }
 
-    /// ‖r‖² of a reading, in σ as they are taken to be.
+    /// ‖r‖² of a reading, in assumed σ.
     pub fn squared(&self, channel: usize, whitened: &[f64]) -> f64 {
         self.noises(channel).map(|(noise, part)| norm_squared(&whitened[part]) / self.scales[noise].powi(2)).sum()
     }
@@ -264,7 +264,7 @@ impl Posterior {
         })
     }
 
-    /// By kind of noise, how well the data are fitted at `state`: for one that is as assumed `squared` is χ² distributed with
+    /// The fit of the data at `state` by kind of noise: where the noise is as assumed, `squared` is χ² distributed with
     /// `equations` degrees of freedom.
     pub fn fit(&self, state: &State, layout: &Layout) -> Vec<Fit> {
         let mut fits = match &self.joints {
@@ -304,7 +304,7 @@ impl Posterior {
         Some(normal)
     }
 
-    /// The same by another loss; what is above the diagonal of the information means nothing.
+    /// The normal equations at `state` by another loss; the information's upper triangle is meaningless.
     pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout, room: &mut Room) -> Option<Normal> {
         let (mut information, mut descent) = room.derivatives(layout.dimension());
         let mut cost = 0.0;
@@ -354,7 +354,7 @@ impl Posterior {
         (rows, residuals)
     }
 
-    /// √w Hᵀ/s and √w (y − h)/s of some measurements, one beside the other, and what they cost.
+    /// √w Hᵀ/s and √w (y − h)/s of some measurements, side by side, and their cost.
     fn stacked(
         &self,
         loss: Graduated,
@@ -383,8 +383,8 @@ impl Posterior {
         (stacked, residuals, cost)
     }
 
-    /// Weighs the rows and residuals of an observation, reading by reading, and returns what they cost: nothing where there is no
-    /// prediction, as can be where not all of it `is_whole`.
+    /// Weighs the rows and residuals of an observation, reading by reading, and returns their cost: zero where there is no
+    /// prediction, which can be if not all of it `is_whole`.
     fn weigh(
         &self,
         loss: Graduated,
@@ -420,7 +420,8 @@ impl Posterior {
         cost
     }
 
-    /// Σ w HᵀH and its kin of some measurements, by kind of noise and in nominal σ, and what they cost beyond ½ Σ w ‖r‖².
+    /// Σ w HᵀH and related sums of some measurements, by kind of noise and in nominal σ, and their cost beyond ½ Σ w
+    /// ‖r‖².
     fn quadratics(&self, state: &State, layout: &Layout, measurements: &[Measurement]) -> (Vec<Quadratic>, f64) {
         let (rows, residuals, cost) = self.stacked(self.loss.into(), state, layout, measurements);
         let mut of_noise = vec![Vec::new(); self.scales.len()];
@@ -472,7 +473,7 @@ impl Posterior {
         self.settled = Some(Settled { state: state.clone(), noises, excess, count: total });
     }
 
-    /// By kind of noise, how many of its equations the parameters account for: tr(Λₙ P), with Λₙ its share of the information.
+    /// The number of equations, by kind of noise, that the parameters absorb: tr(Λₙ P), with Λₙ its share of the information.
     pub fn absorbed(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
         if let Some(joints) = &self.joints {
             let (kept, _) = self.joint_shares(self.loss.into(), joints, mode, layout);

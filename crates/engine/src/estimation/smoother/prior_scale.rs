@@ -1,27 +1,28 @@
-//! How large errors of a description are, told by the evidence of measurements.
+//! The size of a description's errors, learned from the evidence of measurements.
 //!
-//! The prior [along a chain](ChainPrior) has scales: of its origins, and of every zero; where σ is unknown it has a scale, too. While there are few measurements more than parameters, small errors with large noise explain them as well as large errors with
-//! hardly any, and whoever settles for one of these is wrong by as much. So they are taken together, with what all of them
-//! make of the measurements where they were linearised (Laplace's approximation, with G = Σ w HᵀH and g = Σ w Hᵀ(y − h) at δ = 0 in
-//! the chart at the guess, c = Σ w ‖y − h‖² there, N = Σ w d, all in the noise as it was, and β = 1/τ² its precision from now on):
+//! The prior [along a chain](ChainPrior) has scales: of its origins, and of every zero; where σ is unknown it has a scale, too. While there
+//! are few measurements more than parameters, small errors with large noise explain them as well as large errors with hardly any, and
+//! choosing either alone would be wrong by as much. So both are judged together, by the evidence of the measurements where they were
+//! linearised (Laplace's approximation, with G = Σ w HᵀH and g = Σ w Hᵀ(y − h) at δ = 0 in the chart at the guess, c = Σ w ‖y − h‖² there,
+//! N = Σ w d, all in the noise as it was, and β = 1/τ² its precision from now on):
 //!
 //! ```text
 //! 2 ln p(y | s, τ) = N ln β − ln det P₀(s) − ln det Λ − β c + β² gᵀΛ⁻¹g,      Λ = β G + P₀(s)⁻¹
 //! ```
 //!
-//! and a weak prior of each: a spike and a slab of the scales, and of σ a normal distribution of ln σ around half of what is nominal.
-//! The scale of origins and σ are looked at on a lattice, from some of its places on as far as there is evidence (MacKay, "Bayesian
-//! interpolation", 1992, maximises it; with so few equations that lets σ collapse). Then the zeros are looked at one by one, the one
-//! that is likeliest to be off first (Tipping and Faul, "Fast marginal likelihood maximisation for sparse Bayesian models", 2003): with k how a zero
-//! moves the parameters, and M = βG − βG Λ⁻¹ βG, u = βg − βG Λ⁻¹ βg of all else,
+//! and a weak prior of each: a spike and a slab of the scales, and of σ a normal distribution of ln σ around half of what is nominal. The
+//! scale of origins and σ are looked at on a lattice, from some of its places on as far as there is evidence (MacKay, "Bayesian
+//! interpolation", 1992, maximises it; with so few equations that lets σ collapse). Then the zeros are looked at one by one, the one that
+//! is likeliest to be off first (Tipping and Faul, "Fast marginal likelihood maximisation for sparse Bayesian models", 2003): with k how a
+//! zero moves the parameters, and M = βG − βG Λ⁻¹ βG, u = βg − βG Λ⁻¹ βg of all else,
 //!
 //! ```text
 //! 2 ln p(y | v) = − ln(1 + v kᵀMk) + v (kᵀu)² / (1 + v kᵀMk) + constant
 //! ```
 //!
 //! A zero is off where that is likelier than not, with a lattice of its own, since what it explains no origin needs to explain. What is
-//! taken is the posterior mean of every scale and of ln τ.
-//! So a description that is right stays right, and one that is wrong by more than was stated is learned as if that had been said.
+//! taken is the posterior mean of every scale and of ln τ. So a description that is right stays right, and one that is wrong by more than
+//! stated is learned as if the larger error had been stated.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -40,25 +41,26 @@ pub(super) struct Scaled {
     pub(super) scales: Scales,
 }
 
-/// How often scales are found where the mode is that the last ones led to, at most.
+/// The most rounds in which scales are found at the mode that the last ones led to.
 const ROUNDS: usize = 3;
-/// Scales that change by less than this have been found.
+/// The change of a scale below which it has converged.
 const FOUND: f64 = 0.02;
-/// What is known of noise that is not: σ is half of what its maker promises, give or take a factor of e.
+/// The likely σ of unknown noise: half of what its maker promises, give or take a factor of e.
 const LIKELY_SIGMA: f64 = 0.5;
 const SIGMA_SPREAD: f64 = 1.0;
-/// Places on the lattice of less evidence than this (its logarithm, below the best) do not count.
+/// Places on the lattice whose log evidence is this far below the best do not count.
 const NEGLIGIBLE: f64 = 5.0;
-/// Steps of ln τ on the lattice, and how far it reaches to each side.
+/// The step of ln τ on the lattice, and how far it reaches to each side.
 const STEPS: (f64, f64) = (0.04, 0.4);
 const REACH: f64 = 8.0;
-/// A scale that is small makes no difference.
+/// A scale below this makes no difference.
 const SMALL: f64 = 0.05;
-/// Logarithm of the odds from which on it is tried whether a zero is off.
+/// The logarithm of the odds from which on a zero is tried for being off.
 const WORTH_TRYING: f64 = -5.0;
 
 impl Smoother {
-    /// The same with a prior along a chain, whose scales are learned. Its covariance at scales of 1 is that of the prior.
+    /// This smoother with a prior along a chain, whose scales are learned. Its covariance at scales of 1 is that of the
+    /// prior.
     pub fn with_chain(mut self, chain: Arc<ChainPrior>) -> Self {
         // No zero is off before anything says so.
         let zeros = vec![ChainPrior::GRID[0]; chain.stated().zeros.len()];
@@ -111,16 +113,16 @@ struct Data {
     vector: DVector<f64>,
     /// c.
     squares: f64,
-    /// N, of noise that is not known; 0 where all is.
+    /// N, of unknown noise; 0 where all noise is known.
     equations: f64,
-    /// By kind of unknown noise: ln of its scale in what is likely.
+    /// ln of each unknown noise's scale relative to the likely one.
     sigmas: Vec<f64>,
     /// The least ln τ: no noise is smaller than the least that is learned, at which equations still are regular.
     least_log_noise: f64,
 }
 
 impl Data {
-    /// `None` outside the charts.
+    /// The quadratic at a mode; `None` outside the charts.
     fn of(posterior: &Posterior, unknown: &[bool], mode: &Mode, layout: &Layout) -> Option<Self> {
         let state = &mode.state;
         let m = layout.dimension();
@@ -156,21 +158,21 @@ impl Data {
 /// A place: the scale of origins on the chain's grid, and steps of ln τ.
 type Place = (usize, i32);
 
-/// What the evidence makes of all scales.
+/// The scales that the evidence favours.
 struct Found {
     scales: Scales,
     /// ln τ.
     log_noise: f64,
 }
 
-/// By how much scales differ: small ones in what they stand for, large ones in their logarithm.
+/// The change between scales: of small ones by what they stand for, of large ones by their logarithm.
 fn changed(before: &Scales, after: &Scales) -> f64 {
     let all =
         |scales: &Scales| std::iter::once(scales.origins).chain(scales.zeros.iter().copied()).collect::<Vec<f64>>();
     all(before).into_iter().zip(all(after)).map(|(a, b)| ln((a + SMALL) / (b + SMALL)).abs()).fold(0.0, f64::max)
 }
 
-/// What the evidence makes of them, from some scales on.
+/// Finds the scales that the evidence favours, starting from given ones.
 fn found(chain: &ChainPrior, data: &Data, from: &Scales) -> Option<Found> {
     let none = vec![ChainPrior::GRID[0]; from.zeros.len()];
     let mut scales = Scales { origins: from.origins, zeros: none };
@@ -197,15 +199,15 @@ fn found(chain: &ChainPrior, data: &Data, from: &Scales) -> Option<Found> {
 /// A zero that may be off.
 struct Suspect {
     zero: usize,
-    /// The mean of its scale if it is.
+    /// The mean of its scale if the zero is off.
     scale: f64,
-    /// ln of the odds that it is, before anything is known, and of what is lost by not knowing its scale.
+    /// ln of the prior odds that it is off, less what is lost by not knowing its scale.
     odds: f64,
-    /// ln of the odds that it is at these scales of origins.
+    /// ln of the odds that it is off at these scales of origins.
     promised: f64,
 }
 
-/// The zero of `left` that is likeliest to be off, at some scales of all else.
+/// The zero of `left` that is likeliest to be off, at given scales of all else.
 fn suspect(
     chain: &ChainPrior,
     data: &Data,
@@ -243,22 +245,22 @@ fn suspect(
     Some(all.max_by(|a, b| a.promised.total_cmp(&b.promised)))
 }
 
-/// What a lattice makes of the scales.
+/// The mean of the scales over a lattice.
 struct Mean {
     origins: f64,
     log_noise: f64,
-    /// Of all its places together.
+    /// The log evidence of all its places together.
     log_evidence: f64,
 }
 
-/// Evidence by place, as far as it has been looked at.
+/// The evidence by place, as far as it has been computed.
 struct Lattice<'a> {
     chain: &'a ChainPrior,
     data: &'a Data,
     probabilities: Vec<f64>,
-    /// How zeros move parameters, and their variances.
+    /// How zeros move the parameters, and their variances.
     zeros: (DMatrix<f64>, Vec<f64>),
-    /// Of ln τ.
+    /// The step of ln τ.
     step: f64,
     known: HashMap<Place, f64>,
     inverted: Vec<Option<Option<Inverted>>>,
@@ -284,7 +286,7 @@ impl<'a> Lattice<'a> {
         }
     }
 
-    /// The logarithm of the evidence at a place, with that of its prior; but for what all places have in common.
+    /// The logarithm of the evidence at a place, its prior included, up to a constant that all places share.
     fn at(&mut self, place: Place) -> f64 {
         if let Some(known) = self.known.get(&place) {
             return *known;
@@ -314,7 +316,7 @@ impl<'a> Lattice<'a> {
         Some(log_likelihood + probability + self.data.sigmas.iter().map(sigma).sum::<f64>())
     }
 
-    /// The best place at this scale, wherever τ is.
+    /// The best place at this scale of origins, for any τ.
     fn climbed(&mut self, (origins, mut noise): Place) -> Place {
         if self.data.equations == 0.0 {
             return (origins, noise);

@@ -1,11 +1,11 @@
-//! Noise as most readings have it.
+//! Robust scales of noise, taken from most of the readings.
 //!
-//! Least squares let one reading of −9999 decide how large noise is, and with noise that large nothing is an outlier; a few readings
-//! that happen to be exact make it so small that all others are outliers. So scales that are learned are doubted wherever most
-//! readings scatter much less, or much more, than the scale says: the median of their squares, over the
-//! median of χ², is a scale that no minority of readings changes, whatever its size. From there modes are searched with
-//! Huber's loss, the scale in turn with them (an M-estimator with a scale of its own; Huber and Ronchetti, *Robust Statistics*, 7.8),
-//! and then as ever. Of the two, what has more evidence is kept,
+//! With least squares, one reading of −9999 decides how large noise is, and with noise that large nothing is an outlier; a few
+//! readings that happen to be exact make it so small that all others are outliers. So scales that are learned are doubted wherever
+//! most readings scatter much less, or much more, than the scale says: the median of their squares, over the median of χ², is a scale
+//! that no minority of readings changes, whatever its size. From there modes are searched with Huber's loss, the scale in turn with
+//! them (an M-estimator with a scale of its own; Huber and Ronchetti, *Robust Statistics*, 7.8), and then with the usual loss. The
+//! result with more evidence is kept,
 //!
 //! ```text
 //! ln p = −E − ½ ln det Λ − Σ q d ln s − Σ (1 − q) d ln s₊
@@ -27,15 +27,16 @@ use crate::{
     sensing::{Graduated, Loss},
 };
 
-/// Most readings scatter much less than a scale says when theirs is so much of it.
+/// The ratio below which the scatter of most readings puts a learned scale in doubt.
 const DOUBTFUL: f64 = 0.4;
-/// Equations that no parameter accounts for, from which on most readings tell a scale.
-const SPARE: f64 = 6.0;
-/// How often modes and scales are found in turn, at most.
+/// The degrees of freedom from which on most readings tell a scale.
+const LEAST_DEGREES: f64 = 6.0;
+/// The most rounds in which modes and scales are found in turn.
 const ROUNDS: usize = 12;
-/// Scales that change by less than this have been found.
+/// The change of a scale below which it has converged.
 const FOUND: f64 = 0.02;
-/// Least squares hold for readings of so many times the median residual; beyond, they pull as much as one at this distance.
+/// The multiple of the median residual within which least squares hold; beyond it a reading pulls as much as one at this
+/// distance.
 const FAR: f64 = 10.0;
 
 /// The median of χ² of d degrees of freedom (Wilson and Hilferty).
@@ -45,7 +46,7 @@ fn median_square(d: usize) -> f64 {
 }
 
 impl Posterior {
-    /// Least squares for all readings but those that are far from where most are.
+    /// A loss that is least squares for all readings but those far from where most are.
     pub fn least_squares(&self, state: &State) -> Graduated {
         let mut squares = Vec::new();
         for seen in &self.measurements {
@@ -58,7 +59,7 @@ impl Posterior {
         if width.is_finite() { Graduated { loss: Loss::Huber, width } } else { Loss::None.into() }
     }
 
-    /// By kind of noise: the scale of most readings at `state`; `None` where there are none.
+    /// The scale of most readings at `state`, by kind of noise; `None` where there are none.
     fn common_scales(&self, state: &State) -> Vec<Option<f64>> {
         let mut squares = vec![Vec::new(); self.scales.len()];
         for seen in &self.measurements {
@@ -74,8 +75,8 @@ impl Posterior {
 }
 
 impl Smoother {
-    /// Where the latest readings look like outliers although nothing is settled, it may be the estimate that is wrong: a guess that is
-    /// off by thousands of σ would reject everything. So a mode is searched from there as from afar, beside those that there are.
+    /// Doubts the estimate where the latest readings look like outliers although nothing is settled: a guess that is off by thousands
+    /// of σ would reject everything. A mode is then searched from the estimate with a wide loss, beside the modes there are.
     pub(super) fn doubt_estimate(&mut self) {
         let Some(best) = self.hypotheses.modes.iter().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else {
             return;
@@ -88,8 +89,8 @@ impl Smoother {
         self.hypotheses.modes.extend(found.and_then(Result::ok));
     }
 
-    /// Learns the scales anew from those of most readings, where these are much smaller, from where the heaviest mode is and from
-    /// `starts`; whether that is what has more evidence, and was kept.
+    /// Learns the scales again from those of most readings, where these differ much, beginning at the heaviest mode and at
+    /// `starts`; returns whether the result has more evidence, and was kept.
     pub(super) fn doubt_noise(&mut self, starts: &[&State]) -> bool {
         if !self.posterior.loss.is_robust() || !self.unknown.contains(&true) {
             return false;
@@ -109,19 +110,20 @@ impl Smoother {
         let mut revised = false;
         for trial in tried {
             if self.hypotheses.modes.is_empty() || trial.evidence_beside(self) > self.evidence_beside(&trial) {
-                (self.posterior, self.hypotheses, self.spare) = (trial.posterior, trial.hypotheses, trial.spare);
+                (self.posterior, self.hypotheses, self.degrees_of_freedom) =
+                    (trial.posterior, trial.hypotheses, trial.degrees_of_freedom);
                 revised = true;
             }
         }
         revised
     }
 
-    /// Whether a scale that is learned is much larger than that of most readings.
+    /// Whether a learned scale is much larger than that of most readings.
     fn is_exceeded(&self, common: &[Option<f64>]) -> bool {
         self.is_off(common, |common, scale| common < DOUBTFUL * scale)
     }
 
-    /// Whether a scale that is learned is much smaller than that of most readings, which are taken for outliers.
+    /// Whether a learned scale is much smaller than that of most readings, which are then taken for outliers.
     fn falls_short(&self, common: &[Option<f64>]) -> bool {
         self.is_off(common, |common, scale| scale < DOUBTFUL * common)
     }
@@ -131,7 +133,7 @@ impl Smoother {
         scales.any(|((common, scale), unknown)| *unknown && common.is_some_and(|common| is_off(common, *scale)))
     }
 
-    /// Takes the scales of most readings for those that are learned, as far as these tell them.
+    /// Sets the learned scales to those of most readings, where these are known.
     fn take_scales(&mut self, common: Vec<Option<f64>>) {
         for ((scale, common), unknown) in self.posterior.scales.iter_mut().zip(common).zip(&self.unknown) {
             if let (Some(common), true) = (common, *unknown) {
@@ -140,20 +142,22 @@ impl Smoother {
         }
     }
 
-    /// The scales of most readings at a mode, as they would be without what parameters account for; `None` where hardly anything else
-    /// is left.
+    /// The scales of most readings at a mode, corrected for what parameters absorb; `None` where hardly any degrees of freedom are
+    /// left.
     fn common(&self, mode: &Mode, layout: &Layout) -> Vec<Option<f64>> {
         let Some(absorbed) = self.posterior.absorbed(mode, layout) else { return Vec::new() };
         let equations = self.posterior.fit(&mode.state, layout).into_iter().map(|fit| fit.equations);
         let common = self.posterior.common_scales(&mode.state).into_iter();
         let of = |((common, absorbed), equations): ((Option<f64>, f64), f64)| {
-            let spare = equations - absorbed;
-            common.filter(|_| spare >= SPARE).map(|common| common * (equations / spare).sqrt())
+            let degrees_of_freedom = equations - absorbed;
+            common
+                .filter(|_| degrees_of_freedom >= LEAST_DEGREES)
+                .map(|common| common * (equations / degrees_of_freedom).sqrt())
         };
         common.zip(absorbed).zip(equations).map(of).collect()
     }
 
-    /// What is learned from where most readings are explained.
+    /// Learns from a start where most readings are explained.
     fn by_most_readings(&self, start: &State, layout: &Layout) -> Option<Self> {
         let mut trial = self.clone();
         let loss = std::mem::replace(&mut trial.posterior.loss, Loss::Huber);
@@ -179,7 +183,7 @@ impl Smoother {
         (!trial.hypotheses.modes.is_empty()).then_some(trial)
     }
 
-    /// The logarithm of the evidence of the heaviest mode and its scales, beside those of another.
+    /// The logarithm of the evidence of the heaviest mode and its scales, compared with those of another.
     pub(super) fn evidence_beside(&self, other: &Self) -> f64 {
         let Some(mode) = self.hypotheses.modes.first() else { return f64::NEG_INFINITY };
         let fits = self.posterior.fit(&mode.state, &self.belief.layout);

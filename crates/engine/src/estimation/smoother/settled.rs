@@ -1,4 +1,4 @@
-//! Measurements whose linearisation has settled, as a quadratic: ½ (δ − δ̂)ᵀ Λ (δ − δ̂) in the chart at one state.
+//! Settled measurements, marginalised into a quadratic: ½ (δ − δ̂)ᵀ Λ (δ − δ̂) in the chart at one state.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,15 +8,15 @@ use crate::model::{Layout, State};
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Settled {
     pub state: State,
-    /// By kind of noise, in nominal σ.
+    /// The quadratics by kind of noise, in nominal σ.
     pub noises: Vec<Quadratic>,
-    /// What the readings cost at δ = 0 beyond their weighted squares: of outliers.
+    /// The readings' cost at δ = 0 beyond their weighted squares: that of outliers.
     pub excess: f64,
-    /// How many measurements.
+    /// The number of measurements.
     pub count: usize,
 }
 
-/// Σ w HᵀH and its kin of one kind of noise.
+/// Σ w HᵀH and related sums of one kind of noise.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Quadratic {
     /// Λ, m × m.
@@ -27,7 +27,7 @@ pub(super) struct Quadratic {
     pub vector: DVector<f64>,
     /// ½ Σ w ‖r‖² at δ = 0.
     pub misfit: f64,
-    /// Σ w d: how many equations it holds, outliers not counted.
+    /// Σ w d: the number of its equations, outliers not counted.
     pub equations: f64,
 }
 
@@ -49,12 +49,12 @@ impl Quadratic {
 }
 
 impl Settled {
-    /// Equations that it holds, outliers not counted.
+    /// The number of its equations, outliers not counted.
     pub fn equations(&self) -> f64 {
         self.noises.iter().map(|of| of.equations).sum()
     }
 
-    /// The quadratics in the chart at `state`: their information there, their descent and their misfit.
+    /// The quadratics in the chart at `state`: their information there, their negative gradient and their misfit.
     ///
     /// A change of chart moves δ by `D = ∂ local(settled, retract(state, ε))/∂ε` at ε = 0. It is not the inverse of the
     /// transport at δ: a line is pinned, and its pivot in `state` need not be where a retraction from the settled state

@@ -1,4 +1,4 @@
-//! What a smoother has learned, as bytes to go on from.
+//! What a smoother has learned, as bytes from which it can go on.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::{
     model::{Loads, Prior, Scales, State},
 };
 
-/// All of a smoother that measurements change.
+/// The part of a smoother that measurements change.
 #[derive(Serialize, Deserialize)]
 struct Stored {
     prior: Prior,
@@ -27,7 +27,7 @@ struct Stored {
     rng: ChaCha8Rng,
     movements: u64,
     past: Vec<ReadingReport>,
-    spare: Vec<f64>,
+    degrees_of_freedom: Vec<f64>,
     remembered: Vec<Left>,
     changed_at: Option<u64>,
     told_at: Option<u64>,
@@ -39,14 +39,14 @@ struct Stored {
 }
 
 impl Stored {
-    /// The states in it, of which none knows what its robot bears.
+    /// The stored states, which do not include the robot's loads.
     fn states(&mut self) -> impl Iterator<Item = &mut State> {
         let modes = self.hypotheses.modes.iter_mut().map(|mode| &mut mode.state);
         let settled = self.settled.iter_mut().map(|settled| &mut settled.state);
         [&mut self.pins, self.prior.guess_mut(), self.original.guess_mut()].into_iter().chain(settled).chain(modes)
     }
 
-    /// Whether it is of a smoother like this one.
+    /// Whether this was stored by a smoother like the given one.
     fn is_of(&self, smoother: &Smoother) -> bool {
         let m = smoother.belief.layout.dimension();
         let noises = smoother.unknown.len();
@@ -56,7 +56,7 @@ impl Stored {
             && is_square(self.original.covariance())
             && !self.hypotheses.modes.is_empty()
             && self.hypotheses.modes.iter().all(|mode| is_square(&mode.information))
-            && [self.scales.len(), self.spare.len(), self.remembered.len()] == [noises; 3]
+            && [self.scales.len(), self.degrees_of_freedom.len(), self.remembered.len()] == [noises; 3]
             && self.joints.is_some() == smoother.posterior.joints.is_some()
             && self.chain.is_some() == smoother.scaled.is_some()
             && self.pins.joints.len() == joints
@@ -65,7 +65,7 @@ impl Stored {
 }
 
 impl Smoother {
-    /// All that it has learned; see [`Estimator::stored`](crate::estimation::Estimator::stored).
+    /// Everything learned so far; see [`Estimator::stored`](crate::estimation::Estimator::stored).
     pub(super) fn to_stored(&self) -> Option<Vec<u8>> {
         let posterior = &self.posterior;
         let stored = Stored {
@@ -80,7 +80,7 @@ impl Smoother {
             rng: self.rng.clone(),
             movements: self.movements,
             past: self.past.to_vec(),
-            spare: self.spare.clone(),
+            degrees_of_freedom: self.degrees_of_freedom.clone(),
             remembered: self.remembered.clone(),
             changed_at: self.changed_at,
             told_at: self.told_at,
@@ -93,7 +93,7 @@ impl Smoother {
         postcard::to_allocvec(&stored).ok()
     }
 
-    /// The same smoother where it has learned what is stored; `None` where that is of another.
+    /// This smoother with what is stored; `None` if that was stored by another kind of smoother.
     pub(super) fn with_stored(&self, stored: &[u8]) -> Option<Self> {
         let mut stored: Stored = postcard::from_bytes(stored).ok()?;
         if !stored.is_of(self) {
@@ -121,7 +121,7 @@ impl Smoother {
             original: stored.original,
             movements: stored.movements,
             past: Arc::new(stored.past),
-            spare: stored.spare,
+            degrees_of_freedom: stored.degrees_of_freedom,
             remembered: stored.remembered,
             changed_at: stored.changed_at,
             told_at: stored.told_at,

@@ -1,28 +1,28 @@
-//! A description that is further off than was said.
+//! Widening the prior of a description that is further off than stated.
 //!
-//! A prior that is too narrow pulls the estimate away from what was measured, and the noise seems large. That is a wrong account
-//! wherever the same readings are explained to their nominal noise by axes that are further off. So while noise is larger than
-//! is usual, the prior of axes and of zeros is tried with several times its deviations, from the nominal noise on, and of the accounts
-//! that one is kept which has most evidence,
+//! A prior that is too narrow pulls the estimate away from what was measured, and the noise seems large. That is a wrong account wherever
+//! the same readings are explained to their nominal noise by axes that are further off. So while noise is larger than is usual, the prior
+//! of axes and of zeros is tried with several times its deviations, from the nominal noise on, and of the accounts that one is kept which
+//! has most evidence,
 //!
 //! ```text
 //! ln p = −E − ½ ln det Λ − ½ ln det P₀ − Σ q d ln s + ln P(f)
 //! ```
 //!
-//! with f the factor, and the rest as in [`robust`](super::robust). The wider prior has to do with the nominal noise, or with what is less:
-//! with few equations it would explain them to any noise. A prior is only ever widened: that a description is better than
-//! was said is no reason to believe in it.
+//! with f the factor, and the rest as in [`robust`](super::robust). The wider prior must do with the nominal noise, or less: with few
+//! equations it would explain them to any noise. A prior is only ever widened: that a description is better than stated is no reason to
+//! trust it more.
 
 use nalgebra::DMatrix;
 
 use super::{Smoother, THOROUGH};
 use crate::{elementary::ln, model::Block};
 
-/// How many times as far off a description may be.
+/// The factors by which a description may be further off than stated.
 const FACTORS: [f64; 3] = [1.0, 3.0, 10.0];
-/// ln P(f) of one that is larger than so far.
+/// ln P(f) of a factor larger than the one so far.
 const LOG_CHANCE: f64 = -3.0;
-/// Noise so many times its nominal size is larger than is usual.
+/// The multiple of its nominal size beyond which noise is larger than usual.
 const UNUSUAL: f64 = 2.0;
 /// Movements between two trials, as a share of those so far.
 const SHARE: u64 = 8;
@@ -48,8 +48,8 @@ impl Smoother {
         }
     }
 
-    /// The same with a prior of axes and zeros that is so many times as wide as was said, and what that adds to the evidence beside
-    /// the likelihood; `None` where nothing is found.
+    /// This smoother with the prior of axes and zeros widened by `factor`, and what that adds to the evidence beside the
+    /// likelihood; `None` if no mode is found.
     fn with_wider_prior(&self, factor: f64) -> Option<(f64, Self)> {
         let layout = self.belief.layout.clone();
         let is_described = |block: &Block| matches!(block, Block::Axis(_) | Block::Offset(_));

@@ -46,7 +46,7 @@ impl Whitening {
         }
     }
 
-    /// The transpose.
+    /// Multiplies by the transpose of the whitening.
     fn unwhiten(&self, x: Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Even(weight) => x * *weight,
@@ -56,7 +56,7 @@ impl Whitening {
 }
 
 impl Points {
-    /// At one posture (readings of the joints, rad or m, as many as there are joints).
+    /// The points at one posture (readings of the joints, rad or m, one per joint).
     pub fn at(&self, posture: &[f64]) -> Posture<'_> {
         let (mut walk, mut places) = (self.kernel.walk(Plain), Vec::with_capacity(self.places.len()));
         let mut next = self.places.iter().peekable();
@@ -159,13 +159,13 @@ impl Posture<'_> {
         &self.readings
     }
 
-    /// H, whitened: of each equation m numbers, one behind the other.
+    /// H, whitened: m numbers for each equation, one after the other.
     pub fn rows(&self) -> &[f64] {
         &self.rows
     }
 
-    /// Adds to `slope` how a value changes with the reading of every joint, given how it changes with every whitened reading
-    /// and with every number of the [rows](Self::rows).
+    /// Adds to `slope` the derivative of a value by every joint's reading, given its derivatives by every whitened reading
+    /// and by every number of the [rows](Self::rows).
     pub fn add_slope(&self, (by_readings, by_rows): (&[f64], &[f64]), slope: &mut [f64]) {
         let m = self.points.dimension;
         // By joint: Σ c × u and Σ u × ω of its columns.
@@ -201,7 +201,7 @@ impl Posture<'_> {
         }
     }
 
-    /// dθ by d reading of a joint.
+    /// ∂θ/∂q of a joint.
     fn rate(&self, joint: usize) -> f64 {
         self.points.kernel.correction(joint).rate(Plain, self.joints.at(joint).reading)
     }

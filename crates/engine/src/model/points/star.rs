@@ -46,7 +46,7 @@ pub struct Stage {
     pub of_axis: usize,
 }
 
-/// A few postures in the middle of stars.
+/// A few postures at the centres of stars.
 #[derive(Default)]
 pub struct Centres {
     /// Where the point is, metres.
@@ -55,7 +55,7 @@ pub struct Centres {
     joints: Aligned,
 }
 
-/// One of them.
+/// One centre of those looked up.
 #[derive(Clone, Copy)]
 pub struct Centre<'a> {
     points: &'a Points,
@@ -77,7 +77,7 @@ pub struct Pivot<'a> {
     across: [Vector3<f64>; 2],
 }
 
-/// What becomes of the columns when a joint moves.
+/// How the columns change when a joint moves.
 pub struct Ray {
     /// R, of what is behind the joint.
     pub rotation: Matrix3<f64>,
@@ -151,7 +151,7 @@ pub(super) fn keep<S: Simd>(passed: &Passed<S>, joints: &mut [f64], first: usize
 }
 
 impl Centres {
-    /// One of those that were looked up.
+    /// The centre of this index among those looked up.
     pub fn at<'a>(&'a self, points: &'a Points, index: usize) -> Centre<'a> {
         Centre { points, of: self, index }
     }
@@ -262,7 +262,7 @@ impl Pivot<'_> {
     }
 }
 
-/// What a term is multiplied by at a reading.
+/// The factor f of a term at a reading.
 fn factor(term: Term, reading: f64) -> f64 {
     term.factor(Plain, read::<Plain>(reading, term.needs_sine()), &[0.0; LOADS]).0
 }

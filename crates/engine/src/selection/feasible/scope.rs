@@ -43,7 +43,8 @@ impl<'a> Scope<'a> {
     ///
     /// # Errors
     ///
-    /// Where a list has come to its end, or nothing in it is feasible, or a joint cannot come back within its limits.
+    /// [`SelectionError::Exhausted`] if a list has come to its end; [`SelectionError::Infeasible`] if nothing in it is
+    /// feasible, or a joint cannot come back within its limits.
     pub fn of(situation: &Situation<'a>) -> Result<Self, SelectionError> {
         let (constraints, from) = (situation.constraints, standing(situation));
         let domain = match (situation.actions, constraints) {
@@ -78,7 +79,7 @@ impl<'a> Scope<'a> {
     ///
     /// # Errors
     ///
-    /// Where a joint cannot come back within its limits.
+    /// [`SelectionError::Infeasible`] if a joint cannot come back within its limits.
     pub fn around(
         situation: &Situation<'a>,
         joints: &'a JointBox,
@@ -154,6 +155,10 @@ impl<'a> Scope<'a> {
     }
 
     /// A feasible posture, drawn uniformly.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::Infeasible`] if neither draws nor a search find a feasible posture.
     pub fn draw<R: Rng + ?Sized>(&self, limits: &JointBox, rng: &mut R) -> Result<Vec<f64>, SelectionError> {
         let mut draws = std::iter::repeat_with(|| limits.draw(rng)).take(PATIENCE);
         match draws.find(|posture| self.is_feasible(posture)) {
@@ -164,11 +169,19 @@ impl<'a> Scope<'a> {
 
     /// Some feasible postures, one at least where anything is constrained, always the same ones: where a search over the box
     /// comes upon none.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::Infeasible`] if the constraints exclude every posture that was tried.
     pub fn some(&self) -> Result<Vec<Vec<f64>>, SelectionError> {
         self.constraints.map_or(Ok(Vec::new()), |constraints| Ok(constraints.some(self.from)?))
     }
 
     /// The posture itself if it may be proposed, or else the nearest one to it, by travel, of some that may.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::Infeasible`] if the constraints exclude every posture that was tried.
     pub fn towards(&self, posture: Vec<f64>) -> Result<Vec<f64>, SelectionError> {
         if self.is_feasible(&posture) {
             return Ok(posture);

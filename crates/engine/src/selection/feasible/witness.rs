@@ -17,7 +17,7 @@ impl Constraints {
     ///
     /// # Errors
     ///
-    /// For a joint that cannot come back within its limits in one movement.
+    /// [`Infeasible::Stranded`] if a joint cannot come back within its limits in one movement.
     pub fn reach(&self, from: Option<&[f64]>) -> Result<JointBox, Infeasible> {
         let Some(from) = from else { return Ok(self.tightened.clone()) };
         let joints = self.tightened.joints().iter().zip(from).zip(&self.greatest_travel);
@@ -36,7 +36,8 @@ impl Constraints {
     ///
     /// # Errors
     ///
-    /// Where none of 20 000 is feasible.
+    /// [`Infeasible::Tried`] if none of 20 000 draws is feasible, [`Infeasible::Stranded`] if a joint cannot come back within
+    /// its limits.
     pub fn some(&self, from: Option<&[f64]>) -> Result<Vec<Vec<f64>>, Infeasible> {
         let reach = self.reach(from)?;
         let mut tally = Tally::new(from.is_some() && self.greatest_travel.iter().any(|travel| travel.is_finite()));
@@ -59,7 +60,7 @@ impl Constraints {
     ///
     /// # Errors
     ///
-    /// Where nothing is.
+    /// [`Infeasible::Tried`] if nothing in the list is feasible.
     pub fn of<T>(
         &self,
         from: Option<&[f64]>,

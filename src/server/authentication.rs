@@ -1,8 +1,8 @@
-//! Who may ask: a server that others can reach answers those who carry its token, and under names that are its own.
+//! Authentication: a server that others can reach answers requests with its token, under names that are its own.
 //!
-//! Programs carry the token in `Authorization: Bearer`. A browser is opened once at `/?token=…`, which puts it into a cookie that
-//! scripts cannot read and other sites cannot send, as a pass that is good at this server alone, and goes on to the page without it: a
-//! copied link never holds it.
+//! Programs carry the token in `Authorization: Bearer`. A browser is opened once at `/?token=…`, which puts a pass into a cookie that
+//! scripts cannot read and other sites cannot send. The pass is valid for this server alone, and the page is then opened without the
+//! token in its address, so that a copied link never holds it.
 
 use std::{fmt, net::SocketAddr, str::FromStr};
 
@@ -16,7 +16,7 @@ use subtle::ConstantTimeEq;
 
 use super::problem::{Kind, Problem};
 
-/// What whoever asks has to carry.
+/// The token that requests must carry.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
@@ -25,20 +25,20 @@ pub struct Token(String);
 #[error("a token has {LEAST} to {MOST} letters, digits and -._~; make one with `openssl rand -hex 32`")]
 pub struct NoToken;
 
-/// So short a token could be guessed.
+/// The least length of a token; a shorter one could be guessed.
 const LEAST: usize = 16;
 const MOST: usize = 200;
-/// Bytes of a token that is drawn.
+/// The random bytes of a drawn token.
 const DRAWN: usize = 32;
-/// How long a browser keeps it, seconds: a year.
+/// How long a browser keeps its pass, seconds: a year.
 const KEPT_S: u64 = 365 * 24 * 3600;
 
 impl Token {
-    /// One that nobody has had before.
+    /// Draws a new token.
     ///
     /// # Errors
     ///
-    /// Where the operating system has no random numbers.
+    /// The system's error if it has no random numbers.
     pub fn draw() -> Result<Self, getrandom::Error> {
         let mut bytes = [0; DRAWN];
         getrandom::fill(&mut bytes)?;
@@ -50,7 +50,7 @@ impl Token {
         &self.0
     }
 
-    /// In a time that tells nothing of how much of it is right.
+    /// Compares in constant time, which tells nothing of how much is right.
     fn is(&self, given: &str) -> bool {
         self.0.as_bytes().ct_eq(given.as_bytes()).into()
     }
@@ -71,7 +71,7 @@ impl fmt::Debug for Token {
     }
 }
 
-/// A name under which the server is meant, beside those that it has anyway.
+/// A further name of the server, beside those that it always has.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HostName(String);
 
@@ -105,21 +105,21 @@ impl Reached {
     }
 }
 
-/// What tells strangers from others.
-pub(super) struct Strangers {
+/// The authentication of requests.
+pub(super) struct Authentication {
     token: Option<Token>,
-    /// Cookies do not tell ports apart: each server has one of its own.
+    /// The name of the cookie: cookies are shared among ports, so each server has its own name.
     cookie: String,
     hosts: Vec<HostName>,
 }
 
-impl Strangers {
+impl Authentication {
     pub(super) fn new(token: Option<Token>, hosts: Vec<HostName>, port: u16) -> Self {
         Self { token, hosts, cookie: format!("body-schema-{port}") }
     }
 
-    /// Whether a host is this server: a name of this machine, the address at which it was reached, or a name that was allowed.
-    /// Any other may be a page that had its name point here.
+    /// Whether a host is this server: a name of this machine, the address at which it was reached, or an allowed name. Any
+    /// other name may belong to a page that made it point here.
     pub(super) fn are_meant_by(&self, host: &str, reached: Option<Reached>) -> bool {
         let name = name_of(host);
         let is_reached = || {
@@ -129,7 +129,7 @@ impl Strangers {
         is_local(&name) || self.hosts.iter().any(|HostName(allowed)| *allowed == name) || is_reached() == Some(true)
     }
 
-    /// What is answered to who does not carry the token; `None` to all others, who may come in.
+    /// The answer to a request without the token; `None` for a request that may go on.
     pub(super) fn turn_away(&self, request: &Request) -> Option<Response> {
         let headers = request.headers();
         let Some(token) = &self.token else {
@@ -162,7 +162,8 @@ impl Strangers {
         given.any(|given| right.as_bytes().ct_eq(given.as_bytes()).into())
     }
 
-    /// What a browser is given in place of the token: whoever reads it can neither ask another server with it, nor tell the token.
+    /// The pass that a browser is given in place of the token: its reader can neither use it at another server nor derive the
+    /// token.
     fn pass(&self, token: &Token) -> String {
         let mut hash = Sha256::new();
         for part in ["body-schema cookie", &self.cookie, token.as_str()] {
@@ -172,7 +173,7 @@ impl Strangers {
         hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// Has the browser keep a pass, and go to the page.
+    /// A response that lets the browser keep a pass, and go to the page.
     fn keep(&self, token: &Token, rest: &str, headers: &HeaderMap) -> Response {
         let is_encrypted = headers.get("x-forwarded-proto").is_some_and(|scheme| scheme == "https");
         let secure = if is_encrypted { "; Secure" } else { "" };
@@ -184,7 +185,7 @@ impl Strangers {
     }
 }
 
-/// To the page, with the rest of a query.
+/// A redirection to the page, with the rest of a query.
 fn to_page(rest: &str) -> Response {
     let location = if rest.is_empty() { "/".to_owned() } else { format!("/?{rest}") };
     let mut response = StatusCode::SEE_OTHER.into_response();
@@ -224,14 +225,14 @@ fn is_local(name: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn strangers(hosts: &[&str]) -> Strangers {
+    fn allowing(hosts: &[&str]) -> Authentication {
         let hosts = hosts.iter().map(|host| host.parse().expect("a name")).collect();
-        Strangers::new(None, hosts, 8080)
+        Authentication::new(None, hosts, 8080)
     }
 
     #[test]
     fn only_names_of_this_machine_are_local() {
-        let none = strangers(&[]);
+        let none = allowing(&[]);
         for host in ["localhost", "localhost:8080", "LOCALHOST:1", "127.0.0.1:80", "127.1.2.3", "[::1]:8080", "[::1]"] {
             assert!(none.are_meant_by(host, None), "{host}");
         }
@@ -244,7 +245,7 @@ mod tests {
 
     #[test]
     fn a_server_is_meant_by_the_address_at_which_it_was_reached_and_by_allowed_names() {
-        let some = strangers(&["Lab.example.org", "10.0.0.9"]);
+        let some = allowing(&["Lab.example.org", "10.0.0.9"]);
         let reached = |address: &str| Some(Reached(Some(address.parse().expect("an address"))));
         assert!(some.are_meant_by("10.0.0.1:8080", reached("10.0.0.1:8080")));
         assert!(some.are_meant_by("10.0.0.1", reached("[::ffff:10.0.0.1]:80")));

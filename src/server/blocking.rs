@@ -1,4 +1,4 @@
-//! Work that would hold up other requests.
+//! Running blocking work without holding up other requests.
 
 use std::{
     sync::{
@@ -14,11 +14,11 @@ use tokio_util::sync::CancellationToken;
 use super::problem::{Kind, Problem};
 use body_schema_calibration::Progress;
 
-/// How many may wait for a core.
+/// The most jobs that wait for a core.
 const MOST_WAITING: usize = 64;
 
-/// Does what takes long where it holds up no other request.
-pub(super) async fn aside<T, E>(work: impl FnOnce() -> Result<T, E> + Send + 'static) -> Result<T, Problem>
+/// Runs blocking work on a thread where it holds up no other request.
+pub(super) async fn run_blocking<T, E>(work: impl FnOnce() -> Result<T, E> + Send + 'static) -> Result<T, Problem>
 where
     T: Send + 'static,
     E: Into<Problem> + Send + 'static,
@@ -29,17 +29,17 @@ where
     }
 }
 
-/// Work that takes a core for a while: as much at a time as there are cores, and what waits.
+/// Jobs that take a core for a while: as many at a time as there are cores, and a queue.
 pub(super) struct Jobs {
     cores: Arc<Semaphore>,
     waiting: AtomicUsize,
 }
 
-/// Whether whoever asked for a job still waits for it.
+/// Whether the caller of a job still waits for it.
 pub(super) struct Wanted(CancellationToken);
 
 impl Wanted {
-    /// Whether nobody does.
+    /// Whether the caller no longer waits.
     pub(super) fn is_given_up(&self) -> bool {
         self.0.is_cancelled()
     }
@@ -63,7 +63,7 @@ impl Default for Jobs {
 }
 
 impl Jobs {
-    /// Does it when its turn has come. The work hears when the caller has gone.
+    /// Runs a job when its turn has come. The job learns when the caller has gone.
     pub(super) async fn done<T, E>(
         &self,
         work: impl FnOnce(&Wanted) -> Result<T, E> + Send + 'static,
@@ -80,7 +80,7 @@ impl Jobs {
         let given_up = CancellationToken::new();
         let wanted = Wanted(given_up.clone());
         let _caller = given_up.drop_guard();
-        aside(move || {
+        run_blocking(move || {
             let _core = core;
             work(&wanted)
         })
@@ -88,7 +88,7 @@ impl Jobs {
     }
 }
 
-/// One who waits.
+/// A waiting job, counted.
 struct Waiting<'a>(&'a AtomicUsize);
 
 impl<'a> Waiting<'a> {

@@ -1,4 +1,4 @@
-//! What holds for every request and every response.
+//! Middleware: what holds for every request and every response.
 
 use std::sync::Arc;
 
@@ -15,16 +15,16 @@ use crate::page::CONTENT_SECURITY_POLICY;
 
 use super::{
     App, FrameAncestor,
+    authentication::Reached,
     holding::Holding,
     problem::{Kind, PROBLEM_JSON, Problem},
     requests,
     session::Taken,
-    strangers::Reached,
 };
 
-/// Answers from so many bytes on are counted.
+/// The size from which on answers are counted, bytes.
 const LARGE_BYTES: usize = 64 << 10;
-/// So much is read of what an error that no handler made says.
+/// The most bytes that are read of an error that no handler made.
 const MOST_SAID_BYTES: usize = 64 << 10;
 
 /// The headers of every response.
@@ -32,7 +32,7 @@ const MOST_SAID_BYTES: usize = 64 << 10;
 pub(super) struct Headers(Arc<[(HeaderName, HeaderValue)]>);
 
 impl Headers {
-    /// With these origins allowed to show the page in a frame.
+    /// The headers, with these origins allowed to show the page in a frame.
     pub(super) fn new(frame_ancestors: &[FrameAncestor]) -> Self {
         let policy = match frame_ancestors {
             [] => format!("{CONTENT_SECURITY_POLICY}; frame-ancestors 'none'"),
@@ -56,7 +56,7 @@ impl Headers {
     }
 }
 
-/// The routes with all that holds for every one of them.
+/// The routes with the middleware around them.
 pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>, always: Headers) -> Router {
     let router = router
         .fallback(async |uri: Uri| {
@@ -67,14 +67,14 @@ pub(super) fn layered(router: Router<Arc<App>>, app: &Arc<App>, always: Headers)
     // Around the router as a whole: what is wrong with a method is known only there.
     Router::new()
         .fallback_service(router.with_state(app.clone()))
-        .layer(from_fn_with_state(app.clone(), refuse_strangers))
+        .layer(from_fn_with_state(app.clone(), authenticate))
         .layer(from_fn_with_state(app.clone(), refuse_large_heads))
         .layer(map_response(as_problem))
         .layer(map_response(move |response| with_headers(always.clone(), response)))
         .layer(from_fn_with_state(app.metrics.clone(), requests::attended))
 }
 
-/// A head that is larger than it may be, though not so large that it was not read.
+/// Refuses a head that is larger than allowed, though small enough to be read.
 async fn refuse_large_heads(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     match app.limits.too_large_a_head(request.method(), request.uri(), request.headers()) {
         Some(detail) => Problem::new(Kind::HeadTooLarge, detail).into_response(),
@@ -82,7 +82,7 @@ async fn refuse_large_heads(State(app): State<Arc<App>>, request: Request, next:
     }
 }
 
-/// Has large answers count until they are sent, beyond as many as there may be those who only read are asked to come again.
+/// Counts large answers until they are sent; beyond the limit, requests that only read are asked to come again.
 pub(super) async fn counted(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let only_reads = *request.method() == Method::GET;
     let response = next.run(request).await;
@@ -98,20 +98,20 @@ pub(super) async fn counted(State(app): State<Arc<App>>, request: Request, next:
     response.map(|body| Body::new(Holding::new(body, taken)))
 }
 
-/// Who has no business here: under a foreign name, without the token, or from a page of another origin, which must neither
-/// change anything nor open a WebSocket.
-async fn refuse_strangers(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+/// Refuses requests under a foreign name, without the token, or from a page of another origin, which must neither change
+/// anything nor open a WebSocket.
+async fn authenticate(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let mut hosts = request.headers().get_all(header::HOST).into_iter();
     let (Some(host), None) = (hosts.next().and_then(|host| host.to_str().ok()), hosts.next()) else {
         let detail = "a request has one header `Host`: the name or the address of the server, with its port";
         return Problem::new(Kind::Malformed, detail).field("Host").into_response();
     };
     let reached = request.extensions().get::<ConnectInfo<Reached>>().map(|ConnectInfo(reached)| *reached);
-    if !app.strangers.are_meant_by(host, reached) {
+    if !app.authentication.are_meant_by(host, reached) {
         let detail = format!("this server does not answer to `{host}`; start it with --allow-host if it is to");
         return Problem::new(Kind::ForeignOrigin, detail).field("Host").into_response();
     }
-    if let Some(response) = app.strangers.turn_away(&request) {
+    if let Some(response) = app.authentication.turn_away(&request) {
         return response;
     }
     let harmless = matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS)
@@ -123,7 +123,7 @@ async fn refuse_strangers(State(app): State<Arc<App>>, request: Request, next: N
     next.run(request).await
 }
 
-/// Scripts send no origin; browsers always do where it matters.
+/// Whether the origin is our own. Scripts send none; browsers always do where it matters.
 fn is_own_origin(headers: &HeaderMap, host: &str) -> bool {
     let Some(origin) = headers.get(header::ORIGIN) else { return true };
     let authority = origin.to_str().ok().and_then(|origin| origin.split_once("://")).map(|(_, authority)| authority);
