@@ -82,6 +82,11 @@ impl Appraised {
 
 impl Experiment {
     /// How the last movement of a learner was chosen, by DIRECT or in sight of what DIRECT finds.
+    ///
+    /// # Errors
+    ///
+    /// [`ChoiceError::UnknownLearner`] if there is none of that name, [`ChoiceError::NotSearched`] if DIRECT did not choose
+    /// its last movement, [`ChoiceError::Search`] if the search cannot be repeated.
     pub fn choice(&self, learner: &str) -> Result<Chosen, ChoiceError> {
         let index = self.index_of(learner)?;
         self.learners[index].choice(self.latest.learners[index].movement.as_ref(), self.joint_box()?)
@@ -89,6 +94,11 @@ impl Experiment {
 
     /// What a movement to `configuration` (rad or m per joint) would have taught a learner instead of its last one;
     /// before the first movement, what it would teach now.
+    ///
+    /// # Errors
+    ///
+    /// [`ChoiceError::UnknownLearner`] if there is none of that name, [`ChoiceError::Configuration`] if the posture does not
+    /// have one position within limits for each joint, [`ChoiceError::Selection`] if the criterion cannot be computed there.
     pub fn appraise(&self, learner: &str, configuration: &[f64]) -> Result<Appraised, ChoiceError> {
         let index = self.index_of(learner)?;
         self.check_configuration(configuration)?;
@@ -97,6 +107,12 @@ impl Experiment {
 
     /// Sets the next movement of a learner for which a person chooses, to `configuration` (rad or m per joint), and tells
     /// what it is expected to teach. It may be set anew until the next step.
+    ///
+    /// # Errors
+    ///
+    /// [`ChoiceError::UnknownLearner`] if there is none of that name, [`ChoiceError::ChoosesItself`] if no person chooses for it,
+    /// [`ChoiceError::Ended`] if it moves no more, [`ChoiceError::Configuration`] if the posture does not have one position
+    /// within limits for each joint, [`ChoiceError::Selection`] if the policy refuses it.
     pub fn set_configuration(&mut self, learner: &str, configuration: &[f64]) -> Result<Appraised, ChoiceError> {
         let index = self.index_of(learner)?;
         self.check_configuration(configuration)?;
@@ -104,6 +120,10 @@ impl Experiment {
     }
 
     /// The movement that is set for the next step of a learner for which a person chooses.
+    ///
+    /// # Errors
+    ///
+    /// [`ChoiceError::UnknownLearner`] if there is none of that name.
     pub fn configuration(&self, learner: &str) -> Result<Option<&[f64]>, ChoiceError> {
         let index = self.index_of(learner)?;
         Ok(self.learners[index].configuration())

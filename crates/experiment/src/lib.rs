@@ -156,6 +156,11 @@ impl Experiment {
     }
 
     /// One movement of every learner.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::Selection`] if a learner cannot choose and [`ExperimentError::World`] if nothing can be measured after its
+    /// movement, both before anything has changed; [`ExperimentError::Absorb`] if a learner refuses its observation.
     pub fn step(&mut self) -> Result<&StepOutcome, ExperimentError> {
         // All propose and the world shows what it has before any learns, so that a failure leaves the experiment as it was:
         // proposals that nobody carried out are there still, and the same, when they are asked for again.

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::server::{aside::aside, problem::Problem};
+use crate::server::{blocking::run_blocking, problem::Problem};
 use axum::{Json, extract::Path};
 use body_schema_backend::{ScenarioList, ScenarioResource};
 use body_schema_scenario::ScenarioSummary;
@@ -34,6 +34,6 @@ fn summaries() -> Result<Vec<ScenarioSummary>, Problem> {
     )
 )]
 pub(super) async fn get(Path(name): Path<String>) -> Result<Json<ScenarioResource>, Problem> {
-    let scenario = aside(move || Ok::<_, Problem>(body_schema_backend::scenario(&name)?)).await?;
+    let scenario = run_blocking(move || Ok::<_, Problem>(body_schema_backend::scenario(&name)?)).await?;
     Ok(Json(ScenarioResource { summary: scenario.summary(), source: scenario.source }))
 }

@@ -440,7 +440,7 @@ impl Elsewhere {
         if step >= self.shared.steps() {
             let report = self.session.report();
             let kept = Kept::of(&report, &self.session.description());
-            reports.push(kept.map_err(|problem| RecordingError::Encode(problem.detail.to_string().into()))?);
+            reports.push(kept.map_err(|problem| RecordingError::Encode(problem.detail.to_string()))?);
             if self.recorded == step {
                 self.recorded += 1;
                 self.recorder.log(&report)?;
