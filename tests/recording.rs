@@ -171,7 +171,7 @@ fn a_changed_body_is_drawn_anew() {
     let scenario = Scenario::parse("sooner", &text, &|_| Err("none".into())).unwrap();
     let mut experiment = scenario.experiment(3, None).unwrap();
     let mut reports = vec![StepReport::of(&experiment)];
-    (0..4).for_each(|_| reports.push(experiment.step().unwrap().clone()));
+    (0..4).for_each(|_| reports.push(next(&mut experiment)));
     let changed: Vec<bool> = reports.iter().map(|report| report.truth.is_some()).collect();
     assert_eq!(changed, [false, false, false, true, false]);
     let live = LiveLog::new();
