@@ -21,6 +21,7 @@ use body_schema::{
         learner_slots,
     },
     scenario::{Scenario, builtin},
+    wire::BestDesign,
 };
 use checks::check;
 use reading::Reading;
@@ -327,6 +328,7 @@ fn the_best_designs_stand_at_their_steps() {
     let live = LiveLog::new();
     let mut recorder = Recorder::new(&description, Target::live(live.clone())).unwrap();
     reports.iter().for_each(|report| recorder.log(report).unwrap());
+    let designs: Vec<_> = designs.into_iter().map(BestDesign::from).collect();
     recorder.log_best_designs(&designs).unwrap();
     recorder.finish().unwrap();
     let reading = Reading::of(&live.complete().unwrap());

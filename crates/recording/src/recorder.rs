@@ -22,8 +22,8 @@ use super::{
     stage::{GROUNDS, Stage},
     values::cells,
 };
-use body_schema_engine::{design::BestDesign, model::State};
-use body_schema_wire::{Description, LearnerDescription, ModelReport, StepReport};
+use body_schema_engine::model::State;
+use body_schema_wire::{BestDesign, Description, LearnerDescription, ModelReport, StepReport};
 
 /// So many steps are written at once unless somebody flushes earlier: a message costs more than the rows in it …
 const BATCH_STEPS: usize = 256;

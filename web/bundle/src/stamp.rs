@@ -10,23 +10,24 @@ const CRATES: [&str; 8] = ["eframe", "egui", "egui_plot", "epaint", "serde", "se
 
 /// What the panel takes of other crates: the types of reports, those of sessions with robots elsewhere, the rules behind a
 /// picture, and the palette of recordings. All else of these crates may change without changing the bundle.
-const ENGINE: [&str; 16] = [
+const ENGINE: [&str; 17] = [
     "crates/ask-tell/src/observation.rs",
     "crates/ask-tell/src/status.rs",
     "crates/ask-tell/src/suggestion.rs",
-    "crates/engine/src/kinematics/joint.rs",
     "crates/engine/src/optimize/direct/plane.rs",
     "crates/engine/src/optimize/direct/settings.rs",
     "crates/engine/src/optimize/direct/ternary.rs",
-    "crates/experiment/src/choice.rs",
     "crates/experiment/src/convergence.rs",
-    "crates/experiment/src/head.rs",
-    "crates/experiment/src/loads.rs",
-    "crates/experiment/src/metrics.rs",
-    "crates/experiment/src/report.rs",
-    "crates/experiment/src/sight.rs",
     "crates/palette/src/lib.rs",
     "crates/scenario/src/summary.rs",
+    "crates/wire/src/choice.rs",
+    "crates/wire/src/description.rs",
+    "crates/wire/src/head.rs",
+    "crates/wire/src/loads.rs",
+    "crates/wire/src/metrics.rs",
+    "crates/wire/src/model.rs",
+    "crates/wire/src/place.rs",
+    "crates/wire/src/step.rs",
 ];
 
 /// The stamp of the panel's sources, given the folder of the workspace.

@@ -96,7 +96,6 @@ impl Clone for Box<dyn Estimator> {
 
 /// What an estimator makes of one reading, by its belief.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ReadingReport {
     /// The movement, counted from 1; 0 for what was known before the first.
     pub movement: u64,
@@ -134,7 +133,6 @@ pub enum MisfitCause {
 
 /// The learned scale of one kind of noise.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct NoiseReport {
     /// The channel, counted from 0.
     pub channel: usize,

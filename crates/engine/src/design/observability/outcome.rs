@@ -6,7 +6,6 @@ use super::Indices;
 
 /// What can be determined of a robot before anything is measured.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Observability {
     /// The scenario's name.
     pub scenario: String,
@@ -36,7 +35,6 @@ pub struct Observability {
 
 /// What is to be learned, and what can be.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ObservedParameters {
     /// How many.
     pub learned: usize,
@@ -48,7 +46,6 @@ pub struct ObservedParameters {
 
 /// A direction of which little is told.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Weak {
     /// What is left of its deviation after the best N postures, as a share of the prior's.
     pub left: f64,
@@ -58,7 +55,6 @@ pub struct Weak {
 
 /// Indices of the best and of random postures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct IndexTable {
     /// Of the best.
     pub best: Indices,
@@ -68,7 +64,6 @@ pub struct IndexTable {
 
 /// The standard deviation of a parameter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Deviation {
     /// What it is.
     pub parameter: String,
@@ -84,7 +79,6 @@ pub struct Deviation {
 
 /// The expected error of predictions after so many postures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ErrorPoint {
     /// How many.
     pub postures: usize,
@@ -100,7 +94,6 @@ pub struct ErrorPoint {
 
 /// How many postures a wanted accuracy takes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Accuracy {
     /// What is wanted, millimetres.
     pub wanted_mm: f64,
@@ -116,7 +109,6 @@ pub struct Accuracy {
 
 /// A posture to measure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Posture {
     /// By joint, degrees; of sliding joints millimetres.
     pub joints: Vec<f64>,
