@@ -121,6 +121,7 @@ fn recordings() {
     use body_schema::{
         recording::{Recorder, Target},
         scenario::builtin,
+        wire::{Description, StepReport},
     };
 
     let folder = tempfile::tempdir().expect("a folder");

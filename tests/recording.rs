@@ -16,6 +16,7 @@ use body_schema::{
         learner_slots,
     },
     scenario::{Scenario, builtin},
+    wire::BestDesign,
 };
 use checks::check;
 use reading::Reading;
@@ -166,7 +167,7 @@ fn a_changed_body_is_drawn_anew() {
     let scenario = Scenario::parse("sooner", &text, &|_| Err("none".into())).unwrap();
     let mut experiment = scenario.experiment(3, None).unwrap();
     let mut reports = vec![StepReport::of(&experiment)];
-    (0..4).for_each(|_| reports.push(experiment.step().unwrap().clone()));
+    (0..4).for_each(|_| reports.push(next(&mut experiment)));
     let changed: Vec<bool> = reports.iter().map(|report| report.truth.is_some()).collect();
     assert_eq!(changed, [false, false, false, true, false]);
     let live = LiveLog::new();
@@ -322,6 +323,7 @@ fn the_best_designs_stand_at_their_steps() {
     let live = LiveLog::new();
     let mut recorder = Recorder::new(&description, Target::live(live.clone())).unwrap();
     reports.iter().for_each(|report| recorder.log(report).unwrap());
+    let designs: Vec<_> = designs.into_iter().map(BestDesign::from).collect();
     recorder.log_best_designs(&designs).unwrap();
     recorder.finish().unwrap();
     let reading = Reading::of(&live.complete().unwrap());

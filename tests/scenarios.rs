@@ -2,7 +2,10 @@
 
 mod bounds;
 
-use body_schema::scenario::{BUILTIN, Problem, Scenario, ScenarioError, builtin};
+use body_schema::{
+    experiment::StepReport,
+    scenario::{BUILTIN, Problem, Scenario, ScenarioError, builtin},
+};
 
 const ARM: &str = include_str!("../scenarios/arm-6dof.toml");
 const TIAGO: &str = include_str!("../scenarios/tiago-mocap.toml");
@@ -307,7 +310,8 @@ fn what_is_held_out_touches_nothing_but_the_prediction_error() {
         let mut experiment = scenario.experiment(3, None).expect("starts");
         (0..30)
             .map(|_| {
-                let report = experiment.step().expect("30 rows").clone();
+                experiment.step().expect("30 rows");
+                let report = StepReport::of(&experiment);
                 let prediction = report.learners[0].metrics.prediction_mean_m;
                 let models: Vec<_> = report.learners.iter().map(|learner| learner.estimate.clone()).collect();
                 let rows: Vec<_> =

@@ -1,8 +1,8 @@
 //! Lines on what any learner could reach, beside what the learners reached.
 
 use anyhow::Result;
-use body_schema_engine::design::BestDesign;
 use body_schema_scenario::{Scenario, WorldSpec};
+use body_schema_wire::BestDesign;
 
 use super::{BadInput, output};
 

@@ -7,11 +7,11 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use body_schema_engine::design::{BestDesign, best_designs};
+use body_schema_engine::design::best_designs;
 use body_schema_experiment::Experiment;
 use body_schema_files::AtomicFile;
 use body_schema_recording::{EllipsoidSize, Recorder, StepsCsv, Target};
-use body_schema_wire::{Description, RunResult, StepReport};
+use body_schema_wire::{BestDesign, Description, RunResult, StepReport};
 
 use super::{
     ScenarioArguments, designs,

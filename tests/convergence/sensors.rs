@@ -22,7 +22,7 @@ fn outliers_are_told_from_readings_and_least_squares_is_lost_to_them() {
             if step <= 20 {
                 continue;
             }
-            let result = experiment.result();
+            let result = RunResult::of(&experiment);
             let truth: Vec<_> = result.outliers.iter().map(|it| (it.movement, it.channel)).collect();
             assert_eq!(result.learners[0].readings.len(), step);
             told += truth.len();
@@ -87,7 +87,7 @@ fn play_of_a_hobby_arm_is_learned_with_its_axes() {
                 (metrics.prediction_m.expect("a truth"), metrics.expected_prediction_m.expect("kept"));
             found.push(error);
             ratios.push(expected / error);
-            let learner = experiment.result().learners.remove(0);
+            let learner = RunResult::of(&experiment).learners.remove(0);
             play.push(learner.reading_sigmas.first().map_or(0.0, |sigma| sigma.to_degrees()));
             suspected += learner.readings.iter().filter(|reading| reading.weight < 0.5).count();
         }
@@ -154,7 +154,7 @@ fn gears_and_noise_that_nobody_knows_are_learned() {
         for _ in 0..150 {
             experiment.step().expect("a step");
         }
-        let learner = &experiment.result().learners[0];
+        let learner = &RunResult::of(&experiment).learners[0];
         let truth = scenario.robot.state.corrections.iter();
         let errors = truth.zip(&learner.model.joints).map(|(truth, joint)| (joint.ratio / truth.ratio - 1.0).abs());
         within += usize::from(errors.fold(0.0, f64::max) < 1e-3);
@@ -221,7 +221,7 @@ fn what_no_parameter_explains_is_expected_and_not_chased() {
                 found_by_expected[index][step].push(found / learner.metrics.expected_prediction_m.expect("kept"));
             }
         }
-        let result = experiment.result();
+        let result = RunResult::of(&experiment);
         let remark = &result.learners[0].remarks;
         assert!(remark.iter().any(|remark| remark.contains("no parameter explains")), "{remark:?}");
     }

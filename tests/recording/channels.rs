@@ -3,13 +3,13 @@
 use std::fs;
 
 use body_schema::{
-    experiment::StepReport,
+    experiment::{Description, StepReport},
     recording::{LiveLog, Recorder, Target},
     scenario::{Scenario, builtin},
 };
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 
-use crate::recording::{checks::check, path, reading::Reading, record, run};
+use crate::recording::{checks::check, next, path, reading::Reading, record, run};
 
 fn recorded(scenario: &str, steps: usize) -> (Reading, Vec<StepReport>, Vec<String>) {
     let (description, reports) = run(scenario, steps);
@@ -167,7 +167,7 @@ fn a_long_recording_with_a_camera_is_small() {
     let scenario = Scenario::parse("three", &format!("{text}{third}"), &|_| Err("none".into())).unwrap();
     let mut experiment = scenario.experiment(3, None).unwrap();
     let mut reports = vec![StepReport::of(&experiment)];
-    (0..200).for_each(|_| reports.push(experiment.step().unwrap().clone()));
+    (0..200).for_each(|_| reports.push(next(&mut experiment)));
     assert_eq!(experiment.learners().len(), 3);
     let file = path("camera.rrd");
     record(&Description::of(&experiment), &reports, Target::file(&file));

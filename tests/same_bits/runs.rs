@@ -1,6 +1,9 @@
 //! Whole runs, to compare what comes of them.
 
-use body_schema::scenario::builtin;
+use body_schema::{
+    experiment::{RunResult, StepReport},
+    scenario::builtin,
+};
 use serde_json::Value;
 
 /// Scenarios of every kind of sensor and learner, how many steps are made, and by whom.

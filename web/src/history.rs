@@ -127,7 +127,7 @@ impl History {
     pub fn new(description: &Description) -> Self {
         Self {
             change_at: description.change_at,
-            convergence: vec![Convergence::new(description.thresholds); description.learners.len()],
+            convergence: vec![Convergence::new(description.thresholds.into()); description.learners.len()],
             first: 0,
             rows: Vec::new(),
             readings: Vec::new(),

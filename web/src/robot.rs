@@ -1,9 +1,8 @@
 //! A robot elsewhere: its suggestions, the status of its session, and the visitor's reports about suggestions.
 
 use body_schema_ask_tell::{Answer, Outcome, Status, Suggestion};
-use body_schema_engine::kinematics::JointKind;
 use body_schema_scenario::WorldKind;
-use body_schema_wire::{ChannelReading, Description};
+use body_schema_wire::{ChannelReading, Description, JointKind};
 
 use crate::{host::Command, panel::Panel, wire::Standing};
 

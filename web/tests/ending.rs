@@ -19,7 +19,7 @@ fn a_run_stops_when_its_story_is_told_and_says_who_needed_what() {
     let mut page = Page::with_session("speed=50");
     page.press(Key::Space);
     page.make_steps(1000);
-    let result = page.server.experiment().result();
+    let result = page.server.result();
     let converged = |name: &str| {
         let learner = result.learners.iter().find(|learner| learner.name == name);
         learner.and_then(|learner| learner.converged_at).expect("it converges")
@@ -115,7 +115,7 @@ fn the_change_of_the_body_is_marked_and_recovering_is_counted_from_there() {
     let mut page = Page::with_session("scenario=body-change&learners=active,random&speed=100");
     page.press(Key::Space);
     page.make_steps(1000);
-    let result = page.server.experiment().result();
+    let result = page.server.result();
     for learner in &result.learners {
         let movements = learner.recovered_at.expect("it recovers");
         assert!(page.has(&format!("recovered in {movements}")), "{}", learner.name);

@@ -103,8 +103,7 @@ fn a_run_stops_when_all_that_judge_themselves_have_settled_and_plays_on() {
     page.press(Key::Space);
     page.make_steps(200);
     let latest = page.harness.state().history.latest();
-    let settled =
-        |name: &str| page.server.experiment().result().learners.iter().find(|one| one.name == name)?.settled_at;
+    let settled = |name: &str| page.server.result().learners.iter().find(|one| one.name == name)?.settled_at;
     let last = settled("global").max(settled("smoother:random")).expect("both settle");
     // Steps are made by the dozen where drawing is slow, so that the last of them may overshoot.
     assert!((last..last + 25).contains(&latest), "{last} {latest}");
@@ -122,7 +121,7 @@ fn convergence_and_divergence_are_shown() {
     page.begin();
     page.press(Key::Space);
     page.make_steps(80);
-    let result = page.server.experiment().result();
+    let result = page.server.result();
     let global = result.learners.iter().find(|learner| learner.name == "global").expect("chosen");
     let converged = global.converged_at.expect("it converges within 80 movements");
     assert!(page.has(&format!("learned in {converged}")) && page.has("ran away"));

@@ -3,9 +3,8 @@
 use std::io;
 
 use super::{RecordingError, metrics};
-use body_schema_engine::kinematics::JointKind;
 use body_schema_table::{Component, Title, Writer};
-use body_schema_wire::{Comparison, Description, Quantiles, StepReport};
+use body_schema_wire::{Comparison, Description, JointKind, Quantiles, StepReport};
 
 /// A writer of one row per step and learner. Units stand in the names of the columns; null is an empty cell.
 pub struct StepsCsv<W: io::Write> {

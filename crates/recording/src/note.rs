@@ -11,8 +11,7 @@ use super::{
     rerun::{Color, MediaType, Points3D, Radius, TextDocument},
     solid::single,
 };
-use body_schema_engine::kinematics::JointKind;
-use body_schema_wire::Description;
+use body_schema_wire::{Description, JointKind};
 
 const HEAD: &str = "- **Head**: in pale grey the cone of the lens at rest, and the square over which its axis can turn; in the \
                     learner's pale colour the cone after the head has followed the marker. A marker outside it is missed: red, where \

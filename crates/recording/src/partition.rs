@@ -9,12 +9,11 @@ use super::{
     values::{Cell, Values},
 };
 use body_schema_engine::{
-    kinematics::JointKind,
     optimize::{Plane, Projection},
     selection::{Leaf, Partition},
 };
 use body_schema_palette::viridis;
-use body_schema_wire::JointDescription;
+use body_schema_wire::{JointDescription, JointKind};
 
 const NO_VALUE: [u8; 3] = [0x60, 0x60, 0x60];
 const FRAME: [u8; 3] = [0x90, 0x90, 0x90];

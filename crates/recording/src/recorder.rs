@@ -21,8 +21,8 @@ use super::{
     stage::{GROUNDS, Stage},
     values::cells,
 };
-use body_schema_engine::{design::BestDesign, model::State};
-use body_schema_wire::{Description, LearnerDescription, ModelReport, StepReport};
+use body_schema_engine::model::State;
+use body_schema_wire::{BestDesign, Description, LearnerDescription, ModelReport, StepReport};
 
 /// The most steps that are gathered before they are written: a message costs more than the rows in it. They are written
 /// earlier when flushed, …

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{HeadDescription, ModelReport, array, arrays};
 use body_schema_engine::{
-    kinematics::JointKind,
+    kinematics,
     sensing::{CameraKind, TargetKind},
 };
 use body_schema_experiment as experiment;
@@ -90,6 +90,17 @@ impl SocketDescription {
     pub fn label(&self) -> String {
         self.place.as_ref().map_or_else(|| self.name.clone(), |place| format!("{place}/{}", self.name))
     }
+}
+
+/// Whether a joint turns or slides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub enum JointKind {
+    /// Turns about a line; position in radians.
+    Revolute,
+    /// Slides along a direction; position in metres.
+    Prismatic,
 }
 
 /// A joint as the scenario describes it.
@@ -212,10 +223,19 @@ impl From<experiment::Body> for Body {
     }
 }
 
+impl From<kinematics::JointKind> for JointKind {
+    fn from(kind: kinematics::JointKind) -> Self {
+        match kind {
+            kinematics::JointKind::Revolute => Self::Revolute,
+            kinematics::JointKind::Prismatic => Self::Prismatic,
+        }
+    }
+}
+
 impl From<&JointSetting> for JointDescription {
     fn from(joint: &JointSetting) -> Self {
         let JointSetting { name, kind, learned, limits } = joint;
-        Self { name: name.clone(), kind: *kind, learned: *learned, limits: *limits }
+        Self { name: name.clone(), kind: (*kind).into(), learned: *learned, limits: *limits }
     }
 }
 

@@ -9,6 +9,7 @@
 mod choice;
 mod comparison;
 mod description;
+pub mod design;
 mod head;
 mod loads;
 mod metrics;
@@ -22,15 +23,18 @@ pub use comparison::{
     Comparison, Curve, LearnerComparison, Quantiles, RunSummary, SeedRun, SelectionTime, Summary, Trace,
 };
 pub use description::{
-    Body, CameraDescription, ChannelDescription, Description, JointDescription, LearnerDescription, SocketDescription,
-    TargetDescription, Thresholds,
+    Body, CameraDescription, ChannelDescription, Description, JointDescription, JointKind, LearnerDescription,
+    SocketDescription, TargetDescription, Thresholds,
 };
+pub use design::BestDesign;
 pub use head::{GazeReport, HeadDescription};
 pub use loads::{AxisReport, LoadsReport, MassReport};
 pub use metrics::{JointMetrics, Metrics};
 pub use model::{JointReport, ModelReport};
 pub use place::{CorrectionReport, PlaceReport};
-pub use result::{JointModel, LearnerResult, MarkerModel, Model, OtherModel, OutlierReading, RunResult};
+pub use result::{
+    JointModel, LearnerResult, MarkerModel, Model, NoiseReport, OtherModel, OutlierReading, ReadingReport, RunResult,
+};
 pub use step::{ChannelReading, LearnerReport, MovementReport, StepReport};
 
 use nalgebra::{Matrix3, Point3, Vector3};

@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Metrics, Thresholds, array};
+use super::{BestDesign, JointKind, Metrics, Thresholds, array};
 use body_schema_engine::{
-    design::BestDesign,
-    estimation::{Belief, NoiseReport, ReadingReport},
-    kinematics::{JointKind, chart},
+    design,
+    estimation::{self, Belief},
+    kinematics::chart,
     model::Block,
 };
 use body_schema_experiment::{Experiment, Outlier};
@@ -97,6 +97,36 @@ pub struct LearnerResult {
     pub remarks: Vec<String>,
     /// The learned model.
     pub model: Model,
+}
+
+/// What an estimator makes of one reading, by its belief.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct ReadingReport {
+    /// The movement, counted from 1; 0 for what was known before the first.
+    pub movement: u64,
+    /// The channel, counted from 0.
+    pub channel: usize,
+    /// Its equations.
+    pub equations: usize,
+    /// How far it is from what the belief predicts, in standard deviations of its noise.
+    pub residual_sigmas: f64,
+    /// The weight of its equations; 1 for least squares.
+    pub weight: f64,
+    /// The probability that it is an outlier; null for a loss that knows of none.
+    pub outlier_probability: Option<f64>,
+}
+
+/// The learned scale of one kind of noise.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct NoiseReport {
+    /// The channel, counted from 0.
+    pub channel: usize,
+    /// The first of its equations that this noise is of.
+    pub first: usize,
+    /// Its standard deviation in nominal ones.
+    pub scale: f64,
 }
 
 /// A learned chain with its covariance, at θ = 0, in the frame of the measurements.
@@ -194,7 +224,7 @@ impl Model {
                 let coordinates = [layout.point(index), layout.direction(index)];
                 JointModel {
                     name: names.get(index).cloned().unwrap_or_default(),
-                    kind: joint.kind(),
+                    kind: joint.kind().into(),
                     learned: layout.is_learned(index),
                     axis: array(&joint.direction()),
                     point_m: joint.line().map(|line| array(&line.point.coords)),
@@ -242,8 +272,8 @@ impl RunResult {
                 efficiency: None,
                 parameters: learner.belief().layout.dimension(),
                 metrics: Metrics::from(&outcome.metrics),
-                readings: learner.readings(),
-                noise: learner.noise(),
+                readings: learner.readings().into_iter().map(ReadingReport::from).collect(),
+                noise: learner.noise().into_iter().map(NoiseReport::from).collect(),
                 reading_sigmas: learner.reading_sigmas(),
                 remarks: experiment.remarks(index),
                 model: Model::new(learner.belief(), &names),
@@ -263,11 +293,12 @@ impl RunResult {
     }
 
     /// The same beside the best designs of the scenario.
-    pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
+    pub fn beside(mut self, best_designs: Vec<design::BestDesign>) -> Self {
         for learner in &mut self.learners {
-            learner.efficiency = BestDesign::efficiency(&best_designs, learner.metrics.bound_trace, learner.parameters);
+            learner.efficiency =
+                design::BestDesign::efficiency(&best_designs, learner.metrics.bound_trace, learner.parameters);
         }
-        Self { best_designs, ..self }
+        Self { best_designs: best_designs.into_iter().map(BestDesign::from).collect(), ..self }
     }
 }
 
@@ -275,5 +306,20 @@ impl From<&Outlier> for OutlierReading {
     fn from(outlier: &Outlier) -> Self {
         let Outlier { movement, channel } = *outlier;
         Self { movement, channel }
+    }
+}
+
+impl From<estimation::ReadingReport> for ReadingReport {
+    fn from(reading: estimation::ReadingReport) -> Self {
+        let estimation::ReadingReport { movement, channel, equations, residual_sigmas, weight, outlier_probability } =
+            reading;
+        Self { movement, channel, equations, residual_sigmas, weight, outlier_probability }
+    }
+}
+
+impl From<estimation::NoiseReport> for NoiseReport {
+    fn from(noise: estimation::NoiseReport) -> Self {
+        let estimation::NoiseReport { channel, first, scale } = noise;
+        Self { channel, first, scale }
     }
 }

@@ -1,6 +1,6 @@
 //! Beat the algorithm: sliders, a slice to click, what the posture would teach, and the score.
 
-use body_schema_engine::kinematics::JointKind;
+use body_schema_wire::JointKind;
 use egui::{Button, ComboBox, Frame, ProgressBar, RichText, Sense, Slider, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::{card::filled, learners::entry, style::accent, why::joint_value};

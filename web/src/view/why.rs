@@ -1,7 +1,7 @@
 //! Why this posture? DIRECT's search for the last movement, and what another posture would have taught.
 
-use body_schema_engine::{kinematics::JointKind, optimize::Plane};
-use body_schema_wire::Choice;
+use body_schema_engine::optimize::Plane;
+use body_schema_wire::{Choice, JointKind};
 use egui::{ComboBox, RichText, Slider, Ui};
 
 use crate::{panel::Panel, search::Search};

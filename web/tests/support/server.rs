@@ -2,7 +2,7 @@
 
 use body_schema_experiment::Experiment;
 use body_schema_scenario::{Scenario, builtin, edited};
-use body_schema_wire::{AppraisalReport, Choice, Description, StepReport};
+use body_schema_wire::{AppraisalReport, Choice, Description, RunResult, StepReport};
 use serde_json::{Value, json};
 
 /// How long every choice is said to have taken, ms: the one number that is another in each run.
@@ -61,6 +61,11 @@ impl Server {
     /// The experiment of the session.
     pub fn experiment(&self) -> &Experiment {
         self.experiment.as_ref().expect("a session")
+    }
+
+    /// What has come of it so far.
+    pub fn result(&self) -> RunResult {
+        RunResult::of(self.experiment())
     }
 
     /// Makes steps.

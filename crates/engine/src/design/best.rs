@@ -6,7 +6,6 @@ use super::Problem;
 
 /// The best design of so many movements.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct BestDesign {
     /// The step of a run after which a learner has made them.
     pub step: u64,

@@ -107,7 +107,6 @@ impl Clone for Box<dyn Estimator> {
 
 /// What an estimator makes of one reading.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ReadingReport {
     /// The movement, counted from 1; 0 for what was known before the first.
     pub movement: u64,
@@ -145,7 +144,6 @@ pub enum MisfitCause {
 
 /// The learned scale of one kind of noise.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct NoiseReport {
     /// The channel, counted from 0.
     pub channel: usize,

@@ -34,7 +34,6 @@ impl Line {
 /// Whether a joint turns or slides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub enum JointKind {
     /// Turns about a line; position in radians.
     Revolute,

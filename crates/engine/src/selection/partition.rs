@@ -9,7 +9,6 @@ use crate::{
 
 /// The rectangles into which DIRECT had divided the box that it searched when its budget ended.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Partition {
     /// All rectangles; they fill the unit cube (each joint from its lower limit, 0, to its upper, 1; those of `limits`, where
     /// there are any).
@@ -24,7 +23,6 @@ pub struct Partition {
 
 /// One rectangle of a partition.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Leaf {
     /// Its centre in the unit cube, where the criterion was evaluated.
     pub centre: Vec<f64>,

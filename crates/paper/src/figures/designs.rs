@@ -2,9 +2,9 @@
 
 use super::Source;
 use body_schema_chart::{Axis, Layer, Panel, Style};
-use body_schema_engine::{design::BestDesign, selection::CriterionUnits};
+use body_schema_engine::selection::CriterionUnits;
 use body_schema_palette::TRUTH_COLOR;
-use body_schema_wire::{Comparison, Curve, LearnerComparison, Quantiles};
+use body_schema_wire::{BestDesign, Comparison, Curve, LearnerComparison, Quantiles};
 
 /// Dashes of a learner's bound.
 const BOUND: &str = "1.5 2.5";

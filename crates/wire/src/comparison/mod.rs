@@ -7,8 +7,8 @@ pub use trace::Trace;
 
 use serde::{Deserialize, Serialize};
 
-use super::JointMetrics;
-use body_schema_engine::design::BestDesign;
+use super::{BestDesign, JointMetrics};
+use body_schema_engine::design;
 use body_schema_experiment::Metrics;
 use statistics::{median, nearest_rank, sorted};
 
@@ -193,12 +193,12 @@ impl Comparison {
     }
 
     /// The same beside the best designs of the scenario.
-    pub fn beside(mut self, best_designs: Vec<BestDesign>) -> Self {
+    pub fn beside(mut self, best_designs: Vec<design::BestDesign>) -> Self {
         for learner in &mut self.learners {
             let bound = learner.curve.last().and_then(|end| end.bound_trace).map(|bound| bound.median);
-            learner.efficiency = BestDesign::efficiency(&best_designs, bound, learner.parameters);
+            learner.efficiency = design::BestDesign::efficiency(&best_designs, bound, learner.parameters);
         }
-        Self { best_designs, ..self }
+        Self { best_designs: best_designs.into_iter().map(BestDesign::from).collect(), ..self }
     }
 }
 

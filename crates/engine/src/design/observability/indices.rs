@@ -13,7 +13,6 @@ use crate::{
 /// Without a unit; all are better the greater they are. Collected and compared by Y. Sun and J. M. Hollerbach, "Observability Index
 /// Selection for Robot Calibration", ICRA 2008.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Indices {
     /// (σ₁ σ₂ … σₘ)^{1/m} / √n (Borm and Menq 1991): criterion D.
     pub o1: f64,

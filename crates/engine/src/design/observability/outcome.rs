@@ -6,7 +6,6 @@ use super::Indices;
 
 /// What can be determined of a robot before anything is measured.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Observability {
     /// The scenario's name.
     pub scenario: String,
@@ -36,7 +35,6 @@ pub struct Observability {
 
 /// The parameters to be learned, and those that can be determined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ObservedParameters {
     /// How many.
     pub learned: usize,
@@ -48,7 +46,6 @@ pub struct ObservedParameters {
 
 /// A direction of which measurements tell little.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Weak {
     /// The deviation that is left after the best N postures, as a share of the prior's.
     pub left: f64,
@@ -58,7 +55,6 @@ pub struct Weak {
 
 /// Indices of the best and of random postures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct IndexTable {
     /// The indices of the best postures.
     pub best: Indices,
@@ -68,7 +64,6 @@ pub struct IndexTable {
 
 /// The standard deviation of a parameter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Deviation {
     /// The parameter's name.
     pub parameter: String,
@@ -84,7 +79,6 @@ pub struct Deviation {
 
 /// The expected error of predictions after so many postures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ErrorPoint {
     /// The number of postures.
     pub postures: usize,
@@ -100,7 +94,6 @@ pub struct ErrorPoint {
 
 /// How many postures a wanted accuracy takes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Accuracy {
     /// The wanted accuracy, millimetres.
     pub wanted_mm: f64,
@@ -116,7 +109,6 @@ pub struct Accuracy {
 
 /// A posture to measure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Posture {
     /// The joint positions, degrees; millimetres for sliding joints.
     pub joints: Vec<f64>,
