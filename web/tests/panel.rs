@@ -258,7 +258,7 @@ fn the_choice_is_explained_and_challenged() {
     let commands = page.commands();
     assert!(matches!(&commands[..], [Command::Evaluate { learner, .. }] if learner == "active"), "{commands:?}");
     page.tell(page.server.evaluation("active", &posture));
-    let gain = page.server.experiment().appraise("active", &posture).expect("an appraisal").gain;
+    let gain = page.server.experiment().appraise("active", &posture).expect("an appraisal").appraisal.gain;
     let share = gain / expected * 100.0;
     assert!(gain < expected && page.has(&format!("by {gain:.3}, {share:.0} % of what DIRECT found")));
     assert!(page.has("chance of being seen 100 %"));
