@@ -1,11 +1,6 @@
 //! Independent work on several cores.
 
-#[cfg_attr(not(feature = "parallel"), path = "alone.rs")]
-mod batches;
-
 use crate::lanes::GROUP;
-
-pub use batches::{Batches, shared};
 
 /// `of` of every item, in order: on several cores with the feature `parallel`. The results do not depend on how many.
 pub fn mapped<T: Sync, R: Send>(items: &[T], of: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
@@ -89,35 +84,6 @@ mod tests {
     use std::thread;
 
     use super::*;
-
-    /// However many help, whether they come in time or not, and whether or not it pays to call them.
-    #[test]
-    fn shared_batches_say_what_is_said_alone() {
-        for work in [0, 2000] {
-            let roots = |batch: &[f64]| {
-                let root = |x: &f64| (0..work).fold(*x, |y, _| (y + x / (y + 1.0)) / 2.0);
-                batch.iter().map(root).collect::<Vec<f64>>()
-            };
-            let sizes = || (0..120).map(|round| 7 * round % 61);
-            let candidates = sizes().sum::<usize>();
-            for threads in [1, 2, 3, 8] {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-                let check = || {
-                    shared(&roots, candidates, |batches| {
-                        for size in sizes() {
-                            let all: Vec<f64> = (0..size).map(|x| x as f64).collect();
-                            let mut batch = all.clone();
-                            assert_eq!(batches.evaluate(&mut batch), roots(&all), "{size} by {threads}");
-                            assert_eq!(batch, all, "{size} by {threads}");
-                        }
-                    });
-                };
-                pool.install(check);
-                // Who is not of the pool, and others who have taken it.
-                thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(|| pool.install(check)))));
-            }
-        }
-    }
 
     #[test]
     fn nobody_waits_for_a_place_in_the_pool() {
