@@ -1,9 +1,7 @@
 //! The divisible rectangles, sorted by size and within a size by score.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
-use super::ranked::{number, ranked, score};
+use std::cmp::Ordering;
+use std::collections::BTreeSet;
 
 /// Scores this close are taken for equal when all best rectangles of a size are divided: the figure of
 /// Gablonsky's code. Rounding makes symmetric points differ in their last bits, and the published counts rest on
@@ -18,92 +16,82 @@ pub struct Head {
     pub score: f64,
 }
 
-/// One heap per size class, so that an iteration looks at one rectangle per size rather than at all. Equal scores are served
-/// first come, first served: what a heap holds is a score and an arrival.
-///
-/// What is taken out stays in its heap until it gets to the top: an arrival counts only as long as it is the rectangle's
-/// latest.
+/// The divisible rectangles, a set for each size class in the order in which they are served, so that an iteration looks at one
+/// rectangle per size rather than at all.
 #[derive(Debug, Clone, Default)]
 pub struct SizeClasses {
-    classes: Vec<BinaryHeap<Reverse<u128>>>,
-    /// Who arrived, in the order of arrival.
-    arrived: Vec<usize>,
-    /// Of each rectangle the arrival in the class that it is in; [`NOWHERE`] if it is in none.
-    arrivals: Vec<usize>,
+    classes: Vec<BTreeSet<Entry>>,
+    /// Of each rectangle what stands for it in the class that it is in, if it is in one.
+    entries: Vec<Option<Entry>>,
+    /// How many have arrived.
+    arrivals: usize,
 }
 
-/// The arrival of a rectangle that is in no class.
-const NOWHERE: usize = usize::MAX;
+/// A rectangle in its class: served by its score and, of equal scores, first come, first served.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    score: f64,
+    arrival: usize,
+    rectangle: usize,
+}
 
-/// Rectangles of a class for which there is room from the beginning.
-const CLASS_ROOM: usize = 64;
+impl Ord for Entry {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.score.total_cmp(&other.score).then(self.arrival.cmp(&other.arrival))
+    }
+}
+
+impl PartialOrd for Entry {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Entry {}
 
 impl SizeClasses {
-    /// With room for so many rectangles.
-    pub fn with_room(room: usize) -> Self {
-        // Who is divided arrives once more, and has two children at least.
-        let arrived = Vec::with_capacity(room + room / 2);
-        Self { arrived, arrivals: Vec::with_capacity(room), ..Self::default() }
-    }
-
     /// Knows the first so many rectangles, never fewer than before: those that are new to it are in no class yet.
     pub fn know(&mut self, rectangles: usize) {
-        self.arrivals.resize(rectangles, NOWHERE);
+        self.entries.resize(rectangles, None);
     }
 
     /// Adds a rectangle, which is known and in no class, behind those of its class that have the same score.
-    #[inline]
     pub fn insert(&mut self, class: usize, rectangle: usize, score: f64) {
         if self.classes.len() <= class {
-            self.classes.resize_with(class + 1, || BinaryHeap::with_capacity(CLASS_ROOM));
+            self.classes.resize_with(class + 1, BTreeSet::new);
         }
-        let arrival = self.arrived.len();
-        self.arrived.push(rectangle);
-        self.arrivals[rectangle] = arrival;
-        self.classes[class].push(Reverse(ranked(score, arrival)));
+        let entry = Entry { score, arrival: self.arrivals, rectangle };
+        self.arrivals += 1;
+        self.entries[rectangle] = Some(entry);
+        self.classes[class].insert(entry);
     }
 
     /// Takes a rectangle out of its class, and says whether it was there.
     pub fn remove(&mut self, class: usize, rectangle: usize) -> bool {
-        let Self { classes, arrived, arrivals } = self;
-        let arrival = std::mem::replace(&mut arrivals[rectangle], NOWHERE);
-        if let Some(heap) = classes.get_mut(class) {
-            while heap.peek().is_some_and(|Reverse(entry)| !is_latest(*entry, arrived, arrivals)) {
-                heap.pop();
-            }
-        }
-        arrival != NOWHERE
+        self.entries[rectangle].take().is_some_and(|entry| self.classes[class].remove(&entry))
     }
 
     /// The best rectangle of every class that has one, from the largest size to the smallest.
     pub fn heads(&self) -> impl Iterator<Item = Head> {
-        self.classes.iter().enumerate().filter_map(|(class, heap)| {
-            let &Reverse(entry) = heap.peek()?;
-            Some(Head { class, rectangle: self.arrived[number(entry)], score: score(entry) })
+        self.classes.iter().enumerate().filter_map(|(class, entries)| {
+            let Entry { score, rectangle, .. } = *entries.first()?;
+            Some(Head { class, rectangle, score })
         })
     }
 
     /// The rectangles of a class, other than the best, whose score ties with that of the best, in their order.
     pub fn ties(&self, class: usize) -> impl Iterator<Item = usize> {
-        let entries = self.classes.get(class).map_or(&[][..], BinaryHeap::as_slice);
-        let best = entries.first().map_or(f64::NAN, |&Reverse(entry)| score(entry));
-        let mut ties = Vec::new();
-        let mut open = vec![0];
-        while let Some(node) = open.pop() {
-            let Some(&Reverse(entry)) = entries.get(node) else { continue };
-            // Compared twice, since the difference of two infinite scores is not a number. What is below a node is no better.
-            if score(entry) == best || score(entry) - best <= TIE {
-                ties.extend(is_latest(entry, &self.arrived, &self.arrivals).then_some(entry));
-                open.extend([2 * node + 1, 2 * node + 2]);
-            }
-        }
-        ties.sort_unstable();
-        ties.into_iter().skip(1).map(|entry| self.arrived[number(entry)])
+        let mut entries = self.classes.get(class).into_iter().flatten();
+        let best = entries.next().map_or(f64::NAN, |entry| entry.score);
+        // Compared twice, since the difference of two infinite scores is not a number.
+        entries.take_while(move |entry| entry.score == best || entry.score - best <= TIE).map(|entry| entry.rectangle)
     }
-}
-
-fn is_latest(entry: u128, arrived: &[usize], arrivals: &[usize]) -> bool {
-    arrivals[arrived[number(entry)]] == number(entry)
 }
 
 #[cfg(test)]
@@ -111,7 +99,7 @@ mod tests {
     use super::*;
 
     fn known(rectangles: usize) -> SizeClasses {
-        let mut classes = SizeClasses::with_room(rectangles);
+        let mut classes = SizeClasses::default();
         classes.know(rectangles);
         classes
     }

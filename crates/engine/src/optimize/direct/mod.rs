@@ -8,7 +8,6 @@ mod lineage;
 mod minimize;
 mod partition;
 mod plane;
-mod ranked;
 mod search;
 mod settings;
 mod ternary;

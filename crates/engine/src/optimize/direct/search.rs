@@ -83,7 +83,7 @@ impl Direct {
         Ok(Self {
             settings,
             rectangles: Rectangles::cube(dimension, room),
-            classes: SizeClasses::with_room(room),
+            classes: SizeClasses::default(),
             lineage: Lineage::default(),
             hull: Vec::with_capacity(CLASSES),
             chosen: Vec::with_capacity(CLASSES),
