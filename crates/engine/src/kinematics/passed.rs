@@ -35,7 +35,7 @@ impl<N: Numbers> Passed<N> {
     /// None, with room for so many.
     #[inline(always)]
     pub fn with_room(numbers: N, joints: usize) -> Self {
-        Self { of: numbers, numbers: Aligned::of_any(joints * 3 * VECTORS * N::COUNT), count: 0 }
+        Self { of: numbers, numbers: Aligned::zeros(joints * 3 * VECTORS * N::COUNT), count: 0 }
     }
 
     /// Adds the next one.
