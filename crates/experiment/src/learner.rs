@@ -12,14 +12,13 @@ use super::{
     metrics::Metrics,
     report::{LearnerDescription, LearnerReport, ModelReport, MovementReport, array, arrays, shown},
     sight::{ChannelDescription, readings},
-    standpoint::{OwnedStandpoint, Standpoint},
     world::World,
 };
 use body_schema_engine::{
     estimation::{Belief, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
     model::{Hand, State, Workspace},
-    selection::{Movement, Search, SelectionError, Weights},
+    selection::{KeptSituation, Movement, Search, SelectionError, Situation, Weights},
     sensing::Observation,
 };
 
@@ -41,9 +40,9 @@ pub struct Learner {
     workspace: Workspace,
     /// It calls itself settled when its expected prediction error stays below this, metres.
     settled_below_m: f64,
-    /// Where it stood before its last movement; at the start, where it stands.
-    before: OwnedStandpoint,
-    /// The gain of the best movement that DIRECT finds, once asked for, at the standpoint before and at the present one;
+    /// The situation before its last movement; at the start, the present one.
+    before: KeptSituation,
+    /// The gain of the best movement that DIRECT finds, once asked for, in the situation before and in the present one;
     /// `None` where its policy does not search.
     best_gain_before: OnceLock<Option<f64>>,
     best_gain: OnceLock<Option<f64>>,
@@ -72,7 +71,7 @@ impl Learner {
         workspace: impl Into<Workspace>,
         settled_below_m: f64,
     ) -> Self {
-        let before = agent.standpoint().to_owned();
+        let before = agent.situation().kept();
         Self {
             description,
             agent,
@@ -161,7 +160,7 @@ impl Learner {
             SelectionError::Refused(why) => ChoiceError::Configuration(format!("is not feasible: {why}")),
             error => error.into(),
         })?;
-        let best = *self.best_gain.get_or_init(|| self.searched_gain(self.agent.standpoint()));
+        let best = *self.best_gain.get_or_init(|| self.searched_gain(self.agent.situation()));
         Ok(AppraisalReport::of(configuration, &appraisal, &self.belief().state, best))
     }
 
@@ -170,14 +169,14 @@ impl Learner {
         self.agent.failure().map(str::to_owned).or(self.stopped.as_ref().map(ToString::to_string))
     }
 
-    /// The gain of the best movement that DIRECT finds at a standpoint, for a policy that explains itself by one.
-    fn searched_gain(&self, standpoint: Standpoint<'_>) -> Option<f64> {
-        let partition = self.agent.explain(standpoint).ok()??.partition();
+    /// The gain of the best movement that DIRECT finds in a situation, for a policy that explains itself by one.
+    fn searched_gain(&self, situation: Situation<'_>) -> Option<f64> {
+        let partition = self.agent.explain(situation).ok()??.partition();
         let values = partition.leaves.iter().filter_map(|leaf| Some((leaf, leaf.value?)));
         let (best, _) = values.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let centre = partition.searched(self.limits()).from_unit(&best.centre);
         // Without the price of the travel there.
-        Some(self.agent.appraise(standpoint, &centre).ok()?.gain)
+        Some(self.agent.appraise(situation, &centre).ok()?.gain)
     }
 
     /// Its agent.
@@ -207,7 +206,7 @@ impl Learner {
         let truth = world.truth();
         let row = movement.row;
         let configuration = movement.configuration.clone();
-        let before = self.agent.standpoint().to_owned();
+        let before = self.agent.situation().kept();
         let predicted = before.belief.state.marker_at(&configuration);
         let measured = match before.belief.state.hand {
             Hand::Target(hand) => observation.position(&before.belief.rig, hand),
@@ -270,12 +269,12 @@ impl Learner {
         let not_searched = || ChoiceError::NotSearched(self.description.name.clone());
         let movement = report.movement.as_ref().ok_or_else(not_searched)?;
         let selection = &self.last.as_ref().ok_or_else(not_searched)?.selection;
-        let (before, after) = (self.before.borrowed(), self.agent.standpoint());
+        let (before, after) = (self.before.borrowed(), self.agent.situation());
         let search = match (&selection.plan, &selection.search) {
             (None, Some(search)) => search.clone(),
             _ => self.agent.explain(before)?.ok_or_else(not_searched)?,
         };
-        let value = |standpoint| self.agent.appraise(standpoint, &movement.configuration).map(|it| it.before).ok();
+        let value = |situation| self.agent.appraise(situation, &movement.configuration).map(|it| it.before).ok();
         Choice::of(step, report, movement, search, limits, [value(before), value(after)])
     }
 

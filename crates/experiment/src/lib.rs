@@ -23,7 +23,6 @@ mod remarks;
 mod report;
 mod result;
 mod sight;
-mod standpoint;
 mod streams;
 mod told;
 mod world;
@@ -54,7 +53,6 @@ pub use sight::{
     CameraDescription, ChannelDescription, ChannelReading, CorrectionReport, PlaceReport, TargetDescription, channels,
     described,
 };
-pub use standpoint::{OwnedStandpoint, Standpoint};
 pub use streams::Stream;
 pub use told::Prospect;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};

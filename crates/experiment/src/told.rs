@@ -48,9 +48,9 @@ impl Experiment {
         let before = agent.pending().last().map(|last| last.selection.movement.configuration.as_slice());
         let from = before.or(agent.posture());
         let travel = from.map(|from| travel(from, &movement.configuration));
-        let mut standpoint = agent.foreseen();
-        let chance_seen = agent.foresee(&mut standpoint, movement);
-        let expected_error_m = standpoint.belief.expected_error_m(learner.workspace());
+        let mut foreseen = agent.foreseen();
+        let chance_seen = agent.foresee(&mut foreseen, movement);
+        let expected_error_m = foreseen.belief.expected_error_m(learner.workspace());
         Ok((proposal, Prospect { expected_error_m, chance_seen, travel }))
     }
 
