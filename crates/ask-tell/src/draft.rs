@@ -4,9 +4,10 @@ use std::{collections::BTreeSet, sync::Arc};
 
 use super::{
     Ask, Choice, Event, Fault, Happened, Plan, Prepared, Refusal, Session, Suggestion, SuggestionState, Why,
-    channel::label, ledger::Ledger,
+    ledger::Ledger,
 };
 use body_schema_experiment::{Agent, StepReport};
+use body_schema_scenario::SocketSpec;
 
 /// A copy of a session at work.
 pub(super) struct Draft {
@@ -78,7 +79,7 @@ impl Draft {
             client: ask.client.clone(),
             joints: robot.names.clone(),
             configuration: self.ledger.named(&selection.movement.configuration),
-            socket: socket.map(label),
+            socket: socket.map(SocketSpec::label),
             expected_gain: finite(selection.gain),
             expected_error_mm_after: finite(prospect.expected_error_m.map(|metres| metres * 1e3)),
             chance_seen: finite(Some(prospect.chance_seen)).unwrap_or(0.0),

@@ -43,7 +43,7 @@ use body_schema_engine::{
     selection::{Constraints, CriterionUnits, Planning, Watch, Weights},
     sensing::{Equipment, Loss, Observation, Rig, Spacing},
 };
-use body_schema_experiment::{Body, Outliers, Thresholds};
+use body_schema_experiment::{Body, Outliers, SocketDescription, Thresholds};
 use body_schema_robot::{Chain, Urdf};
 
 /// A validated scenario.
@@ -201,7 +201,8 @@ pub struct SocketSpec {
 impl SocketSpec {
     /// Its place and its name.
     pub fn label(&self) -> String {
-        self.place.as_ref().map_or_else(|| self.name.clone(), |place| format!("{place}/{}", self.name))
+        let (name, place) = (self.name.clone(), self.place.clone());
+        SocketDescription { name, place, at_m: None, held_out: false }.label()
     }
 }
 
