@@ -1,7 +1,7 @@
 //! The divisible rectangles, sorted by size and within a size by score.
 
 use std::cmp::Ordering;
-use std::collections::BTreeSet;
+use std::collections::BinaryHeap;
 
 /// Scores this close are taken for equal when all best rectangles of a size are divided: the figure of
 /// Gablonsky's code. Rounding makes symmetric points differ in their last bits, and the published counts rest on
@@ -16,32 +16,29 @@ pub struct Head {
     pub score: f64,
 }
 
-/// The divisible rectangles, a set for each size class in the order in which they are served, so that an iteration looks at one
-/// rectangle per size rather than at all.
-#[derive(Debug, Clone, Default)]
-pub struct SizeClasses {
-    classes: Vec<BTreeSet<Entry>>,
-    /// Of each rectangle what stands for it in the class that it is in, if it is in one.
-    entries: Vec<Option<Entry>>,
-    /// How many have arrived.
-    arrivals: usize,
-}
-
-/// A rectangle in its class: served by its score and, of equal scores, first come, first served.
+/// What a heap holds: a rectangle's score and arrival. The greatest is who is served first: of the least score and, of equal
+/// scores, the first to come.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     score: f64,
     arrival: usize,
-    rectangle: usize,
+}
+
+impl Entry {
+    fn is_latest(&self, arrived: &[usize], arrivals: &[usize]) -> bool {
+        arrivals[arrived[self.arrival]] == self.arrival
+    }
 }
 
 impl Ord for Entry {
+    #[inline]
     fn cmp(&self, other: &Self) -> Ordering {
-        self.score.total_cmp(&other.score).then(self.arrival.cmp(&other.arrival))
+        other.score.total_cmp(&self.score).then(other.arrival.cmp(&self.arrival))
     }
 }
 
 impl PartialOrd for Entry {
+    #[inline]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
@@ -55,42 +52,80 @@ impl PartialEq for Entry {
 
 impl Eq for Entry {}
 
+/// One heap per size class, so that an iteration looks at one rectangle per size rather than at all. Equal scores are served
+/// first come, first served.
+///
+/// What is taken out stays in its heap until it gets to the top: an arrival counts only as long as it is the rectangle's
+/// latest.
+#[derive(Debug, Clone, Default)]
+pub struct SizeClasses {
+    classes: Vec<BinaryHeap<Entry>>,
+    /// Who arrived, in the order of arrival.
+    arrived: Vec<usize>,
+    /// Of each rectangle the arrival in the class that it is in; [`NOWHERE`] if it is in none.
+    arrivals: Vec<usize>,
+}
+
+/// The arrival of a rectangle that is in no class.
+const NOWHERE: usize = usize::MAX;
+
+/// Rectangles of a class for which there is room from the beginning.
+const CLASS_ROOM: usize = 64;
+
 impl SizeClasses {
     /// Knows the first so many rectangles, never fewer than before: those that are new to it are in no class yet.
     pub fn know(&mut self, rectangles: usize) {
-        self.entries.resize(rectangles, None);
+        self.arrivals.resize(rectangles, NOWHERE);
     }
 
     /// Adds a rectangle, which is known and in no class, behind those of its class that have the same score.
+    #[inline]
     pub fn insert(&mut self, class: usize, rectangle: usize, score: f64) {
         if self.classes.len() <= class {
-            self.classes.resize_with(class + 1, BTreeSet::new);
+            self.classes.resize_with(class + 1, || BinaryHeap::with_capacity(CLASS_ROOM));
         }
-        let entry = Entry { score, arrival: self.arrivals, rectangle };
-        self.arrivals += 1;
-        self.entries[rectangle] = Some(entry);
-        self.classes[class].insert(entry);
+        let arrival = self.arrived.len();
+        self.arrived.push(rectangle);
+        self.arrivals[rectangle] = arrival;
+        self.classes[class].push(Entry { score, arrival });
     }
 
     /// Takes a rectangle out of its class, and says whether it was there.
     pub fn remove(&mut self, class: usize, rectangle: usize) -> bool {
-        self.entries[rectangle].take().is_some_and(|entry| self.classes[class].remove(&entry))
+        let Self { classes, arrived, arrivals } = self;
+        let arrival = std::mem::replace(&mut arrivals[rectangle], NOWHERE);
+        if let Some(heap) = classes.get_mut(class) {
+            while heap.peek().is_some_and(|entry| !entry.is_latest(arrived, arrivals)) {
+                heap.pop();
+            }
+        }
+        arrival != NOWHERE
     }
 
     /// The best rectangle of every class that has one, from the largest size to the smallest.
     pub fn heads(&self) -> impl Iterator<Item = Head> {
-        self.classes.iter().enumerate().filter_map(|(class, entries)| {
-            let Entry { score, rectangle, .. } = *entries.first()?;
-            Some(Head { class, rectangle, score })
+        self.classes.iter().enumerate().filter_map(|(class, heap)| {
+            let Entry { score, arrival } = *heap.peek()?;
+            Some(Head { class, rectangle: self.arrived[arrival], score })
         })
     }
 
     /// The rectangles of a class, other than the best, whose score ties with that of the best, in their order.
     pub fn ties(&self, class: usize) -> impl Iterator<Item = usize> {
-        let mut entries = self.classes.get(class).into_iter().flatten();
-        let best = entries.next().map_or(f64::NAN, |entry| entry.score);
-        // Compared twice, since the difference of two infinite scores is not a number.
-        entries.take_while(move |entry| entry.score == best || entry.score - best <= TIE).map(|entry| entry.rectangle)
+        let entries = self.classes.get(class).map_or(&[][..], BinaryHeap::as_slice);
+        let best = entries.first().map_or(f64::NAN, |entry| entry.score);
+        let mut ties = Vec::new();
+        let mut open = vec![0];
+        while let Some(node) = open.pop() {
+            let Some(&entry) = entries.get(node) else { continue };
+            // Compared twice, since the difference of two infinite scores is not a number. What is below a node is no better.
+            if entry.score == best || entry.score - best <= TIE {
+                ties.extend(entry.is_latest(&self.arrived, &self.arrivals).then_some(entry));
+                open.extend([2 * node + 1, 2 * node + 2]);
+            }
+        }
+        ties.sort_unstable_by(|a, b| b.cmp(a));
+        ties.into_iter().skip(1).map(|entry| self.arrived[entry.arrival])
     }
 }
 
