@@ -18,7 +18,7 @@ use body_schema_engine::{
     estimation::{Belief, EstimationError, Estimator, Misfit, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
     selection::{
-        Actions, Appraisal, Constraints, History, KeptSituation, Movement, Planned, Policy, Search, Selection,
+        Actions, Appraisal, Constraints, KeptSituation, Movement, Past, Planned, Policy, Search, Selection,
         SelectionError, Situation,
     },
     sensing::{Observation, Refused},
@@ -38,7 +38,7 @@ pub struct Agent {
     pending: Vec<Proposal>,
     /// The plan of the latest proposal that was carried out, with its ordinal.
     carried_out: Option<(u64, Planned)>,
-    history: History,
+    history: Past,
     failure: Option<String>,
 }
 
@@ -105,7 +105,7 @@ impl Agent {
         limits: JointBox,
         seed: u64,
     ) -> Self {
-        let (pending, history) = (Vec::new(), History::default());
+        let (pending, history) = (Vec::new(), Past::default());
         let policy = Arc::from(policy);
         let (constraints, carried_out, failure) = (None, None, None);
         Self {

@@ -54,7 +54,7 @@ pub use sight::{
     described,
 };
 pub use streams::Stream;
-pub use told::Prospect;
+pub use told::Foreseen;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};
 
 use body_schema_engine::{design::Problem, estimation::Update, selection::SelectionError};

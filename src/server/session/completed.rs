@@ -41,7 +41,7 @@ enum Whole {
 }
 
 /// What was written last.
-pub(super) type Kept = AsyncMutex<Option<Arc<Completed>>>;
+pub(super) type LastCompleted = AsyncMutex<Option<Arc<Completed>>>;
 
 impl Session {
     /// All of the recording so far; whoever asks while it is written waits for the same file.

@@ -68,9 +68,9 @@ pub(super) struct Session {
     /// … and how many of them by a stream.
     streams: AtomicUsize,
     /// The recording for those who come late.
-    together: together::Kept,
+    together: together::LastTogether,
     /// The recording to take away.
-    completed: completed::Kept,
+    completed: completed::LastCompleted,
     /// Of a robot elsewhere.
     report: AsyncMutex<Option<ReportFiles>>,
 }

@@ -19,7 +19,7 @@ pub(in crate::server) struct Together {
 }
 
 /// What was put together last.
-pub(super) type Kept = Arc<AsyncMutex<Option<Arc<Together>>>>;
+pub(super) type LastTogether = Arc<AsyncMutex<Option<Arc<Together>>>>;
 
 impl Together {
     /// Whether so much has come since that it is worth being made anew: each time it grows by a fifth at least, so that all that

@@ -17,9 +17,9 @@ pub(super) fn checksum<const N: usize>(texts: [&str; N]) -> u32 {
 
 /// Which file a path leads to.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Place(u64, u64);
+pub(super) struct FileId(u64, u64);
 
-impl Place {
+impl FileId {
     /// `None` where there is no file, and on platforms that do not let go of a file's name while it is open.
     pub(super) fn of(path: &Path) -> Option<Self> {
         #[cfg(unix)]

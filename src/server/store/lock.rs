@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{StoreError, checks::Place};
+use super::{StoreError, checks::FileId};
 
 /// The file that is locked; it stays, and means nothing by itself.
 const FILE: &str = "sessions.lock";
@@ -14,7 +14,7 @@ const FILE: &str = "sessions.lock";
 /// A data directory held: the operating system lets go of it when the process ends, however it does.
 pub(super) struct Lock {
     path: PathBuf,
-    place: Option<Place>,
+    place: Option<FileId>,
     /// It is locked as long as it is open.
     _file: File,
 }
@@ -34,7 +34,7 @@ impl Lock {
         let folder = |source| StoreError::Folder { path: directory.to_owned(), source };
         let file = open(&path).map_err(folder)?;
         match file.try_lock() {
-            Ok(()) => Ok(Self { place: Place::of(&path), path, _file: file }),
+            Ok(()) => Ok(Self { place: FileId::of(&path), path, _file: file }),
             Err(TryLockError::WouldBlock) => Err(StoreError::Held { path: directory.to_owned() }),
             Err(TryLockError::Error(source)) => Err(folder(source)),
         }
@@ -42,7 +42,7 @@ impl Lock {
 
     /// Whether it still keeps others away: whoever removes it and makes another would be let in.
     pub(super) fn is_held(&self) -> bool {
-        self.place.is_none() || Place::of(&self.path) == self.place
+        self.place.is_none() || FileId::of(&self.path) == self.place
     }
 }
 

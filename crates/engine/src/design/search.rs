@@ -65,7 +65,7 @@ impl Problem {
         if let Some(sighted) = self.sighted() {
             return sighted.best_design_from(movements, gap, start);
         }
-        let mut search = Search::new(self, movements, start);
+        let mut search = DesignSearch::new(self, movements, start);
         if search.candidates.is_empty() {
             return None;
         }
@@ -99,7 +99,7 @@ fn excess(found: &[(Vec<f64>, f64)], standing: &Standing) -> f64 {
 }
 
 /// A design on its way.
-pub struct Search<'a> {
+pub struct DesignSearch<'a> {
     problem: &'a Problem,
     sensitivity: Sensitivity<'a>,
     /// Poses, rad or m, all of which are seen.
@@ -108,7 +108,7 @@ pub struct Search<'a> {
     shares: Shares<'a>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> DesignSearch<'a> {
     /// Begins with a design, or with one of candidates.
     pub fn new(problem: &'a Problem, movements: usize, start: Option<&Design>) -> Self {
         let candidates = candidates(problem);

@@ -50,7 +50,7 @@ mod pool {
     static TAKEN: AtomicUsize = AtomicUsize::new(0);
 
     /// The place of one who has come from elsewhere, until it is dropped; one of the pool's own threads needs none.
-    pub struct Place {
+    pub struct Seat {
         is_counted: bool,
     }
 
@@ -61,16 +61,16 @@ mod pool {
 
     /// A place in the pool, or `None` while all are taken: one who has little to do does not wait behind those who have much, as
     /// the sessions of a server would, but works alone meanwhile.
-    pub fn taken() -> Option<Place> {
+    pub fn taken() -> Option<Seat> {
         if rayon::current_thread_index().is_some() {
-            return Some(Place { is_counted: false });
+            return Some(Seat { is_counted: false });
         }
         let places = places();
         let one_more = |taken| (taken < places).then_some(taken + 1);
-        TAKEN.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_more).ok().map(|_| Place { is_counted: true })
+        TAKEN.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_more).ok().map(|_| Seat { is_counted: true })
     }
 
-    impl Drop for Place {
+    impl Drop for Seat {
         fn drop(&mut self) {
             if self.is_counted {
                 TAKEN.fetch_sub(1, Ordering::Relaxed);

@@ -2,7 +2,7 @@
 
 use super::{
     Criterion, Partition, Scope, SelectionError,
-    star::{Room, Stars},
+    star::{StarBuffers, Stars},
 };
 use crate::{
     kinematics::JointBox,
@@ -32,7 +32,7 @@ pub(super) fn direct(
     let mut direct = Direct::new(limits.dimension(), settings).map_err(SelectionError::Search)?;
     // What is not feasible is left out posture by posture.
     let around = criterion.filter(|_| !scope.is_constrained()).and_then(Criterion::around_centres);
-    let (mut stars, mut room) = (Stars::new(limits.dimension()), Room::default());
+    let (mut stars, mut room) = (Stars::new(limits.dimension()), StarBuffers::default());
     while let Some(batch) = direct.ask() {
         let values = match &around {
             // The centre of the cube is a star's, but nobody's ray.

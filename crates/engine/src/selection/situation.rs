@@ -13,7 +13,7 @@ pub struct Situation<'a> {
     /// What may be done.
     pub actions: &'a Actions,
     /// What was done.
-    pub history: &'a History,
+    pub history: &'a Past,
     /// What movements are bound to, if to anything.
     pub constraints: Option<&'a Constraints>,
 }
@@ -34,7 +34,7 @@ pub struct KeptSituation {
     /// What could be done.
     pub actions: Actions,
     /// What had been done.
-    pub history: History,
+    pub history: Past,
     /// What movements were bound to, if to anything.
     pub constraints: Option<Constraints>,
 }
@@ -49,7 +49,7 @@ impl KeptSituation {
 
 /// What policies go by of all that happened: made of the list of events, and nothing else.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct History {
+pub struct Past {
     has_moved: bool,
     /// Shared, since a history is copied at every step.
     made: Vec<Arc<[f64]>>,
@@ -69,7 +69,7 @@ pub struct Planned {
     pub committed: usize,
 }
 
-impl History {
+impl Past {
     /// A movement was proposed, with this plan if there is one.
     pub fn proposed(&mut self, plan: Option<&Planned>) {
         if let Some(plan) = plan {

@@ -154,7 +154,7 @@ impl Data {
 }
 
 /// A place: the scale of origins on the chain's grid, and steps of ln τ.
-type Place = (usize, i32);
+type GridPoint = (usize, i32);
 
 /// What the evidence makes of all scales.
 struct Found {
@@ -260,9 +260,9 @@ struct Lattice<'a> {
     zeros: (DMatrix<f64>, Vec<f64>),
     /// Of ln τ.
     step: f64,
-    known: HashMap<Place, f64>,
+    known: HashMap<GridPoint, f64>,
     inverted: Vec<Option<Option<Inverted>>>,
-    starts: Vec<Place>,
+    starts: Vec<GridPoint>,
 }
 
 impl<'a> Lattice<'a> {
@@ -285,7 +285,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// The logarithm of the evidence at a place, with that of its prior; but for what all places have in common.
-    fn at(&mut self, place: Place) -> f64 {
+    fn at(&mut self, place: GridPoint) -> f64 {
         if let Some(known) = self.known.get(&place) {
             return *known;
         }
@@ -294,7 +294,7 @@ impl<'a> Lattice<'a> {
         found
     }
 
-    fn evidence(&mut self, (origins, noise): Place) -> Option<f64> {
+    fn evidence(&mut self, (origins, noise): GridPoint) -> Option<f64> {
         let log_noise = f64::from(noise) * self.step;
         let probability = self.probabilities[origins];
         if log_noise.abs() > REACH || log_noise < self.data.least_log_noise {
@@ -315,7 +315,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// The best place at this scale, wherever τ is.
-    fn climbed(&mut self, (origins, mut noise): Place) -> Place {
+    fn climbed(&mut self, (origins, mut noise): GridPoint) -> GridPoint {
         if self.data.equations == 0.0 {
             return (origins, noise);
         }
@@ -333,9 +333,9 @@ impl<'a> Lattice<'a> {
 
     /// The posterior mean of the scale of origins and of ln τ; `None` where nothing has any evidence.
     fn mean(mut self) -> Option<Mean> {
-        let mut open: Vec<Place> = self.starts.clone().into_iter().map(|start| self.climbed(start)).collect();
+        let mut open: Vec<GridPoint> = self.starts.clone().into_iter().map(|start| self.climbed(start)).collect();
         let mut best = open.clone().into_iter().map(|place| self.at(place)).fold(f64::NEG_INFINITY, f64::max);
-        let mut counted: HashMap<Place, f64> = HashMap::new();
+        let mut counted: HashMap<GridPoint, f64> = HashMap::new();
         // Depth first from the best on: what is found to be negligible later costs little.
         while let Some(place) = open.pop() {
             let evidence = self.at(place);
@@ -356,7 +356,7 @@ impl<'a> Lattice<'a> {
             return None;
         }
         // In one order, whatever that of a hash map is.
-        let mut places: Vec<(Place, f64)> = counted.into_iter().collect();
+        let mut places: Vec<(GridPoint, f64)> = counted.into_iter().collect();
         places.sort_unstable_by_key(|(place, _)| *place);
         let (mut total, mut sums) = (0.0, [0.0; 2]);
         for ((origins, noise), evidence) in places {

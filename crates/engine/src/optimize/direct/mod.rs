@@ -16,7 +16,7 @@ pub use batch::{Batch, Star};
 pub use history::{History, Moment, Shape};
 pub use hull::HullPoint;
 pub use minimize::minimize;
-pub use partition::{Partition, Rectangle};
+pub use partition::{Division, Rectangle};
 pub use plane::{Plane, Projection, contains};
 pub use search::Direct;
 pub use settings::{DirectError, Settings, Variant};

@@ -205,14 +205,14 @@ fn repeat<T: Copy>(buffer: &mut Vec<T>, part: Range<usize>, times: usize) {
 /// A rectangle keeps its number and its centre for good, while its sides shrink. Numbers follow the order in which
 /// the centres were asked for.
 #[derive(Debug, Clone, Copy)]
-pub struct Partition<'a> {
+pub struct Division<'a> {
     pub(super) rectangles: &'a Rectangles,
     pub(super) variant: Variant,
     pub(super) round: usize,
     pub(super) remote: f64,
 }
 
-/// One rectangle of a [`Partition`].
+/// One rectangle of a [`Division`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Rectangle<'a> {
     /// Its centre, where the objective was evaluated.
@@ -232,7 +232,7 @@ pub struct Rectangle<'a> {
     pub potentially_optimal: bool,
 }
 
-impl<'a> Partition<'a> {
+impl<'a> Division<'a> {
     /// How many rectangles there are: as many as values told.
     pub fn len(&self) -> usize {
         self.rectangles.len()
