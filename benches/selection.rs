@@ -10,7 +10,7 @@ use body_schema::{
     model::jacobian,
     optimize::{Direct, Settings, Variant},
     scenario::{Scenario, builtin},
-    selection::{Actions, Active, Criterion, History, Minimiser, Policy, Situation, Weights},
+    selection::{Actions, Active, Criterion, Minimiser, Past, Policy, Situation, Weights},
     sensing::Rig,
 };
 use divan::Bencher;
@@ -87,7 +87,7 @@ fn d_one_active_selection(bencher: Bencher<'_, '_>, name: &str) {
     let case = case(name);
     let active = Active::new(case.weights.clone(), Minimiser::Direct(case.scenario.selection.search));
     let actions = Actions::Box(case.scenario.robot.limits.clone());
-    let history = History::default();
+    let history = Past::default();
     let situation = Situation { belief: &case.belief, actions: &actions, history: &history, constraints: None };
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     bencher.bench_local(|| active.select(&situation, &mut rng).expect("a selection"));

@@ -7,7 +7,7 @@
 use body_schema::{
     estimation::Belief,
     scenario::builtin,
-    selection::{Actions, Active, Criterion, History, Minimiser, Policy, Situation},
+    selection::{Actions, Active, Criterion, Minimiser, Past, Policy, Situation},
     sensing::Rig,
 };
 use nalgebra::DMatrix;
@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let weights = scenario.weights();
     let policy = Active::new(weights.clone(), Minimiser::Direct(scenario.selection.search));
     let actions = Actions::Box(scenario.robot.limits.clone());
-    let history = History::default();
+    let history = Past::default();
     let situation = Situation { belief: &belief, actions: &actions, history: &history, constraints: None };
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let chosen = policy.select(&situation, &mut rng)?;

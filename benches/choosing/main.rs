@@ -16,7 +16,6 @@
 //! | NLopt | `GN_DIRECT_L` with the same budget and the posterior's trace by the textbook's formula, with our Jacobian |
 //!
 //! Which of the two finds the lower value is a matter of the problem: `-- --least` compares them over 40 of each size.
-//! `-- --threads` lets a choice on two threads take turns with one on a single thread.
 //!
 //! SciPy's `direct` takes its turn in a script, `benches/choosing/scipy_direct.py`; `-- --write FILE` writes it the problems, `-- --once`
 //! prints what each costs us.
@@ -34,7 +33,7 @@ use body_schema::{
     model::jacobian,
     optimize::{Direct, Settings, Variant},
     scenario::{Scenario, builtin},
-    selection::{Actions, Active, Criterion, History, Minimiser, Policy, Situation, Weights},
+    selection::{Actions, Active, Criterion, Minimiser, Past, Policy, Situation, Weights},
     sensing::Rig,
 };
 use nalgebra::{DMatrix, Matrix3, MatrixXx3};
@@ -104,11 +103,8 @@ impl Case {
     /// The least value, and by how many evaluations it was found: DIRECT leaves a rectangle that it cannot divide along all its
     /// longest sides.
     fn choose_by(&self, settings: Settings) -> (f64, usize) {
-        self.choose_as(&Active::new(self.weights.clone(), Minimiser::Direct(settings)))
-    }
-
-    fn choose_as(&self, active: &Active) -> (f64, usize) {
-        let history = History::default();
+        let active = Active::new(self.weights.clone(), Minimiser::Direct(settings));
+        let history = Past::default();
         let situation =
             Situation { belief: &self.belief, actions: &self.actions, history: &history, constraints: None };
         let selection = active.select(&situation, &mut ChaCha8Rng::seed_from_u64(1)).expect("a selection");
@@ -239,29 +235,6 @@ fn least() {
     }
 }
 
-/// One choice on a single thread and on two: of what is believed, and of samples of it, which cost as many times as much.
-fn threads() {
-    println!(
-        "microseconds for a choice by 600 evaluations on one thread and on two, and times faster: median (quartiles)"
-    );
-    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-    let (one, two) = (pool(1), pool(2));
-    for samples in [0, 8] {
-        for name in CASES {
-            let case = Case::new(&builtin(name).expect("built in"), SEED);
-            let active = Active::new(case.weights.clone(), Minimiser::Direct(SETTINGS)).sampled(samples);
-            let choose = || case.choose_as(&active).0;
-            let times =
-                race(&mut [("one", Box::new(|| one.install(choose))), ("two", Box::new(|| two.install(choose)))]);
-            let medians = [&times[0], &times[1]].map(|times| spread(times.iter().copied())[0]);
-            let [ratio, least, most] = spread(times[0].iter().zip(&times[1]).map(|(one, two)| one / two));
-            let of = if samples == 0 { String::new() } else { format!(", {samples} samples") };
-            let title = format!("{name}{of}");
-            println!("  {title:22} {:8.1} {:8.1}   {ratio:5.2} ({least:.2} to {most:.2})", medians[0], medians[1]);
-        }
-    }
-}
-
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     if let Some(option) = arguments.iter().position(|argument| argument == "--write") {
@@ -270,9 +243,6 @@ fn main() {
     }
     if arguments.iter().any(|argument| argument == "--once") {
         return once();
-    }
-    if arguments.iter().any(|argument| argument == "--threads") {
-        return threads();
     }
     #[cfg(feature = "nlopt")]
     if arguments.iter().any(|argument| argument == "--least") {

@@ -25,7 +25,7 @@ pub struct Arguments {
     #[command(flatten)]
     scenario: ScenarioArguments,
     /// Seeds: `20` for 1 to 20, or a range with both ends such as `101..120`
-    #[arg(long, default_value = "20", value_name = "SEEDS")]
+    #[arg(long, default_value = "20", value_name = "SEEDS", value_parser = Seeds::counted)]
     seeds: Seeds,
     /// Movements of every run [default: the scenario's]
     #[arg(long, value_name = "N", value_parser = super::steps)]

@@ -1,6 +1,6 @@
 //! `export`: the page without a server.
 
-use std::{collections::BTreeSet, path::PathBuf, str::FromStr};
+use std::{collections::BTreeSet, path::PathBuf};
 
 use anyhow::{Context, Result};
 use body_schema::{
@@ -12,7 +12,7 @@ use body_schema_scenario::Scenario;
 use uuid::Uuid;
 
 use super::{
-    BadInput, files_of, load_scenario, no_person,
+    BadInput, Seeds, files_of, load_scenario, no_person,
     output::{self, Outputs},
     progress, serve,
 };
@@ -35,8 +35,8 @@ pub struct Arguments {
     #[arg(long = "learner", value_name = "NAME", value_delimiter = ',')]
     learners: Vec<String>,
     /// Seeds to record: numbers and ranges with both ends, as 1,4 or 1..5
-    #[arg(long = "seed", value_name = "SEEDS", value_delimiter = ',', default_value = "1")]
-    seeds: Vec<SeedRange>,
+    #[arg(long = "seed", value_name = "SEEDS", value_delimiter = ',', default_value = "1", value_parser = Seeds::named)]
+    seeds: Vec<Seeds>,
     /// Movements of every run, at most 1000 [default: 100, after the change where the body changes]
     #[arg(long, value_name = "N", value_parser = super::steps)]
     steps: Option<u64>,
@@ -49,38 +49,6 @@ pub struct Arguments {
     /// Take the page's panel from DIR, which `cargo run -p body-schema-bundle -- DIR` built
     #[arg(long, value_name = "DIR", hide = true)]
     panel_dir: Option<PathBuf>,
-}
-
-/// One seed, or all from one to another.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct SeedRange {
-    first: u64,
-    last: u64,
-}
-
-/// The most runs: more make a folder that is too large to download.
-const MOST_SEEDS: usize = 200;
-/// The greatest seed that browsers read exactly.
-const MAX_SEED: u64 = (1 << 53) - 1;
-
-impl FromStr for SeedRange {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let number = |part: &str| part.parse::<u64>().map_err(|_| format!("`{part}` is not a whole number"));
-        let (first, last) = text.split_once("..").unwrap_or((text, text));
-        let (first, last) = (number(first)?, number(last)?);
-        if first > last {
-            return Err(format!("the range is empty; write {last}..{first}"));
-        }
-        if last > MAX_SEED {
-            return Err(format!("a page takes seeds up to {MAX_SEED}"));
-        }
-        if (last - first) as usize >= MOST_SEEDS {
-            return Err(format!("at most {MOST_SEEDS} seeds in one go"));
-        }
-        Ok(Self { first, last })
-    }
 }
 
 /// The address of a folder: with a slash at its end.
@@ -96,10 +64,11 @@ pub fn export(arguments: &Arguments) -> Result<()> {
     let scenarios = arguments.scenarios.iter().map(|name| load_scenario(name)).collect::<Result<Vec<Scenario>>>()?;
     let sessions = sessions(arguments)?;
     if scenarios.is_empty() && sessions.is_empty() && (arguments.steps.is_some() || !arguments.learners.is_empty()) {
-        let what = "--steps and --learner are of recorded runs; name their scenarios, or leave both out: the page then computes what its visitors ask for";
+        let what = "--steps and --learner are of recorded runs; name their scenarios, or leave both out: the page then computes what its \
+                    visitors ask for";
         return Err(BadInput(what.to_owned()).into());
     }
-    let seeds: BTreeSet<u64> = arguments.seeds.iter().flat_map(|range| range.first..=range.last).collect();
+    let seeds: BTreeSet<u64> = arguments.seeds.iter().flat_map(Seeds::iter).collect();
     let learners = (!arguments.learners.is_empty()).then_some(arguments.learners.as_slice());
     for scenario in &scenarios {
         no_person(&scenario.chosen(learners)?)?;
@@ -153,15 +122,6 @@ fn sessions(arguments: &Arguments) -> Result<Vec<Session>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn seeds_are_numbers_and_ranges() {
-        let range = |text: &str| text.parse::<SeedRange>().map(|range| (range.first, range.last));
-        assert_eq!((range("7"), range("1..5"), range("3..3")), (Ok((7, 7)), Ok((1, 5)), Ok((3, 3))));
-        for text in ["", "x", "-1", "5..1", "1..", "1..1000", "0..18446744073709551615", "9007199254740992"] {
-            assert!(range(text).is_err(), "{text}");
-        }
-    }
 
     #[test]
     fn an_address_is_that_of_a_folder() {

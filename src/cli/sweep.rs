@@ -25,7 +25,7 @@ pub struct Arguments {
     #[arg(long = "set", value_name = "KEY=V1,V2,…", required = true)]
     axes: Vec<Axis>,
     /// Seeds: `20` for 1 to 20, or a range with both ends
-    #[arg(long, default_value = "1001..1020", value_name = "SEEDS")]
+    #[arg(long, default_value = "1001..1020", value_name = "SEEDS", value_parser = Seeds::counted)]
     seeds: Seeds,
     /// Movements of every run [default: the scenario's]
     #[arg(long, value_name = "N", value_parser = super::steps)]

@@ -189,7 +189,7 @@ impl Connections {
             unread: AtomicBool::new(false),
         });
         self.lock().push(connection.clone());
-        let place = Place { connection, all: self.clone(), _permit: permit };
+        let place = Admitted { connection, all: self.clone(), _permit: permit };
         tokio::spawn(self.clone().attend(stream, place, reached, service.clone(), shutdown.clone()));
     }
 
@@ -235,7 +235,7 @@ impl Connections {
     async fn attend(
         self: Arc<Self>,
         stream: TcpStream,
-        place: Place,
+        place: Admitted,
         reached: Option<SocketAddr>,
         service: TowerToHyperService<Router>,
         shutdown: CancellationToken,
@@ -315,13 +315,13 @@ impl Connections {
 }
 
 /// The place of a connection among all, freed when its stream is closed.
-struct Place {
+struct Admitted {
     connection: Arc<Connection>,
     all: Arc<Connections>,
     _permit: OwnedSemaphorePermit,
 }
 
-impl Drop for Place {
+impl Drop for Admitted {
     fn drop(&mut self) {
         self.all.lock().retain(|other| !Arc::ptr_eq(other, &self.connection));
     }

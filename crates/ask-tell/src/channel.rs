@@ -59,7 +59,7 @@ pub(super) fn shapes(robot: &Robot, rig: &Rig) -> Vec<ChannelShape> {
         shapes.push(ChannelShape { name, shape });
     }
     if !robot.sockets.is_empty() {
-        let sockets = robot.sockets.iter().map(label).collect();
+        let sockets = robot.sockets.iter().map(SocketSpec::label).collect();
         shapes.push(ChannelShape { name: SOCKET.to_owned(), shape: Shape::Sockets { sockets } });
     }
     shapes
@@ -78,11 +78,6 @@ fn named(robot: &Robot, channel: &dyn Channel) -> (String, Shape) {
         (None, 6) => (name, Shape::Pose),
         (None, _) => (name, Shape::Position),
     }
-}
-
-/// A socket's label: its place, if it has one, and its name.
-pub(super) fn label(socket: &SocketSpec) -> String {
-    socket.place.as_ref().map_or_else(|| socket.name.clone(), |place| format!("{place}/{}", socket.name))
 }
 
 impl Shape {

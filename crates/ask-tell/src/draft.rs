@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, sync::Arc};
 
 use super::{
     Ask, Choice, Event, Fault, Happened, Plan, Prepared, Refusal, Session, Suggestion, SuggestionState, Why,
-    channel::label, ledger::Ledger,
+    ledger::Ledger,
 };
 use body_schema_experiment::Agent;
 
@@ -78,7 +78,7 @@ impl Draft {
             client: ask.client.clone(),
             joints: robot.names.clone(),
             configuration: self.ledger.named(&selection.movement.configuration),
-            socket: socket.map(label),
+            socket: socket.map(|socket| socket.label()),
             expected_gain: finite(selection.gain),
             expected_error_mm_after: finite(prospect.expected_error_m.map(|metres| metres * 1e3)),
             chance_seen: finite(Some(prospect.chance_seen)).unwrap_or(0.0),

@@ -8,7 +8,7 @@ use std::{
 use super::{
     Answer, ChannelShape, Event, Happened, Observation, Outcome, Plan, Setup, SetupError, Suggestion, SuggestionState,
     Why,
-    channel::{label, shapes},
+    channel::shapes,
     checkpoint::{Checkpoint, Hear, Replayed, excluded},
 };
 use body_schema_engine::selection::{Movement, Planned, Selection};
@@ -240,7 +240,7 @@ impl Ledger {
         let positions = robot.names.iter().map(|name| suggestion.configuration.get(name).copied());
         let configuration = positions.collect::<Option<Vec<f64>>>().ok_or("it is about another robot")?;
         let known = |wanted: &String| {
-            let found = robot.sockets.iter().position(|socket| label(socket) == *wanted);
+            let found = robot.sockets.iter().position(|socket| socket.label() == *wanted);
             found.ok_or_else(|| format!("there is no socket `{wanted}`"))
         };
         Ok(Movement { configuration, row: None, socket: suggestion.socket.as_ref().map(known).transpose()? })

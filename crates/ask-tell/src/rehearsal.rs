@@ -344,7 +344,7 @@ mod tests {
             };
             measurements.insert(shape.name.clone(), told);
         }
-        let held = executed.movement.socket.map(|socket| super::super::channel::label(&robot.sockets[socket]));
+        let held = executed.movement.socket.map(|socket| robot.sockets[socket].label());
         measurements.extend(held.map(|held| ("socket".to_owned(), json!(held))));
         let configuration = robot.names.iter().cloned().zip(executed.movement.configuration.iter().copied()).collect();
         Observation { suggestion_id: None, configuration, measurements }

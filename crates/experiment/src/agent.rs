@@ -13,16 +13,13 @@ use std::{collections::VecDeque, sync::Arc};
 use serde::{Deserialize, Serialize};
 use web_time::Instant;
 
-use super::{
-    standpoint::{OwnedStandpoint, Standpoint},
-    streams::Stream,
-};
+use super::streams::Stream;
 use body_schema_engine::{
     estimation::{Belief, EstimationError, Estimator, Misfit, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
     selection::{
-        Actions, Appraisal, Constraints, History, Movement, Planned, Policy, Search, Selection, SelectionError,
-        Situation,
+        Actions, Appraisal, Constraints, KeptSituation, Movement, Past, Planned, Policy, Search, Selection,
+        SelectionError, Situation,
     },
     sensing::{Observation, Refused},
 };
@@ -41,7 +38,7 @@ pub struct Agent {
     pending: Vec<Proposal>,
     /// The plan of the latest proposal that was carried out, with its ordinal.
     carried_out: Option<(u64, Planned)>,
-    history: History,
+    history: Past,
     failure: Option<String>,
 }
 
@@ -108,7 +105,7 @@ impl Agent {
         limits: JointBox,
         seed: u64,
     ) -> Self {
-        let (pending, history) = (Vec::new(), History::default());
+        let (pending, history) = (Vec::new(), Past::default());
         let policy = Arc::from(policy);
         let (constraints, carried_out, failure) = (None, None, None);
         Self {
@@ -259,32 +256,32 @@ impl Agent {
     fn choose(&self) -> Result<Selection, SelectionError> {
         let mut rng = Stream::Policy.keyed(self.seed, self.proposals);
         if self.pending.is_empty() {
-            return self.policy.select(&self.standpoint().situation(), &mut rng);
+            return self.policy.select(&self.situation(), &mut rng);
         }
-        self.policy.select(&self.foreseen().borrowed().situation(), &mut rng)
+        self.policy.select(&self.foreseen().borrowed(), &mut rng)
     }
 
-    /// Where it expects to stand once all that is pending is carried out.
-    pub fn foreseen(&self) -> OwnedStandpoint {
-        let mut standpoint = self.standpoint().to_owned();
+    /// The situation that it expects once all that is pending is carried out.
+    pub fn foreseen(&self) -> KeptSituation {
+        let mut foreseen = self.situation().kept();
         for Proposal { selection, .. } in &self.pending {
-            self.foresee(&mut standpoint, &selection.movement);
+            self.foresee(&mut foreseen, &selection.movement);
         }
-        standpoint
+        foreseen
     }
 
-    /// Goes on to where it expects to stand after a movement. Tells the chance that anything is seen there.
-    pub fn foresee(&self, standpoint: &mut OwnedStandpoint, movement: &Movement) -> f64 {
+    /// Goes on to the situation that it expects after a movement. Tells the chance that anything is seen there.
+    pub fn foresee(&self, foreseen: &mut KeptSituation, movement: &Movement) -> f64 {
         let Movement { configuration, socket, .. } = movement;
-        let belief = standpoint.belief.held_in(*socket);
-        let situation = Situation { belief: &belief, ..standpoint.borrowed().situation() };
+        let belief = foreseen.belief.held_in(*socket);
+        let situation = Situation { belief: &belief, ..foreseen.borrowed() };
         // What is not expected to be seen is not expected to teach.
         let appraisal = self.policy.appraise(&situation, &self.limits, configuration);
         let chance = appraisal.map_or(1.0, |appraisal| appraisal.chance);
         drop(belief);
-        standpoint.belief.after(movement, |_| chance);
-        standpoint.history.expect(configuration);
-        standpoint.actions.use_up(movement);
+        foreseen.belief.after(movement, |_| chance);
+        foreseen.history.expect(configuration);
+        foreseen.actions.use_up(movement);
         chance
     }
 
@@ -307,7 +304,7 @@ impl Agent {
     /// [`SelectionError::NoConfiguration`] if there is not one position for each joint, [`SelectionError::Refused`] if
     /// the constraints exclude the posture; others if the criterion cannot be computed there.
     pub fn set(&mut self, configuration: &[f64]) -> Result<Appraisal, SelectionError> {
-        let appraisal = self.appraise(self.standpoint(), configuration)?;
+        let appraisal = self.appraise(self.situation(), configuration)?;
         self.refuse(&[], configuration)?;
         let selection = Selection {
             criterion: Some(appraisal.criterion),
@@ -479,38 +476,38 @@ impl Agent {
         Ok(())
     }
 
-    /// Where it stands now.
-    pub fn standpoint(&self) -> Standpoint<'_> {
-        let (actions, history, constraints) = (&self.actions, &self.history, &self.constraints);
-        Standpoint { belief: self.belief(), actions, history, constraints }
+    /// What it would choose from now.
+    pub fn situation(&self) -> Situation<'_> {
+        let (actions, history, constraints) = (&self.actions, &self.history, self.constraints.as_deref());
+        Situation { belief: self.belief(), actions, history, constraints }
     }
 
-    /// What a movement would teach it where it stood at `standpoint`, by what it chooses by.
+    /// What a movement would teach it in a `situation`, by what it chooses by.
     ///
     /// # Errors
     ///
     /// [`SelectionError::NoConfiguration`] if there is not one position for each joint; others if the criterion cannot
     /// be computed there.
-    pub fn appraise(&self, standpoint: Standpoint<'_>, configuration: &[f64]) -> Result<Appraisal, SelectionError> {
+    pub fn appraise(&self, situation: Situation<'_>, configuration: &[f64]) -> Result<Appraisal, SelectionError> {
         if configuration.len() != self.limits.dimension() {
             return Err(SelectionError::NoConfiguration(configuration.len()));
         }
-        let socket = standpoint.actions.movement_to(standpoint.belief, configuration).socket;
-        let belief = standpoint.belief.held_in(socket);
-        let situation = Situation { belief: &belief, ..standpoint.situation() };
+        let socket = situation.actions.movement_to(situation.belief, configuration).socket;
+        let belief = situation.belief.held_in(socket);
+        let situation = Situation { belief: &belief, ..situation };
         self.policy.appraise(&situation, &self.limits, configuration)
     }
 
-    /// How the criterion of the next movement looked over the joint box at `standpoint`, if its policy plans.
+    /// How the criterion of the next movement looked over the joint box in a `situation`, if its policy plans.
     ///
     /// # Errors
     ///
-    /// [`SelectionError`] if the policy cannot repeat its search at that standpoint.
-    pub fn explain(&self, standpoint: Standpoint<'_>) -> Result<Option<Search>, SelectionError> {
+    /// [`SelectionError`] if the policy cannot repeat its search there.
+    pub fn explain(&self, situation: Situation<'_>) -> Result<Option<Search>, SelectionError> {
         // Of manifolds there is no partition of the joint box to show, recorded or not.
-        if standpoint.belief.rig.holds(0).is_some() {
+        if situation.belief.rig.holds(0).is_some() {
             return Ok(None);
         }
-        self.policy.explain(&standpoint.situation(), &self.limits)
+        self.policy.explain(&situation, &self.limits)
     }
 }

@@ -12,13 +12,12 @@ use super::{
     chosen::{Appraised, ChoiceError, Chosen},
     outcome::{MovementOutcome, Standing},
     setting::LearnerSetting,
-    standpoint::{OwnedStandpoint, Standpoint},
 };
 use body_schema_engine::{
     estimation::{Belief, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
     model::{Hand, Workspace},
-    selection::{Movement, SelectionError, Weights},
+    selection::{KeptSituation, Movement, SelectionError, Situation, Weights},
     sensing::Observation,
 };
 
@@ -40,9 +39,9 @@ pub struct Learner {
     workspace: Workspace,
     /// It calls itself settled when its expected prediction error stays below this, metres.
     settled_below_m: f64,
-    /// Where it stood before its last movement; at the start, where it stands.
-    before: OwnedStandpoint,
-    /// The gain of the best movement that DIRECT finds, once asked for, at the standpoint before and at the present one;
+    /// The situation before its last movement; at the start, the present one.
+    before: KeptSituation,
+    /// The gain of the best movement that DIRECT finds, once asked for, in the situation before and in the present one;
     /// `None` where its policy does not search.
     best_gain_before: OnceLock<Option<f64>>,
     best_gain: OnceLock<Option<f64>>,
@@ -71,7 +70,7 @@ impl Learner {
         workspace: impl Into<Workspace>,
         settled_below_m: f64,
     ) -> Self {
-        let before = agent.standpoint().to_owned();
+        let before = agent.situation().kept();
         Self {
             setting,
             agent,
@@ -160,7 +159,7 @@ impl Learner {
             SelectionError::Refused(why) => ChoiceError::Configuration(format!("is not feasible: {why}")),
             error => error.into(),
         })?;
-        let best_gain = *self.best_gain.get_or_init(|| self.searched_gain(self.agent.standpoint()));
+        let best_gain = *self.best_gain.get_or_init(|| self.searched_gain(self.agent.situation()));
         let (configuration, estimate) = (configuration.to_vec(), self.belief().state.clone());
         Ok(Appraised { configuration, appraisal, estimate, best_gain })
     }
@@ -170,14 +169,14 @@ impl Learner {
         self.agent.failure().map(str::to_owned).or(self.stopped.as_ref().map(ToString::to_string))
     }
 
-    /// The gain of the best movement that DIRECT finds at a standpoint, for a policy that explains itself by one.
-    fn searched_gain(&self, standpoint: Standpoint<'_>) -> Option<f64> {
-        let partition = self.agent.explain(standpoint).ok()??.partition();
+    /// The gain of the best movement that DIRECT finds in a situation, for a policy that explains itself by one.
+    fn searched_gain(&self, situation: Situation<'_>) -> Option<f64> {
+        let partition = self.agent.explain(situation).ok()??.partition();
         let values = partition.leaves.iter().filter_map(|leaf| Some((leaf, leaf.value?)));
         let (best, _) = values.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let centre = partition.searched(self.limits()).from_unit(&best.centre);
         // Without the price of the travel there.
-        Some(self.agent.appraise(standpoint, &centre).ok()?.gain)
+        Some(self.agent.appraise(situation, &centre).ok()?.gain)
     }
 
     /// Its agent.
@@ -203,7 +202,7 @@ impl Learner {
         observation: Observation,
     ) -> Result<(MovementOutcome, Update), AbsorbError> {
         let Movement { configuration, row, socket } = movement.clone();
-        let before = self.agent.standpoint().to_owned();
+        let before = self.agent.situation().kept();
         let predicted_marker = before.belief.state.marker_at(&configuration);
         let measured_marker = match before.belief.state.hand {
             Hand::Target(hand) => observation.position(&before.belief.rig, hand),
@@ -256,12 +255,12 @@ impl Learner {
         let not_searched = || ChoiceError::NotSearched(self.setting.name.clone());
         let movement = movement.ok_or_else(not_searched)?;
         let selection = &movement.proposal.as_ref().ok_or_else(not_searched)?.selection;
-        let (before, after) = (self.before.borrowed(), self.agent.standpoint());
+        let (before, after) = (self.before.borrowed(), self.agent.situation());
         let search = match (&selection.plan, &selection.search) {
             (None, Some(search)) => search.clone(),
             _ => self.agent.explain(before)?.ok_or_else(not_searched)?,
         };
-        let value = |standpoint| self.agent.appraise(standpoint, &movement.configuration).map(|it| it.before).ok();
+        let value = |situation| self.agent.appraise(situation, &movement.configuration).map(|it| it.before).ok();
         let (before, after) = (value(before), value(after));
         Ok(Chosen { configuration: movement.configuration.clone(), search, limits, before, after })
     }

@@ -21,7 +21,6 @@ mod outcome;
 mod remarks;
 mod setting;
 mod sight;
-mod standpoint;
 mod streams;
 mod told;
 mod world;
@@ -39,9 +38,8 @@ pub use metrics::{
 pub use outcome::{LearnerOutcome, MovementOutcome, Standing, StepOutcome};
 pub use setting::{Body, ChannelSetting, JointSetting, LearnerSetting, Setting, SocketSetting, channels};
 pub use sight::Reading;
-pub use standpoint::{OwnedStandpoint, Standpoint};
 pub use streams::Stream;
-pub use told::Prospect;
+pub use told::Foreseen;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};
 
 use body_schema_engine::{design::Problem, estimation::Update, selection::SelectionError};

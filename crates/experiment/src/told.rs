@@ -8,7 +8,7 @@ use body_schema_engine::{
 
 /// What is expected of a proposal, once all that was pending before it is carried out.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Prospect {
+pub struct Foreseen {
     /// The error of predictions over the workspace that the learner expects of itself after it, metres; `None` without a
     /// covariance.
     pub expected_error_m: Option<f64>,
@@ -40,7 +40,7 @@ impl Experiment {
     /// # Errors
     ///
     /// [`SelectionError`] where nothing can be chosen.
-    pub fn next_proposal(&self) -> Result<(Proposal, Prospect), SelectionError> {
+    pub fn next_proposal(&self) -> Result<(Proposal, Foreseen), SelectionError> {
         let learner = self.learners.first().ok_or(SelectionError::Exhausted)?;
         let agent = learner.agent();
         let proposal = agent.next_proposal()?;
@@ -48,10 +48,10 @@ impl Experiment {
         let before = agent.pending().last().map(|last| last.selection.movement.configuration.as_slice());
         let from = before.or(agent.posture());
         let travel = from.map(|from| travel(from, &movement.configuration));
-        let mut standpoint = agent.foreseen();
-        let chance_seen = agent.foresee(&mut standpoint, movement);
-        let expected_error_m = standpoint.belief.expected_error_m(learner.workspace());
-        Ok((proposal, Prospect { expected_error_m, chance_seen, travel }))
+        let mut foreseen = agent.foreseen();
+        let chance_seen = agent.foresee(&mut foreseen, movement);
+        let expected_error_m = foreseen.belief.expected_error_m(learner.workspace());
+        Ok((proposal, Foreseen { expected_error_m, chance_seen, travel }))
     }
 
     /// The first learner takes in a movement that a robot elsewhere has made, and what was observed after it. It is

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{
     PaperError, Plan,
     experiments::{Kind, PaperExperiment},
-    outcome::{LearnedJoint, Outcome, Search, Timing, Trial, is_kept},
+    outcome::{LearnedJoint, Outcome, Searched, Timing, Trial, is_kept},
 };
 use body_schema_engine::{design::best_designs, optimize::History};
 use body_schema_experiment::{Experiment, ExperimentError, MovementOutcome};
@@ -118,7 +118,7 @@ impl Measurement<'_> {
 
     /// The search of one choice. Its partition comes with the outcome; the search is told the same values once more, for
     /// its hull.
-    fn search(&self, variant: &str, step: u64) -> Result<Search, PaperError> {
+    fn search(&self, variant: &str, step: u64) -> Result<Searched, PaperError> {
         let scenario = self.with(&[("selection.variant", toml::Value::String(variant.to_owned()))])?;
         let seed = *self.plan.seeds_of(self.experiment).start();
         let mut experiment = self.start(&scenario, seed)?;
@@ -131,7 +131,7 @@ impl Measurement<'_> {
         let values: Vec<f64> = partition.leaves.iter().map(|leaf| leaf.value.unwrap_or(f64::NAN)).collect();
         let direct = History::replay(scenario.robot.limits.dimension(), scenario.selection.search, &values)?.search;
         (self.tick)();
-        Ok(Search {
+        Ok(Searched {
             variant: variant.to_owned(),
             sizes: direct.partition().iter().map(|rectangle| rectangle.size).collect(),
             hull: direct.hull().to_vec(),

@@ -14,7 +14,7 @@ pub enum Outcome {
     /// The time of choosing.
     Timing(Timing),
     /// The searches of DIRECT, in both variants.
-    Searches(Vec<Search>),
+    Searches(Vec<Searched>),
 }
 
 /// One comparison over all seeds.
@@ -52,7 +52,7 @@ pub struct Timing {
 
 /// One search by DIRECT.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Search {
+pub struct Searched {
     /// `direct` or `direct-l`.
     pub variant: String,
     /// The rectangles.

@@ -81,7 +81,7 @@ fn digest(mut bytes: impl io::Read) -> io::Result<String> {
 }
 
 #[derive(Serialize, Deserialize)]
-struct Kept<F, O> {
+struct Remembered<F, O> {
     fingerprint: F,
     outcome: O,
 }
@@ -101,13 +101,13 @@ impl Store {
     /// The outcome of this fingerprint, if it is kept.
     pub fn load(&self, fingerprint: &Fingerprint) -> Option<Outcome> {
         let text = fs::read_to_string(self.path(&fingerprint.experiment)).ok()?;
-        let kept: Kept<Fingerprint, Outcome> = serde_json::from_str(&text).ok()?;
+        let kept: Remembered<Fingerprint, Outcome> = serde_json::from_str(&text).ok()?;
         (fingerprint.build.is_some() && kept.fingerprint == *fingerprint).then_some(kept.outcome)
     }
 
     /// Stores an outcome.
     pub fn save(&self, fingerprint: &Fingerprint, outcome: &Outcome) -> Result<(), PaperError> {
-        let text = serde_json::to_string(&Kept { fingerprint, outcome })?;
+        let text = serde_json::to_string(&Remembered { fingerprint, outcome })?;
         let path = self.path(&fingerprint.experiment);
         write(&path, text.as_bytes())
     }

@@ -20,7 +20,7 @@ pub(super) enum Keep {
 /// The order of chunks. What is between steps cannot be put together with what is at them, and what says that they are
 /// complete comes after both.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Place {
+enum Order {
     Always,
     Steps,
     Between,
@@ -31,7 +31,7 @@ enum Place {
 pub(super) fn put_together(stream: Vec<u8>, keep: Keep) -> Result<Vec<LogMsg>, RecordingError> {
     let mut messages = Vec::new();
     let last = EntityPath::from(COMPLETE);
-    let mut chunks: BTreeMap<(Place, EntityPath), (StoreId, Vec<Chunk>)> = BTreeMap::new();
+    let mut chunks: BTreeMap<(Order, EntityPath), (StoreId, Vec<Chunk>)> = BTreeMap::new();
     for message in decoded::messages(Cursor::new(stream)) {
         match message.map_err(RecordingError::Encode)? {
             LogMsg::ArrowMsg(store, message) if store.is_recording() => {
@@ -43,10 +43,10 @@ pub(super) fn put_together(stream: Vec<u8>, keep: Keep) -> Result<Vec<LogMsg>, R
                 };
                 let entity = chunk.entity_path().clone();
                 let place = match is_between {
-                    _ if chunk.is_static() => Place::Always,
-                    false => Place::Steps,
-                    true if entity == last => Place::Complete,
-                    true => Place::Between,
+                    _ if chunk.is_static() => Order::Always,
+                    false => Order::Steps,
+                    true if entity == last => Order::Complete,
+                    true => Order::Between,
                 };
                 let key = (place, entity);
                 chunks.entry(key).or_insert_with(|| (store, Vec::new())).1.push(chunk);

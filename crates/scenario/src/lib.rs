@@ -43,7 +43,7 @@ use body_schema_engine::{
     selection::{Constraints, CriterionUnits, Planning, Watch, Weights},
     sensing::{Equipment, Loss, Observation, Rig, Spacing},
 };
-use body_schema_experiment::{Body, Outliers, Thresholds};
+use body_schema_experiment::{Body, Outliers, SocketSetting, Thresholds};
 use body_schema_robot::{Chain, Urdf};
 
 /// A validated scenario.
@@ -208,7 +208,8 @@ pub struct SocketSpec {
 impl SocketSpec {
     /// Its place and its name, as one label.
     pub fn label(&self) -> String {
-        self.place.as_ref().map_or_else(|| self.name.clone(), |place| format!("{place}/{}", self.name))
+        let (name, place) = (self.name.clone(), self.place.clone());
+        SocketSetting { name, place, at: None, held_out: false }.label()
     }
 }
 

@@ -15,7 +15,7 @@ use tokio::{
 };
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 
-use super::Place;
+use super::Admitted;
 
 /// A TCP stream with its place among the connections. It fails when nothing that is written was taken for a while, and when all
 /// connections are cancelled; a WebSocket that takes it over keeps both.
@@ -27,7 +27,7 @@ pub(super) struct Stream {
     broken: Pin<Box<WaitForCancellationFutureOwned>>,
     /// Runs while the rest of a request is taken that was refused.
     draining: Option<Pin<Box<Sleep>>>,
-    place: Place,
+    place: Admitted,
 }
 
 /// How long the rest of a refused request is read, so that its sender comes to read the answer: if the connection were closed with
@@ -37,7 +37,7 @@ const DRAINED_WITHIN: Duration = Duration::from_secs(2);
 const DRAINED_BYTES: usize = 16 << 10;
 
 impl Stream {
-    pub(super) fn new(tcp: TcpStream, write_timeout: Duration, broken: CancellationToken, place: Place) -> Self {
+    pub(super) fn new(tcp: TcpStream, write_timeout: Duration, broken: CancellationToken, place: Admitted) -> Self {
         Self { tcp, write_timeout, stalled: None, broken: Box::pin(broken.cancelled_owned()), draining: None, place }
     }
 

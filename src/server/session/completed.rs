@@ -40,7 +40,7 @@ enum Whole {
 }
 
 /// The recording that was written last.
-pub(super) type Kept = AsyncMutex<Option<Arc<Completed>>>;
+pub(super) type LastCompleted = AsyncMutex<Option<Arc<Completed>>>;
 
 impl Session {
     /// All of the recording so far; requests that come while it is written wait for the same file.

@@ -67,9 +67,9 @@ pub(super) struct Session {
     /// … and how many of them follow by a stream.
     streams: AtomicUsize,
     /// The recording, put together for late followers.
-    together: together::Kept,
+    together: together::LastTogether,
     /// The recording for downloads.
-    completed: completed::Kept,
+    completed: completed::LastCompleted,
     /// The report of a robot elsewhere.
     report: AsyncMutex<Option<ReportFiles>>,
 }

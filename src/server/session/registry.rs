@@ -323,7 +323,7 @@ mod tests {
             scenario: scenario.to_owned(),
             seed: 1,
             learners: None,
-            ellipsoids: EllipsoidSize::default(),
+            ellipsoids: Default::default(),
         };
         let session = sessions.open(new("arm-6dof")).await.expect("a session");
         session.make_steps(2, None, 0).await.expect("steps");
@@ -366,7 +366,7 @@ mod tests {
             scenario: "arm-6dof".to_owned(),
             seed: 1,
             learners: Some(vec!["random".to_owned()]),
-            ellipsoids: EllipsoidSize::default(),
+            ellipsoids: Default::default(),
         };
         let session = sessions.open(new).await.expect("a session");
         let made = session.make_steps(2, None, 0).await.expect("steps");
@@ -384,7 +384,7 @@ mod tests {
             scenario: "arm-6dof".to_owned(),
             seed: 1,
             learners: Some(vec!["random".to_owned()]),
-            ellipsoids: EllipsoidSize::default(),
+            ellipsoids: Default::default(),
         };
         let (first, second) = (sessions.open(new.clone()).await.expect("one"), sessions.open(new).await.expect("two"));
         first.make_steps(300, None, 0).await.expect("the last command may overshoot");

@@ -19,7 +19,7 @@ pub(in crate::server) struct Together {
 }
 
 /// The recording that was put together last.
-pub(super) type Kept = Arc<AsyncMutex<Option<Arc<Together>>>>;
+pub(super) type LastTogether = Arc<AsyncMutex<Option<Arc<Together>>>>;
 
 impl Together {
     /// Whether so much has come since that it should be made anew: when the recording has grown by a fifth at least, so that all

@@ -17,9 +17,9 @@ pub(super) fn checksum<const N: usize>(texts: [&str; N]) -> u32 {
 
 /// The identity of the file that a path leads to.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Place(u64, u64);
+pub(super) struct FileId(u64, u64);
 
-impl Place {
+impl FileId {
     /// The identity; `None` if there is no file, and on platforms that do not release a file's name while it is open.
     pub(super) fn of(path: &Path) -> Option<Self> {
         #[cfg(unix)]

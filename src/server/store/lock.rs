@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{StoreError, checks::Place};
+use super::{StoreError, checks::FileId};
 
 /// The name of the lock file; it stays, and means nothing by itself.
 const FILE: &str = "sessions.lock";
@@ -14,7 +14,7 @@ const FILE: &str = "sessions.lock";
 /// A held data directory. The operating system releases it when the process ends, however it ends.
 pub(super) struct Lock {
     path: PathBuf,
-    place: Option<Place>,
+    place: Option<FileId>,
     /// The lock file, locked as long as it is open.
     _file: File,
 }
@@ -34,7 +34,7 @@ impl Lock {
         let folder = |source| StoreError::Folder { path: directory.to_owned(), source };
         let file = open(&path).map_err(folder)?;
         match file.try_lock() {
-            Ok(()) => Ok(Self { place: Place::of(&path), path, _file: file }),
+            Ok(()) => Ok(Self { place: FileId::of(&path), path, _file: file }),
             Err(TryLockError::WouldBlock) => Err(StoreError::Held { path: directory.to_owned() }),
             Err(TryLockError::Error(source)) => Err(folder(source)),
         }
@@ -42,7 +42,7 @@ impl Lock {
 
     /// Whether it still keeps others away: if the lock file was removed and made anew, others would be let in.
     pub(super) fn is_held(&self) -> bool {
-        self.place.is_none() || Place::of(&self.path) == self.place
+        self.place.is_none() || FileId::of(&self.path) == self.place
     }
 }
 

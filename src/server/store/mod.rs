@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 pub use checkpoints::{EVERY, Saved, build, packed, unpacked};
-use checks::{Place, checksum};
+use checks::{FileId, checksum};
 pub use error::StoreError;
 use lock::Lock;
 pub use repair::{Finding, Held, State};
@@ -44,7 +44,7 @@ pub struct Store {
     /// The path in errors.
     path: PathBuf,
     /// The identity of the file when it was opened.
-    place: Option<Place>,
+    place: Option<FileId>,
     /// The version of its form.
     version: u32,
     /// The most sessions that are kept.
@@ -160,7 +160,7 @@ impl Store {
     }
 
     fn of(connection: Connection, path: PathBuf, version: u32, locks: Vec<Lock>) -> Self {
-        let (place, connection, left) = (Place::of(&path), Mutex::new(connection), AtomicU64::new(length(&path)));
+        let (place, connection, left) = (FileId::of(&path), Mutex::new(connection), AtomicU64::new(length(&path)));
         let (most, most_bytes, damage) = (usize::MAX, u64::MAX, Vec::new());
         Self { connection, path, place, version, most, most_bytes, damage, left, locks }
     }
@@ -386,7 +386,7 @@ impl Store {
     fn is_there(&self) -> Result<(), StoreError> {
         let path = || self.path.clone();
         match &self.place {
-            Some(place) if Place::of(&self.path).as_ref() != Some(place) => Err(StoreError::Gone { path: path() }),
+            Some(place) if FileId::of(&self.path).as_ref() != Some(place) => Err(StoreError::Gone { path: path() }),
             Some(_) if length(&self.path) != self.left.load(Ordering::Relaxed) => {
                 Err(StoreError::Changed { path: path() })
             }

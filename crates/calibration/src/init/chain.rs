@@ -5,14 +5,14 @@ use body_schema_engine::kinematics::JointKind;
 use body_schema_robot::{Chain, Follows, JointEnds, Urdf, UrdfError};
 
 /// The search for the chain.
-pub struct Search<'a> {
+pub struct ChainSearch<'a> {
     pub sources: &'a Sources<'a>,
     pub urdf: &'a Urdf,
     /// The table's titles.
     pub titles: &'a [String],
 }
 
-impl Search<'_> {
+impl ChainSearch<'_> {
     /// The chain that was asked for, or else the one that the columns move; how it was found is added to `guesses`.
     ///
     /// # Errors

@@ -14,7 +14,7 @@ mod written;
 use body_schema_robot::{Urdf, UrdfError};
 use body_schema_scenario::Scenario;
 use body_schema_table::{Table, TableError};
-use chain::Search;
+use chain::ChainSearch;
 use columns::Measured;
 use places::Held;
 use written::{Sockets, written};
@@ -94,7 +94,7 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     if let Some(error) = titles.separated() {
         return Err(of_table(error));
     }
-    let chain = Search { sources, urdf: &urdf, titles: titles.all() }.chain(&mut guesses)?;
+    let chain = ChainSearch { sources, urdf: &urdf, titles: titles.all() }.chain(&mut guesses)?;
     let joints: Vec<String> = chain.readings.iter().map(|reading| reading.name.clone()).collect();
     guesses.push(format!("joints: {}, by the titles of columns", joints.join(", ")));
     let of_joints = chain.readings.iter();

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Problem, balance::Shares, search::Search, sensitivity::Sensitivity};
+use super::{Problem, balance::Shares, search::DesignSearch, sensitivity::Sensitivity};
 use crate::{
     kinematics::JointBox,
     model::{
@@ -132,7 +132,7 @@ proptest! {
 #[test]
 fn a_sensitivity_that_is_no_number_is_nobodys_favourite() {
     let problem = random_problem(&mut ChaCha8Rng::seed_from_u64(1006), 6, None);
-    let mut search = Search::new(&problem, 20, None);
+    let mut search = DesignSearch::new(&problem, 20, None);
     let standing = search.balance(1e-6).expect("informative");
     let wanted = search.favoured(&standing, 6);
     let n = problem.limits.dimension();

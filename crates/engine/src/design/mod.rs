@@ -40,7 +40,7 @@ pub use counting::{General, general_movements, movements_by_counting};
 pub use search::Design;
 #[cfg(feature = "testing")]
 #[doc(hidden)]
-pub use search::Search;
+pub use search::DesignSearch;
 
 use std::sync::Arc;
 

@@ -66,7 +66,7 @@ impl Problem {
         if let Some(sighted) = self.sighted() {
             return sighted.best_design_from(movements, gap, start);
         }
-        let mut search = Search::new(self, movements, start);
+        let mut search = DesignSearch::new(self, movements, start);
         if search.candidates.is_empty() {
             return None;
         }
@@ -100,7 +100,7 @@ fn excess(found: &[(Vec<f64>, f64)], standing: &Standing) -> f64 {
 }
 
 /// A design that is being searched.
-pub struct Search<'a> {
+pub struct DesignSearch<'a> {
     problem: &'a Problem,
     sensitivity: Sensitivity<'a>,
     /// Poses, rad or m, all of which are seen.
@@ -109,7 +109,7 @@ pub struct Search<'a> {
     shares: Shares<'a>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> DesignSearch<'a> {
     /// Begins with a given design, or with one made of candidates.
     pub fn new(problem: &'a Problem, movements: usize, start: Option<&Design>) -> Self {
         let candidates = candidates(problem);

@@ -100,17 +100,8 @@ impl JointBox {
     /// The configuration that `point` stands for, one coordinate per joint. It is within the limits whatever rounding
     /// does; a coordinate below 0 or above 1 means the limit.
     pub fn from_unit(&self, point: &[f64]) -> Vec<f64> {
-        let mut configuration = vec![0.0; self.dimension()];
-        self.write_from_unit(point, &mut configuration);
-        configuration
-    }
-
-    /// Writes to `configuration` what [`from_unit`](Self::from_unit) returns.
-    pub(crate) fn write_from_unit(&self, point: &[f64], configuration: &mut [f64]) {
         debug_assert_eq!(point.len(), self.dimension(), "one coordinate per joint");
-        for (joint, (position, x)) in configuration.iter_mut().zip(point).enumerate() {
-            *position = self.along_from_unit(joint, *x);
-        }
+        point.iter().enumerate().map(|(joint, x)| self.along_from_unit(joint, *x)).collect()
     }
 
     /// The position of one joint at a coordinate of the unit cube.

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::{
     elementary,
-    lanes::{self, Frame, Lanes, Vector},
+    lanes::{self, Lanes, Rotations, Vector},
 };
 
 /// Numbers, vectors and rotations of one posture or of several postures side by side.
@@ -143,7 +143,7 @@ impl Numbers for Plain {
 impl<S: Simd> Numbers for S {
     type Number = Lanes<S>;
     type Vector = Vector<S>;
-    type Rotation = Frame<S>;
+    type Rotation = Rotations<S>;
     const COUNT: usize = Lanes::<S>::LEN;
 
     #[inline(always)]
@@ -157,8 +157,8 @@ impl<S: Simd> Numbers for S {
     }
 
     #[inline(always)]
-    fn rotation(self, r: &Matrix3<f64>) -> Frame<S> {
-        Frame::splat(self, r)
+    fn rotation(self, r: &Matrix3<f64>) -> Rotations<S> {
+        Rotations::splat(self, r)
     }
 
     #[inline(always)]
@@ -197,27 +197,27 @@ impl<S: Simd> Numbers for S {
     }
 
     #[inline(always)]
-    fn columns(r: &Frame<S>) -> [Vector<S>; 3] {
+    fn columns(r: &Rotations<S>) -> [Vector<S>; 3] {
         r.0
     }
 
     #[inline(always)]
-    fn of_columns(columns: [Vector<S>; 3]) -> Frame<S> {
-        Frame(columns)
+    fn of_columns(columns: [Vector<S>; 3]) -> Rotations<S> {
+        Rotations(columns)
     }
 
     #[inline(always)]
-    fn times(r: &Frame<S>, v: &Vector3<f64>) -> Vector<S> {
+    fn times(r: &Rotations<S>, v: &Vector3<f64>) -> Vector<S> {
         r.times(v)
     }
 
     #[inline(always)]
-    fn then(r: &Frame<S>, c: &Matrix3<f64>) -> Frame<S> {
+    fn then(r: &Rotations<S>, c: &Matrix3<f64>) -> Rotations<S> {
         r.then(c)
     }
 
     #[inline(always)]
-    fn turned(r: &Frame<S>, sin: Lanes<S>, cos: Lanes<S>) -> Frame<S> {
+    fn turned(r: &Rotations<S>, sin: Lanes<S>, cos: Lanes<S>) -> Rotations<S> {
         r.turned(sin, cos)
     }
 }

@@ -36,7 +36,7 @@ impl<N: Numbers> Passed<N> {
     /// No joints yet, with room for `joints` of them.
     #[inline(always)]
     pub fn with_room(numbers: N, joints: usize) -> Self {
-        Self { of: numbers, numbers: Aligned::of_any(joints * 3 * VECTORS * N::COUNT), count: 0 }
+        Self { of: numbers, numbers: Aligned::zeros(joints * 3 * VECTORS * N::COUNT), count: 0 }
     }
 
     /// Adds the next joint.

@@ -23,7 +23,7 @@ pub use aligned::Aligned;
 pub(crate) use level::level;
 pub use level::{Instructions, use_at_most};
 pub use rotor::sin_cos;
-pub use space::{Frame, Vector};
+pub use space::{Rotations, Vector};
 pub use symmetric::{add_few_squares, times, times_few, write_times};
 
 /// As many numbers as a register holds.

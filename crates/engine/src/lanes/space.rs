@@ -72,7 +72,7 @@ impl<S: Simd> Vector<S> {
     #[inline(always)]
     pub fn through(self, a: &Matrix3<f64>) -> Self {
         let [x, y, z] = self.0;
-        let frame = Frame::splat(x.token(), a);
+        let frame = Rotations::splat(x.token(), a);
         let [a, b, c] = frame.0;
         a.scaled_onto(x, b.scaled_onto(y, c.scaled(z)))
     }
@@ -110,9 +110,9 @@ impl<S: Simd> Neg for Vector<S> {
 
 /// A rotation for each candidate: the columns of its matrix.
 #[derive(Clone, Copy)]
-pub struct Frame<S: Simd>(pub [Vector<S>; 3]);
+pub struct Rotations<S: Simd>(pub [Vector<S>; 3]);
 
-impl<S: Simd> Frame<S> {
+impl<S: Simd> Rotations<S> {
     /// The rotation in all lanes.
     #[inline(always)]
     pub fn splat(simd: S, rotation: &Matrix3<f64>) -> Self {

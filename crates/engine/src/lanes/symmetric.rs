@@ -8,7 +8,7 @@ use super::{Aligned, GROUP, Lanes, Run, load, runs, splat, store};
 ///
 /// Unlike a general product it packs nothing, so that few candidates cost little.
 pub fn times(level: Level, [d, candidates]: [usize; 2], rows: &[f64], p: &[f64]) -> Aligned {
-    let mut found = Aligned::of_any(rows.len());
+    let mut found = Aligned::zeros(rows.len());
     let of_group = p.len().isqrt() * d * GROUP;
     for Run { level, groups, candidates } in runs(level, candidates) {
         let place = groups.start * of_group..groups.end * of_group;

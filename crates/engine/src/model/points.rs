@@ -21,7 +21,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::{Block, Layout, State, Target};
 use crate::{
     kinematics::{Joint, JointKind, Kernel, Passed, Placed, Term, Turned, correction::LOADS},
-    lanes::{Frame, GROUP, Lanes, Vector, groups, splat},
+    lanes::{GROUP, Lanes, Rotations, Vector, groups, splat},
 };
 
 pub use posture::Posture;
@@ -37,7 +37,7 @@ pub struct Points {
     /// Tangent coordinates, m.
     dimension: usize,
     /// The points, in the order of their links.
-    places: Vec<Place>,
+    places: Vec<Measured>,
 }
 
 /// The learned parameters of a joint.
@@ -52,7 +52,7 @@ struct Learned {
 
 /// A point that is measured.
 #[derive(Clone, Debug)]
-struct Place {
+struct Measured {
     /// The link that carries it.
     link: usize,
     /// The point and the axes of its link, as the kernel holds them.
@@ -129,9 +129,9 @@ impl Points {
             let Target { link, place } = &state.targets[*target];
             let own = layout.block(Block::Target(*target)).map(|range| range.start);
             let fixed = kernel.fixed(*link, &place.origin());
-            Place { link: *link, fixed, own, whitening: whitening.clone(), index }
+            Measured { link: *link, fixed, own, whitening: whitening.clone(), index }
         });
-        let mut places: Vec<Place> = places.collect();
+        let mut places: Vec<Measured> = places.collect();
         places.sort_by_key(|place| place.link);
         let base = layout.block(Block::Base).map(|range| (range.start, state.base.translation.vector));
         let joints = state.joints.iter().zip(terms).enumerate().map(learned).collect();
@@ -196,7 +196,7 @@ impl Points {
 
     /// The joints that move a point, in order.
     #[inline(always)]
-    fn moving(&self, place: &Place) -> impl Iterator<Item = (usize, &Learned)> {
+    fn moving(&self, place: &Measured) -> impl Iterator<Item = (usize, &Learned)> {
         let (link, tree) = (place.link, self.kernel.tree());
         self.joints.iter().enumerate().take(link).filter(move |(joint, _)| tree.moves(*joint, link))
     }
@@ -205,8 +205,8 @@ impl Points {
     #[inline(always)]
     fn put<S: Simd>(
         &self,
-        place: &Place,
-        (x, axes): (&Vector<S>, &Frame<S>),
+        place: &Measured,
+        (x, axes): (&Vector<S>, &Rotations<S>),
         passed: &Passed<S>,
         first: usize,
         rows: &mut [f64],

@@ -111,6 +111,6 @@ pub use minimum::least;
 pub use polish::{Polish, polish};
 
 pub use direct::{
-    Batch, Direct, DirectError, History, HullPoint, MAX_LEVEL, Moment, Partition, Plane, Projection, Rectangle,
+    Batch, Direct, DirectError, Division, History, HullPoint, MAX_LEVEL, Moment, Plane, Projection, Rectangle,
     Settings, Shape, Star, Variant, contains, minimize,
 };

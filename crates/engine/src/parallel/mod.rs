@@ -1,14 +1,8 @@
 //! Independent work on several cores.
 
-#[cfg_attr(not(feature = "parallel"), path = "alone.rs")]
-mod batches;
-
 use crate::lanes::GROUP;
 
-pub use batches::{Batches, shared};
-
-/// Applies `of` to every item, in order; on several cores with the feature `parallel`. The results do not depend on the
-/// number of cores.
+/// `of` of every item, in order: on several cores with the feature `parallel`. The results do not depend on how many.
 pub fn mapped<T: Sync, R: Send>(items: &[T], of: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     #[cfg(feature = "parallel")]
     if let Some(_pool) = pool::taken() {
@@ -57,7 +51,7 @@ mod pool {
     static TAKEN: AtomicUsize = AtomicUsize::new(0);
 
     /// The place of a caller from another thread in the pool, until it is dropped; the pool's own threads need none.
-    pub struct Place {
+    pub struct Seat {
         is_counted: bool,
     }
 
@@ -68,16 +62,16 @@ mod pool {
 
     /// Takes a place in the pool; `None` while all are taken. A caller with little to do then works alone rather than wait
     /// behind those with much, as the sessions of a server would.
-    pub fn taken() -> Option<Place> {
+    pub fn taken() -> Option<Seat> {
         if rayon::current_thread_index().is_some() {
-            return Some(Place { is_counted: false });
+            return Some(Seat { is_counted: false });
         }
         let places = places();
         let one_more = |taken| (taken < places).then_some(taken + 1);
-        TAKEN.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_more).ok().map(|_| Place { is_counted: true })
+        TAKEN.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_more).ok().map(|_| Seat { is_counted: true })
     }
 
-    impl Drop for Place {
+    impl Drop for Seat {
         fn drop(&mut self) {
             if self.is_counted {
                 TAKEN.fetch_sub(1, Ordering::Relaxed);
@@ -91,35 +85,6 @@ mod tests {
     use std::thread;
 
     use super::*;
-
-    /// However many help, whether they come in time or not, and whether or not it pays to call them.
-    #[test]
-    fn shared_batches_say_what_is_said_alone() {
-        for work in [0, 2000] {
-            let roots = |batch: &[f64]| {
-                let root = |x: &f64| (0..work).fold(*x, |y, _| (y + x / (y + 1.0)) / 2.0);
-                batch.iter().map(root).collect::<Vec<f64>>()
-            };
-            let sizes = || (0..120).map(|round| 7 * round % 61);
-            let candidates = sizes().sum::<usize>();
-            for threads in [1, 2, 3, 8] {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-                let check = || {
-                    shared(&roots, candidates, |batches| {
-                        for size in sizes() {
-                            let all: Vec<f64> = (0..size).map(|x| x as f64).collect();
-                            let mut batch = all.clone();
-                            assert_eq!(batches.evaluate(&mut batch), roots(&all), "{size} by {threads}");
-                            assert_eq!(batch, all, "{size} by {threads}");
-                        }
-                    });
-                };
-                pool.install(check);
-                // Who is not of the pool, and others who have taken it.
-                thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(|| pool.install(check)))));
-            }
-        }
-    }
 
     #[test]
     fn nobody_waits_for_a_place_in_the_pool() {

@@ -30,7 +30,7 @@ use crate::{
 ///     kinematics::{Joint, JointBox, Line},
 ///     model::{Layout, State},
 ///     optimize::Settings,
-///     selection::{Actions, Active, CriterionUnits, History, Minimiser, Policy, Situation, Weights},
+///     selection::{Actions, Active, CriterionUnits, Past, Minimiser, Policy, Situation, Weights},
 ///     sensing::Rig,
 /// };
 /// use nalgebra::{DMatrix, DVector, Point3, Vector3};
@@ -47,7 +47,7 @@ use crate::{
 ///     .with_covariance(DMatrix::from_diagonal(&deviations.map(|deviation| deviation * deviation)));
 ///
 /// let actions = Actions::Box(JointBox::new(vec![(-1.5, 1.5), (0.2, 2.5)])?);
-/// let history = History::default();
+/// let history = Past::default();
 /// let situation = Situation { belief: &belief, actions: &actions, history: &history, constraints: None };
 /// let active = Active::new(weights, Minimiser::Direct(Settings { max_evaluations: 300, ..Settings::default() }));
 /// let selection = active.select(&situation, &mut ChaCha8Rng::seed_from_u64(1))?;

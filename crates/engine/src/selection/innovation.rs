@@ -32,7 +32,7 @@ pub(super) fn products(
     weights: Option<&[f64]>,
 ) -> Aligned {
     let (of_group, of_found) = (m * d * GROUP, entries(d) * GROUP);
-    let mut found = Aligned::of_any(groups(candidates) * of_found);
+    let mut found = Aligned::zeros(groups(candidates) * of_found);
     for Run { level, groups, candidates } in runs(level, candidates) {
         let place = groups.start * of_group..groups.end * of_group;
         let found = &mut found[groups.start * of_found..groups.end * of_found];

@@ -55,7 +55,7 @@ pub use planner::{Planner, Planning};
 pub use random::Random;
 pub use search::Search;
 pub use sight::Sight;
-pub use situation::{History, Planned, Situation};
+pub use situation::{KeptSituation, Past, Planned, Situation};
 pub use sockets::Sockets;
 pub use visibility::{Visibility, Watch};
 pub use weights::{CriterionUnits, Weights};

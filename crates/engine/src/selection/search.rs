@@ -2,12 +2,11 @@
 
 use super::{
     Criterion, Partition, Scope, SelectionError,
-    star::{Room, Stars},
+    star::{StarBuffers, Stars},
 };
 use crate::{
     kinematics::JointBox,
     optimize::{Direct, Settings},
-    parallel::{Batches, shared},
 };
 
 /// How DIRECT searched the joint box, and what came of it.
@@ -21,47 +20,31 @@ pub struct Search {
     chosen: Option<Vec<f64>>,
 }
 
-/// Searches `limits`, the box of a scope; `evaluate` returns the criterion of a batch of postures in it (rad or m), which is not
+/// Searches `limits`, the box of a scope, on this thread: most batches take less time than to hand them over; `evaluate` returns the criterion of a batch of postures in it (rad or m), which is not
 /// finite where they are not feasible. Where it is a single `criterion` that is searched, that may evaluate whole stars.
 pub(super) fn direct(
     scope: &Scope<'_>,
     limits: &JointBox,
     settings: Settings,
-    evaluate: &(dyn Fn(&[Vec<f64>]) -> Vec<f64> + Sync),
+    evaluate: &dyn Fn(&[Vec<f64>]) -> Vec<f64>,
     criterion: Option<&Criterion<'_>>,
 ) -> Result<Search, SelectionError> {
     let mut direct = Direct::new(limits.dimension(), settings).map_err(SelectionError::Search)?;
     // What is not feasible is left out posture by posture.
     let around = criterion.filter(|_| !scope.is_constrained()).and_then(Criterion::around_centres);
-    let mut search = |batches: &mut Batches<'_, Vec<f64>>| {
-        // One batch after the other is written to the same place.
-        let (mut postures, mut spare): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
-        let (mut stars, mut room) = (Stars::new(limits.dimension()), Room::default());
-        while let Some(batch) = direct.ask() {
-            let values = match &around {
-                // The centre of the cube is a star's, but nobody's ray.
-                Some(around) if batch.stars().len() > 0 => {
-                    stars.clear();
-                    batch.stars().for_each(|star| stars.push(&star, limits));
-                    around.evaluate(&stars, &mut room)
-                }
-                _ => {
-                    spare.extend(postures.drain(batch.len().min(postures.len())..));
-                    postures.resize_with(batch.len(), || spare.pop().unwrap_or_else(|| vec![0.0; limits.dimension()]));
-                    postures.iter_mut().zip(batch).for_each(|(posture, point)| limits.write_from_unit(point, posture));
-                    batches.evaluate(&mut postures)
-                }
-            };
-            direct.tell(&values)?;
-        }
-        Ok(())
-    };
-    // A batch of stars takes a few microseconds: to share it was no faster.
-    let done = match around {
-        Some(_) => search(&mut Batches::alone(evaluate)),
-        None => shared(evaluate, settings.max_evaluations, search),
-    };
-    done.map_err(SelectionError::Search)?;
+    let (mut stars, mut room) = (Stars::new(limits.dimension()), StarBuffers::default());
+    while let Some(batch) = direct.ask() {
+        let values = match &around {
+            // The centre of the cube is a star's, but nobody's ray.
+            Some(around) if batch.stars().len() > 0 => {
+                stars.clear();
+                batch.stars().for_each(|star| stars.push(&star, limits));
+                around.evaluate(&stars, &mut room)
+            }
+            _ => evaluate(&batch.iter().map(|point| limits.from_unit(point)).collect::<Vec<Vec<f64>>>()),
+        };
+        direct.tell(&values).map_err(SelectionError::Search)?;
+    }
     Ok(Search { direct: Box::new(direct), limits: scope.is_constrained().then(|| limits.clone()), chosen: None })
 }
 

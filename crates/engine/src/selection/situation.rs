@@ -13,14 +13,43 @@ pub struct Situation<'a> {
     /// What may be done.
     pub actions: &'a Actions,
     /// What was done.
-    pub history: &'a History,
+    pub history: &'a Past,
     /// What movements are bound to, if to anything.
     pub constraints: Option<&'a Constraints>,
 }
 
+impl Situation<'_> {
+    /// A copy to keep.
+    pub fn kept(&self) -> KeptSituation {
+        let (belief, actions, history) = (self.belief.clone(), self.actions.clone(), self.history.clone());
+        KeptSituation { belief, actions, history, constraints: self.constraints.cloned() }
+    }
+}
+
+/// A [`Situation`] that was kept.
+#[derive(Clone, Debug)]
+pub struct KeptSituation {
+    /// What was believed.
+    pub belief: Belief,
+    /// What could be done.
+    pub actions: Actions,
+    /// What had been done.
+    pub history: Past,
+    /// What movements were bound to, if to anything.
+    pub constraints: Option<Constraints>,
+}
+
+impl KeptSituation {
+    /// The same to choose from.
+    pub fn borrowed(&self) -> Situation<'_> {
+        let Self { belief, actions, history, constraints } = self;
+        Situation { belief, actions, history, constraints: constraints.as_ref() }
+    }
+}
+
 /// What policies go by of all that happened: made of the list of events, and nothing else.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct History {
+pub struct Past {
     has_moved: bool,
     /// Shared, since a history is copied at every step.
     made: Vec<Arc<[f64]>>,
@@ -40,7 +69,7 @@ pub struct Planned {
     pub committed: usize,
 }
 
-impl History {
+impl Past {
     /// A movement was proposed, with this plan if there is one.
     pub fn proposed(&mut self, plan: Option<&Planned>) {
         if let Some(plan) = plan {

@@ -21,7 +21,7 @@ use registers::{Moved, drift, sum_behind, turn_all};
 use super::innovation::{entries, place, traces};
 use crate::{
     kinematics::JointBox,
-    lanes::{Aligned, Frame, GROUP, Vector, groups, narrowed},
+    lanes::{Aligned, GROUP, Rotations, Vector, groups, narrowed},
     model::{Centre, Centres, Passage, Points, Ray},
     optimize::Star,
 };
@@ -60,7 +60,7 @@ pub(super) struct AroundCentres<'a> {
 
 /// What a star is computed in. Of three numbers per coordinate, those of each dimension stand together.
 #[derive(Default)]
-pub(super) struct Room {
+pub(super) struct StarBuffers {
     centres: Centres,
     /// h and b, by coordinate, then by dimension.
     columns: Vec<Vector3<f64>>,
@@ -127,7 +127,7 @@ impl<'a> AroundCentres<'a> {
     }
 
     /// C(θ) of every ray, in order; not finite where it is no number.
-    pub fn evaluate(&self, stars: &Stars, room: &mut Room) -> Vec<f64> {
+    pub fn evaluate(&self, stars: &Stars, room: &mut StarBuffers) -> Vec<f64> {
         let [m, wide] = self.sizes;
         let centres = stars.centres();
         let level = narrowed(self.level, centres.len());
@@ -178,11 +178,11 @@ impl<'a> AroundCentres<'a> {
         simd: S,
         (index, readings): (usize, &[f64]),
         (first, rays): (usize, &[(usize, f64)]),
-        room: &mut Room,
+        room: &mut StarBuffers,
     ) {
         let [_, wide] = self.sizes;
         let stages = &self.passage.stages;
-        let Room { centres, columns, drifts, terms, across, behind, drifting, angles, found } = room;
+        let StarBuffers { centres, columns, drifts, terms, across, behind, drifting, angles, found } = room;
         let centre = centres.at(self.points, index);
         self.gather(&centre, readings, (columns, drifts), across);
         sum_behind(simd, wide, stages, (&self.p, columns), behind);
@@ -222,7 +222,7 @@ impl<'a> AroundCentres<'a> {
                 let moved = Moved {
                     simd,
                     wide,
-                    rotation: Frame::splat(simd, &turn.rotation),
+                    rotation: Rotations::splat(simd, &turn.rotation),
                     shift: Vector::splat(simd, &turn.shift),
                     axis: [
                         Vector::splat(simd, h1),
@@ -337,12 +337,12 @@ mod tests {
             for level in levels() {
                 let (p, value) = (belief.covariance.as_ref().expect("a covariance"), criterion.before());
                 let around = AroundCentres::new(level, &points, p, weights.all(), value).expect("one point");
-                let found = around.evaluate(&stars, &mut Room::default());
+                let found = around.evaluate(&stars, &mut StarBuffers::default());
                 prop_assert_eq!(found.len(), expected.len());
                 for (found, expected) in found.iter().zip(&expected) {
                     prop_assert!((found - expected).abs() < 1e-12 * criterion.before(), "{level:?}: {found} {expected}");
                 }
-                let mut room = Room::default();
+                let mut room = StarBuffers::default();
                 let apart: Vec<f64> = alone.iter().flat_map(|star| around.evaluate(star, &mut room)).collect();
                 prop_assert_eq!(apart, found);
             }

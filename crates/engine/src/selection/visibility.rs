@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Matrix3, Point3};
 
-use super::{History, Scope, Selection, SelectionError, Sight, Situation};
+use super::{Past, Scope, Selection, SelectionError, Sight, Situation};
 use crate::{elementary::exp_m1, kinematics::JointBox, sensing::Head};
 
 /// What is known of what can be seen; every learner of a scenario is told the same.
@@ -34,7 +34,7 @@ impl Watch {
     /// The first movement of all, where anybody watches: to where the marker is known to be seen, or as near to it as may be.
     pub(super) fn beginning(
         watch: Option<&Self>,
-        history: &History,
+        history: &Past,
         scope: &Scope<'_>,
     ) -> Result<Option<Selection>, SelectionError> {
         let watch = watch.filter(|_| !history.has_moved());
@@ -86,7 +86,7 @@ pub struct Visibility<'a> {
 
 impl<'a> Visibility<'a> {
     /// Of what `head` sees, or without one of all, with the misses that there were.
-    pub fn new(head: Option<&'a Head>, history: &'a History) -> Self {
+    pub fn new(head: Option<&'a Head>, history: &'a Past) -> Self {
         let in_a_row = if head.is_some() { 0 } else { history.misses_in_a_row().saturating_sub(1) };
         let radius = (RADIUS + GROWTH * in_a_row as f64).min(WIDEST);
         Self { head, misses: history.misses(), radius }
@@ -140,13 +140,13 @@ mod tests {
             lens_half_angle: 0.3,
             baseline: None,
         };
-        let mut history = History::default();
+        let mut history = Past::default();
         let movement = |at: f64| Movement::to(vec![at, 0.5]);
         let limits = JointBox::new(vec![(0.0, 1.0); 2]).expect("limits");
-        let miss = |history: &mut History, at: f64| {
+        let miss = |history: &mut Past, at: f64| {
             history.moved(&movement(at), &Actions::Box(limits.clone()), &Observation::missed(1));
         };
-        let chance = |history: &History, at: f64| {
+        let chance = |history: &Past, at: f64| {
             let visibility = Visibility::new(Some(&head), history);
             visibility.chance(&[at, 0.5], &Point3::new(1.0, 0.0, 0.0), &Matrix3::zeros())
         };

@@ -1,7 +1,7 @@
 //! Fig. 3: DIRECT's partition, and its choice in the diagram of size and value.
 
 use super::{Figure, Source};
-use crate::outcome::{Outcome, Search};
+use crate::outcome::{Outcome, Searched};
 use body_schema_chart::{Axis, Chart, Colour, Layer, Marker, Panel, Style};
 use body_schema_engine::{
     optimize::{Plane, Projection},
@@ -42,12 +42,12 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
     Some(Figure { id: source.experiment.id.to_owned(), caption, chart })
 }
 
-fn name(search: &Search) -> &'static str {
+fn name(search: &Searched) -> &'static str {
     if search.variant == "direct" { "DIRECT" } else { "DIRECT-l" }
 }
 
 /// The rectangles that cut the plane of the two joints divided most, at the chosen configuration.
-fn slice(search: &Search) -> Option<Panel> {
+fn slice(search: &Searched) -> Option<Panel> {
     let leaves = &search.partition.leaves;
     let chosen = leaves.get(search.partition.chosen)?;
     let plane = Plane::most_divided(leaves.iter().map(|leaf| leaf.levels.as_slice()))?;
@@ -91,7 +91,7 @@ fn grey(value: f64) -> Colour {
     [(0xFC as f64 - value.clamp(0.0, 1.0) * 0x80 as f64) as u8; 3]
 }
 
-fn diagram(search: &Search) -> Panel {
+fn diagram(search: &Searched) -> Panel {
     let leaves = &search.partition.leaves;
     let points: Vec<[f64; 2]> =
         search.sizes.iter().zip(leaves).filter_map(|(size, leaf)| Some([*size, leaf.value?])).collect();

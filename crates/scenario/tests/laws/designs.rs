@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use body_schema_engine::{
-    design::{Problem, Search, movements_by_counting},
+    design::{DesignSearch, Problem, movements_by_counting},
     model::{Frame, State},
     selection::Movement,
     sensing::{Channel, Equipment, Facing, InView, Pixels, Rig},
@@ -57,7 +57,7 @@ fn certificates_hold() {
         let sensitivity = &inverse * problem.weights.scale(&inverse) * 40.0;
         let phi = |pose: &[f64]| told(world, &problem, pose).dot(&sensitivity);
         let mean: f64 = design.poses.iter().zip(&design.shares).map(|(pose, share)| share * phi(pose)).sum();
-        let mut search = Search::new(&problem, 40, Some(&design));
+        let mut search = DesignSearch::new(&problem, 40, Some(&design));
         let standing = search.balance(1.0).expect("informative");
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let anywhere = random_poses(&mut rng, &problem, 100_000);

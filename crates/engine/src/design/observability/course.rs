@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::Prospect;
 use crate::{
     estimation::Belief,
-    selection::{History, Movement, Policy, SelectionError, Situation},
+    selection::{Movement, Past, Policy, SelectionError, Situation},
     sensing::Observation,
 };
 
@@ -41,7 +41,7 @@ impl Prospect {
         tick: &(dyn Fn() + Sync),
     ) -> Result<Course, SelectionError> {
         let mut rng = rng(draw, 0);
-        let (mut actions, mut history) = (self.actions.clone(), History::default());
+        let (mut actions, mut history) = (self.actions.clone(), Past::default());
         let mut information = self.known_beforehand();
         let covariance = self.covariance(&information)?;
         let mut belief =

@@ -28,7 +28,7 @@ use super::{
     jump::{Jump, log_determinant},
     mode::Mode,
     noise::NoiseEvidence,
-    points::Room,
+    points::Buffers,
     posterior::{Normal, Posterior},
 };
 use crate::{
@@ -136,7 +136,7 @@ impl Smoother {
         let layout = &self.belief.layout;
         // With the scales of noise as they are now, for which the mode need not have been searched again.
         let Normal { mut information, descent, .. } =
-            posterior.normal_by(posterior.loss.into(), &mode.state, layout, &mut Room::default())?;
+            posterior.normal_by(posterior.loss.into(), &mode.state, layout, &mut Buffers::default())?;
         information.fill_upper_triangle_with_lower_triangle();
         let shift = Cholesky::new(information.clone())?.solve(&descent);
         let (mut rows, mut residuals) = (Vec::new(), Vec::new());

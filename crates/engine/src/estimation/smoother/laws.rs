@@ -11,7 +11,7 @@ use rand_distr::StandardNormal;
 use super::{
     HypothesisSettings, Smoother,
     mode::{Effort, Mode},
-    points::Room,
+    points::Buffers,
     posterior::{Measurement, Normal, Posterior},
 };
 use crate::{
@@ -79,7 +79,7 @@ proptest! {
         if is_robust {
             posterior.loss = Loss::Huber;
         }
-        let mut room = Room::default();
+        let mut room = Buffers::default();
         // What is no number at one step is none of the next.
         for scale in [1.0, 0.5, f64::NAN, 1.0, 2.0] {
             posterior.scales.fill(scale);
@@ -87,7 +87,7 @@ proptest! {
             let state = truth.retract(&layout, &away).slid_towards(&posterior.pins);
             let loss = posterior.loss.into();
             let again = posterior.normal_by(loss, &state, &layout, &mut room).expect("no chart ends");
-            let fresh = posterior.normal_by(loss, &state, &layout, &mut Room::default()).expect("no chart ends");
+            let fresh = posterior.normal_by(loss, &state, &layout, &mut Buffers::default()).expect("no chart ends");
             let bits = |x: &f64| x.to_bits();
             let all = |normal: &Normal| -> Vec<u64> {
                 let (information, descent) = (normal.information.lower_triangle(), &normal.descent);

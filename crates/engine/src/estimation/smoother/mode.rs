@@ -6,7 +6,7 @@ use rand::{Rng, RngExt};
 
 use super::{
     factor::Factor,
-    points::Room,
+    points::Buffers,
     posterior::{Normal, Posterior},
 };
 use crate::{
@@ -158,7 +158,7 @@ impl Posterior {
         effort: Effort<'_>,
     ) -> Result<(State, Normal), NoMode> {
         let mut state = start.slid_towards(&self.pins);
-        let (mut room, mut kept) = (Room::default(), None);
+        let (mut room, mut kept) = (Buffers::default(), None);
         let mut normal = self.normal_by(loss, &state, layout, &mut room).ok_or(NoMode::OutsideChart)?;
         let (mut lambda, mut growth) = (1e-3, 2.0);
         for step in 0..effort.steps {

@@ -19,7 +19,7 @@ const TOGETHER: usize = 32;
 
 /// A workspace for rows and residuals, reused step after step of a search of one layout.
 #[derive(Default)]
-pub(super) struct Room {
+pub(super) struct Buffers {
     spare: Option<Normal>,
     rows: Vec<f64>,
     readings: Vec<f64>,
@@ -40,7 +40,7 @@ fn kept(numbers: &mut Vec<f64>, count: usize) -> &mut [f64] {
     if numbers.len() == count { numbers } else { emptied(numbers, count) }
 }
 
-impl Room {
+impl Buffers {
     /// Zeroed sums of squares (m × m) and of products.
     pub(super) fn derivatives(&mut self, m: usize) -> (DMatrix<f64>, DVector<f64>) {
         let Some(Normal { mut information, mut descent, .. }) = self.spare.take() else {
@@ -64,7 +64,7 @@ impl Posterior {
         loss: Graduated,
         points: &Points,
         (information, descent): (&mut DMatrix<f64>, &mut DVector<f64>),
-        room: &mut Room,
+        room: &mut Buffers,
     ) -> f64 {
         let (m, d) = (information.nrows(), points.equations());
         let mut cost = 0.0;

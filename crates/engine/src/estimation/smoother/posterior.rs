@@ -18,7 +18,7 @@ use super::{
     gram::add_row_squares,
     joints::Joints,
     mode::Mode,
-    points::Room,
+    points::Buffers,
     settled::{Quadratic, Settled},
 };
 use crate::{
@@ -299,13 +299,13 @@ impl Posterior {
     /// The normal equations at `state`, linearised there; `None` outside the chart of settled measurements.
     #[cfg(test)]
     pub fn normal(&self, state: &State, layout: &Layout) -> Option<Normal> {
-        let mut normal = self.normal_by(self.loss.into(), state, layout, &mut Room::default())?;
+        let mut normal = self.normal_by(self.loss.into(), state, layout, &mut Buffers::default())?;
         normal.information.fill_upper_triangle_with_lower_triangle();
         Some(normal)
     }
 
     /// The normal equations at `state` by another loss; the information's upper triangle is meaningless.
-    pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout, room: &mut Room) -> Option<Normal> {
+    pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout, room: &mut Buffers) -> Option<Normal> {
         let (mut information, mut descent) = room.derivatives(layout.dimension());
         let mut cost = 0.0;
         if !self.known.is_empty() {

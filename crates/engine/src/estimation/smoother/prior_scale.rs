@@ -156,7 +156,7 @@ impl Data {
 }
 
 /// A place: the scale of origins on the chain's grid, and steps of ln τ.
-type Place = (usize, i32);
+type GridPoint = (usize, i32);
 
 /// The scales that the evidence favours.
 struct Found {
@@ -262,9 +262,9 @@ struct Lattice<'a> {
     zeros: (DMatrix<f64>, Vec<f64>),
     /// The step of ln τ.
     step: f64,
-    known: HashMap<Place, f64>,
+    known: HashMap<GridPoint, f64>,
     inverted: Vec<Option<Option<Inverted>>>,
-    starts: Vec<Place>,
+    starts: Vec<GridPoint>,
 }
 
 impl<'a> Lattice<'a> {
@@ -287,7 +287,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// The logarithm of the evidence at a place, its prior included, up to a constant that all places share.
-    fn at(&mut self, place: Place) -> f64 {
+    fn at(&mut self, place: GridPoint) -> f64 {
         if let Some(known) = self.known.get(&place) {
             return *known;
         }
@@ -296,7 +296,7 @@ impl<'a> Lattice<'a> {
         found
     }
 
-    fn evidence(&mut self, (origins, noise): Place) -> Option<f64> {
+    fn evidence(&mut self, (origins, noise): GridPoint) -> Option<f64> {
         let log_noise = f64::from(noise) * self.step;
         let probability = self.probabilities[origins];
         if log_noise.abs() > REACH || log_noise < self.data.least_log_noise {
@@ -317,7 +317,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// The best place at this scale of origins, for any τ.
-    fn climbed(&mut self, (origins, mut noise): Place) -> Place {
+    fn climbed(&mut self, (origins, mut noise): GridPoint) -> GridPoint {
         if self.data.equations == 0.0 {
             return (origins, noise);
         }
@@ -335,9 +335,9 @@ impl<'a> Lattice<'a> {
 
     /// The posterior mean of the scale of origins and of ln τ; `None` where nothing has any evidence.
     fn mean(mut self) -> Option<Mean> {
-        let mut open: Vec<Place> = self.starts.clone().into_iter().map(|start| self.climbed(start)).collect();
+        let mut open: Vec<GridPoint> = self.starts.clone().into_iter().map(|start| self.climbed(start)).collect();
         let mut best = open.clone().into_iter().map(|place| self.at(place)).fold(f64::NEG_INFINITY, f64::max);
-        let mut counted: HashMap<Place, f64> = HashMap::new();
+        let mut counted: HashMap<GridPoint, f64> = HashMap::new();
         // Depth first from the best on: what is found to be negligible later costs little.
         while let Some(place) = open.pop() {
             let evidence = self.at(place);
@@ -358,7 +358,7 @@ impl<'a> Lattice<'a> {
             return None;
         }
         // In one order, whatever that of a hash map is.
-        let mut places: Vec<(Place, f64)> = counted.into_iter().collect();
+        let mut places: Vec<(GridPoint, f64)> = counted.into_iter().collect();
         places.sort_unstable_by_key(|(place, _)| *place);
         let (mut total, mut sums) = (0.0, [0.0; 2]);
         for ((origins, noise), evidence) in places {

@@ -13,7 +13,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Passed, Place, Points, Turned, Whitening};
+use super::{Measured, Passed, Points, Turned, Whitening};
 use crate::kinematics::{JointKind, Numbers, Plain, correction::LOADS};
 
 /// Points at one posture, with their whitened rows.
@@ -90,7 +90,7 @@ impl Points {
     #[inline(always)]
     fn columns_of_joints(
         &self,
-        place: &Place,
+        place: &Measured,
         joints: &Passed<Plain>,
         x: Vector3<f64>,
         mut each: impl FnMut(usize, Column),
@@ -145,7 +145,7 @@ impl Points {
     }
 }
 
-impl Place {
+impl Measured {
     /// What the point's own coordinates do, where its link has these axes.
     fn own_columns(&self, axes: &Matrix3<f64>, mut each: impl FnMut(usize, Vector3<f64>)) {
         let Some(start) = self.own else { return };

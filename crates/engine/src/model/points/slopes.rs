@@ -13,10 +13,10 @@
 use fearless_simd::{ExtractToken, Simd};
 use nalgebra::Vector3;
 
-use super::{Passed, Place, Points, Wanted, Whitening};
+use super::{Measured, Passed, Points, Wanted, Whitening};
 use crate::{
     kinematics::{JointKind, correction::LOADS},
-    lanes::{Frame, GROUP, Lanes, Vector, load, splat, store},
+    lanes::{GROUP, Lanes, Rotations, Vector, load, splat, store},
 };
 
 /// What multiplies the rows of one point at a few postures, as its columns would be before they are whitened.
@@ -58,8 +58,8 @@ impl Points {
     #[inline(always)]
     pub(super) fn slope<S: Simd>(
         &self,
-        place: &Place,
-        (x, axes): (&Vector<S>, &Frame<S>),
+        place: &Measured,
+        (x, axes): (&Vector<S>, &Rotations<S>),
         passed: &Passed<S>,
         (first, factors): (usize, &[f64]),
         slopes: &mut [f64],

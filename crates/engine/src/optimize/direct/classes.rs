@@ -1,9 +1,7 @@
 //! The divisible rectangles, sorted by size and within a size by score.
 
-use std::cmp::Reverse;
+use std::cmp::Ordering;
 use std::collections::BinaryHeap;
-
-use super::ranked::{number, ranked, score};
 
 /// Scores this close are taken for equal when all best rectangles of a size are divided: the figure of
 /// Gablonsky's code. Rounding makes symmetric points differ in their last bits, and the published counts rest on
@@ -18,14 +16,50 @@ pub struct Head {
     pub score: f64,
 }
 
+/// What a heap holds: a rectangle's score and arrival. The greatest is who is served first: of the least score and, of equal
+/// scores, the first to come.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    score: f64,
+    arrival: usize,
+}
+
+impl Entry {
+    fn is_latest(&self, arrived: &[usize], arrivals: &[usize]) -> bool {
+        arrivals[arrived[self.arrival]] == self.arrival
+    }
+}
+
+impl Ord for Entry {
+    #[inline]
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.score.total_cmp(&self.score).then(other.arrival.cmp(&self.arrival))
+    }
+}
+
+impl PartialOrd for Entry {
+    #[inline]
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Entry {}
+
 /// One heap per size class, so that an iteration looks at one rectangle per size rather than at all. Equal scores are served
-/// first come, first served: what a heap holds is a score and an arrival.
+/// first come, first served.
 ///
 /// What is taken out stays in its heap until it gets to the top: an arrival counts only as long as it is the rectangle's
 /// latest.
 #[derive(Debug, Clone, Default)]
 pub struct SizeClasses {
-    classes: Vec<BinaryHeap<Reverse<u128>>>,
+    classes: Vec<BinaryHeap<Entry>>,
     /// Who arrived, in the order of arrival.
     arrived: Vec<usize>,
     /// Of each rectangle the arrival in the class that it is in; [`NOWHERE`] if it is in none.
@@ -39,13 +73,6 @@ const NOWHERE: usize = usize::MAX;
 const CLASS_ROOM: usize = 64;
 
 impl SizeClasses {
-    /// With room for so many rectangles.
-    pub fn with_room(room: usize) -> Self {
-        // Who is divided arrives once more, and has two children at least.
-        let arrived = Vec::with_capacity(room + room / 2);
-        Self { arrived, arrivals: Vec::with_capacity(room), ..Self::default() }
-    }
-
     /// Knows the first so many rectangles, never fewer than before: those that are new to it are in no class yet.
     pub fn know(&mut self, rectangles: usize) {
         self.arrivals.resize(rectangles, NOWHERE);
@@ -60,7 +87,7 @@ impl SizeClasses {
         let arrival = self.arrived.len();
         self.arrived.push(rectangle);
         self.arrivals[rectangle] = arrival;
-        self.classes[class].push(Reverse(ranked(score, arrival)));
+        self.classes[class].push(Entry { score, arrival });
     }
 
     /// Takes a rectangle out of its class, and says whether it was there.
@@ -68,7 +95,7 @@ impl SizeClasses {
         let Self { classes, arrived, arrivals } = self;
         let arrival = std::mem::replace(&mut arrivals[rectangle], NOWHERE);
         if let Some(heap) = classes.get_mut(class) {
-            while heap.peek().is_some_and(|Reverse(entry)| !is_latest(*entry, arrived, arrivals)) {
+            while heap.peek().is_some_and(|entry| !entry.is_latest(arrived, arrivals)) {
                 heap.pop();
             }
         }
@@ -78,32 +105,28 @@ impl SizeClasses {
     /// The best rectangle of every class that has one, from the largest size to the smallest.
     pub fn heads(&self) -> impl Iterator<Item = Head> {
         self.classes.iter().enumerate().filter_map(|(class, heap)| {
-            let &Reverse(entry) = heap.peek()?;
-            Some(Head { class, rectangle: self.arrived[number(entry)], score: score(entry) })
+            let Entry { score, arrival } = *heap.peek()?;
+            Some(Head { class, rectangle: self.arrived[arrival], score })
         })
     }
 
     /// The rectangles of a class, other than the best, whose score ties with that of the best, in their order.
     pub fn ties(&self, class: usize) -> impl Iterator<Item = usize> {
         let entries = self.classes.get(class).map_or(&[][..], BinaryHeap::as_slice);
-        let best = entries.first().map_or(f64::NAN, |&Reverse(entry)| score(entry));
+        let best = entries.first().map_or(f64::NAN, |entry| entry.score);
         let mut ties = Vec::new();
         let mut open = vec![0];
         while let Some(node) = open.pop() {
-            let Some(&Reverse(entry)) = entries.get(node) else { continue };
+            let Some(&entry) = entries.get(node) else { continue };
             // Compared twice, since the difference of two infinite scores is not a number. What is below a node is no better.
-            if score(entry) == best || score(entry) - best <= TIE {
-                ties.extend(is_latest(entry, &self.arrived, &self.arrivals).then_some(entry));
+            if entry.score == best || entry.score - best <= TIE {
+                ties.extend(entry.is_latest(&self.arrived, &self.arrivals).then_some(entry));
                 open.extend([2 * node + 1, 2 * node + 2]);
             }
         }
-        ties.sort_unstable();
-        ties.into_iter().skip(1).map(|entry| self.arrived[number(entry)])
+        ties.sort_unstable_by(|a, b| b.cmp(a));
+        ties.into_iter().skip(1).map(|entry| self.arrived[entry.arrival])
     }
-}
-
-fn is_latest(entry: u128, arrived: &[usize], arrivals: &[usize]) -> bool {
-    arrivals[arrived[number(entry)]] == number(entry)
 }
 
 #[cfg(test)]
@@ -111,7 +134,7 @@ mod tests {
     use super::*;
 
     fn known(rectangles: usize) -> SizeClasses {
-        let mut classes = SizeClasses::with_room(rectangles);
+        let mut classes = SizeClasses::default();
         classes.know(rectangles);
         classes
     }

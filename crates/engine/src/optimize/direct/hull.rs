@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Jones, Perttunen and Stuckman explain the method.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HullPoint {
-    /// The rectangle behind the point, as numbered in the [`Partition`](super::Partition).
+    /// The rectangle behind the point, as numbered in the [`Division`](super::Division).
     pub rectangle: usize,
     /// Its size.
     pub size: f64,

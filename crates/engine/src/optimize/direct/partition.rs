@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use super::ranked::{number, ranked};
 use super::settings::Variant;
 use super::ternary::{self, MAX_LEVEL};
 
@@ -24,8 +23,8 @@ pub struct Rectangles {
     pub records: Vec<Record>,
     /// The sides along which the last rectangles to be sampled around are cut: each gives two children, the last ones.
     pub sides: Vec<usize>,
-    /// Those of the rectangle that is being cut, numbered, by the lower of the two children's scores.
-    ranking: Vec<u128>,
+    /// Those of the rectangle that is being cut: the lower of the two children's scores, and the number of the side.
+    ranking: Vec<(f64, usize)>,
 }
 
 /// What is known of a rectangle whose value has been told.
@@ -163,8 +162,8 @@ impl Rectangles {
         let sides = &sides[sides.len() - (records.len() - first_child) / 2..];
         ranking.clear();
         let pairs = records[children.clone()].chunks_exact(2).enumerate();
-        ranking.extend(pairs.map(|(number, pair)| ranked(pair[0].score.min(pair[1].score), number)));
-        ranking.sort_unstable();
+        ranking.extend(pairs.map(|(number, pair)| (pair[0].score.min(pair[1].score), number)));
+        ranking.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         // Who is cut along every longest side has all sides alike; a child lacks the cuts that come after its own.
         let divided = longest + 1;
         if levels_alike.len() <= usize::from(divided) * dimension {
@@ -172,12 +171,12 @@ impl Rectangles {
         }
         birth_levels.resize(children.end * dimension, divided);
         (records[parent].longest, records[parent].long_sides) = (divided, dimension as u32);
-        for (rank, side) in ranking.iter().enumerate() {
-            let child = first_child + 2 * number(*side);
+        for (rank, (_, side)) in ranking.iter().enumerate() {
+            let child = first_child + 2 * side;
             let later = &ranking[rank + 1..];
             let (plus, minus) = birth_levels[child * dimension..][..2 * dimension].split_at_mut(dimension);
-            for side in later {
-                let side = sides[number(*side)];
+            for (_, side) in later {
+                let side = sides[*side];
                 (plus[side], minus[side]) = (longest, longest);
             }
             let of_longest = if later.is_empty() { (divided, dimension as u32) } else { (longest, later.len() as u32) };
@@ -206,14 +205,14 @@ fn repeat<T: Copy>(buffer: &mut Vec<T>, part: Range<usize>, times: usize) {
 /// A rectangle keeps its number and its centre for good, while its sides shrink. Numbers follow the order in which
 /// the centres were asked for.
 #[derive(Debug, Clone, Copy)]
-pub struct Partition<'a> {
+pub struct Division<'a> {
     pub(super) rectangles: &'a Rectangles,
     pub(super) variant: Variant,
     pub(super) round: usize,
     pub(super) remote: f64,
 }
 
-/// One rectangle of a [`Partition`].
+/// One rectangle of a [`Division`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Rectangle<'a> {
     /// Its centre, where the objective was evaluated.
@@ -233,7 +232,7 @@ pub struct Rectangle<'a> {
     pub potentially_optimal: bool,
 }
 
-impl<'a> Partition<'a> {
+impl<'a> Division<'a> {
     /// How many rectangles there are: as many as values told.
     pub fn len(&self) -> usize {
         self.rectangles.len()

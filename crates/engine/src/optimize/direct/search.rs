@@ -6,7 +6,7 @@ use super::batch::Batch;
 use super::classes::SizeClasses;
 use super::hull::{HullPoint, lower_right_hull};
 use super::lineage::{Lineage, surrogate};
-use super::partition::{Partition, Rectangles};
+use super::partition::{Division, Rectangles};
 use super::settings::{DirectError, Settings, Variant};
 
 /// A search of the unit cube by DIRECT or DIRECT-l, as told by the [`Variant`](super::Variant).
@@ -83,7 +83,7 @@ impl Direct {
         Ok(Self {
             settings,
             rectangles: Rectangles::cube(dimension, room),
-            classes: SizeClasses::with_room(room),
+            classes: SizeClasses::default(),
             lineage: Lineage::default(),
             hull: Vec::with_capacity(CLASSES),
             chosen: Vec::with_capacity(CLASSES),
@@ -170,8 +170,8 @@ impl Direct {
 
     /// The rectangles as of the last values told, and which of them are about to be divided. Empty before the
     /// first.
-    pub fn partition(&self) -> Partition<'_> {
-        Partition {
+    pub fn partition(&self) -> Division<'_> {
+        Division {
             rectangles: &self.rectangles,
             variant: self.settings.variant,
             round: self.round,

@@ -11,8 +11,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Actions, Constraints, CriterionUnits, History, Movement, Policy, Selection, SelectionError, Situation, Watch,
-    Weights,
+    Actions, Constraints, CriterionUnits, Movement, Past, Policy, Selection, SelectionError, Situation, Watch, Weights,
 };
 use crate::{
     estimation::{Alternative, Belief},
@@ -42,7 +41,7 @@ struct Case {
     belief: Belief,
     weights: Weights,
     actions: Actions,
-    history: History,
+    history: Past,
 }
 
 impl Case {
@@ -58,7 +57,7 @@ impl Case {
         let covariance = DMatrix::from_diagonal(&deviations.map(|sd| sd * sd));
         let belief = Belief::new(state, layout, Arc::new(Rig::tracker(0.01))).with_covariance(covariance);
         let limits = JointBox::new(vec![(-1.5, 1.5); JOINTS]).expect("limits");
-        Self { belief, weights, actions: Actions::Box(limits), history: History::default() }
+        Self { belief, weights, actions: Actions::Box(limits), history: Past::default() }
     }
 
     /// The same with a rival of the estimate that is as likely.

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use super::OWN;
 use crate::{
-    lanes::{Aligned, Frame, GROUP, GroupSum, Lanes, Vector, load, sin_cos, splat, store},
+    lanes::{Aligned, GROUP, GroupSum, Lanes, Rotations, Vector, load, sin_cos, splat, store},
     model::Stage,
 };
 
@@ -87,7 +87,7 @@ pub fn drift<S: Simd>(simd: S, wide: usize, stages: &[Stage], (p, b): (&[f64], &
 pub struct Moved<'a, S: Simd> {
     pub simd: S,
     pub wide: usize,
-    pub rotation: Frame<S>,
+    pub rotation: Rotations<S>,
     pub shift: Vector<S>,
     /// h' of the joint's axis, and P of its coordinates, of which so many are learned; those that are not count for nothing.
     pub axis: [Vector<S>; OWN],
