@@ -46,6 +46,7 @@
 //! | `body-schema-report` | [`report`] | reports of a calibration for readers: text, HTML, plots |
 //! | `body-schema-files` | [`files`] | files and folders that get their names only once they are whole |
 //! | `body-schema-recording` | [`recording`] | runs and calibrations as Rerun recordings and CSV files |
+//! | `body-schema-backend` | [`backend`] | what a page asks of experiments, answered without a server |
 //! | `body-schema-paper` | [`paper`] | the paper's experiments beside its numbers, drawn as charts |
 //!
 //! Those before `body-schema-palette` do no input or output, and build for `wasm32-unknown-unknown`. Notation, frames and units are told in
@@ -57,6 +58,7 @@ pub mod page;
 pub mod server;
 
 pub use body_schema_ask_tell as ask_tell;
+pub use body_schema_backend as backend;
 pub use body_schema_calibration as calibration;
 pub use body_schema_diagnostics as diagnostics;
 pub use body_schema_engine::{

@@ -269,7 +269,6 @@ fn bad_input_exits_with_two_and_says_what_to_do() {
         (&["serve", "--frame-ancestors", "example.org"], &["`example.org`", "https://example.org"]),
         (&["serve", "--allow-host", "http://lab"], &["`http://lab` is no host name", "lab.example.org"]),
         (&["serve", "--ephemeral", "--data-dir", "x"], &["--ephemeral", "cannot be used with", "--data-dir"]),
-        (&["export", "--out", "x"], &["SCENARIO"]),
         (&["fly"], &["fly"]),
     ];
     for (arguments, expected) in cases {

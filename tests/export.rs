@@ -112,8 +112,10 @@ fn what_cannot_be_exported_is_said_before_anything_runs() {
     std::fs::create_dir(&full).expect("a folder");
     std::fs::write(full.join("thesis.tex"), "mine").expect("written");
     let new = folder.path().join("new");
-    let cases: [(&Path, &[&str], &[&str]); 9] = [
+    let cases: [(&Path, &[&str], &[&str]); 11] = [
         (&full, &["arm-6dof"], &["is not empty and holds no export", "--force"]),
+        (&new, &["--steps", "3"], &["name their scenarios", "the page then computes"]),
+        (&new, &["--learner", "random"], &["name their scenarios"]),
         (&new, &["arm-6dofx"], &["did you mean `arm-6dof`"]),
         (&new, &["arm-6dof", "arm-6dof"], &["named twice"]),
         (&new, &["arm-6dof", "--learner", "clever"], &["`clever`"]),
@@ -182,6 +184,49 @@ async fn a_folder_plays_to_its_end_below_any_address() {
         page.wait_for_state("the same step", "state.phase === 'ready' && state.step === '59'").await;
         let asked = "performance.getEntriesByType('resource').some(({ name }) => name.includes('/selections/active/'))";
         page.wait_for("the choice", asked).await;
+    })
+    .await;
+}
+
+/// Asks the engine in the page, as the page does.
+async fn asked(page: &Browser, method: &str, path: &str, body: &str) -> Value {
+    let script = format!("import(new URL('engine.js', document.baseURI)).then((m) => m.ask('{method}', {path}{body}))");
+    page.evaluate_later(&script).await
+}
+
+/// Without runs there is the engine: whatever is asked is computed by the visitor, and nothing is asked of the host any more.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn without_runs_the_visitors_browser_computes() {
+    let folder = exported(&[]);
+    let size: u64 = files(folder.path()).iter().map(|(_, size)| size).sum();
+    assert!(size < MOST_BYTES, "{size} bytes: {:#?}", files(folder.path()));
+    assert!(!folder.path().join("runs").exists(), "nothing is recorded");
+    in_browser(&folder, "/demo/", |page, address| async move {
+        page.open(&format!("{address}?scenario=arm-12dof&seed=4711&learners=active,random&speed=20&stop=never")).await;
+        page.wait_for_state("step 1", "state.phase === 'ready' && state.step === '1'").await;
+        page.wait_for("the scene", "document.getElementById('cover').hidden").await;
+        let requests = "performance.getEntriesByType('resource').length";
+        let loaded = page.evaluate(requests).await;
+        page.press(ESCAPE).await;
+        page.press(SPACE).await;
+        page.wait_for_state("twelve steps", "Number(state.latest) >= 12").await;
+        page.press(SPACE).await;
+        let sessions = asked(&page, "GET", "'/v1/sessions'", "").await;
+        let session = &sessions["sessions"][0];
+        assert_eq!(session["description"]["seed"], 4711);
+        let of = |what: &str| format!("'/v1/sessions/{}{what}'", session["id"].as_str().expect("an id"));
+        let choice = asked(&page, "GET", &of("/learners/active/selection"), "").await;
+        assert!(choice["evaluations"].as_u64().is_some_and(|evaluations| evaluations >= 300), "{choice}");
+        let posture = format!(", {{ configuration: {:?} }}", [0.1; 12]);
+        let appraised = asked(&page, "POST", &of("/learners/active/evaluations"), &posture).await;
+        assert!(appraised["gain"].is_number(), "{appraised}");
+        assert_eq!(page.evaluate(requests).await, loaded, "nothing was fetched");
+
+        // Another scenario, whose seed nobody has recorded, by its address alone.
+        page.open(&format!("{address}?scenario=head-fov&seed=77")).await;
+        page.wait_for_state("another run", "state.phase === 'ready' && state.step === '1'").await;
+        let sessions = asked(&page, "GET", "'/v1/sessions'", "").await;
+        assert_eq!(sessions["sessions"][0]["description"]["scenario"], "head-fov");
     })
     .await;
 }

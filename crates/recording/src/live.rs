@@ -310,7 +310,7 @@ fn in_few(parts: &[Bytes]) -> impl Iterator<Item = &[Bytes]> {
     })
 }
 
-fn encode(message: &LogMsg) -> Result<Bytes, RecordingError> {
+pub(super) fn encode(message: &LogMsg) -> Result<Bytes, RecordingError> {
     let mut bytes = Vec::new();
     message.to_transport(EncodingOptions::PROTOBUF_COMPRESSED.compression)?.to_rrd_bytes(&mut bytes)?;
     // Parts stay as long as their session: without the room that a growing vector has to spare.
