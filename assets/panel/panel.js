@@ -14,6 +14,10 @@ export class PanelHandle {
     }
     /**
      * Does what was done to an element, told as JSON.
+     *
+     * # Errors
+     *
+     * The reason, as a string, if the JSON is no act that the panel knows.
      * @param {string} act
      */
     act(act) {
@@ -83,6 +87,10 @@ export class PanelHandle {
     }
     /**
      * Takes in an event, as JSON. What the panel does not know is refused with a reason.
+     *
+     * # Errors
+     *
+     * The reason, as a string, if the JSON is no event that the panel knows.
      * @param {string} event
      */
     receive(event) {
@@ -101,6 +109,10 @@ export class PanelHandle {
     }
     /**
      * Draws on a canvas from now on; sparingly where that is slow.
+     *
+     * # Errors
+     *
+     * A JavaScript value that says why the canvas cannot be drawn on.
      * @param {HTMLCanvasElement} canvas
      * @param {Function} command
      * @param {boolean} slow
@@ -640,6 +652,9 @@ function __wbg_get_imports() {
             getDataViewMemory0().setInt32((arg0 >>> 0) + 4 * 1, len1, true);
             getDataViewMemory0().setInt32((arg0 >>> 0) + 4 * 0, ptr1, true);
         }, arguments); },
+        __wbg_getRandomValues_5d8c030b527203a6: function() { return handleError(function (arg0, arg1) {
+            globalThis.crypto.getRandomValues(getArrayU8FromWasm0(arg0, arg1));
+        }, arguments); },
         __wbg_getRootNode_6de097189559981d: function(arg0) {
             const ret = arg0.getRootNode();
             return ret;
@@ -1013,7 +1028,7 @@ function __wbg_get_imports() {
                     const a = state0.a;
                     state0.a = 0;
                     try {
-                        return wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined_______true_(a, state0.b, arg0, arg1);
+                        return wasm_bindgen_505cb65460296365___convert__closures_____invoke___js_sys_bcf4215125a288___Function_fn_wasm_bindgen_505cb65460296365___JsValue_____wasm_bindgen_505cb65460296365___sys__Undefined___js_sys_bcf4215125a288___Function_fn_wasm_bindgen_505cb65460296365___JsValue_____wasm_bindgen_505cb65460296365___sys__Undefined_______true_(a, state0.b, arg0, arg1);
                     } finally {
                         state0.a = a;
                     }
@@ -1383,23 +1398,23 @@ function __wbg_get_imports() {
             return ret;
         },
         __wbindgen_generic_0000000000000001: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 875, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___wasm_bindgen_a6f65211bf6a5470___JsValue__core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsError___true_);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 883, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_505cb65460296365___convert__closures_____invoke___wasm_bindgen_505cb65460296365___JsValue__core_d64945a8f0161d4d___result__Result_____wasm_bindgen_505cb65460296365___JsError___true_);
             return ret;
         },
         __wbindgen_generic_0000000000000002: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 395, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true_);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 361, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_505cb65460296365___convert__closures_____invoke___js_sys_bcf4215125a288___Array______true_);
             return ret;
         },
         __wbindgen_generic_0000000000000003: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 395, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true__12);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 361, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_505cb65460296365___convert__closures_____invoke___js_sys_bcf4215125a288___Array______true__12);
             return ret;
         },
         __wbindgen_generic_0000000000000004: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 398, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsValue___true_);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 360, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_505cb65460296365___convert__closures_____invoke___core_d64945a8f0161d4d___result__Result_____wasm_bindgen_505cb65460296365___JsValue___true_);
             return ret;
         },
         __wbindgen_generic_0000000000000005: function(arg0, arg1) {
@@ -1457,30 +1472,30 @@ function __wbg_get_imports() {
     };
 }
 
-function wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsValue___true_(arg0, arg1) {
-    const ret = wasm.wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsValue___true_(arg0, arg1);
+function wasm_bindgen_505cb65460296365___convert__closures_____invoke___core_d64945a8f0161d4d___result__Result_____wasm_bindgen_505cb65460296365___JsValue___true_(arg0, arg1) {
+    const ret = wasm.wasm_bindgen_505cb65460296365___convert__closures_____invoke___core_d64945a8f0161d4d___result__Result_____wasm_bindgen_505cb65460296365___JsValue___true_(arg0, arg1);
     if (ret[1]) {
         throw takeFromExternrefTable0(ret[0]);
     }
 }
 
-function wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true_(arg0, arg1, arg2) {
-    wasm.wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true_(arg0, arg1, arg2);
+function wasm_bindgen_505cb65460296365___convert__closures_____invoke___js_sys_bcf4215125a288___Array______true_(arg0, arg1, arg2) {
+    wasm.wasm_bindgen_505cb65460296365___convert__closures_____invoke___js_sys_bcf4215125a288___Array______true_(arg0, arg1, arg2);
 }
 
-function wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true__12(arg0, arg1, arg2) {
-    wasm.wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Array______true__12(arg0, arg1, arg2);
+function wasm_bindgen_505cb65460296365___convert__closures_____invoke___js_sys_bcf4215125a288___Array______true__12(arg0, arg1, arg2) {
+    wasm.wasm_bindgen_505cb65460296365___convert__closures_____invoke___js_sys_bcf4215125a288___Array______true__12(arg0, arg1, arg2);
 }
 
-function wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___wasm_bindgen_a6f65211bf6a5470___JsValue__core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsError___true_(arg0, arg1, arg2) {
-    const ret = wasm.wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___wasm_bindgen_a6f65211bf6a5470___JsValue__core_61682fbea50a882c___result__Result_____wasm_bindgen_a6f65211bf6a5470___JsError___true_(arg0, arg1, arg2);
+function wasm_bindgen_505cb65460296365___convert__closures_____invoke___wasm_bindgen_505cb65460296365___JsValue__core_d64945a8f0161d4d___result__Result_____wasm_bindgen_505cb65460296365___JsError___true_(arg0, arg1, arg2) {
+    const ret = wasm.wasm_bindgen_505cb65460296365___convert__closures_____invoke___wasm_bindgen_505cb65460296365___JsValue__core_d64945a8f0161d4d___result__Result_____wasm_bindgen_505cb65460296365___JsError___true_(arg0, arg1, arg2);
     if (ret[1]) {
         throw takeFromExternrefTable0(ret[0]);
     }
 }
 
-function wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined_______true_(arg0, arg1, arg2, arg3) {
-    wasm.wasm_bindgen_a6f65211bf6a5470___convert__closures_____invoke___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined___js_sys_83a5bdd881aaa944___Function_fn_wasm_bindgen_a6f65211bf6a5470___JsValue_____wasm_bindgen_a6f65211bf6a5470___sys__Undefined_______true_(arg0, arg1, arg2, arg3);
+function wasm_bindgen_505cb65460296365___convert__closures_____invoke___js_sys_bcf4215125a288___Function_fn_wasm_bindgen_505cb65460296365___JsValue_____wasm_bindgen_505cb65460296365___sys__Undefined___js_sys_bcf4215125a288___Function_fn_wasm_bindgen_505cb65460296365___JsValue_____wasm_bindgen_505cb65460296365___sys__Undefined_______true_(arg0, arg1, arg2, arg3) {
+    wasm.wasm_bindgen_505cb65460296365___convert__closures_____invoke___js_sys_bcf4215125a288___Function_fn_wasm_bindgen_505cb65460296365___JsValue_____wasm_bindgen_505cb65460296365___sys__Undefined___js_sys_bcf4215125a288___Function_fn_wasm_bindgen_505cb65460296365___JsValue_____wasm_bindgen_505cb65460296365___sys__Undefined_______true_(arg0, arg1, arg2, arg3);
 }
 
 

@@ -22,6 +22,8 @@ use std::{
 use flate2::{Compression, write::GzEncoder};
 use wasm_bindgen_cli_support::Bindgen;
 
+/// How it is compiled: see Cargo.toml.
+const PROFILE: &str = "web";
 const TARGET: &str = "wasm32-unknown-unknown";
 /// Wide registers, and random numbers from the browser.
 const FLAGS: &str = "-C target-feature=+simd128 --cfg getrandom_backend=\"wasm_js\"";
@@ -71,19 +73,19 @@ const BUNDLES: [(&str, &str, &str, usize); 2] = [
 fn build(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
     let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target/panel"), PathBuf::from);
     compile(workspace, &target)?;
-    let release = target.join(TARGET).join("release");
+    let made = target.join(TARGET).join(PROFILE);
     let mut said = Vec::new();
     for (_, module, name, most) in BUNDLES {
-        let made = target.join("bindgen");
+        let bound = target.join("bindgen");
         // No wasm-opt: names removed, it saves nothing once compressed, and Debian's (108) exports the wrong table.
         let mut bindgen = Bindgen::new();
         bindgen.web(true)?.typescript(false).remove_name_section(true).remove_producers_section(true);
-        bindgen.input_path(release.join(module)).out_name(name).generate(&made)?;
-        let wasm = fs::read(made.join(format!("{name}_bg.wasm")))?;
+        bindgen.input_path(made.join(module)).out_name(name).generate(&bound)?;
+        let wasm = fs::read(bound.join(format!("{name}_bg.wasm")))?;
         let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
         encoder.write_all(&wasm)?;
         let compressed = encoder.finish()?;
-        let script = fs::read(made.join(format!("{name}.js")))?;
+        let script = fs::read(bound.join(format!("{name}.js")))?;
         let size = compressed.len() + script.len();
         if size > most {
             return Err(format!("the bundle `{name}` weighs {size} bytes, more than {most}").into());
@@ -95,7 +97,7 @@ fn build(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
         let (wasm, compressed) = (wasm.len(), compressed.len());
         said.push(format!("{}: {wasm} bytes of WebAssembly, {compressed} compressed", folder.display()));
     }
-    let modules = BUNDLES.map(|(_, module, ..)| release.join(module).with_extension("d"));
+    let modules = BUNDLES.map(|(_, module, ..)| made.join(module).with_extension("d"));
     fs::write(folder.join("sources.txt"), stamp::sources(workspace, &modules)?)?;
     fs::write(folder.join("stamp.txt"), stamp::of_sources(workspace, folder)?)?;
     Ok(said.join("\n"))
@@ -118,10 +120,7 @@ fn compile(workspace: &Path, target: &Path) -> Result<(), Box<dyn Error>> {
     }
     cargo
         .current_dir(workspace)
-        // All at once: what nobody calls is left out across crates.
-        .env("CARGO_PROFILE_RELEASE_LTO", "fat")
-        .env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "1")
-        .args(["build", "--locked", "--release", "--target", TARGET])
+        .args(["build", "--locked", "--profile", PROFILE, "--target", TARGET])
         .args(BUNDLES.iter().flat_map(|(package, ..)| ["--package", package]))
         .arg("--target-dir")
         .arg(target);
