@@ -247,7 +247,7 @@ fn bad_input_exits_with_two_and_says_what_to_do() {
     let measured = folder.path().join("measured.toml");
     std::fs::write(&measured, include_str!("../scenarios/tiago-mocap.toml")).expect("written");
     let (binary, measured) = (binary.to_str().expect("a plain path"), measured.to_str().expect("a plain path"));
-    let cases: [(&[&str], &[&str]); 20] = [
+    let cases: [(&[&str], &[&str]); 19] = [
         (&["check", file], &["bad.toml:", "`sensor.sigma`", "`sigma_m`"]),
         (&["run", "arm-6dofx"], &["did you mean `arm-6dof`"]),
         (&["run", "no/such.toml"], &["no/such.toml"]),

@@ -41,7 +41,16 @@ fn timeless(bytes: &[u8]) -> String {
             strip(&mut value);
             value.to_string()
         }
-        Err(_) => String::from_utf8_lossy(bytes).into_owned(),
+        // A table: without the column of times.
+        Err(_) => {
+            let text = String::from_utf8_lossy(bytes);
+            let time = text.lines().next().and_then(|head| head.split(',').position(|name| name == "selection_ms"));
+            let kept = |line: &str| {
+                let cells = line.split(',').enumerate().filter(|(index, _)| Some(*index) != time);
+                cells.map(|(_, cell)| cell).collect::<Vec<_>>().join(",")
+            };
+            text.lines().map(kept).collect::<Vec<_>>().join("\n")
+        }
     }
 }
 
