@@ -1,4 +1,4 @@
-//! The best designs of the engine's [`design`](body_schema_engine::design), as they are told.
+//! The best designs of the engine's module `design`, as they are told.
 
 use serde::{Deserialize, Serialize};
 
