@@ -128,7 +128,7 @@ async fn a_folder_that_vanishes_takes_no_observation_with_it() {
     assert_eq!(tell(0).await.status(), StatusCode::CREATED);
     fs::rename(&data, folder.path().join("elsewhere")).expect("moved");
     let refused = problem(tell(1).await, 507, None).await;
-    assert!(refused["detail"].as_str().expect("text").contains("not there any more"), "{refused}");
+    assert!(refused["detail"].as_str().expect("text").contains("has disappeared"), "{refused}");
     problem(program.api.post("/v1/sessions", robot::opening()).await, 507, None).await;
     // A session whose recording would be kept there cannot begin; what needs no disk goes on.
     problem(program.api.post("/v1/sessions", json!({ "scenario": "arm-6dof" })).await, 500, None).await;

@@ -18,7 +18,11 @@ async fn the_page_and_all_that_it_names_are_served() {
     assert!(policy.starts_with("default-src 'none'") && !policy.contains("unsafe-inline") && !policy.contains("http"));
     let page = page.text().await.expect("text");
     let addresses: Vec<&str> = page.split('"').filter(|text| text.starts_with('/') && text.contains("?v=")).collect();
-    assert_eq!(addresses.len(), 7, "style, script, icon, script and wasm of panel and viewer: {addresses:?}");
+    assert_eq!(
+        addresses.len(),
+        10,
+        "style, script, icon, worker, script and wasm of panel, viewer and engine: {addresses:?}"
+    );
     for address in addresses {
         let file = server.get(address).await;
         assert_eq!(file.status(), StatusCode::OK, "{address}");
